@@ -1,0 +1,55 @@
+"""How benchmarks measure: interleaved runs, medians, and ratios within one process."""
+
+import statistics
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+
+class Row(NamedTuple):
+    """One figure of a benchmark."""
+
+    name: str
+    value: float
+    unit: str
+    aim: str = ""  # what the project aims for, such as "<= 0.15"; empty: reported only
+    note: str = ""
+
+    @property
+    def meets_aim(self) -> bool | None:
+        """Whether the value meets the aim; None without one."""
+        if not self.aim:
+            return None
+        sign, bound = self.aim.split()
+        return self.value <= float(bound) if sign == "<=" else self.value >= float(bound)
+
+
+class Ratio(NamedTuple):
+    """Time of A over time of B, pair by pair."""
+
+    median: float
+    low: float
+    high: float
+    seconds_a: float  # median
+    seconds_b: float
+
+
+def seconds(function: Callable[[], object], repeats: int = 5) -> float:
+    """Return the median wall time of `function` after one warm-up call, s."""
+    function()
+    return statistics.median(_time(function) for _ in range(repeats))
+
+
+def ratio(a: Callable[[], object], b: Callable[[], object], repeats: int = 7) -> Ratio:
+    """Time A and B in turn, A B A B ..., after one warm-up call of each."""
+    a(), b()
+    pairs = [(_time(a), _time(b)) for _ in range(repeats)]
+    quotients = sorted(x / y for x, y in pairs)
+    return Ratio(statistics.median(quotients), quotients[0], quotients[-1],
+                 statistics.median(x for x, _ in pairs), statistics.median(y for _, y in pairs))
+
+
+def _time(function: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    function()
+    return time.perf_counter() - started

@@ -1,0 +1,168 @@
+"""Every Numba option of the project, and where compiled kernels are kept.
+
+Kernels are compiled with strict IEEE arithmetic: no fastmath, no contraction of multiply and add, division by zero
+gives infinity instead of a branch. That costs little when pixels are the SIMD lanes, and it makes results equal to
+the bit for every thread count and on every machine with the same arithmetic.
+
+Numba keys its disk cache by the source file of a kernel alone, so a change in an *imported* kernel leaves a stale
+caller behind. Here each kernel's cache folder is keyed by its module's source **and the sources of every refgi
+module it imports, directly or not**, together with the versions of numba, llvmlite and NumPy and the CPU's features.
+A cache file that cannot be read is dropped and rebuilt.
+"""
+
+import ast
+import hashlib
+import importlib.util
+import os
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, overload
+
+import llvmlite
+import llvmlite.binding
+import numba
+import numpy as np
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+prange = numba.prange
+
+
+def cache_root() -> Path:
+    """Return the folder of all compiled kernels: `REFGI_CACHE_DIR`, else the platform's cache folder."""
+    if named := os.environ.get("REFGI_CACHE_DIR"):
+        return Path(named)
+    base = os.environ.get("LOCALAPPDATA") if platform.system() == "Windows" else os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "refgi"
+
+
+@overload
+def kernel(function: Callable[P, R], /) -> Callable[P, R]: ...
+@overload
+def kernel(*, parallel: bool = ...) -> Callable[[Callable[P, R]], Callable[P, R]]: ...
+
+
+def kernel(function: Callable[..., Any] | None = None, /, *, parallel: bool = False) -> Any:
+    """Compile a function on arrays with the project's one set of Numba options.
+
+    Parameters
+    ----------
+    function : callable
+        The function; absent when options are given.
+    parallel : bool
+        Run its `prange` loops on all threads. Each output element must be owned by one iteration.
+
+    Returns
+    -------
+    callable
+        The compiled function, with the signature of `function`.
+    """
+
+    def compile_later(plain: Callable[P, R]) -> Callable[P, R]:
+        with _cache_folder(plain.__module__):
+            compiled = numba.njit(
+                cache=True, fastmath=False, error_model="numpy", nogil=True, parallel=parallel, boundscheck=None
+            )(plain)
+        _mend_when_damaged(compiled)
+        return compiled
+
+    return compile_later if function is None else compile_later(function)
+
+
+@contextmanager
+def threads(count: int | None) -> Iterator[None]:
+    """Run parallel kernels on `count` threads inside the block (None: leave as is).
+
+    Parameters
+    ----------
+    count : int or None
+        Threads, 1 to the number Numba started with.
+    """
+    before = numba.get_num_threads()
+    try:
+        if count is not None:
+            numba.set_num_threads(count)
+        yield
+    finally:
+        numba.set_num_threads(before)
+
+
+@contextmanager
+def _cache_folder(module: str) -> Iterator[None]:
+    config: Any = numba.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_root() / _key(module))
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
+
+
+@cache
+def _key(module: str) -> str:
+    digest = hashlib.sha256(_platform_key().encode())
+    for name in sorted(_sources_of(module)):
+        path = _source_path(name)
+        digest.update(name.encode() + b"\0" + (path.read_bytes() if path else b""))
+    return f"{module.rpartition('.')[2]}-{digest.hexdigest()[:16]}"
+
+
+@cache
+def _platform_key() -> str:
+    features = llvmlite.binding.get_host_cpu_features().flatten()
+    bounds = os.environ.get("NUMBA_BOUNDSCHECK", "")
+    return f"{numba.__version__} {llvmlite.__version__} {np.__version__} {features} {bounds}"
+
+
+@cache
+def _source_path(module: str) -> Path | None:
+    try:
+        spec = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        return None
+    return Path(spec.origin) if spec and spec.origin and spec.origin.endswith(".py") else None
+
+
+def _sources_of(module: str) -> set[str]:
+    """Return `module` and every module of its package that it imports, directly or not."""
+    found: set[str] = set()
+    pending = [module]
+    while pending:
+        name = pending.pop()
+        if name not in found:
+            found.add(name)
+            pending += _imports(name, module.partition(".")[0])
+    return found
+
+
+@cache
+def _imports(module: str, package: str) -> tuple[str, ...]:
+    path = _source_path(module)
+    if path is None:
+        return ()
+    names: list[str] = []
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return tuple(name for name in names if name.partition(".")[0] == package and _source_path(name))
+
+
+def _mend_when_damaged(compiled: Any) -> None:
+    """Make an unreadable cache file count as absent: Numba itself would fail on every later run."""
+    stored = compiled._cache
+    load = stored.load_overload
+
+    def load_or_drop(signature: Any, target: Any) -> Any:
+        try:
+            return load(signature, target)
+        except Exception:
+            stored.flush()
+            return None
+
+    stored.load_overload = load_or_drop

@@ -1,0 +1,211 @@
+"""@stage: the one decorator that names a step of a method, times it, records it and reuses it.
+
+A stage is a pure function. Called plainly it is just that function. Inside `observe()` each call leaves a `Run` in
+the log: what ran and for how long, what was reused because every input was the same object or an equal value, and,
+through `skip`, what was left out and why. Nothing else in refgi times, caches or logs.
+"""
+
+import dataclasses
+import functools
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, Literal, ParamSpec, TypeVar
+
+import numpy as np
+
+P = ParamSpec("P")
+R = TypeVar("R")
+Status = Literal["ran", "reused", "skipped"]
+
+KEPT_RESULTS = 8  # per stage: one per light of a scene with several, without hoarding buffers
+SMALL_ARRAY = 4096  # elements up to which two distinct arrays are compared by value
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """One line of the log."""
+
+    name: str
+    status: Status
+    seconds: float = 0.0  # including the stages called inside
+    depth: int = 0  # how many stages enclose it
+    reason: str = ""
+    inputs: Mapping[str, Any] | None = None  # kept only when recording
+    output: Any = None
+
+
+@dataclasses.dataclass
+class Log:
+    """What happened inside one `observe()` block."""
+
+    runs: list[Run] = dataclasses.field(default_factory=list)
+    record: bool = False
+    memory: "Memory | None" = None
+    progress: Callable[[str, float], None] | None = None
+    _depth: int = 0
+    _open: list[str] = dataclasses.field(default_factory=list)
+
+    def seconds(self, name: str) -> float:
+        """Return the total time of all runs of the stage `name`, s."""
+        return sum(run.seconds for run in self.runs if run.name == name)
+
+    def status(self, name: str) -> list[Status]:
+        """Return what happened to each call of the stage `name`, in order."""
+        return [run.status for run in self.runs if run.name == name]
+
+
+class Memory:
+    """Last results of every stage, given back while the inputs stay the same."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, list[tuple[tuple[Any, ...], Any]]] = defaultdict(list)
+
+    def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
+        """Return whether a result for these inputs is kept, and the result."""
+        for known, output in self._kept[name]:
+            if len(known) == len(inputs) and all(map(_same, known, inputs)):
+                return True, output
+        return False, None
+
+    def keep(self, name: str, inputs: tuple[Any, ...], output: Any) -> None:
+        """Keep a result, dropping the oldest of that stage."""
+        kept = self._kept[name]
+        kept.append((inputs, output))
+        del kept[:-KEPT_RESULTS]
+
+
+_log: ContextVar[Log | None] = ContextVar("refgi_stage_log", default=None)
+
+
+def stage(name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Name a pure function as one step of a method.
+
+    Parameters
+    ----------
+    name : str
+        The step's name in logs and test vectors, such as ``"splat.irradiance"``.
+
+    Returns
+    -------
+    callable
+        The decorator; the decorated function behaves as before.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            log = _log.get()
+            if log is None:
+                return function(*args, **kwargs)
+            return _observed(log, name, function, args, kwargs)
+
+        call.stage_name = name  # type: ignore[attr-defined]
+        return call
+
+    return decorate
+
+
+@contextmanager
+def observe(
+    *, record: bool = False, memory: Memory | None = None, progress: Callable[[str, float], None] | None = None
+) -> Iterator[Log]:
+    """Log every stage that runs inside the block.
+
+    Parameters
+    ----------
+    record : bool
+        Keep inputs and outputs of each run.
+    memory : Memory, optional
+        Reuse results kept there by this and earlier blocks.
+    progress : callable, optional
+        Called with (stage name, fraction done) as long stages advance.
+
+    Yields
+    ------
+    Log
+        Filled while the block runs.
+    """
+    log = Log(record=record, memory=memory, progress=progress)
+    token = _log.set(log)
+    try:
+        yield log
+    finally:
+        _log.reset(token)
+
+
+def skip(name: str, reason: str) -> None:
+    """Note in the log that a stage was left out and why.
+
+    Parameters
+    ----------
+    name : str
+        The stage that does not run.
+    reason : str
+        Why the scene at hand does not need it.
+    """
+    if (log := _log.get()) is not None:
+        log.runs.append(Run(name, "skipped", reason=reason, depth=log._depth))
+
+
+def report_progress(fraction: float) -> None:
+    """Tell whoever observes how far the running stage is.
+
+    Parameters
+    ----------
+    fraction : float
+        Share of the stage's work that is done, 0 to 1.
+    """
+    log = _log.get()
+    if log is not None and log.progress is not None and log._open:
+        log.progress(log._open[-1], fraction)
+
+
+def _observed(
+    log: Log, name: str, function: Callable[..., R], args: tuple[Any, ...], kwargs: dict[str, Any]
+) -> R:
+    inputs = (*args, *(item for pair in sorted(kwargs.items()) for item in pair))
+    if log.memory is not None:
+        known, output = log.memory.recall(name, inputs)
+        if known:
+            log.runs.append(Run(name, "reused", depth=log._depth, reason="inputs unchanged"))
+            return output  # type: ignore[no-any-return]
+    position = len(log.runs)
+    log._depth += 1
+    log._open.append(name)
+    if log.progress is not None:
+        log.progress(name, 0.0)
+    started = time.perf_counter()
+    try:
+        output = function(*args, **kwargs)
+    finally:
+        seconds = time.perf_counter() - started
+        log._depth -= 1
+        log._open.pop()
+    if log.progress is not None:
+        log.progress(name, 1.0)
+    named = {str(k): v for k, v in (*enumerate(args), *kwargs.items())} if log.record else None
+    run = Run(name, "ran", seconds, log._depth, inputs=named, output=output if log.record else None)
+    log.runs.insert(position, run)
+    if log.memory is not None:
+        log.memory.keep(name, inputs, output)
+    return output
+
+
+def _same(a: Any, b: Any) -> bool:
+    if a is b:
+        return True
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, np.ndarray):
+        return a.shape == b.shape and a.dtype == b.dtype and a.size <= SMALL_ARRAY and bool(np.array_equal(a, b))
+    if isinstance(a, list | tuple):
+        return len(a) == len(b) and all(map(_same, a, b))
+    if dataclasses.is_dataclass(a):
+        return all(_same(getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(a))
+    try:
+        return bool(a == b)
+    except (TypeError, ValueError):
+        return False

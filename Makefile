@@ -1,0 +1,49 @@
+# One-word targets; each makes what it needs. PYTHON may name another interpreter (3.11 or newer).
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test test-all check evidence bench docs clean
+
+demo: $(VENV)/run.stamp
+	$(BIN)/refgi compare cornell_box --out out/
+	@echo "open out/index.html"
+
+test: $(VENV)/dev.stamp
+	$(BIN)/python -m pytest
+
+test-all: $(VENV)/dev.stamp
+	$(BIN)/python -m pytest --all
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest tests/rsm tests/splat
+	NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest tests/rsm tests/splat tests/truth
+
+check: $(VENV)/dev.stamp
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m numpydoc.hooks.validate_docstrings $$(git ls-files 'refgi/*.py')
+
+evidence: $(VENV)/dev.stamp
+	$(BIN)/python -m pytest tests -m feature --evidence -q
+
+bench: $(VENV)/dev.stamp
+	$(BIN)/python -m benchmarks --out out/bench
+
+docs: $(VENV)/dev.stamp
+	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+	@echo "open docs/_build/html/index.html"
+
+clean:
+	rm -rf $(VENV) out docs/_build
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "refgi needs Python 3.11 or newer")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/run.stamp: $(VENV)/bin/python pyproject.toml
+	$(BIN)/pip install --quiet -e .
+	touch $@
+
+$(VENV)/dev.stamp: $(VENV)/bin/python pyproject.toml
+	$(BIN)/pip install --quiet -e '.[dev]'
+	touch $@ $(VENV)/run.stamp

@@ -1,0 +1,66 @@
+"""Run the benchmarks: `python -m benchmarks [--quick] [--out DIR] [topic ...]`.
+
+Every figure is a ratio within one run, or reported without an aim. Results: a table here, results.json in --out.
+"""
+
+import argparse
+import importlib
+import json
+import platform
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.harness import Row
+
+FOLDER = Path(__file__).parent
+NOT_TOPICS = {"__init__", "__main__", "harness"}
+
+
+def topics() -> list[str]:
+    return sorted(path.stem for path in FOLDER.glob("*.py") if path.stem not in NOT_TOPICS)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("topics", nargs="*", metavar="topic", help=f"of {', '.join(topics())}; all if none")
+    parser.add_argument("--quick", action="store_true", help="smaller sizes, fewer repeats")
+    parser.add_argument("--out", type=Path, help="folder for results.json")
+    options = parser.parse_args()
+    if unknown := set(options.topics) - set(topics()):
+        parser.error(f"no benchmark named {', '.join(sorted(unknown))}; there are {', '.join(topics())}")
+    console = Console()
+    results: dict[str, list[Row]] = {}
+    for topic in options.topics or topics():
+        module = importlib.import_module(f"benchmarks.{topic}")
+        console.print(f"[bold]{topic}[/bold]  {(module.__doc__ or '').splitlines()[0]}")
+        results[topic] = list(module.rows(options.quick))
+        console.print(_table(results[topic]))
+    if options.out:
+        _write(options.out, results)
+        console.print(f"written: {options.out / 'results.json'}")
+    return 0
+
+
+def _table(rows: list[Row]) -> Table:
+    table = Table("what", "value", "unit", "aim", "", "note", box=None)
+    for row in rows:
+        verdict = {None: "", True: "[green]met[/green]", False: "[red]short[/red]"}[row.meets_aim]
+        table.add_row(row.name, f"{row.value:.4g}", row.unit, row.aim, verdict, row.note)
+    return table
+
+
+def _write(folder: Path, results: dict[str, list[Row]]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    machine = {"python": platform.python_version(), "numba": numba.__version__, "numpy": np.__version__,
+               "machine": platform.machine(), "threads": numba.get_num_threads()}
+    rows = {topic: [row._asdict() | {"meets_aim": row.meets_aim} for row in found] for topic, found in results.items()}
+    (folder / "results.json").write_text(json.dumps({"machine": machine, "results": rows}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

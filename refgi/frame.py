@@ -1,0 +1,169 @@
+"""A scene seen and lit once: its buffers are computed when first asked for, then kept.
+
+A `Frame` computes nothing on construction. A method that works in screen space alone never causes an RSM, a question
+about the light never causes a G-buffer, and Embree is loaded only when rays are traced. Every buffer comes from a
+stage, so frames of an animation share what did not change when they run under one `stages.Memory`.
+"""
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.scene.model import LightTable, MaterialTable, Scene, light_table, material_table
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.rays import Tracer
+    from refgi.rsm import GBuffer, Rsm
+
+Array = npt.NDArray[Any]
+Shadows = Literal["map", "exact"]
+
+
+class Frame:
+    """One view of one scene under its lights.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is seen.
+    width, height : int, optional
+        Picture size in pixels; the camera's own where absent.
+    dtype : dtype
+        float32 (default) or float64 (the oracle) for every buffer and kernel.
+    rsm_resolution : int
+        Texels along one side of a reflective shadow map (of one face of a cube).
+    shadows : {"map", "exact"}
+        Direct light's shadows: from the RSM's depth as published, or by rays.
+
+    Raises
+    ------
+    InputError
+        If a size, type or name is not usable, or the scene has nothing to see.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        width: int | None = None,
+        height: int | None = None,
+        dtype: npt.DTypeLike = np.float32,
+        rsm_resolution: int = 512,
+        shadows: Shadows = "map",
+    ) -> None:
+        self.scene = scene
+        self.width = scene.camera.width if width is None else width
+        self.height = scene.camera.height if height is None else height
+        self.dtype = np.dtype(dtype)
+        self.rsm_resolution = rsm_resolution
+        self.shadows = shadows
+        for key in ("width", "height"):
+            expect(1 <= getattr(self, key) <= 65536, key, "1 to 65536 pixels", getattr(self, key))
+        expect(self.dtype in (np.float32, np.float64), "dtype", "float32 or float64", self.dtype.name)
+        expect(1 <= rsm_resolution <= 16384, "rsm_resolution", "1 to 16384 texels", rsm_resolution)
+        expect(shadows in ("map", "exact"), "shadows", "'map' or 'exact'", shadows)
+        expect(scene.face_count > 0, f"scene {scene.name!r}", "at least one triangle", "none")
+        expect(len(scene.lights) > 0, f"scene {scene.name!r}", "at least one light", "none")
+
+    @cached_property
+    def materials(self) -> MaterialTable:
+        """The scene's materials as arrays."""
+        return material_table(self.scene.materials, self.dtype)
+
+    @cached_property
+    def lights(self) -> LightTable:
+        """The scene's lights as arrays."""
+        return light_table(self.scene.lights, self.dtype)
+
+    @cached_property
+    def gbuffer(self) -> "GBuffer":
+        """What the camera sees; its channels are resolved when first asked for."""
+        from refgi.rsm import gbuffer
+
+        camera = self.scene.camera
+        return gbuffer(self.scene.geometry, self.materials, camera, self.width, self.height, self.dtype)
+
+    @cached_property
+    def rsms(self) -> "tuple[Rsm, ...]":
+        """What each light sees, one reflective shadow map a light."""
+        from refgi.rsm import reflective_shadow_map
+
+        return tuple(
+            reflective_shadow_map(self.scene.geometry, self.materials, light, self.rsm_resolution, self.dtype)
+            for light in self.scene.lights
+        )
+
+    @cached_property
+    def tracer(self) -> "Tracer":
+        """The scene's triangles, ready for rays."""
+        return _tracer(self.scene.geometry)
+
+    @cached_property
+    def direct(self) -> Array:
+        """Direct irradiance of all lights with shadows, (3, h, w), W/m^2."""
+        from refgi.rsm import direct_irradiance
+
+        total = np.zeros((3, self.height, self.width), self.dtype)
+        for index, light in enumerate(self.scene.lights):
+            total += direct_irradiance(self.gbuffer, light, self._visible_from_light(index))
+        return total
+
+    def radiance(self, indirect: Array | None = None) -> Array:
+        """Return what the camera receives: emission + albedo/pi (direct + indirect).
+
+        Parameters
+        ----------
+        indirect : (3, h, w) ndarray, optional
+            Indirect irradiance, W/m^2; none where absent.
+
+        Returns
+        -------
+        (3, h, w) ndarray
+            Radiance, W/m^2/sr, linear RGB. Receivers reflect by their diffuse part alone.
+        """
+        irradiance = self.direct if indirect is None else self.direct + indirect
+        return compose(irradiance, self.gbuffer, self.materials)
+
+    def _visible_from_light(self, index: int) -> Array:
+        buffer, light = self.gbuffer, self.scene.lights[index]
+        if self.shadows == "map":
+            from refgi.rsm import shadow_map_visibility
+
+            return shadow_map_visibility(buffer.position, buffer.normal, buffer.covered, self.rsms[index])
+        return self.tracer.visible_from_light(buffer.position, buffer.normal, buffer.covered, light)
+
+
+@stage("frame.compose")
+def compose(irradiance: Array, buffer: "GBuffer", materials: MaterialTable) -> Array:
+    """Turn irradiance into what the camera receives.
+
+    Parameters
+    ----------
+    irradiance : (3, h, w) ndarray
+        Direct and indirect irradiance, W/m^2.
+    buffer : GBuffer
+        What the camera sees.
+    materials : MaterialTable
+        The scene's materials; only their emission is used here.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Radiance, W/m^2/sr, linear RGB.
+    """
+    radiance: Array = irradiance * buffer.albedo / irradiance.dtype.type(np.pi)
+    if materials.emission.any():
+        # a pixel without surface has id -1, whose row is masked out
+        radiance += np.moveaxis(materials.emission[buffer.material_id], -1, 0) * buffer.covered
+    return radiance
+
+
+@stage("rays.build")
+def _tracer(geometry: Any) -> "Tracer":
+    from refgi.rays import Tracer
+
+    return Tracer(geometry)

@@ -1,0 +1,112 @@
+"""The table of methods. A new method is one package and one line here."""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy.typing as npt
+
+from refgi.errors import InputError
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+    from refgi.scene import Scene
+
+Array = npt.NDArray[Any]
+
+
+class Method(NamedTuple):
+    """A method by name; its code is imported when it is loaded."""
+
+    name: str
+    home: str  # module and function
+    settings: str  # name of the settings class in the same module
+    visibility: bool  # whether it knows what blocks indirect light
+    summary: str
+
+    def load(self) -> tuple[Callable[["Frame", Any], Array], type]:
+        """Return the method's function and its settings class."""
+        module, _, function = self.home.partition(":")
+        loaded = import_module(module)
+        return getattr(loaded, function), getattr(loaded, self.settings)
+
+
+METHODS = {
+    method.name: method
+    for method in (
+        Method("sii", "refgi.splat.sii:sii", "SiiSettings", False,
+               "Splatting Indirect Illumination (2006): every pixel light at every pixel"),
+        Method("gather", "refgi.splat.gather:gather", "GatherSettings", False,
+               "Reflective Shadow Maps (2005): gathering around the projected point"),
+        Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,
+               "the same pixel lights with ray-traced visibility"),
+        Method("truth", "refgi.truth.truth:truth", "TruthSettings", True,
+               "one-bounce path tracing with a standard error for every pixel"),
+    )
+}
+
+
+class Picture(NamedTuple):
+    """What a method made of a scene."""
+
+    frame: "Frame"
+    irradiance: Array  # (3, h, w) indirect, W/m^2
+    radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
+
+
+def find_method(name: str) -> Method:
+    """Return a method of the table.
+
+    Parameters
+    ----------
+    name : str
+        Its short name.
+
+    Returns
+    -------
+    Method
+        The table's row.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in METHODS:
+        raise InputError(f"method: expected one of {', '.join(METHODS)}, got {name!r}")
+    return METHODS[name]
+
+
+def render(scene: "Scene | str", method: str = "sii", settings: Any = None, **frame_options: Any) -> Picture:
+    """Render a scene by one method.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        A scene, or what `load_scene` takes.
+    method : str
+        A name of `METHODS`.
+    settings : object, optional
+        The method's settings; the paper's values where absent.
+    **frame_options : object
+        Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
+
+    Returns
+    -------
+    Picture
+        The frame, the indirect irradiance and the radiance.
+
+    Raises
+    ------
+    InputError
+        If scene, method or settings are not usable.
+    """
+    from refgi.frame import Frame
+    from refgi.scene import load_scene
+
+    function, settings_class = find_method(method).load()
+    if settings is not None and not isinstance(settings, settings_class):
+        raise InputError(f"settings: expected {settings_class.__name__}, got {type(settings).__name__}")
+    frame = Frame(load_scene(scene) if isinstance(scene, str) else scene, **frame_options)
+    irradiance = function(frame, settings_class() if settings is None else settings)
+    return Picture(frame, irradiance, frame.radiance(irradiance))

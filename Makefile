@@ -21,7 +21,7 @@ check: $(VENV)/dev.stamp
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m numpydoc.hooks.validate_docstrings $$(git ls-files 'refgi/*.py')
+	$(BIN)/numpydoc lint $$(git ls-files 'refgi/*.py')
 
 evidence: $(VENV)/dev.stamp
 	$(BIN)/python -m pytest tests -m feature --evidence -q

@@ -33,7 +33,7 @@ class Frame:
     width, height : int, optional
         Picture size in pixels; the camera's own where absent.
     dtype : dtype
-        float32 (default) or float64 (the oracle) for every buffer and kernel.
+        Float32 (default) or float64 (the oracle) for every buffer and kernel.
     rsm_resolution : int
         Texels along one side of a reflective shadow map (of one face of a cube).
     shadows : {"map", "exact"}

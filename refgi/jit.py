@@ -33,7 +33,13 @@ prange = numba.prange
 
 
 def cache_root() -> Path:
-    """Return the folder of all compiled kernels: `REFGI_CACHE_DIR`, else the platform's cache folder."""
+    """Return the folder of all compiled kernels.
+
+    Returns
+    -------
+    Path
+        `REFGI_CACHE_DIR`, else a folder of the platform's cache.
+    """
     if named := os.environ.get("REFGI_CACHE_DIR"):
         return Path(named)
     base = os.environ.get("LOCALAPPDATA") if platform.system() == "Windows" else os.environ.get("XDG_CACHE_HOME")

@@ -1,0 +1,91 @@
+"""Property tests of the kernel cache: it follows imported sources, and mends what is damaged."""
+
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from refgi import jit
+
+CALL = "import package_a.outer as o; print(o.outer(1.5), o.outer.stats.cache_hits.total())"
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    folder = tmp_path / "package_a"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    write_inner(folder, "x + 1.0")
+    (folder / "outer.py").write_text(textwrap.dedent("""\
+        from package_a.inner import inner
+        from refgi.jit import kernel
+
+        @kernel
+        def outer(x):
+            return 2.0 * inner(x)
+        """))
+    return folder
+
+
+def write_inner(folder: Path, expression: str) -> None:
+    (folder / "inner.py").write_text(
+        f"from refgi.jit import kernel\n\n@kernel\ndef inner(x):\n    return {expression}\n")
+
+
+def run(folder: Path) -> str:
+    call = CALL.replace("o.outer.stats.cache_hits.total()", "sum(o.outer.stats.cache_hits.values())")
+    environment = os.environ | {"REFGI_CACHE_DIR": str(folder.parent / "cache"), "PYTHONPATH": str(folder.parent)}
+    done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_a_changed_import_recompiles_the_caller(package):
+    assert run(package) == "5.0 0"
+    assert run(package) == "5.0 1"
+    write_inner(package, "x + 2.0")
+    assert run(package) == "7.0 0"
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", [b"", b"\x80\x05garbage"])
+def test_a_damaged_cache_is_dropped_and_rebuilt(package, suffix, damage):
+    run(package)
+    files = list((package.parent / "cache").rglob(f"outer.*.{suffix}"))
+    assert files
+    for file in files:
+        file.write_bytes(damage)
+    assert run(package) == "5.0 0"
+    assert run(package) == "5.0 1"
+
+
+def test_kernels_are_strict():
+    """Summing 1, 1e16, -1e16 in this order must lose the 1, and a*b - a*b must be exactly rounded twice."""
+
+    @jit.kernel
+    def total(values):
+        result = 0.0
+        for value in values:
+            result += value
+        return result
+
+    @jit.kernel
+    def difference(a, b, c):
+        return a * b - c
+
+    assert total(np.array([1.0, 1e16, -1e16])) == 0.0
+    a = 1 + 2.0**-30
+    assert difference(a, a, a * a) == 0.0  # a fused multiply-add would give 2**-60
+
+
+def test_threads_are_put_back():
+    import numba
+
+    before = numba.get_num_threads()
+    with jit.threads(1):
+        assert numba.get_num_threads() == 1
+    assert numba.get_num_threads() == before

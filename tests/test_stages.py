@@ -1,0 +1,121 @@
+"""Property tests of @stage: a stage is its function; observed, it is logged, reused and skipped with reasons."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from refgi import stages
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    count: int = 1
+    weights: tuple[float, ...] = (0.5, 0.5)
+
+
+@stages.stage("test.double")
+def double(values, options=Options()):
+    stages.report_progress(0.5)
+    return 2 * options.count * values
+
+
+@stages.stage("test.outer")
+def outer(values):
+    return double(values) + 1
+
+
+def test_a_stage_is_its_function():
+    assert double(3) == 6
+    assert double.stage_name == "test.double"
+
+
+def test_log_has_order_depth_and_time():
+    with stages.observe() as log:
+        outer(np.ones(3))
+    assert [(run.name, run.depth, run.status) for run in log.runs] == [
+        ("test.outer", 0, "ran"), ("test.double", 1, "ran")]
+    assert log.seconds("test.outer") >= log.seconds("test.double") > 0
+    assert all(run.inputs is None and run.output is None for run in log.runs)
+
+
+def test_recording_keeps_inputs_and_output():
+    values = np.arange(3.0)
+    with stages.observe(record=True) as log:
+        result = double(values, options=Options())
+    assert log.runs[0].inputs == {"0": values, "options": Options()}
+    assert log.runs[0].output is result
+
+
+def test_skip_is_logged_where_it_happens():
+    stages.skip("test.none", "nobody listens")
+    with stages.observe() as log:
+        stages.skip("test.lobes", "no glossy material")
+    assert (log.runs[0].status, log.runs[0].reason) == ("skipped", "no glossy material")
+
+
+def test_progress_names_the_stage():
+    seen = []
+    with stages.observe(progress=lambda name, fraction: seen.append((name, fraction))):
+        outer(1)
+    assert seen == [("test.outer", 0.0), ("test.double", 0.0), ("test.double", 0.5), ("test.double", 1.0),
+                    ("test.outer", 1.0)]
+
+
+BIG = np.zeros(stages.SMALL_ARRAY + 1)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "reused"),
+    [
+        ((BIG,), (BIG,), True),  # the same object
+        ((BIG,), (BIG.copy(),), False),  # a large copy is not compared element by element
+        ((np.ones(3),), (np.ones(3),), True),  # a small equal value
+        ((np.ones(3),), (np.zeros(3),), False),
+        ((np.ones(3),), (np.ones(3, np.float32),), False),  # equal values of another type give another result
+        ((np.ones(3), Options(2)), (np.ones(3), Options(2)), True),
+        ((np.ones(3), Options(2)), (np.ones(3), Options(3)), False),
+        ((1,), (1.0,), False),
+        ((True,), (1,), False),
+        ((float("nan"),), (float("nan"),), False),
+    ],
+)
+def test_results_are_reused_when_inputs_are_the_same(first, second, reused):
+    memory = stages.Memory()
+    with stages.observe(memory=memory):
+        one = double(*first)
+    with stages.observe(memory=memory) as log:
+        two = double(*second)
+    assert log.status("test.double") == ["reused" if reused else "ran"]
+    if isinstance(one, np.ndarray):
+        assert (one is two) == reused
+
+
+def test_reuse_gives_the_same_bits_as_a_fresh_run():
+    values = np.random.default_rng(1).random(10_000)
+    with stages.observe(memory=stages.Memory()):
+        first, second = outer(values), outer(values)
+    np.testing.assert_array_equal(second, outer(values))
+    assert second is first
+
+
+def test_memory_forgets_the_oldest():
+    memory = stages.Memory()
+    with stages.observe(memory=memory) as log:
+        for value in range(stages.KEPT_RESULTS + 1):
+            double(value)
+        double(0)
+        double(stages.KEPT_RESULTS)
+    assert log.status("test.double")[-2:] == ["ran", "reused"]
+
+
+def test_an_error_leaves_the_log_usable():
+    @stages.stage("test.fails")
+    def fails():
+        raise ValueError("no")
+
+    with stages.observe() as log:
+        with pytest.raises(ValueError, match="no"):
+            fails()
+        double(1)
+    assert [(run.name, run.depth) for run in log.runs] == [("test.double", 0)]

@@ -1,0 +1,240 @@
+"""Radiometry shared by every method, as scalar kernels: lights, solid angles, Phong lobes, local frames.
+
+All kernels take float32 or float64 scalars and keep the type. Angles enter as cosines, directions as unit vectors.
+Units: radiant intensity W/sr, irradiance W/m^2, solid angle sr. The equations are those of docs/radiometry; a lobe
+is cos^P around an axis, and K(th, P) is the part of its flux that leaves above a surface tilted by th.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from refgi.jit import kernel
+
+SPOT, POINT, DIRECTIONAL = 0, 1, 2  # LightTable.kind
+
+
+@kernel
+def spot_falloff(cos_angle: Any, cos_inner: Any, cos_outer: Any) -> Any:
+    """Return the share of a spot's on-axis intensity at an angle off its axis: t t (3 - 2 t).
+
+    Parameters
+    ----------
+    cos_angle : float
+        Cosine of the angle between the spot's axis and the direction away from it.
+    cos_inner, cos_outer : float
+        Cosines of the half-angles; full intensity inside the first, none outside the second.
+
+    Returns
+    -------
+    float
+        0 to 1.
+    """
+    real = type(cos_angle)
+    if cos_angle >= cos_inner:
+        return real(1.0)
+    if cos_angle <= cos_outer:
+        return real(0.0)
+    t = (cos_angle - cos_outer) / (cos_inner - cos_outer)
+    return real(t * t * (real(3.0) - t - t))
+
+
+@kernel
+def radiant_intensity(lights: Any, k: int, wx: Any, wy: Any, wz: Any) -> Any:
+    """Return the radiant intensity of a spot or point light in one direction.
+
+    Parameters
+    ----------
+    lights : LightTable
+        Lights in the dtype of the direction.
+    k : int
+        Which light.
+    wx, wy, wz : float
+        Unit vector away from the light.
+
+    Returns
+    -------
+    tuple of 3 floats
+        W/sr, linear RGB.
+    """
+    real = type(wx)
+    share = real(1.0)
+    if lights.kind[k] == SPOT:
+        axis = lights.direction
+        cos_angle = axis[k, 0] * wx + axis[k, 1] * wy + axis[k, 2] * wz
+        share = spot_falloff(cos_angle, lights.cos_inner[k], lights.cos_outer[k])
+    peak = lights.intensity
+    return peak[k, 0] * share, peak[k, 1] * share, peak[k, 2] * share
+
+
+@kernel
+def incident_light(lights: Any, k: int, x: Any, y: Any, z: Any) -> Any:
+    """Return where a light is seen from a point and the unshadowed irradiance it gives there: I(w) / d^2.
+
+    Parameters
+    ----------
+    lights : LightTable
+        Lights in the dtype of the point.
+    k : int
+        Which light.
+    x, y, z : float
+        The point, world space, m.
+
+    Returns
+    -------
+    tuple of 7 floats
+        Unit vector towards the light (3), distance to it (m; inf when directional), irradiance on a surface
+        perpendicular to that vector (W/m^2, RGB). All zero at the light itself.
+    """
+    real = type(x)
+    zero = real(0.0)
+    if lights.kind[k] == DIRECTIONAL:
+        axis, given = lights.direction, lights.intensity
+        return -axis[k, 0], -axis[k, 1], -axis[k, 2], real(np.inf), given[k, 0], given[k, 1], given[k, 2]
+    dx = lights.position[k, 0] - x
+    dy = lights.position[k, 1] - y
+    dz = lights.position[k, 2] - z
+    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if distance == zero:
+        return zero, zero, zero, zero, zero, zero, zero
+    wx, wy, wz = dx / distance, dy / distance, dz / distance
+    ir, ig, ib = radiant_intensity(lights, k, -wx, -wy, -wz)
+    falloff = real(1.0) / (distance * distance)
+    return wx, wy, wz, distance, ir * falloff, ig * falloff, ib * falloff
+
+
+@kernel
+def corner_solid_angle_perspective(x: Any, y: Any) -> Any:
+    """Return F(x, y) of a perspective image at z = 1: a rectangle spans F11 - F01 - F10 + F00.
+
+    Parameters
+    ----------
+    x, y : float
+        Corner on the plane z = 1.
+
+    Returns
+    -------
+    float
+        Solid angle of the rectangle from (0, 0) to (x, y), signed, sr.
+    """
+    real = type(x)
+    return math.atan2(x * y, math.sqrt(real(1.0) + x * x + y * y))
+
+
+@kernel
+def corner_solid_angle_paraboloid(u: Any, v: Any) -> Any:
+    """Return F(u, v) of a paraboloid image, (u, v) = (x, y) / (1 + z): a rectangle spans F11 - F01 - F10 + F00.
+
+    Parameters
+    ----------
+    u, v : float
+        Corner; the hemisphere is the unit disc, which texels must be masked to.
+
+    Returns
+    -------
+    float
+        Solid angle of the rectangle from (0, 0) to (u, v), signed, sr.
+    """
+    real = type(u)
+    su = math.sqrt(real(1.0) + u * u)
+    sv = math.sqrt(real(1.0) + v * v)
+    return real(2.0) * (v / sv * math.atan(u / sv) + u / su * math.atan(v / su))
+
+
+@kernel
+def orthonormal_basis(nx: Any, ny: Any, nz: Any) -> Any:
+    """Return two unit vectors that make a right-handed frame with a unit normal, without branches.
+
+    Parameters
+    ----------
+    nx, ny, nz : float
+        Unit normal.
+
+    Returns
+    -------
+    tuple of 6 floats
+        Tangent (3) and bitangent (3).
+
+    Notes
+    -----
+    The construction of Duff et al. 2017 (JCGT 6, 1): the sign of z moves the seam to z = 0.
+    """
+    real = type(nx)
+    sign = math.copysign(real(1.0), nz)
+    a = real(-1.0) / (sign + nz)
+    b = nx * ny * a
+    return real(1.0) + sign * nx * nx * a, sign * b, -sign * nx, b, sign + ny * ny * a, -ny
+
+
+@kernel
+def lobe_fraction(cos_theta: Any, exponent: Any) -> Any:
+    """Return K(th, P), the part of a cos^P lobe's flux above a surface whose normal is th off the lobe's axis.
+
+    Parameters
+    ----------
+    cos_theta : float
+        Cosine of the tilt, 0 to 1; below 0 the part is that of the mirrored tilt, 1 - K(pi - th).
+    exponent : float
+        P >= 0, real.
+
+    Returns
+    -------
+    float
+        0 to 1, of the type of `cos_theta`, computed in float64.
+
+    Notes
+    -----
+    K = 1 - I(sin^2 th; (P + 1) / 2, 1/2) / 2 with the regularised incomplete beta function I, by its continued
+    fraction on the side where that converges fast. K(th, 0) = 1 - th/pi, K(th, 1) = (1 + cos th)/2.
+    """
+    real = type(cos_theta)
+    c = min(1.0, abs(np.float64(cos_theta)))
+    a = 0.5 * (exponent + 1.0)
+    x = (1.0 - c) * (1.0 + c)
+    if x < (a + 1.0) / (a + 2.5):
+        # x^a (1-x)^(1/2) / (a B(a, 1/2)), the power through log1p because x may be just below 1
+        lead = math.exp(a * math.log1p(-c * c)) * c * _gamma_step(a) / (a * math.sqrt(math.pi))
+        above = 1.0 - 0.5 * lead * _beta_fraction(x, a, 0.5)
+    else:
+        lead = math.exp(a * math.log1p(-c * c)) * c * _gamma_step(a) * 2.0 / math.sqrt(math.pi) if c < 1.0 else 0.0
+        above = 0.5 + 0.5 * lead * _beta_fraction(c * c, 0.5, a)
+    return real(above if cos_theta >= 0 else 1.0 - above)
+
+
+@kernel
+def _gamma_step(a: float) -> float:
+    """Return Gamma(a + 1/2) / Gamma(a) for a >= 1/2, without the difference of two large logarithms."""
+    factor = 1.0
+    while a < 16.0:
+        factor *= a / (a + 0.5)
+        a += 1.0
+    w = a - 0.25
+    q = 1.0 / (w * w)
+    series = q * (1 / 64 + q * (-19 / 8192 + q * (631 / 524288 - q * 174317 / 134217728)))
+    return factor * math.sqrt(w) * (1.0 + series)
+
+
+@kernel
+def _beta_fraction(x: float, a: float, b: float) -> float:
+    """Return the continued fraction of the incomplete beta function by the method of Lentz."""
+    tiny = 1e-300
+    d = 1.0 / _away_from_zero(1.0 - (a + b) * x / (a + 1.0), tiny)
+    c, value = 1.0, d
+    for m in range(1, 20000):
+        even = m * (b - m) * x / ((a + 2 * m - 1.0) * (a + 2 * m))
+        d = 1.0 / _away_from_zero(1.0 + even * d, tiny)
+        c = _away_from_zero(1.0 + even / c, tiny)
+        value *= d * c
+        odd = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1.0))
+        d = 1.0 / _away_from_zero(1.0 + odd * d, tiny)
+        c = _away_from_zero(1.0 + odd / c, tiny)
+        value *= d * c
+        if abs(d * c - 1.0) < 3e-16:
+            break
+    return value
+
+
+@kernel
+def _away_from_zero(value: float, tiny: float) -> float:
+    return value if abs(value) > tiny else tiny

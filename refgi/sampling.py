@@ -1,0 +1,244 @@
+"""Point sets on the unit square and what turns them into directions.
+
+Host functions return whole sets (Halton, grid, an order along a Hilbert curve). Kernels give single points by index,
+for use inside loops: a Sobol pair with hash-based Owen scrambling, where dimension and seed pick an independent
+randomisation. Nothing here keeps state: the same index, dimension and seed give the same point everywhere.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.jit import kernel
+
+Array = npt.NDArray[Any]
+
+ONE_ULP_BELOW_1 = 1.0 - 2.0**-53
+
+
+def halton(count: int, bases: Sequence[int] = (2, 3), shift: Sequence[float] | None = None, start: int = 0) -> Array:
+    """Return consecutive points of the Halton sequence, optionally shifted modulo 1 (Cranley-Patterson).
+
+    Parameters
+    ----------
+    count : int
+        Number of points.
+    bases : sequence of int
+        One base a dimension, pairwise coprime.
+    shift : sequence of float, optional
+        Added to every point, modulo 1.
+    start : int
+        Index of the first point; index 0 is the origin.
+
+    Returns
+    -------
+    (count, d) ndarray of float64
+        Points in [0, 1).
+
+    Examples
+    --------
+    >>> halton(3, start=1).round(3).tolist()
+    [[0.5, 0.333], [0.25, 0.667], [0.75, 0.111]]
+    """
+    expect(count >= 0, "count", "0 or more points", count)
+    points = np.stack([_radical_inverse(np.arange(start, start + count), base) for base in bases], axis=1)
+    if shift is not None:
+        points = np.minimum((points + np.asarray(shift)) % 1.0, ONE_ULP_BELOW_1)
+    return points
+
+
+def _radical_inverse(index: Array, base: int) -> Array:
+    value = np.zeros(len(index))
+    digit = 1.0
+    while index.any():
+        digit /= base
+        index, rest = np.divmod(index, base)
+        value += rest * digit
+    return value
+
+
+def grid(n: int) -> Array:
+    """Return the centres of an n by n grid, rows first: ((i + 1/2) / n, (j + 1/2) / n).
+
+    Parameters
+    ----------
+    n : int
+        Cells along each side.
+
+    Returns
+    -------
+    (n * n, 2) ndarray of float64
+        Points (u, v); u runs fastest.
+
+    Examples
+    --------
+    >>> grid(2).tolist()
+    [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]]
+    """
+    centre = (np.arange(n) + 0.5) / n
+    v, u = np.meshgrid(centre, centre, indexing="ij")
+    return np.stack([u.ravel(), v.ravel()], axis=1)
+
+
+def hilbert_order(height: int, width: int) -> Array:
+    """Return the pixels of a picture in the order a Hilbert curve visits them, so that neighbours stay close.
+
+    Parameters
+    ----------
+    height, width : int
+        Size of the picture, pixels.
+
+    Returns
+    -------
+    (height * width,) ndarray of int64
+        Flat pixel indices, each once.
+    """
+    order = max(1, max(height, width) - 1).bit_length()
+    row, column = (axis.ravel().astype(np.int64) for axis in np.mgrid[:height, :width])
+    rank = np.zeros(len(row), np.int64)
+    x, y = column.copy(), row.copy()
+    for bit in range(order - 1, -1, -1):
+        right, below = (x >> bit) & 1, (y >> bit) & 1
+        rank = rank * 4 + ((3 * right) ^ below)
+        mirror = (below == 0) & (right == 1)
+        x, y = np.where(mirror, ~x, x), np.where(mirror, ~y, y)
+        x, y = np.where(below == 0, y, x), np.where(below == 0, x, y)
+    return np.argsort(rank, kind="stable")
+
+
+@kernel
+def hash_bits(value: Any) -> Any:
+    """Return 32 well-mixed bits of an integer.
+
+    Parameters
+    ----------
+    value : int
+        Taken modulo 2^32.
+
+    Returns
+    -------
+    uint32
+        The hash.
+    """
+    x = np.uint32(value)
+    x = np.uint32((x ^ (x >> np.uint32(16))) * np.uint32(0x21F0AAAD))
+    x = np.uint32((x ^ (x >> np.uint32(15))) * np.uint32(0xD35A2D97))
+    return np.uint32(x ^ (x >> np.uint32(15)))
+
+
+@kernel
+def reverse_bits(value: Any) -> Any:
+    """Return a 32-bit integer with its bits in reverse order.
+
+    Parameters
+    ----------
+    value : int
+        Taken modulo 2^32.
+
+    Returns
+    -------
+    uint32
+        First bit last.
+    """
+    x = np.uint32(value)
+    x = np.uint32((x >> np.uint32(16)) | (x << np.uint32(16)))
+    x = np.uint32(((x & np.uint32(0xFF00FF00)) >> np.uint32(8)) | ((x & np.uint32(0x00FF00FF)) << np.uint32(8)))
+    x = np.uint32(((x & np.uint32(0xF0F0F0F0)) >> np.uint32(4)) | ((x & np.uint32(0x0F0F0F0F)) << np.uint32(4)))
+    x = np.uint32(((x & np.uint32(0xCCCCCCCC)) >> np.uint32(2)) | ((x & np.uint32(0x33333333)) << np.uint32(2)))
+    return np.uint32(((x & np.uint32(0xAAAAAAAA)) >> np.uint32(1)) | ((x & np.uint32(0x55555555)) << np.uint32(1)))
+
+
+@kernel
+def scramble(value: Any, seed: Any) -> Any:
+    """Return 32 bits after a nested uniform (Owen) scramble: each bit flips by a hash of the bits above it.
+
+    Parameters
+    ----------
+    value : int
+        Bits of a point (value * 2^-32 in [0, 1)).
+    seed : int
+        Which scramble; equal seeds give equal scrambles.
+
+    Returns
+    -------
+    uint32
+        Bits of the scrambled point. Every elementary interval keeps its number of points.
+
+    Notes
+    -----
+    The multiply-and-add permutation idea of Laine and Karras 2011, applied to the reversed bits.
+    """
+    s = hash_bits(seed)
+    x = np.uint32(reverse_bits(value) + s)
+    x = np.uint32(x ^ np.uint32(x * np.uint32(0x6C50B47C)))
+    x = np.uint32(x ^ np.uint32(x * np.uint32(0xB82F1E52)))
+    x = np.uint32(x ^ np.uint32(x * np.uint32(0xC7AFE638)))
+    x = np.uint32(x ^ np.uint32(x * np.uint32(0x8D22F6E6)))
+    return reverse_bits(x)
+
+
+@kernel
+def sobol_owen(index: Any, dimension: Any, seed: Any) -> Any:
+    """Return one coordinate of a scrambled low-discrepancy point.
+
+    Parameters
+    ----------
+    index : int
+        Which point, 0 to 2^32 - 1.
+    dimension : int
+        Which coordinate. Coordinates 2 k and 2 k + 1 form a (0, 2)-sequence; pairs are shuffled against each other.
+    seed : int
+        Which randomisation of the whole set.
+
+    Returns
+    -------
+    float64
+        In [0, 1).
+
+    Notes
+    -----
+    Padded pairs with shuffled order, after Burley 2020 (JCGT 9, 4).
+    """
+    pair = hash_bits(np.uint32(seed) ^ hash_bits(np.uint32(dimension >> 1) + np.uint32(0x9E3779B9)))
+    shuffled = scramble(index, pair)  # blocks of 2^k points stay blocks, so each stays well spread
+    bits = reverse_bits(shuffled)
+    if dimension & 1:
+        bits = _second_sobol_axis(shuffled)
+    return np.float64(scramble(bits, np.uint32(pair + np.uint32(1) + np.uint32(dimension & 1)))) * 2.0**-32
+
+
+@kernel
+def _second_sobol_axis(index: Any) -> Any:
+    direction = np.uint32(0x80000000)
+    bits = np.uint32(0)
+    rest = np.uint32(index)
+    while rest:
+        if rest & np.uint32(1):
+            bits = np.uint32(bits ^ direction)
+        direction = np.uint32(direction ^ (direction >> np.uint32(1)))
+        rest = np.uint32(rest >> np.uint32(1))
+    return bits
+
+
+@kernel
+def cosine_hemisphere(u: Any, v: Any) -> Any:
+    """Return a direction of the upper hemisphere with density cos(theta) / pi.
+
+    Parameters
+    ----------
+    u, v : float
+        Point of the unit square; u = sin^2 theta, v the share of the turn.
+
+    Returns
+    -------
+    tuple of 3 floats
+        Unit vector, z up.
+    """
+    real = type(u)
+    radius = math.sqrt(u)
+    phi = real(2.0 * math.pi) * v
+    return radius * math.cos(phi), radius * math.sin(phi), math.sqrt(max(real(0.0), real(1.0) - u))

@@ -1,4 +1,4 @@
-"""SII Table 1: what a frame costs when light and camera move or rest, with stages reused where inputs did not change."""
+"""SII Table 1: what a frame costs when light and camera move or rest, and what it reuses."""
 
 import dataclasses
 import statistics

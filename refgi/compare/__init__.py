@@ -1,0 +1,23 @@
+"""Methods judged against path tracing: figures of error, one comparison, its files and its page.
+
+`metrics` has the figures, each beside what the truth's own noise gives; `comparison.compare` runs every method on one
+scene; `results` writes EXR, PNG and results.json; `report` writes the one-file page.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from refgi.compare.comparison import Comparison, MethodResult, compare
+    from refgi.compare.metrics import Figure, Measurement, measure
+
+__all__ = ["Comparison", "Figure", "Measurement", "MethodResult", "compare", "measure"]
+
+_HOME = {"Figure": "metrics", "Measurement": "metrics", "measure": "metrics"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'refgi.compare' has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(f"refgi.compare.{_HOME.get(name, 'comparison')}"), name)

@@ -1,0 +1,102 @@
+"""Structural similarity of linear pictures (Wang, Bovik, Sheikh and Simoncelli 2004), with a mask.
+
+Gaussian windows of 11x11 pixels and sigma 1.5 around every covered pixel; weights of pixels outside the picture or
+the mask are zero and the rest is normalised again, so border and mask are treated alike. Population variances,
+K1 = 0.01, K2 = 0.03. The dynamic range is the reference's maximum, since linear values have no fixed white.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import correlate1d
+
+Array = npt.NDArray[Any]
+
+RADIUS = 5
+SIGMA = 1.5
+K1, K2 = 0.01, 0.03
+
+
+def mean_ssim(image: Array, reference: Array, covered: Array) -> float:
+    """Return the mean over covered pixels and channels of the similarity of the windows around them.
+
+    Parameters
+    ----------
+    image, reference : (3, h, w) ndarray
+        Finite on the covered pixels.
+    covered : (h, w) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    float
+        1 for equal pictures; nan where the reference's maximum is not positive.
+    """
+    c1, c2 = _constants(reference, covered)
+    if not c1 > 0:
+        return math.nan
+    average = _window_average(covered)
+    similarities = []
+    for x, r in zip(image.astype(np.float64), reference.astype(np.float64), strict=True):
+        mean_x, mean_r = average(x), average(r)
+        variance_x = np.maximum(average(x * x) - mean_x**2, 0)
+        variance_r = np.maximum(average(r * r) - mean_r**2, 0)
+        covariance = average(x * r) - mean_x * mean_r
+        luminance = (2 * mean_x * mean_r + c1) / (mean_x**2 + mean_r**2 + c1)
+        similarities.append(luminance * (2 * covariance + c2) / (variance_x + variance_r + c2))
+    return float(np.mean([s[covered].mean() for s in similarities]))
+
+
+def ssim_of_noise(reference: Array, variance: Array, covered: Array) -> float:
+    """Return the similarity a perfect picture would have with a reference of this noise.
+
+    Parameters
+    ----------
+    reference : (3, h, w) ndarray
+        The noisy reference.
+    variance : (3, h, w) ndarray
+        Variance of its pixels.
+    covered : (h, w) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    float
+        mean((2 s + C2) / (2 s + n + C2)): n is the window's mean noise variance, s its variance without noise.
+    """
+    c1, c2 = _constants(reference, covered)
+    if not c1 > 0:
+        return math.nan
+    average = _window_average(covered)
+    similarities = []
+    for r, v in zip(reference.astype(np.float64), variance.astype(np.float64), strict=True):
+        noise = average(v)
+        signal = np.maximum(average(r * r) - average(r) ** 2 - noise, 0)
+        similarities.append((2 * signal + c2) / (2 * signal + noise + c2))
+    return float(np.mean([s[covered].mean() for s in similarities]))
+
+
+def _constants(reference: Array, covered: Array) -> tuple[float, float]:
+    peak = max(float(reference[:, covered].max()), 0.0)
+    return (K1 * peak) ** 2, (K2 * peak) ** 2
+
+
+def _window_average(covered: Array) -> Callable[[Array], Array]:
+    offsets = np.arange(-RADIUS, RADIUS + 1)
+    weights = np.exp(-(offsets**2) / (2 * SIGMA**2))
+
+    def weighted_sum(plane: Array) -> Array:
+        masked = np.where(covered, plane, 0.0)
+        rows = correlate1d(masked, weights, axis=0, mode="constant")
+        return np.asarray(correlate1d(rows, weights, axis=1, mode="constant"))
+
+    total = weighted_sum(np.ones(covered.shape))
+
+    def average(plane: Array) -> Array:
+        averaged: Array = np.divide(weighted_sum(plane), total, out=np.zeros(plane.shape), where=total > 0)
+        return averaged
+
+    return average

@@ -1,0 +1,13 @@
+"""Rays against a scene's triangles: closest hits and occlusion. The only importer of Embree.
+
+`Tracer` copies the triangles into Embree once and answers batches of rays. Embree works in float32 and, although its
+robust mode closes the seams between triangles, lets a few rays aimed exactly at vertices through; `Tracer` finds
+those misses and decides them in float64. Two ways lead to Embree with the same answers, to the bit: its C functions
+called by address from compiled kernels, and the `run` method of embreex (`REFGI_EMBREE=run`, or wherever the
+library of the wheel cannot be found).
+"""
+
+from refgi.rays.embree import MISS
+from refgi.rays.tracer import Hits, Tracer
+
+__all__ = ["MISS", "Hits", "Tracer"]

@@ -1,0 +1,238 @@
+"""Tracer: batches of rays against one geometry, checked, with misses decided in float64."""
+
+import threading
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.rays.embree import MISS, Door, open_door
+from refgi.rays.watertight import Corners, closest_around, corners
+from refgi.scene import Geometry
+
+Array = npt.NDArray[Any]
+
+# Offset of ray ends from surfaces, in units of the largest coordinate. float32 positions are off by 1e-7 of it; a
+# larger offset than 2e-5 shows in the picture.
+RELATIVE_OFFSET = 2e-6
+# Sideways shift that tells a slip between triangles from a miss: many float32 steps, far below any detail.
+RELATIVE_SHIFT = 4e-6
+
+
+class Hits(NamedTuple):
+    """Nearest hits of a batch of rays."""
+
+    triangle_id: Array  # (n,) int32, -1 where nothing was hit
+    distance: Array  # (n,) float64 in lengths of the direction, inf where nothing was hit
+
+
+class Tracer:
+    """Answers rays against a geometry.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles; copied. May be empty: then every ray misses.
+
+    Notes
+    -----
+    `closest`, `occluded` and `segments_blocked` check their input, convert it to float32 and decide misses that may
+    have slipped between triangles in float64. `fill_closest` and `fill_occluded` are the bare traversal for
+    estimators: random rays meet such a slip with a probability of about 1e-7.
+    """
+
+    def __init__(self, geometry: Geometry) -> None:
+        self._vertices = np.array(geometry.vertices, np.float32).reshape(-1, 3)
+        self._faces = np.array(geometry.faces, np.int32).reshape(-1, 3)
+        used = self._vertices[self._faces.reshape(-1)]
+        expect(bool(np.isfinite(used).all()), "geometry.vertices", "finite numbers within float32", "others")
+        self._scale = float(np.abs(used).max(initial=0.0)) or 1.0
+        self._lock = threading.Lock()
+
+    @property
+    def offset(self) -> float:
+        """How far ray ends must stay from a surface not to hit it, m."""
+        return RELATIVE_OFFSET * self._scale
+
+    def closest(self, origins: Array, directions: Array, reach: Array | float = np.inf) -> Hits:
+        """Find the nearest triangle along each ray.
+
+        Parameters
+        ----------
+        origins : (n, 3) array_like
+            Ray origins, world space, m.
+        directions : (n, 3) array_like
+            Ray directions, not zero, any length.
+        reach : float or (n,) array_like
+            How far to look, in lengths of the direction.
+
+        Returns
+        -------
+        Hits
+            Triangle ids and distances in lengths of the direction.
+
+        Raises
+        ------
+        InputError
+            For shapes that do not fit, numbers that are not finite, or a direction of zero.
+        """
+        o, d, far = _checked(origins, directions, reach)
+        triangle_id, distance = np.full(len(o), MISS, np.int32), np.full(len(o), np.inf, np.float32)
+        self.fill_closest(o, d, far, triangle_id, distance)
+        exact = distance.astype(np.float64)
+        for ray, triangle, t in self._slipped(o, d, far, np.flatnonzero(triangle_id == MISS)):
+            triangle_id[ray], exact[ray] = triangle, t
+        return Hits(triangle_id, exact)
+
+    def occluded(self, origins: Array, directions: Array, distances: Array | float = np.inf) -> Array:
+        """Tell whether anything lies on each ray before a distance.
+
+        Parameters
+        ----------
+        origins : (n, 3) array_like
+            Ray origins, world space, m.
+        directions : (n, 3) array_like
+            Ray directions, not zero, any length.
+        distances : float or (n,) array_like
+            How far to look, in lengths of the direction.
+
+        Returns
+        -------
+        (n,) bool ndarray
+            True where something blocks.
+
+        Raises
+        ------
+        InputError
+            For shapes that do not fit, numbers that are not finite, or a direction of zero.
+        """
+        o, d, far = _checked(origins, directions, distances)
+        blocked = np.zeros(len(o), np.bool_)
+        self.fill_occluded(o, d, far, blocked)
+        for ray, _, _ in self._slipped(o, d, far, np.flatnonzero(~blocked)):
+            blocked[ray] = True
+        return blocked
+
+    def segments_blocked(self, starts: Array, ends: Array, start_normals: Array | None = None,
+                         end_normals: Array | None = None) -> Array:
+        """Tell whether anything lies between pairs of surface points.
+
+        Parameters
+        ----------
+        starts, ends : (n, 3) array_like
+            Ends of the segments, world space, m.
+        start_normals, end_normals : (n, 3) array_like, optional
+            Unit normals on the side the segment leaves to: that end is lifted by `offset` along it. Without, the
+            segment is cut short by `offset` at that end.
+
+        Returns
+        -------
+        (n,) bool ndarray
+            True where something blocks. Segments of no length are free.
+        """
+        a, b = np.array(starts, np.float64).reshape(-1, 3), np.array(ends, np.float64).reshape(-1, 3)
+        expect(a.shape == b.shape, "ends", f"shape {a.shape} as starts", b.shape)
+        length = np.linalg.norm(b - a, axis=1, keepdims=True)
+        along = np.divide(b - a, length, out=np.zeros_like(a), where=length > 0)
+        a += self.offset * (along if start_normals is None else np.asarray(start_normals, np.float64))
+        b += self.offset * (-along if end_normals is None else np.asarray(end_normals, np.float64))
+        blocked = np.zeros(len(a), np.bool_)
+        traced = length[:, 0] > 2 * self.offset
+        blocked[traced] = self.occluded(a[traced], (b - a)[traced], 1.0)
+        return blocked
+
+    def fill_closest(self, origins: Array, directions: Array, reach: Array, triangle_id: Array,
+                     distance: Array) -> None:
+        """Fill nearest hits, unchecked and in float32 alone.
+
+        Parameters
+        ----------
+        origins, directions : (n, 3) float32 ndarray
+            Rays, world space.
+        reach : (n,) float32 ndarray
+            How far to look; rays of `reach` <= 0 miss untraced.
+        triangle_id : (n,) int32 ndarray
+            Filled with triangle ids, -1 for a miss.
+        distance : (n,) float32 ndarray
+            Filled with distances, inf for a miss.
+        """
+        if self._door is None:
+            triangle_id[:], distance[:] = MISS, np.inf
+        else:
+            self._door.closest(origins, directions, reach, triangle_id, distance)
+
+    def fill_occluded(self, origins: Array, directions: Array, reach: Array, blocked: Array) -> None:
+        """Fill whether rays are blocked, unchecked and in float32 alone.
+
+        Parameters
+        ----------
+        origins, directions : (n, 3) float32 ndarray
+            Rays, world space.
+        reach : (n,) float32 ndarray
+            How far to look; rays of `reach` <= 0 count as blocked and are not traced.
+        blocked : (n,) bool ndarray
+            Filled with the answers.
+        """
+        if self._door is None:
+            np.less_equal(reach, 0, out=blocked)
+        else:
+            self._door.occluded(origins, directions, reach, blocked)
+
+    @property
+    def _door(self) -> Door | None:
+        with self._lock:
+            return self._opened
+
+    @cached_property
+    def _opened(self) -> Door | None:
+        return open_door(self._vertices, self._faces) if len(self._faces) else None
+
+    @cached_property
+    def _corners(self) -> Corners:
+        return corners(self._vertices, self._faces)
+
+    def _slipped(self, origins: Array, directions: Array, reach: Array,
+                 missed: Array) -> list[tuple[int, int, float]]:
+        """Return (ray, triangle, distance) of the misses that float64 turns into hits."""
+        missed = missed[reach[missed] > 0]
+        if self._door is None or not len(missed):
+            return []
+        found = []
+        for shift in _sideways(directions[missed], RELATIVE_SHIFT * self._scale):
+            near, distance = np.empty(len(missed), np.int32), np.empty(len(missed), np.float32)
+            shifted = (origins[missed] + shift).astype(np.float32)
+            self.fill_closest(shifted, directions[missed], reach[missed], near, distance)
+            for k in np.flatnonzero(near != MISS):
+                ray = int(missed[k])
+                triangle, t = closest_around(self._corners, int(near[k]), origins[ray].astype(np.float64),
+                                             directions[ray].astype(np.float64), float(reach[ray]))
+                if triangle != MISS:
+                    found.append((ray, triangle, t))
+        return found
+
+
+def _sideways(directions: Array, length: float) -> tuple[Array, Array, Array]:
+    """Return three shifts of `length` across each direction, 120 degrees apart."""
+    d = directions.astype(np.float64)
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    least = np.eye(3)[np.argmin(np.abs(d), axis=1)]
+    u = np.cross(d, least)
+    u *= length / np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(d, u)
+    turns = (0.3, 0.3 + 2 * np.pi / 3, 0.3 + 4 * np.pi / 3)  # 0.3: along no axis of common models
+    return tuple(np.cos(t) * u + np.sin(t) * v for t in turns)  # type: ignore[return-value]
+
+
+def _checked(origins: Array, directions: Array, reach: Array | float) -> tuple[Array, Array, Array]:
+    o, d = (np.array(rays, np.float32, order="C") for rays in (origins, directions))
+    expect(o.ndim == 2 and o.shape[1] == 3, "origins", "shape (n, 3)", o.shape)
+    expect(d.shape == o.shape, "directions", f"shape {o.shape} as origins", d.shape)
+    expect(bool(np.isfinite(o).all()), "origins", "finite numbers", "NaN or infinity")
+    expect(bool(np.isfinite(d).all()), "directions", "finite numbers", "NaN or infinity")
+    expect(bool(d.any(axis=1).all()), "directions", "vectors of some length", "zero vectors")
+    far = np.array(reach, np.float32)
+    expect(far.shape in ((), (len(o),)), "reach", f"one number or shape ({len(o)},)", far.shape)
+    expect(not np.isnan(far).any(), "reach", "numbers", "NaN")
+    return o, d, np.ascontiguousarray(np.broadcast_to(far, len(o)))

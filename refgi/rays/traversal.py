@@ -1,0 +1,121 @@
+"""Kernels that call Embree's single-ray functions by address.
+
+A ray lies in a small float32 buffer laid out as Embree's `RTCRayHit`: origin, tnear, direction, time, tfar, mask,
+id, flags, then normal, u, v, triangle id, geometry id, instance ids. The integer fields are written through an int32
+view of the same memory. Addresses are run-time values, so compiled kernels can be kept on disk.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from refgi.jit import kernel, prange
+
+Array = npt.NDArray[Any]
+
+CHUNK = 1024  # rays that one parallel iteration owns
+
+
+class Calls(NamedTuple):
+    """Addresses of `rtcIntersect1`, `rtcOccluded1` and of a built scene."""
+
+    closest: np.uint64
+    occluded: np.uint64
+    scene: np.uint64
+
+
+@intrinsic  # type: ignore[misc, unused-ignore]
+def _call(typing: Any, function: Any, scene: Any, ray: Any) -> Any:  # noqa: ARG001
+    """Call `void function(scene, ray, NULL)`."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        byte = ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [byte, byte, byte])
+        target = builder.inttoptr(arguments[0], kind.as_pointer())
+        pointers = [builder.inttoptr(argument, byte) for argument in arguments[1:]]
+        builder.call(target, [*pointers, cgutils.get_null_value(byte)])
+        return context.get_dummy_value()
+
+    return types.void(types.uint64, types.uint64, types.uint64), generate
+
+
+@kernel
+def _load(ray: Array, bits: Array, origin: Array, direction: Array, reach: Any) -> None:
+    ray[0] = origin[0]
+    ray[1] = origin[1]
+    ray[2] = origin[2]
+    ray[3] = 0
+    ray[4] = direction[0]
+    ray[5] = direction[1]
+    ray[6] = direction[2]
+    ray[7] = 0
+    ray[8] = reach
+    bits[9] = -1  # mask: every geometry
+    bits[10] = 0
+    bits[11] = 0
+    bits[17] = -1  # no triangle yet
+    bits[18] = -1
+    bits[19] = -1
+
+
+@kernel(parallel=True)
+def closest_hits(calls: Calls, origins: Array, directions: Array, reach: Array, triangle_id: Array,
+                 distance: Array) -> None:
+    """Find the nearest triangle along each ray.
+
+    Parameters
+    ----------
+    calls : Calls
+        Embree's functions and scene.
+    origins, directions : (n, 3) float32 ndarray
+        Rays, world space; distances count in lengths of `directions`.
+    reach : (n,) float32 ndarray
+        How far to look; inf for no limit, rays of `reach` <= 0 miss untraced.
+    triangle_id : (n,) int32 ndarray
+        Filled with the triangle, -1 for a miss.
+    distance : (n,) float32 ndarray
+        Filled with the distance, inf for a miss.
+    """
+    count = len(origins)
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        ray = np.empty(32, np.float32)
+        bits = ray.view(np.int32)
+        for i in range(chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)):
+            bits[17] = -1
+            if reach[i] > 0:
+                _load(ray, bits, origins[i], directions[i], reach[i])
+                _call(calls.closest, calls.scene, ray.ctypes.data)
+            triangle_id[i] = bits[17]
+            distance[i] = ray[8] if bits[17] >= 0 else np.inf
+
+
+@kernel(parallel=True)
+def occlusions(calls: Calls, origins: Array, directions: Array, reach: Array, blocked: Array) -> None:
+    """Tell whether any triangle lies on each ray before `reach`.
+
+    Parameters
+    ----------
+    calls : Calls
+        Embree's functions and scene.
+    origins, directions : (n, 3) float32 ndarray
+        Rays, world space; distances count in lengths of `directions`.
+    reach : (n,) float32 ndarray
+        How far to look; rays of `reach` <= 0 count as blocked and are not traced.
+    blocked : (n,) bool ndarray
+        Filled with the answers.
+    """
+    count = len(origins)
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        ray = np.empty(32, np.float32)
+        bits = ray.view(np.int32)
+        for i in range(chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)):
+            ray[8] = -np.inf
+            if reach[i] > 0:
+                _load(ray, bits, origins[i], directions[i], reach[i])
+                _call(calls.occluded, calls.scene, ray.ctypes.data)
+            blocked[i] = ray[8] < 0  # Embree marks a blocked ray by tfar = -inf

@@ -1,0 +1,109 @@
+"""Decide in float64 the rays that slip between triangles in float32.
+
+A ray aimed exactly at a vertex can pass Embree's float32 test of every triangle around it. Such a miss is found by
+asking again with rays shifted sideways by many float32 steps: if all of them miss as well, the miss stands. Else the
+triangles around what the shifted ray hit are tested against the ray itself, in float64, by signed volumes of
+(direction, edge) taken in one order per edge, so that two triangles always agree on which side of their common edge a
+ray passes (Woop, Benthin & Wald 2013) and no ray passes between them.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+
+Array = npt.NDArray[Any]
+
+
+class Corners(NamedTuple):
+    """Triangles by shared corners: vertices at equal positions count as one."""
+
+    vertices: Array  # (n, 3) float64, distinct positions, m
+    faces: Array  # (m, 3) int64
+    first: Array  # (n + 1,) int64: the triangles around vertex v are `around[first[v]:first[v + 1]]`
+    around: Array  # (3 m,) int64
+
+
+def corners(vertices: Array, faces: Array) -> Corners:
+    """Weld equal positions and list the triangles around each.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float32 ndarray
+        Vertices as Embree has them.
+    faces : (m, 3) int32 ndarray
+        Vertex indices.
+
+    Returns
+    -------
+    Corners
+        The tables for `closest_around`.
+    """
+    positions, welded = np.unique(vertices + np.float32(0), axis=0, return_inverse=True)  # + 0 makes -0 equal 0
+    faces = welded.reshape(-1)[faces].astype(np.int64)
+    order = np.argsort(faces.reshape(-1), kind="stable")
+    first = np.concatenate([[0], np.cumsum(np.bincount(faces.reshape(-1), minlength=len(positions)))])
+    return Corners(positions.astype(np.float64), faces, first, order // 3)
+
+
+@kernel
+def closest_around(tables: Corners, triangle: int, origin: Array, direction: Array, reach: float) -> tuple[int, float]:
+    """Find the nearest hit among the triangles that share a corner with `triangle`, in float64.
+
+    Parameters
+    ----------
+    tables : Corners
+        The mesh by corners.
+    triangle : int
+        Where to look.
+    origin, direction : (3,) float64 ndarray
+        The ray; its distance counts in lengths of `direction`.
+    reach : float
+        How far to look.
+
+    Returns
+    -------
+    tuple of int and float
+        Triangle and distance; -1 and inf for a miss. Ties go to the lowest id.
+    """
+    nearest, hit = np.inf, -1
+    for corner in range(3):
+        vertex = tables.faces[triangle, corner]
+        for k in range(tables.first[vertex], tables.first[vertex + 1]):
+            candidate = tables.around[k]
+            t = _hit_distance(tables, candidate, origin, direction)
+            if t <= reach and (t < nearest or (t == nearest and candidate < hit)):
+                nearest, hit = t, candidate
+    return hit, nearest
+
+
+@kernel
+def _side(vertices: Array, i: int, j: int, origin: Array, direction: Array) -> float:
+    """Return the signed volume of direction and edge i-j, exactly negated for j-i."""
+    low, high = min(i, j), max(i, j)
+    ax, ay, az = vertices[low, 0] - origin[0], vertices[low, 1] - origin[1], vertices[low, 2] - origin[2]
+    bx, by, bz = vertices[high, 0] - origin[0], vertices[high, 1] - origin[1], vertices[high, 2] - origin[2]
+    volume = (direction[0] * (ay * bz - az * by) + direction[1] * (az * bx - ax * bz)
+              + direction[2] * (ax * by - ay * bx))
+    return volume if i < j else -volume
+
+
+@kernel
+def _hit_distance(tables: Corners, triangle: int, origin: Array, direction: Array) -> float:
+    i, j, k = tables.faces[triangle]
+    a = _side(tables.vertices, j, k, origin, direction)
+    b = _side(tables.vertices, k, i, origin, direction)
+    c = _side(tables.vertices, i, j, origin, direction)
+    volume = a + b + c
+    if min(a, b, c) < 0 < max(a, b, c) or volume == 0:
+        return np.inf
+    t = 0.0  # the hit is the corners' mean with weights a, b, c; its distance the same mean of theirs along the ray
+    length = direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]
+    for weight, vertex in ((a, i), (b, j), (c, k)):
+        along = 0.0
+        for axis in range(3):
+            along += (tables.vertices[vertex, axis] - origin[axis]) * direction[axis]
+        t += weight / volume * (along / length)
+    return t if t > 0 else np.inf

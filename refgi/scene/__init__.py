@@ -1,5 +1,7 @@
 """What is lit: scenes from files and built-in procedural ones, as one frozen model."""
 
+from refgi.scene.builtin import BuiltinScene, builtin_scenes
+from refgi.scene.load import load_scene
 from refgi.scene.model import (
     Camera,
     DirectionalLight,
@@ -18,6 +20,7 @@ from refgi.scene.model import (
 )
 
 __all__ = [
+    "BuiltinScene",
     "Camera",
     "DirectionalLight",
     "Geometry",
@@ -29,7 +32,9 @@ __all__ = [
     "PointLight",
     "Scene",
     "SpotLight",
+    "builtin_scenes",
     "light_table",
+    "load_scene",
     "material_table",
     "merge",
 ]

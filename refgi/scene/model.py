@@ -22,6 +22,18 @@ Rgb = tuple[float, float, float]
 Vector = tuple[float, float, float]
 
 BLACK: Rgb = (0.0, 0.0, 0.0)
+LARGEST = 1e9  # m; squares and cubes of coordinates stay within float32
+
+
+def _is_vector(value: Any) -> bool:
+    try:
+        return len(value) == 3 and all(math.isfinite(c) for c in value)
+    except (TypeError, OverflowError):
+        return False
+
+
+def _expect_power(value: Rgb, key: str) -> None:
+    expect(_is_vector(value) and min(value) >= 0, f"light: {key}", "three finite numbers >= 0", value)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,9 +55,9 @@ class Material:
     def __post_init__(self) -> None:
         for key in ("diffuse", "specular"):
             value = getattr(self, key)
-            expect(_is_rgb(value) and all(0 <= c <= 1 for c in value), f"material {self.name!r}: {key}",
+            expect(_is_vector(value) and all(0 <= c <= 1 for c in value), f"material {self.name!r}: {key}",
                    "three numbers from 0 to 1", value)
-        expect(_is_rgb(self.emission) and min(self.emission) >= 0, f"material {self.name!r}: emission",
+        expect(_is_vector(self.emission) and min(self.emission) >= 0, f"material {self.name!r}: emission",
                "three finite numbers >= 0", self.emission)
         expect(math.isfinite(self.exponent) and self.exponent >= 0, f"material {self.name!r}: exponent",
                "a finite number >= 0", self.exponent)
@@ -72,6 +84,25 @@ class Mesh:
     normals: Array | None = None
     material: Material = Material()
     name: str = "mesh"
+
+    def expect_sound(self, where: str) -> None:
+        """Raise `InputError` naming `where` unless shapes, coordinates and indices make a mesh."""
+        vertices, faces = np.asarray(self.vertices), np.asarray(self.faces)
+        expect(vertices.ndim == 2 and vertices.shape[1] == 3 and vertices.dtype.kind in "fiu",
+               f"{where}: vertices", "numbers in an (n, 3) array", f"{vertices.dtype} {vertices.shape}")
+        expect(faces.ndim == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu",
+               f"{where}: faces", "integers in an (m, 3) array", f"{faces.dtype} {faces.shape}")
+        expect(len(faces) > 0, f"{where}: faces", "at least one triangle", 0)
+        expect(len(vertices) > 0, f"{where}: vertices", "at least one", 0)
+        if not (abs(vertices.min()) <= LARGEST and abs(vertices.max()) <= LARGEST):  # so that NaN fails as well
+            row = int(np.argmin((np.abs(vertices) <= LARGEST).all(axis=1)))
+            expect(False, f"{where}: vertex {row}", f"finite coordinates up to {LARGEST:g} m", vertices[row].tolist())
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            row = int(np.argmax(((faces < 0) | (faces >= len(vertices))).any(axis=1)))
+            expect(False, f"{where}: face {row}", f"vertex indices from 0 to {len(vertices) - 1}", faces[row].tolist())
+        if self.normals is not None:
+            expect(np.shape(self.normals) == vertices.shape, f"{where}: normals", f"shape {vertices.shape}",
+                   np.shape(self.normals))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -270,8 +301,9 @@ def light_table(lights: Sequence[Light], dtype: npt.DTypeLike = np.float64) -> L
     LightTable
         One row a light.
     """
-    table = LightTable(np.zeros(len(lights), np.int32), *(np.zeros((len(lights), 3), dtype) for _ in range(2)),
-                       *(np.zeros(len(lights), dtype) for _ in range(2)), np.zeros((len(lights), 3), dtype))
+    count = len(lights)
+    table = LightTable(np.zeros(count, np.int32), np.zeros((count, 3), dtype), np.zeros((count, 3), dtype),
+                       np.zeros(count, dtype), np.zeros(count, dtype), np.zeros((count, 3), dtype))
     for row, light in enumerate(lights):
         if isinstance(light, DirectionalLight):
             table.kind[row] = DIRECTIONAL
@@ -304,7 +336,16 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
         All triangles.
     tuple of Material
         What `material_of_face` indexes.
+
+    Raises
+    ------
+    InputError
+        If a mesh has a coordinate that is not finite or an index out of range, or there are too many vertices.
     """
+    for number, mesh in enumerate(meshes):
+        mesh.expect_sound(f"mesh {number} ({mesh.name})")
+    total = sum(len(mesh.vertices) for mesh in meshes)
+    expect(total < 2**31, "meshes", "fewer than 2^31 vertices in all", total)
     materials = tuple(dict.fromkeys(mesh.material for mesh in meshes))
     smooth = smooth and any(mesh.normals is not None for mesh in meshes)
     if smooth:
@@ -321,8 +362,6 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
     ), materials
 
 
-
-
 def _with_face_normals(mesh: Mesh) -> Mesh:
     corners = np.asarray(mesh.vertices, np.float64)[np.asarray(mesh.faces)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -331,14 +370,3 @@ def _with_face_normals(mesh: Mesh) -> Mesh:
     vertices = corners.reshape(-1, 3)
     return Mesh(vertices, np.arange(len(vertices)).reshape(-1, 3), np.repeat(normals, 3, axis=0), mesh.material,
                 mesh.name)
-
-
-def _is_vector(value: Any) -> bool:
-    return len(value) == 3 and all(math.isfinite(c) for c in value)
-
-
-_is_rgb = _is_vector
-
-
-def _expect_power(value: Rgb, key: str) -> None:
-    expect(_is_rgb(value) and min(value) >= 0, f"light: {key}", "three finite numbers >= 0", value)

@@ -1,0 +1,76 @@
+"""Files on disk as bytes, and the one shape in which every mesh format hands over what it holds."""
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from refgi.errors import InputError
+from refgi.scene.model import Camera, Light, Mesh
+
+
+class Contents(NamedTuple):
+    """What one mesh file holds, in its own world space."""
+
+    meshes: tuple[Mesh, ...]
+    cameras: tuple[Camera, ...] = ()
+    lights: tuple[Light, ...] = ()
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the bytes of a regular file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    bytes
+        Its content, not empty.
+
+    Raises
+    ------
+    InputError
+        If it is missing, a folder, not a regular file, empty or unreadable.
+    """
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: expected a file, got a folder")
+        if not path.exists():
+            raise InputError(f"{path}: no such file{_near(path)}")
+        if not path.is_file():
+            raise InputError(f"{path}: expected a regular file")
+        content = path.read_bytes()
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: cannot be read: {error}") from error
+    if not content:
+        raise InputError(f"{path}: the file is empty")
+    return content
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return "; did you mean ...?" for the known word nearest to a mistyped one, else nothing.
+
+    Parameters
+    ----------
+    word : str
+        What was given.
+    known : iterable of str
+        What would have been right.
+
+    Returns
+    -------
+    str
+        Ready to follow an error's sentence.
+    """
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def _near(path: Path) -> str:
+    siblings = (p.name for p in path.parent.iterdir()) if path.parent.is_dir() else ()
+    return did_you_mean(path.name, siblings)

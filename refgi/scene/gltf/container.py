@@ -1,0 +1,161 @@
+"""The outer layer of glTF: GLB chunks, the JSON document, and buffers from chunks, files or data URIs."""
+
+import base64
+import binascii
+import json
+import struct
+import urllib.parse
+from pathlib import Path
+from typing import Any
+
+from refgi.errors import InputError, expect
+from refgi.scene.files import read_bytes
+
+MAGIC = b"glTF"
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+# Nothing else that is required by a file can be passed over without drawing something wrong.
+READABLE_EXTENSIONS = {"KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization",
+                       "KHR_materials_ior", "KHR_materials_unlit", "KHR_texture_transform"}
+
+
+class Document:
+    """The JSON of one glTF file with checked look-ups, and its buffers.
+
+    Parameters
+    ----------
+    path : Path
+        The file, ``.glb`` or ``.gltf``.
+
+    Raises
+    ------
+    InputError
+        If the container is damaged, or its JSON no glTF 2 document.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        content = read_bytes(path)
+        text, self._chunk = _chunks(content, path) if content[:4] == MAGIC else (content, None)
+        self.tree = _parsed(text, path)
+        self._buffers: dict[int, bytes] = {}
+
+    def items(self, key: str) -> list[dict[str, Any]]:
+        """Return a top-level list of objects, empty when absent."""
+        found = self.tree.get(key, [])
+        good = isinstance(found, list) and all(isinstance(item, dict) for item in found)
+        expect(good, f"{self.path}: {key}", "a list of objects", _short(found))
+        return list(found)
+
+    def item(self, key: str, index: Any, referrer: str) -> dict[str, Any]:
+        """Return entry `index` of the top-level list `key`, which `referrer` points to."""
+        items = self.items(key)
+        good = isinstance(index, int) and not isinstance(index, bool) and 0 <= index < len(items)
+        expect(good, f"{self.path}: {referrer}", f"an index into the {len(items)} {key}", index)
+        return dict(items[index])
+
+    def member(self, owner: dict[str, Any], key: str, where: str) -> dict[str, Any]:
+        """Return the object `owner[key]`, empty when absent."""
+        found = owner.get(key, {})
+        expect(isinstance(found, dict), f"{self.path}: {where}.{key}", "an object", _short(found))
+        return dict(found)
+
+    def integer(self, owner: dict[str, Any], key: str, where: str, default: int | None = None) -> int:
+        """Return the non-negative integer `owner[key]`."""
+        found = owner.get(key, default)
+        good = isinstance(found, int) and not isinstance(found, bool) and 0 <= found < 2**53
+        expect(good, f"{self.path}: {where}.{key}", "an integer >= 0", _short(found))
+        return int(found)  # type: ignore[arg-type]
+
+    def numbers(self, owner: dict[str, Any], key: str, where: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the finite numbers `owner[key]`, as many as `default` has."""
+        found = owner.get(key, default)
+        expect(isinstance(found, list | tuple) and len(found) == len(default) and all(map(_is_finite, found)),
+               f"{self.path}: {where}.{key}", f"{len(default)} finite numbers", _short(found))
+        return tuple(float(number) for number in found)
+
+    def number(self, owner: dict[str, Any], key: str, where: str, default: float) -> float:
+        """Return the finite number `owner[key]`."""
+        found = owner.get(key, default)
+        expect(_is_finite(found), f"{self.path}: {where}.{key}", "a finite number", _short(found))
+        return float(found)
+
+    def name(self, owner: dict[str, Any], default: str) -> str:
+        """Return the name of an entry, or `default`."""
+        found = owner.get("name")
+        return found if isinstance(found, str) and found else default
+
+    def buffer(self, index: int) -> bytes:
+        """Return the bytes of a buffer, read when first asked for."""
+        if index not in self._buffers:
+            self._buffers[index] = self._fetch(index)
+        return self._buffers[index]
+
+    def _fetch(self, index: int) -> bytes:
+        where = f"buffers[{index}]"
+        entry = self.item("buffers", index, where)
+        length = self.integer(entry, "byteLength", where)
+        uri = entry.get("uri")
+        if uri is None:
+            expect(index == 0 and self._chunk is not None, f"{self.path}: {where}.uri", "a uri or a GLB chunk", None)
+            content = self._chunk or b""
+        else:
+            expect(isinstance(uri, str), f"{self.path}: {where}.uri", "a string", _short(uri))
+            content = self._from_uri(uri, where)
+        expect(len(content) >= length, f"{self.path}: {where}", f"{length} bytes (the file is cut short)", len(content))
+        return content[:length]
+
+    def _from_uri(self, uri: str, where: str) -> bytes:
+        if uri.startswith("data:"):
+            head, _, payload = uri.partition(",")
+            expect(head.endswith(";base64"), f"{self.path}: {where}.uri", "a base64 data URI", head[:40])
+            try:
+                return base64.b64decode(payload, validate=True)
+            except (binascii.Error, ValueError) as error:
+                raise InputError(f"{self.path}: {where}.uri: damaged base64: {error}") from error
+        named = Path(urllib.parse.unquote(uri))
+        beside = not named.is_absolute() and ".." not in named.parts and "://" not in uri and "\0" not in str(named)
+        expect(beside, f"{self.path}: {where}.uri", "a file beside the .gltf", uri[:80])
+        return read_bytes(self.path.parent / named)
+
+
+def _chunks(content: bytes, path: Path) -> tuple[bytes, bytes | None]:
+    expect(len(content) >= 20, f"{path}", "a GLB header of 20 bytes (the file is cut short)", len(content))
+    version, total = struct.unpack_from("<II", content, 4)
+    expect(version == 2, f"{path}: version", "GLB version 2", version)
+    expect(total <= len(content), f"{path}", f"{total} bytes (the file is cut short)", len(content))
+    found: dict[int, bytes] = {}
+    start = 12
+    while start + 8 <= total:
+        length, kind = struct.unpack_from("<II", content, start)
+        expect(start + 8 + length <= total, f"{path}: chunk at byte {start}", f"at most {total - start - 8} bytes",
+               length)
+        found.setdefault(kind, content[start + 8 : start + 8 + length])
+        start += 8 + length
+    expect(JSON_CHUNK in found, f"{path}", "a JSON chunk", [hex(kind) for kind in found])
+    return found[JSON_CHUNK], found.get(BINARY_CHUNK)
+
+
+def _parsed(text: bytes, path: Path) -> dict[str, Any]:
+    try:
+        tree = json.loads(text.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: damaged JSON: {error}") from error
+    expect(isinstance(tree, dict), f"{path}", "a JSON object", _short(tree))
+    asset = tree.get("asset")
+    version = asset.get("version") if isinstance(asset, dict) else None
+    expect(isinstance(version, str) and version.startswith("2."), f"{path}: asset.version", "glTF 2", version)
+    required = tree.get("extensionsRequired", [])
+    expect(isinstance(required, list) and all(isinstance(name, str) for name in required),
+           f"{path}: extensionsRequired", "a list of strings", _short(required))
+    unknown = sorted(set(required) - READABLE_EXTENSIONS)
+    expect(not unknown, f"{path}: extensionsRequired", f"only {', '.join(sorted(READABLE_EXTENSIONS))}", unknown)
+    return tree  # type: ignore[no-any-return]
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and -1e300 < value < 1e300
+
+
+def _short(value: Any) -> Any:
+    text = repr(value)
+    return value if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,190 @@
+"""From a glTF document to meshes in world space: the node tree, primitives and materials."""
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from refgi.errors import InputError, RefgiWarning, expect
+from refgi.scene.files import Contents
+from refgi.scene.gltf.accessors import accessor
+from refgi.scene.gltf.container import Document
+from refgi.scene.gltf.punctual import node_camera, node_light
+from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
+from refgi.scene.transform import affine, placed
+
+TRIANGLES, STRIP, FAN = 4, 5, 6
+LARGEST_COUNT = 2**31 - 1  # vertices; corner indices are int32
+
+
+def read_gltf(path: Path) -> Contents:
+    """Read the default scene of a ``.gltf`` or ``.glb`` file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Contents
+        One mesh per primitive in the order of the node tree, and the cameras and lights on the way.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged or needs what is not read (compressed meshes, sparse accessors).
+    """
+    document = Document(path)
+    return _Reader(document).contents()
+
+
+class _Reader:
+    """Walks the node tree of one document once."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.path = document.path
+        self.meshes: list[Mesh] = []
+        self.cameras: list[Camera] = []
+        self.lights: list[Light] = []
+        self.passed_over: dict[str, int] = {}
+        self.materials: list[Material] = [self._material(index) for index in range(len(document.items("materials")))]
+        self._shapes: dict[int, list[Mesh]] = {}
+
+    def contents(self) -> Contents:
+        visited: set[int] = set()
+        pending = [(index, np.eye(4)) for index in reversed(self._roots())]
+        while pending:
+            index, parent = pending.pop()
+            node = self.document.item("nodes", index, "a node reference")
+            expect(index not in visited, f"{self.path}: nodes[{index}]", "one parent", "several, or a cycle")
+            visited.add(index)
+            matrix = parent @ self._local_matrix(node, f"nodes[{index}]")
+            self._collect(node, matrix, f"nodes[{index}]")
+            pending += [(child, matrix) for child in reversed(self._indices(node, "children", f"nodes[{index}]"))]
+        for what, count in self.passed_over.items():
+            warnings.warn(RefgiWarning(f"{self.path}: {count} {what} passed over"), stacklevel=4)
+        return Contents(tuple(self.meshes), tuple(self.cameras), tuple(self.lights))
+
+    def _collect(self, node: dict[str, Any], matrix: Array, where: str) -> None:
+        if "mesh" in node:
+            for mesh in self._mesh(node["mesh"], f"{where}.mesh"):
+                self.meshes.append(placed(mesh, matrix))
+            total = sum(len(mesh.vertices) for mesh in self.meshes)
+            expect(total <= LARGEST_COUNT, f"{self.path}: {where}.mesh", f"at most {LARGEST_COUNT} vertices", total)
+        if camera := node_camera(self.document, node, matrix, where):
+            self.cameras.append(camera)
+        elif "camera" in node:
+            self._pass_over("orthographic camera(s)")
+        if light := node_light(self.document, node, matrix, where):
+            self.lights.append(light)
+
+    def _roots(self) -> list[int]:
+        scenes = self.document.items("scenes")
+        if scenes:
+            index = self.document.tree.get("scene", 0)
+            return self._indices(self.document.item("scenes", index, "scene"), "nodes", f"scenes[{index}]")
+        nodes = self.document.items("nodes")
+        children = {c for i, node in enumerate(nodes) for c in self._indices(node, "children", f"nodes[{i}]")}
+        return [index for index in range(len(nodes)) if index not in children]
+
+    def _indices(self, owner: dict[str, Any], key: str, where: str) -> list[int]:
+        found = owner.get(key, [])
+        good = isinstance(found, list) and all(type(index) is int for index in found)
+        expect(good, f"{self.path}: {where}.{key}", "a list of indices", found)
+        return list(found)
+
+    def _local_matrix(self, node: dict[str, Any], where: str) -> Array:
+        if "matrix" in node:
+            columns = self.document.numbers(node, "matrix", where, tuple(np.eye(4).ravel().tolist()))
+            return affine(np.reshape(columns, (4, 4)).T.ravel().tolist(), f"{self.path}: {where}.matrix")
+        if not {"translation", "rotation", "scale"} & node.keys():
+            return np.eye(4)
+        translation = self.document.numbers(node, "translation", where, (0.0, 0.0, 0.0))
+        scale = self.document.numbers(node, "scale", where, (1.0, 1.0, 1.0))
+        rotation = self.document.numbers(node, "rotation", where, (0.0, 0.0, 0.0, 1.0))
+        matrix = np.eye(4)
+        matrix[:3, :3] = _rotation(rotation, f"{self.path}: {where}.rotation") * scale
+        matrix[:3, 3] = translation
+        return affine(matrix.ravel().tolist(), f"{self.path}: {where} (translation, rotation, scale)")
+
+    def _mesh(self, index: Any, referrer: str) -> list[Mesh]:
+        entry = self.document.item("meshes", index, referrer)
+        if index not in self._shapes:
+            name = self.document.name(entry, f"meshes[{index}]")
+            primitives = entry.get("primitives", [])
+            good = isinstance(primitives, list) and all(isinstance(p, dict) for p in primitives)
+            expect(good, f"{self.path}: meshes[{index}].primitives", "a list of objects", primitives)
+            read = (self._primitive(p, f"meshes[{index}].primitives[{k}]", name) for k, p in enumerate(primitives))
+            self._shapes[index] = [mesh for mesh in read if mesh is not None]
+        return self._shapes[index]
+
+    def _primitive(self, entry: dict[str, Any], where: str, name: str) -> Mesh | None:
+        mode = entry.get("mode", TRIANGLES)
+        if mode not in (TRIANGLES, STRIP, FAN):
+            self._pass_over("primitive(s) without triangles")
+            return None
+        attributes = self.document.member(entry, "attributes", where)
+        expect("POSITION" in attributes, f"{self.path}: {where}.attributes", "a POSITION", sorted(attributes))
+        vertices = accessor(self.document, attributes["POSITION"], "VEC3", f"{where}.attributes.POSITION")
+        normals = None
+        if "NORMAL" in attributes:
+            normals = accessor(self.document, attributes["NORMAL"], "VEC3", f"{where}.attributes.NORMAL")
+        corners = np.arange(len(vertices), dtype=np.int64)
+        if "indices" in entry:
+            corners = accessor(self.document, entry["indices"], "SCALAR", f"{where}.indices").astype(np.int64)
+        mesh = Mesh(vertices, _triangles(corners, mode, f"{self.path}: {where}"), normals,
+                    self._material_of(entry, where), name)
+        mesh.expect_sound(f"{self.path}: {where}")
+        return mesh
+
+    def _material_of(self, entry: dict[str, Any], where: str) -> Material:
+        if "material" not in entry:
+            return Material()
+        index = entry["material"]
+        self.document.item("materials", index, f"{where}.material")
+        return self.materials[int(index)]
+
+    def _material(self, index: int) -> Material:
+        entry, where = self.document.items("materials")[index], f"materials[{index}]"
+        surface = self.document.member(entry, "pbrMetallicRoughness", where)
+        if "baseColorTexture" in surface or "emissiveTexture" in entry:
+            self._pass_over("material(s)' textures")
+        base = self.document.numbers(surface, "baseColorFactor", f"{where}.pbrMetallicRoughness", (1.0,) * 4)
+        emissive = self.document.numbers(entry, "emissiveFactor", where, (0.0, 0.0, 0.0))
+        key = "KHR_materials_emissive_strength"
+        extension = self.document.member(self.document.member(entry, "extensions", where), key, where)
+        strength = self.document.number(extension, "emissiveStrength", f"{where}.extensions.{key}", 1.0)
+        emission: Rgb = (emissive[0] * strength, emissive[1] * strength, emissive[2] * strength)
+        try:
+            return Material(self.document.name(entry, where), (base[0], base[1], base[2]), emission=emission)
+        except InputError as error:
+            raise InputError(f"{self.path}: {where}: {error}") from error
+
+    def _pass_over(self, what: str) -> None:
+        self.passed_over[what] = self.passed_over.get(what, 0) + 1
+
+
+def _rotation(quaternion: tuple[float, ...], where: str) -> Array:
+    """Return the (3, 3) rotation of a quaternion (x, y, z, w) of any length but zero."""
+    length = float(np.linalg.norm(quaternion))
+    expect(length > 0, where, "a quaternion that is not zero", quaternion)
+    x, y, z, w = (c / length for c in quaternion)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+
+
+def _triangles(corners: Array, mode: int, where: str) -> Array:
+    """Return (m, 3) faces from the corner list of a triangle list, strip or fan."""
+    if mode == TRIANGLES:
+        expect(len(corners) % 3 == 0, f"{where}.indices", "three per triangle", len(corners))
+        return corners.reshape(-1, 3)
+    count = max(len(corners) - 2, 0)
+    if mode == FAN:
+        return np.stack([np.repeat(corners[:1], count), corners[1:-1][:count], corners[2:]], axis=1)
+    faces = np.stack([corners[:count], corners[1 : count + 1], corners[2 : count + 2]], axis=1)
+    faces[1::2, :2] = faces[1::2, 1::-1]
+    return faces

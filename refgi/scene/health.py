@@ -1,0 +1,131 @@
+"""What a mesh must satisfy before anything else sees it, and what is quietly mended with a count.
+
+Errors: a shape that is not a mesh, a coordinate that is not finite, an index without a vertex. Mended: zero-area faces
+are dropped, vertex normals are brought to unit length, and a vertex whose normal is zero or not finite gets the mean
+of its faces' normals.
+"""
+
+import dataclasses
+import warnings
+
+import numpy as np
+
+from refgi.errors import RefgiWarning, expect
+from refgi.scene.model import Array, Mesh
+
+# A face counts as flat when twice its area is lost in the rounding of the cross product that gives it.
+FLAT = 16 * float(np.finfo(np.float64).eps)
+
+
+def mended(mesh: Mesh, where: str) -> tuple[Mesh, int]:
+    """Return the mesh without its zero-area faces and with unit vertex normals.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        A mesh as read.
+    where : str
+        File and object, for the error's text.
+
+    Returns
+    -------
+    Mesh
+        The same object where nothing had to change.
+    int
+        Number of faces dropped.
+
+    Raises
+    ------
+    InputError
+        If coordinates are not finite, indices out of range, or no face has an area.
+    """
+    mesh.expect_sound(where)
+    flat = zero_area(mesh.vertices, mesh.faces)
+    dropped = int(np.count_nonzero(flat))
+    expect(dropped < len(mesh.faces), f"{where}: faces", "at least one with an area", f"{dropped} of zero area")
+    if dropped:
+        mesh = dataclasses.replace(mesh, faces=mesh.faces[~flat])
+    if mesh.normals is not None:
+        mesh = dataclasses.replace(mesh, normals=unit_normals(mesh))
+    return mesh, dropped
+
+
+def warn_of_flat_faces(count: int, where: str) -> None:
+    """Say how many zero-area faces were passed over, if any.
+
+    Parameters
+    ----------
+    count : int
+        Faces dropped.
+    where : str
+        The scene or file they came from.
+    """
+    if count:
+        noun = "face" if count == 1 else "faces"
+        warnings.warn(RefgiWarning(f"{where}: {count} {noun} of zero area skipped"), stacklevel=3)
+
+
+def zero_area(vertices: Array, faces: Array) -> Array:
+    """Return which faces have no area beyond rounding.
+
+    Parameters
+    ----------
+    vertices : (n, 3) ndarray
+        Positions, m.
+    faces : (m, 3) ndarray
+        Vertex indices.
+
+    Returns
+    -------
+    (m,) ndarray of bool
+        True where the cross product of two edges vanishes against their lengths.
+    """
+    a, b, c = (np.asarray(vertices, np.float64)[faces[:, k]] for k in range(3))
+    scale = np.abs(b - a).max(axis=1, initial=0.0) * np.abs(c - a).max(axis=1, initial=0.0)
+    return np.asarray(np.abs(np.cross(b - a, c - a)).max(axis=1, initial=0.0) <= FLAT * scale)
+
+
+def unit_normals(mesh: Mesh) -> Array:
+    """Return the vertex normals at unit length, those that are missing filled in from the faces.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        A mesh with normals.
+
+    Returns
+    -------
+    (n, 3) ndarray of float64
+        Unit vectors; (0, 1, 0) at a vertex that no face with an area uses.
+    """
+    normals = np.asarray(mesh.normals, np.float64)
+    length = np.linalg.norm(normals, axis=1)
+    missing = ~(np.isfinite(length) & (length > 0))
+    if missing.any():
+        normals = np.where(missing[:, None], mean_face_normals(mesh.vertices, mesh.faces), normals)
+        length = np.linalg.norm(normals, axis=1)
+    return np.asarray(normals / length[:, None])
+
+
+def mean_face_normals(vertices: Array, faces: Array) -> Array:
+    """Return the area-weighted mean of the normals of the faces around each vertex.
+
+    Parameters
+    ----------
+    vertices : (n, 3) ndarray
+        Positions, m.
+    faces : (m, 3) ndarray
+        Vertex indices.
+
+    Returns
+    -------
+    (n, 3) ndarray of float64
+        Unit vectors; (0, 1, 0) where the mean vanishes.
+    """
+    a, b, c = (np.asarray(vertices, np.float64)[faces[:, k]] for k in range(3))
+    cross = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    total = np.stack([np.bincount(faces.ravel(), cross[:, k], len(vertices)) for k in range(3)], axis=1)
+    length = np.linalg.norm(total, axis=1)
+    total[length == 0] = (0.0, 1.0, 0.0)
+    length[length == 0] = 1.0
+    return np.asarray(total / length[:, None])

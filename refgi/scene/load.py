@@ -1,0 +1,93 @@
+"""`load_scene`: a built-in name, a scene file or a mesh file in, a `Scene` out."""
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from refgi.errors import InputError, RefgiWarning
+from refgi.scene.builtin import SCENES, build_named
+from refgi.scene.files import did_you_mean
+from refgi.scene.framing import framed, lit
+from refgi.scene.health import mended, warn_of_flat_faces
+from refgi.scene.meshfile import READERS, read_mesh_file
+from refgi.scene.model import Camera, Light, Scene, merge
+from refgi.scene.power import shining
+from refgi.scene.scenefile import read_scene_file
+from refgi.stages import stage
+
+
+@stage("scene.load")
+def load_scene(
+    source: str | Path, *, camera: Camera | None = None, lights: Sequence[Light] | None = None
+) -> Scene:
+    """Load a built-in scene, a scene file or a mesh file.
+
+    Parameters
+    ----------
+    source : str or Path
+        A built-in scene's name, with parameters after a colon (``"atrium:faces=1000000,seed=3"``), or the path of a
+        ``.json`` scene file or a ``.glb``, ``.gltf``, ``.obj`` or ``.ply`` mesh.
+    camera : Camera, optional
+        Looks instead of the scene's own camera.
+    lights : sequence of Light, optional
+        Shine instead of the scene's own lights.
+
+    Returns
+    -------
+    Scene
+        At least one face, one light of power above zero, and a camera.
+
+    Raises
+    ------
+    InputError
+        If the name or a parameter is unknown, or a file cannot be used; names file, key and value.
+
+    Notes
+    -----
+    A mesh file without camera or light gets a camera that frames it and a spot that lights it, with a `RefgiWarning`.
+
+    Examples
+    --------
+    >>> load_scene("cornell_box").face_count
+    30
+    """
+    name = str(source)
+    base = name.partition(":")[0]
+    if isinstance(source, str) and base in SCENES:
+        return _with(build_named(name), camera, lights)
+    path = Path(source)
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        return read_scene_file(path, camera, lights)
+    if suffix in READERS:
+        return _of_mesh_file(path, camera, lights)
+    if suffix or path.exists():
+        what = "a folder" if path.is_dir() else f"the suffix {suffix!r}"
+        raise InputError(f"{path}: expected a scene name or a file named .json, {', '.join(READERS)}; got {what}"
+                         f"{did_you_mean(base, SCENES)}")
+    raise InputError(f"scene: expected one of {', '.join(SCENES)}, or a file; got {name!r}{did_you_mean(base, SCENES)}")
+
+
+def _with(scene: Scene, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
+    if camera is not None:
+        scene = Scene(scene.name, scene.geometry, scene.materials, camera, scene.lights, scene.description,
+                      scene.exposure)
+    return scene if lights is None else scene.with_lights(*shining(lights, "lights"))
+
+
+def _of_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
+    found = read_mesh_file(path)
+    mends = [mended(mesh, f"{path}: {mesh.name}") for mesh in found.meshes]
+    warn_of_flat_faces(sum(dropped for _, dropped in mends), str(path))
+    geometry, materials = merge([mesh for mesh, _ in mends], smooth=True)
+    lacking = []
+    if camera is None:
+        camera = found.cameras[0] if found.cameras else framed(geometry)
+        lacking += [] if found.cameras else ["camera"]
+    if lights is None:
+        lights = found.lights or (lit(geometry),)
+        lacking += [] if found.lights else ["light"]
+    if lacking:
+        text = f"{path}: the file has no {' and no '.join(lacking)}; one was placed to fit the mesh"
+        warnings.warn(RefgiWarning(text), stacklevel=4)
+    return Scene(path.stem, geometry, materials, camera, shining(lights, f"{path}: lights"))

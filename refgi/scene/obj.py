@@ -1,0 +1,167 @@
+"""Wavefront OBJ meshes and the diffuse, specular and emissive colours of their MTL files.
+
+Read line by line here, because trimesh counts a negative index from the end of the whole file and not from the line
+it stands on, takes index 0 for 1, hands groups back in reverse order and rounds colours to eight bits.
+"""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from refgi.errors import InputError, expect
+from refgi.scene.files import Contents, read_bytes
+from refgi.scene.model import Material, Mesh, Rgb
+
+Corner = tuple[int, int]  # position and normal (-1: none), counted from 0
+
+
+def read_obj(path: Path) -> Contents:
+    """Read the polygons of an OBJ file, one mesh per material in order of first use.
+
+    Parameters
+    ----------
+    path : Path
+        The file; `mtllib` files are looked for beside it.
+
+    Returns
+    -------
+    Contents
+        Meshes with vertex normals where every corner names one.
+
+    Raises
+    ------
+    InputError
+        If a line cannot be read, an index is out of range, or there are no polygons.
+    """
+    reader = _Reader(path)
+    for number, words in _lines(path):
+        reader.take(words, f"{path}: line {number}")
+    return reader.contents()
+
+
+class _Reader:
+    """Positions, normals and polygons by material, as the lines come."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.positions: list[tuple[float, ...]] = []
+        self.normals: list[tuple[float, ...]] = []
+        self.materials: dict[str, Material] = {}
+        self.triangles: dict[str, list[Corner]] = {}
+        self.current = "default"
+
+    def take(self, words: list[str], where: str) -> None:
+        key, values = words[0], words[1:]
+        if key == "v":
+            self.positions.append(_numbers(values[:3], where))
+        elif key == "vn":
+            self.normals.append(_numbers(values[:3], where))
+        elif key == "f":
+            self._polygon(values, where)
+        elif key == "usemtl" and values:
+            self.current = " ".join(values)
+        elif key == "mtllib" and values:
+            self.materials |= read_mtl(self.path.parent / " ".join(values))
+
+    def contents(self) -> Contents:
+        expect(bool(self.triangles), f"{self.path}: f", "at least one polygon", 0)
+        return Contents(tuple(self._mesh(name) for name in self.triangles))
+
+    def _polygon(self, values: list[str], where: str) -> None:
+        expect(len(values) >= 3, where, "three or more corners", len(values))
+        corners = [self._corner(value, where) for value in values]
+        fan = self.triangles.setdefault(self.current, [])
+        for second, third in pairwise(corners[1:]):
+            fan += (corners[0], second, third)
+
+    def _corner(self, text: str, where: str) -> Corner:
+        parts = text.split("/")
+        position = _index(parts[0], len(self.positions), where)
+        return position, _index(parts[2], len(self.normals), where) if len(parts) > 2 and parts[2] else -1
+
+    def _mesh(self, name: str) -> Mesh:
+        corners = np.array(self.triangles[name], np.int64)
+        material = self.materials.get(name, Material(name))
+        if (corners[:, 1] < 0).any():
+            used, faces = np.unique(corners[:, 0], return_inverse=True)
+            normals = None
+        else:
+            pairs, faces = np.unique(corners, axis=0, return_inverse=True)
+            used, normals = pairs[:, 0], np.array(self.normals)[pairs[:, 1]]
+        mesh = Mesh(np.array(self.positions)[used], faces.reshape(-1, 3), normals, material, name)
+        mesh.expect_sound(f"{self.path}: material {name!r}")
+        return mesh
+
+
+def read_mtl(path: Path) -> dict[str, Material]:
+    """Read the materials of an MTL file: Kd as albedo, Ks and Ns as Phong lobe, Ke as emission.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict of str to Material
+        By name. A lobe that would reflect more than arrives together with Kd is left out.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or a value is out of range.
+    """
+    values: dict[str, dict[str, tuple[float, ...]]] = {}
+    current: dict[str, tuple[float, ...]] = {}
+    for number, words in _lines(path):
+        if words[0] == "newmtl":
+            current = values.setdefault(" ".join(words[1:]), {})
+        elif words[0] in ("Kd", "Ks", "Ke"):
+            current[words[0]] = _numbers(words[1:4], f"{path}: line {number}")
+        elif words[0] == "Ns":
+            current["Ns"] = _numbers(words[1:2], f"{path}: line {number}", 1)
+    return {name: _material(name, found, path) for name, found in values.items()}
+
+
+def _material(name: str, found: dict[str, tuple[float, ...]], path: Path) -> Material:
+    diffuse, specular = found.get("Kd", (0.5, 0.5, 0.5)), found.get("Ks", (0.0, 0.0, 0.0))
+    exponent = found.get("Ns", (0.0,))[0]
+    if exponent <= 0 or max(d + s for d, s in zip(diffuse, specular, strict=True)) > 1:
+        specular, exponent = (0.0, 0.0, 0.0), 0.0
+    try:
+        return Material(name, _rgb(diffuse), _rgb(specular), exponent, emission=_rgb(found.get("Ke", (0.0, 0.0, 0.0))))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Yield the number and the words of each line that says something, continued lines joined."""
+    text = read_bytes(path).decode("utf-8", "replace").replace("\\\r\n", " ").replace("\\\n", " ")
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.partition("#")[0].split()
+        if words:
+            yield number, words
+
+
+def _numbers(words: list[str], where: str, count: int = 3) -> tuple[float, ...]:
+    try:
+        values = tuple(float(word) for word in words)
+    except ValueError:
+        values = ()
+    expect(len(values) == count, where, f"{count} number(s)", " ".join(words))
+    return values
+
+
+def _index(text: str, count: int, where: str) -> int:
+    try:
+        index = int(text)
+    except ValueError:
+        index = 0
+    expect(1 <= abs(index) <= count, where, f"an index from 1 to {count} (or negative)", text)
+    return index - 1 if index > 0 else count + index
+
+
+def _rgb(values: tuple[float, ...]) -> Rgb:
+    return values[0], values[1], values[2]

@@ -1,0 +1,151 @@
+"""Scene files: JSON that names meshes, materials, camera and lights (docs/scenes.md has the keys)."""
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from refgi.errors import InputError
+from refgi.scene.files import Contents, read_bytes
+from refgi.scene.health import mended, warn_of_flat_faces
+from refgi.scene.meshfile import read_mesh_file
+from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
+from refgi.scene.power import shining
+from refgi.scene.transform import affine, placed
+
+if TYPE_CHECKING:
+    from refgi.scene.schema import Object, SceneFile
+
+
+def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
+    """Read a JSON scene file and the meshes it names.
+
+    Parameters
+    ----------
+    path : Path
+        The file; meshes are looked for beside it.
+    camera : Camera or None
+        Replaces the file's.
+    lights : sequence of Light or None
+        Replace the file's.
+
+    Returns
+    -------
+    Scene
+        The scene, in the order of the file's objects.
+
+    Raises
+    ------
+    InputError
+        One error with all faults of the file, else one with all faults of its meshes.
+    """
+    entry = _validated(read_bytes(path), path, need_camera=camera is None, need_lights=lights is None)
+    materials = {name: given.built(name) for name, given in entry.materials.items()}
+    meshes = _meshes(entry, materials, path)
+    geometry, used = merge(meshes, smooth=any(mesh.normals is not None for mesh in meshes))
+    if camera is None and entry.camera is not None:
+        camera = entry.camera.built("")
+    given = tuple(light.built("") for light in entry.lights) if lights is None else tuple(lights)
+    assert camera is not None  # _validated has seen to it
+    return Scene(entry.name, geometry, used, camera, shining(given, f"{path}: lights"), entry.description,
+                 entry.preview_exposure)
+
+
+def _validated(content: bytes, path: Path, *, need_camera: bool, need_lights: bool) -> "SceneFile":
+    """Return the parsed file, or raise one error that lists all faults."""
+    from pydantic import ValidationError
+
+    from refgi.scene.schema import SceneFile
+
+    tree = _parsed(content, path)
+    named = tree.get("materials")
+    faults = [f"{key}: expected {what}, nothing given" for key, what, needed in (
+        ("camera", "an object", need_camera), ("lights", "at least one light", need_lights)
+    ) if needed and tree.get(key) in (None, [])]
+    try:
+        entry = SceneFile.model_validate_json(content, context=set(named) if isinstance(named, dict) else set())
+    except ValidationError as error:
+        faults = [_fault(detail) for detail in error.errors(include_url=False)] + faults
+    except (ValueError, RecursionError) as error:
+        faults = [str(error)]
+    if faults:
+        raise InputError("\n".join(f"{path}: {fault}" for fault in faults))
+    return entry
+
+
+def _parsed(content: bytes, path: Path) -> dict[str, Any]:
+    def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        tree = dict(pairs)
+        if len(tree) < len(pairs):
+            keys = [key for key, _ in pairs]
+            repeated = sorted({key for key in keys if keys.count(key) > 1})
+            raise InputError(f"{path}: {', '.join(repeated)}: expected each key once in an object")
+        return tree
+
+    try:
+        tree = json.loads(content.decode("utf-8-sig"), object_pairs_hook=without_repeats)
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: damaged JSON: {error}") from error
+    if not isinstance(tree, dict):
+        raise InputError(f"{path}: expected a JSON object, got {type(tree).__name__}")
+    return tree
+
+
+def _fault(detail: Any) -> str:
+    """Return "key: what was expected, got value" of one pydantic error."""
+    key = ""
+    for part in detail["loc"]:
+        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else str(part)
+    text = str(detail["msg"]).removeprefix("Value error, ")
+    value = repr(detail["input"])
+    shown = "" if detail["type"] in ("value_error", "missing") else f", got {value if len(value) < 80 else value[:77]}"
+    return f"{key or 'file'}: {text}{shown}"
+
+
+def _meshes(entry: "SceneFile", materials: dict[str, Material], path: Path) -> list[Mesh]:
+    """Return the placed meshes of all objects, or raise one error with what is wrong with any of them."""
+    contents: dict[str, Contents | InputError] = {}
+    meshes: list[Mesh] = []
+    faults: list[str] = []
+    dropped = 0
+    for number, given in enumerate(entry.objects):
+        try:
+            found = _read_once(contents, given.mesh, path.parent)
+            for mesh in found.meshes:
+                sound, flat = mended(_dressed(mesh, given, materials, entry.smooth_normals), f"{given.mesh}")
+                dropped += flat
+                matrix = affine(given.transform, "transform") if given.transform else None
+                meshes.append(sound if matrix is None else placed(sound, matrix))
+        except InputError as error:
+            faults.append(f"{path}: objects[{number}].mesh: {error}")
+    if faults:
+        raise InputError("\n".join(faults))
+    warn_of_flat_faces(dropped, str(path))
+    return meshes
+
+
+def _read_once(contents: dict[str, Contents | InputError], name: str, folder: Path) -> Contents:
+    if name not in contents:
+        try:
+            contents[name] = read_mesh_file(folder / name)
+        except InputError as error:
+            contents[name] = error
+    found = contents[name]
+    if isinstance(found, InputError):
+        raise found
+    return found
+
+
+def _dressed(mesh: Mesh, given: "Object", materials: dict[str, Material], smooth: bool) -> Mesh:
+    """Return the mesh with the material it shows, and with normals only where the scene asks for them."""
+    if isinstance(given.material, str):
+        material = materials[given.material]
+    elif given.material is not None:
+        material = given.material.built(given.name or mesh.name)
+    else:
+        material = materials.get(mesh.material.name, mesh.material)
+    wanted = smooth if given.smooth_normals is None else given.smooth_normals
+    return dataclasses.replace(mesh, material=material, normals=mesh.normals if wanted else None)

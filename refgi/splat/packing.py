@@ -1,0 +1,147 @@
+"""Pixel lights as the arrays kernels read: offset, normals reversed, constants folded into the flux.
+
+Everything is computed in float64 and rounded once, to the dtype of the receivers.
+"""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.splat.lobe_sum import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
+from refgi.splat.pair_sum import Clamp
+from refgi.splat.settings import PairSettings
+
+if TYPE_CHECKING:
+    from refgi.rsm import PixelLights
+
+Array = npt.NDArray[Any]
+
+NORMS = {"none": NO_NORM, "full_lobe": FULL_LOBE, "clamped": CLAMPED}
+
+
+def pack_diffuse(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:
+    """Pack lights for `sum_pairs`: offset position, reversed normal, flux / pi; an even number of them.
+
+    Parameters
+    ----------
+    lights : PixelLights
+        Lights.
+    settings : PairSettings
+        Says offset and pi.
+    dtype : dtype
+        Of the result; computed in float64.
+    chosen : (N,) ndarray of bool
+        Which lights.
+
+    Returns
+    -------
+    (9, M) ndarray
+        Packed lights, the last one black where their number is odd.
+    """
+    scale = 1.0 if "sii_no_pi" in settings.as_published else 1.0 / math.pi
+    packed = np.concatenate([*_place(lights, settings, chosen), np.asarray(lights.flux[:, chosen], np.float64) * scale])
+    if packed.shape[1] % 2:
+        packed = np.concatenate([packed, packed[:, -1:] * ([[1.0]] * 6 + [[0.0]] * 3)], axis=1)
+    return packed.astype(dtype)
+
+
+def _place(lights: "PixelLights", settings: PairSettings, chosen: Array) -> tuple[Array, Array]:
+    normal = np.asarray(lights.normal[:, chosen], np.float64)
+    return lights.position[:, chosen] - settings.offset * normal, -normal
+
+
+def pack_lobes(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:
+    """Pack glossy lights for `add_lobes`: offset position, reversed normal, reversed axis, exponent, flux times norm.
+
+    Parameters
+    ----------
+    lights : PixelLights
+        Lights.
+    settings : PairSettings
+        Says offset and norm.
+    dtype : dtype
+        Of the result; computed in float64.
+    chosen : (N,) ndarray of bool
+        Which lights.
+
+    Returns
+    -------
+    (13, M) ndarray
+        Packed lights.
+    """
+    flux, axis, exponent = _lobes(lights, chosen)
+    cos_theta = (lights.normal[:, chosen] * axis).sum(axis=0)
+    norm = [lobe_norm_factor(float(c), float(p), NORMS[settings.lobe_norm])
+            for c, p in zip(cos_theta, exponent, strict=True)]
+    return np.concatenate([*_place(lights, settings, chosen), -axis, exponent[None], flux * norm]).astype(dtype)
+
+
+def _lobes(lights: "PixelLights", chosen: Array) -> tuple[Array, Array, Array]:
+    expect(lights.lobe_axis is not None and lights.lobe_exponent is not None, "lights.lobe_axis",
+           "axis and exponent of every lobe", None)
+    flux, axis, exponent = (np.asarray(part[..., chosen], np.float64)
+                            for part in (lights.lobe_flux, lights.lobe_axis, lights.lobe_exponent))
+    expect(bool((np.isfinite(exponent) & (exponent >= 0)).all()), "lights.lobe_exponent", "finite numbers >= 0",
+           exponent.min())
+    return flux, axis, exponent
+
+
+def pack_clamp(settings: PairSettings, footprint: Array | None, chosen: Array, count: int, dtype: Any) -> Clamp:
+    """Say for the kernels how near pairs are kept finite.
+
+    Parameters
+    ----------
+    settings : PairSettings
+        Says the mode and its value.
+    footprint : (N,) ndarray or None
+        Surface area each light stands for, m^2.
+    chosen : (N,) ndarray of bool
+        Which lights.
+    count : int
+        How many lights were packed.
+    dtype : dtype
+        Of the kernels.
+
+    Returns
+    -------
+    Clamp
+        With neutral values for the modes not in use.
+    """
+    softness = np.zeros(count, dtype)
+    if settings.clamp == "disc" and footprint is not None:
+        softness[: np.count_nonzero(chosen)] = footprint[chosen] / math.pi
+    least = settings.clamp_value**2 if settings.clamp == "distance" else 0.0
+    bound = settings.clamp_value if settings.clamp == "geometry" else math.inf
+    return Clamp(np.dtype(dtype).type(least), softness, np.dtype(dtype).type(bound))
+
+
+def pack_widening(lights: "PixelLights", settings: PairSettings, dtype: Any, chosen: Array) -> Widening | None:
+    """Say for the kernels how exponents fall near the light (SII Sec. 3.3).
+
+    Parameters
+    ----------
+    lights : PixelLights
+        Lights.
+    settings : PairSettings
+        Says distance, slope and norm.
+    dtype : dtype
+        Of the kernels.
+    chosen : (N,) ndarray of bool
+        Which lights.
+
+    Returns
+    -------
+    Widening or None
+        None where exponents stay.
+    """
+    if settings.widening == 0:
+        return None
+    _, axis, _ = _lobes(lights, chosen)
+    literal = "sii_widening" in settings.as_published
+    keeps_norm = literal or "sii_widening_unnorm" in settings.as_published
+    return Widening(np.dtype(dtype).type(settings.widening), LITERAL if literal else CORRECTED,
+                    -1 if keeps_norm else NORMS[settings.lobe_norm],
+                    (lights.normal[:, chosen] * axis).sum(axis=0).astype(dtype))

@@ -1,0 +1,46 @@
+"""How one pixel light lights one receiver: what the pair sum of every splatting method can be set to."""
+
+import dataclasses
+import math
+from typing import Literal
+
+from refgi.errors import expect
+
+ClampMode = Literal["none", "distance", "geometry", "disc"]
+LobeNorm = Literal["none", "full_lobe", "clamped"]
+
+SWITCHES = frozenset({"sii_no_pi", "sii_widening", "sii_widening_unnorm"})
+
+
+@dataclasses.dataclass(frozen=True)
+class PairSettings:
+    """How one pixel light lights one receiver.
+
+    `clamp` keeps near pairs finite: not at all, by a minimum `distance` of `clamp_value` m, by a `geometry` term of
+    at most `clamp_value` 1/m^2, or by the form factor of a `disc` of the light's footprint. `offset` moves lights
+    back along their normals (m). `lobe_norm` is the norm of Phong lobes and `widening` the distance a (m) within
+    which their exponents fall (0: nowhere). `as_published` names forms to use as printed; see docs/methods/sii.
+    """
+
+    clamp: ClampMode = "none"
+    clamp_value: float = 0.0
+    offset: float = 0.0
+    lobe_norm: LobeNorm = "clamped"
+    widening: float = 0.0
+    as_published: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        expect(self.clamp in ("none", "distance", "geometry", "disc"), "clamp",
+               "'none', 'distance', 'geometry' or 'disc'", self.clamp)
+        needed = self.clamp in ("distance", "geometry")
+        expect(math.isfinite(self.clamp_value) and (self.clamp_value > 0 or (not needed and self.clamp_value == 0)),
+               "clamp_value", f"a finite number > 0 for the clamp {self.clamp!r}" if needed else "a number >= 0",
+               self.clamp_value)
+        expect(math.isfinite(self.offset), "offset", "a finite length, m", self.offset)
+        expect(self.lobe_norm in ("none", "full_lobe", "clamped"), "lobe_norm",
+               "'none', 'full_lobe' or 'clamped'", self.lobe_norm)
+        expect(math.isfinite(self.widening) and self.widening >= 0, "widening", "a finite length >= 0, m",
+               self.widening)
+        object.__setattr__(self, "as_published", frozenset(self.as_published))
+        expect(self.as_published <= SWITCHES, "as_published", f"names out of {sorted(SWITCHES)}",
+               sorted(self.as_published))

@@ -22,6 +22,7 @@ from refgi.splat.pair_sum import GROUP, LEAST_SQUARE, NX, SUM, TILE, TOTAL, Clam
 Array = npt.NDArray[Any]
 
 NO_NORM, FULL_LOBE, CLAMPED = 0, 1, 2  # lobe_norm as a kernel sees it
+H, TERM, R, EXPONENT = 12, 13, 14, 15  # further rows of a tile, of one light
 CORRECTED, LITERAL = 0, 1  # slope of the widened exponent: P min(1, r / a), or min(P, P / (r a)) as printed
 
 
@@ -83,19 +84,14 @@ def add_lobes(
     for block in prange((count + TILE - 1) // TILE):
         first = block * TILE
         size = min(TILE, count - first)
-        tile = np.zeros((12, TILE), position.dtype)
+        tile = np.zeros((16, TILE), position.dtype)
         load_tile(tile, position, normal, first, size)
         for group in range(0, lights.shape[1], GROUP):
             for k in range(group, min(group + GROUP, lights.shape[1])):
-                light = _light(lights, k)
-                for i in range(TILE):
-                    receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-                    if widening is None:
-                        g = _lobe(light, receiver, clamp, k)
-                    else:
-                        g = _widened_lobe(light, receiver, clamp, widening, k)
-                    for c in range(3):
-                        tile[SUM + c, i] += g * light[10 + c]
+                _shine(tile, _light(lights, k), clamp.least, clamp.softness[k], clamp.bound)
+                if widening is not None:
+                    _widen(tile, lights[9, k], widening, k)
+                _add(tile, lights[9, k], lights[10, k], lights[11, k], lights[12, k], widening is not None)
             for c in range(3):
                 for i in range(TILE):
                     tile[TOTAL + c, i] += tile[SUM + c, i]
@@ -108,58 +104,60 @@ def add_lobes(
 @kernel
 def _light(lights: Array, k: int) -> Any:
     return (lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k], lights[6, k],
-            lights[7, k], lights[8, k], lights[9, k], lights[10, k], lights[11, k], lights[12, k])
+            lights[7, k], lights[8, k])
 
 
 @kernel
-def _geometry(light: Any, receiver: Any, clamp: Clamp, k: int) -> Any:
-    """Return h = 1 - r . w (2 where the light's surface hides the receiver), c_x / r^2 and r."""
-    x, y, z, nx, ny, nz = receiver
-    real = type(x)
-    zero, half = real(0.0), real(0.5)
-    dx, dy, dz = light[0] - x, light[1] - y, light[2] - z
-    square = dx * dx + dy * dy + dz * dz
-    square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
-    r = math.sqrt(square)
-    inverse = real(1.0) / r
-    cx = (dx * nx + dy * ny + dz * nz) * inverse
-    above = dx * light[3] + dy * light[4] + dz * light[5]
-    ox, oy, oz = light[6] - dx * inverse, light[7] - dy * inverse, light[8] - dz * inverse
-    h = half * (ox * ox + oy * oy + oz * oz)
-    kept = (square if square > clamp.least else clamp.least) + clamp.softness[k]
-    term = (cx if cx > zero else zero) / kept
-    return h if above > zero else real(2.0), term if term < clamp.bound else clamp.bound, r
+def _shine(tile: Array, light: Any, least: Any, softness: Any, bound: Any) -> None:
+    """Fill rows H with 1 - r . w, TERM with c_x / r^2 where the lobe reaches (0 elsewhere) and R with r."""
+    real = tile.dtype.type
+    zero, half, one = real(0.0), real(0.5), real(1.0)
+    x, y, z, lx, ly, lz, ax, ay, az = light
+    for i in range(TILE):
+        dx, dy, dz = x - tile[X, i], y - tile[X + 1, i], z - tile[X + 2, i]
+        square = dx * dx + dy * dy + dz * dz
+        square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
+        r = math.sqrt(square)
+        inverse = one / r
+        cx = (dx * tile[NX, i] + dy * tile[NX + 1, i] + dz * tile[NX + 2, i]) * inverse
+        ox, oy, oz = ax - dx * inverse, ay - dy * inverse, az - dz * inverse
+        h = half * (ox * ox + oy * oy + oz * oz)
+        kept = (square if square > least else least) + softness
+        term = (cx if cx > zero else zero) / kept
+        term = term if term < bound else bound
+        above = dx * lx + dy * ly + dz * lz
+        reach = h if above > zero else one
+        tile[H, i] = reach if reach < one else zero
+        tile[TERM, i] = term if reach < one else zero
+        tile[R, i] = r
 
 
 @kernel
-def _power(h: Any, exponent: Any) -> Any:
-    """Return (1 - h)^P, 0 from h = 1 on."""
-    real = type(h)
+def _widen(tile: Array, exponent: Any, widening: Widening, k: int) -> None:
+    """Fill row EXPONENT with P' (Sec. 3.3) and scale TERM by c(P') / c(P)."""
+    real = tile.dtype.type
     one = real(1.0)
-    inside = h if h < one else real(0.0)
-    value = exp(exponent * log1p(-inside))
-    return value if h < one else real(0.0)
-
-
-@kernel
-def _lobe(light: Any, receiver: Any, clamp: Clamp, k: int) -> Any:
-    h, term, _ = _geometry(light, receiver, clamp, k)
-    return _power(h, light[9]) * term  # Eq. (3); the norm is part of the packed flux
-
-
-@kernel
-def _widened_lobe(light: Any, receiver: Any, clamp: Clamp, widening: Widening, k: int) -> Any:
-    h, term, r = _geometry(light, receiver, clamp, k)
-    real = type(h)
-    if not (h < real(1.0) and term > real(0.0)):
-        return real(0.0)
-    share = r / widening.distance if widening.slope == CORRECTED else real(1.0) / (r * widening.distance)
-    if share >= real(1.0):
-        return _power(h, light[9]) * term
-    widened = light[9] * share  # P' of Sec. 3.3
-    term *= _power(h, widened)
-    if widening.norm < 0:
-        return term
     cos_theta = widening.cos_theta[k]
-    whole = lobe_norm_factor(cos_theta, light[9], widening.norm)
-    return term * (lobe_norm_factor(cos_theta, widened, widening.norm) / whole)
+    whole = lobe_norm_factor(cos_theta, exponent, widening.norm)
+    for i in range(TILE):
+        r = tile[R, i]
+        share = r / widening.distance if widening.slope == CORRECTED else one / (r * widening.distance)
+        tile[EXPONENT, i] = exponent * (share if share < one else one)
+        if widening.norm >= 0 and share < one and tile[TERM, i] > real(0.0):
+            tile[TERM, i] *= lobe_norm_factor(cos_theta, tile[EXPONENT, i], widening.norm) / whole
+
+
+@kernel
+def _add(tile: Array, exponent: Any, red: Any, green: Any, blue: Any, widened: bool) -> None:
+    """Add flux (1 - h)^P c_x / r^2 of one light to the group's sum; Eq. (3), whose norm is part of the flux."""
+    if not widened:
+        for i in range(TILE):
+            tile[EXPONENT, i] = exponent
+    for i in range(TILE):
+        tile[H, i] = log1p(-tile[H, i])
+    for i in range(TILE):
+        tile[TERM, i] *= exp(tile[EXPONENT, i] * tile[H, i])
+    for i in range(TILE):
+        tile[SUM, i] += tile[TERM, i] * red
+        tile[SUM + 1, i] += tile[TERM, i] * green
+        tile[SUM + 2, i] += tile[TERM, i] * blue

@@ -177,7 +177,7 @@ def psnr(image: Array, reference: Array, covered: Array | None = None) -> float:
     Returns
     -------
     float
-        dB; infinite for equal pictures, nan for a wholly black reference.
+        Decibels; infinite for equal pictures, nan for a wholly black reference.
     """
     x, r = _samples(image, reference, covered)
     return _decibels(float(r.max()), float(np.mean((x - r) ** 2)))

@@ -65,7 +65,7 @@ def ssim_of_noise(reference: Array, variance: Array, covered: Array) -> float:
     Returns
     -------
     float
-        mean((2 s + C2) / (2 s + n + C2)): n is the window's mean noise variance, s its variance without noise.
+        The mean of (2 s + C2) / (2 s + n + C2): n is the window's mean noise variance, s its variance without noise.
     """
     c1, c2 = _constants(reference, covered)
     if not c1 > 0:

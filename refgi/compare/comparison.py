@@ -1,0 +1,244 @@
+"""One comparison: every method on one scene, judged against path tracing.
+
+A method that knows nothing of what blocks indirect light does not converge to the truth but to the truth without
+visibility; both are traced, and each such method is measured against both. Figures are of the indirect irradiance,
+the quantity that the methods compute; FLIP is of the radiance, the picture that a viewer sees.
+
+Each method runs twice: once on a few pixels, so that compiling is not timed, then on a frame of its own, whose buffers
+(G-buffer, RSM) are part of its time.
+"""
+
+import contextlib
+import dataclasses
+import time
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi import stages
+from refgi.compare.environment import environment
+from refgi.compare.flip import Flip, flip
+from refgi.compare.metrics import Measurement, measure
+from refgi.errors import RefgiError, RefgiWarning, expect
+from refgi.frame import Frame
+from refgi.methods import METHODS, find_method
+from refgi.scene import Scene, load_scene
+
+Array = npt.NDArray[Any]
+Progress = Callable[[str, float], None]
+
+TRUTH, UNOCCLUDED = "truth", "unoccluded"
+WARM_UP_SIZE = 16  # pixels along a side
+
+
+@dataclasses.dataclass(frozen=True)
+class Reference:
+    """What path tracing says, with or without visibility."""
+
+    name: str
+    settings: Any
+    irradiance: Array  # (3, h, w) float64 indirect, W/m^2
+    variance: Array  # (3, h, w) of its mean
+    samples: Array  # (h, w)
+    radiance: Array  # (3, h, w) W/m^2/sr
+    seconds: float
+    runs: tuple[stages.Run, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class MethodResult:
+    """What one method made of the scene and how far it is off."""
+
+    name: str
+    summary: str
+    settings: Any
+    irradiance: Array  # (3, h, w) indirect, W/m^2
+    radiance: Array  # (3, h, w) W/m^2/sr
+    seconds: float  # with its own buffers, without compiling
+    runs: tuple[stages.Run, ...]
+    against: Mapping[str, Measurement]  # by reference: "truth", and "unoccluded" for a method without visibility
+    flip: Flip
+
+
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """All methods on one scene against the truth."""
+
+    scene: Scene
+    width: int
+    height: int
+    options: Mapping[str, Any]  # of the frame
+    covered: Array  # (h, w) pixels that see a surface: those that count
+    references: Mapping[str, Reference]  # "truth", and "unoccluded" where a method needs it
+    results: Mapping[str, MethodResult]
+    failures: Mapping[str, str]  # method: why it gave no picture
+    environment: Mapping[str, Any]
+
+    @property
+    def truth(self) -> Reference:
+        """The reference with visibility."""
+        return self.references[TRUTH]
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether every method gave a picture without NaN and infinity."""
+        return not self.failures and not any(r.against[TRUTH].non_finite for r in self.results.values())
+
+
+def compare(
+    scene: Scene | str | Path,
+    methods: Sequence[str] | None = None,
+    *,
+    width: int | None = None,
+    height: int | None = None,
+    truth_settings: Any = None,
+    method_settings: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    progress: Progress | None = None,
+    **frame_options: Any,
+) -> Comparison:
+    """Run methods on a scene and judge them against path tracing.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, or what `load_scene` takes.
+    methods : sequence of str, optional
+        Names of `METHODS`; all but the truth where absent.
+    width, height : int, optional
+        Picture size in pixels; the camera's own where absent.
+    truth_settings : TruthSettings, optional
+        How the truth is traced.
+    method_settings : mapping of str to settings, optional
+        Settings by method; the paper's where absent.
+    out : str or Path, optional
+        Folder for pictures, results.json and index.html; nothing is written where absent.
+    progress : callable, optional
+        Called with (what runs, fraction done).
+    **frame_options : object
+        Passed to `Frame`: dtype, rsm_resolution, shadows.
+
+    Returns
+    -------
+    Comparison
+        Pictures, figures and times.
+
+    Raises
+    ------
+    InputError
+        If scene, methods or settings are not usable, or `out` cannot be written. An error of one method while it
+        runs does not stop the others; it is in `failures`.
+    """
+    scene = scene if isinstance(scene, Scene) else load_scene(scene)
+    names = _names(methods)
+    settings = _settings(names, truth_settings, method_settings or {})
+    runner = _Runner(scene, {"width": width, "height": height, **frame_options}, progress)
+    if out is not None:
+        Path(out).mkdir(parents=True, exist_ok=True)
+    references = {TRUTH: runner.reference(TRUTH, settings[TRUTH])}
+    if any(not METHODS[name].visibility for name in names):
+        hidden_nothing = dataclasses.replace(settings[TRUTH], visibility=False)
+        references[UNOCCLUDED] = runner.reference(UNOCCLUDED, hidden_nothing)
+    results, failures = {}, {}
+    for name in names:
+        try:
+            results[name] = runner.method(name, settings[name], references)
+        except RefgiError as error:
+            failures[name] = str(error)
+    frame = runner.frame
+    comparison = Comparison(scene, frame.width, frame.height, runner.options, frame.gbuffer.covered, references,
+                            results, failures, environment())
+    if out is not None:
+        _write(comparison, Path(out), progress)
+    return comparison
+
+
+class _Runner:
+    """Runs methods on frames of one scene and view."""
+
+    def __init__(self, scene: Scene, options: Mapping[str, Any], progress: Progress | None) -> None:
+        self.frame = Frame(scene, **options)  # shows every method's irradiance; never timed
+        expect(bool(self.frame.gbuffer.covered.any()), f"scene {scene.name!r}: camera", "a view of some surface",
+               "a view past all of it")
+        self.scene, self.progress = scene, progress
+        self.options: dict[str, Any] = {"dtype": self.frame.dtype.name, "rsm_resolution": self.frame.rsm_resolution,
+                        "shadows": self.frame.shadows}
+
+    def reference(self, name: str, settings: Any) -> Reference:
+        from refgi.truth import trace_truth
+
+        result, seconds, runs = self._timed(name, lambda frame: trace_truth(frame, settings))
+        radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype))
+        return Reference(name, settings, result.mean, result.variance_of_mean, result.samples, radiance, seconds, runs)
+
+    def method(self, name: str, settings: Any, references: Mapping[str, Reference]) -> MethodResult:
+        method = METHODS[name]
+        function, _ = method.load()
+        self._warm_up(function, settings)
+        irradiance, seconds, runs = self._timed(name, lambda frame: function(frame, settings))
+        radiance, covered = self.frame.radiance(irradiance), self.frame.gbuffer.covered
+        judges = [TRUTH] if method.visibility else [TRUTH, UNOCCLUDED]
+        against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered) for j in judges}
+        seen = flip(radiance, references[TRUTH].radiance, covered)
+        return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen)
+
+    def _warm_up(self, function: Callable[[Frame, Any], Array], settings: Any) -> None:
+        with warnings.catch_warnings(), contextlib.suppress(RefgiError):  # the real run will say it
+            warnings.simplefilter("ignore", RefgiWarning)
+            function(self._fresh_frame(WARM_UP_SIZE, WARM_UP_SIZE), settings)
+
+    def _timed(self, name: str, run: Callable[[Frame], Any]) -> tuple[Any, float, tuple[stages.Run, ...]]:
+        frame = self._fresh_frame(self.frame.width, self.frame.height)
+        self._tell(name, 0.0)
+        with stages.observe(progress=self._inner_progress(name)) as log:
+            started = time.perf_counter()
+            made = run(frame)
+            seconds = time.perf_counter() - started
+        self._tell(name, 1.0)
+        return made, seconds, tuple(log.runs)
+
+    def _fresh_frame(self, width: int, height: int) -> Frame:
+        return Frame(self.scene, width=width, height=height, **self.options)
+
+    def _inner_progress(self, name: str) -> Progress | None:
+        return (lambda stage, done: self._tell(f"{name}: {stage}", done)) if self.progress else None
+
+    def _tell(self, what: str, done: float) -> None:
+        if self.progress is not None:
+            self.progress(what, done)
+
+
+def _names(methods: Sequence[str] | None) -> list[str]:
+    names = list(METHODS) if methods is None else [find_method(name).name for name in methods]
+    names = [name for name in dict.fromkeys(names) if name != TRUTH]
+    expect(bool(names), "methods", f"one or more of {', '.join(n for n in METHODS if n != TRUTH)}", "none")
+    return names
+
+
+def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+    for name in given:
+        expect(name in names, "method_settings", f"methods of this comparison ({', '.join(names)})", name)
+    settings = {}
+    for name in (*names, TRUTH):
+        wanted = METHODS[name].load()[1]
+        value = truth if name == TRUTH else given.get(name)
+        value = wanted() if value is None else value
+        expect(isinstance(value, wanted), f"settings of {name}", wanted.__name__, type(value).__name__)
+        settings[name] = value
+    return settings
+
+
+def _write(comparison: Comparison, folder: Path, progress: Progress | None) -> None:
+    from refgi.compare.report import write_report
+    from refgi.compare.results import write_results
+
+    for what, write in (("pictures and results.json", write_results), ("index.html", write_report)):
+        if progress is not None:
+            progress(what, 0.0)
+        write(comparison, folder)
+        if progress is not None:
+            progress(what, 1.0)

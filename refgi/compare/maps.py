@@ -1,0 +1,195 @@
+"""Maps of one number a pixel: signed error in diverging colours, luminance in false colours.
+
+All methods of a comparison share one scale, so equal colours mean equal errors. What is beyond the scale takes the
+last colour; a pixel without surface is grey, and one that is not finite magenta.
+"""
+
+import io
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.compare.flip import LUMINANCE
+from refgi.image import NOT_FINITE
+
+Array = npt.NDArray[Any]
+Pixels = npt.NDArray[np.uint8]
+
+DIVERGING, SEQUENTIAL = "RdBu_r", "inferno"
+NO_SURFACE = (128, 128, 128)
+SCALE_PERCENTILE = 99.0  # of all methods' absolute errors: a few fireflies do not wash out the maps
+FALSE_COLOUR_STOPS = 6.0  # below the brightest 0.5 %
+
+
+class Scale(NamedTuple):
+    """A colour map over a range of numbers."""
+
+    low: float
+    high: float
+    colours: str  # a name of matplotlib's
+    label: str
+    logarithmic: bool = False
+
+
+def luminance(rgb: Array) -> Array:
+    """Return the luminance of linear sRGB, 0.2126 R + 0.7152 G + 0.0722 B.
+
+    Parameters
+    ----------
+    rgb : (3, h, w) ndarray
+        Linear RGB.
+
+    Returns
+    -------
+    (h, w) ndarray of float64
+        In the same unit.
+    """
+    weights = np.array(LUMINANCE)
+    weighted: Array = np.einsum("c,chw->hw", weights, rgb.astype(np.float64))
+    return weighted
+
+
+def error_scale(errors: list[Array], covered: Array) -> Scale:
+    """Choose one symmetric scale for all error maps.
+
+    Parameters
+    ----------
+    errors : list of (h, w) ndarray
+        Signed luminance errors.
+    covered : (h, w) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    Scale
+        From -s to s; s is 1, 2 or 5 times a power of ten and holds 99 % of the pixels.
+    """
+    magnitudes = np.abs(np.concatenate([error[covered] for error in errors] or [np.zeros(1)]))
+    magnitudes = magnitudes[np.isfinite(magnitudes)]
+    reach = float(np.percentile(magnitudes, SCALE_PERCENTILE)) if magnitudes.size else 0.0
+    limit = _round_up(reach) if reach > 0 else 1.0
+    return Scale(-limit, limit, DIVERGING, "too dark / too bright, W/m²")
+
+
+def luminance_scale(reference: Array, covered: Array) -> Scale:
+    """Choose one logarithmic scale for all false-colour pictures.
+
+    Parameters
+    ----------
+    reference : (3, h, w) ndarray
+        The truth's irradiance.
+    covered : (h, w) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    Scale
+        Six stops up to the 99.5th percentile of its luminance.
+    """
+    values = luminance(reference)[covered]
+    values = values[np.isfinite(values) & (values > 0)]
+    high = _round_up(float(np.percentile(values, 99.5))) if values.size else 1.0
+    return Scale(high / 2**FALSE_COLOUR_STOPS, high, SEQUENTIAL, "luminance of indirect irradiance, W/m²", True)
+
+
+def paint(values: Array, covered: Array, scale: Scale) -> Pixels:
+    """Colour a map.
+
+    Parameters
+    ----------
+    values : (h, w) ndarray
+        One number a pixel.
+    covered : (h, w) ndarray of bool
+        Pixels with a surface.
+    scale : Scale
+        Range and colours.
+
+    Returns
+    -------
+    (h, w, 3) ndarray of uint8
+        Display colours.
+    """
+    finite = np.isfinite(values)
+    positions = _position(np.where(finite, values, scale.low), scale)
+    pixels: Pixels = (_colours(scale)(positions)[..., :3] * 255 + 0.5).astype(np.uint8)
+    pixels[covered & ~finite] = NOT_FINITE
+    pixels[~covered] = NO_SURFACE
+    return pixels
+
+
+def gradient(scale: Scale, stops: int = 9) -> list[str]:
+    """Return evenly spaced colours of a scale as CSS writes them, low to high.
+
+    Parameters
+    ----------
+    scale : Scale
+        The colours.
+    stops : int
+        How many.
+
+    Returns
+    -------
+    list of str
+        Such as ``#b2182b``.
+    """
+    from matplotlib.colors import to_hex
+
+    colours = _colours(scale)
+    return [to_hex(colours(position)) for position in np.linspace(0, 1, stops)]
+
+
+def with_legend(pixels: Pixels, scale: Scale, title: str) -> bytes:
+    """Return a PNG of a painted map beside its colour bar.
+
+    Parameters
+    ----------
+    pixels : (h, w, 3) ndarray of uint8
+        What `paint` gave.
+    scale : Scale
+        What it was painted by.
+    title : str
+        A line above.
+
+    Returns
+    -------
+    bytes
+        The file's content.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.figure import Figure
+
+    height, width = pixels.shape[:2]
+    figure = Figure(figsize=(7.0, max(1.5, 5.6 * min(height / width, 3))), layout="constrained", dpi=120)
+    axes = figure.add_subplot()
+    axes.imshow(pixels, interpolation="nearest")
+    axes.set_axis_off()
+    axes.set_title(title, fontsize=10)
+    norm = (LogNorm if scale.logarithmic else Normalize)(scale.low, scale.high)
+    bar = figure.colorbar(ScalarMappable(norm, scale.colours), ax=axes, extend="both", fraction=0.05)
+    bar.set_label(scale.label, fontsize=9)
+    stream = io.BytesIO()
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.print_png(stream, metadata={"Software": None})
+    return stream.getvalue()
+
+
+def _position(values: Array, scale: Scale) -> Array:
+    if scale.logarithmic:
+        values = np.log(np.maximum(values, scale.low))
+        return np.clip((values - math.log(scale.low)) / math.log(scale.high / scale.low), 0, 1)
+    return np.clip((values - scale.low) / (scale.high - scale.low), 0, 1)
+
+
+def _colours(scale: Scale) -> Any:
+    import matplotlib
+
+    return matplotlib.colormaps[scale.colours]
+
+
+def _round_up(value: float) -> float:
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(step * power for step in (1, 2, 5, 10) if step * power >= value * (1 - 1e-12))

@@ -1,0 +1,249 @@
+"""The page of a comparison: one file that works from disk, with pictures, maps, table, plot and stages inside."""
+
+import base64
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi import stages
+from refgi.compare import maps
+from refgi.compare.comparison import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
+from refgi.compare.metrics import Figure, Measurement
+from refgi.compare.plot import Point, time_against_error
+from refgi.compare.results import error_scale, plain, signed_error
+from refgi.image import png_bytes, write_text
+
+Array = npt.NDArray[Any]
+
+PAGE = Path(__file__).with_name("page")
+MINUS, DASH, TIMES = "\N{MINUS SIGN}", "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
+INDIRECT_WHITE = 0.9  # what the brightest 1 % of the truth's irradiance shows as
+JUDGES = {TRUTH: "truth", UNOCCLUDED: "truth without visibility"}
+LABELS = {TRUTH: "Truth", UNOCCLUDED: "Truth without visibility"}
+COLUMNS = {
+    "relmse": ("relMSE", "mean of (x-r)² / (r² + (0.1 mean r)²)"), "rmse": ("RMSE", "W/m²"), "mae": ("MAE", "W/m²"),
+    "smape": ("SMAPE", "mean of |x-r| / (|x|+|r|)"), "bias": ("bias", "mean of x-r, W/m²"),
+    "psnr": ("PSNR", "dB, peak: the reference's maximum"), "ssim": ("SSIM", "of linear values"),
+}
+
+
+def write_report(comparison: Comparison, folder: Path) -> None:
+    """Write index.html, whole or not at all.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What `compare` gave.
+    folder : Path
+        An existing folder.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    write_text(Path(folder) / "index.html", page(comparison))
+
+
+def page(comparison: Comparison) -> str:
+    """Return the page as HTML that refers to nothing outside itself.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What `compare` gave.
+
+    Returns
+    -------
+    str
+        The same text for equal input.
+    """
+    import jinja2
+    from markupsafe import Markup
+
+    templates = jinja2.Environment(loader=jinja2.FileSystemLoader(PAGE), autoescape=True, trim_blocks=True,
+                                   lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+    pictures = _pictures(comparison)
+    names = [picture["name"] for picture in pictures]
+    return templates.get_template("report.html.j2").render(
+        style=Markup((PAGE / "style.css").read_text("utf-8")), viewer=Markup((PAGE / "viewer.js").read_text("utf-8")),
+        title=comparison.scene.name, description=comparison.scene.description, facts=_facts(comparison),
+        verdict=_verdict(comparison), failures=comparison.failures, width=comparison.width, height=comparison.height,
+        quantities=_quantities(comparison), pictures=pictures, left=names[0], right=names[-1],
+        columns=[{"label": label, "about": about} for label, about in (*COLUMNS.values(), ("FLIP", "of the picture"))],
+        rows=_rows(comparison), notes=_notes(comparison), plot=Markup(_plot(comparison)), made=_made(comparison),
+        versions=comparison.environment["versions"], machine=_machine(comparison.environment),
+    )
+
+
+def number(value: float) -> str:
+    r"""Write a figure with three significant digits.
+
+    Parameters
+    ----------
+    value : float
+        Any number.
+
+    Returns
+    -------
+    str
+        A dash for nan.
+
+    Examples
+    --------
+    >>> [ascii(number(value)) for value in (0.0123456, -1234.5, 2.5e-7)]
+    ["'0.0123'", "'\\u22121230'", "'2.5e\\u22127'"]
+    """
+    if math.isnan(value):
+        return DASH
+    if math.isinf(value):
+        return "∞" if value > 0 else f"{MINUS}∞"
+    if value == 0:
+        return "0"
+    if not 1e-4 <= abs(value) < 1e6:
+        mantissa, _, exponent = f"{value:.2e}".partition("e")
+        return f"{float(mantissa):g}e{int(exponent)}".replace("-", MINUS)
+    rounded = float(f"{value:.3g}")
+    return f"{rounded:.10f}".rstrip("0").rstrip(".").replace("-", MINUS)
+
+
+def _facts(comparison: Comparison) -> list[str]:
+    scene, truth = comparison.scene, comparison.truth
+    covered = truth.samples[comparison.covered]
+    return [
+        f"{comparison.width} {TIMES} {comparison.height} pixels", f"{comparison.covered.mean():.0%} covered",
+        f"{scene.face_count:,} faces", f"{len(scene.lights)} light{'s' * (len(scene.lights) != 1)}",
+        f"truth: {covered.mean():,.0f} samples a pixel in {number(truth.seconds)} s", comparison.options["dtype"],
+    ]
+
+
+def _verdict(comparison: Comparison) -> str:
+    scored = [(r.against[TRUTH].figures["relmse"], r) for r in comparison.results.values()]
+    scored = [(figure, r) for figure, r in scored if math.isfinite(figure.value)]
+    if not scored:
+        return "No method gave a figure against the truth."
+    figure, best = min(scored, key=lambda pair: pair[0].value)
+    noise = ", within the noise of the truth" if figure.is_noise else ""
+    return f"Closest to the truth: {best.name}, relMSE {number(figure.value)} in {number(best.seconds)} s{noise}."
+
+
+def _quantities(comparison: Comparison) -> list[dict[str, Any]]:
+    errors, brightness = error_scale(comparison), maps.luminance_scale(comparison.truth.irradiance, comparison.covered)
+    found = [
+        {"key": "picture", "label": "Picture", "gradient": None,
+         "about": "What the camera sees: direct and indirect light, sRGB, at the exposure of the scene."},
+        {"key": "indirect", "label": "Indirect", "gradient": None,
+         "about": "Indirect irradiance alone, as on white surfaces; one exposure for all."},
+        {"key": "error", "label": "Error", **_ramp(errors),
+         "about": "Luminance of the indirect irradiance less that of the truth. For the truths: their standard error."},
+    ]
+    if UNOCCLUDED in comparison.references:
+        found.append({"key": "error_unoccluded", "label": "Error without visibility", **_ramp(errors),
+                      "about": "Less the truth without visibility, which methods without visibility converge to."})
+    found.append({"key": "false", "label": "False colour", **_ramp(brightness),
+                  "about": "Luminance of the indirect irradiance, logarithmic."})
+    return found
+
+
+def _ramp(scale: maps.Scale) -> dict[str, Any]:
+    span = np.linspace(0, 1, 5)
+    values = scale.low * (scale.high / scale.low) ** span if scale.logarithmic else (
+        scale.low + (scale.high - scale.low) * span)
+    return {"gradient": maps.gradient(scale), "ticks": [number(float(v)) for v in values], "unit": scale.label}
+
+
+def _pictures(comparison: Comparison) -> list[dict[str, Any]]:
+    errors, brightness = error_scale(comparison), maps.luminance_scale(comparison.truth.irradiance, comparison.covered)
+    noise_scale = errors._replace(low=0.0, colours=maps.SEQUENTIAL)
+
+    def shown(made: Reference | MethodResult, painted: dict[str, maps.Pixels]) -> dict[str, str]:
+        painted["false"] = maps.paint(maps.luminance(made.irradiance), comparison.covered, brightness)
+        lit = {"picture": (made.radiance, comparison.scene.exposure),
+               "indirect": (made.irradiance, _indirect_exposure(comparison))}
+        return {key: _data_uri(np.moveaxis(rgb, 0, -1), exposure) for key, (rgb, exposure) in lit.items()} | {
+            key: _data_uri(pixels, 1.0) for key, pixels in painted.items()}
+
+    pictures = []
+    for result in comparison.results.values():
+        maps_of = {"error" if judge == TRUTH else f"error_{judge}":
+                   maps.paint(signed_error(comparison, result, judge), comparison.covered, errors)
+                   for judge in result.against}
+        pictures.append({"name": result.name, "label": result.name, "images": shown(result, maps_of),
+                         "said": f"relMSE {number(result.against[TRUTH].figures['relmse'].value)}, "
+                                 f"{number(result.seconds)} s",
+                         "without": "This method knows what blocks light: see its error."})
+    for reference in comparison.references.values():
+        deviation = maps.luminance(np.sqrt(reference.variance))
+        painted = {"error": maps.paint(deviation, comparison.covered, noise_scale)}
+        pictures.append({"name": reference.name, "label": LABELS[reference.name], "images": shown(reference, painted),
+                         "said": f"{number(reference.seconds)} s", "without": "A reference: see its standard error."})
+    return pictures
+
+
+def _indirect_exposure(comparison: Comparison) -> float:
+    values = maps.luminance(comparison.truth.irradiance)[comparison.covered]
+    bright = float(np.percentile(values[np.isfinite(values)], 99)) if np.isfinite(values).any() else 0.0
+    return INDIRECT_WHITE / bright if bright > 0 else 1.0
+
+
+def _data_uri(rgb: Array, exposure: float) -> str:
+    return "data:image/png;base64," + base64.b64encode(png_bytes(rgb, exposure)).decode("ascii")
+
+
+def _rows(comparison: Comparison) -> list[dict[str, Any]]:
+    return [
+        {"name": result.name, "first": index == 0, "judge": JUDGES[judge],
+         "seconds": f"{number(result.seconds)} s" if index == 0 else "",
+         "cells": [*(_cell(measurement.figures[name]) for name in COLUMNS), _flip_cell(result, judge)]}
+        for result in comparison.results.values() for index, (judge, measurement) in enumerate(result.against.items())
+    ]
+
+
+def _cell(figure: Figure) -> dict[str, Any]:
+    noise = "" if math.isnan(figure.noise) else number(figure.noise)
+    return {"value": number(figure.value), "noise": noise, "is_noise": figure.is_noise}
+
+
+def _flip_cell(result: MethodResult, judge: str) -> dict[str, Any]:
+    value = "" if judge != TRUTH else number(result.flip.mean)
+    return {"value": value, "noise": "", "is_noise": False}
+
+
+def _notes(comparison: Comparison) -> list[str]:
+    notes = [f"{result.name}: {_bad_pixels(result.against[TRUTH])}." for result in comparison.results.values()
+             if _bad_pixels(result.against[TRUTH])]
+    skipped = {result.flip.skipped for result in comparison.results.values() if result.flip.skipped}
+    return notes + [f"FLIP was not computed: {reason}." for reason in sorted(skipped)]
+
+
+def _bad_pixels(measurement: Measurement) -> str:
+    parts = [(measurement.non_finite, "pixels"), (measurement.non_finite_reference, "pixels of the truth")]
+    return " and ".join(f"{count} {whose} are NaN or infinite, so no figure is defined" for count, whose in parts
+                        if count)
+
+
+def _plot(comparison: Comparison) -> str:
+    points = [Point(result.name, result.seconds, measurement.figures["relmse"].value, judge == TRUTH)
+              for result in comparison.results.values() for judge, measurement in result.against.items()]
+    noises = [result.against[TRUTH].figures["relmse"].noise for result in comparison.results.values()]
+    return time_against_error(points, next((n for n in noises if n > 0), 0.0))
+
+
+def _made(comparison: Comparison) -> list[dict[str, Any]]:
+    everything: list[Reference | MethodResult] = [*comparison.results.values(), *comparison.references.values()]
+    return [{"name": LABELS.get(made.name, made.name),
+             "summary": made.summary if isinstance(made, MethodResult) else "path tracing",
+             "settings": plain(made.settings) or {}, "stages": [_stage(run) for run in made.runs]}
+            for made in everything]
+
+
+def _stage(run: stages.Run) -> dict[str, Any]:
+    said = f"{number(1e3 * run.seconds)} ms" if run.status == "ran" else f"{run.status}: {run.reason}"
+    return {"name": run.name, "status": run.status, "depth": run.depth, "said": said}
+
+
+def _machine(environment: Any) -> str:
+    return f"{environment['platform']}, {environment['cpu']}, {environment['threads']} threads"

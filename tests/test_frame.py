@@ -1,0 +1,149 @@
+"""Property tests of Frame: nothing is computed before it is asked for, and frames share what did not change."""
+
+import dataclasses
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from refgi import Frame, load_scene
+from refgi.errors import InputError
+from refgi.methods import METHODS, find_method, render
+from refgi.scene import DirectionalLight, Geometry, PointLight
+from refgi.splat.sii import SiiSettings, sii
+from refgi.stages import Memory, observe
+
+SIZE = {"width": 48, "height": 32, "rsm_resolution": 64}
+SETTINGS = SiiSettings(lights=64)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene("cornell_box")
+
+
+def ran(log):
+    return {run.name for run in log.runs if run.status == "ran"}
+
+
+def test_construction_computes_nothing(scene):
+    with observe() as log:
+        Frame(scene)
+    assert not log.runs
+
+
+def test_the_light_alone_needs_no_gbuffer(scene):
+    with observe() as log:
+        _ = Frame(scene, **SIZE).rsms
+    assert ran(log)
+    assert not any("gbuffer" in name for name in ran(log))
+
+
+def test_the_view_alone_needs_no_rsm(scene):
+    with observe() as log:
+        _ = Frame(scene, **SIZE).gbuffer.position
+    assert ran(log)
+    assert not any("rsm" in name for name in ran(log))
+
+
+def test_radiance_is_albedo_over_pi_of_all_irradiance(scene):
+    picture = render(scene, "sii", SETTINGS, dtype=np.float64, **SIZE)
+    frame = picture.frame
+    expected = frame.gbuffer.albedo / np.pi * (frame.direct + picture.irradiance)
+    np.testing.assert_allclose(picture.radiance, expected, rtol=1e-14)
+
+
+def test_emission_is_seen(scene):
+    glowing = tuple(dataclasses.replace(m, emission=(1.0, 2.0, 3.0)) for m in scene.materials)
+    plain, lit = (Frame(s, **SIZE) for s in (scene, dataclasses.replace(scene, materials=glowing)))
+    difference = lit.radiance() - plain.radiance()
+    covered = plain.gbuffer.covered
+    for channel, value in enumerate((1.0, 2.0, 3.0)):
+        np.testing.assert_allclose(difference[channel][covered], value, rtol=1e-6)
+        assert not difference[channel][~covered].any()
+
+
+@pytest.mark.parametrize("moves", [(), ("light",), ("camera",), ("light", "camera")])
+def test_frames_of_an_animation_share_what_did_not_change(scene, moves):
+    """The four rows of SII Table 1: reuse must not change a bit."""
+    moved = scene
+    if "light" in moves:
+        moved = moved.with_lights(dataclasses.replace(scene.lights[0], position=(0.3, 0.5, 0.25)))
+    if "camera" in moves:
+        moved = moved.with_camera(eye=(0.3, 0.3, -0.7))
+    memory = Memory()
+    with observe(memory=memory):
+        sii(Frame(scene, **SIZE), SETTINGS)
+    with observe(memory=memory) as log:
+        again = sii(Frame(moved, **SIZE), SETTINGS)
+    np.testing.assert_array_equal(again, sii(Frame(moved, **SIZE), SETTINGS))
+    names = {run.name for run in log.runs if run.status == "reused"}
+    assert ("rsm" in names) == ("light" not in moves)
+    assert ("gbuffer" in names) == ("camera" not in moves)
+    assert ("splat.irradiance" in names) == (not moves)
+
+
+def test_several_lights_add_up(scene):
+    others = (PointLight((0.1, 0.3, 0.1), (0.05, 0.04, 0.03)), DirectionalLight((0.1, -0.2, 1.0), (0.2, 0.2, 0.2)))
+    settings = SiiSettings(pattern="all")
+    options = {"width": 24, "height": 16, "rsm_resolution": 16, "dtype": np.float64}
+    lights = (*scene.lights, *others)
+    together = sii(Frame(scene.with_lights(*lights), **options), settings)
+    apart = sum(sii(Frame(scene.with_lights(light), **options), settings) for light in lights)
+    np.testing.assert_allclose(together, apart, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"width": 0}, "width: expected 1 to 65536 pixels, got 0"),
+        ({"height": 10**6}, "height"),
+        ({"dtype": np.float16}, "dtype: expected float32 or float64, got 'float16'"),
+        ({"rsm_resolution": 0}, "rsm_resolution"),
+        ({"shadows": "soft"}, "shadows: expected 'map' or 'exact', got 'soft'"),
+    ],
+)
+def test_bad_options_are_named(scene, options, said):
+    with pytest.raises(InputError, match=said):
+        Frame(scene, **options)
+
+
+def test_nothing_to_see_or_no_light_is_an_error(scene):
+    empty = Geometry(np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros(0, np.int32))
+    with pytest.raises(InputError, match="at least one triangle"):
+        Frame(dataclasses.replace(scene, geometry=empty))
+    with pytest.raises(InputError, match="at least one light"):
+        Frame(scene.with_lights())
+
+
+def test_methods_are_found_by_name_or_refused():
+    for name in METHODS:
+        function, settings = find_method(name).load()
+        assert callable(function)
+        assert dataclasses.is_dataclass(settings())
+    with pytest.raises(InputError, match="method: expected one of sii, "):
+        find_method("radiosity")
+    with pytest.raises(InputError, match="settings: expected SiiSettings"):
+        render("cornell_box", "sii", object())
+
+
+@pytest.mark.parametrize(
+    ("code", "absent"),
+    [
+        ("import refgi", "numpy"),
+        ("from refgi.methods import render; render('cornell_box', 'sii', width=8, height=8)", "embreex"),
+        ("from refgi.methods import render; render('cornell_box', 'sii', width=8, height=8)", "trimesh"),
+        ("from refgi.methods import render; render('cornell_box', 'sii', width=8, height=8)", "pydantic"),
+    ],
+)
+def test_imports_are_lazy(code, absent):
+    code += f"; import sys; sys.exit({absent!r} in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_map_and_exact_shadows_agree_off_their_edges(scene):
+    """A shadow map decides by texel, rays by point: they may differ only where a shadow's edge passes."""
+    frames = [Frame(scene, width=96, height=96, shadows=kind) for kind in ("map", "exact")]
+    lit = [frame.direct.sum(axis=0) > 0 for frame in frames]
+    assert np.mean(lit[0] != lit[1]) < 0.02  # 2 %: the share of pixels within a texel of an edge in this view

@@ -7,7 +7,11 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 
 from refgi.errors import InputError, expect
-from refgi.scene.builtin.cornell import cornell_box
+from refgi.scene.builtin.atrium import atrium
+from refgi.scene.builtin.closed_forms import integrating_sphere, parallel_plates, wedge
+from refgi.scene.builtin.cornell import cornell_box, cornell_sphere
+from refgi.scene.builtin.metaballs import metaballs
+from refgi.scene.builtin.stage import glass_ball, ring, stage
 from refgi.scene.files import did_you_mean
 from refgi.scene.model import Scene
 
@@ -71,6 +75,18 @@ SCENES: dict[str, BuiltinScene] = {
     for row in (
         BuiltinScene("cornell_box", "The measured Cornell box, a spot under the ceiling tilted at the red wall",
                      30, cornell_box),
+        BuiltinScene("cornell_sphere", "A tessellated sphere in the Cornell box", 16_990, cornell_sphere),
+        BuiltinScene("atrium", "A colonnade of two storeys with curtains, a spot from above into its courtyard",
+                     250_000, atrium),
+        BuiltinScene("integrating_sphere", "Inside a diffuse sphere: one bounce is the same everywhere, in closed form",
+                     20_000, integrating_sphere),
+        BuiltinScene("wedge", "Two plates that meet in an edge, one evenly lit: closed form", 4, wedge),
+        BuiltinScene("parallel_plates", "A plate over a floor lit by a spot: closed form on the axis", 4,
+                     parallel_plates),
+        BuiltinScene("ring", "A polished metal ring whose caustic falls inside it", 20_482, ring),
+        BuiltinScene("glass_ball", "A clear glass ball whose caustic falls into its shadow", 20_488, glass_ball),
+        BuiltinScene("metaballs", "A blob whose pieces join and part with time t, over the stage", 5_400, metaballs),
+        BuiltinScene("stage", "A slightly glossy vase on a stage with three coloured walls", 6_328, stage),
     )
 }
 

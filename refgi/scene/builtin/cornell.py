@@ -8,6 +8,8 @@ import math
 
 import numpy as np
 
+from refgi.errors import expect
+from refgi.scene.builtin.surfaces import sphere
 from refgi.scene.model import Array, Camera, Material, Mesh, Scene, SpotLight, merge
 
 WHITE = Material("white", (0.738, 0.736, 0.74))
@@ -52,6 +54,28 @@ def cornell_box() -> Scene:
     geometry, materials = merge([*shell(), *blocks])
     return Scene("cornell_box", geometry, materials, CAMERA, (LIGHT,),
                  "The Cornell box with a spot under the ceiling tilted at the red wall.", exposure=1.5)
+
+
+def cornell_sphere(faces: int = 16_990) -> Scene:
+    """Build the box with one large sphere instead of the blocks.
+
+    Parameters
+    ----------
+    faces : int
+        Triangles in all, 18 to 50 million.
+
+    Returns
+    -------
+    Scene
+        About that many faces, 4 materials, exact normals on the sphere.
+    """
+    expect(18 <= faces <= 50_000_000, "faces", "18 to 50000000", faces)
+    ball = sphere((0.285, 0.17, 0.3), 0.169, faces - 10, Material("sphere", (0.62, 0.6, 0.55)), "sphere")
+    geometry, materials = merge([*shell(), ball], smooth=True)
+    light = SpotLight((0.15, 0.53, 0.06), (0.483223, -0.662194, 0.572708), math.radians(26), math.radians(38),
+                      (0.7, 0.66, 0.58))
+    return Scene("cornell_sphere", geometry, materials, CAMERA, (light,),
+                 "A tessellated sphere in the Cornell box, lit from the front corner.", exposure=1.6)
 
 
 def shell() -> list[Mesh]:

@@ -1,0 +1,105 @@
+"""TruthSettings: what the ground truth is asked for."""
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Literal
+
+from refgi.errors import expect
+
+Estimator = Literal["combined", "hemisphere", "light"]
+
+PICKS, DIRECTIONS, DIRECTIONS_ALONE = 8, 4, 16
+BOUND = 0.25  # of a light direction's footprint: by trial the least error in equal time on the Cornell box
+
+
+@dataclasses.dataclass(frozen=True)
+class TruthSettings:
+    """How the ground truth is computed and when it stops: at the first of `samples`, `seconds`, `target_error`.
+
+    Parameters
+    ----------
+    estimator : {"combined", "hemisphere", "light"}
+        Split at a bounded geometry term, hemisphere sampling alone, or light-side sampling alone.
+    samples : int
+        Samples per pixel (picks of lit points plus hemisphere directions); at least two passes are made.
+    seconds : float, optional
+        Stop after the pass in which this much time is over, s.
+    target_error : float, optional
+        Stop when the picture's root mean square standard error is below this share of its mean.
+    visibility : bool
+        False: nothing blocks between emitter and receiver (the direct light of the emitter stays shadowed).
+    bounces : int
+        Diffuse or glossy bounces before the receiver, at least 1.
+    caustics : bool
+        Add light that reaches receivers through mirror-like lobes and glass; those lobes are then left out of the
+        other estimators.
+    seed : int
+        Which random numbers.
+    light_grid : int
+        Directions along one side of each light's grid, fresh in every pass.
+    picks : int
+        Lit points that each receiver picks in a pass.
+    directions : int, optional
+        Hemisphere directions per receiver and pass; 4, or 16 for "hemisphere".
+    bound : float
+        Largest geometry term left to the light side, in units of 1 / footprint of a light direction.
+    checkpoint : path, optional
+        File that holds all passes so far; an existing one of the same computation is continued.
+    batch : int
+        Rays traced at a time. Changes memory, never a bit of the result.
+    """
+
+    estimator: Estimator = "combined"
+    samples: int = 120
+    seconds: float | None = None
+    target_error: float | None = None
+    visibility: bool = True
+    bounces: int = 1
+    caustics: bool = False
+    seed: int = 0
+    light_grid: int = 32
+    picks: int = PICKS
+    directions: int | None = None
+    bound: float = BOUND
+    checkpoint: Path | str | None = None
+    batch: int = 1 << 18
+
+    def __post_init__(self) -> None:
+        expect(self.estimator in ("combined", "hemisphere", "light"), "estimator",
+               "'combined', 'hemisphere' or 'light'", self.estimator)
+        for key, low, high in (("samples", 1, 2**31), ("bounces", 1, 64), ("seed", 0, 2**32 - 1),
+                               ("light_grid", 1, 1024), ("picks", 1, 1024), ("batch", 1, 2**30)):
+            value = getattr(self, key)
+            expect(isinstance(value, int) and low <= value <= high, key, f"an integer, {low} to {high}", value)
+        expect(self.directions is None or 1 <= self.directions <= 65536, "directions", "1 to 65536",
+               self.directions)
+        for key in ("seconds", "target_error"):
+            value = getattr(self, key)
+            expect(value is None or (math.isfinite(value) and value > 0), key, "a finite number > 0", value)
+        expect(math.isfinite(self.bound) and self.bound > 0, "bound", "a finite number > 0", self.bound)
+        expect(self.bounces == 1 or self.estimator != "light", "bounces",
+               "1 for the light estimator, which knows no further bounce", self.bounces)
+        expect(self.bounces == 1 or self.visibility, "visibility", "True for more than one bounce", self.visibility)
+
+    @property
+    def picks_per_pass(self) -> int:
+        """Lit points that each receiver picks in a pass."""
+        return 0 if self.estimator == "hemisphere" else self.picks
+
+    @property
+    def directions_per_pass(self) -> int:
+        """Hemisphere directions of each receiver in a pass."""
+        if self.estimator == "light":
+            return 0
+        return self.directions or (DIRECTIONS_ALONE if self.estimator == "hemisphere" else DIRECTIONS)
+
+    @property
+    def passes(self) -> int:
+        """Passes that make up `samples`, at least two."""
+        return max(2, -(-self.samples // (self.picks_per_pass + self.directions_per_pass)))
+
+    @property
+    def shared_bound(self) -> float:
+        """The bound as kernels take it: infinite leaves all to the light side, 0 all to the hemisphere."""
+        return {"combined": self.bound, "light": math.inf, "hemisphere": 0.0}[self.estimator]

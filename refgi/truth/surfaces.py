@@ -1,0 +1,232 @@
+"""What rays find: the tables kernels read, and the light that a directly lit point sends on.
+
+Symbols: y a lit point, n its shading normal and g its face normal, both on the lit side, l the direction to the
+light, F = I(l) cos(g, l) / d^2 the incident flux per area, w a direction away from y.
+
+- Diffuse: intensity per area rho_d F / pi <n.w>, so that a whole texel sends Phi / pi <n.w>, the RSM's convention.
+- Lobe: rho_s F (P + 1) / (2 pi K) <r.w>^P [n.w > 0], r the mirror direction about n, K the part above the surface.
+
+Both are written rho F / pi * pattern(w), where pattern is <n.w>, or (P + 1) / (2 K) <r.w>^P. Light leaves only on the
+lit side of the face: g.w > 0.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+from refgi.radiometry import lobe_fraction, orthonormal_basis
+from refgi.scene import Geometry, LightTable, Scene, light_table, material_table
+
+Array = npt.NDArray[Any]
+
+
+class Surfaces(NamedTuple):
+    """Triangles and their materials, for kernels."""
+
+    vertices: Array  # (n, 3) float64, m
+    faces: Array  # (m, 3) int32
+    normals: Array  # (n, 3) float64 vertex normals, or (0, 3) where faces are flat
+    material_of_face: Array  # (m,) int32
+    diffuse: Array  # (k, 3) float64 reflectances by material; dielectrics are black
+    specular: Array  # (k, 3) float64
+    exponent: Array  # (k,) float64
+
+
+class Receivers(NamedTuple):
+    """The points whose irradiance is asked for, without the pixels that see nothing."""
+
+    pixel: Array  # (r,) int64, flat index into the picture
+    position: Array  # (3, r) float32, m
+    normal: Array  # (3, r) float32: the G-buffer's
+    facing: Array  # (3, r) float32: the face's normal on the same side
+    origin: Array  # (3, r) float32: where rays start, lifted off the face, m
+
+
+def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
+    """Lay out a scene's triangles and materials for kernels.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    mirror_exponent : float
+        Lobes of at least this exponent are left out.
+
+    Returns
+    -------
+    Surfaces
+        Dielectrics have no reflectance in it.
+    """
+    geometry, table = scene.geometry, material_table(scene.materials)
+    table.diffuse[table.ior > 0] = 0
+    table.specular[(table.ior > 0) | (table.exponent >= mirror_exponent)] = 0
+    normals = geometry.vertex_normals
+    return Surfaces(np.ascontiguousarray(geometry.vertices, np.float64), np.ascontiguousarray(geometry.faces, np.int32),
+                    np.zeros((0, 3)) if normals is None else np.ascontiguousarray(normals, np.float64),
+                    np.ascontiguousarray(geometry.material_of_face, np.int32), table.diffuse, table.specular,
+                    table.exponent)
+
+
+def lights_of(scene: Scene) -> LightTable:
+    """Return a scene's lights for kernels in float64.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    LightTable
+        One row a light.
+    """
+    return light_table(scene.lights)
+
+
+def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: Array, offset: float) -> Receivers:
+    """Take the covered pixels of a G-buffer as receivers.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    position, normal : (3, h, w) ndarray
+        The G-buffer's, world space.
+    triangle_id : (h, w) int ndarray
+        Which triangle each pixel sees; -1 for none.
+    offset : float
+        How far rays start above the face, m.
+
+    Returns
+    -------
+    Receivers
+        In picture order.
+    """
+    pixel = np.flatnonzero(triangle_id.reshape(-1) >= 0)
+    at = np.ascontiguousarray(position.reshape(3, -1)[:, pixel], np.float64)
+    up = np.ascontiguousarray(normal.reshape(3, -1)[:, pixel], np.float64)
+    corner = geometry.vertices[geometry.faces[triangle_id.reshape(-1)[pixel]]]
+    face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]).T
+    face *= np.where((face * up).sum(axis=0) < 0, -1.0, 1.0) / np.linalg.norm(face, axis=0)
+    return Receivers(pixel, *(np.ascontiguousarray(a, np.float32) for a in (at, up, face, at + offset * face)))
+
+
+@kernel
+def face_normal(surfaces: Surfaces, triangle: int, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
+    """Return a triangle's unit normal on the side against a direction.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    triangle : int
+        Which one.
+    dx, dy, dz : float
+        Direction in which the surface is seen or lit.
+
+    Returns
+    -------
+    tuple of 3 floats
+        Unit vector g with g.d <= 0.
+    """
+    v = surfaces.vertices
+    i, j, k = surfaces.faces[triangle]
+    ax, ay, az = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
+    bx, by, bz = v[k, 0] - v[i, 0], v[k, 1] - v[i, 1], v[k, 2] - v[i, 2]
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    scale = (-1.0 if nx * dx + ny * dy + nz * dz > 0 else 1.0) / length
+    return nx * scale, ny * scale, nz * scale
+
+
+@kernel
+def shading_normal(surfaces: Surfaces, triangle: int, y: tuple[float, float, float],
+                   g: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return the interpolated unit normal at a point, on the side of the face normal g; g itself on flat faces.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    triangle : int
+        Which one the point lies on.
+    y : tuple of 3 floats
+        The point, m.
+    g : tuple of 3 floats
+        Unit face normal.
+
+    Returns
+    -------
+    tuple of 3 floats
+        Unit vector n with n.g >= 0.
+    """
+    if len(surfaces.normals) == 0:
+        return g
+    v, n = surfaces.vertices, surfaces.normals
+    corner = surfaces.faces[triangle]
+    nx, ny, nz = 0.0, 0.0, 0.0
+    for c in range(3):
+        i, j = corner[(c + 1) % 3], corner[(c + 2) % 3]
+        ax, ay, az = v[i, 0] - y[0], v[i, 1] - y[1], v[i, 2] - y[2]
+        bx, by, bz = v[j, 0] - y[0], v[j, 1] - y[1], v[j, 2] - y[2]
+        # area of the part opposite to corner c, signed along g up to one sign for all three
+        part = (ay * bz - az * by) * g[0] + (az * bx - ax * bz) * g[1] + (ax * by - ay * bx) * g[2]
+        nx += part * n[corner[c], 0]
+        ny += part * n[corner[c], 1]
+        nz += part * n[corner[c], 2]
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length == 0:
+        return g
+    scale = (-1.0 if nx * g[0] + ny * g[1] + nz * g[2] < 0 else 1.0) / length
+    return nx * scale, ny * scale, nz * scale
+
+
+@kernel
+def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float], light: tuple[float, float, float],
+                 w: tuple[float, float, float]) -> float:
+    """Return (P + 1) / (2 K) <r.w>^P [n.w > 0], the lobe's emission relative to diffuse rho F / pi.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    material : int
+        Which material.
+    n, light, w : tuple of 3 floats
+        Unit vectors: shading normal, towards the light, away from the point.
+
+    Returns
+    -------
+    float
+        The pattern; its integral over directions above the surface is pi.
+    """
+    exponent = surfaces.exponent[material]
+    cos_in = n[0] * light[0] + n[1] * light[1] + n[2] * light[2]
+    cos_out = n[0] * w[0] + n[1] * w[1] + n[2] * w[2]
+    r_w = 2 * cos_in * cos_out - (light[0] * w[0] + light[1] * w[1] + light[2] * w[2])  # r = 2 (n.l) n - l
+    if r_w <= 0 or cos_out <= 0:
+        return 0.0
+    return (exponent + 1) / (2 * lobe_fraction(cos_in, exponent)) * r_w**exponent
+
+
+@kernel
+def around(axis: tuple[float, float, float], x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return a local direction (z along the axis) in world space.
+
+    Parameters
+    ----------
+    axis : tuple of 3 floats
+        Unit vector.
+    x, y, z : float
+        Local direction.
+
+    Returns
+    -------
+    tuple of 3 floats
+        World direction of the same length.
+    """
+    tx, ty, tz, bx, by, bz = orthonormal_basis(axis[0], axis[1], axis[2])
+    return (tx * x + bx * y + axis[0] * z, ty * x + by * y + axis[1] * z, tz * x + bz * y + axis[2] * z)

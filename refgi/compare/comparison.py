@@ -43,6 +43,7 @@ class Reference:
     settings: Any
     irradiance: Array  # (3, h, w) float64 indirect, W/m^2
     variance: Array  # (3, h, w) of its mean
+    mean_variance: Array  # (3,) of the picture's mean, with the correlation between pixels
     samples: Array  # (h, w)
     radiance: Array  # (3, h, w) W/m^2/sr
     seconds: float
@@ -141,8 +142,7 @@ def compare(
         Path(out).mkdir(parents=True, exist_ok=True)
     references = {TRUTH: runner.reference(TRUTH, settings[TRUTH])}
     if any(not METHODS[name].visibility for name in names):
-        hidden_nothing = dataclasses.replace(settings[TRUTH], visibility=False)
-        references[UNOCCLUDED] = runner.reference(UNOCCLUDED, hidden_nothing)
+        references[UNOCCLUDED] = runner.reference(UNOCCLUDED, _without_visibility(settings[TRUTH]))
     results, failures = {}, {}
     for name in names:
         try:
@@ -173,7 +173,8 @@ class _Runner:
 
         result, seconds, runs = self._timed(name, lambda frame: trace_truth(frame, settings))
         radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype))
-        return Reference(name, settings, result.mean, result.variance_of_mean, result.samples, radiance, seconds, runs)
+        return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
+                         radiance, seconds, runs)
 
     def method(self, name: str, settings: Any, references: Mapping[str, Reference]) -> MethodResult:
         method = METHODS[name]
@@ -182,7 +183,8 @@ class _Runner:
         irradiance, seconds, runs = self._timed(name, lambda frame: function(frame, settings))
         radiance, covered = self.frame.radiance(irradiance), self.frame.gbuffer.covered
         judges = [TRUTH] if method.visibility else [TRUTH, UNOCCLUDED]
-        against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered) for j in judges}
+        against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered,
+                              references[j].mean_variance) for j in judges}
         seen = flip(radiance, references[TRUTH].radiance, covered)
         return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen)
 
@@ -230,6 +232,11 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
         expect(isinstance(value, wanted), f"settings of {name}", wanted.__name__, type(value).__name__)
         settings[name] = value
     return settings
+
+
+def _without_visibility(settings: Any) -> Any:
+    checkpoint = settings.checkpoint and f"{settings.checkpoint}.{UNOCCLUDED}"
+    return dataclasses.replace(settings, visibility=False, checkpoint=checkpoint)
 
 
 def _write(comparison: Comparison, folder: Path, progress: Progress | None) -> None:

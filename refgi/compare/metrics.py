@@ -235,9 +235,8 @@ METRICS: dict[str, Callable[[Array, Array, Array | None], float]] = {
 }
 
 
-def measure(
-    image: Array, reference: Array, variance: Array | None = None, covered: Array | None = None
-) -> Measurement:
+def measure(image: Array, reference: Array, variance: Array | None = None, covered: Array | None = None,
+            mean_variance: Array | None = None) -> Measurement:
     """Compute every figure, and beside it what the reference's noise alone would give.
 
     Parameters
@@ -248,6 +247,9 @@ def measure(
         Variance of the reference's mean, the unit squared.
     covered : (h, w) ndarray of bool, optional
         Pixels to compare; all where absent.
+    mean_variance : (3,) ndarray, optional
+        Variance of the mean over covered pixels of each channel, which knows how pixels' errors go together; where
+        absent they count as independent.
 
     Returns
     -------
@@ -264,13 +266,14 @@ def measure(
     if bad or bad_reference:
         figures = {name: Figure(math.nan) for name in METRICS}
     else:
-        noise = {} if variance is None else noise_figures(image, reference, variance, mask)
+        noise = {} if variance is None else noise_figures(image, reference, variance, mask, mean_variance)
         figures = {name: _figure(name, f(image, reference, mask), noise.get(name, math.nan))
                    for name, f in METRICS.items()}
     return Measurement(figures, int(mask.sum()), bad, bad_reference)
 
 
-def noise_figures(image: Array, reference: Array, variance: Array, covered: Array | None = None) -> dict[str, float]:
+def noise_figures(image: Array, reference: Array, variance: Array, covered: Array | None = None,
+                  mean_variance: Array | None = None) -> dict[str, float]:
     """Return what each figure would be if the picture were perfect and the reference as noisy as it is.
 
     Parameters
@@ -281,11 +284,14 @@ def noise_figures(image: Array, reference: Array, variance: Array, covered: Arra
         Variance of the reference's mean, the unit squared.
     covered : (h, w) ndarray of bool, optional
         Pixels to compare; all where absent.
+    mean_variance : (3,) ndarray, optional
+        Variance of the mean over covered pixels of each channel; from independent pixels where absent.
 
     Returns
     -------
     dict of str to float
-        By metric; `bias` is the standard error of the reference's mean, for pixels with independent errors.
+        By metric; `bias` is the standard error of the reference's mean. With `mean_variance` the channels count as
+        fully correlated, as they are where they share their samples.
     """
     mask = _mask(image, reference, covered)
     expect(variance.shape == reference.shape, "variance", f"shape {reference.shape}", variance.shape)
@@ -300,7 +306,7 @@ def noise_figures(image: Array, reference: Array, variance: Array, covered: Arra
         "relmse": float(np.mean(v / scale)) if scale.all() else math.nan,
         "mae": float(absolute.mean()),
         "smape": float(np.mean(np.minimum(_over_magnitude(absolute, x, r), 1.0))),
-        "bias": math.sqrt(float(v.sum())) / v.size,
+        "bias": math.sqrt(float(v.sum())) / v.size if mean_variance is None else float(np.sqrt(mean_variance).mean()),
         "psnr": _decibels(float(r.max()), float(v.mean())),
         "ssim": ssim_of_noise(reference, variance, mask),
     }

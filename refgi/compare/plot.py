@@ -56,6 +56,7 @@ def _draw(axes: Any, points: list[Point], noise: float, error_name: str) -> None
     names = list(dict.fromkeys(point.name for point in points))
     axes.patch.set_alpha(0)
     axes.set(xscale="log", yscale="log", xlabel="run time, s", ylabel=f"{error_name} of indirect irradiance")
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(True, which="major", color=LINE, linewidth=0.8)
     axes.set_axisbelow(True)

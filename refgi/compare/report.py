@@ -72,7 +72,7 @@ def page(comparison: Comparison) -> str:
         style=Markup((PAGE / "style.css").read_text("utf-8")), viewer=Markup((PAGE / "viewer.js").read_text("utf-8")),
         title=comparison.scene.name, description=comparison.scene.description, facts=_facts(comparison),
         verdict=_verdict(comparison), failures=comparison.failures, width=comparison.width, height=comparison.height,
-        quantities=_quantities(comparison), pictures=pictures, left=names[0], right=names[-1],
+        quantities=_quantities(comparison), pictures=pictures, left=names[0], right=TRUTH,
         columns=[{"label": label, "about": about} for label, about in (*COLUMNS.values(), ("FLIP", "of the picture"))],
         rows=_rows(comparison), notes=_notes(comparison), plot=Markup(_plot(comparison)), made=_made(comparison),
         versions=comparison.environment["versions"], machine=_machine(comparison.environment),
@@ -115,9 +115,13 @@ def _facts(comparison: Comparison) -> list[str]:
     covered = truth.samples[comparison.covered]
     return [
         f"{comparison.width} {TIMES} {comparison.height} pixels", f"{comparison.covered.mean():.0%} covered",
-        f"{scene.face_count:,} faces", f"{len(scene.lights)} light{'s' * (len(scene.lights) != 1)}",
+        _count(scene.face_count, "face"), _count(len(scene.lights), "light"),
         f"truth: {covered.mean():,.0f} samples a pixel in {number(truth.seconds)} s", comparison.options["dtype"],
     ]
+
+
+def _count(count: int, what: str) -> str:
+    return f"{count:,} {what}{'s' * (count != 1)}"
 
 
 def _verdict(comparison: Comparison) -> str:
@@ -157,7 +161,6 @@ def _ramp(scale: maps.Scale) -> dict[str, Any]:
 
 def _pictures(comparison: Comparison) -> list[dict[str, Any]]:
     errors, brightness = error_scale(comparison), maps.luminance_scale(comparison.truth.irradiance, comparison.covered)
-    noise_scale = errors._replace(low=0.0, colours=maps.SEQUENTIAL)
 
     def shown(made: Reference | MethodResult, painted: dict[str, maps.Pixels]) -> dict[str, str]:
         painted["false"] = maps.paint(maps.luminance(made.irradiance), comparison.covered, brightness)
@@ -177,7 +180,7 @@ def _pictures(comparison: Comparison) -> list[dict[str, Any]]:
                          "without": "This method knows what blocks light: see its error."})
     for reference in comparison.references.values():
         deviation = maps.luminance(np.sqrt(reference.variance))
-        painted = {"error": maps.paint(deviation, comparison.covered, noise_scale)}
+        painted = {"error": maps.paint(deviation, comparison.covered, errors)}
         pictures.append({"name": reference.name, "label": LABELS[reference.name], "images": shown(reference, painted),
                          "said": f"{number(reference.seconds)} s", "without": "A reference: see its standard error."})
     return pictures

@@ -182,7 +182,8 @@ def _reference(reference: Reference, covered: Array) -> dict[str, Any]:
         "settings": reference.settings, "seconds": reference.seconds, "stages": _stages(reference.runs),
         "samples": {"fewest": int(samples.min()), "most": int(samples.max()), "mean": float(samples.mean())},
         "mean_irradiance": float(values.mean()),
-        "mean_standard_error": float(np.sqrt(reference.variance[:, covered]).mean()),
+        "standard_error_of_a_pixel": float(np.sqrt(reference.variance[:, covered]).mean()),
+        "standard_error_of_the_mean": float(np.sqrt(reference.mean_variance).mean()),
         "files": [f"{reference.name}.exr", f"{reference.name}.png"],
     }
 

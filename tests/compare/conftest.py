@@ -41,11 +41,11 @@ def make_comparison(scene, height=36, width=48):
     runs = (Run("rsm", "ran", 0.012, 0), Run("splat.irradiance", "ran", 0.2, 1),
             Run("splat.lobes", "skipped", reason="no glossy material"))
     samples = np.full((height, width), 64)
-    references = {name: Reference(name, Knobs(), mean, variance, samples, mean / 4, 2.5, runs)
+    references = {name: Reference(name, Knobs(), mean, variance, np.full(3, 4e-6), samples, mean / 4, 2.5, runs)
                   for name, mean in (("truth", noisy), ("unoccluded", brighter))}
 
     def result(name, irradiance, judges, seconds, flip):
-        against = {j: measure(irradiance, references[j].irradiance, variance, covered) for j in judges}
+        against = {j: measure(irradiance, references[j].irradiance, variance, covered, references[j].mean_variance) for j in judges}
         return MethodResult(name, f"what {name} is", Knobs(), irradiance.astype(np.float32),
                             (irradiance / 4).astype(np.float32), seconds, runs, against, flip)
 

@@ -181,6 +181,13 @@ def test_the_mean_bias_scatters_by_its_standard_error(noisy):
     assert 14.0 < sum(v * v for v in z) < 84.0
 
 
+def test_the_variance_of_the_mean_decides_over_the_bias(noisy):
+    """Analytic: standard errors 0.1, 0.2 and 0.3 of channels that share their samples average to 0.2."""
+    got = metrics.measure(*noisy, mean_variance=np.array([0.01, 0.04, 0.09])).figures["bias"]
+    assert got.noise == pytest.approx(0.2)
+    assert got.is_noise
+
+
 def test_without_variance_nothing_is_called_noise():
     figures = metrics.measure(np.ones((3, 2, 2)), np.ones((3, 2, 2))).figures
     assert all(math.isnan(f.noise) and not f.is_noise for f in figures.values())

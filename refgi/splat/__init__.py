@@ -6,8 +6,21 @@ same pair term, Eq. 2, in `irradiance`. They differ from the paper where it is s
 solid angles and T / N, intensities 1 / pi, and Phong lobes conserve their flux above the surface.
 """
 
+from refgi.splat.gather import GatherSettings, gather
 from refgi.splat.irradiance import Receivers, irradiance
 from refgi.splat.settings import PairSettings
 from refgi.splat.sii import SiiSettings, sii
+from refgi.splat.walk import WalkSettings, walk, walk_lights
 
-__all__ = ["PairSettings", "Receivers", "SiiSettings", "irradiance", "sii"]
+__all__ = [
+    "GatherSettings",
+    "PairSettings",
+    "Receivers",
+    "SiiSettings",
+    "WalkSettings",
+    "gather",
+    "irradiance",
+    "sii",
+    "walk",
+    "walk_lights",
+]

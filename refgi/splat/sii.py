@@ -103,7 +103,8 @@ def light_footprints(rsms: "Sequence[Rsm]", settings: SiiSettings) -> Array:
     -----
     The area takes the place of the flux in the map, so that pattern, weights and filtering are those of the lights.
     """
-    return pixel_lights([_with_area_as_flux(rsm) for rsm in rsms], settings).flux[0]
+    area: Array = pixel_lights([_with_area_as_flux(rsm) for rsm in rsms], settings).flux[0]
+    return area
 
 
 def _with_area_as_flux(rsm: "Rsm") -> "Rsm":

@@ -1,0 +1,224 @@
+"""Pixel lights without a map: quasi-random light paths, as in instant radiosity (SII Sec. 3.7, Keller 1997).
+
+Every place where a path meets a surface becomes a pixel light with what the surface reflects there. The first
+bounce has the mean of the lights of a reflective shadow map; more bounces follow the diffuse reflection on. In an
+integrating sphere of albedo rho all bounces together give rho / (1 - rho) of the light's flux.
+"""
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.jit import kernel
+from refgi.radiometry import DIRECTIONAL, POINT, cosine_hemisphere, orthonormal_basis, radiant_intensity
+from refgi.sampling import halton
+from refgi.splat.irradiance import Receivers, irradiance
+from refgi.splat.settings import PairSettings
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+    from refgi.rays import Tracer
+    from refgi.rsm import PixelLights
+    from refgi.scene import Geometry, LightTable, MaterialTable
+
+Array = npt.NDArray[Any]
+
+BASES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53)  # a pair for the light and for each bounce
+
+@dataclasses.dataclass(frozen=True)
+class WalkSettings(PairSettings):
+    """What `walk` can be set to: `lights` paths a light (1000 as in SII Fig. 6), `bounces` of each, `seed`."""
+
+    lights: int = 1000
+    bounces: int = 1
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        expect(1 <= self.lights <= 1 << 24, "lights", "1 or more paths", self.lights)
+        expect(1 <= self.bounces < len(BASES) // 2, "bounces", f"1 to {len(BASES) // 2 - 1}", self.bounces)
+        expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
+
+
+class Rays(NamedTuple):
+    """Where paths go next."""
+
+    origin: Array  # (n, 3) m
+    direction: Array  # (n, 3) unit vectors
+    power: Array  # (n, 3) what each carries, W
+    numbers: Array  # (n, d) its coordinates: two for the light, two for each bounce
+
+
+class Left(NamedTuple):
+    """What paths left at one bounce: a pixel light each."""
+
+    position: Array  # (n, 3) m
+    normal: Array  # (n, 3) unit vectors on the lit side
+    flux: Array  # (n, 3) W, reflected diffusely
+    lobe_flux: Array  # (n, 3) W
+    lobe_axis: Array  # (n, 3) mirror directions
+    lobe_exponent: Array  # (n,)
+
+
+def walk(frame: "Frame", settings: WalkSettings) -> Array:
+    """Light every pixel by pixel lights of quasi-random light paths.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen and lit.
+    settings : WalkSettings
+        Number of paths and bounces, and how each light lights a receiver.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Indirect irradiance of all bounces, W/m^2, linear RGB, without visibility between lights and receivers.
+    """
+    from refgi.scene import light_table, material_table
+
+    lights = walk_lights(frame.tracer, frame.scene.geometry, material_table(frame.scene.materials),
+                         light_table(frame.scene.lights), settings)
+    buffer = frame.gbuffer
+    return irradiance(Receivers(buffer.position, buffer.normal, buffer.covered), lights, settings)
+
+
+@stage("walk.lights")
+def walk_lights(
+    tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", lights: "LightTable", settings: WalkSettings
+) -> "PixelLights":
+    """Trace light paths and leave a pixel light at every bounce.
+
+    Parameters
+    ----------
+    tracer : Tracer
+        Traces rays through `geometry`.
+    geometry : Geometry
+        The scene's triangles.
+    materials : MaterialTable
+        Float64.
+    lights : LightTable
+        Float64.
+    settings : WalkSettings
+        Number of paths and bounces, seed.
+
+    Returns
+    -------
+    PixelLights
+        At most paths x bounces x lights of them, float64; those without flux are dropped.
+
+    Notes
+    -----
+    Paths are not ended at random: each carries on with its power times the diffuse reflectance, so the walk adds no
+    noise beyond its directions. Glossy materials leave a lobe, but paths go on by diffuse reflection alone.
+    """
+    used = 2 + 2 * settings.bounces
+    shift = np.random.default_rng(settings.seed).random(used).tolist() if settings.seed else None
+    numbers = halton(settings.lights, BASES[:used], shift, start=1)
+    left: list[Left] = []
+    for k in range(len(lights.kind)):
+        left += _paths(tracer, geometry, materials, _emit(lights, k, numbers, geometry), settings.bounces)
+    return _pixel_lights(left)
+
+
+def _paths(
+    tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", rays: Rays, bounces: int
+) -> list[Left]:
+    """Follow paths and return what they leave at each bounce."""
+    left = []
+    for bounce in range(bounces):
+        hits = tracer.closest(rays.origin, rays.direction)
+        met = np.flatnonzero(hits.triangle_id >= 0)
+        rays = Rays(*(part[met] for part in rays))
+        position, normal, material = _surface(geometry, hits.triangle_id[met], hits.distance[met], rays)
+        opaque = (materials.ior[material] == 0)[:, None]
+        power = np.where(opaque, rays.power, 0)
+        mirror = rays.direction - 2 * (rays.direction * normal).sum(axis=1, keepdims=True) * normal
+        left.append(Left(position, normal, power * materials.diffuse[material], power * materials.specular[material],
+                         mirror, materials.exponent[material]))
+        u, v = rays.numbers[:, 2 + 2 * bounce], rays.numbers[:, 3 + 2 * bounce]
+        rays = Rays(position + tracer.offset * normal, _cosine_directions(normal, u, v), left[-1].flux, rays.numbers)
+    return left
+
+
+def _emit(lights: "LightTable", k: int, numbers: Array, geometry: "Geometry") -> Rays:
+    """Return the first rays of light k: each carries I / (density of its direction) / paths."""
+    count = len(numbers)
+    direction, power = np.empty((count, 3)), np.empty((count, 3))
+    if lights.kind[k] == DIRECTIONAL:
+        low, high = geometry.bounds
+        radius = geometry.diagonal / 2
+        across = np.reshape(orthonormal_basis(*lights.direction[k]), (2, 3))
+        disc = radius * np.sqrt(numbers[:, :1]) * _turn(numbers[:, 1])
+        origin = (low + high) / 2 - 1.001 * radius * lights.direction[k] + disc @ across
+        direction[:] = lights.direction[k]
+        power[:] = lights.intensity[k] * (math.pi * radius**2 / count)
+        return Rays(origin, direction, power, numbers)
+    _emit_from_point(lights, k, numbers, direction, power)
+    return Rays(np.repeat(lights.position[k][None], count, axis=0), direction, power, numbers)
+
+
+@kernel
+def _emit_from_point(lights: Any, k: int, numbers: Array, direction: Array, power: Array) -> None:
+    cos_outer = -1.0 if lights.kind[k] == POINT else lights.cos_outer[k]
+    ax, ay, az = (0.0, 0.0, 1.0) if lights.kind[k] == POINT else (
+        lights.direction[k, 0], lights.direction[k, 1], lights.direction[k, 2])
+    tx, ty, tz, bx, by, bz = orthonormal_basis(ax, ay, az)
+    weight = 2.0 * math.pi * (1.0 - cos_outer) / len(numbers)
+    for i in range(len(numbers)):
+        z = 1.0 - numbers[i, 0] * (1.0 - cos_outer)  # uniform over the cone
+        radius, phi = math.sqrt(max(0.0, 1.0 - z * z)), 2.0 * math.pi * numbers[i, 1]
+        x, y = radius * math.cos(phi), radius * math.sin(phi)
+        wx, wy, wz = tx * x + bx * y + ax * z, ty * x + by * y + ay * z, tz * x + bz * y + az * z
+        direction[i, 0], direction[i, 1], direction[i, 2] = wx, wy, wz
+        red, green, blue = radiant_intensity(lights, k, wx, wy, wz)
+        power[i, 0], power[i, 1], power[i, 2] = red * weight, green * weight, blue * weight
+
+
+@kernel
+def _cosine_directions(normal: Array, u: Array, v: Array) -> Array:
+    directions = np.empty_like(normal)
+    for i in range(len(normal)):
+        x, y, z = cosine_hemisphere(u[i], v[i])
+        tx, ty, tz, bx, by, bz = orthonormal_basis(normal[i, 0], normal[i, 1], normal[i, 2])
+        directions[i, 0] = tx * x + bx * y + normal[i, 0] * z
+        directions[i, 1] = ty * x + by * y + normal[i, 1] * z
+        directions[i, 2] = tz * x + bz * y + normal[i, 2] * z
+    return directions
+
+
+def _turn(share: Array) -> Array:
+    return np.stack([np.cos(2 * math.pi * share), np.sin(2 * math.pi * share)], axis=1)
+
+
+def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: Rays) -> tuple[Array, Array, Array]:
+    """Return position, unit normal on the side the ray came from, and material of each hit."""
+    position = rays.origin + distance[:, None] * rays.direction
+    faces = geometry.faces[triangle]
+    corner = geometry.vertices[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    if geometry.vertex_normals is not None:
+        # twice the areas opposite to the corners, times the face's normal
+        rest = position[:, None] - corner
+        share = np.stack([(np.cross(rest[:, a], rest[:, b]) * normal).sum(axis=1) for a, b in ((1, 2), (2, 0), (0, 1))])
+        smooth = np.einsum("cn,nca->na", share, geometry.vertex_normals[faces])
+        normal = np.where((smooth != 0).any(axis=1, keepdims=True), smooth, normal)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal *= np.where((normal * rays.direction).sum(axis=1, keepdims=True) > 0, -1.0, 1.0)
+    return position, normal, geometry.material_of_face[triangle]
+
+
+def _pixel_lights(left: list[Left]) -> "PixelLights":
+    from refgi.rsm import PixelLights
+
+    position, normal, flux, lobe_flux, axis, exponent = (np.concatenate(parts) for parts in zip(*left, strict=True))
+    glossy = lobe_flux.any(axis=1)
+    kept = flux.any(axis=1) | glossy
+    columns = [np.ascontiguousarray(part[kept].T) for part in (position, normal, flux, lobe_flux, axis, exponent)]
+    lobes = columns[3:] if glossy.any() else [None, None, None]
+    return PixelLights(*columns[:3], *lobes, drawn=len(position))

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.rays.embree import MISS, Door, open_door
 from refgi.rays.watertight import Corners, closest_around, corners
-from refgi.scene import Geometry
+from refgi.scene import DirectionalLight, Geometry, Light
 
 Array = npt.NDArray[Any]
 
@@ -143,6 +143,36 @@ class Tracer:
         blocked[traced] = self.occluded(a[traced], (b - a)[traced], 1.0)
         return blocked
 
+    def visible_from_light(self, position: Array, normal: Array, covered: Array, light: Light) -> Array:
+        """Tell which points of a G-buffer a light reaches.
+
+        Parameters
+        ----------
+        position, normal : (3, h, w) ndarray
+            Points and unit normals, world space, m.
+        covered : (h, w) bool ndarray
+            Where there is a surface.
+        light : Light
+            The light; its cone does not matter here.
+
+        Returns
+        -------
+        (h, w) bool ndarray
+            True where nothing blocks; False without surface and where the light is behind the normal.
+        """
+        at, up = position[:, covered].T.astype(np.float64), normal[:, covered].T.astype(np.float64)
+        origins = at + self.offset * up
+        if isinstance(light, DirectionalLight):
+            toward, reach = np.broadcast_to(-np.asarray(light.direction, np.float64), at.shape), np.inf
+        else:
+            toward, reach = np.asarray(light.position, np.float64) - origins, 1 - RELATIVE_OFFSET
+        far = np.where((toward * up).sum(axis=1) > 0, reach, 0).astype(np.float32)
+        blocked = np.zeros(len(at), np.bool_)
+        self.fill_occluded(origins.astype(np.float32), np.ascontiguousarray(toward, np.float32), far, blocked)
+        visible = np.zeros(covered.shape, np.bool_)
+        visible[covered] = ~blocked
+        return visible
+
     def fill_closest(self, origins: Array, directions: Array, reach: Array, triangle_id: Array,
                      distance: Array) -> None:
         """Fill nearest hits, unchecked and in float32 alone.
@@ -199,30 +229,30 @@ class Tracer:
         missed = missed[reach[missed] > 0]
         if self._door is None or not len(missed):
             return []
+        shifted = (origins[missed] + _sideways(directions[missed], RELATIVE_SHIFT * self._scale)).astype(np.float32)
+        doubtful = np.zeros(len(missed), np.bool_)
+        self.fill_occluded(shifted, directions[missed], reach[missed], doubtful)
+        missed, shifted = missed[doubtful], shifted[doubtful]
+        near, distance = np.empty(len(missed), np.int32), np.empty(len(missed), np.float32)
+        self.fill_closest(shifted, directions[missed], reach[missed], near, distance)
         found = []
-        for shift in _sideways(directions[missed], RELATIVE_SHIFT * self._scale):
-            near, distance = np.empty(len(missed), np.int32), np.empty(len(missed), np.float32)
-            shifted = (origins[missed] + shift).astype(np.float32)
-            self.fill_closest(shifted, directions[missed], reach[missed], near, distance)
-            for k in np.flatnonzero(near != MISS):
-                ray = int(missed[k])
-                triangle, t = closest_around(self._corners, int(near[k]), origins[ray].astype(np.float64),
-                                             directions[ray].astype(np.float64), float(reach[ray]))
-                if triangle != MISS:
-                    found.append((ray, triangle, t))
+        for ray, triangle in zip(missed[near != MISS], near[near != MISS], strict=True):
+            hit, t = closest_around(self._corners, int(triangle), origins[ray].astype(np.float64),
+                                    directions[ray].astype(np.float64), float(reach[ray]))
+            if hit != MISS:
+                found.append((int(ray), hit, t))
         return found
 
 
-def _sideways(directions: Array, length: float) -> tuple[Array, Array, Array]:
-    """Return three shifts of `length` across each direction, 120 degrees apart."""
-    d = directions.astype(np.float64)
-    d /= np.linalg.norm(d, axis=1, keepdims=True)
-    least = np.eye(3)[np.argmin(np.abs(d), axis=1)]
-    u = np.cross(d, least)
-    u *= length / np.linalg.norm(u, axis=1, keepdims=True)
-    v = np.cross(d, u)
-    turns = (0.3, 0.3 + 2 * np.pi / 3, 0.3 + 4 * np.pi / 3)  # 0.3: along no axis of common models
-    return tuple(np.cos(t) * u + np.sin(t) * v for t in turns)  # type: ignore[return-value]
+def _sideways(directions: Array, length: float) -> Array:
+    """Return a shift of `length` across each direction, along no axis of common models."""
+    d = directions / np.abs(directions).max(axis=1, keepdims=True).astype(np.float64)
+    u = np.cross(d, (0.3713906763541037, 0.5570860145311556, 0.7427813527082074))
+    size = np.linalg.norm(u, axis=1, keepdims=True)
+    along = size[:, 0] < 1e-3
+    u[along] = np.cross(d[along], (1.0, 0.0, 0.0))
+    size[along] = np.linalg.norm(u[along], axis=1, keepdims=True)
+    return np.asarray(u * (length / size))
 
 
 def _checked(origins: Array, directions: Array, reach: Array | float) -> tuple[Array, Array, Array]:

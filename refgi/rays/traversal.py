@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from refgi.jit import kernel, prange
@@ -29,19 +28,21 @@ class Calls(NamedTuple):
     scene: np.uint64
 
 
-@intrinsic  # type: ignore[misc, unused-ignore]
-def _call(typing: Any, function: Any, scene: Any, ray: Any) -> Any:  # noqa: ARG001
-    """Call `void function(scene, ray, NULL)`."""
+def _call_by_address(_: Any, function: Any, scene: Any, ray: Any) -> Any:  # noqa: ARG001
+    """Type and emit a call of `void function(scene, ray, NULL)`."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
         byte = ir.IntType(8).as_pointer()
         kind = ir.FunctionType(ir.VoidType(), [byte, byte, byte])
         target = builder.inttoptr(arguments[0], kind.as_pointer())
         pointers = [builder.inttoptr(argument, byte) for argument in arguments[1:]]
-        builder.call(target, [*pointers, cgutils.get_null_value(byte)])
+        builder.call(target, [*pointers, ir.Constant(byte, None)])
         return context.get_dummy_value()
 
     return types.void(types.uint64, types.uint64, types.uint64), generate
+
+
+_call: Any = intrinsic(_call_by_address)
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Decide in float64 the rays that slip between triangles in float32.
 
 A ray aimed exactly at a vertex can pass Embree's float32 test of every triangle around it. Such a miss is found by
-asking again with rays shifted sideways by many float32 steps: if all of them miss as well, the miss stands. Else the
+asking again with the ray shifted sideways by many float32 steps: if that misses as well, the miss stands. Else the
 triangles around what the shifted ray hit are tested against the ray itself, in float64, by signed volumes of
 (direction, edge) taken in one order per edge, so that two triangles always agree on which side of their common edge a
 ray passes (Woop, Benthin & Wald 2013) and no ray passes between them.
@@ -80,7 +80,7 @@ def closest_around(tables: Corners, triangle: int, origin: Array, direction: Arr
 
 
 @kernel
-def _side(vertices: Array, i: int, j: int, origin: Array, direction: Array) -> float:
+def _side(vertices: Array, i: int, j: int, origin: Array, direction: Array) -> Any:
     """Return the signed volume of direction and edge i-j, exactly negated for j-i."""
     low, high = min(i, j), max(i, j)
     ax, ay, az = vertices[low, 0] - origin[0], vertices[low, 1] - origin[1], vertices[low, 2] - origin[2]

@@ -7,5 +7,6 @@ other methods and asks a shadow ray for each, which is what their visibility app
 
 from refgi.truth.settings import TruthSettings
 from refgi.truth.truth import TruthResult, trace_truth, truth
+from refgi.truth.vpl import VplSettings, vpl
 
-__all__ = ["TruthResult", "TruthSettings", "trace_truth", "truth"]
+__all__ = ["TruthResult", "TruthSettings", "VplSettings", "trace_truth", "truth", "vpl"]

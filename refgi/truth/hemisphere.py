@@ -195,8 +195,9 @@ def _rest(pattern: float, receiver: float, limit: float) -> float:
 def _found(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Return the direction back along a ray and the point it found."""
     t = np.float64(paths.distance[ray])
-    d, o = paths.direction[ray], paths.origin[ray]
-    return (-np.float64(d[0]), -np.float64(d[1]), -np.float64(d[2])), (o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2])
+    o, d = paths.origin[ray], paths.direction[ray]
+    y = (o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2])
+    return (-np.float64(d[0]), -np.float64(d[1]), -np.float64(d[2])), y
 
 
 @kernel(parallel=True)
@@ -307,5 +308,5 @@ def _scatter(surfaces: Surfaces, offset: float, word: Any, paths: Paths, ray: in
 
 
 @kernel
-def _uniform(word: Any) -> float:
+def _uniform(word: Any) -> Any:
     return (hash_bits(word) + 0.5) * 2.0**-32

@@ -88,8 +88,9 @@ def join(parts: list[LitPoints]) -> LitPoints:
 
 
 def _empty(count: int) -> LitPoints:
-    vectors, numbers = (lambda: np.zeros((3, count), np.float32)), (lambda: np.zeros(count, np.float32))
-    return LitPoints(vectors(), vectors(), vectors(), vectors(), numbers(), vectors(), numbers(), numbers(), numbers())
+    position, axis, normal, facing, colour = (np.zeros((3, count), np.float32) for _ in range(5))
+    power, exponent, peak, bound = (np.zeros(count, np.float32) for _ in range(4))
+    return LitPoints(position, axis, normal, facing, power, colour, exponent, peak, bound)
 
 
 @kernel

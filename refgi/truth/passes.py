@@ -147,6 +147,6 @@ def _shadows(count: int) -> Shadows:
 
 
 def _paths(count: int) -> Paths:
-    numbers = [np.empty(count, np.float32) for _ in range(4)]
-    vectors = [np.empty((count, 3), np.float32) for _ in range(3)]
-    return Paths(vectors[0], vectors[1], *numbers[:3], np.empty(count, np.int32), numbers[3], vectors[2])
+    origin, direction, weight = (np.empty((count, 3), np.float32) for _ in range(3))
+    reach, travelled, cosine, distance = (np.empty(count, np.float32) for _ in range(4))
+    return Paths(origin, direction, reach, travelled, cosine, np.empty(count, np.int32), distance, weight)

@@ -186,7 +186,7 @@ def shading_normal(surfaces: Surfaces, triangle: int, y: tuple[float, float, flo
 
 @kernel
 def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float], light: tuple[float, float, float],
-                 w: tuple[float, float, float]) -> float:
+                 w: tuple[float, float, float]) -> Any:
     """Return (P + 1) / (2 K) <r.w>^P [n.w > 0], the lobe's emission relative to diffuse rho F / pi.
 
     Parameters

@@ -142,7 +142,8 @@ def _result(moments: Moments, to: Receivers, settings: TruthSettings, shape: tup
     variance.reshape(3, -1)[:, to.pixel] = variance_of_mean[:, :-1]
     per_pass = settings.picks_per_pass + settings.directions_per_pass
     samples.reshape(-1)[to.pixel] = int(moments.passes) * per_pass
-    return TruthResult(mean, variance, samples, moments.mean[:, -1].copy(), variance_of_mean[:, -1], int(moments.passes))
+    return TruthResult(mean, variance, samples, moments.mean[:, -1].copy(), variance_of_mean[:, -1],
+                       int(moments.passes))
 
 
 def _fingerprint(task: Task) -> str:

@@ -45,7 +45,8 @@ def make_comparison(scene, height=36, width=48):
                   for name, mean in (("truth", noisy), ("unoccluded", brighter))}
 
     def result(name, irradiance, judges, seconds, flip):
-        against = {j: measure(irradiance, references[j].irradiance, variance, covered, references[j].mean_variance) for j in judges}
+        against = {j: measure(irradiance, references[j].irradiance, variance, covered, references[j].mean_variance)
+                   for j in judges}
         return MethodResult(name, f"what {name} is", Knobs(), irradiance.astype(np.float32),
                             (irradiance / 4).astype(np.float32), seconds, runs, against, flip)
 

@@ -1,0 +1,106 @@
+"""`refgi compare`: every method on one scene against the truth."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from refgi.cli.options import machine, speech, view
+from refgi.cli.session import FAILED, Session, say, table
+
+if TYPE_CHECKING:
+    from refgi.compare import Comparison
+    from refgi.scene import Scene
+
+SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ssim": "SSIM"}
+
+
+@click.command("compare")
+@view
+@click.option("--methods", metavar="A,B", help="Methods to compare; all where absent.")
+@click.option("--set", "pairs", multiple=True, metavar="METHOD.KEY=VALUE",
+              help="A setting of a method or of truth, such as truth.samples=64; repeatable.")
+@machine
+@click.option("--out", help="Folder for EXR, PNG, error maps, results.json and index.html.")
+@speech
+@click.pass_obj
+def command(session: Session, /, methods: str | None, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
+            shadows: str, threads: int | None, seed: int | None, out: str | None, **options: Any) -> int:
+    """Compare methods on SCENE with path tracing: figures of error, times, pictures and a page.
+
+    A method that knows no visibility is also compared with the truth without visibility, to which it converges.
+    """
+    from refgi.cli.destination import folder
+    from refgi.cli.progress import progress
+    from refgi.cli.threads import on_threads
+    from refgi.cli.view import View
+    from refgi.compare import compare
+
+    names, settings = _asked(methods, pairs, seed)
+    if out is not None:
+        folder(out)
+    scene = View(**options).load()
+    _require_memory(scene, len(names), dtype, rsm_resolution)
+    with on_threads(threads), progress() as tell:
+        comparison = compare(scene, names, truth_settings=settings.pop("truth"), method_settings=settings, out=out,
+                             progress=tell, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)
+    _report(session, comparison, out)
+    return 0 if comparison.is_sound else FAILED
+
+
+def _asked(methods: str | None, pairs: tuple[str, ...], seed: int | None) -> tuple[list[str], dict[str, Any]]:
+    from refgi.cli.settings import by_method, read_settings
+    from refgi.errors import InputError
+    from refgi.methods import METHODS, find_method
+
+    names = [name.strip() for name in methods.split(",")] if methods is not None else list(METHODS)
+    names = [name for name in names if find_method(name).name != "truth"]
+    if not names:
+        raise InputError("--methods: expected a method besides truth, got none")
+    texts = by_method(pairs, [*names, "truth"])
+    settings = {}
+    for name, own in texts.items():
+        wanted = METHODS[name].load()[1]
+        seeded = seed if "seed" in getattr(wanted, "__dataclass_fields__", {}) else None
+        settings[name] = read_settings(wanted, own, seeded, name)
+    return names, settings
+
+
+def _require_memory(scene: "Scene", methods: int, dtype: str, rsm_resolution: int) -> None:
+    from refgi.cli.memory import needed_bytes, require_memory
+
+    width, height = scene.camera.width, scene.camera.height
+    needed = needed_bytes(scene, width, height, float_bytes=8 if dtype == "float64" else 4,
+                          rsm_resolution=rsm_resolution, traced=True, compared=methods + 2)
+    require_memory(needed, width, height)
+
+
+def _report(session: Session, comparison: "Comparison", out: str | None) -> None:
+    from refgi.compare.metrics import count_non_finite
+    from refgi.compare.results import as_json
+
+    if not comparison.truth.irradiance.any():
+        say("there is no indirect light in this scene: the truth is wholly black")
+    if bad := count_non_finite(comparison.truth.irradiance, comparison.covered):
+        say(f"{bad} pixels of the truth are NaN or infinite")
+    for name, result in comparison.results.items():
+        if bad := result.against["truth"].non_finite:
+            say(f"{name}: {bad} pixels are NaN or infinite")
+    for name, reason in comparison.failures.items():
+        say(f"{name} gave no picture: {reason}")
+    where = f"\n\nopen {out.rstrip('/')}/index.html" if out else ""
+    session.result(_table(comparison) + where, as_json(comparison) | {"out": out})
+
+
+def _table(comparison: "Comparison") -> str:
+    from refgi.compare.report import JUDGES, number
+
+    rows: list[tuple[str, ...]] = [("method", "against", "time", *SHOWN.values(), "FLIP")]
+    for result in comparison.results.values():
+        for judge, measurement in result.against.items():
+            first = judge == "truth"
+            figures = (measurement.figures[name] for name in SHOWN)
+            rows.append((result.name if first else "", JUDGES[judge], f"{number(result.seconds)} s" if first else "",
+                         *(number(f.value) + ("*" if f.is_noise else " ") for f in figures),
+                         number(result.flip.mean) if first else ""))
+    text = table(rows, right=frozenset(range(2, len(rows[0]))))
+    return text + "\n* within the noise of the truth" if "*" in text else text

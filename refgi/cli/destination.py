@@ -1,0 +1,80 @@
+"""Where results go, made sure of before anything is computed."""
+
+import os
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+from refgi.errors import InputError
+
+SUFFIXES = (".exr", ".png")
+
+
+class Pictures(NamedTuple):
+    """Files that one picture goes to."""
+
+    exr: Path | None
+    png: Path | None
+
+
+def picture_files(out: str, stem: str) -> Pictures:
+    """Return the files for --out and make sure that they can be written.
+
+    Parameters
+    ----------
+    out : str
+        A name that ends in .exr or .png, or a folder, which then gets both.
+    stem : str
+        Name of the files in a folder.
+
+    Returns
+    -------
+    Pictures
+        One or both.
+
+    Raises
+    ------
+    InputError
+        If the name ends otherwise or its folder cannot be written.
+    """
+    path = Path(out)
+    suffix = path.suffix.lower()
+    if suffix in SUFFIXES and not path.is_dir():
+        _require(path, path.parent)
+        return Pictures(path if suffix == ".exr" else None, path if suffix == ".png" else None)
+    if suffix and not path.is_dir() and not out.endswith(("/", os.sep)):
+        raise InputError(f"--out {out}: expected a name that ends in .exr or .png, or a folder")
+    folder(out)
+    return Pictures(path / f"{stem}.exr", path / f"{stem}.png")
+
+
+def folder(out: str) -> Path:
+    """Make sure that a folder can be written, creating it where it is missing.
+
+    Parameters
+    ----------
+    out : str
+        The folder.
+
+    Returns
+    -------
+    Path
+        The same.
+
+    Raises
+    ------
+    InputError
+        If it cannot be created or written.
+    """
+    path = Path(out)
+    _require(path, path)
+    return path
+
+
+def _require(asked: Path, home: Path) -> None:
+    try:
+        home.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=home):
+            pass
+    except OSError as error:
+        raise InputError(f"--out {asked}: cannot be written: {error.strerror or error}") from error

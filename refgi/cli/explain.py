@@ -1,0 +1,148 @@
+"""`refgi explain`: what a method does for a scene, what it leaves out and why, and what an animation reuses.
+
+The method runs at a small size and is watched; nothing here knows what any method does.
+"""
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from refgi.cli.options import machine, speech, view
+from refgi.cli.session import Session, table
+
+if TYPE_CHECKING:
+    from refgi.scene import Light, Scene
+    from refgi.stages import Memory, Run
+
+SMALL = 48  # pixels along the longer side
+STEP = 0.01  # of the scene's diagonal: how far camera and lights move from one frame to the next
+ROWS = {  # SII Table 1
+    "light and camera still": (False, False), "camera moves": (False, True), "light moves": (True, False),
+    "light and camera move": (True, True),
+}
+
+
+@click.command("explain")
+@view
+@click.option("--method", default="sii", show_default=True, help="sii, gather, vpl or truth.")
+@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
+@machine
+@speech
+@click.pass_obj
+def command(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
+            threads: int | None, seed: int | None, **options: Any) -> None:
+    """Show the stages that METHOD runs for SCENE, which it skips and why, and what an animation reuses.
+
+    The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving.
+    """
+    from refgi.cli.progress import progress
+    from refgi.cli.settings import read_settings
+    from refgi.cli.threads import on_threads
+    from refgi.cli.view import View
+    from refgi.methods import find_method
+
+    settings = read_settings(find_method(method).load()[1], pairs, seed, method)
+    scene = _small(View(**options).load())
+    frame_options = {"dtype": dtype, "rsm_resolution": rsm_resolution, "shadows": shadows}
+    with on_threads(threads), progress() as tell:
+        first = _watch(scene, method, settings, frame_options, None)
+        tell(method, 0.2)
+        animation = {}
+        for row, (light, camera) in ROWS.items():
+            animation[row] = _second_frame(scene, method, settings, frame_options, light, camera)
+            tell(method, 0.2 + 0.2 * len(animation))
+    content = {"scene": scene.name, "method": method, "settings": settings,
+               "stages": [dataclasses.asdict(line) for line in summed(first)],
+               "animation": {row: {line.name: line.what for line in summed(runs)} for row, runs in animation.items()}}
+    session.result(_text(content), content)
+
+
+@dataclasses.dataclass(frozen=True)
+class Line:
+    """What became of all calls of one stage."""
+
+    name: str
+    depth: int
+    ran: int
+    reused: int
+    skipped: int
+    reason: str
+
+    @property
+    def what(self) -> str:
+        """In a word or two."""
+        counts = {"runs": self.ran, "reused": self.reused, "skipped": self.skipped}
+        return ", ".join(f"{word} x{n}" if n > 1 else word for word, n in counts.items() if n)
+
+
+def summed(runs: "list[Run]") -> list[Line]:
+    """Add up the calls of each stage, in the order of first appearance.
+
+    Parameters
+    ----------
+    runs : list of Run
+        A log.
+
+    Returns
+    -------
+    list of Line
+        One a stage.
+    """
+    lines: dict[str, Line] = {}
+    for run in runs:
+        line = lines.get(run.name, Line(run.name, run.depth, 0, 0, 0, ""))
+        reason = run.reason if run.status == "skipped" else line.reason
+        lines[run.name] = dataclasses.replace(
+            line, ran=line.ran + (run.status == "ran"), reused=line.reused + (run.status == "reused"),
+            skipped=line.skipped + (run.status == "skipped"), reason=reason)
+    return list(lines.values())
+
+
+def _small(scene: "Scene") -> "Scene":
+    width, height = scene.camera.width, scene.camera.height
+    factor = min(1.0, SMALL / max(width, height))
+    return scene.with_camera(width=max(1, round(width * factor)), height=max(1, round(height * factor)))
+
+
+def _watch(scene: "Scene", method: str, settings: Any, options: dict[str, Any], memory: "Memory | None") -> "list[Run]":
+    from refgi import stages
+    from refgi.methods import render
+
+    with stages.observe(memory=memory) as log:
+        render(scene, method, settings, **options)
+    return log.runs
+
+
+def _second_frame(scene: "Scene", method: str, settings: Any, options: dict[str, Any], light: bool,
+                  camera: bool) -> "list[Run]":
+    from refgi.stages import Memory
+
+    memory, step = Memory(), STEP * scene.geometry.diagonal
+    _watch(scene, method, settings, options, memory)
+    if light:
+        scene = scene.with_lights(*(_moved(one, step) for one in scene.lights))
+    if camera:
+        x, y, z = scene.camera.eye
+        scene = scene.with_camera(eye=(x + step, y, z))
+    return _watch(scene, method, settings, options, memory)
+
+
+def _moved(light: "Light", step: float) -> "Light":
+    from refgi.scene import DirectionalLight
+
+    if isinstance(light, DirectionalLight):
+        x, y, z = light.direction
+        return dataclasses.replace(light, direction=(x + STEP, y, z + STEP))
+    x, y, z = light.position
+    return dataclasses.replace(light, position=(x + step, y, z))
+
+
+def _text(content: dict[str, Any]) -> str:
+    head = f"{content['method']} on {content['scene']}"
+    lines = [("stage", "", "why")]
+    lines += [("  " * line["depth"] + line["name"], Line(**line).what, line["reason"]) for line in content["stages"]]
+    names = list(dict.fromkeys(name for row in content["animation"].values() for name in row))
+    rows = [("next frame", *content["animation"])]
+    rows += [(name, *(row.get(name, "-") for row in content["animation"].values())) for name in names]
+    return f"{head}\n\n{table(lines)}\n\nWhat the next frame of an animation costs (SII Table 1)\n\n{table(rows)}"

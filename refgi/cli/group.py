@@ -1,0 +1,99 @@
+"""The command's frame: verbs loaded when used, errors and warnings as one line each, exit codes."""
+
+import importlib
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import click
+
+from refgi import __version__
+from refgi.cli.session import DONE, FAILED, INTERRUPTED, USAGE, Session, say
+from refgi.errors import RefgiError
+
+VERBS = ("scenes", "render", "compare", "explain", "info")
+HELP = """Indirect light by four published methods on the CPU, judged by path tracing.
+
+SCENE is a built-in name such as cornell_box (see `refgi scenes`), a scene file (.json), or a mesh (.glb, .gltf, .obj,
+.ply) with camera and light options. Results go to stdout, everything else to stderr.
+
+Exit codes: 0 done, 1 a check failed, 2 usage or input error, 130 interrupted.
+"""
+
+
+class VerbGroup(click.Group):
+    """A group of verbs, each the `command` of a module of this package with its name."""
+
+    @classmethod
+    def refgi(cls) -> "VerbGroup":
+        """Return the whole command."""
+        group = cls("refgi", help=HELP, context_settings={"help_option_names": ["-h", "--help"],
+                                                          "max_content_width": 100})
+        return click.version_option(__version__, "-V", "--version", message="refgi %(version)s")(group)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Return the verbs in the order in which one meets them."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import a verb."""
+        if cmd_name not in VERBS:
+            return None
+        command: click.Command = importlib.import_module(f"refgi.cli.{cmd_name}").command
+        return command
+
+    def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:
+        """Run and exit with the code that tells what became of it."""
+        session = Session(debug=bool(os.environ.get("REFGI_DEBUG")))
+        extra |= {"standalone_mode": False, "obj": session}
+        with warnings.catch_warnings():
+            warnings.simplefilter("default")
+            warnings.showwarning = session.warn  # type: ignore[assignment]
+            try:
+                code = super().main(args, prog_name, **extra)
+                sys.stdout.flush()
+            except BrokenPipeError:
+                code = _reader_left()
+            except (click.exceptions.Abort, KeyboardInterrupt):
+                say("interrupted")
+                code = INTERRUPTED
+            except BaseException as error:
+                code = _explained(error, session)
+        sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _explained(error: BaseException, session: Session) -> int:
+    """Say what went wrong in one line and return the exit code."""
+    if isinstance(error, SystemExit):
+        return error.code if isinstance(error.code, int) else FAILED
+    if session.debug:
+        traceback.print_exception(error)
+    if isinstance(error, click.UsageError):
+        asked = error.ctx.command_path if error.ctx else "refgi"
+        say(f"{_one_line(error.format_message())} (see {asked} --help)")
+        return USAGE
+    if isinstance(error, click.ClickException):
+        say(_one_line(error.format_message()))
+        return USAGE
+    if isinstance(error, RefgiError):
+        say(str(error))
+        return USAGE
+    if isinstance(error, MemoryError):
+        say(f"out of memory: {_one_line(str(error)) or 'try a smaller --size'}")
+        return USAGE
+    hint = "" if session.debug else " (a fault of refgi; --debug shows where)"
+    say(f"unexpected {type(error).__name__}: {_one_line(str(error))}{hint}")
+    return FAILED
+
+
+def _reader_left() -> int:
+    """Leave quietly when whoever read stdout has had enough: `refgi scenes | head -1`."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return DONE
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,91 @@
+"""Options that several verbs share, and how their values are read."""
+
+import re
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+from refgi.cli.session import Session
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Size(click.ParamType[tuple[int, int]]):
+    """WIDTHxHEIGHT in pixels, or one number for a square."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Read one size."""
+        match = re.fullmatch(r"(\d+)(?:[xX](\d+))?", str(value))
+        if match is None:
+            self.fail(f"expected WIDTHxHEIGHT such as 512x512, got {value!r}", param, ctx)
+        width, height = int(match[1]), int(match[2] or match[1])
+        if not (1 <= width <= 65536 and 1 <= height <= 65536):
+            self.fail(f"expected 1 to 65536 pixels either way, got {value!r}", param, ctx)
+        return width, height
+
+
+class Triple(click.ParamType[tuple[float, float, float]]):
+    """Three numbers with commas between."""
+
+    name = "x,y,z"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:  # type: ignore[override]
+        """Read one vector."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            x, y, z = map(float, str(value).split(","))
+        except ValueError:
+            self.fail(f"expected three numbers such as 0,1.5,-2, got {value!r}", param, ctx)
+        return x, y, z
+
+
+def speech(function: F) -> F:
+    """Add --json and --debug."""
+    def keep(name: str) -> Callable[[click.Context, click.Parameter, bool], None]:
+        def store(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+            session = ctx.find_object(Session)
+            if session is not None and value:
+                setattr(session, name, True)
+        return store
+
+    flag: dict[str, Any] = {"is_flag": True, "is_eager": True, "expose_value": False}
+    function = click.option("--debug", help="Show the traceback of an error.", callback=keep("debug"), **flag)(function)
+    return click.option("--json", help="Put one JSON object on stdout.", callback=keep("as_json"), **flag)(function)
+
+
+def view(function: F) -> F:
+    """Add the scene and what is seen of it: size, camera, lights."""
+    for decorate in reversed((
+        click.argument("scene"),
+        click.option("--size", type=Size(), help="Picture size in pixels; the scene's own where absent."),
+        click.option("--eye", type=Triple(), help="Where the camera is, m."),
+        click.option("--target", type=Triple(), help="What it looks at, m."),
+        click.option("--up", type=Triple(), help="Which way is up."),
+        click.option("--vfov-deg", type=float, help="Full vertical field of view."),
+        click.option("--light", "lights", multiple=True, metavar="KIND:KEY=VALUE:...",
+                     help="A light instead of the scene's own; repeatable. spot:position=0,2,0:target=0,0,0:"
+                          "outer_deg=35:intensity=20, point:position=0,2,0:intensity=20 (W/sr) or "
+                          "directional:direction=0,-1,0:irradiance=3 (W/m^2)."),
+    )):
+        function = decorate(function)
+    return function
+
+
+def machine(function: F) -> F:
+    """Add how it is computed: element type, threads, shadow maps."""
+    for decorate in reversed((
+        click.option("--dtype", type=click.Choice(["float32", "float64"]), default="float32", show_default=True,
+                     help="Element type of every buffer and kernel."),
+        click.option("--rsm-resolution", type=click.IntRange(1, 16384), default=512, show_default=True,
+                     help="Texels along one side of a reflective shadow map."),
+        click.option("--shadows", type=click.Choice(["map", "exact"]), default="map", show_default=True,
+                     help="Direct light's shadows: from the shadow map as published, or by rays."),
+        click.option("--threads", type=click.IntRange(1), help="Threads of compiled kernels; all where absent."),
+        click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Which random numbers, where a method has any."),
+    )):
+        function = decorate(function)
+    return function

@@ -1,0 +1,49 @@
+"""What one run of the command knows of itself: how to speak, and what it has warned of."""
+
+import dataclasses
+import json
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+@dataclasses.dataclass
+class Session:
+    """State of one run, the context's `obj`."""
+
+    debug: bool = False
+    as_json: bool = False
+    warnings: list[str] = dataclasses.field(default_factory=list)
+
+    def warn(self, message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        """Print a warning as one line, each text once; takes what `warnings.showwarning` gives."""
+        kind = "" if category.__name__ == "RefgiWarning" else f"{category.__name__}: "
+        text = kind + " ".join(str(message).split())
+        if text not in self.warnings:
+            self.warnings.append(text)
+            say(f"warning: {text}")
+
+    def result(self, text: str, content: dict[str, Any]) -> None:
+        """Print the result to stdout: the text, or with --json one object that also has the warnings."""
+        if self.as_json:
+            from refgi.compare.results import plain
+
+            text = json.dumps(plain({**content, "warnings": self.warnings}), indent=2, allow_nan=False)
+        click.echo(text)
+
+
+def say(text: str) -> None:
+    """Print one line to stderr, after the command's name."""
+    click.echo(f"refgi: {text}", file=sys.stderr)
+
+
+def table(rows: Sequence[tuple[str, ...]], *, right: frozenset[int] = frozenset()) -> str:
+    """Return rows as lines of aligned columns; those in `right` are flush right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    cells = ((cell.rjust(width) if i in right else cell.ljust(width)
+              for i, (cell, width) in enumerate(zip(row, widths, strict=True))) for row in rows)
+    return "\n".join("  ".join(row).rstrip() for row in cells)

@@ -1,0 +1,136 @@
+"""`--set key=value`: text checked against a settings dataclass, all errors at once."""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from typing import Any, get_args, get_type_hints
+
+from refgi.errors import InputError
+from refgi.scene.files import did_you_mean
+
+ABSENT = frozenset({"none", "null", ""})
+
+
+def read_settings(wanted: type, pairs: Iterable[str], seed: int | None = None, owner: str = "") -> Any:
+    """Make a method's settings from text.
+
+    Parameters
+    ----------
+    wanted : type
+        The settings class, a dataclass.
+    pairs : iterable of str
+        Such as ``lights=1024``, ``pattern=grid``, ``as_published=sii_no_pi,sii_widening`` or ``seconds=none``.
+    seed : int, optional
+        Value of the key ``seed``.
+    owner : str
+        The method, for messages.
+
+    Returns
+    -------
+    object
+        An instance of `wanted`.
+
+    Raises
+    ------
+    InputError
+        If a key is unknown or a value not usable; names all of them.
+    """
+    hints = get_type_hints(wanted)
+    known = [field.name for field in fields(wanted)]
+    values: dict[str, Any] = {}
+    errors: list[str] = []
+    for pair in [*pairs, *([] if seed is None else [f"seed={seed}"])]:
+        key, equals, text = pair.partition("=")
+        if not equals:
+            errors.append(f"{pair!r} is not key=value")
+        elif key not in known:
+            errors.append(_unknown(key, known, owner))
+        elif (problem := _read(values, key, text, hints[key])) is not None:
+            errors.append(problem)
+    made, refused = _make(wanted, values)
+    if errors + refused:
+        raise InputError("; ".join(errors + refused))
+    return made
+
+
+def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[str]]:
+    """Sort ``method.key=value`` by method.
+
+    Parameters
+    ----------
+    pairs : iterable of str
+        Such as ``sii.lights=1024``.
+    methods : iterable of str
+        Methods there are.
+
+    Returns
+    -------
+    dict of str to list of str
+        ``key=value`` texts for each method.
+
+    Raises
+    ------
+    InputError
+        If a method is missing or unknown; names all of them.
+    """
+    sorted_pairs: dict[str, list[str]] = {name: [] for name in methods}
+    errors = []
+    for pair in pairs:
+        name, dot, rest = pair.partition(".")
+        if not dot or "=" in name:
+            errors.append(f"--set {pair!r}: expected METHOD.key=value")
+        elif name not in sorted_pairs:
+            errors.append(f"--set {pair!r}: {name!r} is not compared here ({', '.join(sorted_pairs)})"
+                          + did_you_mean(name, sorted_pairs))
+        else:
+            sorted_pairs[name].append(rest)
+    if errors:
+        raise InputError("; ".join(errors))
+    return sorted_pairs
+
+
+def _unknown(key: str, known: list[str], owner: str) -> str:
+    of = f" of {owner}" if owner else ""
+    return f"{key!r} is not a setting{of} ({', '.join(known)})" + did_you_mean(key, known)
+
+
+def _read(values: dict[str, Any], key: str, text: str, hint: Any) -> str | None:
+    from pydantic import TypeAdapter, ValidationError
+
+    adapter = TypeAdapter(hint)
+    first: ValidationError | None = None
+    for candidate in _candidates(text, hint):
+        try:
+            values[key] = adapter.validate_python(candidate)
+        except ValidationError as error:
+            first = first or error
+        else:
+            return None
+    assert first is not None
+    reasons = dict.fromkeys(error["msg"] for error in first.errors() if error["type"] != "none_required")
+    return f"{key}: {' or '.join(reasons).lower()}, got {text!r}"
+
+
+def _candidates(text: str, hint: Any) -> list[Any]:
+    """Return what a text may stand for: None, itself, JSON, a list with commas."""
+    if text.lower() in ABSENT and type(None) in get_args(hint):
+        return [None]
+    candidates: list[Any] = [text]
+    try:
+        candidates.append(json.loads(text))
+    except ValueError:
+        candidates.append([part.strip() for part in text.split(",") if part.strip()])
+    return candidates
+
+
+def _make(wanted: type, values: Mapping[str, Any]) -> tuple[Any, list[str]]:
+    try:
+        return wanted(**values), []
+    except InputError as error:
+        alone = []
+        for key, value in values.items():
+            try:
+                wanted(**{key: value})
+            except InputError as other:
+                alone.append(str(other))
+        return None, list(dict.fromkeys(alone or [str(error)]))

@@ -1,0 +1,32 @@
+"""The software rasterizer, and what it feeds: G-buffer, reflective shadow maps, direct light, pixel lights.
+
+Reflective shadow maps follow Dachsbacher and Stamminger 2005 and their splatting paper of 2006 (SII), with the flux
+calibrated: exact solid angles, the spot's falloff integrated over each texel, and T/N on every pixel light, none of
+which the papers state. The rasterizer keeps a visibility buffer (triangle and nearness) and resolves attributes in a
+second pass, only those that are asked for.
+"""
+
+from refgi.rsm.direct import direct_irradiance, shadow_map_visibility
+from refgi.rsm.gbuffer import GBuffer, gbuffer
+from refgi.rsm.paraboloid import paraboloid_depth_maps
+from refgi.rsm.pixel_lights import PixelLights, choose_pixel_lights
+from refgi.rsm.projection import Projection, camera_projection, project
+from refgi.rsm.raster import Visibility, rasterize
+from refgi.rsm.reflective import Rsm, reflective_shadow_map
+
+__all__ = [
+    "GBuffer",
+    "PixelLights",
+    "Projection",
+    "Rsm",
+    "Visibility",
+    "camera_projection",
+    "choose_pixel_lights",
+    "direct_irradiance",
+    "gbuffer",
+    "paraboloid_depth_maps",
+    "project",
+    "rasterize",
+    "reflective_shadow_map",
+    "shadow_map_visibility",
+]

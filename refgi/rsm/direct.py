@@ -1,0 +1,135 @@
+"""Direct light: irradiance of one light at the receivers, and its shadows from the map's depth."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.jit import kernel, prange
+from refgi.radiometry import incident_light
+from refgi.rsm.gbuffer import GBuffer
+from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection, texel_of
+from refgi.rsm.reflective import Rsm
+from refgi.scene.model import Light, LightTable, light_table
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+STEEPEST = 20.0  # largest slope, depth per sideways distance, that the default bias follows
+NO_SHADOW = np.zeros((0, 0), np.bool_)
+
+
+@stage("rsm.shadow_map_visibility")
+def shadow_map_visibility(
+    position: Array, normal: Array, covered: Array, rsm: Rsm, bias: float | None = None
+) -> Array:
+    """Tell which receivers a light reaches, by the depth in its map.
+
+    Parameters
+    ----------
+    position, normal : (3, h, w) ndarray
+        Receivers, world space.
+    covered : (h, w) ndarray of bool
+        Where there is a receiver.
+    rsm : Rsm
+        The light's map.
+    bias : float, optional
+        A receiver counts as lit up to this far behind the stored depth, m. By default as far as a plane through the
+        receiver sinks within one texel, by its slope towards the light.
+
+    Returns
+    -------
+    (h, w) ndarray of bool
+        True where lit; false outside the map, which encloses all that the light reaches.
+
+    Raises
+    ------
+    InputError
+        If the bias is not finite and at least 0.
+
+    Notes
+    -----
+    The published test: nearest texel, one comparison. Shadow edges are as coarse as the map.
+    """
+    expect(bias is None or (math.isfinite(bias) and bias >= 0), "bias", "a finite number >= 0, m", bias)
+    visible = np.zeros(covered.shape, np.bool_)
+    _look_up(rsm.projection, position, normal, covered, rsm.depth, -1.0 if bias is None else bias, visible)
+    return visible
+
+
+@kernel(parallel=True)
+def _look_up(
+    maps: Projection, position: Array, normal: Array, covered: Array, depth: Array, bias: float, visible: Array
+) -> None:
+    for row in prange(covered.shape[0]):
+        for column in range(covered.shape[1]):
+            if covered[row, column]:
+                x, y, z = position[0, row, column], position[1, row, column], position[2, row, column]
+                texel_row, texel_column, far = texel_of(maps, x, y, z)
+                if far == far:  # seen by the map
+                    i = min(int(texel_row), depth.shape[0] - 1)
+                    j = min(int(texel_column), depth.shape[1] - 1)
+                    allowed = bias
+                    if bias < 0.0:
+                        m = i // maps.height
+                        nx, ny, nz = normal[0, row, column], normal[1, row, column], normal[2, row, column]
+                        allowed = _sinking(maps, m, (x, y, z), (nx, ny, nz), far)
+                    visible[row, column] = far <= depth[i, j] + allowed
+
+
+@kernel
+def _sinking(maps: Projection, m: int, point: Any, normal: Any, depth: float) -> float:
+    """Return how much farther than a receiver its plane may be one texel away, m."""
+    frame, origin = maps.frame, maps.origin
+    dx, dy, dz = frame[m, 2, 0], frame[m, 2, 1], frame[m, 2, 2]
+    width = 2.0 * max(maps.half[0] / maps.width, maps.half[1] / maps.height)
+    if maps.kind != ORTHOGRAPHIC:
+        dx, dy, dz = point[0] - origin[m, 0], point[1] - origin[m, 1], point[2] - origin[m, 2]
+        distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+        dx, dy, dz = dx / distance, dy / distance, dz / distance
+        width *= 2.0 * distance if maps.kind == PARABOLOID else distance
+    cosine = abs(dx * normal[0] + dy * normal[1] + dz * normal[2])
+    slope = min(math.sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-6), STEEPEST)
+    return width * (slope + 0.1) + 1e-6 * depth
+
+
+@stage("rsm.direct_irradiance")
+def direct_irradiance(buffer: GBuffer, light: Light, visible: Array | None = None) -> Array:
+    """Sum the irradiance that a light gives directly: E = I(w) cos / d^2.
+
+    Parameters
+    ----------
+    buffer : GBuffer
+        The receivers.
+    light : Light
+        The light.
+    visible : (h, w) ndarray of bool, optional
+        Where the light arrives; everywhere where absent.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2, linear RGB. Excludes albedo/pi; zero where there is no surface.
+    """
+    position, normal, covered = buffer.resolve("position", "normal", "covered")
+    out = np.zeros_like(position)
+    table = light_table((light,), buffer.dtype)
+    _irradiance(table, position, normal, covered, NO_SHADOW if visible is None else visible, out)
+    return out
+
+
+@kernel(parallel=True)
+def _irradiance(
+    lights: LightTable, position: Array, normal: Array, covered: Array, visible: Array, out: Array
+) -> None:
+    real = position.dtype.type
+    for row in prange(covered.shape[0]):
+        for column in range(covered.shape[1]):
+            if covered[row, column] and (visible.size == 0 or visible[row, column]):
+                x, y, z = position[0, row, column], position[1, row, column], position[2, row, column]
+                wx, wy, wz, _, er, eg, eb = incident_light(lights, 0, x, y, z)
+                cosine = wx * normal[0, row, column] + wy * normal[1, row, column] + wz * normal[2, row, column]
+                cosine = max(cosine, real(0.0))
+                out[0, row, column], out[1, row, column], out[2, row, column] = er * cosine, eg * cosine, eb * cosine

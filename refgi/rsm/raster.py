@@ -1,0 +1,208 @@
+"""The visibility buffer: which triangle each texel sees, and how near.
+
+Work is split by rows. One map is cut into bands; each band keeps the list of triangles that reach it, in mesh order,
+and draws them alone, so that the result does not depend on the height of a band or the number of threads. Several
+maps are drawn one map per task without lists. Depth is kept as nearness in float32, ties go to the lowest id.
+"""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.rsm.paraboloid import draw_paraboloids
+from refgi.rsm.projection import PARABOLOID, Projection
+from refgi.rsm.triangle import LANES, Part, draw, project_vertex, texel_box
+from refgi.scene.model import Geometry
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+BATCH = 1024  # triangles whose boxes are found before they are drawn on one of several maps
+CHUNKS = 32  # pieces of the list of triangles that are counted and listed on their own
+
+
+class Visibility(NamedTuple):
+    """What is seen through each texel of the stacked maps."""
+
+    triangle_id: Array  # (H, W) int32, -1: nothing
+    inverse_depth: Array  # (H, W) float32: 1/depth, 1/m; orthographic 1 - depth/reach; 0: nothing
+
+
+class Bands(NamedTuple):
+    """Triangles by band of rows."""
+
+    boxes: Array  # (m, 4) uint16: first and last column, first and last row; first > last: covers nothing
+    starts: Array  # (bands + 1,) where each band's triangles start in `members`
+    members: Array  # (...) int32: triangles of band 0, of band 1, ..., each in mesh order
+    rows: int  # height of a band
+
+
+class Scratch(NamedTuple):
+    """Room for each worker that draws whole maps."""
+
+    corners: Array  # (workers, n, 4) float64
+    boxes: Array  # (workers, BATCH, 4) uint16
+    members: Array  # (workers, BATCH) int32
+
+
+@stage("rsm.rasterize")
+def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | None = None) -> Visibility:
+    """Find the nearest triangle at every texel centre.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles; those without area are passed over.
+    projection : Projection
+        The maps.
+    band_rows : int, optional
+        Height of a band of one map, in rows; the result does not depend on it.
+
+    Returns
+    -------
+    Visibility
+        Triangle and nearness at each texel of the stacked maps.
+
+    Notes
+    -----
+    A centre on an edge belongs to one of the two triangles that share it, never to both or none. Paraboloid maps are
+    drawn inside the inscribed circle of the hemisphere only.
+    """
+    vertices, faces = geometry.vertices, geometry.faces
+    height, width = projection.shape
+    # filled here by one thread: fresh memory first touched by two costs several times as much
+    seen = Visibility(
+        np.full((height, max(width, LANES)), -1, np.int32), np.full((height, max(width, LANES)), 0.0, np.float32)
+    )
+    workers = numba.get_num_threads()
+    if projection.kind == PARABOLOID:
+        draw_paraboloids(projection, vertices, faces, workers, seen.inverse_depth, seen.triangle_id)
+    elif projection.maps > 1:
+        _draw_maps(projection, vertices, faces, scratch(workers, len(vertices)), seen)
+    else:
+        corners = np.empty((len(vertices), 4))
+        _project(projection, vertices, corners)
+        rows = band_rows or min(max(projection.height // 32, 4), 32)
+        _draw_bands(corners, faces, bands(corners, faces, width, height, rows), workers, seen)
+    if width < LANES:
+        seen = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in seen))
+    return seen
+
+
+def scratch(workers: int, vertices: int) -> Scratch:
+    """Allocate room for workers that draw whole maps.
+
+    Parameters
+    ----------
+    workers : int
+        How many run at once.
+    vertices : int
+        Vertices of the geometry.
+
+    Returns
+    -------
+    Scratch
+        Uninitialised arrays.
+    """
+    return Scratch(
+        np.empty((workers, vertices, 4)),
+        np.empty((workers, BATCH, 4), np.uint16),
+        np.empty((workers, BATCH), np.int32),
+    )
+
+
+def bands(corners: Array, faces: Array, width: int, height: int, rows: int) -> Bands:
+    """List the triangles of each band of rows.
+
+    Parameters
+    ----------
+    corners : (n, 4) ndarray
+        Projected vertices.
+    faces : (m, 3) ndarray
+        Vertices of each triangle.
+    width, height : int
+        Size of the map.
+    rows : int
+        Height of a band.
+
+    Returns
+    -------
+    Bands
+        The lists, in mesh order.
+    """
+    boxes = np.empty((len(faces), 4), np.uint16)
+    counts = np.zeros((CHUNKS, -(-height // rows)), np.int64)
+    _count(corners, faces, np.array([width, height, rows]), boxes, counts)
+    ends = np.cumsum(counts.T).reshape(counts.T.shape)  # band by band, chunk by chunk
+    members = np.empty(ends[-1, -1], np.int32)
+    _list(boxes, rows, np.ascontiguousarray((ends - counts.T).T), members)
+    return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)
+
+
+@kernel(parallel=True)
+def _project(projection: Projection, vertices: Array, corners: Array) -> None:
+    for i in prange(len(vertices)):
+        project_vertex(projection, 0, vertices, i, corners)
+
+
+@kernel(parallel=True)
+def _count(corners: Array, faces: Array, size: Array, boxes: Array, counts: Array) -> None:
+    step = -(-len(faces) // CHUNKS)
+    for chunk in prange(CHUNKS):
+        for face in range(chunk * step, min((chunk + 1) * step, len(faces))):
+            if _store_box(corners, faces, face, size[0], size[1], boxes, face):
+                for band in range(boxes[face, 2] // size[2], boxes[face, 3] // size[2] + 1):
+                    counts[chunk, band] += 1
+
+
+@kernel
+def _store_box(corners: Array, faces: Array, face: int, width: int, height: int, boxes: Array, place: int) -> bool:
+    left, right, top, bottom = texel_box(corners, faces[face, 0], faces[face, 1], faces[face, 2], width, height)
+    empty = left > right or top > bottom
+    boxes[place, 0], boxes[place, 1] = (1, 0) if empty else (left, right)
+    boxes[place, 2], boxes[place, 3] = (1, 0) if empty else (top, bottom)
+    return not empty
+
+
+@kernel(parallel=True)
+def _list(boxes: Array, rows: int, cursors: Array, members: Array) -> None:
+    step = -(-len(boxes) // CHUNKS)
+    for chunk in prange(CHUNKS):
+        for face in range(chunk * step, min((chunk + 1) * step, len(boxes))):
+            if boxes[face, 0] <= boxes[face, 1]:
+                for band in range(boxes[face, 2] // rows, boxes[face, 3] // rows + 1):
+                    members[cursors[chunk, band]] = face
+                    cursors[chunk, band] += 1
+
+
+@kernel(parallel=True)
+def _draw_bands(corners: Array, faces: Array, lists: Bands, workers: int, seen: Visibility) -> None:
+    for worker in prange(workers):
+        for band in range(worker, len(lists.starts) - 1, workers):  # interleaved: neighbours cost alike
+            top = band * lists.rows
+            part = Part(
+                lists.members, lists.starts[band], lists.starts[band + 1], lists.boxes, 0, top, top + lists.rows - 1
+            )
+            draw(corners, faces, part, seen.inverse_depth, seen.triangle_id)
+
+
+@kernel(parallel=True)
+def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: Scratch, seen: Visibility) -> None:
+    workers, height = len(scratch.corners), projection.height
+    for worker in prange(workers):
+        corners, boxes, members = scratch.corners[worker], scratch.boxes[worker], scratch.members[worker]
+        for m in range(worker, len(projection.origin), workers):
+            rows = slice(m * height, (m + 1) * height)
+            for i in range(len(vertices)):
+                project_vertex(projection, m, vertices, i, corners)
+            for base in range(0, len(faces), BATCH):
+                count = 0
+                for face in range(base, min(base + BATCH, len(faces))):
+                    if _store_box(corners, faces, face, projection.width, height, boxes, face - base):
+                        members[count] = face
+                        count += 1
+                part = Part(members, 0, count, boxes, base, 0, height - 1)
+                draw(corners, faces, part, seen.inverse_depth[rows], seen.triangle_id[rows])

@@ -1,0 +1,248 @@
+"""How much light leaves through each texel: exact solid angles, and a spot's falloff integrated over them.
+
+With image-plane coordinates (x, y), r^2 = x^2 + y^2:
+
+- perspective: cos a = (1 + r^2)^(-1/2), density of solid angle (1 + r^2)^(-3/2),
+- paraboloid: cos a = (1 - r^2)/(1 + r^2), density 4/(1 + r^2)^2, cut at the unit disc (papers.md section 0).
+
+A spot's intensity depends on r alone, so its integral over a texel is exact where the intensity is constant (corner
+differences, cut by circles with a closed form along one axis) and a 4 x 4 Gauss rule elsewhere. All maps are
+symmetric about both axes; one quadrant is computed and mirrored.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.radiometry import corner_solid_angle_paraboloid, corner_solid_angle_perspective, spot_falloff
+from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, PERSPECTIVE, Projection
+
+Array = npt.NDArray[Any]
+
+NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263)  # Gauss, on [0, 1]
+WEIGHTS = (0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693)
+SUBSAMPLES = 4  # per side of a texel that a spot's cone crosses askew
+
+
+def texel_solid_angles(projection: Projection) -> Array:
+    """Return the solid angle of every texel.
+
+    Parameters
+    ----------
+    projection : Projection
+        The maps.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Sr, float64; of an orthographic map the area perpendicular to the light, m^2.
+
+    Notes
+    -----
+    A hemisphere's paraboloid map is cut at the unit disc and sums to 2 pi exactly: the part of a rim texel whose
+    centre lies outside, which sees nothing, counts with its inner neighbour.
+    """
+    if projection.kind == ORTHOGRAPHIC:
+        area = 4.0 * projection.half[0] * projection.half[1] / (projection.height * projection.width)
+        return np.full(projection.shape, area)
+    return _mirrored(projection, 1.0, 1.0, 1.0)
+
+
+def spot_power(projection: Projection, cos_inner: float, cos_outer: float) -> Array:
+    """Return the integral of a spot's falloff over every texel of one map that looks along the spot's axis.
+
+    Parameters
+    ----------
+    projection : Projection
+        A perspective or paraboloid map.
+    cos_inner, cos_outer : float
+        Cosines of the spot's half-angles.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Sr, float64: the texel's power is this times the on-axis intensity. Sums to
+        2 pi (1 - (cos_inner + cos_outer)/2) when the map encloses the cone.
+    """
+    return _mirrored(projection, cos_inner, cos_outer, 0.0)
+
+
+def _mirrored(projection: Projection, cos_inner: float, cos_outer: float, everywhere: float) -> Array:
+    height, width = projection.height, projection.width
+    quadrant = np.zeros(((height + 1) // 2, (width + 1) // 2))
+    _fill_quadrant(projection, np.array([cos_inner, cos_outer, everywhere]), quadrant)
+    if projection.kind == PARABOLOID:
+        _give_rim_inwards(projection, quadrant)
+    # row 0 of the quadrant touches the axis; the middle row of an odd height is half a row on either side
+    across = np.concatenate([quadrant[:, ::-1], quadrant[:, width % 2 :]], axis=1)
+    whole = np.concatenate([across[::-1], across[height % 2 :]], axis=0)
+    if width % 2:
+        whole[:, width // 2] *= 2.0
+    if height % 2:
+        whole[height // 2] *= 2.0
+    return np.tile(whole, (projection.maps, 1))
+
+
+@kernel(parallel=True)
+def _fill_quadrant(projection: Projection, spot: Array, quadrant: Array) -> None:
+    kind, (hx, hy) = projection.kind, (projection.half[0], projection.half[1])
+    dx, dy = 2.0 * hx / projection.width, 2.0 * hy / projection.height
+    shift_x, shift_y = 0.5 * (projection.width % 2), 0.5 * (projection.height % 2)
+    for i in prange(quadrant.shape[0]):
+        y0, y1 = max((i - shift_y) * dy, 0.0), (i + 1 - shift_y) * dy
+        for j in range(quadrant.shape[1]):
+            x0, x1 = max((j - shift_x) * dx, 0.0), (j + 1 - shift_x) * dx
+            if spot[2] > 0.0 and (kind == PERSPECTIVE or x1 * x1 + y1 * y1 <= 1.0):
+                quadrant[i, j] = _rectangle(kind, x0, x1, y0, y1)
+            elif spot[2] > 0.0:
+                quadrant[i, j] = _power(kind, x0, x1, y0, y1, 0.0, 0.0)
+            else:
+                quadrant[i, j] = _power(kind, x0, x1, y0, y1, spot[0], spot[1])
+
+
+@kernel
+def _rectangle(kind: int, x0: float, x1: float, y0: float, y1: float) -> float:
+    if kind == PARABOLOID:
+        return (
+            corner_solid_angle_paraboloid(x1, y1)
+            - corner_solid_angle_paraboloid(x0, y1)
+            - corner_solid_angle_paraboloid(x1, y0)
+            + corner_solid_angle_paraboloid(x0, y0)
+        )
+    return (
+        corner_solid_angle_perspective(x1, y1)
+        - corner_solid_angle_perspective(x0, y1)
+        - corner_solid_angle_perspective(x1, y0)
+        + corner_solid_angle_perspective(x0, y0)
+    )
+
+
+@kernel
+def _power(kind: int, x0: float, x1: float, y0: float, y1: float, cos_inner: float, cos_outer: float) -> float:
+    """Integrate the falloff over a rectangle of the first quadrant."""
+    inner, outer = _radius(kind, cos_inner), _radius(kind, cos_outer)
+    farthest = math.sqrt(x1 * x1 + y1 * y1)
+    if farthest <= inner:
+        return _rectangle(kind, x0, x1, y0, y1)
+    if math.sqrt(x0 * x0 + y0 * y0) >= outer:
+        return 0.0
+    # between these abscissae no circle enters or leaves through the top or bottom side
+    cuts = np.array([x0, _meets(inner, y1, x0, x1), _meets(inner, y0, x0, x1),
+                     _meets(outer, y1, x0, x1), _meets(outer, y0, x0, x1), x1])  # fmt: skip
+    cuts.sort()
+    total = 0.0
+    for piece in range(5):
+        left, size = cuts[piece], cuts[piece + 1] - cuts[piece]
+        if size > 0.0:
+            for node in range(4):
+                x = left + NODES[node] * size
+                middle = min(max(math.sqrt(max(inner * inner - x * x, 0.0)), y0), y1)
+                top = min(max(math.sqrt(max(outer * outer - x * x, 0.0)), y0), y1)
+                total += WEIGHTS[node] * size * (
+                    _strip(kind, x, middle) - _strip(kind, x, y0)
+                    + _falloff_strip(kind, x, middle, top, cos_inner, cos_outer)
+                )  # fmt: skip
+    return total
+
+
+@kernel
+def _meets(radius: float, y: float, x0: float, x1: float) -> float:
+    """Return the abscissa where a circle meets the horizontal through y, moved into [x0, x1]."""
+    return min(max(math.sqrt(max(radius * radius - y * y, 0.0)), x0), x1)
+
+
+@kernel
+def _radius(kind: int, cosine: float) -> float:
+    tangent = math.sqrt(max(1.0 - cosine * cosine, 0.0))
+    return tangent / (1.0 + cosine) if kind == PARABOLOID else tangent / cosine
+
+
+@kernel
+def _strip(kind: int, x: float, y: float) -> float:
+    """Return the integral of the density of solid angle over [0, y] at fixed x."""
+    square = 1.0 + x * x
+    if kind == PARABOLOID:
+        root = math.sqrt(square)
+        return 2.0 * (y / (square * (square + y * y)) + math.atan(y / root) / (square * root))
+    return y / (square * math.sqrt(square + y * y))
+
+
+@kernel
+def _falloff_strip(kind: int, x: float, y0: float, y1: float, cos_inner: float, cos_outer: float) -> float:
+    total = 0.0
+    if y1 > y0:
+        for node in range(4):
+            y = y0 + NODES[node] * (y1 - y0)
+            square = 1.0 + x * x + y * y
+            if kind == PARABOLOID:
+                cosine, density = (2.0 - square) / square, 4.0 / (square * square)
+            else:
+                cosine = 1.0 / math.sqrt(square)
+                density = cosine / square
+            total += WEIGHTS[node] * density * spot_falloff(cosine, cos_inner, cos_outer)
+    return total * (y1 - y0)
+
+
+@kernel
+def _give_rim_inwards(projection: Projection, quadrant: Array) -> None:
+    """Move what texels with a centre beyond the hemisphere hold to the neighbour nearer to the axis."""
+    step = 2.0 * projection.half[0] / projection.width
+    shift = 0.5 - 0.5 * (projection.width % 2)
+    for i in range(quadrant.shape[0]):
+        for j in range(quadrant.shape[1]):
+            if _beyond(i, j, shift, step) and quadrant[i, j] > 0.0:
+                to_i, to_j = (i - 1, j) if i > j else (i, j - 1)
+                if i == j or _beyond(to_i, to_j, shift, step):
+                    to_i, to_j = i - 1, j - 1
+                quadrant[to_i, to_j] += quadrant[i, j]
+                quadrant[i, j] = 0.0
+
+
+@kernel
+def _beyond(i: int, j: int, shift: float, step: float) -> bool:
+    x, y = (j + shift) * step, (i + shift) * step
+    return x * x + y * y > 1.0
+
+
+def sampled_spot_share(projection: Projection, axis: Array, cos_inner: float, cos_outer: float) -> Array:
+    """Return the mean falloff of a spot over each texel of maps that do not look along its axis.
+
+    Parameters
+    ----------
+    projection : Projection
+        Perspective maps, such as the faces of a cube.
+    axis : (3,) ndarray
+        Unit vector along the spot.
+    cos_inner, cos_outer : float
+        Cosines of the spot's half-angles.
+
+    Returns
+    -------
+    (H, W) ndarray
+        0 to 1, float64, from 4 x 4 samples a texel.
+    """
+    share = np.empty(projection.shape)
+    _sample_spot(projection, np.asarray(axis, np.float64), np.array([cos_inner, cos_outer]), share)
+    return share
+
+
+@kernel(parallel=True)
+def _sample_spot(projection: Projection, axis: Array, cosines: Array, share: Array) -> None:
+    height, width, frame = projection.height, projection.width, projection.frame
+    for row in prange(share.shape[0]):
+        m = row // height
+        ax = frame[m, 0, 0] * axis[0] + frame[m, 0, 1] * axis[1] + frame[m, 0, 2] * axis[2]
+        ay = frame[m, 1, 0] * axis[0] + frame[m, 1, 1] * axis[1] + frame[m, 1, 2] * axis[2]
+        az = frame[m, 2, 0] * axis[0] + frame[m, 2, 1] * axis[1] + frame[m, 2, 2] * axis[2]
+        for column in range(width):
+            total = 0.0
+            for s in range(SUBSAMPLES * SUBSAMPLES):
+                x = (2.0 * (column + (s % SUBSAMPLES + 0.5) / SUBSAMPLES) / width - 1.0) * projection.half[0]
+                y = (2.0 * (row - m * height + (s // SUBSAMPLES + 0.5) / SUBSAMPLES) / height - 1.0)
+                y *= projection.half[1]
+                cosine = (ax * x + ay * y + az) / math.sqrt(1.0 + x * x + y * y)
+                total += spot_falloff(cosine, cosines[0], cosines[1])
+            share[row, column] = total / (SUBSAMPLES * SUBSAMPLES)

@@ -85,7 +85,7 @@ def atrium(faces: int = 250_000, seed: int = 1) -> Scene:
                       (5200.0, 4900.0, 4350.0))
     return Scene("atrium", geometry, materials, camera, (light,),
                  "A colonnade of two storeys with curtains; a spot from above on the left side and the floor.",
-                 exposure=0.6)
+                 exposure=0.5)
 
 
 def _density(pieces: list[Part], faces: int) -> float:
@@ -100,11 +100,11 @@ def _density(pieces: list[Part], faces: int) -> float:
 def _building() -> list[Part]:
     columns, bays = _columns(), _bays()
     found = [Part("lower_columns", COLUMN, with_arguments(parts.turned, LOWER_COLUMN), (34, 40),
-                  _at_height(columns, 0.0), True, (7, 6)),
+                  _at_height(columns, 0.0), True, (4, 5)),
              Part("upper_columns", COLUMN, with_arguments(parts.turned, UPPER_COLUMN), (22, 28),
-                  _at_height(columns, UPPER_FLOOR), True, (5, 6)),
+                  _at_height(columns, UPPER_FLOOR), True, (3, 5)),
              Part("balusters", COLUMN, with_arguments(parts.turned, BALUSTER), (14, 12), _balusters(bays), True,
-                  (4, 4))]
+                  (2, 3))]
     for storey, spring, top in (("lower", GROUND_SPRING, GROUND_TOP), ("upper", UPPER_SPRING, UPPER_TOP)):
         for name, shape, arguments, cells in (("front", parts.arch_front, (spring, top), (6, 34)),
                                               ("back", parts.arch_back, (spring, top), (6, 34)),
@@ -152,14 +152,14 @@ def _floor() -> list[Part]:
 
 
 def _furniture() -> list[Part]:
-    spots = np.array([(x, 0.0, z, 0.0) for x in (-7.5, -1.5, 4.5, 10.2) for z in (-2.15, 2.15)])
+    spots = np.array([(x, 0.0, z, 0.0) for x in (-6.0, 0.0, 6.0, 10.2) for z in (-2.15, 2.15)])
     middle = np.array([(3.0, 0.0, 0.0, 0.0)])
-    return [Part("pots", TERRACOTTA, with_arguments(parts.turned, POT), (24, 32), spots, True, (6, 8)),
+    return [Part("pots", TERRACOTTA, with_arguments(parts.turned, POT), (24, 32), spots, True, (4, 6)),
             Part("shrubs", LEAF, with_arguments(parts.shrub, 0.46), (40, 60), _at_height(spots, 0.95), True,
-                 (5, 8)),
-            Part("fountain", COLUMN, with_arguments(parts.turned, FOUNTAIN), (24, 72), middle, True, (7, 12)),
+                 (4, 6)),
+            Part("fountain", COLUMN, with_arguments(parts.turned, FOUNTAIN), (24, 72), middle, True, (5, 8)),
             Part("fountain_bowl", COLUMN, with_arguments(parts.turned, FOUNTAIN_BOWL), (40, 56), middle, True,
-                 (11, 10)),
+                 (5, 6)),
             Part("pool", WATER, with_arguments(parts.turned, POOL), (10, 40), middle, True, (1, 12))]
 
 
@@ -174,12 +174,12 @@ def _cloth(random: np.random.Generator) -> list[Part]:
             folds, gathered, phase = int(random.integers(9, 13)), random.choice([0.0, 0.35, 1.0]), random.uniform(0, 6)
             place = np.array([(x, 0.0, side * (HALF_WIDTH + 0.1), turn)])
             shape = with_arguments(parts.curtain, folds, gathered, phase)
-            found.append(Part(f"curtain_{number}", material, shape, (36, 130), place, least=(4, 24)))
+            found.append(Part(f"curtain_{number}", material, shape, (36, 130), place, least=(2, 14)))
             if number % 2 == (0 if side > 0 else 1):
                 place = np.array([(x, UPPER_SPRING - 0.15, side * (HALF_WIDTH - 0.05), turn)])
                 shape = with_arguments(parts.swag, float(random.uniform(0.9, 1.3)))
                 material = CLOTHS[(first + number // 2 + 1) % len(CLOTHS)]
-                found.append(Part(f"swag_{number}", material, shape, (60, 40), place, least=(10, 8)))
+                found.append(Part(f"swag_{number}", material, shape, (60, 40), place, least=(4, 6)))
     return found
 
 

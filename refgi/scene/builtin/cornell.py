@@ -70,12 +70,12 @@ def cornell_sphere(faces: int = 16_990) -> Scene:
         About that many faces, 4 materials, exact normals on the sphere.
     """
     expect(18 <= faces <= 50_000_000, "faces", "18 to 50000000", faces)
-    ball = sphere((0.285, 0.17, 0.3), 0.169, faces - 10, Material("sphere", (0.62, 0.6, 0.55)), "sphere")
+    ball = sphere((0.29, 0.1505, 0.3), 0.15, faces - 10, Material("sphere", (0.62, 0.6, 0.55)), "sphere")
     geometry, materials = merge([*shell(), ball], smooth=True)
     light = SpotLight((0.15, 0.53, 0.06), (0.483223, -0.662194, 0.572708), math.radians(26), math.radians(38),
                       (0.7, 0.66, 0.58))
     return Scene("cornell_sphere", geometry, materials, CAMERA, (light,),
-                 "A tessellated sphere in the Cornell box, lit from the front corner.", exposure=1.6)
+                 "A tessellated sphere in the Cornell box, lit from the front corner.", exposure=1.2)
 
 
 def shell() -> list[Mesh]:

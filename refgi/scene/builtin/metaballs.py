@@ -19,7 +19,7 @@ from refgi.scene.model import Array, Camera, Material, Mesh, Scene, SpotLight, m
 CLAY = Material("metaballs", (0.6, 0.58, 0.52))
 MIDDLE = np.array([0.0, 0.24, -0.02])  # m
 HALF_SIZE = 0.2  # m; the grid is a cube around MIDDLE
-POLISH_STEPS = 10  # leaves |f| at the vertices below 1e-9 at the default resolution
+POLISH_STEPS = 10  # leaves |f| at the vertices below 1e-5 at the default resolution
 
 
 class Balls(NamedTuple):
@@ -68,10 +68,10 @@ def balls_at(t: float) -> Balls:
         Around `MIDDLE`, well inside the grid.
     """
     number = np.arange(6)
-    phase = number / 6.0
-    turn = 2 * np.pi * (np.array([1, 2, 1, 1, 2, 1]) * t + phase)
-    sway = np.stack([0.115 * np.cos(turn), 0.07 * np.sin(2 * np.pi * t + 4.4 * number), 0.1 * np.sin(turn)], axis=1)
-    return Balls(MIDDLE + sway, 0.046 + 0.012 * np.cos(2.5 * number))
+    turn = 2 * np.pi * (np.array([1, -1, 2, -1, 1, -2]) * t + number / 6.0)
+    rise = 0.06 * np.sin(2 * np.pi * t + 4.4 * number)
+    sway = np.stack([0.1 * np.cos(turn), rise, 0.08 * np.sin(turn)], axis=1)
+    return Balls(MIDDLE + sway, 0.05 + 0.013 * np.cos(2.5 * number))
 
 
 def field(balls: Balls, points: Array) -> Array:

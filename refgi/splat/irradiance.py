@@ -109,10 +109,10 @@ def _sum(
 ) -> None:
     """Run the kernels that the lights need, some receivers at a time."""
     dtype = points.dtype
-    shines = lights.flux.any(axis=0)
+    shines: Array = (lights.flux != 0).any(axis=0)
     diffuse = pack_diffuse(lights, settings, dtype, shines)
     clamp = None if settings.clamp == "none" else pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
-    glossy = np.zeros(len(shines), bool) if lights.lobe_flux is None else lights.lobe_flux.any(axis=0)
+    glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
     if glossy.any():
         lobes = pack_lobes(lights, settings, dtype, glossy)
         lobe_clamp = pack_clamp(settings, footprint, glossy, lobes.shape[1], dtype)

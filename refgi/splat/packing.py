@@ -80,10 +80,12 @@ def pack_lobes(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLi
 
 
 def _lobes(lights: "PixelLights", chosen: Array) -> tuple[Array, Array, Array]:
-    expect(lights.lobe_axis is not None and lights.lobe_exponent is not None, "lights.lobe_axis",
-           "axis and exponent of every lobe", None)
-    flux, axis, exponent = (np.asarray(part[..., chosen], np.float64)
-                            for part in (lights.lobe_flux, lights.lobe_axis, lights.lobe_exponent))
+    parts = []
+    for key in ("lobe_flux", "lobe_axis", "lobe_exponent"):
+        values = getattr(lights, key)
+        expect(values is not None, f"lights.{key}", "flux, axis and exponent of every lobe", None)
+        parts.append(np.asarray(values[..., chosen], np.float64))
+    flux, axis, exponent = parts
     expect(bool((np.isfinite(exponent) & (exponent >= 0)).all()), "lights.lobe_exponent", "finite numbers >= 0",
            exponent.min())
     return flux, axis, exponent

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
-from refgi.radiometry import DIRECTIONAL, POINT, cosine_hemisphere, orthonormal_basis, radiant_intensity
-from refgi.sampling import halton
+from refgi.radiometry import DIRECTIONAL, POINT, orthonormal_basis, radiant_intensity
+from refgi.sampling import cosine_hemisphere, halton
 from refgi.splat.irradiance import Receivers, irradiance
 from refgi.splat.settings import PairSettings
 from refgi.stages import stage
@@ -216,9 +216,10 @@ def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: Rays)
 def _pixel_lights(left: list[Left]) -> "PixelLights":
     from refgi.rsm import PixelLights
 
-    position, normal, flux, lobe_flux, axis, exponent = (np.concatenate(parts) for parts in zip(*left, strict=True))
-    glossy = lobe_flux.any(axis=1)
-    kept = flux.any(axis=1) | glossy
-    columns = [np.ascontiguousarray(part[kept].T) for part in (position, normal, flux, lobe_flux, axis, exponent)]
-    lobes = columns[3:] if glossy.any() else [None, None, None]
-    return PixelLights(*columns[:3], *lobes, drawn=len(position))
+    position, normal, flux, lobe_flux, axis, exponent = (np.concatenate(parts).T for parts in zip(*left, strict=True))
+    glossy: Array = (lobe_flux != 0).any(axis=0)
+    kept: Array = glossy | (flux != 0).any(axis=0)
+    lights = PixelLights(position[:, kept], normal[:, kept], flux[:, kept], None, None, None, len(kept))
+    if not glossy.any():
+        return lights
+    return lights._replace(lobe_flux=lobe_flux[:, kept], lobe_axis=axis[:, kept], lobe_exponent=exponent[kept])

@@ -25,7 +25,9 @@ SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ss
 @click.pass_obj
 def command(session: Session, /, methods: str | None, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
             shadows: str, threads: int | None, seed: int | None, out: str | None, **options: Any) -> int:
-    """Compare methods on SCENE with path tracing: figures of error, times, pictures and a page.
+    """Judge methods on SCENE by path tracing: errors, times, a page.
+
+    Writes pictures, error maps, results.json and index.html to --out.
 
     A method that knows no visibility is also compared with the truth without visibility, to which it converges.
     """

@@ -25,14 +25,14 @@ ROWS = {  # SII Table 1
 
 @click.command("explain")
 @view
-@click.option("--method", default="sii", show_default=True, help="sii, gather, vpl or truth.")
+@click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
 @speech
 @click.pass_obj
 def command(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
             threads: int | None, seed: int | None, **options: Any) -> None:
-    """Show the stages that METHOD runs for SCENE, which it skips and why, and what an animation reuses.
+    """Show which stages a method runs, skips and reuses for SCENE.
 
     The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving.
     """
@@ -139,7 +139,10 @@ def _moved(light: "Light", step: float) -> "Light":
 
 
 def _text(content: dict[str, Any]) -> str:
-    head = f"{content['method']} on {content['scene']}"
+    from refgi.compare.results import plain
+
+    settings = ", ".join(f"{key}={value}" for key, value in plain(content["settings"]).items())
+    head = f"{content['method']} on {content['scene']}\n{settings}"
     lines = [("stage", "", "why")]
     lines += [("  " * line["depth"] + line["name"], Line(**line).what, line["reason"]) for line in content["stages"]]
     names = list(dict.fromkeys(name for row in content["animation"].values() for name in row))

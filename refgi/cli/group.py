@@ -45,13 +45,15 @@ class VerbGroup(click.Group):
         command: click.Command = importlib.import_module(f"refgi.cli.{cmd_name}").command
         return command
 
-    def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:
+    def main(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any
+    ) -> NoReturn:
         """Run and exit with the code that tells what became of it."""
         session = Session(debug=bool(os.environ.get("REFGI_DEBUG")))
         extra |= {"standalone_mode": False, "obj": session}
         with warnings.catch_warnings():
             warnings.simplefilter("default")
-            warnings.showwarning = session.warn  # type: ignore[assignment]
+            warnings.showwarning = session.warn
             try:
                 code = super().main(args, prog_name, **extra)
                 sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""`refgi info`: versions, processor, threads, cache."""
+"""`refgi info`: methods, versions, processor, threads, cache."""
 
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,13 @@ from refgi.cli.session import Session, table
 @speech
 @click.pass_obj
 def command(session: Session, /) -> None:
-    """Show versions, CPU features, threads, the kernel cache and the way to Embree."""
+    """Show methods, versions, CPU features, threads and cache."""
     from refgi.compare.environment import environment
     from refgi.jit import cache_root
+    from refgi.methods import METHODS
 
     facts = environment()
+    facts["methods"] = {name: method.summary for name, method in METHODS.items()}
     files = [path for path in cache_root().rglob("*") if path.is_file()] if cache_root().is_dir() else []
     facts["cache"] = {"path": str(cache_root()), "files": len(files), "bytes": sum(p.stat().st_size for p in files)}
     facts["embree"] = _embree()
@@ -41,4 +43,4 @@ def _text(facts: dict[str, Any]) -> str:
         ("threads", str(facts["threads"])), ("embree", facts["embree"]),
         ("cache", f"{Path(cache['path'])} ({cache['files']} files, {cache['bytes'] / 2**20:.1f} MiB)"),
     ]
-    return table(rows)
+    return f"{table(rows)}\n\n{table(list(facts['methods'].items()))}"

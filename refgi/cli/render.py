@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @click.command("render")
 @view
-@click.option("--method", default="sii", show_default=True, help="sii, gather, vpl or truth.")
+@click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
 @click.option("--exposure", type=float, help="Factor before the sRGB curve of a PNG; the scene's where absent.")

@@ -1,6 +1,7 @@
 """--threads: how many threads compiled kernels run on."""
 
 from contextlib import AbstractContextManager
+from typing import Any
 
 from refgi.errors import expect
 
@@ -27,6 +28,7 @@ def on_threads(count: int | None) -> AbstractContextManager[None]:
 
     from refgi.jit import threads
 
-    most = numba.config.NUMBA_NUM_THREADS
+    config: Any = numba.config
+    most = config.NUMBA_NUM_THREADS
     expect(count is None or 1 <= count <= most, "--threads", f"1 to {most} (NUMBA_NUM_THREADS)", count)
     return threads(count)

@@ -1,0 +1,148 @@
+"""The page: one file without references to anything outside, with every picture, figure and stage."""
+
+import base64
+import dataclasses
+import io
+import re
+from html.parser import HTMLParser
+
+import imageio.v3
+import numpy as np
+import pytest
+
+from refgi.compare.plot import Point, time_against_error
+from refgi.compare.report import PAGE, number, page, write_report
+from refgi.errors import RefgiWarning
+from refgi.image import tone_map
+
+VOID = {"meta", "img", "input", "br", "link", "hr"}
+
+
+class Outline(HTMLParser):
+    """Checks nesting and gathers tags, attributes and text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.text, self.closed_right = [], [], [], True
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        self.closed_right &= bool(self.open) and self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+@pytest.fixture
+def html(comparison):
+    return page(comparison)
+
+
+def test_the_page_refers_to_nothing_outside_itself(html):
+    assert not re.search(r"https?:|[\"'(]//|@import|url\((?!#)", html)
+    outline = Outline(html)
+    assert all(image["src"].startswith("data:image/png;base64,") for image in outline.all("img") if "src" in image)
+    assert not outline.all("link")
+    assert not any("src" in script for script in outline.all("script"))
+
+
+def test_the_page_is_well_formed(html):
+    outline = Outline(html)
+    assert outline.closed_right
+    assert not outline.open
+    identifiers = [a["id"] for _, a in outline.tags if "id" in a]
+    assert len(identifiers) == len(set(identifiers))
+
+
+def test_every_picture_has_a_text_and_every_control_a_name(html):
+    outline = Outline(html)
+    assert all(image["alt"] for image in outline.all("img") if "src" in image)
+    assert all("aria-label" in b or b["data-zoom"] == "0" for b in outline.all("button"))
+    assert outline.all("html")[0]["lang"] == "en"
+
+
+def test_the_pictures_are_those_of_the_comparison(html, comparison):
+    picture = re.search(r'<img data-q="picture"[^>]*alt="sii:[^>]*src="data:image/png;base64,([^"]*)"', html)
+    pixels = imageio.v3.imread(io.BytesIO(base64.b64decode(picture[1])))
+    assert np.array_equal(pixels, tone_map(np.moveaxis(comparison.results["sii"].radiance, 0, -1)))
+
+
+def test_names_from_outside_are_escaped(comparison):
+    scene = dataclasses.replace(comparison.scene, name="<script>alert(1)</script>")
+    html = page(dataclasses.replace(comparison, scene=scene, failures={"multires": "a < b & c"}))
+    assert "<script>alert" not in html
+    assert "a &lt; b &amp; c" in html
+
+
+def test_noise_is_marked_and_errors_are_not(html):
+    rows = re.findall(r"<tr.*?</tr>", html, re.DOTALL)
+    vpl = next(row for row in rows if '<th scope="row">vpl' in row)
+    sii = next(row for row in rows if '<th scope="row">sii' in row)
+    assert vpl.count('class="noise"') == 7
+    assert 'class="noise"' not in sii
+
+
+def test_stages_settings_and_reasons_are_told(html):
+    text = " ".join(Outline(html).text)
+    for said in ("splat.irradiance", "no glossy material", "pattern", "grid", "truth without visibility"):
+        assert said in text
+
+
+def test_non_finite_pixels_are_told(comparison):
+    bad = comparison.results["sii"].irradiance.copy()
+    bad[:, 18, 30] = np.nan
+    sii = comparison.results["sii"]
+    measured = {judge: dataclasses.replace(m, non_finite=1) for judge, m in sii.against.items()}
+    results = {"sii": dataclasses.replace(sii, irradiance=bad, against=measured)}
+    with pytest.warns(RefgiWarning, match="1 of 1728"):
+        html = page(dataclasses.replace(comparison, results=results))
+    assert "sii: 1 pixels are NaN or infinite" in html
+
+
+def test_without_methods_that_worked_there_is_still_a_page(comparison):
+    html = page(dataclasses.replace(comparison, results={}, failures={"sii": "no light"}))
+    assert "No method gave a figure" in html
+
+
+def test_equal_comparisons_give_equal_pages(comparison, tmp_path):
+    write_report(comparison, tmp_path)
+    assert (tmp_path / "index.html").read_text("utf-8") == page(comparison)
+
+
+def test_the_viewer_stays_small():
+    assert len((PAGE / "viewer.js").read_text().splitlines()) <= 300
+
+
+@pytest.mark.parametrize(("value", "text"), [
+    (0.0, "0"), (1.0, "1"), (0.01234, "0.0123"), (123456.0, "123000"), (-0.5, "\N{MINUS SIGN}0.5"),
+    (3.21e-7, "3.21e\N{MINUS SIGN}7"), (float("nan"), "\N{EN DASH}"), (float("inf"), "\N{INFINITY}"), (2.5e7, "2.5e7"),
+])
+def test_numbers_have_three_digits(value, text):
+    assert number(value) == text
+
+
+def test_the_plot_is_the_same_each_time_and_leaves_out_what_has_no_place():
+    points = [Point("sii", 0.2, 1e-2, True), Point("perfect", 0.2, 0.0, True), Point("lost", 1.0, float("nan"), True)]
+    svg = time_against_error(points, 1e-4)
+    assert svg == time_against_error(points, 1e-4)
+    assert svg.startswith("<svg")
+    assert "sii" in svg
+    assert "perfect" not in svg
+    assert "lost" not in svg
+    assert "#0102" not in svg
+
+
+@pytest.mark.parametrize("points", [[], [Point("sii", 0.2, 1e-2, True)]])
+def test_a_plot_of_few_points_is_drawn(points):
+    assert "</svg>" in time_against_error(points, 0.0)

@@ -1,0 +1,174 @@
+"""A comparison's files: all there, whole, and equal to what was compared."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from pydantic import BaseModel, ConfigDict
+
+from refgi.compare import maps
+from refgi.compare.results import as_json, plain, signed_error, write_results
+from refgi.image import read_exr
+
+
+class Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class Figure(Strict):
+    value: float | str | None
+    noise: float | str | None
+    is_noise: bool
+
+
+class Measured(Strict):
+    figures: dict[str, Figure]
+    pixels: int
+    non_finite: int
+    non_finite_reference: int
+
+
+class Stage(Strict):
+    name: str
+    status: str
+    seconds: float
+    depth: int
+    reason: str
+
+
+class FlipJson(Strict):
+    mean: float | None
+    exposures: list[float]
+    skipped: str
+
+
+class Method(Strict):
+    summary: str
+    settings: dict
+    seconds: float
+    stages: list[Stage]
+    against: dict[str, Measured]
+    flip: FlipJson
+    files: list[str]
+
+
+class Samples(Strict):
+    fewest: int
+    most: int
+    mean: float
+
+
+class Reference(Strict):
+    settings: dict
+    seconds: float
+    stages: list[Stage]
+    samples: Samples
+    mean_irradiance: float
+    standard_error_of_a_pixel: float
+    standard_error_of_the_mean: float
+    files: list[str]
+
+
+class SceneJson(Strict):
+    name: str
+    description: str
+    faces: int
+    lights: int
+    exposure: float
+    camera: dict
+
+
+class Results(BaseModel):
+    """The schema of results.json."""
+
+    model_config = ConfigDict(extra="forbid", strict=False)
+
+    schema_: int
+    scene: SceneJson
+    size: tuple[int, int]
+    covered_pixels: int
+    options: dict
+    environment: dict
+    units: dict[str, str]
+    references: dict[str, Reference]
+    methods: dict[str, Method]
+    failures: dict[str, str]
+    sound: bool
+
+
+def validated(content):
+    content = dict(content)
+    return Results(schema_=content.pop("schema"), **content)
+
+
+def test_results_json_keeps_its_schema(comparison, tmp_path):
+    write_results(comparison, tmp_path)
+    text = (tmp_path / "results.json").read_text()
+    results = validated(json.loads(text, parse_constant=pytest.fail))
+    assert results.schema_ == 1
+    assert set(results.methods) == {"sii", "gather", "vpl"}
+    assert set(results.methods["sii"].against) == {"truth", "unoccluded"}
+    assert set(results.methods["vpl"].against) == {"truth"}
+    figure = results.methods["vpl"].against["truth"].figures["relmse"]
+    assert figure.value == comparison.results["vpl"].against["truth"].figures["relmse"].value
+
+
+def test_every_file_that_results_json_names_is_there_and_no_other(comparison, tmp_path):
+    write_results(comparison, tmp_path)
+    content = json.loads((tmp_path / "results.json").read_text())
+    named = {f for group in ("methods", "references") for made in content[group].values() for f in made["files"]}
+    assert named | {"results.json"} == {p.name for p in tmp_path.iterdir()}
+
+
+def test_the_pixels_are_kept_to_the_bit(comparison, tmp_path):
+    write_results(comparison, tmp_path)
+    channels, attributes = read_exr(tmp_path / "sii.exr")
+    for index, name in enumerate("RGB"):
+        assert np.array_equal(channels[f"irradiance.{name}"], comparison.results["sii"].irradiance[index])
+        assert np.array_equal(channels[name], comparison.results["sii"].radiance[index])
+    assert attributes["settings"] == {"lights": 1024, "pattern": "grid"}
+    assert attributes["units"]["irradiance"] == "W/m^2"
+    truth, _ = read_exr(tmp_path / "truth.exr")
+    assert np.array_equal(truth["variance.G"], comparison.truth.variance[1].astype(np.float32))
+
+
+def test_equal_comparisons_give_equal_files(comparison, tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        write_results(comparison, tmp_path / name)
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
+
+
+def test_numbers_that_json_cannot_hold_are_null_or_words():
+    given = {"a": math.nan, "b": (math.inf, -math.inf), "c": frozenset({"z", "y"}), "d": np.float32(0.5), 3: None}
+    assert plain(given) == {"a": None, "b": ["inf", "-inf"], "c": ["y", "z"], "d": 0.5, "3": None}
+
+
+def test_infinite_figures_keep_the_schema(comparison):
+    result = comparison.results["vpl"]
+    result.against["truth"].figures["psnr"] = type(result.against["truth"].figures["psnr"])(math.inf, math.nan)
+    figure = validated(as_json(comparison)).methods["vpl"].against["truth"].figures["psnr"]
+    assert (figure.value, figure.noise) == ("inf", None)
+
+
+def test_error_maps_are_red_where_too_bright_and_blue_where_too_dark(comparison):
+    sii = comparison.results["sii"]
+    scale = maps.error_scale([signed_error(comparison, sii)], comparison.covered)
+    assert scale.low == -scale.high
+    values = np.array([[-scale.high, 0.0, scale.high, np.nan]])
+    dark, none, bright, bad = maps.paint(values, np.ones((1, 4), bool), scale)[0].astype(int)
+    assert dark[2] > dark[0] + 50
+    assert bright[0] > bright[2] + 50
+    assert none.min() > 230
+    assert bad.tolist() == [255, 0, 255]
+    assert maps.paint(values, np.zeros((1, 4), bool), scale)[0].tolist() == [[128] * 3] * 4
+
+
+def test_the_scale_holds_99_percent_and_is_round():
+    errors = np.linspace(0, 3, 1000).reshape(20, 50)
+    assert maps.error_scale([errors], np.ones((20, 50), bool)).high == 5.0
+    assert maps.error_scale([errors * 0.6], np.ones((20, 50), bool)).high == 2.0
+    assert maps.error_scale([0 * errors], np.ones((20, 50), bool)).high == 1.0
+    assert maps.error_scale([np.full((2, 2), np.nan)], np.ones((2, 2), bool)).high == 1.0

@@ -17,12 +17,12 @@ import numpy.typing as npt
 from refgi.elementary import exp, log1p
 from refgi.jit import kernel, prange
 from refgi.radiometry import lobe_fraction
-from refgi.splat.pair_sum import GROUP, LEAST_SQUARE, NX, SUM, TILE, TOTAL, Clamp, X, load_tile
+from refgi.splat.pair_sum import GROUP, LEAST_SQUARE, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, close_group, load_tile
 
 Array = npt.NDArray[Any]
 
 NO_NORM, FULL_LOBE, CLAMPED = 0, 1, 2  # lobe_norm as a kernel sees it
-H, TERM, R, EXPONENT = 12, 13, 14, 15  # further rows of a tile, of one light
+H, TERM, R, EXPONENT = range(ROWS, ROWS + 4)  # further rows of a tile, of one light
 CORRECTED, LITERAL = 0, 1  # slope of the widened exponent: P min(1, r / a), or min(P, P / (r a)) as printed
 
 
@@ -79,12 +79,11 @@ def add_lobes(
     irradiance : (3, n) ndarray
         Added to, W/m^2.
     """
-    real = position.dtype.type
     count = position.shape[1]
     for block in prange((count + TILE - 1) // TILE):
         first = block * TILE
         size = min(TILE, count - first)
-        tile = np.zeros((16, TILE), position.dtype)
+        tile = np.zeros((ROWS + 4, TILE), position.dtype)
         load_tile(tile, position, normal, first, size)
         for group in range(0, lights.shape[1], GROUP):
             for k in range(group, min(group + GROUP, lights.shape[1])):
@@ -92,10 +91,7 @@ def add_lobes(
                 if widening is not None:
                     _widen(tile, lights[9, k], widening, k)
                 _add(tile, lights[9, k], lights[10, k], lights[11, k], lights[12, k], widening is not None)
-            for c in range(3):
-                for i in range(TILE):
-                    tile[TOTAL + c, i] += tile[SUM + c, i]
-                    tile[SUM + c, i] = real(0.0)
+            close_group(tile)
         for c in range(3):
             for i in range(size):
                 irradiance[c, first + i] += tile[TOTAL + c, i]

@@ -1,9 +1,9 @@
 """The sum over all pairs of pixel light and receiver (SII Eq. 2), for diffuse lights.
 
 Receivers are the SIMD lanes: a thread takes 256 of them into a tile and runs the lights past it, two at a time, so
-that each receiver adds its lights in their order whatever the tile, the thread or the picture around it. Light comes
-in groups of 64 whose sums are added up, which keeps the rounding of a float32 sum over a quarter of a million lights
-near that of a sum over 64.
+that each receiver adds its lights in their order whatever the tile, the thread or the picture around it. Lights come
+in groups of 64 whose sums are added up with compensation, so that a float32 sum over a quarter of a million lights
+rounds like one over 64.
 
 Symbols: d vector from receiver to light (m), n_l, n_x normals of light and receiver, c_l = <n_l . -d>,
 c_x = <n_x . d> (not divided by |d|), g = c_l c_x / r^4 the geometry term (1/m^2).
@@ -22,7 +22,8 @@ TILE = 256  # receivers a thread works on at once
 GROUP = 64  # lights summed before they are added to the total
 LEAST_SQUARE = 1e-30  # m^2; stands in for r^2 = 0, where both cosines are 0 as well
 
-X, NX, SUM, TOTAL = 0, 3, 6, 9  # first rows of a tile: position, normal, sum of the group, sum of all
+ROWS = 15
+X, NX, SUM, TOTAL, LOST = 0, 3, 6, 9, 12  # first rows of a tile: position, normal, sum of the group, sum of all
 FLUX = 6  # first of the last three values of a packed light: position, reversed normal, flux / pi
 
 
@@ -107,12 +108,11 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
     irradiance : (3, n) ndarray
         Filled with W/m^2; without albedo/pi and visibility.
     """
-    real = position.dtype.type
     count = position.shape[1]
     for block in prange((count + TILE - 1) // TILE):
         first = block * TILE
         size = min(TILE, count - first)
-        tile = np.zeros((12, TILE), position.dtype)
+        tile = np.zeros((ROWS, TILE), position.dtype)
         load_tile(tile, position, normal, first, size)
         for group in range(0, lights.shape[1], GROUP):
             for a in range(group, min(group + GROUP, lights.shape[1]), 2):
@@ -122,10 +122,7 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
                     g1, g2 = _term(one, receiver, clamp, a), _term(two, receiver, clamp, a + 1)  # Eq. (2)
                     for c in range(3):
                         tile[SUM + c, i] = tile[SUM + c, i] + g1 * one[FLUX + c] + g2 * two[FLUX + c]
-            for c in range(3):
-                for i in range(TILE):
-                    tile[TOTAL + c, i] += tile[SUM + c, i]
-                    tile[SUM + c, i] = real(0.0)
+            close_group(tile)
         for c in range(3):
             irradiance[c, first : first + size] = tile[TOTAL + c, :size]
 
@@ -147,6 +144,24 @@ def load_tile(tile: Array, position: Array, normal: Array, first: int, size: int
         for i in range(size):
             tile[X + axis, i] = position[axis, first + i]
             tile[NX + axis, i] = normal[axis, first + i]
+
+
+@kernel
+def close_group(tile: Array) -> None:
+    """Add the sum of a group of lights to the total, with what the addition before rounded off (Kahan 1965).
+
+    Parameters
+    ----------
+    tile : (>= ROWS, TILE) ndarray
+        Rows SUM are added to rows TOTAL and cleared; rows LOST keep the rounding.
+    """
+    for c in range(3):
+        for i in range(TILE):
+            part = tile[SUM + c, i] - tile[LOST + c, i]
+            total = tile[TOTAL + c, i] + part
+            tile[LOST + c, i] = (total - tile[TOTAL + c, i]) - part
+            tile[TOTAL + c, i] = total
+            tile[SUM + c, i] = tile.dtype.type(0.0)
 
 
 @kernel

@@ -1,0 +1,46 @@
+"""Slow literal twins of the shared radiometry: definitions by quadrature and by hand, no shortcuts."""
+
+import math
+
+import numpy as np
+
+
+def spot_intensity(axis_intensity, cos_angle, cos_inner, cos_outer):
+    """I(a) = I0 t t (3 - 2 t), t = clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)."""
+    if cos_angle < cos_outer:
+        return 0.0
+    if cos_inner == cos_outer:
+        return axis_intensity
+    t = min(1.0, max(0.0, (cos_angle - cos_outer) / (cos_inner - cos_outer)))
+    return axis_intensity * t * t * (3 - 2 * t)
+
+
+def solid_angle_of_rectangle(density, x0, x1, y0, y1, nodes=64):
+    """Integrate a solid-angle density over a rectangle of the image plane by Gauss-Legendre quadrature."""
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    u = 0.5 * (x0 + x1) + 0.5 * (x1 - x0) * x
+    v = 0.5 * (y0 + y1) + 0.5 * (y1 - y0) * x
+    return float(density(u[:, None], v[None, :]) @ w @ w) * 0.25 * (x1 - x0) * (y1 - y0)
+
+
+def lobe_fraction(theta, exponent, nodes=400):
+    """Share of the integral of cos^P over the half space of the lobe that lies above a surface tilted by theta.
+
+    Polar coordinates around the lobe's axis: at angle a off it, the circle lies above the surface for the azimuths
+    with cos(theta) cos(a) + sin(theta) sin(a) cos(phi) > 0. The integrand bends at a = pi/2 - theta, where the
+    circle first dips below; sin substitutions on both pieces take the square root out of it.
+    """
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    turn = 0.5 * math.pi * (x + 1)
+    weights = 0.5 * math.pi * w
+    edge = math.pi / 2 - theta
+    total = 0.0
+    for low, high in ((0.0, edge), (edge, math.pi / 2)):
+        a = low + (high - low) * 0.5 * (1 - np.cos(turn))
+        da = (high - low) * 0.5 * np.sin(turn) * weights
+        if high <= low:
+            continue
+        cosine = -math.cos(theta) * np.cos(a) / np.maximum(math.sin(theta) * np.sin(a), 1e-300)
+        azimuth = 2 * np.arccos(np.clip(cosine, -1, 1))
+        total += float((azimuth * np.cos(a) ** exponent * np.sin(a) * da).sum())
+    return total * (exponent + 1) / (2 * math.pi)

@@ -171,6 +171,8 @@ class _Runner:
     def reference(self, name: str, settings: Any) -> Reference:
         from refgi.truth import trace_truth
 
+        shortest = dataclasses.replace(settings, samples=1, seconds=None, target_error=None, checkpoint=None)
+        self._warm_up(trace_truth, shortest)
         result, seconds, runs = self._timed(name, lambda frame: trace_truth(frame, settings))
         radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype))
         return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
@@ -188,7 +190,7 @@ class _Runner:
         seen = flip(radiance, references[TRUTH].radiance, covered)
         return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen)
 
-    def _warm_up(self, function: Callable[[Frame, Any], Array], settings: Any) -> None:
+    def _warm_up(self, function: Callable[[Frame, Any], Any], settings: Any) -> None:
         with warnings.catch_warnings(), contextlib.suppress(RefgiError):  # the real run will say it
             warnings.simplefilter("ignore", RefgiWarning)
             function(self._fresh_frame(WARM_UP_SIZE, WARM_UP_SIZE), settings)

@@ -19,7 +19,7 @@ Pixels = npt.NDArray[np.uint8]
 
 DIVERGING, SEQUENTIAL = "RdBu_r", "inferno"
 NO_SURFACE = (128, 128, 128)
-SCALE_PERCENTILE = 99.0  # of all methods' absolute errors: a few fireflies do not wash out the maps
+SCALE_PERCENTILE = 95.0  # of all methods' absolute errors: a few fireflies do not wash out the maps
 FALSE_COLOUR_STOPS = 6.0  # below the brightest 0.5 %
 
 
@@ -64,7 +64,7 @@ def error_scale(errors: list[Array], covered: Array) -> Scale:
     Returns
     -------
     Scale
-        From -s to s; s is 1, 2 or 5 times a power of ten and holds 99 % of the pixels.
+        From -s to s; s is 1, 2 or 5 times a power of ten and holds 95 % of the pixels.
     """
     magnitudes = np.abs(np.concatenate([error[covered] for error in errors] or [np.zeros(1)]))
     magnitudes = magnitudes[np.isfinite(magnitudes)]

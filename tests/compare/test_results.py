@@ -166,7 +166,7 @@ def test_error_maps_are_red_where_too_bright_and_blue_where_too_dark(comparison)
     assert maps.paint(values, np.zeros((1, 4), bool), scale)[0].tolist() == [[128] * 3] * 4
 
 
-def test_the_scale_holds_99_percent_and_is_round():
+def test_the_scale_holds_95_percent_and_is_round():
     errors = np.linspace(0, 3, 1000).reshape(20, 50)
     assert maps.error_scale([errors], np.ones((20, 50), bool)).high == 5.0
     assert maps.error_scale([errors * 0.6], np.ones((20, 50), bool)).high == 2.0

@@ -105,11 +105,9 @@ class Frame:
     @cached_property
     def direct(self) -> Array:
         """Direct irradiance of all lights with shadows, (3, h, w), W/m^2."""
-        from refgi.rsm import direct_irradiance
-
         total = np.zeros((3, self.height, self.width), self.dtype)
-        for index, light in enumerate(self.scene.lights):
-            total += direct_irradiance(self.gbuffer, light, self._visible_from_light(index))
+        for one in self._direct_of_lights:
+            total += one
         return total
 
     def radiance(self, indirect: Array | None = None) -> Array:
@@ -125,8 +123,15 @@ class Frame:
         (3, h, w) ndarray
             Radiance, W/m^2/sr, linear RGB. Receivers reflect by their diffuse part alone.
         """
-        irradiance = self.direct if indirect is None else self.direct + indirect
-        return compose(irradiance, self.gbuffer, self.materials)
+        parts = (*self._direct_of_lights, *(() if indirect is None else (indirect,)))
+        return compose(parts, self.gbuffer, self.materials)
+
+    @cached_property
+    def _direct_of_lights(self) -> tuple[Array, ...]:
+        from refgi.rsm import direct_irradiance
+
+        return tuple(direct_irradiance(self.gbuffer, light, self._visible_from_light(index))
+                     for index, light in enumerate(self.scene.lights))
 
     def _visible_from_light(self, index: int) -> Array:
         buffer, light = self.gbuffer, self.scene.lights[index]
@@ -134,17 +139,18 @@ class Frame:
             from refgi.rsm import shadow_map_visibility
 
             return shadow_map_visibility(buffer.position, buffer.normal, buffer.covered, self.rsms[index])
-        return self.tracer.visible_from_light(buffer.position, buffer.normal, buffer.covered, light)
+        visible: Array = self.tracer.visible_from_light(buffer.position, buffer.normal, buffer.covered, light)
+        return visible
 
 
 @stage("frame.compose")
-def compose(irradiance: Array, buffer: "GBuffer", materials: MaterialTable) -> Array:
+def compose(irradiances: tuple[Array, ...], buffer: "GBuffer", materials: MaterialTable) -> Array:
     """Turn irradiance into what the camera receives.
 
     Parameters
     ----------
-    irradiance : (3, h, w) ndarray
-        Direct and indirect irradiance, W/m^2.
+    irradiances : tuple of (3, h, w) ndarray
+        What arrives, in parts: direct light of each light, indirect light; W/m^2.
     buffer : GBuffer
         What the camera sees.
     materials : MaterialTable
@@ -155,6 +161,7 @@ def compose(irradiance: Array, buffer: "GBuffer", materials: MaterialTable) -> A
     (3, h, w) ndarray
         Radiance, W/m^2/sr, linear RGB.
     """
+    irradiance: Array = sum(irradiances[1:], start=irradiances[0])
     radiance: Array = irradiance * buffer.albedo / irradiance.dtype.type(np.pi)
     if materials.emission.any():
         # a pixel without surface has id -1, whose row is masked out

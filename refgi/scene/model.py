@@ -32,6 +32,10 @@ def _is_vector(value: Any) -> bool:
         return False
 
 
+def _degrees(angle: float) -> float:
+    return round(math.degrees(angle), 9)
+
+
 def _expect_power(value: Rgb, key: str) -> None:
     expect(_is_vector(value) and min(value) >= 0, f"light: {key}", "three finite numbers >= 0", value)
 
@@ -151,7 +155,7 @@ class Camera:
         expect(bool(view.any()), "camera: target", "a point away from eye", self.target)
         cross = np.cross(view / np.linalg.norm(view), np.asarray(self.up) / (np.linalg.norm(self.up) or 1.0))
         expect(bool(np.linalg.norm(cross) > 1e-9), "camera: up", "a direction not along the view", self.up)
-        expect(0 < self.vfov < math.pi, "camera: vfov_deg", "more than 0 and less than 180", math.degrees(self.vfov))
+        expect(0 < self.vfov < math.pi, "camera: vfov_deg", "more than 0 and less than 180", _degrees(self.vfov))
         for key in ("width", "height"):
             size = getattr(self, key)
             expect(isinstance(size, int) and 1 <= size <= 65536, f"camera: {key}", "1 to 65536 pixels", size)
@@ -176,9 +180,9 @@ class SpotLight:
         expect(_is_vector(self.direction) and any(self.direction), "light: direction", "a finite vector, not zero",
                self.direction)
         expect(0 < self.outer_half_angle < math.pi / 2, "light: outer_half_angle_deg",
-               "more than 0 and less than 90", math.degrees(self.outer_half_angle))
+               "more than 0 and less than 90", _degrees(self.outer_half_angle))
         expect(0 <= self.inner_half_angle <= self.outer_half_angle, "light: inner_half_angle_deg",
-               "0 to outer_half_angle_deg", math.degrees(self.inner_half_angle))
+               "0 to outer_half_angle_deg", _degrees(self.inner_half_angle))
         _expect_power(self.intensity, "intensity_w_per_sr")
 
 

@@ -14,6 +14,11 @@ from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
 from refgi.scene.power import shining
 from refgi.scene.transform import affine, placed
 
+PLAINER = {"missing": "expected a value, nothing given", "extra_forbidden": "unknown key",
+           "union_tag_invalid": "type: expected one of {expected_tags}",
+           "union_tag_not_found": "expected a type"}
+KINDS = ("diffuse", "phong", "dielectric", "spot", "point", "directional", "name", "inline")
+
 if TYPE_CHECKING:
     from refgi.scene.schema import Object, SceneFile
 
@@ -66,7 +71,7 @@ def _validated(content: bytes, path: Path, *, need_camera: bool, need_lights: bo
     try:
         entry = SceneFile.model_validate_json(content, context=set(named) if isinstance(named, dict) else set())
     except ValidationError as error:
-        faults = [_fault(detail) for detail in error.errors(include_url=False)] + faults
+        faults = [_fault(detail, tree) for detail in error.errors(include_url=False)] + faults
     except (ValueError, RecursionError) as error:
         faults = [str(error)]
     if faults:
@@ -94,15 +99,30 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
     return tree
 
 
-def _fault(detail: Any) -> str:
+def _fault(detail: Any, tree: Any) -> str:
     """Return "key: what was expected, got value" of one pydantic error."""
-    key = ""
-    for part in detail["loc"]:
-        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else str(part)
-    text = str(detail["msg"]).removeprefix("Value error, ")
-    value = repr(detail["input"])
-    shown = "" if detail["type"] in ("value_error", "missing") else f", got {value if len(value) < 80 else value[:77]}"
-    return f"{key or 'file'}: {text}{shown}"
+    text = str(detail["msg"]).removeprefix("Value error, ").replace("Input should be", "expected")
+    for prefix in ("light: ", "camera: ", "material '': ", "transform: "):
+        text = text.removeprefix(prefix)
+    given, kind = detail["input"], detail["type"]
+    if kind in PLAINER:
+        text = PLAINER[kind].format(**detail.get("ctx", {}))
+    shown = repr(given) if kind != "value_error" and not (kind == "missing" and isinstance(given, dict)) else ""
+    got = f", got {shown if len(shown) < 80 else shown[:77] + '...'}" if shown else ""
+    return f"{_key(detail['loc'], tree, kind) or 'file'}: {text}{got}"
+
+
+def _key(place: Sequence[str | int], tree: Any, kind: str) -> str:
+    """Return a pydantic location as written in the file: without the kinds of light and material it went by."""
+    key, node = "", tree
+    for number, part in enumerate(place):
+        last = number == len(place) - 1
+        found = part in node if isinstance(node, dict) else isinstance(node, list) and part in range(len(node))
+        if (last and kind == "value_error" and part in KINDS) or not (found or (last and kind == "missing")):
+            continue
+        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else part
+        node = node[part] if found else None
+    return key
 
 
 def _meshes(entry: "SceneFile", materials: dict[str, Material], path: Path) -> list[Mesh]:

@@ -85,7 +85,7 @@ SCENES: dict[str, BuiltinScene] = {
                      parallel_plates),
         BuiltinScene("ring", "A polished metal ring whose caustic falls inside it", 20_482, ring),
         BuiltinScene("glass_ball", "A clear glass ball whose caustic falls into its shadow", 20_488, glass_ball),
-        BuiltinScene("metaballs", "A blob whose pieces join and part with time t, over the stage", 5_400, metaballs),
+        BuiltinScene("metaballs", "A blob whose pieces join and part with time t, over the stage", 6_160, metaballs),
         BuiltinScene("stage", "A slightly glossy vase on a stage with three coloured walls", 6_328, stage),
     )
 }

@@ -134,7 +134,9 @@ class _Reader:
             normals = accessor(self.document, attributes["NORMAL"], "VEC3", f"{where}.attributes.NORMAL")
         corners = np.arange(len(vertices), dtype=np.int64)
         if "indices" in entry:
-            corners = accessor(self.document, entry["indices"], "SCALAR", f"{where}.indices").astype(np.int64)
+            indices = accessor(self.document, entry["indices"], "SCALAR", f"{where}.indices")
+            expect(indices.dtype.kind in "iu", f"{self.path}: {where}.indices", "an accessor of integers", indices.dtype)
+            corners = indices.astype(np.int64)
         mesh = Mesh(vertices, _triangles(corners, mode, f"{self.path}: {where}"), normals,
                     self._material_of(entry, where), name)
         mesh.expect_sound(f"{self.path}: {where}")

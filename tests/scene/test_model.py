@@ -1,0 +1,139 @@
+"""The model: what it refuses, how meshes are joined and placed, and the tables that kernels read."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from refgi.errors import InputError, RefgiWarning
+from refgi.scene import (
+    Camera,
+    DirectionalLight,
+    Material,
+    Mesh,
+    PointLight,
+    SpotLight,
+    light_table,
+    material_table,
+    merge,
+)
+from refgi.scene.health import mended, zero_area
+from refgi.scene.power import shining
+from refgi.scene.transform import affine, placed
+
+VERTICES = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+FACES = np.array([[0, 1, 2]])
+
+
+def test_merge_keeps_order_and_shares_equal_materials() -> None:
+    red, blue = Material("red", (1, 0, 0)), Material("blue", (0, 0, 1))
+    geometry, materials = merge([Mesh(VERTICES, FACES, material=m) for m in (red, blue, Material("red", (1, 0, 0)))])
+    assert materials == (red, blue)
+    assert geometry.material_of_face.tolist() == [0, 1, 0]
+    assert geometry.faces.tolist() == [[0, 1, 2], [3, 4, 5], [6, 7, 8]]
+    assert geometry.vertices.dtype == np.float64
+    assert geometry.faces.dtype == np.int32
+    assert geometry.vertex_normals is None
+
+
+def test_merge_gives_face_normals_where_a_mesh_has_none() -> None:
+    smooth = Mesh(VERTICES, FACES, np.array([[0.0, 0.6, 0.8]] * 3))
+    geometry, _ = merge([smooth, Mesh(VERTICES, FACES)], smooth=True)
+    assert geometry.vertex_normals is not None
+    assert geometry.vertex_normals.tolist() == [[0, 0.6, 0.8]] * 3 + [[0, 0, 1]] * 3
+
+
+@pytest.mark.parametrize(("mesh", "said"), [
+    (Mesh(VERTICES * np.nan, FACES), "vertex 0: expected finite"), (Mesh(VERTICES + 1e10, FACES), "vertex 0"),
+    (Mesh(VERTICES, FACES + 1), r"face 0: expected vertex indices from 0 to 2, got \[1, 2, 3\]"),
+    (Mesh(VERTICES, FACES - 1), "face 0"), (Mesh(VERTICES, FACES[:0]), "at least one triangle"),
+    (Mesh(VERTICES[:0], FACES), "vertices"), (Mesh(VERTICES[:, :2], FACES), "vertices"),
+    (Mesh(VERTICES, FACES.astype(float)), "faces"), (Mesh(VERTICES, FACES, VERTICES[:2]), "normals"),
+    (Mesh(VERTICES.astype(str), FACES), "vertices"),
+])
+def test_merge_refuses_unsound_meshes(mesh: Mesh, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        merge([mesh])
+
+
+@pytest.mark.parametrize("make", [
+    lambda: Material(diffuse=(0.5, 0.5, 1.01)), lambda: Material(diffuse=(0.5, 0.5)), lambda: Material(exponent=-1),
+    lambda: Material(diffuse=(math.nan, 0, 0)), lambda: Material(ior=0.9), lambda: Material(emission=(0, 0, -1)),
+    lambda: Camera((0, 0, 0), (0, 0, 0)), lambda: Camera((0, 0, 0), (0, 1, 0)), lambda: Camera((0, 0, 0), (0, 0, math.inf)),
+    lambda: Camera((0, 0, 0), (1, 0, 0), vfov=math.pi), lambda: Camera((0, 0, 0), (1, 0, 0), width=0),
+    lambda: PointLight((0, 0, 0), (-1, 0, 0)), lambda: DirectionalLight((0, 0, 0), (1, 1, 1)),
+    lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.0, 0.0, (1, 1, 1)),
+    lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.1, math.pi / 2, (1, 1, 1)),
+    lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.5, 0.4, (1, 1, 1)),
+    lambda: PointLight(3, (1, 1, 1)),  # type: ignore[arg-type]
+])
+def test_values_that_make_no_scene(make: Any) -> None:
+    with pytest.raises(InputError, match="expected"):
+        make()
+
+
+def test_tables() -> None:
+    spot = SpotLight((1, 2, 3), (0, -3, 0), 0.2, 0.4, (4, 5, 6))
+    table = light_table([spot, PointLight((7, 8, 9), (1, 1, 1)), DirectionalLight((2, 0, 0), (3, 2, 1))], np.float32)
+    assert table.kind.tolist() == [0, 1, 2]
+    assert table.direction.tolist() == [[0, -1, 0], [0, 0, 0], [1, 0, 0]]
+    assert table.position.tolist() == [[1, 2, 3], [7, 8, 9], [0, 0, 0]]
+    assert table.intensity.tolist() == [[4, 5, 6], [1, 1, 1], [3, 2, 1]]
+    assert table.cos_inner[0] == np.float32(math.cos(0.2))
+    assert table.cos_outer[0] == np.float32(math.cos(0.4))
+    assert table.cos_outer.dtype == np.float32
+    materials = material_table([Material(), Material("b", (0, 0, 0), (1, 1, 1), 7.0, 1.5)])
+    assert materials.exponent.tolist() == [0, 7]
+    assert materials.ior.tolist() == [0, 1.5]
+    assert material_table([]).diffuse.shape == (0, 3)
+
+
+def test_lights_without_power() -> None:
+    dark, bright = PointLight((0, 0, 0), (0, 0, 0)), DirectionalLight((0, 1, 0), (0, 0, 1))
+    with pytest.warns(RefgiWarning, match="2 lights of zero power"):
+        assert shining([dark, bright, dark], "lights") == (bright,)
+    with pytest.raises(InputError, match="got 'none'"):
+        shining([], "lights")
+
+
+@given(st.lists(st.floats(-100, 100), min_size=12, max_size=12))
+def test_placing_moves_points_normals_and_orientation_alike(numbers: list[float]) -> None:
+    rows = [*numbers, 0.0, 0.0, 0.0, 1.0]
+    try:
+        matrix = affine(rows, "transform")
+    except InputError:
+        return
+    if np.linalg.cond(matrix[:3, :3]) > 1e4:
+        return
+    moved = placed(Mesh(VERTICES, FACES, np.array([[0.0, 0, 1]] * 3)), matrix)
+    assert np.allclose(sorted(map(tuple, moved.vertices)), sorted(tuple(matrix[:3, :3] @ v + matrix[:3, 3])
+                                                                  for v in VERTICES), atol=1e-9)
+    a, b, c = moved.vertices[moved.faces[0]]
+    normal = np.cross(b - a, c - a)
+    assert np.allclose(normal / np.linalg.norm(normal), np.asarray(moved.normals)[0], atol=1e-6)
+
+
+@pytest.mark.parametrize("numbers", [
+    [1.0] * 16, [0.0] * 15 + [1.0], [math.nan] + [1.0] * 15, [1.0] * 15, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1],
+    [1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1e-14, 0, 0, 0, 0, 1],
+])
+def test_matrices_that_place_nothing(numbers: list[float]) -> None:
+    with pytest.raises(InputError, match="transform: expected"):
+        affine(numbers, "transform")
+
+
+@given(scale=st.floats(1e-8, 1e8), slim=st.floats(1e-12, 1.0))
+def test_a_thin_face_is_kept_at_any_scale(scale: float, slim: float) -> None:
+    vertices = VERTICES * (1.0, slim, 1.0) * scale
+    assert not zero_area(vertices, FACES).any()
+    assert zero_area(np.array([[0.0, 0, 0], [1, 1, 1], [3, 3, 3]]) * scale, FACES).all()
+
+
+def test_missing_normals_are_filled_in() -> None:
+    normals = np.array([[0.0, 0, 2], [0, 0, 0], [math.nan, 0, 0]])
+    mesh, dropped = mended(Mesh(VERTICES, FACES, normals), "mesh")
+    assert dropped == 0
+    assert np.asarray(mesh.normals).tolist() == [[0, 0, 1]] * 3

@@ -1,0 +1,204 @@
+"""Scene files: what they say arrives to the bit, and what is wrong in them is said at once, by file, key and value."""
+
+import copy
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from refgi.errors import InputError, RefgiWarning
+from refgi.scene import Camera, DirectionalLight, PointLight, SpotLight, load_scene
+from tests.scene.samples import SCENE, glb_bytes, ply_bytes, write_scene
+
+
+def changed(*path: str | int, value: Any) -> dict[str, Any]:
+    """Return the sample scene's top-level change that sets one nested key."""
+    tree = copy.deepcopy(SCENE)
+    owner: Any = tree
+    for key in path[:-1]:
+        owner = owner[key]
+    owner[path[-1]] = value
+    return {str(path[0]): tree[str(path[0])]}
+
+
+def test_every_value_arrives(tmp_path: Path) -> None:
+    scene = load_scene(write_scene(tmp_path))
+    assert scene.name == "sample"
+    assert scene.description == "A square."
+    assert scene.exposure == 1.2
+    assert scene.camera == Camera((0, 0, 3), (0, 0, 0), (0, 1, 0), math.radians(40), 64, 48)
+    assert scene.lights == (SpotLight((0, 0, 2), (0, 0, -1), math.radians(20), math.radians(30), (1, 2, 3)),)
+    assert scene.materials[0].diffuse == (0.1, 0.2, 0.3)
+    assert scene.face_count == 2
+    assert scene.geometry.vertices.tolist() == [[0.5, 0, 0], [1.5, 0, 0], [1.5, 1, 0], [0.5, 1, 0]]
+
+
+def test_several_lights_of_each_kind(tmp_path: Path) -> None:
+    lights = [*SCENE["lights"], {"type": "point", "position": [1, 2, 3], "intensity_w_per_sr": [4, 5, 6]},
+              {"type": "directional", "direction": [0, -2, 0], "irradiance_w_per_m2": [7, 8, 9]}]
+    scene = load_scene(write_scene(tmp_path, lights=lights))
+    assert scene.lights[1:] == (PointLight((1, 2, 3), (4, 5, 6)), DirectionalLight((0, -2, 0), (7, 8, 9)))
+
+
+def test_material_by_name_inline_or_from_the_mesh(tmp_path: Path) -> None:
+    (tmp_path / "square.glb").write_bytes(glb_bytes())
+    inline = {"type": "phong", "diffuse": [0.2, 0.2, 0.2], "specular": [0.5, 0.5, 0.5], "exponent": 20}
+    glass = {"type": "dielectric", "ior": 1.5, "note": "clear"}
+    scene = load_scene(write_scene(
+        tmp_path, objects=[{"mesh": "square.glb"}, {"mesh": "square.ply", "material": inline},
+                           {"mesh": "square.ply", "material": "glass"}, {"mesh": "square.ply"}],
+        materials={"paint": {"type": "diffuse", "diffuse": [0.9, 0.8, 0.7]}, "glass": glass}))
+    paint, phong, clear, default = scene.materials
+    assert paint.diffuse == (0.9, 0.8, 0.7)  # `materials` is asked before the mesh's own colour
+    assert (phong.specular, phong.exponent) == ((0.5, 0.5, 0.5), 20)
+    assert (clear.ior, clear.diffuse) == (1.5, (0, 0, 0))
+    assert default.diffuse == (0.5, 0.5, 0.5)
+    own = load_scene(write_scene(tmp_path, objects=[{"mesh": "square.glb"}], materials={}))
+    assert own.materials[0].diffuse == (0.1, 0.2, 0.3)
+
+
+def test_camera_and_lights_can_be_replaced(tmp_path: Path) -> None:
+    path = write_scene(tmp_path, camera=None, lights=None)
+    camera, light = Camera((0, 0, 1), (0, 0, 0)), PointLight((0, 0, 1), (1, 1, 1))
+    scene = load_scene(path, camera=camera, lights=[light])
+    assert scene.camera is camera
+    assert scene.lights == (light,)
+
+
+def test_normals_only_where_asked_for(tmp_path: Path) -> None:
+    for key, value, expected in (("smooth_normals", None, False), ("smooth_normals", True, False)):
+        scene = load_scene(write_scene(tmp_path, **{key: value}))
+        assert (scene.geometry.vertex_normals is not None) is expected  # the mesh has none to give
+
+
+@pytest.mark.parametrize(("change", "key", "value"), [
+    (changed("objects", 0, "colour", value=1), "objects[0].colour", "1"),
+    (changed("camera", "vfov_deg", value="40"), "camera.vfov_deg", "'40'"),
+    (changed("camera", "vfov_deg", value=180), "vfov_deg", "180"),
+    (changed("camera", "width", value=0), "width", "0"),
+    (changed("camera", "width", value=10.5), "camera.width", "10.5"),
+    (changed("camera", "width", value=10**9), "width", "1000000000"),
+    (changed("camera", "target", value=[0, 0, 3]), "target", "(0.0, 0.0, 3.0)"),
+    (changed("camera", "up", value=[0, 0, 1]), "up", "(0.0, 0.0, 1.0)"),
+    (changed("lights", 0, "outer_half_angle_deg", value=0), "outer_half_angle_deg", "0"),
+    (changed("lights", 0, "outer_half_angle_deg", value=90), "lights[0]: outer_half_angle_deg", "90"),
+    (changed("lights", 0, "inner_half_angle_deg", value=31), "inner_half_angle_deg", "31"),
+    (changed("lights", 0, "direction", value=[0, 0, 0]), "direction", "(0.0, 0.0, 0.0)"),
+    (changed("lights", 0, "intensity_w_per_sr", value=[1, -1, 1]), "intensity_w_per_sr", "-1"),
+    (changed("lights", 0, "type", value="lamp"), "lights[0]", "lamp"),
+    (changed("materials", "paint", "diffuse", value=[0.1, 1.2, 0.3]), "materials.paint: diffuse", "1.2"),
+    (changed("materials", "paint", "diffuse", value=[0.1, 0.3]), "materials.paint.diffuse", "0.3"),
+    (changed("materials", "paint", "type", value="velvet"), "materials.paint", "velvet"),
+    (changed("materials", "paint", value={"type": "dielectric", "ior": 0.5}), "ior", "0.5"),
+    (changed("objects", 0, "material", value="pain"), "objects[0].material", "did you mean 'paint'"),
+    (changed("objects", 0, "transform", value=[0.0] * 15 + [1.0]), "objects[0].transform", "invertible"),
+    (changed("objects", 0, "transform", value=[1.0] * 15), "objects[0].transform", "16"),
+    (changed("objects", 0, "mesh", value="sqare.ply"), "objects[0].mesh", "did you mean 'square.ply'"),
+    (changed("objects", 0, "mesh", value="square.stl"), "objects[0].mesh", ".stl"),
+    (changed("objects", 0, "mesh", value="."), "objects[0].mesh", "."),
+    (changed("objects", 0, "mesh", value="nul\0.ply"), "objects[0].mesh", "ply"),
+    ({"objects": []}, "objects", "[]"),
+    ({"schema": 2}, "schema", "2"),
+    ({"units": "cm"}, "units", "cm"),
+    ({"preview_exposure": 0}, "preview_exposure", "0"),
+    ({"camera": None}, "camera", "nothing given"),
+    ({"lights": None}, "lights", "nothing given"),
+    ({"lights": []}, "lights", "nothing given"),
+])
+def test_each_fault_names_file_key_and_value(tmp_path: Path, change: dict[str, Any], key: str, value: str) -> None:
+    path = write_scene(tmp_path, **change)
+    with pytest.raises(InputError) as error:
+        load_scene(path)
+    text = str(error.value)
+    assert str(path) in text
+    assert key in text
+    assert value in text
+    assert "Traceback" not in text
+
+
+def test_all_faults_of_a_file_come_at_once(tmp_path: Path) -> None:
+    path = write_scene(tmp_path, units="cm", colour=1, camera=None,
+                       lights=[SCENE["lights"][0] | {"outer_half_angle_deg": 120}],
+                       objects=[{"mesh": "a.ply", "material": "unknown"}, {"mesh": "b.ply", "transform": [0] * 16}])
+    with pytest.raises(InputError) as error:
+        load_scene(path)
+    lines = str(error.value).splitlines()
+    assert len(lines) == 6
+    assert all(line.startswith(str(path)) for line in lines)
+
+
+def test_all_missing_meshes_come_at_once(tmp_path: Path) -> None:
+    path = write_scene(tmp_path, objects=[{"mesh": "a.ply"}, {"mesh": "b.obj"}])
+    with pytest.raises(InputError, match=r"objects\[0\].*\n.*objects\[1\]"):
+        load_scene(path)
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("{", "damaged JSON"), ("[]", "expected a JSON object"), ('{"schema": 1, "schema": 1}', "each key once"),
+    ("", "empty"), ("\xff", "damaged JSON"), ("[" * 100_000, "damaged JSON"), ("null", "expected a JSON object"),
+    ('{"schema": 1e999}', "schema"), ('{"camera": {"eye": [NaN, 0, 0]}}', "NaN"),
+])
+def test_damaged_json(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "scene.json"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(InputError) as error:
+        load_scene(path)
+    assert str(path) in str(error.value)
+    assert said.lower() in str(error.value).lower()
+
+
+def test_not_a_number_is_named(tmp_path: Path) -> None:
+    path = write_scene(tmp_path)
+    path.write_text(path.read_text().replace('"eye": [0,', '"eye": [NaN,'))
+    with pytest.raises(InputError, match=r"camera\.eye"):
+        load_scene(path)
+
+
+def test_a_light_without_power_is_left_out_and_counted(tmp_path: Path) -> None:
+    dark = SCENE["lights"][0] | {"intensity_w_per_sr": [0, 0, 0]}
+    with pytest.warns(RefgiWarning, match="1 light of zero power"):
+        scene = load_scene(write_scene(tmp_path, lights=[dark, SCENE["lights"][0]]))
+    assert len(scene.lights) == 1
+    with pytest.raises(InputError, match="at least one light of power"):
+        load_scene(write_scene(tmp_path, lights=[dark]))
+
+
+def test_flat_faces_are_skipped_and_counted(tmp_path: Path) -> None:
+    path = write_scene(tmp_path)
+    (tmp_path / "square.ply").write_bytes(ply_bytes(faces=np.array([[0, 1, 2], [0, 1, 1], [3, 3, 3]])))
+    with pytest.warns(RefgiWarning, match="2 faces of zero area skipped"):
+        scene = load_scene(path)
+    assert scene.face_count == 1
+
+
+@given(angle=st.floats(allow_nan=False, width=32))
+def test_any_cone_is_taken_or_refused(tmp_path_factory: pytest.TempPathFactory, angle: float) -> None:
+    folder = tmp_path_factory.mktemp("cone", numbered=True)
+    path = write_scene(folder, **changed("lights", 0, "outer_half_angle_deg", value=angle))
+    if 20 <= angle < 90:
+        assert load_scene(path).lights[0].outer_half_angle == math.radians(angle)
+    else:
+        with pytest.raises(InputError, match="half_angle_deg"):
+            load_scene(path)
+
+
+@given(tree=st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=5),
+                         lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
+                             st.sampled_from(["schema", "camera", "lights", "objects", "mesh", "type"]), inner),
+                         max_leaves=12),
+       key=st.sampled_from(sorted(SCENE)))
+def test_any_value_under_any_key_is_taken_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, key: str, tree: Any
+) -> None:
+    path = write_scene(tmp_path_factory.mktemp("any", numbered=True))
+    path.write_text(json.dumps(copy.deepcopy(SCENE) | {key: tree}))
+    try:
+        load_scene(path)
+    except InputError as error:
+        assert str(path) in str(error)
+

@@ -21,7 +21,7 @@ check: $(VENV)/dev.stamp
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/numpydoc lint $$(git ls-files 'refgi/*.py')
+	$(BIN)/numpydoc lint $$(git ls-files 'refgi/*.py' ':!refgi/cli')
 
 evidence: $(VENV)/dev.stamp
 	$(BIN)/python -m pytest tests -m feature --evidence -q

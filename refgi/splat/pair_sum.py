@@ -24,7 +24,6 @@ LEAST_SQUARE = 1e-30  # m^2; stands in for r^2 = 0, where both cosines are 0 as 
 
 ROWS = 15
 X, NX, SUM, TOTAL, LOST = 0, 3, 6, 9, 12  # first rows of a tile: position, normal, sum of the group, sum of all
-FLUX = 6  # first of the last three values of a packed light: position, reversed normal, flux / pi
 
 
 class Clamp(NamedTuple):
@@ -120,8 +119,10 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
                 for i in range(TILE):
                     receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
                     g1, g2 = _term(one, receiver, clamp, a), _term(two, receiver, clamp, a + 1)  # Eq. (2)
-                    for c in range(3):
-                        tile[SUM + c, i] = tile[SUM + c, i] + g1 * one[FLUX + c] + g2 * two[FLUX + c]
+                    # written out: a loop over the channels would cost the compiler its even split into lanes
+                    tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
+                    tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
+                    tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8]
             close_group(tile)
         for c in range(3):
             irradiance[c, first : first + size] = tile[TOTAL + c, :size]

@@ -31,7 +31,7 @@ class Wanted(NamedTuple):
 
 
 class Planes(NamedTuple):
-    """Where a pass writes, in the buffer's type; background already filled in."""
+    """Where a pass writes, in the buffer's type; zero before."""
 
     depth: Array  # (H, W) m: axial in perspective and orthographic maps, else distance
     distance: Array  # (H, W) m: from the centre of projection; orthographic: the depth
@@ -67,25 +67,33 @@ def texel_ray(projection: Projection, row: int, column: int) -> tuple[float, flo
     tuple of 6 floats
         Origin (m) and direction in world space; the direction's length is one unit of depth.
     """
-    m = row // projection.height
+    view, v = _row_view(projection, row)
     u = ((column + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0]
+    return _ray(projection.kind, view, u, v)
+
+
+@kernel
+def _row_view(projection: Projection, row: int) -> Any:
+    """Return origin, right, down and forward of a row's map as 12 floats, and the row's image coordinate."""
+    m = row // projection.height
     v = ((row - m * projection.height + 0.5) * (2.0 / projection.height) - 1.0) * projection.half[1]
-    origin, frame = projection.origin, projection.frame
-    ox, oy, oz = origin[m, 0], origin[m, 1], origin[m, 2]
-    if projection.kind == ORTHOGRAPHIC:
-        ox += u * frame[m, 0, 0] + v * frame[m, 1, 0]
-        oy += u * frame[m, 0, 1] + v * frame[m, 1, 1]
-        oz += u * frame[m, 0, 2] + v * frame[m, 1, 2]
-        return ox, oy, oz, frame[m, 2, 0], frame[m, 2, 1], frame[m, 2, 2]
+    o, f = projection.origin, projection.frame
+    return (o[m, 0], o[m, 1], o[m, 2], f[m, 0, 0], f[m, 0, 1], f[m, 0, 2], f[m, 1, 0], f[m, 1, 1], f[m, 1, 2],
+            f[m, 2, 0], f[m, 2, 1], f[m, 2, 2]), v  # fmt: skip
+
+
+@kernel
+def _ray(kind: int, view: Any, u: float, v: float) -> tuple[float, float, float, float, float, float]:
+    """Return origin and direction at image coordinates (u, v)."""
+    ox, oy, oz, rx, ry, rz, qx, qy, qz, fx, fy, fz = view
+    if kind == ORTHOGRAPHIC:
+        return ox + u * rx + v * qx, oy + u * ry + v * qy, oz + u * rz + v * qz, fx, fy, fz
     ahead = 1.0
-    if projection.kind == PARABOLOID:
+    if kind == PARABOLOID:
         scale = 1.0 / (1.0 + u * u + v * v)
         ahead = (1.0 - u * u - v * v) * scale
         u, v = 2.0 * u * scale, 2.0 * v * scale
-    dx = u * frame[m, 0, 0] + v * frame[m, 1, 0] + ahead * frame[m, 2, 0]
-    dy = u * frame[m, 0, 1] + v * frame[m, 1, 1] + ahead * frame[m, 2, 1]
-    dz = u * frame[m, 0, 2] + v * frame[m, 1, 2] + ahead * frame[m, 2, 2]
-    return ox, oy, oz, dx, dy, dz
+    return ox, oy, oz, u * rx + v * qx + ahead * fx, u * ry + v * qy + ahead * fy, u * rz + v * qz + ahead * fz
 
 
 @kernel
@@ -94,33 +102,22 @@ def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> 
 
 
 @kernel
-def _plane(vertices: Array, i: int, j: int, k: int) -> tuple[float, float, float]:
-    """Return the normal of a triangle scaled by twice its area."""
-    x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-    ax, ay, az = vertices[j, 0] - x, vertices[j, 1] - y, vertices[j, 2] - z
-    return _cross(ax, ay, az, vertices[k, 0] - x, vertices[k, 1] - y, vertices[k, 2] - z)
-
-
-@kernel
-def _weight(vertices: Array, j: int, k: int, ray: Any) -> float:
-    """Return d . (v_j x v_k): the barycentric coordinate of the third vertex up to a common factor."""
-    ox, oy, oz, dx, dy, dz = ray
-    cx, cy, cz = _cross(
-        vertices[j, 0] - ox, vertices[j, 1] - oy, vertices[j, 2] - oz,
-        vertices[k, 0] - ox, vertices[k, 1] - oy, vertices[k, 2] - oz,
-    )  # fmt: skip
-    return dx * cx + dy * cy + dz * cz
-
-
-@kernel
-def _unit_towards(nx: float, ny: float, nz: float, tx: float, ty: float, tz: float) -> tuple[float, float, float]:
-    """Return the unit vector along n on the side of t; t itself where n has no length."""
+def _towards(nx: float, ny: float, nz: float, tx: float, ty: float, tz: float) -> tuple[float, float, float]:
+    """Return the unit vector along n on the side of t; along t where n has no length."""
     square = nx * nx + ny * ny + nz * nz
     if not square > 0.0:
         nx, ny, nz = tx, ty, tz
         square = nx * nx + ny * ny + nz * nz
     scale = math.copysign(1.0 / math.sqrt(square), nx * tx + ny * ty + nz * tz)
     return nx * scale, ny * scale, nz * scale
+
+
+@kernel
+def _weight(ray: Any, ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
+    """Return d . (a x b), relative to the ray's origin: a barycentric coordinate up to the common factor d . N."""
+    ox, oy, oz, dx, dy, dz = ray
+    cx, cy, cz = _cross(ax - ox, ay - oy, az - oz, bx - ox, by - oy, bz - oz)
+    return dx * cx + dy * cy + dz * cz
 
 
 @kernel(parallel=True)
@@ -152,26 +149,41 @@ def resolve(
 def _resolve_rows(
     surface: Surface, projection: Projection, triangle_id: Array, wanted: Wanted, planes: Planes, first: int, step: int
 ) -> None:
-    """Fill every `step`-th row from `first` on."""
-    vertices, faces = surface.vertices, surface.faces
+    """Fill every `step`-th row from `first` on.
+
+    Inside the loop over columns functions get scalars only: arrays would cost atomic reference counts.
+    """
+    vertices, faces, shading, diffuse = surface.vertices, surface.faces, surface.normals, surface.diffuse
     height, width = triangle_id.shape
-    smooth = len(surface.normals) > 0
+    smooth = len(shading) > 0 and wanted.normal
+    across = 2.0 / projection.width
     for row in range(first, height, step):
-        last, i, j, k = -1, 0, 0, 0
-        gx, gy, gz = 0.0, 0.0, 0.0
+        view, v = _row_view(projection, row)
+        last, material, i, j, k = -1, 0, 0, 0, 0
+        ix, iy, iz, jx, jy, jz, kx, ky, kz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        gx, gy, gz, nx, ny, nz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for column in range(width):
             face = triangle_id[row, column]
             if face < 0:
+                if wanted.depth:
+                    planes.depth[row, column] = np.inf
+                if wanted.distance:
+                    planes.distance[row, column] = np.inf
+                if wanted.material_id:
+                    planes.material_id[row, column] = -1
                 continue
-            ray = texel_ray(projection, row, column)
+            ray = _ray(projection.kind, view, ((column + 0.5) * across - 1.0) * projection.half[0], v)
             ox, oy, oz, dx, dy, dz = ray
             if face != last:
-                last = face
+                last, material = face, surface.material_of_face[face]
                 i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-                gx, gy, gz = _plane(vertices, i, j, k)
+                ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+                jx, jy, jz = vertices[j, 0], vertices[j, 1], vertices[j, 2]
+                kx, ky, kz = vertices[k, 0], vertices[k, 1], vertices[k, 2]
+                gx, gy, gz = _cross(jx - ix, jy - iy, jz - iz, kx - ix, ky - iy, kz - iz)
+                nx, ny, nz = _towards(gx, gy, gz, -dx, -dy, -dz)  # a triangle shows one side to a projection
             facing = dx * gx + dy * gy + dz * gz
-            ahead = (vertices[i, 0] - ox) * gx + (vertices[i, 1] - oy) * gy + (vertices[i, 2] - oz) * gz
-            t = ahead / facing
+            t = ((ix - ox) * gx + (iy - oy) * gy + (iz - oz) * gz) / facing
             if wanted.depth:
                 planes.depth[row, column] = t
             if wanted.distance:
@@ -181,24 +193,20 @@ def _resolve_rows(
                 planes.position[1, row, column] = oy + t * dy
                 planes.position[2, row, column] = oz + t * dz
             if wanted.normal:
-                nx, ny, nz = _unit_towards(gx, gy, gz, -dx, -dy, -dz)
+                sx, sy, sz = nx, ny, nz
                 if smooth:
-                    bi = _weight(vertices, j, k, ray) / facing
-                    bj = _weight(vertices, k, i, ray) / facing
-                    bk = 1.0 - bi - bj
-                    shading = surface.normals
-                    sx = bi * shading[i, 0] + bj * shading[j, 0] + bk * shading[k, 0]
-                    sy = bi * shading[i, 1] + bj * shading[j, 1] + bk * shading[k, 1]
-                    sz = bi * shading[i, 2] + bj * shading[j, 2] + bk * shading[k, 2]
-                    nx, ny, nz = _unit_towards(sx, sy, sz, nx, ny, nz)
-                planes.normal[0, row, column] = nx
-                planes.normal[1, row, column] = ny
-                planes.normal[2, row, column] = nz
-            if wanted.albedo or wanted.material_id:
-                material = surface.material_of_face[face]
-                if wanted.albedo:
-                    planes.albedo[0, row, column] = surface.diffuse[material, 0]
-                    planes.albedo[1, row, column] = surface.diffuse[material, 1]
-                    planes.albedo[2, row, column] = surface.diffuse[material, 2]
-                if wanted.material_id:
-                    planes.material_id[row, column] = material
+                    a = _weight(ray, jx, jy, jz, kx, ky, kz) / facing
+                    b = _weight(ray, kx, ky, kz, ix, iy, iz) / facing
+                    c = 1.0 - a - b
+                    sx = a * shading[i, 0] + b * shading[j, 0] + c * shading[k, 0]
+                    sy = a * shading[i, 1] + b * shading[j, 1] + c * shading[k, 1]
+                    sz = a * shading[i, 2] + b * shading[j, 2] + c * shading[k, 2]
+                    sx, sy, sz = _towards(sx, sy, sz, nx, ny, nz)
+                planes.normal[0, row, column], planes.normal[1, row, column] = sx, sy
+                planes.normal[2, row, column] = sz
+            if wanted.albedo:
+                planes.albedo[0, row, column] = diffuse[material, 0]
+                planes.albedo[1, row, column] = diffuse[material, 1]
+                planes.albedo[2, row, column] = diffuse[material, 2]
+            if wanted.material_id:
+                planes.material_id[row, column] = material

@@ -80,7 +80,7 @@ def _look_up(
 
 
 @kernel
-def _sinking(maps: Projection, m: int, point: Any, normal: Any, depth: float) -> float:
+def _sinking(maps: Projection, m: int, point: Any, normal: Any, depth: float) -> Any:
     """Return how much farther than a receiver its plane may be one texel away, m."""
     frame, origin = maps.frame, maps.origin
     dx, dy, dz = frame[m, 2, 0], frame[m, 2, 1], frame[m, 2, 2]

@@ -1,6 +1,5 @@
 """The G-buffer: what a camera or a light sees through every texel, each channel resolved when first asked for."""
 
-import math
 from typing import Any
 
 import numba
@@ -10,13 +9,11 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.rsm.attributes import Planes, Surface, Wanted, resolve
 from refgi.rsm.projection import Projection, camera_projection
-from refgi.rsm.raster import Visibility, rasterize
+from refgi.rsm.raster import Visibility, fresh, rasterize
 from refgi.scene.model import Camera, Geometry, MaterialTable
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
-
-BACKGROUND = {"depth": math.inf, "distance": math.inf}  # the others: 0; ids: -1
 
 
 class GBuffer:
@@ -58,12 +55,12 @@ class GBuffer:
     @property
     def height(self) -> int:
         """Rows, of all stacked maps."""
-        return self.visibility.triangle_id.shape[0]
+        return int(self.visibility.triangle_id.shape[0])
 
     @property
     def width(self) -> int:
         """Columns."""
-        return self.visibility.triangle_id.shape[1]
+        return int(self.visibility.triangle_id.shape[1])
 
     @property
     def triangle_id(self) -> Array:
@@ -189,8 +186,7 @@ def _resolve(
     planes["material_id"] = np.empty((0, 0), np.int32)
     for name in names:
         full = (3, *shape) if planes[name].ndim == 3 else shape
-        value = -1 if name == "material_id" else BACKGROUND.get(name, 0.0)
-        planes[name] = np.full(full, value, planes[name].dtype)
+        planes[name] = fresh(full, planes[name].dtype)
     normals = np.zeros((0, 3)) if geometry.vertex_normals is None else geometry.vertex_normals
     diffuse = materials.diffuse.astype(dtype, copy=False)
     surface = Surface(geometry.vertices, geometry.faces, normals, geometry.material_of_face, diffuse)

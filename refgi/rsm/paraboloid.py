@@ -20,15 +20,13 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.projection import Projection, paraboloid_projection, view_coordinates
+from refgi.rsm.triangle import LANES, SMALLEST, centres_between
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
 NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the centre
-BOX_PAD = 1e-3  # texels
-SMALLEST = 1e-300  # an edge that owns its plane needs e >= 0, another needs e >= SMALLEST
-LANES = 16  # texels tested at once; a map has at least as many columns in memory
 
 
 class Scratch(NamedTuple):
@@ -95,10 +93,8 @@ def _draw(projection: Projection, corners: Array, faces: Array, nearness: Array,
     for face in range(len(faces)):
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
         s_low, s_high, t_low, t_high = _disc_box(corners, i, j, k)
-        first = max(int(math.ceil(min((s_low + half) / step, n + 1.0) - (0.5 + BOX_PAD))), 0)
-        last = min(int(math.floor(max((s_high + half) / step, -1.0) - (0.5 - BOX_PAD))), n - 1)
-        top = max(int(math.ceil(min((t_low + half) / step, n + 1.0) - (0.5 + BOX_PAD))), 0)
-        bottom = min(int(math.floor(max((t_high + half) / step, -1.0) - (0.5 - BOX_PAD))), n - 1)
+        first, last = centres_between((s_low + half) / step, (s_high + half) / step, n)
+        top, bottom = centres_between((t_low + half) / step, (t_high + half) / step, n)
         if first > last or top > bottom:
             continue
         px, py, pz, _ = _plane(corners, j, k, 1.0)

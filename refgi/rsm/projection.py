@@ -151,7 +151,7 @@ def dual_paraboloid_projection(position: npt.ArrayLike, n: int) -> Projection:
     Projection
         Two paraboloid maps.
     """
-    return paraboloid_projection([position, position], [(0, 0, 1), (0, 0, -1)], n)
+    return paraboloid_projection(np.stack([position, position]), [(0, 0, 1), (0, 0, -1)], n)
 
 
 def directional_projection(light: DirectionalLight, bounds: tuple[Array, Array], n: int) -> Projection:
@@ -295,7 +295,9 @@ def view_coordinates(projection: Projection, m: int, x: float, y: float, z: floa
     )
 
 
-def _maps(kind: int, height: int, width: int, origin: Any, frames: Any, half: Any, reach: float = math.inf) -> Projection:
+def _maps(
+    kind: int, height: int, width: int, origin: Any, frames: Any, half: Any, reach: float = math.inf
+) -> Projection:
     for name, size in (("height", height), ("width", width)):
         expect(1 <= size <= LARGEST_SIDE, name, f"1 to {LARGEST_SIDE} texels", size)
     return Projection(

@@ -20,6 +20,7 @@ from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
+PAGE = 4096  # bytes
 BATCH = 1024  # triangles whose boxes are found before they are drawn on one of several maps
 CHUNKS = 32  # pieces of the list of triangles that are counted and listed on their own
 
@@ -73,10 +74,8 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     """
     vertices, faces = geometry.vertices, geometry.faces
     height, width = projection.shape
-    # filled here by one thread: fresh memory first touched by two costs several times as much
-    seen = Visibility(
-        np.full((height, max(width, LANES)), -1, np.int32), np.full((height, max(width, LANES)), 0.0, np.float32)
-    )
+    columns = max(width, LANES)
+    seen = Visibility(np.full((height, columns), -1, np.int32), fresh((height, columns), np.float32))
     workers = numba.get_num_threads()
     if projection.kind == PARABOLOID:
         draw_paraboloids(projection, vertices, faces, workers, seen.inverse_depth, seen.triangle_id)
@@ -90,6 +89,26 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     if width < LANES:
         seen = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in seen))
     return seen
+
+
+def fresh(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
+    """Return an array of zeros whose memory is already there.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Its shape.
+    dtype : dtype
+        Its type.
+
+    Returns
+    -------
+    ndarray
+        Zeros. Each page was touched once: pages first touched by several threads at once cost several times as much.
+    """
+    array = np.zeros(shape, dtype)
+    array.reshape(-1)[:: PAGE // array.itemsize] = 0
+    return array
 
 
 def scratch(workers: int, vertices: int) -> Scratch:
@@ -160,7 +179,11 @@ def _count(corners: Array, faces: Array, size: Array, boxes: Array, counts: Arra
 
 @kernel
 def _store_box(corners: Array, faces: Array, face: int, width: int, height: int, boxes: Array, place: int) -> bool:
-    left, right, top, bottom = texel_box(corners, faces[face, 0], faces[face, 1], faces[face, 2], width, height)
+    i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+    left, right, top, bottom = texel_box(
+        corners[i, 0], corners[i, 1], corners[i, 2], corners[j, 0], corners[j, 1], corners[j, 2],
+        corners[k, 0], corners[k, 1], corners[k, 2], (width, height),
+    )  # fmt: skip
     empty = left > right or top > bottom
     boxes[place, 0], boxes[place, 1] = (1, 0) if empty else (left, right)
     boxes[place, 2], boxes[place, 3] = (1, 0) if empty else (top, bottom)

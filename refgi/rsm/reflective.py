@@ -194,7 +194,8 @@ def _incident_flux(light: Light, maps: Projection, solid_angle: Array, dtype: np
         else:
             solid_angle = spot_power(maps, *cosines)
     strength = light.irradiance if isinstance(light, DirectionalLight) else light.intensity
-    return np.multiply.outer(np.asarray(strength), solid_angle).astype(dtype)
+    incident: Array = np.multiply.outer(np.asarray(strength), solid_angle).astype(dtype)
+    return incident
 
 
 def _lobe(
@@ -202,7 +203,7 @@ def _lobe(
 ) -> tuple[Array, Array, Array]:
     """Return flux, axis and exponent of the lobes."""
     flux = np.moveaxis(materials.specular.astype(normal.dtype)[material], -1, 0) * incident
-    has_lobe = flux.any(axis=0)
+    has_lobe: Array = np.asarray(flux.any(axis=0))
     exponent = materials.exponent.astype(normal.dtype)[material] * has_lobe
     axis = np.zeros_like(normal)
     _mirror(maps, normal, has_lobe, axis)

@@ -104,7 +104,7 @@ def _fill_quadrant(projection: Projection, spot: Array, quadrant: Array) -> None
 
 
 @kernel
-def _rectangle(kind: int, x0: float, x1: float, y0: float, y1: float) -> float:
+def _rectangle(kind: int, x0: float, x1: float, y0: float, y1: float) -> Any:
     if kind == PARABOLOID:
         return (
             corner_solid_angle_paraboloid(x1, y1)
@@ -121,7 +121,7 @@ def _rectangle(kind: int, x0: float, x1: float, y0: float, y1: float) -> float:
 
 
 @kernel
-def _power(kind: int, x0: float, x1: float, y0: float, y1: float, cos_inner: float, cos_outer: float) -> float:
+def _power(kind: int, x0: float, x1: float, y0: float, y1: float, cos_inner: float, cos_outer: float) -> Any:
     """Integrate the falloff over a rectangle of the first quadrant."""
     inner, outer = _radius(kind, cos_inner), _radius(kind, cos_outer)
     farthest = math.sqrt(x1 * x1 + y1 * y1)

@@ -72,60 +72,70 @@ def project_vertex(projection: Projection, m: int, vertices: Array, i: int, corn
 
 
 @kernel
-def texel_box(corners: Array, i: int, j: int, k: int, width: int, height: int) -> tuple[int, int, int, int]:
+def texel_box(
+    x0: float, y0: float, w0: float, x1: float, y1: float, w1: float, x2: float, y2: float, w2: float, size: Any
+) -> tuple[int, int, int, int]:
     """Return the texels whose centres a triangle may cover.
 
     Parameters
     ----------
-    corners : (n, 4) ndarray
-        Projected vertices.
-    i, j, k : int
-        The triangle's vertices.
-    width, height : int
-        Size of the map, texels.
+    x0, y0, w0, x1, y1, w1, x2, y2, w2 : float
+        Column, row and w of the corners.
+    size : tuple of 2 int
+        Columns and rows of the map.
 
     Returns
     -------
     tuple of 4 int
         First and last column, first and last row; first > last where the triangle covers nothing.
     """
-    if corners[i, 2] > 0.0 and corners[j, 2] > 0.0 and corners[k, 2] > 0.0:
-        x0, x1, x2 = corners[i, 0], corners[j, 0], corners[k, 0]
-        y0, y1, y2 = corners[i, 1], corners[j, 1], corners[k, 1]
+    if w0 > 0.0 and w1 > 0.0 and w2 > 0.0:
         left, right = min(x0, min(x1, x2)), max(x0, max(x1, x2))
         top, bottom = min(y0, min(y1, y2)), max(y0, max(y1, y2))
-    elif corners[i, 2] > 0.0 or corners[j, 2] > 0.0 or corners[k, 2] > 0.0:
-        left, right = _open_interval(corners, i, j, k, 0)
-        top, bottom = _open_interval(corners, i, j, k, 1)
+    elif w0 > 0.0 or w1 > 0.0 or w2 > 0.0:
+        left, right = _open_interval((x0, x1, x2, x0), (w0, w1, w2, w0))
+        top, bottom = _open_interval((y0, y1, y2, y0), (w0, w1, w2, w0))
     else:
         return 1, 0, 1, 0
-    first_x, last_x = _centres_between(left, right, width)
-    first_y, last_y = _centres_between(top, bottom, height)
+    first_x, last_x = centres_between(left, right, size[0])
+    first_y, last_y = centres_between(top, bottom, size[1])
     return first_x, last_x, first_y, last_y
 
 
 @kernel
-def _centres_between(low: float, high: float, size: int) -> tuple[int, int]:
+def centres_between(low: float, high: float, size: int) -> tuple[int, int]:
+    """Return the first and last texel whose centre lies in an interval, or a little outside it.
+
+    Parameters
+    ----------
+    low, high : float
+        The interval, continuous texel coordinates.
+    size : int
+        Texels in all.
+
+    Returns
+    -------
+    tuple of 2 int
+        Within 0 to `size` - 1; first > last where there is none.
+    """
     first = np.ceil(min(max(low, 0.0), size + 1.0) - (0.5 + BOX_PAD))
     last = np.floor(min(max(high, -1.0), float(size)) + (BOX_PAD - 0.5))
     return max(int(first), 0), min(int(last), size - 1)
 
 
 @kernel
-def _open_interval(corners: Array, i: int, j: int, k: int, axis: int) -> tuple[float, float]:
+def _open_interval(place: Any, w: Any) -> tuple[float, float]:
     """Return the range on one axis of the part in front of the eye: an edge through its plane goes to infinity."""
     low, high = np.inf, -np.inf
-    ends = (i, j, k, i)
-    for s in range(3):
-        a, b = ends[s], ends[s + 1]
-        wa, wb = corners[a, 2], corners[b, 2]
-        if wa > 0.0:
-            low, high = min(low, corners[a, axis]), max(high, corners[a, axis])
-        if (wa > 0.0) != (wb > 0.0):
+    for a in range(3):
+        b = a + 1
+        if w[a] > 0.0:
+            low, high = min(low, place[a]), max(high, place[a])
+        if (w[a] > 0.0) != (w[b] > 0.0):
             # the sign of the coordinate times w where the edge meets the plane of the eye
-            pa, pb = corners[a, axis] * wa, corners[b, axis] * wb
-            meets = (pa * wb - pb * wa) * (1.0 if wa < 0.0 else -1.0)
-            doubt = 1e-9 * (abs(pa * wb) + abs(pb * wa))
+            pa, pb = place[a] * w[a], place[b] * w[b]
+            meets = (pa * w[b] - pb * w[a]) * (-1.0 if w[a] > 0.0 else 1.0)
+            doubt = 1e-9 * (abs(pa * w[b]) + abs(pb * w[a]))
             if meets <= doubt:
                 low = -np.inf
             if meets >= -doubt:
@@ -134,15 +144,15 @@ def _open_interval(corners: Array, i: int, j: int, k: int, axis: int) -> tuple[f
 
 
 @kernel
-def edge(corners: Array, j: int, k: int, sign: float) -> tuple[float, float, float, float]:
+def edge(
+    xj: float, yj: float, wj: float, xk: float, yk: float, wk: float, sign: float
+) -> tuple[float, float, float, float]:
     """Return the edge function v_j x v_k and the value from which on a texel centre is inside.
 
     Parameters
     ----------
-    corners : (n, 4) ndarray
-        Projected vertices.
-    j, k : int
-        The edge's vertices.
+    xj, yj, wj, xk, yk, wk : float
+        Column, row and w of the edge's two vertices.
     sign : float
         Sign of the triangle's determinant, 1 or -1.
 
@@ -151,34 +161,12 @@ def edge(corners: Array, j: int, k: int, sign: float) -> tuple[float, float, flo
     tuple of 4 floats
         a, b, c of a x + b y + c, and the threshold.
     """
-    wj, wk = corners[j, 2], corners[k, 2]
-    xj, yj, xk, yk = corners[j, 0] * wj, corners[j, 1] * wj, corners[k, 0] * wk, corners[k, 1] * wk
+    xj, yj, xk, yk = xj * wj, yj * wj, xk * wk, yk * wk
     a = (yj * wk - yk * wj) * sign
     b = (xk * wj - xj * wk) * sign
     c = (xj * yk - xk * yj) * sign
     owns = a > 0.0 or (a == 0.0 and b > 0.0)
     return a, b, c, 0.0 if owns else SMALLEST
-
-
-@kernel
-def determinant(corners: Array, i: int, j: int, k: int) -> float:
-    """Return det(v_i, v_j, v_k): twice the area on the map, in perspective times the three depths.
-
-    Parameters
-    ----------
-    corners : (n, 4) ndarray
-        Projected vertices.
-    i, j, k : int
-        The triangle's vertices.
-
-    Returns
-    -------
-    float
-        Zero where the triangle is seen edge-on or has no area.
-    """
-    x0, y0 = corners[i, 0], corners[i, 1]
-    xj, yj, xk, yk = corners[j, 0] - x0, corners[j, 1] - y0, corners[k, 0] - x0, corners[k, 1] - y0
-    return (xj * yk - xk * yj) * (corners[i, 2] * corners[j, 2] * corners[k, 2])
 
 
 @kernel
@@ -202,26 +190,29 @@ def draw(corners: Array, faces: Array, part: Part, nearness: Array, ids: Array) 
     -----
     The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
     """
-    width = nearness.shape[1]
+    width, members, boxes = nearness.shape[1], part.members, part.boxes
     for place in range(part.start, part.stop):
-        face = part.members[place]
+        face = members[place]
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-        det = determinant(corners, i, j, k)
-        if det == 0.0:
+        xi, yi, wi, ni = corners[i, 0], corners[i, 1], corners[i, 2], corners[i, 3]
+        xj, yj, wj, nj = corners[j, 0], corners[j, 1], corners[j, 2], corners[j, 3]
+        xk, yk, wk, nk = corners[k, 0], corners[k, 1], corners[k, 2], corners[k, 3]
+        det = ((xj - xi) * (yk - yi) - (xk - xi) * (yj - yi)) * (wi * wj * wk)
+        if det == 0.0:  # no area, or seen edge-on
             continue
         sign = 1.0 if det > 0.0 else -1.0
-        a0, b0, c0, t0 = edge(corners, j, k, sign)
-        a1, b1, c1, t1 = edge(corners, k, i, sign)
-        a2, b2, c2, t2 = edge(corners, i, j, sign)
-        n0, n1, n2, scale = corners[i, 3], corners[j, 3], corners[k, 3], sign / det
-        an = (a0 * n0 + a1 * n1 + a2 * n2) * scale
-        bn = (b0 * n0 + b1 * n1 + b2 * n2) * scale
-        cn = (c0 * n0 + c1 * n1 + c2 * n2) * scale
-        farthest = max(abs(corners[i, 2]), max(abs(corners[j, 2]), abs(corners[k, 2])))
-        limit = np.float32(1.0 / (NEAREST * farthest))
-        box = part.boxes[face - part.base]
-        left, right = np.int64(box[0]), np.int64(box[1])
-        for row in range(max(np.int64(box[2]), part.top), min(np.int64(box[3]), part.bottom) + 1):
+        a0, b0, c0, t0 = edge(xj, yj, wj, xk, yk, wk, sign)
+        a1, b1, c1, t1 = edge(xk, yk, wk, xi, yi, wi, sign)
+        a2, b2, c2, t2 = edge(xi, yi, wi, xj, yj, wj, sign)
+        scale = sign / det
+        an = (a0 * ni + a1 * nj + a2 * nk) * scale
+        bn = (b0 * ni + b1 * nj + b2 * nk) * scale
+        cn = (c0 * ni + c1 * nj + c2 * nk) * scale
+        limit = np.float32(1.0 / (NEAREST * max(abs(wi), max(abs(wj), abs(wk)))))
+        place_of_box = face - part.base
+        left, right = _integer(boxes[place_of_box, 0]), _integer(boxes[place_of_box, 1])
+        upper, lower = _integer(boxes[place_of_box, 2]), _integer(boxes[place_of_box, 3])
+        for row in range(max(upper, part.top), min(lower, part.bottom) + 1):
             y = row + 0.5
             r0, r1, r2, rn = b0 * y + c0, b1 * y + c1, b2 * y + c2, bn * y + cn
             first, last = left, right
@@ -240,6 +231,12 @@ def draw(corners: Array, faces: Array, part: Part, nearness: Array, ids: Array) 
                     if inside & (near > nearness[line, column]) & (near <= limit):
                         nearness[line, column] = near
                         ids[line, column] = face
+
+
+@kernel
+def _integer(side: Any) -> Any:
+    """Widen a side of a box: 16-bit and signed integers together would become floats."""
+    return np.int64(side)
 
 
 @kernel

@@ -22,6 +22,7 @@ Rgb = tuple[float, float, float]
 Vector = tuple[float, float, float]
 
 BLACK: Rgb = (0.0, 0.0, 0.0)
+BRIGHTEST = 1e20  # W/sr or W/m^2; falls off within float32
 LARGEST = 1e9  # m; squares and cubes of coordinates stay within float32
 
 
@@ -32,12 +33,21 @@ def _is_vector(value: Any) -> bool:
         return False
 
 
+def _is_place(value: Any) -> bool:
+    return _is_vector(value) and max(map(abs, value)) <= LARGEST
+
+
+def _is_direction(value: Any) -> bool:
+    return _is_vector(value) and 1e-100 < math.hypot(*value) < 1e100  # squares neither vanish nor overflow
+
+
 def _degrees(angle: float) -> float:
     return round(math.degrees(angle), 9)
 
 
 def _expect_power(value: Rgb, key: str) -> None:
-    expect(_is_vector(value) and min(value) >= 0, f"light: {key}", "three finite numbers >= 0", value)
+    fits = _is_vector(value) and min(value) >= 0 and max(value) <= BRIGHTEST
+    expect(fits, f"light: {key}", f"three numbers from 0 to {BRIGHTEST:g}", value)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -149,11 +159,13 @@ class Camera:
     height: int = 512
 
     def __post_init__(self) -> None:
-        for key in ("eye", "target", "up"):
-            expect(_is_vector(getattr(self, key)), f"camera: {key}", "three finite numbers", getattr(self, key))
+        for key in ("eye", "target"):
+            expect(_is_place(getattr(self, key)), f"camera: {key}", f"three finite numbers up to {LARGEST:g} m",
+                   getattr(self, key))
+        expect(_is_direction(self.up), "camera: up", "a finite vector, not zero", self.up)
         view = np.subtract(self.target, self.eye)
-        expect(bool(view.any()), "camera: target", "a point away from eye", self.target)
-        cross = np.cross(view / np.linalg.norm(view), np.asarray(self.up) / (np.linalg.norm(self.up) or 1.0))
+        expect(bool(np.linalg.norm(view) > 1e-9), "camera: target", "a point away from eye", self.target)
+        cross = np.cross(view / np.linalg.norm(view), np.asarray(self.up) / np.linalg.norm(self.up))
         expect(bool(np.linalg.norm(cross) > 1e-9), "camera: up", "a direction not along the view", self.up)
         expect(0 < self.vfov < math.pi, "camera: vfov_deg", "more than 0 and less than 180", _degrees(self.vfov))
         for key in ("width", "height"):
@@ -176,8 +188,8 @@ class SpotLight:
     intensity: Rgb
 
     def __post_init__(self) -> None:
-        expect(_is_vector(self.position), "light: position", "three finite numbers", self.position)
-        expect(_is_vector(self.direction) and any(self.direction), "light: direction", "a finite vector, not zero",
+        expect(_is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
+        expect(_is_direction(self.direction), "light: direction", "a finite vector, not zero",
                self.direction)
         expect(0 < self.outer_half_angle < math.pi / 2, "light: outer_half_angle_deg",
                "more than 0 and less than 90", _degrees(self.outer_half_angle))
@@ -194,7 +206,7 @@ class PointLight:
     intensity: Rgb
 
     def __post_init__(self) -> None:
-        expect(_is_vector(self.position), "light: position", "three finite numbers", self.position)
+        expect(_is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
         _expect_power(self.intensity, "intensity_w_per_sr")
 
 
@@ -206,7 +218,7 @@ class DirectionalLight:
     irradiance: Rgb
 
     def __post_init__(self) -> None:
-        expect(_is_vector(self.direction) and any(self.direction), "light: direction", "a finite vector, not zero",
+        expect(_is_direction(self.direction), "light: direction", "a finite vector, not zero",
                self.direction)
         _expect_power(self.irradiance, "irradiance_w_per_m2")
 

@@ -30,7 +30,7 @@ def written(folder: Path, edit: Edit | None = None, buffer: bytes = BUFFER) -> P
 
 def test_mesh_material_camera_and_light(tmp_path: Path) -> None:
     scene = load_scene(written(tmp_path))
-    assert np.array_equal(scene.geometry.vertices, TRIANGLES.astype(np.float64) + [1, 2, 3])
+    assert np.array_equal(scene.geometry.vertices, TRIANGLES.astype(np.float64) + np.array([1, 2, 3]))
     assert np.array_equal(scene.geometry.faces, FACES)
     assert scene.materials[0].diffuse == (0.1, 0.2, 0.3)  # as decimal digits in the JSON, not rounded to 8 bits
     assert scene.materials[0].emission == (4.0, 2.0, 0.0)
@@ -105,7 +105,7 @@ def test_interleaved_and_normalised_attributes(tmp_path: Path) -> None:
 
     rows = b"".join(v.tobytes() + struct.pack("<4b", 0, 0, 127, 0) for v in TRIANGLES)
     scene = load_scene(written(tmp_path, edit, rows + FACES.tobytes()))
-    assert np.array_equal(scene.geometry.vertices, TRIANGLES.astype(np.float64) + [1, 2, 3])
+    assert np.array_equal(scene.geometry.vertices, TRIANGLES.astype(np.float64) + np.array([1, 2, 3]))
     assert scene.geometry.vertex_normals.tolist() == [[0, 0, 1]] * 4
 
 

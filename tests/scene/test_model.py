@@ -62,7 +62,8 @@ def test_merge_refuses_unsound_meshes(mesh: Mesh, said: str) -> None:
 @pytest.mark.parametrize("make", [
     lambda: Material(diffuse=(0.5, 0.5, 1.01)), lambda: Material(diffuse=(0.5, 0.5)), lambda: Material(exponent=-1),
     lambda: Material(diffuse=(math.nan, 0, 0)), lambda: Material(ior=0.9), lambda: Material(emission=(0, 0, -1)),
-    lambda: Camera((0, 0, 0), (0, 0, 0)), lambda: Camera((0, 0, 0), (0, 1, 0)), lambda: Camera((0, 0, 0), (0, 0, math.inf)),
+    lambda: Camera((0, 0, 0), (0, 0, 0)), lambda: Camera((0, 0, 0), (0, 1, 0)),
+    lambda: Camera((0, 0, 0), (0, 0, math.inf)),
     lambda: Camera((0, 0, 0), (1, 0, 0), vfov=math.pi), lambda: Camera((0, 0, 0), (1, 0, 0), width=0),
     lambda: PointLight((0, 0, 0), (-1, 0, 0)), lambda: DirectionalLight((0, 0, 0), (1, 1, 1)),
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.0, 0.0, (1, 1, 1)),
@@ -117,7 +118,8 @@ def test_placing_moves_points_normals_and_orientation_alike(numbers: list[float]
 
 
 @pytest.mark.parametrize("numbers", [
-    [1.0] * 16, [0.0] * 15 + [1.0], [math.nan] + [1.0] * 15, [1.0] * 15, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1],
+    [1.0] * 16, [0.0] * 15 + [1.0], [math.nan] + [1.0] * 15, [1.0] * 15,
+    [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1],
     [1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1e-14, 0, 0, 0, 0, 1],
 ])
 def test_matrices_that_place_nothing(numbers: list[float]) -> None:

@@ -48,8 +48,9 @@ def test_materials_are_floats_in_order_of_use(tmp_path: Path) -> None:
     (tmp_path / "colours.mtl").write_text(
         "newmtl matt\nKd 0.1 0.2 0.0001\n\nnewmtl shiny\nKd 0.3 0.3 0.3\nKs 0.5 0.5 0.5\nNs 40\nKe 1 2 3\n"
         "newmtl too_bright\nKd 0.8 0.8 0.8\nKs 0.5 0.5 0.5\nNs 40\n")
-    meshes = read_obj(written(tmp_path, "mtllib colours.mtl\n" + SQUARE + "usemtl shiny\nf 1 2 3\nusemtl matt\n"
-                              "f 1 3 4\nusemtl too_bright\nf 1 2 4\nusemtl unheard\nf 2 3 4\nusemtl shiny\nf 2 3 4\n")).meshes
+    text = ("mtllib colours.mtl\n" + SQUARE + "usemtl shiny\nf 1 2 3\nusemtl matt\nf 1 3 4\n"
+            "usemtl too_bright\nf 1 2 4\nusemtl unheard\nf 2 3 4\nusemtl shiny\nf 2 3 4\n")
+    meshes = read_obj(written(tmp_path, text)).meshes
     shiny, matt, bright, unheard = (mesh.material for mesh in meshes)
     assert matt.diffuse == (0.1, 0.2, 0.0001)
     assert (shiny.specular, shiny.exponent, shiny.emission) == ((0.5, 0.5, 0.5), 40, (1, 2, 3))

@@ -197,8 +197,10 @@ def test_any_value_under_any_key_is_taken_or_refused(
 ) -> None:
     path = write_scene(tmp_path_factory.mktemp("any", numbered=True))
     path.write_text(json.dumps(copy.deepcopy(SCENE) | {key: tree}))
+    refusal = ""
     try:
         load_scene(path)
     except InputError as error:
-        assert str(path) in str(error)
+        refusal = str(error)
+    assert not refusal or str(path) in refusal
 

@@ -35,7 +35,7 @@ def integrating_sphere(faces: int = 20_000, albedo: float = 0.5, radius: float =
     irradiance albedo Phi0 / (4 pi R^2) everywhere, Phi0 being the flux of the light (papers.md section 0).
     """
     expect(8 <= faces <= MOST_FACES, "faces", f"8 to {MOST_FACES}", faces)
-    expect(0 < radius <= 1e6, "radius", "more than 0 and at most 1e6 m", radius)
+    expect(1e-6 <= radius <= 1e6, "radius", "1e-6 to 1e6 m", radius)
     wall = Material("wall", (albedo, albedo, albedo))
     geometry, materials = merge([sphere((0.0, 0.0, 0.0), radius, faces, wall, "sphere")], smooth=True)
     camera = Camera((0.0, -0.1 * radius, 0.75 * radius), (0.0, 0.05 * radius, -radius), vfov=math.radians(75))
@@ -109,7 +109,7 @@ def parallel_plates(height: float = 1.0, half_angle_deg: float = 40.0, albedo: f
     At the middle of the receiver E = 2/5 albedo I / h^2 (1 - cos^5 c) for half-angle c and intensity I = 1 W/sr. The
     light hangs 2e-5 h below the receiver so that the receiver cannot block it.
     """
-    expect(0 < height <= 1e6, "height", "more than 0 and at most 1e6 m", height)
+    expect(1e-6 <= height <= 1e6, "height", "1e-6 to 1e6 m", height)
     expect(1 <= half_angle_deg <= 75, "half_angle_deg", "1 to 75", half_angle_deg)
     half_angle = math.radians(half_angle_deg)
     floor, receiver = Material("floor", (albedo,) * 3), Material("receiver", (albedo,) * 3)

@@ -135,7 +135,8 @@ class _Reader:
         corners = np.arange(len(vertices), dtype=np.int64)
         if "indices" in entry:
             indices = accessor(self.document, entry["indices"], "SCALAR", f"{where}.indices")
-            expect(indices.dtype.kind in "iu", f"{self.path}: {where}.indices", "an accessor of integers", indices.dtype)
+            whole = indices.dtype.kind in "iu"
+            expect(whole, f"{self.path}: {where}.indices", "an accessor of integers", indices.dtype)
             corners = indices.astype(np.int64)
         mesh = Mesh(vertices, _triangles(corners, mode, f"{self.path}: {where}"), normals,
                     self._material_of(entry, where), name)

@@ -46,16 +46,13 @@ _call: Any = intrinsic(_call_by_address)
 
 
 @kernel
-def _load(ray: Array, bits: Array, origin: Array, direction: Array, reach: Any) -> None:
-    ray[0] = origin[0]
-    ray[1] = origin[1]
-    ray[2] = origin[2]
+def _load(ray: Array, bits: Array, origins: Array, directions: Array, reach: Array, i: int) -> None:
+    for c in range(3):
+        ray[c] = origins[i, c]
+        ray[4 + c] = directions[i, c]
     ray[3] = 0
-    ray[4] = direction[0]
-    ray[5] = direction[1]
-    ray[6] = direction[2]
     ray[7] = 0
-    ray[8] = reach
+    ray[8] = reach[i]
     bits[9] = -1  # mask: every geometry
     bits[10] = 0
     bits[11] = 0
@@ -89,7 +86,7 @@ def closest_hits(calls: Calls, origins: Array, directions: Array, reach: Array, 
         for i in range(chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)):
             bits[17] = -1
             if reach[i] > 0:
-                _load(ray, bits, origins[i], directions[i], reach[i])
+                _load(ray, bits, origins, directions, reach, i)
                 _call(calls.closest, calls.scene, ray.ctypes.data)
             triangle_id[i] = bits[17]
             distance[i] = ray[8] if bits[17] >= 0 else np.inf
@@ -117,6 +114,6 @@ def occlusions(calls: Calls, origins: Array, directions: Array, reach: Array, bl
         for i in range(chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)):
             ray[8] = -np.inf
             if reach[i] > 0:
-                _load(ray, bits, origins[i], directions[i], reach[i])
+                _load(ray, bits, origins, directions, reach, i)
                 _call(calls.occluded, calls.scene, ray.ctypes.data)
             blocked[i] = ray[8] < 0  # Embree marks a blocked ray by tfar = -inf

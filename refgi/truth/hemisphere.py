@@ -5,8 +5,8 @@ min(G, b) to the light side; here the rest, the share max(0, (G - b) / G) of eac
 Keller 2004). Without bound the share is 1. Directions are points of a low-discrepancy set that is scrambled anew in
 every pass and shifted by a random word per pixel.
 
-The parallel loops only call a scalar kernel for each path: Numba drops, without a word, what a parallel loop itself
-writes into arrays that it reached through a NamedTuple's attribute.
+The parallel loops only call a kernel for each chunk of paths: Numba drops, without a word, what a parallel loop
+itself writes into arrays that it reached through a NamedTuple's attribute.
 """
 
 import math
@@ -16,13 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.radiometry import incident_light, lobe_fraction
+from refgi.radiometry import DIRECTIONAL, incident_light, lobe_fraction
 from refgi.rays import MISS
 from refgi.sampling import cosine_hemisphere, hash_bits, sobol_owen
 from refgi.scene import LightTable
-from refgi.truth.surfaces import Receivers, Surfaces, around, face_normal, lobe_pattern, shading_normal
+from refgi.truth.surfaces import Receivers, Surfaces, around, face_cross, face_normal, lobe_pattern, shading_normal
 
 Array = npt.NDArray[Any]
+
+CHUNK = 1024  # paths or receivers that one parallel iteration owns
 
 
 class Paths(NamedTuple):
@@ -90,31 +92,33 @@ def send(to: Receivers, span: tuple[int, int], points: Array, seed: int, reach: 
     paths : Paths
         Origins, directions, reach, lengths, cosines and weights are filled.
     """
-    first, last = span
-    for i in prange(last - first):
-        _send(to, first, i, points, seed, reach, paths)
+    count = span[1] - span[0]
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _send(to, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), points, seed, reach, paths)
 
 
 @kernel
-def _send(to: Receivers, first: int, i: int, points: Array, seed: int, reach: float, paths: Paths) -> None:
-    r = first + i
-    word = hash_bits(np.uint32(to.pixel[r]) ^ np.uint32(seed))
-    shift_u, shift_v = hash_bits(word ^ np.uint32(0x68E31DA4)), hash_bits(word ^ np.uint32(0xB5297A4D))
-    normal = (np.float64(to.normal[0, r]), np.float64(to.normal[1, r]), np.float64(to.normal[2, r]))
-    for s in range(len(points)):
-        ray = i * len(points) + s
-        u = ((points[s, 0] ^ shift_u) + 0.5) * 2.0**-32
-        v = ((points[s, 1] ^ shift_v) + 0.5) * 2.0**-32
-        x, y, z = cosine_hemisphere(u, v)
-        w = around(normal, x, y, z)
-        above = to.facing[0, r] * w[0] + to.facing[1, r] * w[1] + to.facing[2, r] * w[2]
-        paths.reach[ray] = reach if above > 0 else 0
-        paths.travelled[ray] = 0
-        paths.cosine[ray] = z
-        for c in range(3):
-            paths.origin[ray, c] = to.origin[c, r]
-            paths.direction[ray, c] = w[c]
-            paths.weight[ray, c] = np.pi / len(points)
+def _send(to: Receivers, first: int, span: tuple[int, int], points: Array, seed: int, reach: float,
+          paths: Paths) -> None:
+    ray = span[0] * len(points)
+    for r in range(first + span[0], first + span[1]):
+        word = hash_bits(np.uint32(to.pixel[r]) ^ np.uint32(seed))
+        shift_u, shift_v = hash_bits(word ^ np.uint32(0x68E31DA4)), hash_bits(word ^ np.uint32(0xB5297A4D))
+        normal = (np.float64(to.normal[0, r]), np.float64(to.normal[1, r]), np.float64(to.normal[2, r]))
+        for s in range(len(points)):
+            u = ((points[s, 0] ^ shift_u) + 0.5) * 2.0**-32
+            v = ((points[s, 1] ^ shift_v) + 0.5) * 2.0**-32
+            x, y, z = cosine_hemisphere(u, v)
+            w = around(normal, x, y, z)
+            above = to.facing[0, r] * w[0] + to.facing[1, r] * w[1] + to.facing[2, r] * w[2]
+            paths.reach[ray] = reach if above > 0 else 0
+            paths.travelled[ray] = 0
+            paths.cosine[ray] = z
+            for c in range(3):
+                paths.origin[ray, c] = to.origin[c, r]
+                paths.direction[ray, c] = w[c]
+                paths.weight[ray, c] = np.pi / len(points)
+            ray += 1
 
 
 @kernel(parallel=True)
@@ -138,51 +142,70 @@ def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, 
     shadows : Shadows
         Origins, directions, reach and worth are filled; the reach is 0 where there is nothing to gain.
     """
-    for ray in prange(len(paths.reach)):
-        _gather(surfaces, lights, k, limits, paths, shadows, ray)
+    count = len(paths.reach)
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _gather(surfaces, lights, k, limits, paths, shadows, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
 
 
 @kernel
 def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], paths: Paths,
-            shadows: Shadows, ray: int) -> None:
+            shadows: Shadows, span: tuple[int, int]) -> None:
     bound, measure, offset = limits
-    triangle = paths.triangle_id[ray]
-    shadows.reach[ray] = 0
-    if triangle == MISS:
-        return
-    material = surfaces.material_of_face[triangle]
-    w, y = _found(paths, ray)
-    lx, ly, lz, far, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
-    light, irradiance = (lx, ly, lz), (red, green, blue)
-    g = face_normal(surfaces, triangle, -lx, -ly, -lz)
-    cos_out = g[0] * w[0] + g[1] * w[1] + g[2] * w[2]
-    if cos_out <= 0 or max(red, green, blue) <= 0:
-        return
-    n = shading_normal(surfaces, triangle, y, g)
-    # radiance = rho F / pi * pattern / <g.w>, F = E_perp <g.l>
-    factor = (g[0] * lx + g[1] * ly + g[2] * lz) / (np.pi * cos_out)
-    length = np.float64(paths.travelled[ray]) + paths.distance[ray]
-    receiver = paths.cosine[ray] / (length * length)  # G = pattern * <n_x.w> / r^2
-    limit = bound / (measure * far * far if far < np.inf else measure)
-    diffuse = _rest(max(0.0, n[0] * w[0] + n[1] * w[1] + n[2] * w[2]), receiver, limit)
-    lobe = 0.0
-    rho, glossy = surfaces.diffuse[material], surfaces.specular[material]
-    if max(glossy[0], glossy[1], glossy[2]) > 0:
-        lobe = _rest(lobe_pattern(surfaces, material, n, light, w), receiver, limit)
-    if diffuse <= 0 and lobe <= 0:
-        return
-    most = 0.0
-    for c in range(3):
-        worth = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
-        shadows.worth[ray, c] = worth
-        most = max(most, worth)
-        shadows.origin[ray, c] = y[c] + offset * g[c]
-        toward = light[c]
-        if far < np.inf:
-            toward = lights.position[k, c] - (y[c] + offset * g[c])
-        shadows.direction[ray, c] = toward
-    if most > 0:
-        shadows.reach[ray] = 1.0 if far < np.inf else np.inf
+    directional = lights.kind[k] == DIRECTIONAL
+    for ray in range(span[0], span[1]):
+        triangle = paths.triangle_id[ray]
+        shadows.reach[ray] = 0
+        if triangle == MISS:
+            continue
+        material = surfaces.material_of_face[triangle]
+        w, y = _found(paths, ray)
+        # whatever ends here most often is asked first, and before anything is normalised
+        toward = _toward_light(lights, k, y)
+        cross = face_cross(surfaces, triangle)
+        side, side_out = _dot(cross, toward), _dot(cross, w)
+        if side * side_out <= 0:
+            continue
+        length = np.float64(paths.travelled[ray]) + paths.distance[ray]
+        receiver = paths.cosine[ray] / (length * length)  # G = pattern * <n_x.w> / r^2
+        limit = bound / (measure if directional else measure * _dot(toward, toward))
+        rho, glossy = _row(surfaces.diffuse, material), _row(surfaces.specular, material)
+        has_lobe = max(glossy[0], glossy[1], glossy[2]) > 0
+        if receiver <= limit and not has_lobe:
+            continue
+        lx, ly, lz, _, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
+        if max(red, green, blue) <= 0:
+            continue
+        light, irradiance = (lx, ly, lz), (red, green, blue)
+        scale = math.copysign(1 / math.sqrt(_dot(cross, cross)), side)
+        g = (cross[0] * scale, cross[1] * scale, cross[2] * scale)
+        n = shading_normal(surfaces, triangle, y, g)
+        # radiance = rho F / pi * pattern / <g.w>, F = E_perp <g.l>
+        factor = _dot(g, light) / (np.pi * _dot(g, w))
+        diffuse, lobe = _rest(max(0.0, _dot(n, w)), receiver, limit), 0.0
+        if has_lobe:
+            lobe = _rest(lobe_pattern(surfaces, material, n, light, w), receiver, limit)
+        most = 0.0
+        for c in range(3):
+            worth = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
+            most = max(most, worth)
+            shadows.worth[ray, c] = worth
+            shadows.origin[ray, c] = y[c] + offset * g[c]
+            shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
+        if most > 0:
+            shadows.reach[ray] = np.inf if directional else 1.0
+
+
+@kernel
+def _toward_light(lights: LightTable, k: int, y: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return the vector from a point to a light, of length 1 if that is infinitely far."""
+    if lights.kind[k] == DIRECTIONAL:
+        return -lights.direction[k, 0], -lights.direction[k, 1], -lights.direction[k, 2]
+    return lights.position[k, 0] - y[0], lights.position[k, 1] - y[1], lights.position[k, 2] - y[2]
+
+
+@kernel
+def _dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
@@ -195,9 +218,15 @@ def _rest(pattern: float, receiver: float, limit: float) -> float:
 def _found(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Return the direction back along a ray and the point it found."""
     t = np.float64(paths.distance[ray])
-    o, d = paths.origin[ray], paths.direction[ray]
-    y = (o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2])
-    return (-np.float64(d[0]), -np.float64(d[1]), -np.float64(d[2])), y
+    dx, dy, dz = _row(paths.direction, ray)
+    ox, oy, oz = _row(paths.origin, ray)
+    return (-dx, -dy, -dz), (ox + t * dx, oy + t * dy, oz + t * dz)
+
+
+@kernel
+def _row(rows: Array, i: int) -> tuple[float, float, float]:
+    """Return a row of three as scalars: a view of it would count references, over which threads stall."""
+    return np.float64(rows[i, 0]), np.float64(rows[i, 1]), np.float64(rows[i, 2])
 
 
 @kernel(parallel=True)
@@ -272,7 +301,7 @@ def _scatter(surfaces: Surfaces, offset: float, word: Any, paths: Paths, ray: in
     if triangle == MISS:
         return
     material = surfaces.material_of_face[triangle]
-    rho, glossy = surfaces.diffuse[material], surfaces.specular[material]
+    rho, glossy = _row(surfaces.diffuse, material), _row(surfaces.specular, material)
     most, most_glossy = max(rho[0], rho[1], rho[2]), max(glossy[0], glossy[1], glossy[2])
     if most + most_glossy <= 0:
         return
@@ -281,8 +310,7 @@ def _scatter(surfaces: Surfaces, offset: float, word: Any, paths: Paths, ray: in
     back, y = _found(paths, ray)
     g = face_normal(surfaces, triangle, -back[0], -back[1], -back[2])
     n = shading_normal(surfaces, triangle, y, g)
-    cos_g = g[0] * back[0] + g[1] * back[1] + g[2] * back[2]
-    cos_n = n[0] * back[0] + n[1] * back[1] + n[2] * back[2]
+    cos_g, cos_n = _dot(g, back), _dot(n, back)
     if cos_g <= 0 or cos_n <= 0:
         return
     if _uniform(word ^ np.uint32(0x1B56C4E9)) < chance:
@@ -295,10 +323,8 @@ def _scatter(surfaces: Surfaces, offset: float, word: Any, paths: Paths, ray: in
         across, phi = math.sqrt(max(0.0, 1 - z * z)), 2 * np.pi * v
         mirror = (2 * cos_n * n[0] - back[0], 2 * cos_n * n[1] - back[1], 2 * cos_n * n[2] - back[2])
         w = around(mirror, across * math.cos(phi), across * math.sin(phi), z)
-        above = g[0] * w[0] + g[1] * w[1] + g[2] * w[2]
-        fraction = lobe_fraction(n[0] * w[0] + n[1] * w[1] + n[2] * w[2], exponent)
-        part, factor = glossy, above / (fraction * cos_g * (1 - chance))
-    if g[0] * w[0] + g[1] * w[1] + g[2] * w[2] <= 0:
+        part, factor = glossy, _dot(g, w) / (lobe_fraction(_dot(n, w), exponent) * cos_g * (1 - chance))
+    if _dot(g, w) <= 0:
         return
     paths.reach[ray] = np.inf
     for c in range(3):

@@ -115,6 +115,29 @@ def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: A
 
 
 @kernel
+def face_cross(surfaces: Surfaces, triangle: int) -> tuple[float, float, float]:
+    """Return the cross product of two edges of a triangle: along its normal, twice its area long.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    triangle : int
+        Which one.
+
+    Returns
+    -------
+    tuple of 3 floats
+        The vector, m^2.
+    """
+    v = surfaces.vertices
+    i, j, k = surfaces.faces[triangle, 0], surfaces.faces[triangle, 1], surfaces.faces[triangle, 2]
+    ax, ay, az = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
+    bx, by, bz = v[k, 0] - v[i, 0], v[k, 1] - v[i, 1], v[k, 2] - v[i, 2]
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@kernel
 def face_normal(surfaces: Surfaces, triangle: int, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
     """Return a triangle's unit normal on the side against a direction.
 
@@ -132,11 +155,7 @@ def face_normal(surfaces: Surfaces, triangle: int, dx: float, dy: float, dz: flo
     tuple of 3 floats
         Unit vector g with g.d <= 0.
     """
-    v = surfaces.vertices
-    i, j, k = surfaces.faces[triangle]
-    ax, ay, az = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
-    bx, by, bz = v[k, 0] - v[i, 0], v[k, 1] - v[i, 1], v[k, 2] - v[i, 2]
-    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    nx, ny, nz = face_cross(surfaces, triangle)
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     scale = (-1.0 if nx * dx + ny * dy + nz * dz > 0 else 1.0) / length
     return nx * scale, ny * scale, nz * scale
@@ -166,17 +185,17 @@ def shading_normal(surfaces: Surfaces, triangle: int, y: tuple[float, float, flo
     if len(surfaces.normals) == 0:
         return g
     v, n = surfaces.vertices, surfaces.normals
-    corner = surfaces.faces[triangle]
+    faces = surfaces.faces
     nx, ny, nz = 0.0, 0.0, 0.0
     for c in range(3):
-        i, j = corner[(c + 1) % 3], corner[(c + 2) % 3]
+        i, j, k = faces[triangle, (c + 1) % 3], faces[triangle, (c + 2) % 3], faces[triangle, c]
         ax, ay, az = v[i, 0] - y[0], v[i, 1] - y[1], v[i, 2] - y[2]
         bx, by, bz = v[j, 0] - y[0], v[j, 1] - y[1], v[j, 2] - y[2]
         # area of the part opposite to corner c, signed along g up to one sign for all three
         part = (ay * bz - az * by) * g[0] + (az * bx - ax * bz) * g[1] + (ax * by - ay * bx) * g[2]
-        nx += part * n[corner[c], 0]
-        ny += part * n[corner[c], 1]
-        nz += part * n[corner[c], 2]
+        nx += part * n[k, 0]
+        ny += part * n[k, 1]
+        nz += part * n[k, 2]
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     if length == 0:
         return g

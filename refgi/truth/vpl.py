@@ -157,8 +157,14 @@ def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tup
     """
     count = lights[1] - lights[0]
     for i in prange(receivers[1] - receivers[0]):
-        for k in range(count):
-            _aim(to, receivers[0] + i, senders, lights[0] + k, offset, rays, i * count + k)
+        _aim_all(to, receivers[0] + i, senders, lights, offset, rays, i * count)
+
+
+@kernel
+def _aim_all(to: Receivers, r: int, senders: Senders, lights: tuple[int, int], offset: float,
+             rays: tuple[Array, Array, Array, Array], ray: int) -> None:
+    for k in range(lights[0], lights[1]):
+        _aim(to, r, senders, k, offset, rays, ray + k - lights[0])
 
 
 @kernel

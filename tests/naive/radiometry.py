@@ -1,6 +1,7 @@
 """Slow literal twins of the shared radiometry: definitions by quadrature and by hand, no shortcuts."""
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -23,6 +24,7 @@ def solid_angle_of_rectangle(density, x0, x1, y0, y1, nodes=64):
     return float(density(u[:, None], v[None, :]) @ w @ w) * 0.25 * (x1 - x0) * (y1 - y0)
 
 
+@cache
 def lobe_fraction(theta, exponent, nodes=400):
     """Share of the integral of cos^P over the half space of the lobe that lies above a surface tilted by theta.
 

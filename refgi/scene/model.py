@@ -10,83 +10,49 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.scene.light import (
+    DIRECTIONAL,
+    POINT,
+    SPOT,
+    DirectionalLight,
+    Light,
+    LightTable,
+    PointLight,
+    SpotLight,
+    light_table,
+)
+from refgi.scene.material import UNPAINTED, Material, MaterialTable, material_table
+from refgi.scene.values import BLACK, LARGEST, Array, Rgb, Vector, degrees, is_direction, is_place
 
-Array = npt.NDArray[Any]
-Rgb = tuple[float, float, float]
-Vector = tuple[float, float, float]
-
-BLACK: Rgb = (0.0, 0.0, 0.0)
-BRIGHTEST = 1e20  # W/sr or W/m^2; falls off within float32
-LARGEST = 1e9  # m; squares and cubes of coordinates stay within float32
-
-
-def _is_vector(value: Any) -> bool:
-    try:
-        return len(value) == 3 and all(math.isfinite(c) for c in value)
-    except (TypeError, OverflowError):
-        return False
-
-
-def _is_place(value: Any) -> bool:
-    return _is_vector(value) and max(map(abs, value)) <= LARGEST
-
-
-def _is_direction(value: Any) -> bool:
-    return _is_vector(value) and 1e-100 < math.hypot(*value) < 1e100  # squares neither vanish nor overflow
-
-
-def _degrees(angle: float) -> float:
-    return round(math.degrees(angle), 9)
-
-
-def _expect_power(value: Rgb, key: str) -> None:
-    fits = _is_vector(value) and min(value) >= 0 and max(value) <= BRIGHTEST
-    expect(fits, f"light: {key}", f"three numbers from 0 to {BRIGHTEST:g}", value)
-
-
-@dataclasses.dataclass(frozen=True)
-class Material:
-    """How a surface reflects: a diffuse part, a Phong lobe, or clear glass.
-
-    `diffuse` and `specular` are reflectances (1), `exponent` is the Phong exponent of the lobe around the mirror
-    direction (normalised so that `specular` is its reflectance), `ior` the index of refraction of a dielectric (0:
-    opaque), `emission` the radiance the surface emits by itself (W/m^2/sr; seen by the camera, not a light source).
-    """
-
-    name: str = "default"
-    diffuse: Rgb = (0.5, 0.5, 0.5)
-    specular: Rgb = BLACK
-    exponent: float = 0.0
-    ior: float = 0.0
-    emission: Rgb = BLACK
-
-    def __post_init__(self) -> None:
-        for key in ("diffuse", "specular"):
-            value = getattr(self, key)
-            expect(_is_vector(value) and all(0 <= c <= 1 for c in value), f"material {self.name!r}: {key}",
-                   "three numbers from 0 to 1", value)
-        expect(_is_vector(self.emission) and min(self.emission) >= 0, f"material {self.name!r}: emission",
-               "three finite numbers >= 0", self.emission)
-        expect(math.isfinite(self.exponent) and self.exponent >= 0, f"material {self.name!r}: exponent",
-               "a finite number >= 0", self.exponent)
-        expect(self.ior == 0 or (math.isfinite(self.ior) and self.ior >= 1), f"material {self.name!r}: ior",
-               "0 (opaque) or a finite number >= 1", self.ior)
-
-    @property
-    def is_glossy(self) -> bool:
-        """Whether the material has a Phong lobe."""
-        return any(self.specular)
-
-    @property
-    def is_dielectric(self) -> bool:
-        """Whether the material is clear glass."""
-        return self.ior > 0
+__all__ = [
+    "BLACK",
+    "DIRECTIONAL",
+    "LARGEST",
+    "POINT",
+    "SPOT",
+    "Array",
+    "Camera",
+    "DirectionalLight",
+    "Geometry",
+    "Light",
+    "LightTable",
+    "Material",
+    "MaterialTable",
+    "Mesh",
+    "PointLight",
+    "Rgb",
+    "Scene",
+    "SpotLight",
+    "Vector",
+    "light_table",
+    "material_table",
+    "merge",
+]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -96,7 +62,7 @@ class Mesh:
     vertices: Array
     faces: Array
     normals: Array | None = None
-    material: Material = Material()
+    material: Material = UNPAINTED
     name: str = "mesh"
 
     def expect_sound(self, where: str) -> None:
@@ -160,70 +126,17 @@ class Camera:
 
     def __post_init__(self) -> None:
         for key in ("eye", "target"):
-            expect(_is_place(getattr(self, key)), f"camera: {key}", f"three finite numbers up to {LARGEST:g} m",
+            expect(is_place(getattr(self, key)), f"camera: {key}", f"three finite numbers up to {LARGEST:g} m",
                    getattr(self, key))
-        expect(_is_direction(self.up), "camera: up", "a finite vector, not zero", self.up)
+        expect(is_direction(self.up), "camera: up", "a finite vector, not zero", self.up)
         view = np.subtract(self.target, self.eye)
         expect(bool(np.linalg.norm(view) > 1e-9), "camera: target", "a point away from eye", self.target)
         cross = np.cross(view / np.linalg.norm(view), np.asarray(self.up) / np.linalg.norm(self.up))
         expect(bool(np.linalg.norm(cross) > 1e-9), "camera: up", "a direction not along the view", self.up)
-        expect(0 < self.vfov < math.pi, "camera: vfov_deg", "more than 0 and less than 180", _degrees(self.vfov))
+        expect(0 < self.vfov < math.pi, "camera: vfov_deg", "more than 0 and less than 180", degrees(self.vfov))
         for key in ("width", "height"):
             size = getattr(self, key)
             expect(isinstance(size, int) and 1 <= size <= 65536, f"camera: {key}", "1 to 65536 pixels", size)
-
-
-@dataclasses.dataclass(frozen=True)
-class SpotLight:
-    """A point that shines into a cone.
-
-    On-axis radiant intensity `intensity` (W/sr), half-angles rad. With t = clamp((cos a - cos outer) / (cos inner -
-    cos outer), 0, 1) the intensity at angle a off the axis is I0 t t (3 - 2t), and nothing outside `outer`.
-    """
-
-    position: Vector
-    direction: Vector
-    inner_half_angle: float
-    outer_half_angle: float
-    intensity: Rgb
-
-    def __post_init__(self) -> None:
-        expect(_is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
-        expect(_is_direction(self.direction), "light: direction", "a finite vector, not zero",
-               self.direction)
-        expect(0 < self.outer_half_angle < math.pi / 2, "light: outer_half_angle_deg",
-               "more than 0 and less than 90", _degrees(self.outer_half_angle))
-        expect(0 <= self.inner_half_angle <= self.outer_half_angle, "light: inner_half_angle_deg",
-               "0 to outer_half_angle_deg", _degrees(self.inner_half_angle))
-        _expect_power(self.intensity, "intensity_w_per_sr")
-
-
-@dataclasses.dataclass(frozen=True)
-class PointLight:
-    """A point that shines equally in all directions with radiant intensity `intensity`, W/sr."""
-
-    position: Vector
-    intensity: Rgb
-
-    def __post_init__(self) -> None:
-        expect(_is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
-        _expect_power(self.intensity, "intensity_w_per_sr")
-
-
-@dataclasses.dataclass(frozen=True)
-class DirectionalLight:
-    """Parallel light that travels along `direction`, with `irradiance` on a perpendicular surface, W/m^2."""
-
-    direction: Vector
-    irradiance: Rgb
-
-    def __post_init__(self) -> None:
-        expect(_is_direction(self.direction), "light: direction", "a finite vector, not zero",
-               self.direction)
-        _expect_power(self.irradiance, "irradiance_w_per_m2")
-
-
-Light = SpotLight | PointLight | DirectionalLight
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -253,87 +166,6 @@ class Scene:
     def face_count(self) -> int:
         """Number of triangles."""
         return len(self.geometry.faces)
-
-
-class MaterialTable(NamedTuple):
-    """The materials as arrays for kernels: one row a material."""
-
-    diffuse: Array  # (m, 3) reflectance of the diffuse part
-    specular: Array  # (m, 3) reflectance of the Phong lobe
-    exponent: Array  # (m,) Phong exponent
-    ior: Array  # (m,) index of refraction, 0 where opaque
-    emission: Array  # (m, 3) radiance, W/m^2/sr
-
-
-class LightTable(NamedTuple):
-    """The lights as arrays for kernels: one row a light."""
-
-    kind: Array  # (k,) int32: 0 spot, 1 point, 2 directional
-    position: Array  # (k, 3) m; zero for a directional light
-    direction: Array  # (k, 3) unit vector the light travels along; zero for a point light
-    cos_inner: Array  # (k,) cosine of the inner half-angle
-    cos_outer: Array  # (k,) cosine of the outer half-angle
-    intensity: Array  # (k, 3) W/sr on the axis; perpendicular irradiance W/m^2 for a directional light
-
-
-SPOT, POINT, DIRECTIONAL = 0, 1, 2
-
-
-def material_table(materials: Sequence[Material], dtype: npt.DTypeLike = np.float64) -> MaterialTable:
-    """Gather materials into arrays for kernels.
-
-    Parameters
-    ----------
-    materials : sequence of Material
-        The scene's materials.
-    dtype : dtype
-        Element type of the arrays.
-
-    Returns
-    -------
-    MaterialTable
-        One row a material.
-    """
-    def column(key: str, width: int) -> Array:
-        values = np.array([getattr(m, key) for m in materials], dtype)
-        return values.reshape((-1, width) if width > 1 else -1)
-
-    return MaterialTable(column("diffuse", 3), column("specular", 3), column("exponent", 1), column("ior", 1),
-                         column("emission", 3))
-
-
-def light_table(lights: Sequence[Light], dtype: npt.DTypeLike = np.float64) -> LightTable:
-    """Gather lights into arrays for kernels.
-
-    Parameters
-    ----------
-    lights : sequence of Light
-        The scene's lights.
-    dtype : dtype
-        Element type of the arrays.
-
-    Returns
-    -------
-    LightTable
-        One row a light.
-    """
-    count = len(lights)
-    table = LightTable(np.zeros(count, np.int32), np.zeros((count, 3), dtype), np.zeros((count, 3), dtype),
-                       np.zeros(count, dtype), np.zeros(count, dtype), np.zeros((count, 3), dtype))
-    for row, light in enumerate(lights):
-        if isinstance(light, DirectionalLight):
-            table.kind[row] = DIRECTIONAL
-            table.intensity[row] = light.irradiance
-        else:
-            table.kind[row] = SPOT if isinstance(light, SpotLight) else POINT
-            table.position[row] = light.position
-            table.intensity[row] = light.intensity
-        if not isinstance(light, PointLight):
-            table.direction[row] = np.asarray(light.direction) / np.linalg.norm(light.direction)
-        if isinstance(light, SpotLight):
-            table.cos_inner[row] = math.cos(light.inner_half_angle)
-            table.cos_outer[row] = math.cos(light.outer_half_angle)
-    return table
 
 
 def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tuple[Material, ...]]:

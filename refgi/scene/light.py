@@ -1,0 +1,117 @@
+"""Lights, and the table of them that kernels read."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.scene.values import BRIGHTEST, LARGEST, Array, Rgb, Vector, degrees, is_direction, is_place, is_vector
+
+SPOT, POINT, DIRECTIONAL = 0, 1, 2  # kinds of light in a LightTable
+
+
+@dataclasses.dataclass(frozen=True)
+class SpotLight:
+    """A point that shines into a cone.
+
+    On-axis radiant intensity `intensity` (W/sr), half-angles rad. With t = clamp((cos a - cos outer) / (cos inner -
+    cos outer), 0, 1) the intensity at angle a off the axis is I0 t t (3 - 2t), and nothing outside `outer`.
+    """
+
+    position: Vector
+    direction: Vector
+    inner_half_angle: float
+    outer_half_angle: float
+    intensity: Rgb
+
+    def __post_init__(self) -> None:
+        expect(is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
+        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero",
+               self.direction)
+        expect(0 < self.outer_half_angle < math.pi / 2, "light: outer_half_angle_deg",
+               "more than 0 and less than 90", degrees(self.outer_half_angle))
+        expect(0 <= self.inner_half_angle <= self.outer_half_angle, "light: inner_half_angle_deg",
+               "0 to outer_half_angle_deg", degrees(self.inner_half_angle))
+        _expect_power(self.intensity, "intensity_w_per_sr")
+
+
+@dataclasses.dataclass(frozen=True)
+class PointLight:
+    """A point that shines equally in all directions with radiant intensity `intensity`, W/sr."""
+
+    position: Vector
+    intensity: Rgb
+
+    def __post_init__(self) -> None:
+        expect(is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
+        _expect_power(self.intensity, "intensity_w_per_sr")
+
+
+@dataclasses.dataclass(frozen=True)
+class DirectionalLight:
+    """Parallel light that travels along `direction`, with `irradiance` on a perpendicular surface, W/m^2."""
+
+    direction: Vector
+    irradiance: Rgb
+
+    def __post_init__(self) -> None:
+        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero",
+               self.direction)
+        _expect_power(self.irradiance, "irradiance_w_per_m2")
+
+
+Light = SpotLight | PointLight | DirectionalLight
+
+
+class LightTable(NamedTuple):
+    """The lights as arrays for kernels: one row a light."""
+
+    kind: Array  # (k,) int32: 0 spot, 1 point, 2 directional
+    position: Array  # (k, 3) m; zero for a directional light
+    direction: Array  # (k, 3) unit vector the light travels along; zero for a point light
+    cos_inner: Array  # (k,) cosine of the inner half-angle
+    cos_outer: Array  # (k,) cosine of the outer half-angle
+    intensity: Array  # (k, 3) W/sr on the axis; perpendicular irradiance W/m^2 for a directional light
+
+
+def light_table(lights: Sequence[Light], dtype: npt.DTypeLike = np.float64) -> LightTable:
+    """Gather lights into arrays for kernels.
+
+    Parameters
+    ----------
+    lights : sequence of Light
+        The scene's lights.
+    dtype : dtype
+        Element type of the arrays.
+
+    Returns
+    -------
+    LightTable
+        One row a light.
+    """
+    count = len(lights)
+    table = LightTable(np.zeros(count, np.int32), np.zeros((count, 3), dtype), np.zeros((count, 3), dtype),
+                       np.zeros(count, dtype), np.zeros(count, dtype), np.zeros((count, 3), dtype))
+    for row, light in enumerate(lights):
+        if isinstance(light, DirectionalLight):
+            table.kind[row] = DIRECTIONAL
+            table.intensity[row] = light.irradiance
+        else:
+            table.kind[row] = SPOT if isinstance(light, SpotLight) else POINT
+            table.position[row] = light.position
+            table.intensity[row] = light.intensity
+        if not isinstance(light, PointLight):
+            table.direction[row] = np.asarray(light.direction) / np.linalg.norm(light.direction)
+        if isinstance(light, SpotLight):
+            table.cos_inner[row] = math.cos(light.inner_half_angle)
+            table.cos_outer[row] = math.cos(light.outer_half_angle)
+    return table
+
+
+def _expect_power(value: Rgb, key: str) -> None:
+    fits = is_vector(value) and min(value) >= 0 and max(value) <= BRIGHTEST
+    expect(fits, f"light: {key}", f"three numbers from 0 to {BRIGHTEST:g}", value)

@@ -1,0 +1,87 @@
+"""Materials, and the table of them that kernels read."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.scene.values import BLACK, Array, Rgb, is_vector
+
+
+@dataclasses.dataclass(frozen=True)
+class Material:
+    """How a surface reflects: a diffuse part, a Phong lobe, or clear glass.
+
+    `diffuse` and `specular` are reflectances (1), `exponent` is the Phong exponent of the lobe around the mirror
+    direction (normalised so that `specular` is its reflectance), `ior` the index of refraction of a dielectric (0:
+    opaque), `emission` the radiance the surface emits by itself (W/m^2/sr; seen by the camera, not a light source).
+    """
+
+    name: str = "default"
+    diffuse: Rgb = (0.5, 0.5, 0.5)
+    specular: Rgb = BLACK
+    exponent: float = 0.0
+    ior: float = 0.0
+    emission: Rgb = BLACK
+
+    def __post_init__(self) -> None:
+        for key in ("diffuse", "specular"):
+            value = getattr(self, key)
+            expect(is_vector(value) and all(0 <= c <= 1 for c in value), f"material {self.name!r}: {key}",
+                   "three numbers from 0 to 1", value)
+        expect(is_vector(self.emission) and min(self.emission) >= 0, f"material {self.name!r}: emission",
+               "three finite numbers >= 0", self.emission)
+        expect(math.isfinite(self.exponent) and self.exponent >= 0, f"material {self.name!r}: exponent",
+               "a finite number >= 0", self.exponent)
+        expect(self.ior == 0 or (math.isfinite(self.ior) and self.ior >= 1), f"material {self.name!r}: ior",
+               "0 (opaque) or a finite number >= 1", self.ior)
+
+    @property
+    def is_glossy(self) -> bool:
+        """Whether the material has a Phong lobe."""
+        return any(self.specular)
+
+    @property
+    def is_dielectric(self) -> bool:
+        """Whether the material is clear glass."""
+        return self.ior > 0
+
+
+UNPAINTED = Material()  # of a mesh that names none
+
+
+class MaterialTable(NamedTuple):
+    """The materials as arrays for kernels: one row a material."""
+
+    diffuse: Array  # (m, 3) reflectance of the diffuse part
+    specular: Array  # (m, 3) reflectance of the Phong lobe
+    exponent: Array  # (m,) Phong exponent
+    ior: Array  # (m,) index of refraction, 0 where opaque
+    emission: Array  # (m, 3) radiance, W/m^2/sr
+
+
+def material_table(materials: Sequence[Material], dtype: npt.DTypeLike = np.float64) -> MaterialTable:
+    """Gather materials into arrays for kernels.
+
+    Parameters
+    ----------
+    materials : sequence of Material
+        The scene's materials.
+    dtype : dtype
+        Element type of the arrays.
+
+    Returns
+    -------
+    MaterialTable
+        One row a material.
+    """
+    def column(key: str, width: int) -> Array:
+        values = np.array([getattr(m, key) for m in materials], dtype)
+        return values.reshape((-1, width) if width > 1 else -1)
+
+    return MaterialTable(column("diffuse", 3), column("specular", 3), column("exponent", 1), column("ior", 1),
+                         column("emission", 3))

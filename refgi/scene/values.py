@@ -1,0 +1,81 @@
+"""The plain values a scene is made of: colours, vectors, arrays, and what makes one usable."""
+
+import math
+from typing import Any
+
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+Rgb = tuple[float, float, float]
+Vector = tuple[float, float, float]
+
+BLACK: Rgb = (0.0, 0.0, 0.0)
+BRIGHTEST = 1e20  # W/sr or W/m^2; falls off within float32
+LARGEST = 1e9  # m; squares and cubes of coordinates stay within float32
+
+
+def is_vector(value: Any) -> bool:
+    """Return whether a value is three finite numbers.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+
+    Returns
+    -------
+    bool
+        False for what is no sequence of numbers at all.
+    """
+    try:
+        return len(value) == 3 and all(math.isfinite(c) for c in value)
+    except (TypeError, OverflowError):
+        return False
+
+
+def is_place(value: Any) -> bool:
+    """Return whether a value is three coordinates that the arithmetic holds.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+
+    Returns
+    -------
+    bool
+        False for what is no sequence of numbers at all.
+    """
+    return is_vector(value) and max(map(abs, value)) <= LARGEST
+
+
+def is_direction(value: Any) -> bool:
+    """Return whether a value is a vector whose length neither vanishes nor overflows.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+
+    Returns
+    -------
+    bool
+        False for what is no sequence of numbers at all.
+    """
+    return is_vector(value) and 1e-100 < math.hypot(*value) < 1e100  # squares neither vanish nor overflow
+
+
+def degrees(angle: float) -> float:
+    """Return an angle in degrees, as it was written in a file.
+
+    Parameters
+    ----------
+    angle : float
+        In rad.
+
+    Returns
+    -------
+    float
+        Rounded to 1e-9.
+    """
+    return round(math.degrees(angle), 9)

@@ -147,46 +147,40 @@ def pick(points: LitPoints, to: Receivers, span: tuple[int, int], picks: int, se
 @kernel
 def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Array, how: tuple[int, int, bool, Any],
               sums: tuple[Array, Array], first: int, rays: tuple[Array, Array, Array, Array]) -> None:
-    for i in range(count):
-        _pick(points, to, low + i, tile, i, how, sums, first, rays)
-
-
-@kernel
-def _pick(points: LitPoints, to: Receivers, r: int, tile: Array, i: int, how: tuple[int, int, bool, Any],
-          sums: tuple[Array, Array], first: int, rays: tuple[Array, Array, Array, Array]) -> None:
-    """Let one receiver pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
+    """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
     origins, directions, reach, worth = rays
     picks, seed, glossy, offset = how
     blocks, parts = sums
     real = np.float32
-    total = real(0)
-    for b in range(blocks.shape[0]):
-        total += blocks[b, i]
-    shift = real(hash_bits(np.uint32(to.pixel[r]) ^ np.uint32(seed)) >> np.uint32(8)) * real(2.0**-24)
-    share = total / real(picks)
-    b, before = 0, real(0)  # block, and the sum of those before it
-    for s in range(picks):
-        ray = (r - first) * picks + s
-        reach[ray] = real(0)
-        target = (real(s) + shift) * share
-        while b < blocks.shape[0] - 1 and before + blocks[b, i] <= target:
-            before += blocks[b, i]
-            b += 1
-        rest = target - before
-        p, end = b * PARTS, b * PARTS + PARTS - 1
-        while p < end and parts[p, i] <= rest:
-            rest -= parts[p, i]
-            p += 1
-        j, end = p * PART, p * PART + PART - 1
-        term = _term(points, j, tile, i, glossy)
-        while j < end and term <= rest:
-            rest -= term
-            j += 1
+    for i in range(count):
+        total = real(0)
+        for b in range(blocks.shape[0]):
+            total += blocks[b, i]
+        shift = real(hash_bits(np.uint32(to.pixel[low + i]) ^ np.uint32(seed)) >> np.uint32(8)) * real(2.0**-24)
+        share = total / real(picks)
+        b, before = 0, real(0)  # block, and the sum of those before it
+        for s in range(picks):
+            ray = (low + i - first) * picks + s
+            reach[ray] = real(0)
+            target = (real(s) + shift) * share
+            while b < blocks.shape[0] - 1 and before + blocks[b, i] <= target:
+                before += blocks[b, i]
+                b += 1
+            rest = target - before
+            p, end = b * PARTS, b * PARTS + PARTS - 1
+            while p < end and parts[p, i] <= rest:
+                rest -= parts[p, i]
+                p += 1
+            j, end = p * PART, p * PART + PART - 1
             term = _term(points, j, tile, i, glossy)
-        if term > real(0):
-            reach[ray] = _aim(points, j, to, r, offset, origins, directions, ray)
-            for c in range(3):
-                worth[ray, c] = share * points.colour[c, j]
+            while j < end and term <= rest:
+                rest -= term
+                j += 1
+                term = _term(points, j, tile, i, glossy)
+            if term > real(0):
+                reach[ray] = _aim(points, j, to, low + i, offset, origins, directions, ray)
+                for c in range(3):
+                    worth[ray, c] = share * points.colour[c, j]
 
 
 @kernel(parallel=True)

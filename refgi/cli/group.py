@@ -1,5 +1,6 @@
 """The command's frame: verbs loaded when used, errors and warnings as one line each, exit codes."""
 
+import difflib
 import importlib
 import os
 import sys
@@ -45,6 +46,17 @@ class VerbGroup(click.Group):
         command: click.Command = importlib.import_module(f"refgi.cli.{cmd_name}").command
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the verb, and the nearest one for the message where there is none of that name."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            near = difflib.get_close_matches(args[0], VERBS, n=1)
+            hint = f"Did you mean {near[0]!r}?" if near else f"There are {', '.join(VERBS)}."
+            raise click.UsageError(f"{error.format_message()} {hint}", ctx) from error
+
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any
     ) -> NoReturn:
@@ -70,9 +82,14 @@ class VerbGroup(click.Group):
 def _explained(error: BaseException, session: Session) -> int:
     """Say what went wrong in one line and return the exit code."""
     if isinstance(error, SystemExit):
+        if isinstance(error.__context__, BrokenPipeError):
+            return _reader_left()
         return error.code if isinstance(error.code, int) else FAILED
     if session.debug:
         traceback.print_exception(error)
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        click.echo(error.format_message(), file=sys.stderr)
+        return USAGE
     if isinstance(error, click.UsageError):
         asked = error.ctx.command_path if error.ctx else "refgi"
         say(f"{_one_line(error.format_message())} (see {asked} --help)")

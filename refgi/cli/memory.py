@@ -6,12 +6,12 @@ from pathlib import Path
 from refgi.errors import InputError
 from refgi.scene import PointLight, Scene
 
-# Bytes, from peaks measured on the Cornell box and the atrium and rounded up; the truth keeps moments in float64.
-PIXEL_FLOATS = 48  # G-buffer, visibility, direct and indirect light, radiance, and their temporaries
-TRUTH_PIXEL_BYTES = 500  # receivers, moments, results
-COMPARED_PIXEL_BYTES = 260  # a method's pictures, maps and figures
-TEXEL_FLOATS = 24
-FACE_BYTES = 700  # vertices, faces, Embree's copy and tree
+# From peaks measured at 1024^2 and 2048^2, rounded up by a third; the truth keeps moments in float64.
+PIXEL_FLOATS = 32  # G-buffer, visibility, direct and indirect light, radiance, and their temporaries
+TRUTH_PIXEL_BYTES = 250  # receivers, moments, results
+COMPARED_PIXEL_BYTES = 90  # a method's or reference's pictures, maps and figures
+TEXEL_FLOATS = 36
+FACE_BYTES = 400  # vertices, faces, Embree's tree
 
 
 def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4, rsm_resolution: int = 512,

@@ -54,6 +54,6 @@ def _lines() -> Tell:
         now = time.monotonic()
         if now - last >= SECONDS_BETWEEN_LINES:
             last = now
-            say(f"{what} {done:.0%}")
+            say(f"{what} {f'{done:.0%}' if done < 1 else 'done'}")
 
     return tell

@@ -49,7 +49,7 @@ def read_settings(wanted: type, pairs: Iterable[str], seed: int | None = None, o
             errors.append(problem)
     made, refused = _make(wanted, values)
     if errors + refused:
-        raise InputError("; ".join(errors + refused))
+        raise InputError(f"{'; '.join(errors + refused)} (settings: {', '.join(known)})")
     return made
 
 
@@ -91,7 +91,7 @@ def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[st
 
 def _unknown(key: str, known: list[str], owner: str) -> str:
     of = f" of {owner}" if owner else ""
-    return f"{key!r} is not a setting{of} ({', '.join(known)})" + did_you_mean(key, known)
+    return f"{key!r} is not a setting{of}" + did_you_mean(key, known)
 
 
 def _read(values: dict[str, Any], key: str, text: str, hint: Any) -> str | None:

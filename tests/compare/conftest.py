@@ -20,6 +20,10 @@ class Knobs:
 
 @pytest.fixture
 def scene():
+    return make_scene()
+
+
+def make_scene():
     triangle = Geometry(np.eye(3), np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32))
     return Scene("made_by_hand", triangle, (Material(),), Camera((0.0, 0.0, 5.0), (0.0, 0.0, 0.0)),
                  (SpotLight((0.0, 2.0, 0.0), (0.0, -1.0, 0.0), 0.3, 0.5, (9.0, 9.0, 9.0)),), "A <test> & nothing else.")

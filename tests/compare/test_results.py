@@ -2,7 +2,13 @@
 
 import json
 import math
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
 
+import imageio.v3
 import numpy as np
 import pytest
 from pydantic import BaseModel, ConfigDict
@@ -172,3 +178,49 @@ def test_the_scale_holds_95_percent_and_is_round():
     assert maps.error_scale([errors * 0.6], np.ones((20, 50), bool)).high == 2.0
     assert maps.error_scale([0 * errors], np.ones((20, 50), bool)).high == 1.0
     assert maps.error_scale([np.full((2, 2), np.nan)], np.ones((2, 2), bool)).high == 1.0
+
+
+WRITER = """
+import importlib.util, sys
+from pathlib import Path
+spec = importlib.util.spec_from_file_location("by_hand", sys.argv[1])
+by_hand = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(by_hand)
+from refgi.compare.report import write_report
+from refgi.compare.results import write_results
+comparison = by_hand.make_comparison(by_hand.make_scene())
+print("ready", flush=True)
+while True:
+    write_results(comparison, Path(sys.argv[2]))
+    write_report(comparison, Path(sys.argv[2]))
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGKILL is POSIX")
+def test_a_kill_leaves_whole_files_or_none(tmp_path, evidence):
+    """Killed at eight moments while it writes a comparison over and over: each file by its own name is whole."""
+    conftest = Path(__file__).with_name("conftest.py")
+    whole = 0
+    for moment in range(8):
+        writer = subprocess.Popen([sys.executable, "-c", WRITER, str(conftest), str(tmp_path)], stdout=subprocess.PIPE)
+        assert writer.stdout.readline() == b"ready\n"
+        time.sleep(0.1 + 0.23 * moment)
+        writer.kill()
+        writer.wait()
+        writer.stdout.close()
+        for path in tmp_path.glob("[!.]*"):
+            check_whole(path)
+            whole += 1
+    assert whole
+    evidence(f"{whole} of {whole} files whole after 8 kills")
+
+
+def check_whole(path):
+    if path.suffix == ".exr":
+        read_exr(path)
+    elif path.suffix == ".png":
+        imageio.v3.imread(path)
+    elif path.suffix == ".json":
+        validated(json.loads(path.read_text()))
+    else:
+        assert path.read_text("utf-8").endswith("</html>")

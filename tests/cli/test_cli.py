@@ -1,0 +1,232 @@
+"""The command as a whole: verbs, exit codes, what goes to stdout and what to stderr."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import refgi
+from refgi.cli.group import VERBS, VerbGroup
+from refgi.image import read_exr
+
+TINY = ["--size", "12x10", "--rsm-resolution", "16"]
+HELP_SECONDS = 0.3  # the aim; the test allows a busy machine three times as much
+
+
+def run(*arguments):
+    return CliRunner().invoke(VerbGroup.refgi(), [str(a) for a in arguments])
+
+
+def refused(result, *words):
+    """Exit code 2 and one line on stderr with these words, nothing on stdout."""
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    assert result.stderr.startswith("refgi: ")
+    assert result.stderr.count("\n") == 1
+    for word in words:
+        assert word in result.stderr
+    return True
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["--version"], *([verb, "--help"] for verb in VERBS)])
+def test_help_loads_neither_numpy_nor_numba(arguments, evidence):
+    code = ("import sys; from refgi.cli import main; sys.argv = ['refgi', *sys.argv[1:]]\n"
+            "try: main()\n"
+            "finally: print([m for m in ('numpy', 'numba', 'rich', 'pydantic', 'jinja2') if m in sys.modules],"
+            " file=sys.stderr)")
+    seconds = []
+    for _ in range(3):
+        started = time.perf_counter()
+        done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
+        seconds.append(time.perf_counter() - started)
+        assert done.returncode == 0
+        assert done.stderr == "[]\n"
+        assert done.stdout
+    assert min(seconds) < 3 * HELP_SECONDS
+    evidence(f"refgi {' '.join(arguments)}: {min(seconds):.2f} s")
+
+
+def test_every_verb_has_a_line_of_help_that_is_not_cut():
+    result = run("--help")
+    assert result.exit_code == 0
+    for verb in VERBS:
+        assert f"  {verb} " in result.stdout
+    assert "..." not in result.stdout.partition("Commands:")[2]
+
+
+def test_version_and_module():
+    assert run("-V").stdout == f"refgi {refgi.__version__}\n"
+    done = subprocess.run([sys.executable, "-m", "refgi", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == f"refgi {refgi.__version__}\n"
+
+
+def test_without_a_verb_the_help_goes_to_stderr():
+    result = run()
+    assert result.exit_code == 2
+    assert "Commands:" in result.stderr
+    assert result.stdout == ""
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["rendr"], ["'rendr'", "Did you mean 'render'"]),
+    (["--nonsense"], ["--nonsense"]),
+    (["render"], ["SCENE", "render --help"]),
+    (["render", "cornell_box"], ["--out"]),
+    (["render", "cornell_box", "--out", "a.exr", "--siz", "3"], ["--siz", "--size"]),
+])
+def test_usage_errors_are_one_line(arguments, words):
+    assert refused(run(*arguments), *words)
+
+
+def test_scenes_as_text_and_as_json():
+    text = run("scenes")
+    assert text.exit_code == 0
+    assert "cornell_box" in text.stdout
+    listed = json.loads(run("scenes", "--json").stdout)
+    assert listed["scenes"]["cornell_box"]["faces"] == 30
+    assert set(listed["scenes"]) >= {"atrium", "ring", "stage"}
+
+
+def test_info_tells_versions_cache_methods_and_the_way_to_embree():
+    told = json.loads(run("info", "--json").stdout)
+    assert told["versions"]["refgi"] == refgi.__version__
+    assert told["versions"]["numpy"] == np.__version__
+    assert told["embree"] in ("by address", "embreex's run")
+    assert told["cache"]["bytes"] >= 0
+    assert told["threads"] >= 1
+    assert set(told["methods"]) >= {"sii", "truth"}
+    text = run("info").stdout
+    assert refgi.__version__ in text
+    assert "MiB" in text
+
+
+def test_an_unexpected_error_is_one_line_and_debug_shows_the_traceback(monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError("division\nby zero")
+
+    monkeypatch.setattr("refgi.scene.builtin_scenes", broken)
+    plain, debug = run("scenes"), run("scenes", "--debug")
+    assert plain.exit_code == debug.exit_code == 1
+    assert plain.stderr == ("refgi: unexpected ZeroDivisionError: division by zero"
+                            " (a fault of refgi; --debug shows where)\n")
+    assert "Traceback" in debug.stderr
+    assert plain.stdout == debug.stdout == ""
+
+
+@pytest.mark.parametrize(("error", "code", "line"), [
+    (KeyboardInterrupt, 130, "interrupted"), (MemoryError, 2, "out of memory: try a smaller --size"),
+    (refgi.errors.InputError("key: expected a, got b"), 2, "key: expected a, got b"),
+])
+def test_what_stops_a_run_decides_the_exit_code(error, code, line, monkeypatch):
+    def stop(*_, **__):
+        raise error
+
+    monkeypatch.setattr("refgi.scene.builtin_scenes", stop)
+    result = run("scenes")
+    assert result.exit_code == code
+    assert result.stderr.strip().endswith(line)
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGINT of a child is POSIX")
+def test_ctrl_c_leaves_with_130_and_no_file(tmp_path):
+    child = subprocess.Popen(
+        [sys.executable, "-m", "refgi", "render", "cornell_box", "--method", "truth", "--size", "64", "--set",
+         "samples=100000000", "--out", str(tmp_path / "a.exr")], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True)
+    child.stderr.readline()  # the first line of progress: it is computing
+    child.send_signal(signal.SIGINT)
+    out, err = child.communicate(timeout=120)
+    assert child.returncode == 130
+    assert out == ""
+    assert err.strip().endswith("refgi: interrupted")
+    assert "Traceback" not in err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX pipes")
+def test_a_reader_that_leaves_is_no_error():
+    child = subprocess.Popen([sys.executable, "-m", "refgi", "scenes"], stdout=subprocess.PIPE,
+                             stderr=subprocess.PIPE)
+    child.stdout.close()
+    err = child.stderr.read()
+    child.stderr.close()
+    assert child.wait(timeout=60) == 0
+    assert err == b""
+
+
+def test_explain_shows_the_four_rows_of_table_1(evidence):
+    """SII Table 1: what stays the same is reused."""
+    told = json.loads(run("explain", "cornell_box", *TINY, "--set", "lights=16", "--json").stdout)
+    rows = told["animation"]
+    assert set(rows["light and camera still"].values()) <= {"reused", "runs"}
+    assert rows["light and camera still"]["splat.irradiance"] == "reused"
+    assert rows["camera moves"]["rsm.reflective_shadow_map"] == "reused"
+    assert rows["camera moves"]["splat.irradiance"] == "runs"
+    assert rows["light moves"]["rsm.gbuffer"] == "reused"
+    assert rows["light moves"]["rsm.reflective_shadow_map"] == "runs"
+    assert {rows["light and camera move"][stage] for stage in ("rsm.gbuffer", "rsm.reflective_shadow_map")} == {"runs"}
+    evidence("; ".join(f"{row}: {sum(v == 'reused' for v in stages.values())} stages reused"
+                       for row, stages in rows.items()))
+
+
+def test_explain_says_what_is_skipped_and_why():
+    told = json.loads(run("explain", "cornell_box", *TINY, "--set", "lights=16", "--json").stdout)
+    skipped = [line for line in told["stages"] if line["skipped"]]
+    assert skipped
+    assert all(line["reason"] for line in skipped)
+    text = run("explain", "cornell_box", *TINY, "--set", "lights=16").stdout
+    assert skipped[0]["reason"] in text
+    assert "SII Table 1" in text
+
+
+def test_compare_writes_everything_and_prints_a_table(tmp_path):
+    result = run("compare", "cornell_box", *TINY, "--methods", "sii", "--set", "sii.lights=16", "--set",
+                 "truth.samples=24", "--out", tmp_path / "new" / "out")
+    assert result.exit_code == 0, result.stderr
+    folder = tmp_path / "new" / "out"
+    assert {"index.html", "results.json", "sii.exr", "sii.png", "sii_error.png", "truth.exr"} <= {
+        path.name for path in folder.iterdir()}
+    content = json.loads((folder / "results.json").read_text())
+    assert content["methods"]["sii"]["settings"]["lights"] == 16
+    assert content["references"]["truth"]["settings"]["samples"] == 24
+    assert content["size"] == [12, 10]
+    assert "truth without visibility" in result.stdout
+    assert read_exr(folder / "sii.exr")[0]["R"].shape == (10, 12)
+
+
+def test_compare_as_json_prints_what_results_json_holds():
+    result = run("compare", "cornell_box", *TINY, "--methods", "sii", "--set", "sii.lights=16", "--set",
+                 "truth.samples=24", "--json")
+    content = json.loads(result.stdout)
+    assert content["schema"] == 1
+    assert content["sound"] is True
+    assert content["out"] is None
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--methods", "sii,nothing"], ["nothing"]), (["--methods", "truth"], ["--methods"]),
+    (["--methods", "sii", "--set", "lights=3"], ["METHOD.key=value"]),
+    (["--methods", "sii", "--set", "sij.lights=3", "--set", "vpl.x=1"], ["'sij'", "did you mean 'sii'", "'vpl'"]),
+    (["--methods", "sii", "--set", "truth.samples=0"], ["samples"]),
+])
+def test_compare_refuses_what_it_cannot_do(arguments, words):
+    assert refused(run("compare", "cornell_box", *TINY, *arguments), *words)
+
+
+def test_compare_fails_with_1_when_a_method_fails(monkeypatch):
+    from refgi.compare import comparison
+
+    def fail(*_):
+        raise refgi.errors.InputError("lobes: expected none, got some")
+
+    monkeypatch.setattr(comparison._Runner, "method", fail)
+    result = run("compare", "cornell_box", *TINY, "--methods", "sii", "--set", "truth.samples=24")
+    assert result.exit_code == 1
+    assert "refgi: sii gave no picture: lobes" in result.stderr

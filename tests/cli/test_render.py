@@ -1,0 +1,216 @@
+"""`refgi render`: what it writes, what it refuses before computing, what it says aloud."""
+
+import json
+
+import imageio.v3
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from refgi.cli import memory
+from refgi.cli.group import VerbGroup
+from refgi.image import read_exr
+from refgi.methods import Picture, render
+from refgi.scene import Camera, PointLight, SpotLight, load_scene
+from refgi.splat import SiiSettings
+
+TINY = ["--size", "12x10", "--rsm-resolution", "16", "--set", "lights=16"]
+
+
+def run(*arguments):
+    return CliRunner().invoke(VerbGroup.refgi(), ["render", *(str(a) for a in arguments)])
+
+
+def refused(result, *words):
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    assert result.stderr.count("\n") == 1
+    for word in words:
+        assert word in result.stderr
+    return True
+
+
+@pytest.fixture
+def never_computes(monkeypatch):
+    def computing(*_, **__):
+        pytest.fail("computed before the arguments were checked")
+
+    monkeypatch.setattr("refgi.methods.render", computing)
+
+
+@pytest.fixture
+def plate(tmp_path):
+    """A bare mesh: a floor of two triangles."""
+    path = tmp_path / "plate.obj"
+    path.write_text("v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 1 3 2\nf 1 4 3\n")
+    return path
+
+
+def test_an_exr_holds_what_python_computes(tmp_path):
+    assert run("cornell_box", *TINY, "--out", tmp_path / "a.exr").exit_code == 0
+    channels, attributes = read_exr(tmp_path / "a.exr")
+    scene = load_scene("cornell_box").with_camera(width=12, height=10)
+    picture = render(scene, "sii", SiiSettings(lights=16), rsm_resolution=16)
+    for index, name in enumerate("RGB"):
+        assert np.array_equal(channels[name], picture.radiance[index])
+        assert np.array_equal(channels[f"irradiance.{name}"], picture.irradiance[index])
+    assert attributes["method"] == "sii"
+    assert attributes["settings"]["lights"] == 16
+    assert attributes["versions"]["numpy"] == np.__version__
+
+
+def test_a_folder_gets_both_and_a_png_one(tmp_path):
+    assert run("cornell_box", *TINY, "--out", tmp_path / "new").exit_code == 0
+    assert {p.name for p in (tmp_path / "new").iterdir()} == {"cornell_box_sii.exr", "cornell_box_sii.png"}
+    assert run("cornell_box", *TINY, "--out", tmp_path / "a.png", "--exposure", "0.5").exit_code == 0
+    assert imageio.v3.imread(tmp_path / "a.png").shape == (10, 12, 3)
+
+
+def test_json_is_the_only_thing_on_stdout(tmp_path):
+    result = run("cornell_box", *TINY, "--out", tmp_path / "a.exr", "--json", "--seed", "7")
+    content = json.loads(result.stdout)
+    assert content["settings"]["seed"] == 7
+    assert content["files"] == [str(tmp_path / "a.exr")]
+    assert content["non_finite_pixels"] == 0
+    assert content["warnings"] == []
+    assert {"rsm.gbuffer", "splat.irradiance"} <= {line["name"] for line in content["stages"]}
+
+
+def test_float64_and_threads(tmp_path):
+    one = run("cornell_box", *TINY, "--out", tmp_path / "a.exr", "--dtype", "float64", "--threads", "1", "--json")
+    assert json.loads(one.stdout)["dtype"] == "float64"
+    assert run("cornell_box", *TINY, "--out", tmp_path / "b.exr", "--dtype", "float64").exit_code == 0
+    a, b = (read_exr(tmp_path / name)[0] for name in ("a.exr", "b.exr"))
+    assert all(np.array_equal(a[name], b[name]) for name in a)
+
+
+@pytest.mark.usefixtures("never_computes")
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["cornel_box"], ["did you mean 'cornell_box'"]),
+    (["no/such/file.json"], ["no/such/file.json"]),
+    (["cornell_box", "--method", "sij"], ["method", "sii"]),
+    (["cornell_box", "--size", "12x"], ["12x"]), (["cornell_box", "--size", "0"], ["'0'"]),
+    (["cornell_box", "--size", "99999x9"], ["65536"]),
+    (["cornell_box", "--threads", "0"], ["--threads"]),
+    (["cornell_box", "--dtype", "float16"], ["float32"]),
+    (["cornell_box", "--exposure", "nan"], ["--exposure"]), (["cornell_box", "--exposure", "-1"], ["--exposure"]),
+    (["cornell_box", "--eye", "1,2"], ["1,2"]), (["cornell_box", "--eye", "nan,0,0"], ["eye"]),
+    (["cornell_box", "--vfov-deg", "180"], ["vfov_deg"]),
+    (["cornell_box", "--light", "lamp:x=1"], ["lamp", "spot"]),
+    (["cornell_box", "--light", "point:position=0,1,0"], ["intensity", "none"]),
+    (["cornell_box", "--light", "point:postion=0,1,0:intensity=1"], ["did you mean 'position'"]),
+    (["cornell_box", "--light", "spot:position=0,1,0:target=0,1,0:intensity=1"], ["direction"]),
+    (["cornell_box", "--light", "spot:position=0,1,0:target=0,0,0:outer_deg=90:intensity=1"], ["outer_half_angle"]),
+    (["cornell_box", "--light", "point:position=0,1,0:intensity=many"], ["many"]),
+    (["cornell_box", "--set", "lights"], ["key=value"]),
+])
+def test_unusable_options_are_named_before_anything_is_computed(arguments, words, tmp_path):
+    assert refused(run(*arguments, "--out", tmp_path / "a.exr"), *words)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.usefixtures("never_computes")
+def test_all_wrong_settings_are_told_at_once(tmp_path):
+    result = run("cornell_box", "--out", tmp_path / "a.exr", "--set", "light=5", "--set", "lights=many", "--set",
+                 "pattern=spiral", "--set", "offset=nan")
+    assert refused(result, "'light'", "did you mean 'lights'", "'many'", "'spiral'", "offset")
+
+
+@pytest.mark.usefixtures("never_computes")
+@pytest.mark.parametrize("name", ["a.jpg", "a.tiff", "file/a.exr", "file/folder/"])
+def test_an_out_that_cannot_be_written_is_refused_before_anything_is_computed(name, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    assert refused(run("cornell_box", "--out", f"{tmp_path}/{name}"), "--out")
+
+
+@pytest.mark.usefixtures("never_computes")
+def test_a_size_that_does_not_fit_is_refused_with_both_figures(tmp_path, monkeypatch):
+    monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
+    assert refused(run("cornell_box", "--size", "8000x8000", "--out", tmp_path / "a.exr"), "size: 8000x8000",
+                   "1,000,000,000 are available")
+
+
+def test_where_memory_cannot_be_told_nothing_is_refused(monkeypatch):
+    monkeypatch.setattr(memory, "available_bytes", lambda: None)
+    memory.require_memory(10**18, 1, 1)
+
+
+def test_the_estimate_grows_with_everything():
+    scene = load_scene("cornell_box")
+    base = memory.needed_bytes(scene, 100, 100)
+    assert memory.needed_bytes(scene, 200, 100) > base
+    assert memory.needed_bytes(scene, 100, 100, float_bytes=8) > base
+    assert memory.needed_bytes(scene, 100, 100, rsm_resolution=1024) > base
+    assert memory.needed_bytes(scene, 100, 100, traced=True) > base
+    point = scene.with_lights(PointLight((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)))
+    assert memory.needed_bytes(point, 100, 100) > base
+    assert (memory.available_bytes() or 1) > 0
+
+
+def test_camera_and_light_options_replace_the_scenes_own(tmp_path, monkeypatch):
+    seen = []
+
+    def spy(scene, *arguments, **options):
+        seen.append(scene)
+        return render(scene, *arguments, **options)
+
+    monkeypatch.setattr("refgi.methods.render", spy)
+    run("cornell_box", *TINY, "--out", tmp_path / "a.png", "--eye", "0,0.3,1.2", "--vfov-deg", "30", "--light",
+        "spot:position=0,0.5,0:direction=0,-1,0:inner_deg=20:outer_deg=30:intensity=1,2,3", "--light",
+        "point:position=0.1,0.2,0.3:intensity=2")
+    scene, = seen
+    own = load_scene("cornell_box").camera
+    assert scene.camera == Camera((0.0, 0.3, 1.2), own.target, own.up, np.radians(30.0), 12, 10)
+    assert scene.lights == (SpotLight((0.0, 0.5, 0.0), (0.0, -1.0, 0.0), np.radians(20.0), np.radians(30.0),
+                                      (1.0, 2.0, 3.0)), PointLight((0.1, 0.2, 0.3), (2.0, 2.0, 2.0)))
+
+
+def test_a_bare_mesh_gets_a_view_and_says_so(plate, tmp_path):
+    result = run(plate, *TINY, "--out", tmp_path / "a.png")
+    assert result.exit_code == 0
+    lines = result.stderr.splitlines()
+    assert len([line for line in lines if line.startswith("refgi: warning: ")]) == 1
+    assert "camera" in lines[0]
+
+
+def test_a_bare_mesh_with_camera_and_light_needs_no_warning(plate, tmp_path):
+    result = run(plate, *TINY, "--out", tmp_path / "a.png", "--eye", "0,3,3", "--target", "0,0,0", "--light",
+                 "directional:direction=0,-1,0:irradiance=3")
+    assert result.exit_code == 0
+    assert "warning" not in result.stderr
+
+
+def test_a_wholly_black_picture_is_said_aloud(tmp_path):
+    result = run("cornell_box", *TINY, "--out", tmp_path / "a.png", "--eye", "0,0,50", "--target", "0,0,100")
+    assert result.exit_code == 0
+    assert "wholly black: the camera sees no surface" in result.stderr
+
+
+def test_a_picture_without_indirect_light_is_said_aloud(plate, tmp_path):
+    result = run(plate, *TINY, "--out", tmp_path / "a.png", "--eye", "0,3,3", "--target", "0,0,0", "--light",
+                 "directional:direction=0,-1,0:irradiance=3")
+    assert "no indirect light" in result.stderr
+
+
+def test_non_finite_pixels_are_said_aloud_and_fail(tmp_path, monkeypatch):
+    def broken(*arguments, **options):
+        picture = render(*arguments, **options)
+        radiance = picture.radiance.copy()
+        radiance[1, 2, 3] = np.nan
+        return Picture(picture.frame, picture.irradiance, radiance)
+
+    monkeypatch.setattr("refgi.methods.render", broken)
+    result = run("cornell_box", *TINY, "--out", tmp_path)
+    assert result.exit_code == 1
+    assert "1 pixels of the picture are NaN or infinite" in result.stderr
+    assert imageio.v3.imread(tmp_path / "cornell_box_sii.png")[2, 3].tolist() == [255, 0, 255]
+    assert np.isnan(read_exr(tmp_path / "cornell_box_sii.exr")[0]["G"][2, 3])
+
+
+def test_a_warning_is_one_line_and_said_once():
+    from refgi.cli.session import Session
+
+    session = Session()
+    for _ in range(2):
+        session.warn("two\nlines", UserWarning, "file", 1)
+    assert session.warnings == ["UserWarning: two lines"]

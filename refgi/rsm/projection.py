@@ -72,6 +72,7 @@ def camera_projection(camera: Camera, width: int | None = None, height: int | No
     """
     width = camera.width if width is None else width
     height = camera.height if height is None else height
+    _expect_size(height, width)
     half_v = math.tan(camera.vfov / 2)
     frame = look_frame(np.subtract(camera.target, camera.eye), camera.up)
     return _maps(PERSPECTIVE, height, width, [camera.eye], [frame], (half_v * width / height, half_v))
@@ -298,8 +299,7 @@ def view_coordinates(projection: Projection, m: int, x: float, y: float, z: floa
 def _maps(
     kind: int, height: int, width: int, origin: Any, frames: Any, half: Any, reach: float = math.inf
 ) -> Projection:
-    for name, size in (("height", height), ("width", width)):
-        expect(1 <= size <= LARGEST_SIDE, name, f"1 to {LARGEST_SIDE} texels", size)
+    _expect_size(height, width)
     return Projection(
         kind,
         int(height),
@@ -309,6 +309,11 @@ def _maps(
         np.array(half, np.float64),
         float(reach),
     )
+
+
+def _expect_size(height: int, width: int) -> None:
+    for name, size in (("height", height), ("width", width)):
+        expect(1 <= size <= LARGEST_SIDE, name, f"1 to {LARGEST_SIDE} texels", size)
 
 
 def _unit(vector: npt.ArrayLike) -> Array:

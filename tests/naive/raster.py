@@ -1,0 +1,130 @@
+"""Slow literal twin of the rasterizer: one ray per texel, every triangle tried, written from the definitions."""
+
+import math
+
+import numpy as np
+
+
+def look(forward, up):
+    """Rows right, down, forward of a view."""
+    forward = np.asarray(forward, float) / np.linalg.norm(forward)
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    return np.array([right, -np.cross(right, forward), forward])
+
+
+def perspective_ray(origin, frame, half, height, width, row, column):
+    """A direction that reaches axial depth 1."""
+    x = half[0] * (2 * (column + 0.5) / width - 1)
+    y = half[1] * (2 * (row + 0.5) / height - 1)
+    return np.asarray(origin, float), x * frame[0] + y * frame[1] + frame[2]
+
+
+def orthographic_ray(origin, frame, half, height, width, row, column):
+    x = half[0] * (2 * (column + 0.5) / width - 1)
+    y = half[1] * (2 * (row + 0.5) / height - 1)
+    return origin + x * frame[0] + y * frame[1], frame[2]
+
+
+def paraboloid_ray(origin, frame, half, height, width, row, column):
+    """(s, t) = (x, y)/(1 + z) of a unit vector, so x = 2s/(1 + s^2 + t^2); None outside the hemisphere."""
+    s = half[0] * (2 * (column + 0.5) / width - 1)
+    t = half[1] * (2 * (row + 0.5) / height - 1)
+    square = s * s + t * t
+    if square > 1:
+        return None
+    local = np.array([2 * s, 2 * t, 1 - square]) / (1 + square)
+    return np.asarray(origin, float), local @ frame
+
+
+def nearest(origin, direction, vertices, faces):
+    """Moller-Trumbore over all triangles.
+
+    Returns id (-1: none), t, barycentric coordinates, and the margin: how far, in barycentric coordinates, the
+    closest decision was (of the inside tests of every triangle that is not clearly farther, and of the depth order).
+    """
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    e1, e2 = b - a, c - a
+    p = np.cross(direction, e2)
+    det = np.einsum("ij,ij->i", e1, p)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = origin - a
+        u = np.einsum("ij,ij->i", s, p) / det
+        q = np.cross(s, e1)
+        v = q @ direction / det
+        t = np.einsum("ij,ij->i", e2, q) / det
+    smallest = np.minimum(np.minimum(u, v), 1 - u - v)
+    hit = (det != 0) & (smallest >= 0) & (t > 0)
+    ts = np.where(hit, t, np.inf)
+    winner = int(np.argmin(ts)) if hit.any() else -1
+    first = ts[winner] if winner >= 0 else np.inf
+    doubtful = (det != 0) & (t > 0) & (t <= first * (1 + 1e-6))
+    margin = np.abs(smallest[doubtful]).min(initial=np.inf)
+    others = np.delete(ts, winner) if winner >= 0 else ts
+    if winner >= 0 and len(others):
+        margin = min(margin, abs(others.min() / first - 1))
+    weights = (1 - u[winner] - v[winner], u[winner], v[winner]) if winner >= 0 else (0, 0, 0)
+    return winner, float(first), weights, float(margin)
+
+
+def attributes(origin, direction, hit, vertices, faces, normals=None):
+    """Position, normal on the seen side, distance of one hit of `nearest`."""
+    winner, t, weights, _ = hit
+    corners = vertices[faces[winner]]
+    position = sum(w * corner for w, corner in zip(weights, corners, strict=True))
+    face_normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    face_normal /= np.linalg.norm(face_normal)
+    if face_normal @ direction > 0:
+        face_normal = -face_normal
+    normal = face_normal
+    if normals is not None:
+        normal = sum(w * n for w, n in zip(weights, normals[faces[winner]], strict=True))
+        normal /= np.linalg.norm(normal)
+        if normal @ face_normal < 0:
+            normal = -normal
+    return position, normal, t * np.linalg.norm(direction)
+
+
+def solid_angle(density, x0, x1, y0, y1, n=24):
+    """Gauss-Legendre quadrature of a density of solid angle over a rectangle of the image plane."""
+    nodes, weights = np.polynomial.legendre.leggauss(n)
+    x, y = (x0 + x1 + (x1 - x0) * nodes) / 2, (y0 + y1 + (y1 - y0) * nodes) / 2
+    total = 0.0
+    for i in range(n):
+        for j in range(n):
+            total += weights[i] * weights[j] * density(x[i], y[j])
+    return total * (x1 - x0) * (y1 - y0) / 4
+
+
+def perspective_density(x, y):
+    return (1 + x * x + y * y) ** -1.5
+
+
+def paraboloid_density(u, v):
+    return 4 / (1 + u * u + v * v) ** 2
+
+
+def falloff(cos_angle, cos_inner, cos_outer):
+    """Smoothstep of the scene files."""
+    if cos_inner == cos_outer:
+        return 1.0 if cos_angle >= cos_inner else 0.0
+    t = min(max((cos_angle - cos_outer) / (cos_inner - cos_outer), 0.0), 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def spot_texel(cosine, density, x0, x1, y0, y1, cos_inner, cos_outer, n=200):
+    """Midpoint sum of the falloff over a texel, n x n samples."""
+    total = 0.0
+    for i in range(n):
+        for j in range(n):
+            x, y = x0 + (x1 - x0) * (i + 0.5) / n, y0 + (y1 - y0) * (j + 0.5) / n
+            total += density(x, y) * falloff(cosine(x, y), cos_inner, cos_outer)
+    return total * (x1 - x0) * (y1 - y0) / n**2
+
+
+def perspective_cosine(x, y):
+    return 1 / math.sqrt(1 + x * x + y * y)
+
+
+def paraboloid_cosine(u, v):
+    return (1 - u * u - v * v) / (1 + u * u + v * v)

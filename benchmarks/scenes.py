@@ -25,8 +25,9 @@ def rows(quick: bool) -> Iterator[Row]:
 
 
 def _ply(vertices: np.ndarray, faces: np.ndarray) -> bytes:
-    head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\nproperty float x\nproperty float y\n"
-            f"property float z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
+    head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\nproperty float x\n"
+            "property float y\nproperty float z\n"
+            f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
     entries = np.zeros(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
     entries["count"], entries["corners"] = 3, faces
     return head.encode() + vertices.tobytes() + entries.tobytes()

@@ -27,6 +27,7 @@ from refgi.scene.light import (
     light_table,
 )
 from refgi.scene.material import UNPAINTED, Material, MaterialTable, material_table
+from refgi.scene.room import expect_room
 from refgi.scene.values import BLACK, LARGEST, Array, Rgb, Vector, degrees, is_direction, is_place
 
 __all__ = [
@@ -188,12 +189,11 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
     Raises
     ------
     InputError
-        If a mesh has a coordinate that is not finite or an index out of range, or there are too many vertices.
+        If a mesh has a coordinate that is not finite or an index out of range, or all do not fit in memory.
     """
     for number, mesh in enumerate(meshes):
         mesh.expect_sound(f"mesh {number} ({mesh.name})")
-    total = sum(len(mesh.vertices) for mesh in meshes)
-    expect(total < 2**31, "meshes", "fewer than 2^31 vertices in all", total)
+    expect_room(sum(len(mesh.vertices) for mesh in meshes), sum(len(mesh.faces) for mesh in meshes), "meshes")
     materials = tuple(dict.fromkeys(mesh.material for mesh in meshes))
     smooth = smooth and any(mesh.normals is not None for mesh in meshes)
     if smooth:

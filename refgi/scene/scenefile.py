@@ -12,6 +12,7 @@ from refgi.scene.health import mended, warn_of_flat_faces
 from refgi.scene.meshfile import read_mesh_file
 from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
 from refgi.scene.power import shining
+from refgi.scene.room import expect_room
 from refgi.scene.transform import affine, placed
 
 PLAINER = {"missing": "expected a value, nothing given", "extra_forbidden": "unknown key",
@@ -130,10 +131,13 @@ def _meshes(entry: "SceneFile", materials: dict[str, Material], path: Path) -> l
     contents: dict[str, Contents | InputError] = {}
     meshes: list[Mesh] = []
     faults: list[str] = []
-    dropped = 0
+    dropped = vertices = faces = 0
     for number, given in enumerate(entry.objects):
         try:
             found = _read_once(contents, given.mesh, path.parent)
+            vertices += sum(len(mesh.vertices) for mesh in found.meshes)
+            faces += sum(len(mesh.faces) for mesh in found.meshes)
+            expect_room(vertices, faces, "all objects so far")
             for mesh in found.meshes:
                 sound, flat = mended(_dressed(mesh, given, materials, entry.smooth_normals), f"{given.mesh}")
                 dropped += flat

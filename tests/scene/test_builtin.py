@@ -171,6 +171,23 @@ def test_parallel_plates_have_the_closed_form_in_their_geometry() -> None:
     assert height < 2.0  # the receiver cannot block the light
 
 
+@pytest.mark.parametrize("angle", [45.0, 90.0, 135.0])
+def test_a_long_wedge_has_the_closed_form_in_its_geometry(angle: float) -> None:
+    """Midpoint sum over the sender of the kernel to a point of the receiver, against the endless wedge."""
+    sender = load_scene(f"wedge:angle_deg={angle},length=200").geometry.vertices[4:]
+    lean, along = sender[2] - sender[0], sender[1] - sender[0]
+    cos, sin, s = math.cos(math.radians(angle)), math.sin(math.radians(angle)), 0.5
+    up = (np.arange(400) + 0.5) / 400
+    # Points crowd where the kernel lives: z = 2 sinh(v).
+    edge = math.asinh(np.linalg.norm(along) / 4)
+    v = ((np.arange(600) + 0.5) / 600 * 2 - 1) * edge
+    z, area = 2 * np.sinh(v), np.linalg.norm(lean) / 400 * 2 * np.cosh(v) * 2 * edge / 600
+    x, y = up[:, None] * lean[0], up[:, None] * lean[1]
+    kernel = y * s * sin / ((x - s) ** 2 + y**2 + z**2) ** 2 / math.pi
+    total = (kernel * area).sum()
+    assert total == pytest.approx((1 + (cos - s) / math.sqrt(1 + s * s - 2 * s * cos)) / 2, rel=1e-4)
+
+
 @pytest.mark.parametrize("angle", [30.0, 90.0, 150.0])
 def test_wedge_lights_one_plate_alone(angle: float) -> None:
     scene = load_scene(f"wedge:angle_deg={angle}")

@@ -212,6 +212,16 @@ def test_each_fault_names_file_and_key(tmp_path: Path, edit: Edit, key: str) -> 
     assert key in str(error.value)
 
 
+def test_more_instances_than_memory_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def edit(tree: dict[str, Any]) -> None:
+        tree["nodes"] += [{"mesh": 0}] * 9
+        tree["scenes"][0]["nodes"] = [0, *range(3, 12)]
+
+    monkeypatch.setattr("refgi.scene.room.physical_memory", lambda: 4 * 48.0 * 10)
+    with pytest.raises(InputError, match=r"nodes\[9\]\.mesh: expected a scene that fits"):
+        load_scene(written(tmp_path, edit))
+
+
 def test_index_out_of_range(tmp_path: Path) -> None:
     path = written(tmp_path, None, TRIANGLES.tobytes() + np.array([0, 1, 2, 0, 2, 4], np.uint16).tobytes())
     with pytest.raises(InputError, match=r"face 1: expected vertex indices from 0 to 3, got \[0, 2, 4\]"):

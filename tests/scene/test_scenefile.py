@@ -176,6 +176,12 @@ def test_flat_faces_are_skipped_and_counted(tmp_path: Path) -> None:
     assert scene.face_count == 1
 
 
+def test_more_instances_than_memory_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("refgi.scene.room.physical_memory", lambda: 4 * 48.0 * 10)
+    with pytest.raises(InputError, match=r"objects\[7\].*fits in .* GiB of memory, got '32 vertices and 16 faces"):
+        load_scene(write_scene(tmp_path, objects=[{"mesh": "square.ply"}] * 8))
+
+
 @given(angle=st.floats(allow_nan=False, width=32))
 def test_any_cone_is_taken_or_refused(tmp_path_factory: pytest.TempPathFactory, angle: float) -> None:
     folder = tmp_path_factory.mktemp("cone", numbered=True)

@@ -12,10 +12,10 @@ from refgi.scene.gltf.accessors import accessor
 from refgi.scene.gltf.container import Document
 from refgi.scene.gltf.punctual import node_camera, node_light
 from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
+from refgi.scene.room import expect_room
 from refgi.scene.transform import affine, placed
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
-LARGEST_COUNT = 2**31 - 1  # vertices; corner indices are int32
 
 
 def read_gltf(path: Path) -> Contents:
@@ -47,6 +47,7 @@ class _Reader:
         self.document = document
         self.path = document.path
         self.meshes: list[Mesh] = []
+        self.vertices = self.faces = 0
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
         self.passed_over: dict[str, int] = {}
@@ -71,9 +72,10 @@ class _Reader:
     def _collect(self, node: dict[str, Any], matrix: Array, where: str) -> None:
         if "mesh" in node:
             for mesh in self._mesh(node["mesh"], f"{where}.mesh"):
+                self.vertices += len(mesh.vertices)
+                self.faces += len(mesh.faces)
+                expect_room(self.vertices, self.faces, f"{self.path}: {where}.mesh")
                 self.meshes.append(placed(mesh, matrix))
-            total = sum(len(mesh.vertices) for mesh in self.meshes)
-            expect(total <= LARGEST_COUNT, f"{self.path}: {where}.mesh", f"at most {LARGEST_COUNT} vertices", total)
         if camera := node_camera(self.document, node, matrix, where):
             self.cameras.append(camera)
         elif "camera" in node:

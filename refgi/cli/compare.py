@@ -9,7 +9,6 @@ from refgi.cli.session import FAILED, Session, say, table
 
 if TYPE_CHECKING:
     from refgi.compare import Comparison
-    from refgi.scene import Scene
 
 SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ssim": "SSIM"}
 
@@ -23,7 +22,7 @@ SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ss
 @click.option("--out", help="Folder for EXR, PNG, error maps, results.json and index.html.")
 @speech
 @click.pass_obj
-def command(session: Session, /, methods: str | None, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
+def _compare(session: Session, /, methods: str | None, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
             shadows: str, threads: int | None, seed: int | None, out: str | None, **options: Any) -> int:
     """Judge methods on SCENE by path tracing: errors, times, a page.
 
@@ -32,6 +31,7 @@ def command(session: Session, /, methods: str | None, pairs: tuple[str, ...], dt
     A method that knows no visibility is also compared with the truth without visibility, to which it converges.
     """
     from refgi.cli.destination import folder
+    from refgi.cli.memory import require_memory
     from refgi.cli.progress import progress
     from refgi.cli.threads import on_threads
     from refgi.cli.view import View
@@ -41,12 +41,15 @@ def command(session: Session, /, methods: str | None, pairs: tuple[str, ...], dt
     if out is not None:
         folder(out)
     scene = View(**options).load()
-    _require_memory(scene, len(names), dtype, rsm_resolution)
+    require_memory(scene, dtype, rsm_resolution, traced=True, compared=len(names) + 2)
     with on_threads(threads), progress() as tell:
         comparison = compare(scene, names, truth_settings=settings.pop("truth"), method_settings=settings, out=out,
                              progress=tell, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)
     _report(session, comparison, out)
     return 0 if comparison.is_sound else FAILED
+
+
+command = _compare
 
 
 def _asked(methods: str | None, pairs: tuple[str, ...], seed: int | None) -> tuple[list[str], dict[str, Any]]:
@@ -65,15 +68,6 @@ def _asked(methods: str | None, pairs: tuple[str, ...], seed: int | None) -> tup
         seeded = seed if "seed" in getattr(wanted, "__dataclass_fields__", {}) else None
         settings[name] = read_settings(wanted, own, seeded, name)
     return names, settings
-
-
-def _require_memory(scene: "Scene", methods: int, dtype: str, rsm_resolution: int) -> None:
-    from refgi.cli.memory import needed_bytes, require_memory
-
-    width, height = scene.camera.width, scene.camera.height
-    needed = needed_bytes(scene, width, height, float_bytes=8 if dtype == "float64" else 4,
-                          rsm_resolution=rsm_resolution, traced=True, compared=methods + 2)
-    require_memory(needed, width, height)
 
 
 def _report(session: Session, comparison: "Comparison", out: str | None) -> None:

@@ -30,7 +30,7 @@ ROWS = {  # SII Table 1
 @machine
 @speech
 @click.pass_obj
-def command(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
+def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
             threads: int | None, seed: int | None, **options: Any) -> None:
     """Show which stages a method runs, skips and reuses for SCENE.
 
@@ -56,6 +56,9 @@ def command(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str
                "stages": [dataclasses.asdict(line) for line in summed(first)],
                "animation": {row: {line.name: line.what for line in summed(runs)} for row, runs in animation.items()}}
     session.result(_text(content), content)
+
+
+command = _explain
 
 
 @dataclasses.dataclass(frozen=True)

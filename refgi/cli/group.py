@@ -57,6 +57,17 @@ class VerbGroup(click.Group):
             hint = f"Did you mean {near[0]!r}?" if near else f"There are {', '.join(VERBS)}."
             raise click.UsageError(f"{error.format_message()} {hint}", ctx) from error
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a verb; an interrupt and a reader that left end it here, before click has its own word on them."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            say("interrupted")
+            return INTERRUPTED
+        except BrokenPipeError:  # whoever read stdout has had enough: refgi scenes | head -1
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return DONE
+
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any
     ) -> NoReturn:
@@ -68,11 +79,7 @@ class VerbGroup(click.Group):
             warnings.showwarning = session.warn
             try:
                 code = super().main(args, prog_name, **extra)
-                sys.stdout.flush()
-            except BrokenPipeError:
-                code = _reader_left()
             except (click.exceptions.Abort, KeyboardInterrupt):
-                say("interrupted")
                 code = INTERRUPTED
             except BaseException as error:
                 code = _explained(error, session)
@@ -82,8 +89,6 @@ class VerbGroup(click.Group):
 def _explained(error: BaseException, session: Session) -> int:
     """Say what went wrong in one line and return the exit code."""
     if isinstance(error, SystemExit):
-        if isinstance(error.__context__, BrokenPipeError):
-            return _reader_left()
         return error.code if isinstance(error.code, int) else FAILED
     if session.debug:
         traceback.print_exception(error)
@@ -106,12 +111,6 @@ def _explained(error: BaseException, session: Session) -> int:
     hint = "" if session.debug else " (a fault of refgi; --debug shows where)"
     say(f"unexpected {type(error).__name__}: {_one_line(str(error))}{hint}")
     return FAILED
-
-
-def _reader_left() -> int:
-    """Leave quietly when whoever read stdout has had enough: `refgi scenes | head -1`."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return DONE
 
 
 def _one_line(text: str) -> str:

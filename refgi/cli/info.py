@@ -12,7 +12,7 @@ from refgi.cli.session import Session, table
 @click.command("info")
 @speech
 @click.pass_obj
-def command(session: Session, /) -> None:
+def _info(session: Session, /) -> None:
     """Show methods, versions, CPU features, threads and cache."""
     from refgi.compare.environment import environment
     from refgi.jit import cache_root
@@ -24,6 +24,9 @@ def command(session: Session, /) -> None:
     facts["cache"] = {"path": str(cache_root()), "files": len(files), "bytes": sum(p.stat().st_size for p in files)}
     facts["embree"] = _embree()
     session.result(_text(facts), facts)
+
+
+command = _info
 
 
 def _embree() -> str:

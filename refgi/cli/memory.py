@@ -45,26 +45,41 @@ def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4,
 
 
 def available_bytes() -> int | None:
-    """Return the memory that is free for use, of the machine or of the container; None where it cannot be told."""
+    """Return the memory that is free for use, of the machine or of the container, whichever is less.
+
+    Returns
+    -------
+    int or None
+        Bytes; None where it cannot be told.
+    """
     found = [amount for amount in (_machine_bytes(), _container_bytes()) if amount is not None]
     return min(found) if found else None
 
 
-def require_memory(needed: int, width: int, height: int) -> None:
-    """Refuse what will not fit.
+def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: bool = False, compared: int = 0) -> None:
+    """Refuse a picture of the camera's size that will not fit.
 
     Parameters
     ----------
-    needed : int
-        Bytes.
-    width, height : int
-        Pixels, for the message.
+    scene : Scene
+        The scene.
+    dtype : str
+        A float type of NumPy.
+    rsm_resolution : int
+        Texels along a side.
+    traced : bool
+        Whether the truth is among the methods.
+    compared : int
+        How many methods and references are compared.
 
     Raises
     ------
     InputError
         If more is needed than available; names both.
     """
+    width, height = scene.camera.width, scene.camera.height
+    needed = needed_bytes(scene, width, height, float_bytes=8 if dtype == "float64" else 4,
+                          rsm_resolution=rsm_resolution, traced=traced, compared=compared)
     available = available_bytes()
     if available is not None and needed > available:
         raise InputError(f"size: {width}x{height} needs about {needed:,} bytes of memory, {available:,} are available")

@@ -44,7 +44,18 @@ class Triple(click.ParamType[tuple[float, float, float]]):
 
 
 def speech(function: F) -> F:
-    """Add --json and --debug."""
+    """Add --json and --debug.
+
+    Parameters
+    ----------
+    function : callable
+        A verb.
+
+    Returns
+    -------
+    callable
+        The same, with the options.
+    """
     def keep(name: str) -> Callable[[click.Context, click.Parameter, bool], None]:
         def store(ctx: click.Context, _: click.Parameter, value: bool) -> None:
             session = ctx.find_object(Session)
@@ -58,7 +69,18 @@ def speech(function: F) -> F:
 
 
 def view(function: F) -> F:
-    """Add the scene and what is seen of it: size, camera, lights."""
+    """Add the scene and what is seen of it: size, camera, lights.
+
+    Parameters
+    ----------
+    function : callable
+        A verb.
+
+    Returns
+    -------
+    callable
+        The same, with the options.
+    """
     for decorate in reversed((
         click.argument("scene"),
         click.option("--size", type=Size(), help="Picture size in pixels; the scene's own where absent."),
@@ -76,7 +98,18 @@ def view(function: F) -> F:
 
 
 def machine(function: F) -> F:
-    """Add how it is computed: element type, threads, shadow maps."""
+    """Add how it is computed: element type, threads, shadow maps.
+
+    Parameters
+    ----------
+    function : callable
+        A verb.
+
+    Returns
+    -------
+    callable
+        The same, with the options.
+    """
     for decorate in reversed((
         click.option("--dtype", type=click.Choice(["float32", "float64"]), default="float32", show_default=True,
                      help="Element type of every buffer and kernel."),

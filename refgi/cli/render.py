@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.option("--out", required=True, help="out.exr (linear), out.png (tone-mapped), or a folder for both.")
 @speech
 @click.pass_obj
-def command(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
+def _render(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
             threads: int | None, seed: int | None, exposure: float | None, out: str, **options: Any) -> int:
     """Render SCENE by one method.
 
@@ -32,7 +32,7 @@ def command(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str
     """
     from refgi import stages
     from refgi.cli.destination import picture_files
-    from refgi.cli.memory import needed_bytes, require_memory
+    from refgi.cli.memory import require_memory
     from refgi.cli.progress import progress
     from refgi.cli.settings import read_settings
     from refgi.cli.threads import on_threads
@@ -44,9 +44,7 @@ def command(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str
     settings = read_settings(find_method(method).load()[1], pairs, seed, method)
     files = picture_files(out, f"{_stem(options['scene'])}_{method}")
     scene = View(**options).load()
-    width, height = scene.camera.width, scene.camera.height
-    require_memory(needed_bytes(scene, width, height, float_bytes=8 if dtype == "float64" else 4,
-                                rsm_resolution=rsm_resolution, traced=method == "truth"), width, height)
+    require_memory(scene, dtype, rsm_resolution, traced=method == "truth")
     started = time.perf_counter()
     with on_threads(threads), progress() as tell, stages.observe(progress=tell) as log:
         picture = render(scene, method, settings, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)
@@ -55,9 +53,12 @@ def command(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str
     _write(picture, files, content, scene.exposure if exposure is None else exposure)
     _say_aloud(content)
     content["files"] = [str(file) for file in files if file]
-    session.result(f"{scene.name} by {method}: {width}x{height} in {seconds:.2f} s -> {', '.join(content['files'])}",
-                   content)
+    size = "x".join(map(str, content["size"]))
+    session.result(f"{scene.name} by {method}: {size} in {seconds:.2f} s -> {', '.join(content['files'])}", content)
     return FAILED if content["non_finite_pixels"] else 0
+
+
+command = _render
 
 
 def _content(picture: "Picture", method: str, settings: Any, seconds: float) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from refgi.cli.session import Session, table
 @click.command("scenes")
 @speech
 @click.pass_obj
-def command(session: Session, /) -> None:
+def _scenes(session: Session, /) -> None:
     """List the built-in scenes, with faces and a line each.
 
     A scene's parameters follow its name: refgi render atrium:faces=1000000,seed=3 ...
@@ -24,3 +24,6 @@ def command(session: Session, /) -> None:
         name: {"faces": scene.faces, "summary": scene.summary, "parameters": scene.parameters}
         for name, scene in scenes.items()
     }})
+
+
+command = _scenes

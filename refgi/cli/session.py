@@ -37,12 +37,31 @@ class Session:
 
 
 def say(text: str) -> None:
-    """Print one line to stderr, after the command's name."""
+    """Print one line to stderr, after the command's name.
+
+    Parameters
+    ----------
+    text : str
+        The line.
+    """
     click.echo(f"refgi: {text}", file=sys.stderr)
 
 
 def table(rows: Sequence[tuple[str, ...]], *, right: frozenset[int] = frozenset()) -> str:
-    """Return rows as lines of aligned columns; those in `right` are flush right."""
+    """Lay rows out as lines of aligned columns.
+
+    Parameters
+    ----------
+    rows : sequence of tuple of str
+        Equally many cells in each.
+    right : frozenset of int
+        Columns that are flush right.
+
+    Returns
+    -------
+    str
+        One line a row.
+    """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     cells = ((cell.rjust(width) if i in right else cell.ljust(width)
               for i, (cell, width) in enumerate(zip(row, widths, strict=True))) for row in rows)

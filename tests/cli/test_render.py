@@ -132,7 +132,7 @@ def test_a_size_that_does_not_fit_is_refused_with_both_figures(tmp_path, monkeyp
 
 def test_where_memory_cannot_be_told_nothing_is_refused(monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: None)
-    memory.require_memory(10**18, 1, 1)
+    memory.require_memory(load_scene("cornell_box").with_camera(width=65536, height=65536), "float64", 16384)
 
 
 def test_the_estimate_grows_with_everything():

@@ -1,0 +1,165 @@
+"""sii on whole scenes: closed forms, number and pattern of lights, filtering, presets."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from refgi.errors import InputError
+from refgi.frame import Frame
+from refgi.scene import SpotLight, load_scene
+from refgi.splat import SiiSettings, sii
+from refgi.splat.sii import light_footprints, pixel_lights
+from refgi.stages import observe
+
+ALL = SiiSettings(pattern="all")
+
+
+@pytest.fixture(scope="module")
+def plates():
+    return Frame(load_scene("parallel_plates"), width=24, height=24, rsm_resolution=128)
+
+
+@pytest.fixture(scope="module")
+def box():
+    return Frame(load_scene("cornell_box"), width=48, height=48, rsm_resolution=128)
+
+
+def rms(image, reference):
+    return float(np.sqrt(((image - reference) ** 2).mean()) / reference.mean())
+
+
+@pytest.mark.parametrize(("real", "limit"), [(np.float32, 1e-3), (np.float64, 1e-3)])
+@pytest.mark.feature("REF-06")
+def test_integrating_sphere_scene(real, limit, evidence):
+    """The tessellated sphere lies inside its circumsphere: E differs by its sagitta, 2 pi / sqrt(3 faces) squared."""
+    scene = load_scene("integrating_sphere:faces=20000,albedo=0.6")
+    frame = Frame(scene, width=32, height=32, dtype=real, rsm_resolution=128)
+    light = scene.lights[0]
+    half = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
+    flux = light.intensity[0] * 2 * math.pi * ((1 - half[0]) + 0.5 * (half[0] - half[1]))
+    expected = 0.6 * flux / (4 * math.pi)
+    got = sii(frame, ALL)
+    away = np.abs(got / expected - 1)
+    # lights within a few texels of a receiver see the facets, not the sphere
+    assert np.quantile(away, 0.95) < limit
+    assert abs(np.median(got) / expected - 1) < limit
+    evidence(f"{np.dtype(real).name}: median E / (rho Phi0 / 4 pi R^2) - 1 = {np.median(got) / expected - 1:+.1e}, "
+             f"95 % of pixels within {np.quantile(away, 0.95):.1e}")
+
+
+@pytest.mark.feature("SII-13")
+def test_irradiance_does_not_depend_on_the_number_of_lights(plates, evidence):
+    """T/N: over 200 draws the mean is that of all texels, at every N; without it E would fall by 16 and 256."""
+    reference, found = sii(plates, ALL).mean(), []
+    for count in (16, 64, 256):
+        runs = np.array([sii(plates, SiiSettings(lights=count, pattern="random", seed=s)).mean() for s in range(200)])
+        error = runs.std() / math.sqrt(200)
+        assert abs(runs.mean() - reference) < 4 * error
+        found.append(f"N = {count}: {runs.mean() / reference - 1:+.2%} +- {error / reference:.2%}")
+    evidence("mean of 200 random sets against all texels: " + ", ".join(found))
+
+
+@pytest.mark.feature("SII-10")
+def test_error_slopes_of_random_and_low_discrepancy_patterns(plates, evidence):
+    # 3^5 texels: cells of 3, 9 and 27 lights a side have a middle texel; else a grid would be off by half a texel
+    plates = Frame(plates.scene, width=24, height=24, rsm_resolution=243)
+    reference = sii(plates, ALL)
+    counts = (9, 81, 729)
+    slopes = {}
+    for pattern in ("random", "halton", "grid"):
+        seeds = range(100) if pattern != "grid" else range(1)
+        errors = [math.sqrt(np.mean([rms(sii(plates, SiiSettings(lights=n, pattern=pattern, seed=s)), reference) ** 2
+                                     for s in seeds])) for n in counts]
+        slopes[pattern] = float(np.polyfit(np.log(counts), np.log(errors), 1)[0])
+    assert slopes["random"] == pytest.approx(-0.5, abs=0.1)
+    assert slopes["halton"] < slopes["random"] - 0.15
+    assert slopes["grid"] < slopes["random"] - 0.15
+    evidence("RMSE ~ N^s: " + ", ".join(f"{pattern} {slope:.2f}" for pattern, slope in slopes.items()))
+
+
+@pytest.mark.feature("SII-26")
+def test_presets_come_nearer_to_the_sum_over_all_texels(box, evidence):
+    clamp = {"clamp": "distance", "clamp_value": 0.05}  # else the nearest pair alone decides the error
+    reference = sii(box, dataclasses.replace(ALL, **clamp))
+    presets = (108, 256, 768, 1000, 4096)
+    errors = [math.sqrt(np.mean([rms(sii(box, SiiSettings(lights=n, seed=s, **clamp)), reference) ** 2
+                                 for s in range(1, 9)])) for n in presets]
+    assert errors == sorted(errors, reverse=True)
+    evidence("RMSE / mean: " + ", ".join(f"{n} lights {e:.3f}" for n, e in zip(presets, errors, strict=True)))
+
+
+@pytest.mark.feature("SII-03")
+def test_filtered_flux_is_steadier_under_a_moving_light(box, evidence):
+    """The light turns by a quarter of a texel a step. A texel enters or leaves the grid's choice at once, a cell's
+    sum by little."""
+    scene, light = box.scene, box.scene.lights[0]
+    step = 2 * math.tan(light.outer_half_angle) / 128 / 4
+    means = {False: [], True: []}
+    for k in range(24):
+        turned = np.asarray(light.direction) / np.linalg.norm(light.direction) + [k * step, 0, 0]
+        moved = scene.with_lights(dataclasses.replace(light, direction=tuple(turned)))
+        frame = Frame(moved, width=16, height=16, rsm_resolution=128)
+        for filtered in means:
+            how = SiiSettings(lights=64, pattern="grid", filtered=filtered, clamp="distance", clamp_value=0.05)
+            means[filtered].append(sii(frame, how).mean(axis=(1, 2)))
+
+    def unsteady(values):
+        return float(np.diff(values, 2, axis=0).std() / np.mean(values))  # what is left of a smooth change: nothing
+
+    plain, steady = unsteady(means[False]), unsteady(means[True])
+    assert steady < plain / 2
+    sums = [pixel_lights(box.rsms, SiiSettings(lights=64, pattern="grid", filtered=True)).flux.sum(axis=1),
+            box.rsms[0].flux.sum(axis=(1, 2))]
+    np.testing.assert_allclose(*sums, rtol=1e-5)  # float32 sums
+    evidence(f"std of the second difference of E over 24 quarter-texel steps: {plain:.3%} unfiltered, "
+             f"{steady:.3%} filtered; flux sum kept")
+
+
+@pytest.mark.feature("SII-27")
+@pytest.mark.feature("REF-08")
+def test_clamps_and_offset_on_a_scene(box, evidence):
+    plain = sii(box, ALL)
+    found = []
+    for how in ({"clamp": "distance", "clamp_value": 0.1}, {"clamp": "geometry", "clamp_value": 50.0},
+                {"clamp": "disc"}, {"offset": 0.02}):
+        got = sii(box, dataclasses.replace(ALL, **how))
+        assert np.isfinite(got).all()
+        if "offset" not in how:
+            assert (got <= plain * (1 + 1e-5)).all()
+        found.append(f"{how} max {got.max():.3g} mean {got.mean() / plain.mean() - 1:+.1%}")
+    evidence(f"none max {plain.max():.3g}; " + "; ".join(found))
+
+
+def test_footprints_are_the_lit_area(plates):
+    """A spot of 40 degrees straight down on a floor at height 1 (and just below the upper plate) lights a disc."""
+    (light,) = plates.scene.lights
+    area = light_footprints(plates.rsms, ALL)
+    assert len(area) == pixel_lights(plates.rsms, ALL).position.shape[1]
+    disc = math.pi * (light.position[1] * math.tan(light.outer_half_angle)) ** 2
+    assert area.sum() == pytest.approx(disc, rel=0.03)  # whole texels on the rim
+    few = light_footprints(plates.rsms, SiiSettings(lights=256, seed=1))
+    assert len(few) == pixel_lights(plates.rsms, SiiSettings(lights=256, seed=1)).position.shape[1]
+    assert few.sum() == pytest.approx(disc, rel=0.1)
+
+
+def test_several_lights_add_up(box):
+    first = box.scene.lights[0]
+    second = SpotLight((0.3, 0.4, 0.3), (1.0, -0.5, 0.0), 0.2, 0.5, (1.0, 2.0, 3.0))
+    parts = [sii(Frame(box.scene.with_lights(*lights), width=16, height=16, rsm_resolution=64), ALL)
+             for lights in ((first,), (second,), (first, second))]
+    np.testing.assert_allclose(parts[2], parts[0] + parts[1], rtol=1e-5)
+
+
+def test_lobe_code_is_skipped_without_glossy_materials(box):
+    with observe() as log:
+        sii(box, SiiSettings())
+    assert log.status("splat.lobes") == ["skipped"]
+    assert log.status("splat.irradiance") == ["ran"]
+
+
+def test_settings_are_checked():
+    for change in ({"lights": 0}, {"pattern": "spiral"}, {"seed": -1}):
+        with pytest.raises(InputError, match=next(iter(change))):
+            SiiSettings(**change)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from refgi.errors import InputError
@@ -166,6 +166,8 @@ def test_parallel_plates_have_the_closed_form_in_their_geometry() -> None:
     kernel = 4.0 / (4.0 + radius**2) ** 2
     total = (0.4 / math.pi * floor * kernel * 2 * math.pi * radius).sum() * edge / 20_000
     assert total == pytest.approx(0.4 * 0.4 / 4 * (1 - math.cos(math.radians(35)) ** 5), rel=5e-5)
+    assert light.inner_half_angle == light.outer_half_angle == math.radians(35)
+    assert light.intensity == (1, 1, 1)
     receiver = scene.geometry.vertices[scene.geometry.faces[2]]
     assert (receiver[:, 1] == 2.0).all()
     assert height < 2.0  # the receiver cannot block the light
@@ -238,6 +240,33 @@ def test_parameters_in_any_notation() -> None:
     assert builtin_scenes()["atrium"].build(faces=20_000).face_count == load_scene("atrium:faces=20000").face_count
 
 
+@pytest.mark.parametrize("faces", [10_000, 250_000])
+def test_the_atrium_keeps_its_measures_at_any_density(faces: int) -> None:
+    scene = load_scene(f"atrium:faces={faces}")
+    low, high = scene.geometry.bounds
+    assert np.allclose(high, (4 * 3.0 + 3.25, 10.5, 3.0 + 3.25), atol=1e-12)
+    assert np.allclose(low, (-high[0], 0.0, -high[2]), atol=0.02)  # tiles are worn into the floor by 15 mm
+    eye, light = np.array(scene.camera.eye), scene.lights[0]
+    assert (np.abs(eye[[0, 2]]) < (12, 3)).all()
+    assert 0 < eye[1] < 4
+    # The spot's axis passes the opening between the cornices at 9.5 m and meets the floor of the courtyard.
+    for height, reach in ((9.5, 3.0 - 0.58), (0.0, 3.0)):
+        along = (light.position[1] - height) / -light.direction[1]
+        place = np.array(light.position) + along * np.array(light.direction)
+        assert abs(place[0]) < 12
+        assert abs(place[2]) < reach
+    names = [material.name for material in scene.materials]
+    assert {"red_cloth", "green_cloth", "blue_cloth", "gold_cloth"} < set(names)
+    columns = scene.geometry.faces[scene.geometry.material_of_face == names.index("column")]
+    corners = scene.geometry.vertices[np.unique(columns)]
+    for x in np.arange(-12, 12.1, 3):
+        for z in (-3, 3):  # a column of either storey stands here
+            near = np.hypot(corners[:, 0] - x, corners[:, 2] - z) < 0.36
+            assert near.any()
+            assert corners[near, 1].min() < 1
+            assert corners[near, 1].max() > 7
+
+
 def test_the_seed_of_the_atrium_changes_its_cloth_alone() -> None:
     one, two, same = (load_scene(f"atrium:faces=20000,seed={seed}") for seed in (1, 2, 1))
     assert np.array_equal(one.geometry.vertices, same.geometry.vertices)
@@ -245,6 +274,7 @@ def test_the_seed_of_the_atrium_changes_its_cloth_alone() -> None:
     assert one.camera == two.camera
 
 
+@settings(deadline=None)  # a scene may be built
 @given(st.text(max_size=30))
 def test_any_name_is_built_or_refused(text: str) -> None:
     try:
@@ -254,6 +284,7 @@ def test_any_name_is_built_or_refused(text: str) -> None:
     assert scene.face_count > 0
 
 
+@settings(deadline=None)
 @given(st.fixed_dictionaries({}, optional={"faces": st.floats() | st.integers(), "albedo": st.floats(),
                                            "radius": st.floats(), "other": st.just(1)}))
 def test_any_parameters_are_taken_or_refused(parameters: dict[str, Any]) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from refgi.errors import InputError, RefgiWarning
@@ -100,6 +100,7 @@ def test_lights_without_power() -> None:
         shining([], "lights")
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-100, 100), min_size=12, max_size=12))
 def test_placing_moves_points_normals_and_orientation_alike(numbers: list[float]) -> None:
     rows = [*numbers, 0.0, 0.0, 0.0, 1.0]
@@ -127,6 +128,7 @@ def test_matrices_that_place_nothing(numbers: list[float]) -> None:
         affine(numbers, "transform")
 
 
+@settings(deadline=None)
 @given(scale=st.floats(1e-8, 1e8), slim=st.floats(1e-12, 1.0))
 def test_a_thin_face_is_kept_at_any_scale(scale: float, slim: float) -> None:
     vertices = VERTICES * (1.0, slim, 1.0) * scale

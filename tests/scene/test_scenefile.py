@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from refgi.errors import InputError, RefgiWarning
@@ -182,6 +182,7 @@ def test_more_instances_than_memory_holds(tmp_path: Path, monkeypatch: pytest.Mo
         load_scene(write_scene(tmp_path, objects=[{"mesh": "square.ply"}] * 8))
 
 
+@settings(deadline=None)  # files are written and read
 @given(angle=st.floats(allow_nan=False, width=32))
 def test_any_cone_is_taken_or_refused(tmp_path_factory: pytest.TempPathFactory, angle: float) -> None:
     folder = tmp_path_factory.mktemp("cone", numbered=True)
@@ -193,6 +194,7 @@ def test_any_cone_is_taken_or_refused(tmp_path_factory: pytest.TempPathFactory, 
             load_scene(path)
 
 
+@settings(deadline=None)
 @given(tree=st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=5),
                          lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
                              st.sampled_from(["schema", "camera", "lights", "objects", "mesh", "type"]), inner),

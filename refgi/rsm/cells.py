@@ -11,6 +11,8 @@ from refgi.rsm.projection import Projection
 
 Array = npt.NDArray[Any]
 
+EQUALLY_NEAR = 8  # chosen texels looked at for ties
+
 
 def cells_of_grid(maps: Projection, count: int) -> Array:
     """Return the grid cell that holds each texel's centre.
@@ -49,7 +51,7 @@ def cells_of_nearest(maps: Projection, texel: Array) -> Array:
     maps : Projection
         The stacked maps.
     texel : (N,) ndarray of int
-        Chosen texels, indices into the flattened maps; of equal ones the first gets the cell.
+        Chosen texels, indices into the flattened maps; of equal or equally near ones the first gets the texel.
 
     Returns
     -------
@@ -65,8 +67,10 @@ def cells_of_nearest(maps: Projection, texel: Array) -> Array:
         return np.stack([row + row // maps.height * apart, column], axis=1).astype(np.float64)
 
     unique, first = np.unique(texel, return_index=True)
-    _, nearest = cKDTree(place(unique)).query(place(np.arange(math.prod(maps.shape))))
-    return np.asarray(first[nearest])
+    candidates = np.arange(1, min(EQUALLY_NEAR, len(unique)) + 1)
+    distance, nearest = cKDTree(place(unique)).query(place(np.arange(math.prod(maps.shape))), k=candidates)
+    tied = np.rint(distance**2) == np.rint(distance[:, :1] ** 2)  # squares of integer steps
+    return np.where(tied, first[nearest], len(texel)).min(axis=1)
 
 
 def cell_sums(flux: Array, cell: Array, count: int) -> Array:

@@ -1,7 +1,7 @@
 """Direct light: irradiance of one light at the receivers, and its shadows from the map's depth."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,17 @@ from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
-STEEPEST = 20.0  # largest slope, depth per sideways distance, that the default bias follows
+MARGIN = 0.1  # texels, also per unit of slope: how far above a receiver's plane its own surface may be stored
+STEEPEST = 10.0  # largest slope, depth per sideways distance, that the margin follows
 NO_SHADOW = np.zeros((0, 0), np.bool_)
+
+
+class Stored(NamedTuple):
+    """What a light's map tells about its nearest surface."""
+
+    depth: Array  # (H, W) m
+    position: Array  # (3, H, W) m
+    bias: float  # m; negative: compare with the receiver's plane
 
 
 @stage("rsm.shadow_map_visibility")
@@ -36,8 +45,8 @@ def shadow_map_visibility(
     rsm : Rsm
         The light's map.
     bias : float, optional
-        A receiver counts as lit up to this far behind the stored depth, m. By default as far as a plane through the
-        receiver sinks within one texel, by its slope towards the light.
+        A receiver counts as lit up to this far behind the stored depth, m: the published test. By default it is in
+        shadow where the stored point lies above the receiver's own plane by more than a fraction of a texel.
 
     Returns
     -------
@@ -51,37 +60,48 @@ def shadow_map_visibility(
 
     Notes
     -----
-    The published test: nearest texel, one comparison. Shadow edges are as coarse as the map.
+    One look-up, of the nearest texel: shadow edges are as coarse as the map. What blocks the light lies between it and
+    the receiver, hence above the receiver's plane; a neighbouring point of the same surface does not, at any slope.
     """
     expect(bias is None or (math.isfinite(bias) and bias >= 0), "bias", "a finite number >= 0, m", bias)
     visible = np.zeros(covered.shape, np.bool_)
-    _look_up(rsm.projection, position, normal, covered, rsm.depth, -1.0 if bias is None else bias, visible)
+    stored = Stored(rsm.depth, rsm.position, -1.0 if bias is None else bias)
+    _look_up(rsm.projection, position, normal, covered, stored, visible)
     return visible
 
 
 @kernel(parallel=True)
 def _look_up(
-    maps: Projection, position: Array, normal: Array, covered: Array, depth: Array, bias: float, visible: Array
+    maps: Projection, position: Array, normal: Array, covered: Array, stored: Stored, visible: Array
 ) -> None:
     for row in prange(covered.shape[0]):
         for column in range(covered.shape[1]):
             if covered[row, column]:
-                x, y, z = position[0, row, column], position[1, row, column], position[2, row, column]
-                texel_row, texel_column, far = texel_of(maps, x, y, z)
-                if far == far:  # seen by the map
-                    i = min(int(texel_row), depth.shape[0] - 1)
-                    j = min(int(texel_column), depth.shape[1] - 1)
-                    allowed = bias
-                    if bias < 0.0:
-                        m = i // maps.height
-                        nx, ny, nz = normal[0, row, column], normal[1, row, column], normal[2, row, column]
-                        allowed = _sinking(maps, m, (x, y, z), (nx, ny, nz), far)
-                    visible[row, column] = far <= depth[i, j] + allowed
+                point = position[0, row, column], position[1, row, column], position[2, row, column]
+                facing = normal[0, row, column], normal[1, row, column], normal[2, row, column]
+                visible[row, column] = _reached(maps, stored, point, facing)
 
 
 @kernel
-def _sinking(maps: Projection, m: int, point: Any, normal: Any, depth: float) -> Any:
-    """Return how much farther than a receiver its plane may be one texel away, m."""
+def _reached(maps: Projection, stored: Stored, point: Any, facing: Any) -> Any:
+    """Tell whether one receiver is lit."""
+    row, column, far = texel_of(maps, point[0], point[1], point[2])
+    if far != far:  # outside the map
+        return False
+    i, j = min(int(row), stored.depth.shape[0] - 1), min(int(column), stored.depth.shape[1] - 1)
+    if stored.bias >= 0.0:
+        return far <= stored.depth[i, j] + stored.bias
+    if far <= stored.depth[i, j]:
+        return True
+    above = 0.0
+    for axis in range(3):
+        above += facing[axis] * (stored.position[axis, i, j] - point[axis])
+    return above <= _margin(maps, i // maps.height, point, facing) + 1e-6 * far
+
+
+@kernel
+def _margin(maps: Projection, m: int, point: Any, facing: Any) -> Any:
+    """Return the margin over a receiver's plane, m: a fraction of a texel that grows with the slope."""
     frame, origin = maps.frame, maps.origin
     dx, dy, dz = frame[m, 2, 0], frame[m, 2, 1], frame[m, 2, 2]
     width = 2.0 * max(maps.half[0] / maps.width, maps.half[1] / maps.height)
@@ -90,9 +110,9 @@ def _sinking(maps: Projection, m: int, point: Any, normal: Any, depth: float) ->
         distance = math.sqrt(dx * dx + dy * dy + dz * dz)
         dx, dy, dz = dx / distance, dy / distance, dz / distance
         width *= 2.0 * distance if maps.kind == PARABOLOID else distance
-    cosine = abs(dx * normal[0] + dy * normal[1] + dz * normal[2])
-    slope = min(math.sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-6), STEEPEST)
-    return width * (slope + 0.1) + 1e-6 * depth
+    cosine = abs(dx * facing[0] + dy * facing[1] + dz * facing[2])
+    slope = math.sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-6)
+    return MARGIN * width * (1.0 + min(slope, STEEPEST))
 
 
 @stage("rsm.direct_irradiance")

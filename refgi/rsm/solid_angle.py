@@ -5,9 +5,9 @@ With image-plane coordinates (x, y), r^2 = x^2 + y^2:
 - perspective: cos a = (1 + r^2)^(-1/2), density of solid angle (1 + r^2)^(-3/2),
 - paraboloid: cos a = (1 - r^2)/(1 + r^2), density 4/(1 + r^2)^2, cut at the unit disc (papers.md section 0).
 
-A spot's intensity depends on r alone, so its integral over a texel is exact where the intensity is constant (corner
-differences, cut by circles with a closed form along one axis) and a 4 x 4 Gauss rule elsewhere. All maps are
-symmetric about both axes; one quadrant is computed and mirrored.
+A spot's intensity depends on r alone. Where it is constant over a texel its integral is a difference of corners; where
+a circle cuts the texel it is a closed form along y and a Gauss rule along x; elsewhere a 4 x 4 Gauss rule. All maps
+are symmetric about both axes; one quadrant is computed and mirrored.
 """
 
 import math
@@ -22,8 +22,13 @@ from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, PERSPECTIVE, Projecti
 
 Array = npt.NDArray[Any]
 
-NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263)  # Gauss, on [0, 1]
-WEIGHTS = (0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693)
+# Gauss-Legendre rules of 4 and of 8 nodes on [0, 1]
+FEW_NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263)
+FEW_WEIGHTS = (0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693)
+NODES = (0.019855071751231912, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751,
+         0.5917173212478248, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681)
+WEIGHTS = (0.05061426814518853, 0.11119051722668721, 0.15685332293894344, 0.18134189168918083,
+           0.18134189168918083, 0.15685332293894344, 0.11119051722668721, 0.05061426814518853)
 SUBSAMPLES = 4  # per side of a texel that a spot's cone crosses askew
 
 
@@ -129,23 +134,33 @@ def _power(kind: int, x0: float, x1: float, y0: float, y1: float, cos_inner: flo
         return _rectangle(kind, x0, x1, y0, y1)
     if math.sqrt(x0 * x0 + y0 * y0) >= outer:
         return 0.0
+    if math.sqrt(x0 * x0 + y0 * y0) >= inner and farthest <= outer:
+        return _smooth_power(kind, x0, x1, y0, y1, cos_inner, cos_outer)
     # between these abscissae no circle enters or leaves through the top or bottom side
-    cuts = np.array([x0, _meets(inner, y1, x0, x1), _meets(inner, y0, x0, x1),
-                     _meets(outer, y1, x0, x1), _meets(outer, y0, x0, x1), x1])  # fmt: skip
-    cuts.sort()
+    enters, leaves = _meets(inner, y0, x0, x1), _meets(outer, y1, x0, x1)
+    cuts = (x0, _meets(inner, y1, x0, x1), min(enters, leaves), max(enters, leaves), _meets(outer, y0, x0, x1), x1)
     total = 0.0
     for piece in range(5):
         left, size = cuts[piece], cuts[piece + 1] - cuts[piece]
         if size > 0.0:
-            for node in range(4):
-                x = left + NODES[node] * size
+            for node in range(8):
+                # a circle may be upright at the right end: x = left + size (1 - (1 - q)^2) makes it smooth there
+                rest = 1.0 - NODES[node]
+                x, step = left + size * (1.0 - rest * rest), 2.0 * size * rest * WEIGHTS[node]
                 middle = min(max(math.sqrt(max(inner * inner - x * x, 0.0)), y0), y1)
                 top = min(max(math.sqrt(max(outer * outer - x * x, 0.0)), y0), y1)
-                total += WEIGHTS[node] * size * (
-                    _strip(kind, x, middle) - _strip(kind, x, y0)
-                    + _falloff_strip(kind, x, middle, top, cos_inner, cos_outer)
-                )  # fmt: skip
+                constant = _strip(kind, x, middle) - _strip(kind, x, y0)
+                total += step * (constant + _falloff_strip(kind, x, middle, top, cos_inner, cos_outer))
     return total
+
+
+@kernel
+def _smooth_power(kind: int, x0: float, x1: float, y0: float, y1: float, cos_inner: float, cos_outer: float) -> float:
+    total = 0.0
+    for node in range(4):
+        x = x0 + FEW_NODES[node] * (x1 - x0)
+        total += FEW_WEIGHTS[node] * _falloff_strip(kind, x, y0, y1, cos_inner, cos_outer)
+    return total * (x1 - x0)
 
 
 @kernel
@@ -175,14 +190,14 @@ def _falloff_strip(kind: int, x: float, y0: float, y1: float, cos_inner: float, 
     total = 0.0
     if y1 > y0:
         for node in range(4):
-            y = y0 + NODES[node] * (y1 - y0)
+            y = y0 + FEW_NODES[node] * (y1 - y0)
             square = 1.0 + x * x + y * y
             if kind == PARABOLOID:
                 cosine, density = (2.0 - square) / square, 4.0 / (square * square)
             else:
                 cosine = 1.0 / math.sqrt(square)
                 density = cosine / square
-            total += WEIGHTS[node] * density * spot_falloff(cosine, cos_inner, cos_outer)
+            total += FEW_WEIGHTS[node] * density * spot_falloff(cosine, cos_inner, cos_outer)
     return total * (y1 - y0)
 
 
@@ -238,11 +253,13 @@ def _sample_spot(projection: Projection, axis: Array, cosines: Array, share: Arr
         ay = frame[m, 1, 0] * axis[0] + frame[m, 1, 1] * axis[1] + frame[m, 1, 2] * axis[2]
         az = frame[m, 2, 0] * axis[0] + frame[m, 2, 1] * axis[1] + frame[m, 2, 2] * axis[2]
         for column in range(width):
-            total = 0.0
+            total, whole = 0.0, 0.0
             for s in range(SUBSAMPLES * SUBSAMPLES):
                 x = (2.0 * (column + (s % SUBSAMPLES + 0.5) / SUBSAMPLES) / width - 1.0) * projection.half[0]
                 y = (2.0 * (row - m * height + (s // SUBSAMPLES + 0.5) / SUBSAMPLES) / height - 1.0)
                 y *= projection.half[1]
-                cosine = (ax * x + ay * y + az) / math.sqrt(1.0 + x * x + y * y)
-                total += spot_falloff(cosine, cosines[0], cosines[1])
-            share[row, column] = total / (SUBSAMPLES * SUBSAMPLES)
+                scale = 1.0 / math.sqrt(1.0 + x * x + y * y)
+                density = scale * scale * scale
+                total += density * spot_falloff((ax * x + ay * y + az) * scale, cosines[0], cosines[1])
+                whole += density
+            share[row, column] = total / whole

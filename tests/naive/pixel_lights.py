@@ -49,7 +49,7 @@ def grid_cell_sums(flux, n):
 
 
 def nearest_cell_sums(flux, texels):
-    """Flux of the texels nearest to each chosen one; of equally near ones the share is not defined."""
+    """Flux of the texels nearest to each chosen one; of equally near ones the first gets it."""
     height, width = len(flux[0]), len(flux[0][0])
     sums = [[0.0] * len(texels) for _ in flux]
     for row in range(height):

@@ -67,7 +67,7 @@ def nearest(origin, direction, vertices, faces):
     return winner, float(first), weights, float(margin)
 
 
-def attributes(origin, direction, hit, vertices, faces, normals=None):
+def attributes(direction, hit, vertices, faces, normals=None):
     """Position, normal on the seen side, distance of one hit of `nearest`."""
     winner, t, weights, _ = hit
     corners = vertices[faces[winner]]

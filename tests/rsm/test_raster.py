@@ -93,10 +93,10 @@ def test_a_sheet_covers_each_texel_exactly_once(kind):
         flat = sheet(5, rng, 0.4)
         turn = rotation(rng)
         shape = geometry(40 * flat.vertices @ turn.T + turn[:, 2], flat.faces)
+        above, along = -turn[None, :, 2], look_frame(turn[:, 2])[None]
         projection = {
             "perspective": camera_projection(Camera((0, 0, 0), tuple(turn[:, 2]), tuple(turn[:, 1]), 1.5, 37, 29)),
-            "orthographic": Projection(ORTHOGRAPHIC, 31, 33, -turn[None, :, 2], look_frame(turn[:, 2])[None],
-                                       np.array([20.0, 25.0]), 10.0),  # fmt: skip
+            "orthographic": Projection(ORTHOGRAPHIC, 31, 33, above, along, np.array([20.0, 25.0]), 10.0),
             "paraboloid": paraboloid_projection([(0, 0, 0)], [turn[:, 2]], 33, 0.7),
             "cube": cube_projection((0, 0, 0), 15),
         }[kind]

@@ -1,0 +1,203 @@
+"""Pixel lights: which texels, the weight T/N, footprints that keep the flux, several lights."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.errors import InputError
+from refgi.rsm import choose_pixel_lights, reflective_shadow_map
+from refgi.scene import Material, PointLight, SpotLight, load_scene, material_table
+from tests.naive import pixel_lights as naive
+from tests.rsm.shapes import geometry, sphere
+
+ROUNDING = 1e-12  # float64 sums of thousands of fluxes
+GLOSSY = Material(diffuse=(0.1, 0.2, 0.3), specular=(0.3, 0.4, 0.5), exponent=20.0)
+
+
+def box_map(resolution=24, dtype=np.float64, **changes):
+    box = load_scene("cornell_box")
+    light = box.lights[0]
+    for key, value in changes.items():
+        light = light.__class__(**{**light.__dict__, key: value})
+    return reflective_shadow_map(box.geometry, material_table(box.materials, dtype), light, resolution, dtype)
+
+
+def cube_map(resolution=10):
+    box = load_scene("cornell_box")
+    light = PointLight(box.lights[0].position, (1.0, 2.0, 3.0))
+    materials = material_table(box.materials, np.float64)
+    return reflective_shadow_map(box.geometry, materials, light, resolution, np.float64)
+
+
+@pytest.mark.feature("SII-13")
+@pytest.mark.parametrize(("pattern", "count"), [("grid", 25), ("grid", 49), ("halton", 50), ("halton", 700)])
+def test_texels_and_weights_equal_those_of_a_literal_twin(pattern, count, evidence):
+    rsm = box_map()
+    texels = (naive.grid_texels(math.isqrt(count), 24, 24) if pattern == "grid"
+              else naive.halton_texels(count, 24, 24))  # fmt: skip
+    expected = naive.lights(rsm.flux, texels)
+    lights = choose_pixel_lights([rsm], count=count, pattern=pattern)
+    assert lights.drawn == count
+    assert lights.flux.shape == (3, len(expected))
+    for k, (row, column, phi) in enumerate(expected):
+        np.testing.assert_allclose(lights.flux[:, k], phi, rtol=ROUNDING)
+        np.testing.assert_array_equal(lights.position[:, k], rsm.position[:, row, column])
+        np.testing.assert_array_equal(lights.normal[:, k], rsm.normal[:, row, column])
+    evidence(f"{pattern} N={count}: {len(expected)} lights with flux, weights T/N")
+
+
+@pytest.mark.feature("SII-13")
+def test_the_mean_over_draws_is_the_maps_flux_for_every_count(evidence):
+    rsm = box_map()
+    total = rsm.flux.sum(axis=(1, 2))
+    for count in (1, 7, 64, 1000):
+        sums = np.array([choose_pixel_lights([rsm], count=count, pattern="random", seed=seed).flux.sum(axis=1)
+                         for seed in range(400)])  # fmt: skip
+        error = sums.mean(axis=0) - total
+        standard = sums.std(axis=0, ddof=1) / 20
+        z = np.abs(error / standard).max()
+        assert z < 4
+        evidence(f"N={count}: mean of 400 draws {z:.1f} standard errors off")
+
+
+def test_all_texels_have_weight_one():
+    rsm = box_map()
+    lights = choose_pixel_lights([rsm], count=None, pattern="all")
+    bright = rsm.flux.any(axis=0)
+    np.testing.assert_array_equal(lights.flux, rsm.flux[:, bright])
+    np.testing.assert_array_equal(lights.position, rsm.position[:, bright])
+    assert lights.drawn == rsm.texels == 576
+    assert 0 < lights.flux.shape[1] < 576
+
+
+@pytest.mark.feature("SII-03")
+@pytest.mark.parametrize("pattern", ["grid", "halton", "random"])
+@pytest.mark.parametrize("source", ["spot", "cube"])
+def test_filtering_keeps_the_flux(pattern, source, evidence):
+    rsm = box_map(31) if source == "spot" else cube_map()
+    for count in (6, 54, 150) if source == "cube" else (1, 16, 49, 225):
+        lights = choose_pixel_lights([rsm], count=count, pattern=pattern, filtered=True)
+        error = np.abs(lights.flux.sum(axis=1) / rsm.flux.sum(axis=(1, 2)) - 1).max()
+        assert error < ROUNDING
+        assert lights.drawn == count
+        assert (np.linalg.norm(lights.normal, axis=0) > 0.99).all()  # each stands on a surface
+    evidence(f"{pattern}, {source}: flux sum changes by {error:.0e}")
+
+
+@pytest.mark.parametrize(("n", "resolution"), [(4, 24), (5, 24), (24, 24), (7, 31)])
+def test_grid_cells_equal_those_of_a_literal_twin(n, resolution):
+    rsm = box_map(resolution)
+    lights = choose_pixel_lights([rsm], count=n * n, pattern="grid", filtered=True)
+    expected = np.array(naive.grid_cell_sums(rsm.flux, n))
+    np.testing.assert_allclose(lights.flux, expected[:, expected.any(axis=0)], rtol=ROUNDING)
+
+
+def test_nearest_cells_equal_those_of_a_literal_twin():
+    rsm = box_map()
+    texels = naive.halton_texels(9, 24, 24)
+    lights = choose_pixel_lights([rsm], count=9, pattern="halton", filtered=True)
+    expected = np.array(naive.nearest_cell_sums(rsm.flux, texels))
+    np.testing.assert_allclose(lights.flux, expected[:, expected.any(axis=0)], rtol=ROUNDING)
+
+
+@pytest.mark.feature("SII-03")
+def test_filtering_calms_the_light_under_sub_texel_motion(evidence):
+    jumps = {}
+    for filtered in (False, True):
+        sums = []
+        for step in range(24):  # 0.4 mm each, under a texel in all
+            rsm = box_map(64, position=(0.268 + step * 4e-4, 0.5475, 0.2))
+            lights = choose_pixel_lights([rsm], count=64, pattern="grid", filtered=filtered)
+            away = np.array([0.28, 0.27, -2.0])[:, None] - lights.position  # before the box, facing it: no near light
+            cosines = np.maximum((lights.normal * away).sum(axis=0), 0) * np.maximum(-away[2], 0)
+            sums.append((lights.flux * cosines / (away**2).sum(axis=0) ** 2).sum(axis=1))
+        jumps[filtered] = (np.diff(sums, 2, axis=0).std(axis=0) / np.mean(sums, axis=0)).max()
+    assert jumps[True] < 0.5 * jumps[False]
+    evidence(f"relative std of E's jumps over 24 sub-texel steps: {jumps[False]:.1e} plain, {jumps[True]:.1e} filtered")
+
+
+def test_a_filtered_light_on_a_dark_texel_moves_to_the_nearest_bright_one():
+    rsm = box_map()
+    lights = choose_pixel_lights([rsm], count=1, pattern="grid", filtered=True)
+    dark = np.zeros_like(rsm.flux)
+    dark[:, 3, 20] = 1.0
+    moved = choose_pixel_lights([rsm._replace(flux=dark)], count=1, pattern="grid", filtered=True)
+    np.testing.assert_array_equal(moved.position[:, 0], rsm.position[:, 3, 20])
+    np.testing.assert_array_equal(lights.position[:, 0], rsm.position[:, 12, 12])
+
+
+def test_several_lights_share_the_count_and_each_keeps_its_flux():
+    first, second = box_map(), box_map(16)
+    glossy = reflective_shadow_map(sphere(10, 2.0), material_table([GLOSSY], np.float64),
+                                   SpotLight((0, 0, 0), (0, -1, 0), 0.4, 0.8, (1, 1, 1)), 16, np.float64)  # fmt: skip
+    joined = choose_pixel_lights([first, second, glossy], count=32, pattern="halton", seed=3)
+    assert joined.drawn == 32
+    alone = [choose_pixel_lights([rsm], count=count, pattern="all" if count is None else "random")
+             for rsm, count in ((first, None), (second, None), (glossy, None))]  # fmt: skip
+    every = choose_pixel_lights([first, second, glossy], count=None, pattern="all")
+    np.testing.assert_array_equal(every.flux, np.concatenate([part.flux for part in alone], axis=1))
+    assert every.lobe_flux.shape == every.flux.shape == every.lobe_axis.shape
+    dark = alone[0].flux.shape[1] + alone[1].flux.shape[1]
+    assert (every.lobe_flux[:, :dark] == 0).all()
+    np.testing.assert_array_equal(every.lobe_flux[:, dark:], alone[2].lobe_flux)
+    np.testing.assert_array_equal(every.lobe_exponent[dark:], 20)
+    grid = choose_pixel_lights([first, second], count=16 + 16, pattern="grid")
+    for part, rsm in ((slice(0, 10), first),):
+        assert set(map(tuple, grid.position[:, part].T)) <= set(map(tuple, rsm.position.reshape(3, -1).T))
+
+
+def test_lobes_carry_the_same_weight_as_the_diffuse_part():
+    light = SpotLight((0, 0, 0), (0, -1, 0), 0.4, 0.8, (1, 1, 1))
+    rsm = reflective_shadow_map(sphere(10, 2.0), material_table([GLOSSY], np.float64), light, 16, np.float64)
+    for filtered in (False, True):
+        lights = choose_pixel_lights([rsm], count=64, pattern="grid", filtered=filtered)
+        np.testing.assert_allclose(lights.lobe_flux[0] / lights.flux[0], 3.0)
+    assert lights.lobe_flux.sum() == pytest.approx(rsm.lobe_flux.sum())
+
+
+def test_same_seed_same_lights_other_seed_others():
+    rsm = box_map()
+    for pattern in ("halton", "random"):
+        first, again, other = (choose_pixel_lights([rsm], count=50, pattern=pattern, seed=s) for s in (5, 5, 6))
+        np.testing.assert_array_equal(first.position, again.position)
+        assert first.position.shape != other.position.shape or (first.position != other.position).any()
+
+
+def test_float32_maps_give_float32_lights():
+    lights = choose_pixel_lights([box_map(dtype=np.float32)], count=16, pattern="grid", filtered=True)
+    assert lights.flux.dtype == lights.position.dtype == np.float32
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"count": 30, "pattern": "grid"}, "nearest 25 or 36, got 30"),
+        ({"count": 0, "pattern": "halton"}, "at least one for each of 1 lights, got 0"),
+        ({"count": None, "pattern": "random"}, "an integer, at least one for each of 1 lights, got None"),
+        ({"count": 10, "pattern": "all"}, "None or 576 with pattern 'all', got 10"),
+        ({"count": 10, "pattern": "hex"}, "grid or halton or all or random, got 'hex'"),
+        ({"count": 625, "pattern": "grid", "filtered": True}, "at most 576 with filtering, got 625"),
+    ],
+)
+def test_errors_name_what_is_wrong(options, message):
+    with pytest.raises(InputError, match=message):
+        choose_pixel_lights([box_map()], **options)
+
+
+def test_grids_on_several_maps_say_which_counts_fit():
+    with pytest.raises(InputError, match="nearest 96 or 150, got 100"):
+        choose_pixel_lights([cube_map()], count=100, pattern="grid")
+    with pytest.raises(InputError, match="nearest 50 or 72, got 60"):
+        choose_pixel_lights([box_map(), box_map()], count=60, pattern="grid")
+    with pytest.raises(InputError, match="rsms: expected at least one map"):
+        choose_pixel_lights([], count=4, pattern="grid")
+
+
+def test_a_map_without_flux_gives_no_lights():
+    light = PointLight((0, 0, 0), (1, 1, 1))
+    empty = reflective_shadow_map(geometry(np.zeros((0, 3)), np.zeros((0, 3))), material_table([GLOSSY]), light, 4)
+    for pattern, count in (("grid", 24), ("halton", 5), ("all", None)):
+        for filtered in (False, True):
+            lights = choose_pixel_lights([empty], count=count, pattern=pattern, filtered=filtered)
+            assert lights.flux.shape == (3, 0)

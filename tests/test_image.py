@@ -203,6 +203,16 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     assert len(list(tmp_path.iterdir())) == 1
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows does not replace an open file")
+def test_a_file_is_replaced_and_never_written_over(tmp_path):
+    """Whoever has the old file open reads the old file: no moment shows a mixture."""
+    write_text(tmp_path / "a.json", "old")
+    with (tmp_path / "a.json").open() as reader:
+        write_text(tmp_path / "a.json", "newer")
+        assert reader.read() == "old"
+    assert (tmp_path / "a.json").read_text() == "newer"
+
+
 def test_canonical_json_does_not_depend_on_the_order_of_keys():
     assert canonical_json({"b": [1, 2.5], "a": {"d": None, "c": True}}) == '{"a":{"c":true,"d":null},"b":[1,2.5]}'
 

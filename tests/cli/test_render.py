@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from refgi.cli import memory
 from refgi.cli.group import VerbGroup
+from refgi.cli.lights import read_lights
 from refgi.image import read_exr
 from refgi.methods import Picture, render
 from refgi.scene import Camera, PointLight, SpotLight, load_scene
@@ -163,6 +164,13 @@ def test_camera_and_light_options_replace_the_scenes_own(tmp_path, monkeypatch):
     assert scene.camera == Camera((0.0, 0.3, 1.2), own.target, own.up, np.radians(30.0), 12, 10)
     assert scene.lights == (SpotLight((0.0, 0.5, 0.0), (0.0, -1.0, 0.0), np.radians(20.0), np.radians(30.0),
                                       (1.0, 2.0, 3.0)), PointLight((0.1, 0.2, 0.3), (2.0, 2.0, 2.0)))
+
+
+def test_a_spot_shines_from_its_position_to_its_target():
+    light, = read_lights(["spot:position=1,2,3:target=1,0,0:outer_deg=30:intensity=5"])
+    assert light.direction == (0.0, -2.0, -3.0)
+    assert light.outer_half_angle == pytest.approx(np.radians(30))
+    assert light.inner_half_angle == pytest.approx(np.radians(27))
 
 
 def test_a_bare_mesh_gets_a_view_and_says_so(plate, tmp_path):

@@ -159,6 +159,13 @@ def test_infinite_figures_keep_the_schema(comparison):
     assert (figure.value, figure.noise) == ("inf", None)
 
 
+def test_a_signed_error_is_positive_where_the_method_is_too_bright(comparison):
+    """Analytic: sii is 1.3 times the ideal picture, whose noise is 2 %."""
+    error = signed_error(comparison, comparison.results["sii"])[comparison.covered]
+    truth = maps.luminance(comparison.truth.irradiance)[comparison.covered]
+    assert (error / truth).mean() == pytest.approx(0.3, abs=0.01)
+
+
 def test_error_maps_are_red_where_too_bright_and_blue_where_too_dark(comparison):
     sii = comparison.results["sii"]
     scale = maps.error_scale([signed_error(comparison, sii)], comparison.covered)

@@ -5,7 +5,12 @@ import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
+
+# the same examples on every run and no limit on time, which a compiling kernel would break
+hypothesis.settings.register_profile("refgi", derandomize=True, deadline=None)
+hypothesis.settings.load_profile("refgi")
 
 ROOT = Path(__file__).parents[1]
 FIGURES = pytest.StashKey[list[str]]()

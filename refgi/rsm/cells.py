@@ -70,7 +70,7 @@ def cells_of_nearest(maps: Projection, texel: Array) -> Array:
     candidates = np.arange(1, min(EQUALLY_NEAR, len(unique)) + 1)
     distance, nearest = cKDTree(place(unique)).query(place(np.arange(math.prod(maps.shape))), k=candidates)
     tied = np.rint(distance**2) == np.rint(distance[:, :1] ** 2)  # squares of integer steps
-    return np.where(tied, first[nearest], len(texel)).min(axis=1)
+    return np.asarray(np.where(tied, first[nearest], len(texel)).min(axis=1))
 
 
 def cell_sums(flux: Array, cell: Array, count: int) -> Array:

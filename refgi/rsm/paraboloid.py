@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
+from refgi.rsm.attributes import Planes, Surface, Wanted, resolve
 from refgi.rsm.projection import Projection, paraboloid_projection, view_coordinates
 from refgi.rsm.triangle import LANES, SMALLEST, centres_between
 from refgi.scene.model import Geometry
@@ -212,6 +213,7 @@ def paraboloid_depth_maps(
     """
     centers = np.reshape(np.asarray(centers, np.float64), (-1, 3))
     axes = np.reshape(np.asarray(axes, np.float64), (-1, 3))
+    expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
     expect(len(centers) == len(axes), "axes", f"{len(centers)} as many as centres", len(axes))
     expect(bool(np.isfinite(centers).all()), "centers", "finite coordinates", centers)
     expect(bool(np.isfinite(axes).all() and axes.any(axis=1).all()), "axes", "finite vectors, not zero", axes)
@@ -221,8 +223,20 @@ def paraboloid_depth_maps(
     ids = np.full(nearness.shape, -1, np.int32)
     if len(geometry.faces):
         draw_paraboloids(projection, geometry.vertices, geometry.faces, numba.get_num_threads(), nearness, ids)
-    distance = np.full((len(centers), size, size), np.inf, dtype)
+    if np.dtype(dtype) == np.float64:
+        return _exact_distances(geometry, projection, ids[:, :width]).reshape(-1, size, size)
+    distance = np.full((len(centers), size, size), np.inf, np.float32)
     _distances(projection, nearness, distance)
+    return distance
+
+
+def _exact_distances(geometry: Geometry, projection: Projection, ids: Array) -> Array:
+    """Return the distance to the plane of each texel's triangle, float64."""
+    distance, none, no_vectors = np.zeros(ids.shape), np.zeros((0, 0)), np.zeros((3, 0, 0))
+    surface = Surface(geometry.vertices, geometry.faces, np.zeros((0, 3)), geometry.material_of_face, np.zeros((1, 3)))
+    planes = Planes(distance, none, no_vectors, no_vectors, no_vectors, np.zeros((0, 0), np.int32))
+    wanted = Wanted(True, False, False, False, False, False)
+    resolve(surface, projection, np.ascontiguousarray(ids), wanted, planes, numba.get_num_threads())
     return distance
 
 

@@ -46,7 +46,8 @@ def test_channels_equal_those_of_a_literal_twin(name):
             hit = naive.nearest(*ray, shape.vertices, shape.faces)
             if hit[0] < 0 or hit[3] < DOUBT:
                 continue
-            position, normal, distance = naive.attributes(ray[1], hit, shape.vertices, shape.faces, shape.vertex_normals)
+            expected = naive.attributes(ray[1], hit, shape.vertices, shape.faces, shape.vertex_normals)
+            position, normal, distance = expected
             at = row, column
             assert seen.triangle_id[at] == hit[0]
             np.testing.assert_allclose(seen.depth[at], hit[1], rtol=FLOAT64)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 PAIRS_AT_ONCE = 1 << 31  # between two reports of progress
+BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
 
 
 class Receivers(NamedTuple):
@@ -68,15 +69,27 @@ def irradiance(
     """
     position, normal, covered = (np.asarray(part) for part in receivers)
     _check(position, normal, covered, lights, settings, footprint)
-    result = np.zeros(position.shape, position.dtype)
-    places = None if covered.all() else np.flatnonzero(covered)
-    points, normals = (_pack(part, places) for part in (position, normal))
+    places = _block_by_block(covered)
+    points, normals = (np.take(part.reshape(3, -1), places, axis=1) for part in (position, normal))
     total = np.zeros_like(points)
     _sum(points, normals, lights, settings, footprint, total)
-    if places is None:
-        return total.reshape(position.shape)
+    result = np.zeros_like(position)
     result.reshape(3, -1)[:, places] = total
     return result
+
+
+def _block_by_block(covered: Array) -> Array:
+    """Return the flat indices of covered pixels, 16 x 16 of them after another: a kernel's tile is one block.
+
+    Blocks are compact, so that more lights lie behind all their receivers than behind those of a piece of a row.
+    """
+    index = np.arange(covered.size).reshape(covered.shape)
+    index[~covered] = -1
+    height, width = (-(-size // BLOCK) * BLOCK for size in covered.shape)
+    padded = np.full((height, width), -1)
+    padded[: covered.shape[0], : covered.shape[1]] = index
+    blocks = padded.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK).transpose(0, 2, 1, 3).reshape(-1)
+    return blocks[blocks >= 0]
 
 
 def _check(
@@ -99,11 +112,6 @@ def _check(
                footprint.shape)
 
 
-def _pack(part: Array, places: Array | None) -> Array:
-    flat = np.ascontiguousarray(part).reshape(3, -1)
-    return flat if places is None else np.take(flat, places, axis=1)
-
-
 def _sum(
     points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None, total: Array
 ) -> None:
@@ -123,7 +131,7 @@ def _sum(
     for first in range(0, points.shape[1], step):
         part = np.s_[:, first : first + step]
         here, facing, sums = (np.ascontiguousarray(array[part]) for array in (points, normals, total))
-        if diffuse.shape[1]:
+        if diffuse.shape[1] > 1:
             sum_pairs(here, facing, diffuse, clamp, sums)
         if glossy.any():
             add_lobes(here, facing, lobes, lobe_clamp, widening, sums)

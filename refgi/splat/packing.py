@@ -23,7 +23,7 @@ NORMS = {"none": NO_NORM, "full_lobe": FULL_LOBE, "clamped": CLAMPED}
 
 
 def pack_diffuse(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:
-    """Pack lights for `sum_pairs`: offset position, reversed normal, flux / pi; an even number of them.
+    """Pack lights for `sum_pairs`: offset position, reversed normal, flux / pi; then a black one.
 
     Parameters
     ----------
@@ -38,13 +38,12 @@ def pack_diffuse(lights: "PixelLights", settings: PairSettings, dtype: npt.DType
 
     Returns
     -------
-    (9, M) ndarray
-        Packed lights, the last one black where their number is odd.
+    (9, M + 1) ndarray
+        The M chosen lights and a black one.
     """
     scale = 1.0 if "sii_no_pi" in settings.as_published else 1.0 / math.pi
     packed = np.concatenate([*_place(lights, settings, chosen), np.asarray(lights.flux[:, chosen], np.float64) * scale])
-    if packed.shape[1] % 2:
-        packed = np.concatenate([packed, packed[:, -1:] * ([[1.0]] * 6 + [[0.0]] * 3)], axis=1)
+    packed = np.concatenate([packed, np.zeros((9, 1))], axis=1)
     return packed.astype(dtype)
 
 

@@ -1,7 +1,8 @@
 """The sum over all pairs of pixel light and receiver (SII Eq. 2), for diffuse lights.
 
 Receivers are the SIMD lanes: a thread takes 256 of them into a tile and runs the lights past it, two at a time, so
-that each receiver adds its lights in their order whatever the tile, the thread or the picture around it. Lights come
+that each receiver adds its lights in their order whatever the tile, the thread or the picture around it; lights that
+cannot reach the tile are passed over. Lights come
 in groups of 64 whose sums are added up with compensation, so that a float32 sum over a quarter of a million lights
 rounds like one over 64.
 
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.splat.culling import bound_tile, lights_in_reach
 
 Array = npt.NDArray[Any]
 
@@ -101,7 +103,7 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
     position, normal : (3, n) ndarray
         Receivers, world space; m and unit vectors.
     lights : (9, N) ndarray
-        Packed lights, N even: position, reversed normal, flux / pi.
+        Packed lights: position, reversed normal, flux / pi. The last one is black and stands in for an odd partner.
     clamp : Clamp or None
         How near pairs are kept finite; None sums the plain term.
     irradiance : (3, n) ndarray
@@ -113,19 +115,27 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
         size = min(TILE, count - first)
         tile = np.zeros((ROWS, TILE), position.dtype)
         load_tile(tile, position, normal, first, size)
-        for group in range(0, lights.shape[1], GROUP):
-            for a in range(group, min(group + GROUP, lights.shape[1]), 2):
-                one, two = _light(lights, a), _light(lights, a + 1)
+        low, high = np.empty(6, position.dtype), np.empty(6, position.dtype)
+        bound_tile(tile, size, low, high)
+        reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
+        black = lights.shape[1] - 1
+        for group in range(0, black, GROUP):
+            listed = lights_in_reach(lights, group, min(group + GROUP, black), low, high, reach, chosen)
+            chosen[listed] = black
+            for pair in range(0, listed, 2):
+                a, b = chosen[pair], chosen[pair + 1]
+                one, two = _light(lights, a), _light(lights, b)
                 for i in range(TILE):
                     receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-                    g1, g2 = _term(one, receiver, clamp, a), _term(two, receiver, clamp, a + 1)  # Eq. (2)
+                    g1, g2 = _term(one, receiver, clamp, a), _term(two, receiver, clamp, b)  # Eq. (2)
                     # written out: a loop over the channels would cost the compiler its even split into lanes
                     tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
                     tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
                     tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8]
             close_group(tile)
         for c in range(3):
-            irradiance[c, first : first + size] = tile[TOTAL + c, :size]
+            for i in range(size):
+                irradiance[c, first + i] = tile[TOTAL + c, i]
 
 
 @kernel

@@ -1,0 +1,88 @@
+"""Which lights can reach which tile of receivers: what lies behind a plane adds exactly 0 and need not be summed.
+
+A tile is bounded by boxes around its positions and its normals. A light is passed over when the whole tile lies
+behind the light's surface, or the light behind the surface of every receiver, by more than the rounding of the
+cosines: then each term is 0 in the kernels' arithmetic as well, and the sum is the same to the bit.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+
+Array = npt.NDArray[Any]
+
+ROUNDING = 32.0  # units of rounding of |d| that a cosine computed from d may be off; about 6 are possible
+
+
+@kernel
+def bound_tile(tile: Array, size: int, low: Array, high: Array) -> None:
+    """Bound the positions (entries 0 to 2) and normals (3 to 5) of a tile's receivers.
+
+    Parameters
+    ----------
+    tile : (>= 6, TILE) ndarray
+        Receivers: position and normal.
+    size : int
+        How many of them count.
+    low, high : (6,) ndarray
+        Filled with the corners of both boxes.
+    """
+    for row in range(6):
+        least, most = tile[row, 0], tile[row, 0]
+        for i in range(1, size):
+            value = tile[row, i]
+            least = value if value < least else least
+            most = value if value > most else most
+        low[row], high[row] = least, most
+
+
+@kernel
+def lights_in_reach(lights: Array, first: int, last: int, low: Array, high: Array, reach: Array, chosen: Array) -> int:
+    """List the lights of a group that may reach a tile.
+
+    Parameters
+    ----------
+    lights : (>= 6, N) ndarray
+        Packed lights: position and reversed normal.
+    first, last : int
+        The group: lights first to last - 1.
+    low, high : (6,) ndarray
+        Boxes of the tile's positions and normals.
+    reach : (>= last - first,) ndarray of bool
+        Room to work in.
+    chosen : (>= last - first,) ndarray of int64
+        Filled with indices of lights, rising.
+
+    Returns
+    -------
+    int
+        How many were listed.
+    """
+    _reaches(lights, first, last, low, high, reach)
+    count = 0
+    for k in range(first, last):
+        chosen[count] = k
+        count += reach[k - first]
+    return count
+
+
+@kernel
+def _reaches(lights: Array, first: int, last: int, low: Array, high: Array, reach: Array) -> None:
+    real = lights.dtype.type
+    zero = real(0.0)
+    slack = real(ROUNDING) * real(np.finfo(lights.dtype).eps)
+    ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
+    ux, uy, uz, vx, vy, vz = low[3], low[4], low[5], high[3], high[4], high[5]
+    for k in range(first, last):
+        # d = light - receiver lies between e and f
+        ex, ey, ez = lights[0, k] - bx, lights[1, k] - by, lights[2, k] - bz
+        fx, fy, fz = lights[0, k] - ax, lights[1, k] - ay, lights[2, k] - az
+        lx, ly, lz = lights[3, k], lights[4, k], lights[5, k]
+        cl = max(ex * lx, fx * lx) + max(ey * ly, fy * ly) + max(ez * lz, fz * lz)
+        cx = (max(max(ex * ux, ex * vx), max(fx * ux, fx * vx)) + max(max(ey * uy, ey * vy), max(fy * uy, fy * vy))
+              + max(max(ez * uz, ez * vz), max(fz * uz, fz * vz)))
+        size = max(abs(ex), abs(fx)) + max(abs(ey), abs(fy)) + max(abs(ez), abs(fz))
+        reach[k - first] = (cl + slack * size > zero) & (cx + slack * size > zero)

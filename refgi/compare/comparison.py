@@ -23,7 +23,7 @@ from refgi import stages
 from refgi.compare.environment import environment
 from refgi.compare.flip import Flip, flip
 from refgi.compare.metrics import Measurement, measure
-from refgi.errors import RefgiError, RefgiWarning, expect
+from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS, find_method
 from refgi.scene import Scene, load_scene
@@ -139,7 +139,7 @@ def compare(
     settings = _settings(names, truth_settings, method_settings or {})
     runner = _Runner(scene, {"width": width, "height": height, **frame_options}, progress)
     if out is not None:
-        Path(out).mkdir(parents=True, exist_ok=True)
+        _require_folder(Path(out))
     references = {TRUTH: runner.reference(TRUTH, settings[TRUTH])}
     if any(not METHODS[name].visibility for name in names):
         references[UNOCCLUDED] = runner.reference(UNOCCLUDED, _without_visibility(settings[TRUTH]))
@@ -239,6 +239,13 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
 def _without_visibility(settings: Any) -> Any:
     checkpoint = settings.checkpoint and f"{settings.checkpoint}.{UNOCCLUDED}"
     return dataclasses.replace(settings, visibility=False, checkpoint=checkpoint)
+
+
+def _require_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"out: {folder} cannot be written: {error.strerror or error}") from error
 
 
 def _write(comparison: Comparison, folder: Path, progress: Progress | None) -> None:

@@ -110,13 +110,17 @@ def number(value: float) -> str:
     return f"{rounded:.10f}".rstrip("0").rstrip(".").replace("-", MINUS)
 
 
+def _seconds(value: float) -> str:
+    return f"{number(value)}\N{NO-BREAK SPACE}s"
+
+
 def _facts(comparison: Comparison) -> list[str]:
     scene, truth = comparison.scene, comparison.truth
     covered = truth.samples[comparison.covered]
     return [
         f"{comparison.width} {TIMES} {comparison.height} pixels", f"{comparison.covered.mean():.0%} covered",
         _count(scene.face_count, "face"), _count(len(scene.lights), "light"),
-        f"truth: {covered.mean():,.0f} samples a pixel in {number(truth.seconds)} s", comparison.options["dtype"],
+        f"truth: {covered.mean():,.0f} samples a pixel in {_seconds(truth.seconds)}", comparison.options["dtype"],
     ]
 
 
@@ -131,7 +135,7 @@ def _verdict(comparison: Comparison) -> str:
         return "No method gave a figure against the truth."
     figure, best = min(scored, key=lambda pair: pair[0].value)
     noise = ", within the noise of the truth" if figure.is_noise else ""
-    return f"Closest to the truth: {best.name}, relMSE {number(figure.value)} in {number(best.seconds)} s{noise}."
+    return f"Closest to the truth: {best.name}, relMSE {number(figure.value)} in {_seconds(best.seconds)}{noise}."
 
 
 def _quantities(comparison: Comparison) -> list[dict[str, Any]]:
@@ -176,13 +180,13 @@ def _pictures(comparison: Comparison) -> list[dict[str, Any]]:
                    for judge in result.against}
         pictures.append({"name": result.name, "label": result.name, "images": shown(result, maps_of),
                          "said": f"relMSE {number(result.against[TRUTH].figures['relmse'].value)}, "
-                                 f"{number(result.seconds)} s",
+                                 + _seconds(result.seconds),
                          "without": "This method knows what blocks light: see its error."})
     for reference in comparison.references.values():
         deviation = maps.luminance(np.sqrt(reference.variance))
         painted = {"error": maps.paint(deviation, comparison.covered, errors)}
         pictures.append({"name": reference.name, "label": LABELS[reference.name], "images": shown(reference, painted),
-                         "said": f"{number(reference.seconds)} s", "without": "A reference: see its standard error."})
+                         "said": _seconds(reference.seconds), "without": "A reference: see its standard error."})
     return pictures
 
 
@@ -199,7 +203,7 @@ def _data_uri(rgb: Array, exposure: float) -> str:
 def _rows(comparison: Comparison) -> list[dict[str, Any]]:
     return [
         {"name": result.name, "first": index == 0, "judge": JUDGES[judge],
-         "seconds": f"{number(result.seconds)} s" if index == 0 else "",
+         "seconds": _seconds(result.seconds) if index == 0 else "",
          "cells": [*(_cell(measurement.figures[name]) for name in COLUMNS), _flip_cell(result, judge)]}
         for result in comparison.results.values() for index, (judge, measurement) in enumerate(result.against.items())
     ]

@@ -165,6 +165,13 @@ def test_unusable_arguments_are_named(arguments, word):
         compare(**{"scene": "cornell_box"} | arguments)
 
 
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_traced(box, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setattr(module._Runner, "reference", lambda *_: pytest.fail("traced"))
+    with pytest.raises(InputError, match="out"):
+        compare(box, ["sii"], out=tmp_path / "file" / "out", **SIZE)
+
+
 def test_a_camera_that_sees_nothing_is_named():
     away = Scene("away", Geometry(np.eye(3), np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32)), (Material(),),
                  Camera((0.0, 0.0, 9.0), (0.0, 0.0, 20.0)),

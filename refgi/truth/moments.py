@@ -122,7 +122,7 @@ def load(path: Path, computation: str) -> Moments:
         If the file is damaged or belongs to another computation.
     """
     try:
-        with np.load(path) as file:
+        with path.open("rb") as handle, np.load(handle) as file:
             found = str(file["computation"])
             moments = Moments(*(np.array(file[name]) for name in Moments._fields))
     except (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError) as trouble:

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from refgi.rays import Tracer
 from refgi.scene import LightTable, Scene
+from refgi.truth.caustics import Film, photon_pass
 from refgi.truth.hemisphere import Paths, Shadows, gather, pass_through, scatter, scrambled_points, send
 from refgi.truth.light_grid import footprint, light_rays
 from refgi.truth.light_side import add_free, pick
@@ -26,6 +27,7 @@ class Task(NamedTuple):
     surfaces: Surfaces
     lights: LightTable
     to: Receivers
+    caustics: Film | None = None
 
 
 def one_pass(task: Task, number: int) -> Array:
@@ -50,6 +52,10 @@ def one_pass(task: Task, number: int) -> Array:
             _light_side(task, words, sums)
         if task.settings.directions_per_pass:
             _hemisphere(task, words, sums)
+        if task.caustics is not None:
+            random = np.random.default_rng([*words[:2], 1])
+            photons = photon_pass(task.caustics, task.tracer, task.lights, task.settings.photons, random)
+            sums += photons[:, task.to.pixel]
     return sums
 
 

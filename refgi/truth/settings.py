@@ -34,6 +34,8 @@ class TruthSettings:
     caustics : bool
         Add light that reaches receivers through mirror-like lobes and glass; those lobes are then left out of the
         other estimators.
+    photons : int
+        Photons from each light in a pass, for caustics.
     seed : int
         Which random numbers.
     light_grid : int
@@ -57,6 +59,7 @@ class TruthSettings:
     visibility: bool = True
     bounces: int = 1
     caustics: bool = False
+    photons: int = 1 << 18
     seed: int = 0
     light_grid: int = 32
     picks: int = PICKS
@@ -69,7 +72,7 @@ class TruthSettings:
         expect(self.estimator in ("combined", "hemisphere", "light"), "estimator",
                "'combined', 'hemisphere' or 'light'", self.estimator)
         for key, low, high in (("samples", 1, 2**31), ("bounces", 1, 64), ("seed", 0, 2**32 - 1),
-                               ("light_grid", 1, 1024), ("picks", 1, 1024), ("batch", 1, 2**30)):
+                               ("light_grid", 1, 1024), ("picks", 1, 1024), ("photons", 1, 2**28), ("batch", 1, 2**30)):
             value = getattr(self, key)
             expect(isinstance(value, int) and low <= value <= high, key, f"an integer, {low} to {high}", value)
         expect(self.directions is None or 1 <= self.directions <= 65536, "directions", "1 to 65536",

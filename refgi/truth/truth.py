@@ -1,6 +1,7 @@
 """The ground truth: one-bounce irradiance at the G-buffer's points, with its standard error."""
 
 import hashlib
+import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -10,6 +11,7 @@ import numpy.typing as npt
 
 from refgi.scene import Scene
 from refgi.stages import report_progress, stage
+from refgi.truth.caustics import MIRROR_EXPONENT, film
 from refgi.truth.moments import Moments, add_pass, load, no_passes, save
 from refgi.truth.passes import Task, one_pass
 from refgi.truth.settings import TruthSettings
@@ -110,7 +112,9 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
     """
     started = time.perf_counter()
     to = receivers(scene.geometry, position, normal, triangle_id, tracer.offset)
-    task = Task(scene, settings, tracer, surfaces(scene), lights_of(scene), to)
+    caustics = film(scene, triangle_id.shape) if settings.caustics else None
+    found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else math.inf)
+    task = Task(scene, settings, tracer, found, lights_of(scene), to, caustics)
     file = Path(settings.checkpoint) if settings.checkpoint else None
     name = _fingerprint(task) if file else ""
     moments = load(file, name) if file and file.exists() else no_passes(len(to.pixel))
@@ -151,7 +155,8 @@ def _fingerprint(task: Task) -> str:
     settings = task.settings
     digest = hashlib.sha256(repr((
         settings.estimator, settings.visibility, settings.bounces, settings.caustics, settings.seed,
-        settings.light_grid, settings.picks_per_pass, settings.directions_per_pass, settings.bound)).encode())
+        settings.light_grid, settings.picks_per_pass, settings.directions_per_pass, settings.bound,
+        settings.photons)).encode())
     for array in (*task.surfaces, *task.lights, *task.to):
         digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).data)
     return digest.hexdigest()

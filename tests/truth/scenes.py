@@ -1,7 +1,5 @@
 """Small scenes made by hand, and receivers without a camera."""
 
-import math
-
 import numpy as np
 
 from refgi.rays import Tracer
@@ -28,7 +26,7 @@ def floor(half=50.0, material=WHITE):
     return rectangle((-half, 0, half), (2 * half, 0, 0), (0, 0, -2 * half), material)
 
 
-def spot_down(height=1.0, half_angle=math.radians(40), intensity=(1.0, 2.0, 0.5)):
+def spot_down(height=1.0, half_angle=0.7, intensity=(1.0, 2.0, 0.5)):
     return SpotLight((0.0, height, 0.0), (0.0, -1.0, 0.0), half_angle, half_angle, intensity)
 
 

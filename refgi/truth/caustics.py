@@ -1,0 +1,247 @@
+"""Caustics: light that reaches what the camera sees through mirror-like lobes and glass, traced from the lights.
+
+Each pass sends fresh photons from every light. A photon that meets a mirror-like lobe or glass goes on from there;
+wherever it lands after at least one such bounce it counts for the pixel that sees this point. The flux dPhi of a photon
+landing at y with the camera at distance D covers a pixel of solid angle W by E = dPhi <g.v> / (D^2 W), v towards the
+camera: so a pixel holds the mean of the irradiance over its footprint, without any search radius, and nothing else is
+approximated (glass is clear and smooth, its Fresnel reflection chosen at random; chains end after 16 bounces).
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.radiometry import lobe_fraction, radiant_intensity
+from refgi.rays import MISS, Tracer
+from refgi.rsm.projection import camera_projection, project
+from refgi.rsm.solid_angle import texel_solid_angles
+from refgi.sampling import hash_bits
+from refgi.scene import DirectionalLight, LightTable, Scene, material_table
+from refgi.truth.hemisphere import CHUNK
+from refgi.truth.light_grid import light_rays
+from refgi.truth.surfaces import Surfaces, around, face_cross, face_normal, shading_normal, surfaces
+
+Array = npt.NDArray[Any]
+
+MIRROR_EXPONENT = 100.0  # lobes from here on count as mirror-like: half of their flux lies within 7 degrees
+LONGEST_CHAIN = 16
+
+
+class Film(NamedTuple):
+    """Where photons are counted."""
+
+    scene: Scene
+    shape: tuple[int, int]  # rows and columns of the picture
+    solid_angle: Array  # (h, w) of each pixel, sr
+    mirrors: Surfaces  # with only the mirror-like lobes
+    ior: Array  # (k,) by material; 0: opaque
+
+
+class Photons(NamedTuple):
+    """A batch of photons on their way."""
+
+    origin: Array  # (n, 3) float32, m
+    direction: Array  # (n, 3) float32
+    reach: Array  # (n,) float32; 0 once a photon is gone
+    triangle_id: Array  # (n,) int32
+    distance: Array  # (n,) float32
+    flux: Array  # (n, 3) float64, W
+    landed: Array  # (n, 3) float64: where it met a surface, m
+    towards: Array  # (n, 3) float64: face normal there, on the side it came from
+
+
+def film(scene: Scene, shape: tuple[int, int]) -> Film | None:
+    """Prepare the counting of photons, or return None for a scene without mirror or glass.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    shape : tuple of 2 ints
+        Rows and columns of the picture.
+
+    Returns
+    -------
+    Film or None
+        None where there is nothing to count.
+    """
+    table = material_table(scene.materials)
+    mirrors = surfaces(scene)
+    mirrors.diffuse[:] = 0
+    mirrors.specular[table.exponent < MIRROR_EXPONENT] = 0
+    if not (mirrors.specular.any() or table.ior.any()):
+        return None
+    solid_angle = texel_solid_angles(camera_projection(scene.camera, shape[1], shape[0]))
+    return Film(scene, shape, solid_angle, mirrors, table.ior)
+
+
+def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, random: np.random.Generator) -> Array:
+    """Count one pass of photons.
+
+    Parameters
+    ----------
+    film : Film
+        Where they are counted.
+    tracer : Tracer
+        The scene's rays.
+    lights : LightTable
+        The lights, float64.
+    photons : int
+        From each light; the largest square number up to it is sent.
+    random : numpy.random.Generator
+        Where they go.
+
+    Returns
+    -------
+    (3, h w) ndarray of float64
+        Irradiance, W/m^2.
+    """
+    irradiance = np.zeros((3, film.solid_angle.size))
+    side = math.isqrt(photons)
+    for k, light in enumerate(film.scene.lights):
+        rays = light_rays(light, film.scene.geometry, random.random((side * side, 2)))
+        batch = _photons(rays.origins, rays.directions)
+        _power(lights, k, isinstance(light, DirectionalLight), rays.measure, rays.directions, batch.flux)
+        for bounce in range(LONGEST_CHAIN):
+            tracer.fill_closest(batch.origin, batch.direction, batch.reach, batch.triangle_id, batch.distance)
+            words = random.integers(2**32, size=len(batch.reach), dtype=np.uint32)
+            landing = (batch.triangle_id != MISS) & (bounce > 0)
+            arriving = batch.flux[landing]
+            reflect(film.mirrors, film.ior, tracer.offset, words, batch)
+            _count(film, tracer, batch.landed[landing], batch.towards[landing], arriving, irradiance)
+            if not (batch.reach > 0).any():
+                break
+    return irradiance
+
+
+def _photons(origins: Array, directions: Array) -> Photons:
+    count = len(origins)
+    return Photons(origins.astype(np.float32), directions.astype(np.float32), np.full(count, np.inf, np.float32),
+                   np.empty(count, np.int32), np.empty(count, np.float32), *(np.zeros((count, 3)) for _ in range(3)))
+
+
+@kernel
+def _power(lights: LightTable, k: int, directional: bool, measure: float, directions: Array, flux: Array) -> None:
+    for i in range(len(flux)):
+        if directional:
+            for c in range(3):
+                flux[i, c] = lights.intensity[k, c] * measure
+        else:
+            power = radiant_intensity(lights, k, directions[i, 0], directions[i, 1], directions[i, 2])
+            for c in range(3):
+                flux[i, c] = power[c] * measure
+
+
+def _count(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Array, irradiance: Array) -> None:
+    """Add photons to the pixels that see where they landed, in their order."""
+    camera = film.scene.camera
+    view = np.subtract(camera.eye, landed)
+    row, column, _ = project(camera_projection(camera, film.shape[1], film.shape[0]), landed.T)
+    cosine = (view * normals).sum(axis=1) / np.linalg.norm(view, axis=1)
+    seen = ~np.isnan(row) & (cosine > 0)
+    starts = landed[seen] + tracer.offset * normals[seen]
+    reach, blocked = np.ones(len(starts), np.float32), np.empty(len(starts), np.bool_)
+    tracer.fill_occluded(starts.astype(np.float32), (camera.eye - starts).astype(np.float32), reach, blocked)
+    seen[np.flatnonzero(seen)[blocked]] = False
+    at = np.floor(row[seen]).astype(np.int64), np.floor(column[seen]).astype(np.int64)
+    density = cosine[seen] / ((view[seen] ** 2).sum(axis=1) * film.solid_angle[at])
+    pixel = at[0] * film.shape[1] + at[1]
+    for c in range(3):
+        irradiance[c] += np.bincount(pixel, flux[seen, c] * density, irradiance.shape[1])
+
+
+@kernel(parallel=True)
+def reflect(mirrors: Surfaces, ior: Array, offset: float, words: Array, photons: Photons) -> None:
+    """Note where photons landed and send on those that met a mirror-like lobe or glass.
+
+    Parameters
+    ----------
+    mirrors : Surfaces
+        The scene with only its mirror-like lobes.
+    ior : (k,) ndarray
+        Index of refraction by material, 0 where opaque.
+    offset : float
+        How far rays start above faces, m.
+    words : (n,) ndarray of uint32
+        Random numbers.
+    photons : Photons
+        Moved on; glass keeps the flux, a lobe sends on its share.
+    """
+    count = len(photons.reach)
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _reflect(mirrors, ior, offset, words, photons, chunk * CHUNK, min(count, chunk * CHUNK + CHUNK))
+
+
+@kernel
+def _reflect(mirrors: Surfaces, ior: Array, offset: float, words: Array, photons: Photons, low: int,
+             high: int) -> None:
+    for i in range(low, high):
+        triangle = photons.triangle_id[i]
+        photons.reach[i] = 0
+        if triangle == MISS:
+            continue
+        t = np.float64(photons.distance[i])
+        d = (np.float64(photons.direction[i, 0]), np.float64(photons.direction[i, 1]),
+             np.float64(photons.direction[i, 2]))
+        y = (photons.origin[i, 0] + t * d[0], photons.origin[i, 1] + t * d[1], photons.origin[i, 2] + t * d[2])
+        g = face_normal(mirrors, triangle, d[0], d[1], d[2])
+        for c in range(3):
+            photons.landed[i, c] = y[c]
+            photons.towards[i, c] = g[c]
+        material = mirrors.material_of_face[triangle]
+        n = shading_normal(mirrors, triangle, y, g)
+        if ior[material] > 0:
+            w, share = _through_glass(n, d, _outside(mirrors, triangle, g), ior[material], words[i]), 1.0
+        else:
+            share = max(mirrors.specular[material, 0], mirrors.specular[material, 1], mirrors.specular[material, 2])
+            if share <= 0:
+                continue
+            w, share = _off_lobe(n, g, d, mirrors.exponent[material], words[i])
+        length = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        side = math.copysign(offset, w[0] * g[0] + w[1] * g[1] + w[2] * g[2])
+        for c in range(3):
+            if ior[material] == 0:
+                photons.flux[i, c] *= share * mirrors.specular[material, c]
+            photons.origin[i, c] = y[c] + side * g[c]
+            photons.direction[i, c] = w[c] / length
+        photons.reach[i] = np.inf if share > 0 else 0
+
+
+@kernel
+def _outside(mirrors: Surfaces, triangle: int, g: tuple[float, float, float]) -> bool:
+    """Return whether g is the side that a triangle's vertex order calls outside."""
+    x, y, z = face_cross(mirrors, triangle)
+    return bool(x * g[0] + y * g[1] + z * g[2] > 0)
+
+
+@kernel
+def _through_glass(n: tuple[float, float, float], d: tuple[float, float, float], entering: bool, ior: float,
+                   word: Any) -> tuple[float, float, float]:
+    """Return the direction behind or off a smooth surface of glass, chosen by Fresnel's reflectance."""
+    ratio = 1 / ior if entering else ior
+    cos_in = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
+    sin2 = ratio * ratio * (1 - cos_in * cos_in)
+    cos_out = math.sqrt(max(0.0, 1 - sin2))
+    along = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out)  # perpendicular polarisation
+    across = (cos_in - ratio * cos_out) / (cos_in + ratio * cos_out)
+    if sin2 >= 1 or (hash_bits(word) + 0.5) * 2.0**-32 < (along * along + across * across) / 2:
+        return d[0] + 2 * cos_in * n[0], d[1] + 2 * cos_in * n[1], d[2] + 2 * cos_in * n[2]
+    bend = ratio * cos_in - cos_out
+    return ratio * d[0] + bend * n[0], ratio * d[1] + bend * n[1], ratio * d[2] + bend * n[2]
+
+
+@kernel
+def _off_lobe(n: tuple[float, float, float], g: tuple[float, float, float], d: tuple[float, float, float],
+              exponent: float, word: Any) -> tuple[tuple[float, float, float], float]:
+    """Return a direction of a lobe and 1 / K, or 0 where it points below the surface."""
+    u, v = (hash_bits(word) + 0.5) * 2.0**-32, (hash_bits(word ^ np.uint32(0xB5297A4D)) + 0.5) * 2.0**-32
+    z = u ** (1 / (exponent + 1))
+    across, phi = math.sqrt(max(0.0, 1 - z * z)), 2 * np.pi * v
+    cos_in = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
+    mirror = (d[0] + 2 * cos_in * n[0], d[1] + 2 * cos_in * n[1], d[2] + 2 * cos_in * n[2])
+    w = around(mirror, across * math.cos(phi), across * math.sin(phi), z)
+    above = min(w[0] * g[0] + w[1] * g[1] + w[2] * g[2], w[0] * n[0] + w[1] * n[1] + w[2] * n[2])
+    return w, 1 / lobe_fraction(cos_in, exponent) if above > 0 else 0.0

@@ -13,6 +13,7 @@ from refgi.splat import GatherSettings, Receivers, SiiSettings, gather, sii
 from refgi.splat.gather import gather_counted, gather_irradiance
 from refgi.splat.gather_sum import disc_pattern
 from refgi.splat.interpolation import Agreement, coarse_pixels, interpolate
+from tests.naive import eq2
 
 WHOLE_MAP = 1.5  # a disc around any texel with this radius holds the map
 
@@ -49,6 +50,20 @@ def test_pattern_lies_in_the_disc(seed):
     assert (np.hypot(down, right) <= 1).all()
     assert weight.mean() == pytest.approx(math.pi, rel=0.01)
     assert (np.hypot(down.mean(), right.mean())) < 0.02
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.03])
+def test_sum_is_that_of_the_twin(offset):
+    frame = Frame(load_scene("cornell_box"), width=12, height=12, dtype=np.float64, rsm_resolution=32)
+    got = gather(frame, GatherSettings(samples=60, radius=0.4, grid=0, offset=offset))
+    (rsm,) = frame.rsms
+    row, column, _ = rsm.project(frame.gbuffer.position)
+    seen = np.argwhere(frame.gbuffer.covered & np.isfinite(row))
+    assert len(seen) > 50
+    for i, j in seen:
+        expected = eq2.gather(frame.gbuffer.position[:, i, j], frame.gbuffer.normal[:, i, j], (row[i, j], column[i, j]),
+                              rsm, 60, 0.4, offset)
+        np.testing.assert_allclose(got[:, i, j], expected, rtol=1e-10, atol=1e-15)
 
 
 @pytest.mark.feature("SII-25")

@@ -1,8 +1,8 @@
 """Methods judged against path tracing: figures of error, one comparison, its files and its page.
 
-`metrics` has the figures, each beside what the truth's own noise gives; `comparison.compare` runs every method on one
-scene; `results` writes EXR, PNG and results.json; `report` writes the one-file page. The package itself can be called:
-`refgi.compare(...)` is `refgi.compare.compare(...)`.
+`metrics` has the figures and `measurement` puts each beside what the truth's own noise gives; `comparison.compare` runs
+every method on one scene; `results` writes EXR, PNG and results.json; `report` writes the one-file page. The package
+itself can be called: `refgi.compare(...)` is `refgi.compare.compare(...)`.
 """
 
 import sys
@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from refgi.compare.comparison import Comparison, MethodResult, compare
-    from refgi.compare.metrics import Figure, Measurement, measure
+    from refgi.compare.measurement import Figure, Measurement, measure
 
 __all__ = ["Comparison", "Figure", "Measurement", "MethodResult", "compare", "measure"]
 
-_HOME = {"Figure": "metrics", "Measurement": "metrics", "measure": "metrics"}
+_HOME = {"Figure": "measurement", "Measurement": "measurement", "measure": "measurement"}
 
 
 def __getattr__(name: str) -> Any:

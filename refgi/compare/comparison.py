@@ -22,7 +22,7 @@ import numpy.typing as npt
 from refgi import stages
 from refgi.compare.environment import environment
 from refgi.compare.flip import Flip, flip
-from refgi.compare.metrics import Measurement, measure
+from refgi.compare.measurement import Measurement, measure
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS, find_method

@@ -7,7 +7,7 @@ import pytest
 
 from refgi.compare.comparison import Comparison, MethodResult, Reference
 from refgi.compare.flip import Flip
-from refgi.compare.metrics import measure
+from refgi.compare.measurement import measure
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
 from refgi.stages import Run
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from refgi.compare import metrics
+from refgi.compare.measurement import measure
 from refgi.compare.ssim import ssim_of_noise
 from refgi.errors import InputError
 from tests.naive import metrics as naive
@@ -104,7 +105,7 @@ def test_measure_counts_non_finite_pixels_and_hides_no_figure_behind_them():
     image, reference = np.ones((2, 3, 4, 4))
     image[:, 0, 0] = np.nan
     reference[2, 1, 1] = np.inf
-    got = metrics.measure(image, reference, np.ones((3, 4, 4)))
+    got = measure(image, reference, np.ones((3, 4, 4)))
     assert (got.non_finite, got.non_finite_reference, got.pixels) == (1, 1, 16)
     assert all(math.isnan(f.value) and not f.is_noise for f in got.figures.values())
 
@@ -122,7 +123,7 @@ def test_unusable_arrays_are_named(image, reference, covered, word):
 
 def test_a_black_reference_leaves_relative_figures_undefined():
     image, black = np.ones((3, 4, 4)), np.zeros((3, 4, 4))
-    figures = metrics.measure(image, black, np.zeros((3, 4, 4))).figures
+    figures = measure(image, black, np.zeros((3, 4, 4))).figures
     assert all(math.isnan(figures[name].value) for name in ("relmse", "psnr", "ssim"))
     assert figures["mse"].value == figures["smape"].value == 1.0
 
@@ -154,7 +155,7 @@ def noisy():
 @pytest.mark.feature("REF-21")
 def test_a_perfect_picture_scores_the_noise_of_the_reference(noisy, evidence):
     """Statistical: simulated normal noise of known variance; every figure is marked as noise."""
-    got = metrics.measure(*noisy).figures
+    got = measure(*noisy).figures
     for name in ("mse", "rmse", "relmse", "mae", "smape"):
         assert got[name].value == pytest.approx(got[name].noise, rel=NOISE_TOLERANCE)
     assert got["psnr"].value == pytest.approx(got["psnr"].noise, abs=10 * math.log10(1 + NOISE_TOLERANCE))
@@ -165,7 +166,7 @@ def test_a_perfect_picture_scores_the_noise_of_the_reference(noisy, evidence):
 
 def test_a_real_error_is_not_marked_as_noise(noisy):
     perfect, reference, variance = noisy
-    got = metrics.measure(perfect * 1.5, reference, variance).figures
+    got = measure(perfect * 1.5, reference, variance).figures
     assert not any(figure.is_noise for figure in got.values())
 
 
@@ -176,27 +177,27 @@ def test_the_mean_bias_scatters_by_its_standard_error(noisy):
     z = []
     for _ in range(40):
         reference = perfect + rng.standard_normal(perfect.shape) * np.sqrt(variance)
-        figure = metrics.measure(perfect, reference, variance).figures["bias"]
+        figure = measure(perfect, reference, variance).figures["bias"]
         z.append(figure.value / figure.noise)
     assert 14.0 < sum(v * v for v in z) < 84.0
 
 
 def test_the_variance_of_the_mean_decides_over_the_bias(noisy):
     """Analytic: standard errors 0.1, 0.2 and 0.3 of channels that share their samples average to 0.2."""
-    got = metrics.measure(*noisy, mean_variance=np.array([0.01, 0.04, 0.09])).figures["bias"]
+    got = measure(*noisy, mean_variance=np.array([0.01, 0.04, 0.09])).figures["bias"]
     assert got.noise == pytest.approx(0.2)
     assert got.is_noise
 
 
 def test_without_variance_nothing_is_called_noise():
-    figures = metrics.measure(np.ones((3, 2, 2)), np.ones((3, 2, 2))).figures
+    figures = measure(np.ones((3, 2, 2)), np.ones((3, 2, 2))).figures
     assert all(math.isnan(f.noise) and not f.is_noise for f in figures.values())
 
 
 @pytest.mark.parametrize("variance", [np.full((3, 2, 2), -1.0), np.full((3, 2, 2), np.nan), np.ones((2, 2))])
 def test_an_unusable_variance_is_refused(variance):
     with pytest.raises(InputError, match="variance"):
-        metrics.measure(np.ones((3, 2, 2)), np.ones((3, 2, 2)), variance)
+        measure(np.ones((3, 2, 2)), np.ones((3, 2, 2)), variance)
 
 
 def test_ssim_of_a_noiseless_reference_is_one(noisy):

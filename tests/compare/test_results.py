@@ -205,13 +205,13 @@ while True:
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGKILL is POSIX")
 def test_a_kill_leaves_whole_files_or_none(tmp_path, evidence):
-    """Killed at eight moments while it writes a comparison over and over: each file by its own name is whole."""
+    """Killed at five moments while it writes a comparison over and over: each file by its own name is whole."""
     conftest = Path(__file__).with_name("conftest.py")
     whole = 0
-    for moment in range(8):
+    for moment in range(5):
         writer = subprocess.Popen([sys.executable, "-c", WRITER, str(conftest), str(tmp_path)], stdout=subprocess.PIPE)
         assert writer.stdout.readline() == b"ready\n"
-        time.sleep(0.1 + 0.23 * moment)
+        time.sleep(0.1 + 0.37 * moment)
         writer.kill()
         writer.wait()
         writer.stdout.close()
@@ -219,7 +219,7 @@ def test_a_kill_leaves_whole_files_or_none(tmp_path, evidence):
             check_whole(path)
             whole += 1
     assert whole
-    evidence(f"{whole} of {whole} files whole after 8 kills")
+    evidence(f"{whole} of {whole} files whole after 5 kills")
 
 
 def check_whole(path):

@@ -21,7 +21,7 @@ from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.attributes import Planes, Surface, Wanted, resolve
 from refgi.rsm.projection import Projection, paraboloid_projection, view_coordinates
-from refgi.rsm.triangle import LANES, SMALLEST, centres_between
+from refgi.rsm.triangle import LANES, SMALLEST, SPAN_CUT, centres_between
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
@@ -74,13 +74,27 @@ def _draw_maps(projection: Projection, vertices: Array, scratch: Scratch, nearne
                 corners[i, 3], corners[i, 4] = x * scale, y * scale
             rows = slice(m * height, (m + 1) * height)
             _draw(projection, corners, scratch.faces, nearness[rows], ids[rows])
+            _clear_outside_disc(projection, nearness[rows], ids[rows])
 
 
 @kernel
-def _plane(corners: Array, j: int, k: int, sign: float) -> tuple[float, float, float, float]:
-    """Return n = v_j x v_k times the sign of det, and the value of e from which on a texel is inside."""
-    ax, ay, az = corners[j, 0], corners[j, 1], corners[j, 2]
-    bx, by, bz = corners[k, 0], corners[k, 1], corners[k, 2]
+def _clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> None:
+    n, half = projection.width, projection.half[0]
+    step = 2.0 * half / n
+    for row in range(n):
+        t = (row + 0.5) * step - half
+        for column in range(n):
+            s = (column + 0.5) * step - half
+            if s * s + t * t > 1.0:
+                nearness[row, column] = 0.0
+                ids[row, column] = -1
+
+
+@kernel
+def _plane(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float, sign: float
+) -> tuple[float, float, float, float]:
+    """Return n = a x b times the sign of det, and the value of e from which on a texel is inside."""
     nx, ny, nz = (ay * bz - az * by) * sign, (az * bx - ax * bz) * sign, (ax * by - ay * bx) * sign
     owns = nx > 0.0 or (nx == 0.0 and (ny > 0.0 or (ny == 0.0 and nz > 0.0)))
     return nx, ny, nz, 0.0 if owns else SMALLEST
@@ -90,33 +104,47 @@ def _plane(corners: Array, j: int, k: int, sign: float) -> tuple[float, float, f
 def _draw(projection: Projection, corners: Array, faces: Array, nearness: Array, ids: Array) -> None:
     """Draw every triangle on one map; the loop is inside because calls with arrays cost atomic reference counts."""
     n, width, half = projection.width, nearness.shape[1], projection.half[0]
-    step = 2.0 * half / n
+    step, texels = 2.0 * half / n, 0.5 * n / half
     for face in range(len(faces)):
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-        s_low, s_high, t_low, t_high = _disc_box(corners, i, j, k)
-        first, last = centres_between((s_low + half) / step, (s_high + half) / step, n)
-        top, bottom = centres_between((t_low + half) / step, (t_high + half) / step, n)
+        xi, yi, zi = corners[i, 0], corners[i, 1], corners[i, 2]
+        xj, yj, zj = corners[j, 0], corners[j, 1], corners[j, 2]
+        xk, yk, zk = corners[k, 0], corners[k, 1], corners[k, 2]
+        if zi < 0.0 and zj < 0.0 and zk < 0.0:
+            continue
+        if zi >= 0.0 and zj >= 0.0 and zk >= 0.0:
+            s_low, s_high, t_low, t_high = _box_ahead(
+                corners[i, 3], corners[i, 4], corners[j, 3], corners[j, 4], corners[k, 3], corners[k, 4]
+            )
+        else:
+            s_low, s_high, t_low, t_high = _box_across((xi, xj, xk, xi), (yi, yj, yk, yi), (zi, zj, zk, zi))
+        first, last = centres_between((s_low + half) * texels, (s_high + half) * texels, n)
+        top, bottom = centres_between((t_low + half) * texels, (t_high + half) * texels, n)
         if first > last or top > bottom:
             continue
-        px, py, pz, _ = _plane(corners, j, k, 1.0)
-        det = corners[i, 0] * px + corners[i, 1] * py + corners[i, 2] * pz
-        if det == 0.0:
+        det = xi * (yj * zk - zj * yk) + yi * (zj * xk - xj * zk) + zi * (xj * yk - yj * xk)
+        if det == 0.0:  # no area, or seen edge-on
             continue
         sign = 1.0 if det > 0.0 else -1.0
-        x0, y0, z0, t0 = _plane(corners, j, k, sign)
-        x1, y1, z1, t1 = _plane(corners, k, i, sign)
-        x2, y2, z2, t2 = _plane(corners, i, j, sign)
+        x0, y0, z0, t0 = _plane(xj, yj, zj, xk, yk, zk, sign)
+        x1, y1, z1, t1 = _plane(xk, yk, zk, xi, yi, zi, sign)
+        x2, y2, z2, t2 = _plane(xi, yi, zi, xj, yj, zj, sign)
         scale = sign / det
         xn, yn, zn = (x0 + x1 + x2) * scale, (y0 + y1 + y2) * scale, (z0 + z1 + z2) * scale
-        limit = np.float32(1.0 / (NEAREST * _size(corners, i, j, k)))
+        size = max(_longest(xi, yi, zi), max(_longest(xj, yj, zj), _longest(xk, yk, zk)))
+        limit = np.float32(1.0 / (NEAREST * size))
         for row in range(top, bottom + 1):
             t = (row + 0.5) * step - half
             rest = 1.0 - t * t
             r0, r1, r2 = 2.0 * t * y0 + rest * z0, 2.0 * t * y1 + rest * z1, 2.0 * t * y2 + rest * z2
             rn = 2.0 * t * yn + rest * zn
-            line = np.uint64(row)
-            for block in range((last - first + LANES) // LANES):
-                start = min(first + block * LANES, width - LANES)
+            line, left, right = np.uint64(row), first, last
+            if last - first > SPAN_CUT:
+                left, right = _cut(left, right, x0, z0, r0, step, 0.5 * (n - 1))
+                left, right = _cut(left, right, x1, z1, r1, step, 0.5 * (n - 1))
+                left, right = _cut(left, right, x2, z2, r2, step, 0.5 * (n - 1))
+            for block in range((right - left + LANES) // LANES):
+                start = min(left + block * LANES, width - LANES)
                 place_0, centre = np.uint64(start), start + 0.5
                 for lane in range(LANES):
                     column = place_0 + np.uint64(lane)
@@ -126,7 +154,6 @@ def _draw(projection: Projection, corners: Array, faces: Array, nearness: Array,
                         ((2.0 * x0 - z0 * s) * s + r0 >= t0)
                         & ((2.0 * x1 - z1 * s) * s + r1 >= t1)
                         & ((2.0 * x2 - z2 * s) * s + r2 >= t2)
-                        & (s * s <= rest)
                     )
                     if inside & (near > nearness[line, column]) & (near <= limit):
                         nearness[line, column] = near
@@ -134,52 +161,86 @@ def _draw(projection: Projection, corners: Array, faces: Array, nearness: Array,
 
 
 @kernel
-def _size(corners: Array, i: int, j: int, k: int) -> float:
-    """Return the largest coordinate of a triangle, m."""
-    size = 0.0
-    for axis in range(3):
-        size = max(size, max(abs(corners[i, axis]), max(abs(corners[j, axis]), abs(corners[k, axis]))))
-    return size
+def _cut(
+    first: int, last: int, nx: float, nz: float, rest: float, step: float, middle: float
+) -> tuple[int, int]:
+    """Shorten a span to where -n_z s^2 + 2 n_x s + rest may be >= 0, with a texel to spare."""
+    square = nx * nx + nz * rest
+    if square < 0.0:
+        return (first, last) if nz < 0.0 else (first, first - 1)
+    q = nx + math.copysign(math.sqrt(square), nx)
+    if q == 0.0:
+        return first, last
+    one, other = q / (nz + 0.0) / step + middle, -rest / q / step + middle  # roots, as columns; nz + 0.0 is never -0.0
+    low = min(max(min(one, other), first - 2.0), last + 2.0)
+    high = min(max(max(one, other), first - 2.0), last + 2.0)
+    if nz >= 0.0:  # between the roots
+        return max(first, int(low) - 1), min(last, int(high) + 2)
+    if low < first - 1.0:  # outside them: to the right
+        return max(first, int(high) - 1), last
+    if high > last + 1.0:
+        return first, min(last, int(low) + 2)
+    return first, last
 
 
 @kernel
-def _disc_box(corners: Array, i: int, j: int, k: int) -> tuple[float, float, float, float]:
-    """Return the range of s and of t that the part of a triangle before the plane z = 0 may cover.
+def _longest(x: float, y: float, z: float) -> Any:
+    return max(abs(x), max(abs(y), abs(z)))
 
-    The corners of that part span a box; each of its edges is an arc of at most half a circle of radius R >= 1, which
-    leaves its chord L by no more than R - sqrt(R^2 - L^2/4) <= 1 - sqrt(1 - L^2/4).
+
+@kernel
+def _bulge(square: float) -> Any:
+    """Return how far an edge may leave its chord of squared length L^2: 1 - sqrt(1 - L^2/4).
+
+    Each edge is an arc of at most half a circle, of radius R >= 1: R - sqrt(R^2 - L^2/4) is largest for R = 1.
     """
-    if corners[i, 2] < 0.0 and corners[j, 2] < 0.0 and corners[k, 2] < 0.0:
-        return 1.0, 0.0, 1.0, 0.0
-    s_low, s_high, t_low, t_high = np.inf, -np.inf, np.inf, -np.inf
-    s_last, t_last, chord = np.nan, np.nan, 0.0
-    s_first, t_first = np.nan, np.nan
-    ends = (i, j, k, i)
-    for side in range(3):
-        a, b = ends[side], ends[side + 1]
-        for step in range(2):
-            if step == 0:
-                if corners[a, 2] < 0.0:
-                    continue
-                s, t = corners[a, 3], corners[a, 4]
-            else:
-                if (corners[a, 2] < 0.0) == (corners[b, 2] < 0.0):
-                    continue
-                share = corners[a, 2] / (corners[a, 2] - corners[b, 2])
-                x = corners[a, 0] + share * (corners[b, 0] - corners[a, 0])
-                y = corners[a, 1] + share * (corners[b, 1] - corners[a, 1])
-                length = math.sqrt(x * x + y * y)
-                if length == 0.0:  # through the centre itself: no way to tell
-                    return -1.0, 1.0, -1.0, 1.0
-                s, t = x / length, y / length
-            s_low, s_high, t_low, t_high = min(s_low, s), max(s_high, s), min(t_low, t), max(t_high, t)
-            if s_first != s_first:
-                s_first, t_first = s, t
-            else:
-                chord = max(chord, (s - s_last) * (s - s_last) + (t - t_last) * (t - t_last))
-            s_last, t_last = s, t
-    chord = max(chord, (s_first - s_last) * (s_first - s_last) + (t_first - t_last) * (t_first - t_last))
-    bulge = 1.0 - math.sqrt(max(1.0 - 0.25 * chord, 0.0)) + 1e-12
+    if square < 0.04:
+        return 0.13 * square + 1e-12
+    return 1.0 - math.sqrt(max(1.0 - 0.25 * square, 0.0)) + 1e-12
+
+
+@kernel
+def _box_ahead(
+    s0: float, t0: float, s1: float, t1: float, s2: float, t2: float
+) -> tuple[float, float, float, float]:
+    """Return the range of s and of t that a triangle ahead of the plane z = 0 may cover."""
+    chord = max((s1 - s0) * (s1 - s0) + (t1 - t0) * (t1 - t0),
+                max((s2 - s1) * (s2 - s1) + (t2 - t1) * (t2 - t1),
+                    (s0 - s2) * (s0 - s2) + (t0 - t2) * (t0 - t2)))  # fmt: skip
+    bulge = _bulge(chord)
+    return (min(s0, min(s1, s2)) - bulge, max(s0, max(s1, s2)) + bulge,
+            min(t0, min(t1, t2)) - bulge, max(t0, max(t1, t2)) + bulge)  # fmt: skip
+
+
+@kernel
+def _box_across(x: Any, y: Any, z: Any) -> tuple[float, float, float, float]:
+    """Return the range of s and of t that the part ahead of z = 0 may cover of a triangle that crosses it."""
+    s_low, s_high, t_low, t_high, longest = np.inf, -np.inf, np.inf, -np.inf, 0.0
+    s_first, t_first, s_last, t_last = np.nan, np.nan, np.nan, np.nan
+    for half_step in range(6):  # each corner, then where its edge meets the plane
+        a = half_step // 2
+        if half_step % 2 == 0:
+            if z[a] < 0.0:
+                continue
+            scale = 1.0 / max(math.sqrt(x[a] * x[a] + y[a] * y[a] + z[a] * z[a]) + z[a], SMALLEST)
+            s, t = x[a] * scale, y[a] * scale
+        else:
+            if (z[a] < 0.0) == (z[a + 1] < 0.0):
+                continue
+            share = z[a] / (z[a] - z[a + 1])
+            rim_x, rim_y = x[a] + share * (x[a + 1] - x[a]), y[a] + share * (y[a + 1] - y[a])
+            length = math.sqrt(rim_x * rim_x + rim_y * rim_y)
+            if length == 0.0:  # through the centre itself: no way to tell
+                return -1.0, 1.0, -1.0, 1.0
+            s, t = rim_x / length, rim_y / length
+        s_low, s_high, t_low, t_high = min(s_low, s), max(s_high, s), min(t_low, t), max(t_high, t)
+        if s_first == s_first:
+            longest = max(longest, (s - s_last) * (s - s_last) + (t - t_last) * (t - t_last))
+        else:
+            s_first, t_first = s, t
+        s_last, t_last = s, t
+    longest = max(longest, (s_first - s_last) * (s_first - s_last) + (t_first - t_last) * (t_first - t_last))
+    bulge = _bulge(longest)
     return s_low - bulge, s_high + bulge, t_low - bulge, t_high + bulge
 
 
@@ -225,7 +286,7 @@ def paraboloid_depth_maps(
         draw_paraboloids(projection, geometry.vertices, geometry.faces, numba.get_num_threads(), nearness, ids)
     if np.dtype(dtype) == np.float64:
         return _exact_distances(geometry, projection, ids[:, :width]).reshape(-1, size, size)
-    distance = np.full((len(centers), size, size), np.inf, np.float32)
+    distance = np.empty((len(centers), size, size), np.float32)
     _distances(projection, nearness, distance)
     return distance
 
@@ -244,10 +305,10 @@ def _exact_distances(geometry: Geometry, projection: Projection, ids: Array) -> 
 def _distances(projection: Projection, nearness: Array, distance: Array) -> None:
     n, half = projection.width, projection.half[0]
     step = 2.0 * half / n
-    for row in prange(distance.shape[0] * n):
-        t = (row % n + 0.5) * step - half
-        for column in range(n):
-            near = nearness[row, column]
-            if near > 0.0:
+    for m in prange(len(distance)):
+        for row in range(n):
+            t = (row + 0.5) * step - half
+            for column in range(n):
                 s = (column + 0.5) * step - half
-                distance[row // n, row % n, column] = (1.0 + s * s + t * t) / near
+                # nothing seen: nearness 0, distance inf
+                distance[m, row, column] = (1.0 + s * s + t * t) / nearness[m * n + row, column]

@@ -103,7 +103,7 @@ def test_nearest_cells_equal_those_of_a_literal_twin():
 
 @pytest.mark.feature("SII-03")
 def test_filtering_calms_the_light_under_sub_texel_motion(evidence):
-    """In a sphere E = sum(Phi) / (4 pi R^2) wherever the lights lie: what jumps is the flux, here of a chequered wall."""
+    """In a sphere E = sum(Phi) / (4 pi R^2) wherever the lights lie: what jumps is the flux, of a chequered wall."""
     ball = sphere(12, 2.0)
     wall = geometry(ball.vertices, ball.faces, materials=np.random.default_rng(1).integers(0, 2, len(ball.faces)))
     materials = material_table([Material(diffuse=(0.1, 0.4, 0.7)), Material(diffuse=(0.8, 0.5, 0.2))], np.float64)

@@ -103,7 +103,8 @@ def _explained(error: BaseException, session: Session) -> int:
         say(_one_line(error.format_message()))
         return USAGE
     if isinstance(error, RefgiError):
-        say(str(error))
+        for line in str(error).splitlines():  # a scene file's errors come all at once
+            say(line)
         return USAGE
     if isinstance(error, MemoryError):
         say(f"out of memory: {_one_line(str(error)) or 'try a smaller --size'}")

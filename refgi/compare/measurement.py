@@ -79,8 +79,9 @@ def measure(image: Array, reference: Array, variance: Array | None = None, cover
         figures = {name: Figure(math.nan) for name in METRICS}
     else:
         noise = {} if variance is None else noise_figures(image, reference, variance, mask, mean_variance)
-        figures = {name: _figure(name, f(image, reference, mask), noise.get(name, math.nan))
-                   for name, f in METRICS.items()}
+        x, r = (row.reshape(3, 1, -1) for row in samples(image, reference, mask))  # gathered once for all but SSIM
+        values = {name: f(image, reference, mask) if name == "ssim" else f(x, r, None) for name, f in METRICS.items()}
+        figures = {name: _figure(name, value, noise.get(name, math.nan)) for name, value in values.items()}
     return Measurement(figures, int(mask.sum()), bad, bad_reference)
 
 

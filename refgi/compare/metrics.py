@@ -337,4 +337,5 @@ def samples(image: Array, reference: Array, covered: Array | None) -> tuple[Arra
     for name, pixels in (("image", image), ("reference", reference)):
         if bad := count_non_finite(pixels, mask):
             raise InputError(f"{name}: expected finite pixels, got {bad} that are NaN or infinite")
-    return image[:, mask].astype(np.float64).ravel(), reference[:, mask].astype(np.float64).ravel()
+    x, r = (pixels if covered is None else pixels[:, mask] for pixels in (image, reference))
+    return x.astype(np.float64, copy=False).ravel(), r.astype(np.float64, copy=False).ravel()

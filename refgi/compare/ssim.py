@@ -7,6 +7,7 @@ K1 = 0.01, K2 = 0.03. The dynamic range is the reference's maximum, since linear
 
 import math
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -39,15 +40,19 @@ def mean_ssim(image: Array, reference: Array, covered: Array) -> float:
     if not c1 > 0:
         return math.nan
     average = _window_average(covered)
-    similarities = []
-    for x, r in zip(image.astype(np.float64), reference.astype(np.float64), strict=True):
+
+    def of_channel(x: Array, r: Array) -> float:
+        x, r = x.astype(np.float64), r.astype(np.float64)
         mean_x, mean_r = average(x), average(r)
         variance_x = np.maximum(average(x * x) - mean_x**2, 0)
         variance_r = np.maximum(average(r * r) - mean_r**2, 0)
         covariance = average(x * r) - mean_x * mean_r
         luminance = (2 * mean_x * mean_r + c1) / (mean_x**2 + mean_r**2 + c1)
-        similarities.append(luminance * (2 * covariance + c2) / (variance_x + variance_r + c2))
-    return float(np.mean([s[covered].mean() for s in similarities]))
+        similarity = luminance * (2 * covariance + c2) / (variance_x + variance_r + c2)
+        return float(similarity[covered].mean())
+
+    with ThreadPoolExecutor(3) as pool:  # SciPy's filters leave Python's lock
+        return float(np.mean(list(pool.map(of_channel, image, reference))))
 
 
 def ssim_of_noise(reference: Array, variance: Array, covered: Array) -> float:
@@ -71,12 +76,14 @@ def ssim_of_noise(reference: Array, variance: Array, covered: Array) -> float:
     if not c1 > 0:
         return math.nan
     average = _window_average(covered)
-    similarities = []
-    for r, v in zip(reference.astype(np.float64), variance.astype(np.float64), strict=True):
-        noise = average(v)
+
+    def of_channel(r: Array, v: Array) -> float:
+        r, noise = r.astype(np.float64), average(v.astype(np.float64))
         signal = np.maximum(average(r * r) - average(r) ** 2 - noise, 0)
-        similarities.append((2 * signal + c2) / (2 * signal + noise + c2))
-    return float(np.mean([s[covered].mean() for s in similarities]))
+        return float(((2 * signal + c2) / (2 * signal + noise + c2))[covered].mean())
+
+    with ThreadPoolExecutor(3) as pool:
+        return float(np.mean(list(pool.map(of_channel, reference, variance))))
 
 
 def _constants(reference: Array, covered: Array) -> tuple[float, float]:

@@ -111,6 +111,18 @@ def test_unusable_options_are_named_before_anything_is_computed(arguments, words
 
 
 @pytest.mark.usefixtures("never_computes")
+def test_all_errors_of_a_scene_file_are_told_a_line_each(tmp_path):
+    path = tmp_path / "bad.json"
+    path.write_text('{"camera": {"eye": [0, 0], "fov": 3}}')
+    result = run(path, "--out", tmp_path / "a.exr")
+    assert result.exit_code == 2
+    lines = result.stderr.splitlines()
+    assert len(lines) > 2
+    assert all(line.startswith(f"refgi: {path}: ") for line in lines)
+    assert any("camera.fov" in line for line in lines)
+
+
+@pytest.mark.usefixtures("never_computes")
 def test_all_wrong_settings_are_told_at_once(tmp_path):
     result = run("cornell_box", "--out", tmp_path / "a.exr", "--set", "light=5", "--set", "lights=many", "--set",
                  "pattern=spiral", "--set", "offset=nan")

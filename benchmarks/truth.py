@@ -1,0 +1,91 @@
+"""Truth: rays per second inside the estimators against bare Embree, and time to a given error."""
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from benchmarks.harness import Row, ratio
+from refgi.frame import Frame
+from refgi.rays import Tracer
+from refgi.rays.embree import RunDoor
+from refgi.scene import load_scene
+from refgi.truth import TruthSettings
+from refgi.truth.moments import add_pass, no_passes
+from refgi.truth.passes import Task, one_pass
+from refgi.truth.surfaces import lights_of, receivers, surfaces
+
+TARGETS = (1e-2, 1e-3, 1e-4)
+
+
+class Recorder:
+    """A tracer that keeps copies of the rays it is asked about."""
+
+    def __init__(self, tracer: Tracer) -> None:
+        self.tracer, self.offset = tracer, tracer.offset
+        self.closest: list[tuple[np.ndarray, ...]] = []
+        self.shadow: list[tuple[np.ndarray, ...]] = []
+
+    def fill_closest(self, origins, directions, reach, *found):
+        self.closest.append(tuple(a[reach > 0].copy() for a in (origins, directions, reach)))
+        self.tracer.fill_closest(origins, directions, reach, *found)
+
+    def fill_occluded(self, origins, directions, reach, blocked):
+        self.shadow.append(tuple(a[reach > 0].copy() for a in (origins, directions, reach)))
+        self.tracer.fill_occluded(origins, directions, reach, blocked)
+
+
+def rows(quick: bool) -> Iterator[Row]:
+    size, scenes = (256, ("cornell_box",)) if quick else (512, ("cornell_box", "atrium:faces=100000"))
+    for name in scenes:
+        frame = Frame(load_scene(name), width=size, height=size)
+        for estimator in ("hemisphere", "light", "combined"):
+            task = _task(frame, TruthSettings(estimator))
+            yield _ray_rate(frame, task, name, 3 if quick else 5)
+    frame = Frame(load_scene("cornell_box"), width=size, height=size)
+    for estimator in ("hemisphere", "light", "combined"):
+        yield from _time_to_error(_task(frame, TruthSettings(estimator)), 4 if quick else 10)
+
+
+def _task(frame: Frame, settings: TruthSettings) -> Task:
+    buffer, scene = frame.gbuffer, frame.scene
+    to = receivers(scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
+    return Task(scene, settings, frame.tracer, surfaces(scene), lights_of(scene), to)
+
+
+def _ray_rate(frame: Frame, task: Task, name: str, repeats: int) -> Row:
+    """Time the rays of a pass alone, by embreex's run on two Python threads, against the whole pass."""
+    recorder = Recorder(frame.tracer)
+    one_pass(task._replace(tracer=recorder), 0)
+    door = RunDoor(frame.scene.geometry.vertices, frame.scene.geometry.faces)
+    count = sum(len(batch[0]) for batch in (*recorder.closest, *recorder.shadow))
+    size = max(len(batch[0]) for batch in (*recorder.closest, *recorder.shadow))
+    ids, far, blocked = np.empty(size, np.int32), np.empty(size, np.float32), np.empty(size, np.bool_)
+
+    def bare() -> None:
+        for o, d, reach in recorder.closest:
+            door.closest(o, d, reach, ids[: len(o)], far[: len(o)])
+        for o, d, reach in recorder.shadow:
+            door.occluded(o, d, reach, blocked[: len(o)])
+
+    found = ratio(bare, lambda: one_pass(task, 0), repeats)
+    note = f"{count / found.seconds_b / 1e6:.1f} M rays/s, bare {count / found.seconds_a / 1e6:.1f}"
+    return Row(f"{task.settings.estimator}, {name}: ray rate over bare embreex's", found.median, "", ">= 0.8", note)
+
+
+def _time_to_error(task: Task, passes: int) -> Iterator[Row]:
+    """Take relMSE from the spread of passes: it falls as 1 / passes, as the estimators are unbiased."""
+    moments, seconds = no_passes(len(task.to.pixel)), []
+    one_pass(task, passes)
+    for number in range(passes):
+        started = time.perf_counter()
+        add_pass(moments, one_pass(task, number))
+        seconds.append(time.perf_counter() - started)
+    mean = moments.mean[:, :-1]
+    each = (moments.variance_of_mean[:, :-1] * passes / (mean**2 + (0.1 * mean.mean()) ** 2)).mean()
+    for target in TARGETS:
+        aim = "<= 1" if (target, task.settings.estimator) == (1e-2, "combined") else ""
+        needed = float(np.median(seconds) * each / target)
+        yield Row(f"{task.settings.estimator}: time to relMSE {target:g}, all pixels", needed, "s", aim,
+                  f"{each:.3g} a pass of {np.median(seconds):.2f} s")
+

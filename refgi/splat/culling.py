@@ -24,19 +24,25 @@ def bound_tile(tile: Array, size: int, low: Array, high: Array) -> None:
     Parameters
     ----------
     tile : (>= 6, TILE) ndarray
-        Receivers: position and normal.
+        Receivers: position and normal; TILE is a power of two.
     size : int
         How many of them count.
     low, high : (6,) ndarray
         Filled with the corners of both boxes.
     """
+    # by halves, element by element, which runs in lanes; a running minimum would not
+    lanes = tile.shape[1]
+    least, most = np.empty(lanes, tile.dtype), np.empty(lanes, tile.dtype)
     for row in range(6):
-        least, most = tile[row, 0], tile[row, 0]
-        for i in range(1, size):
-            value = tile[row, i]
-            least = value if value < least else least
-            most = value if value > most else most
-        low[row], high[row] = least, most
+        for i in range(lanes):
+            least[i] = most[i] = tile[row, i if i < size else 0]
+        half = lanes // 2
+        while half > 0:
+            for i in range(half):
+                least[i] = least[i + half] if least[i + half] < least[i] else least[i]
+                most[i] = most[i + half] if most[i + half] > most[i] else most[i]
+            half //= 2
+        low[row], high[row] = least[0], most[0]
 
 
 @kernel

@@ -67,8 +67,8 @@ def irradiance(
     light that coincides with a receiver adds 0. Results do not depend on the number of threads, on how receivers
     are split into calls or on where a pixel stands in the picture, to the bit.
     """
-    position = np.asarray(receivers.position)
-    normal, covered = np.asarray(receivers.normal, position.dtype), np.asarray(receivers.covered, np.bool_)
+    position, normal, covered = (np.asarray(part) for part in receivers)
+    normal, covered = normal.astype(position.dtype, copy=False), covered.astype(np.bool_, copy=False)
     _check(position, normal, covered, lights, settings, footprint)
     places = _block_by_block(covered)
     points, normals = (np.take(part.reshape(3, -1), places, axis=1) for part in (position, normal))

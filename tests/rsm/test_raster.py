@@ -116,6 +116,17 @@ def test_shared_edges_and_vertices_on_texel_centres_belong_to_one_triangle():
             assert (count == 1).all()
 
 
+def test_planes_through_texel_centres_of_a_paraboloid_belong_to_one_triangle():
+    projection = paraboloid_projection([(0, 0, 0)], [(0, 0, 1)], 17)  # s = 0, t = 0 and s = t are texel centres
+    s = (2 * np.arange(17) + 1) / 17 - 1
+    inner = np.add.outer(s**2, s**2) < 0.9
+    for n in (2, 4):
+        flat = sheet(n)
+        count = alone(geometry(flat.vertices * (64, 64, 1) + (0, 0, 1), flat.faces), projection)
+        assert (count[inner] == 1).all()
+        assert count.max() == 1
+
+
 def test_a_lone_quad_owns_its_top_and_left_border():
     projection = Projection(ORTHOGRAPHIC, 8, 8, np.array([[0.0, 0, 4]]), look_frame((0, 0, -1), (0, 1, 0))[None],
                             np.array([4.0, 4.0]), 8.0)  # fmt: skip

@@ -56,7 +56,7 @@ def polygon_form_factor(point: Sequence[float], normal: Sequence[float], corners
 
     Notes
     -----
-    F = |sum over edges of angle(edge) <n . unit normal of the plane through edge and point>| / (2 pi).
+    ``F = |sum over edges of angle(edge) <n . unit normal of the plane through edge and point>| / (2 pi)``.
     """
     rays = np.asarray(corners, np.float64) - np.asarray(point, np.float64)
     following = np.roll(rays, -1, axis=0)

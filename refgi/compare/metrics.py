@@ -83,7 +83,7 @@ def relmse(image: Array, reference: Array, covered: Array | None = None) -> floa
 
 
 def mae(image: Array, reference: Array, covered: Array | None = None) -> float:
-    """Return the mean absolute error, mean|x - r|.
+    """Return the mean absolute error, ``mean(|x - r|)``.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def mae(image: Array, reference: Array, covered: Array | None = None) -> float:
 
 
 def smape(image: Array, reference: Array, covered: Array | None = None) -> float:
-    """Return the symmetric mean absolute percentage error, mean(|x - r| / (|x| + |r|)), 0 where both are 0.
+    """Return the symmetric mean absolute percentage error, ``mean(|x - r| / (|x| + |r|))``, 0 where both are 0.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def relative_scale(r: Array) -> Array:
 
 
 def over_magnitude(difference: Array, x: Array, r: Array) -> Array:
-    """Return difference / (|x| + |r|), 0 where both are 0.
+    """Return ``difference / (|x| + |r|)``, 0 where both are 0.
 
     Parameters
     ----------

@@ -22,6 +22,7 @@ check: $(VENV)/dev.stamp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/numpydoc lint $$(git ls-files 'refgi/*.py' ':!refgi/cli')
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 
 evidence: $(VENV)/dev.stamp
 	$(BIN)/python -m pytest tests -m feature --evidence -q

@@ -6,9 +6,9 @@ which the papers state. The rasterizer keeps a visibility buffer (triangle and n
 second pass, only those that are asked for.
 """
 
+from refgi.rsm.depth_maps import paraboloid_depth_maps
 from refgi.rsm.direct import direct_irradiance, shadow_map_visibility
 from refgi.rsm.gbuffer import GBuffer, gbuffer
-from refgi.rsm.paraboloid import paraboloid_depth_maps
 from refgi.rsm.pixel_lights import PixelLights, choose_pixel_lights
 from refgi.rsm.projection import Projection, camera_projection, project
 from refgi.rsm.raster import Visibility, rasterize

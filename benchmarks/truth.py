@@ -2,48 +2,54 @@
 
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from benchmarks.harness import Row, ratio
 from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.rays.embree import RunDoor
-from refgi.scene import load_scene
+from refgi.scene import Geometry, load_scene
 from refgi.truth import TruthSettings
 from refgi.truth.moments import add_pass, no_passes
 from refgi.truth.passes import Task, one_pass
+from refgi.truth.settings import Estimator
 from refgi.truth.surfaces import lights_of, receivers, surfaces
 
+Array = npt.NDArray[Any]
+ESTIMATORS: tuple[Estimator, ...] = ("hemisphere", "light", "combined")
 TARGETS = (1e-2, 1e-3, 1e-4)
 
 
-class Recorder:
+class Recorder(Tracer):
     """A tracer that keeps copies of the rays it is asked about."""
 
-    def __init__(self, tracer: Tracer) -> None:
-        self.tracer, self.offset = tracer, tracer.offset
-        self.closest: list[tuple[np.ndarray, ...]] = []
-        self.shadow: list[tuple[np.ndarray, ...]] = []
+    def __init__(self, geometry: Geometry) -> None:
+        super().__init__(geometry)
+        self.nearest: list[tuple[Array, ...]] = []
+        self.shadows: list[tuple[Array, ...]] = []
 
-    def fill_closest(self, origins, directions, reach, *found):
-        self.closest.append(tuple(a[reach > 0].copy() for a in (origins, directions, reach)))
-        self.tracer.fill_closest(origins, directions, reach, *found)
+    def fill_closest(self, origins: Array, directions: Array, reach: Array, triangle_id: Array,
+                     distance: Array) -> None:
+        self.nearest.append(tuple(a[reach > 0].copy() for a in (origins, directions, reach)))
+        super().fill_closest(origins, directions, reach, triangle_id, distance)
 
-    def fill_occluded(self, origins, directions, reach, blocked):
-        self.shadow.append(tuple(a[reach > 0].copy() for a in (origins, directions, reach)))
-        self.tracer.fill_occluded(origins, directions, reach, blocked)
+    def fill_occluded(self, origins: Array, directions: Array, reach: Array, blocked: Array) -> None:
+        self.shadows.append(tuple(a[reach > 0].copy() for a in (origins, directions, reach)))
+        super().fill_occluded(origins, directions, reach, blocked)
 
 
 def rows(quick: bool) -> Iterator[Row]:
     size, scenes = (256, ("cornell_box",)) if quick else (512, ("cornell_box", "atrium:faces=100000"))
     for name in scenes:
         frame = Frame(load_scene(name), width=size, height=size)
-        for estimator in ("hemisphere", "light", "combined"):
+        for estimator in ESTIMATORS:
             task = _task(frame, TruthSettings(estimator))
             yield _ray_rate(frame, task, name, 3 if quick else 5)
     frame = Frame(load_scene("cornell_box"), width=size, height=size)
-    for estimator in ("hemisphere", "light", "combined"):
+    for estimator in ESTIMATORS:
         yield from _time_to_error(_task(frame, TruthSettings(estimator)), 4 if quick else 10)
 
 
@@ -55,17 +61,17 @@ def _task(frame: Frame, settings: TruthSettings) -> Task:
 
 def _ray_rate(frame: Frame, task: Task, name: str, repeats: int) -> Row:
     """Time the rays of a pass alone, by embreex's run on two Python threads, against the whole pass."""
-    recorder = Recorder(frame.tracer)
+    recorder = Recorder(frame.scene.geometry)
     one_pass(task._replace(tracer=recorder), 0)
     door = RunDoor(frame.scene.geometry.vertices, frame.scene.geometry.faces)
-    count = sum(len(batch[0]) for batch in (*recorder.closest, *recorder.shadow))
-    size = max(len(batch[0]) for batch in (*recorder.closest, *recorder.shadow))
+    count = sum(len(batch[0]) for batch in (*recorder.nearest, *recorder.shadows))
+    size = max(len(batch[0]) for batch in (*recorder.nearest, *recorder.shadows))
     ids, far, blocked = np.empty(size, np.int32), np.empty(size, np.float32), np.empty(size, np.bool_)
 
     def bare() -> None:
-        for o, d, reach in recorder.closest:
+        for o, d, reach in recorder.nearest:
             door.closest(o, d, reach, ids[: len(o)], far[: len(o)])
-        for o, d, reach in recorder.shadow:
+        for o, d, reach in recorder.shadows:
             door.occluded(o, d, reach, blocked[: len(o)])
 
     found = ratio(bare, lambda: one_pass(task, 0), repeats)

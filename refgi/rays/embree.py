@@ -61,7 +61,17 @@ def open_door(vertices: Array, faces: Array) -> Door:
 
 
 class AddressDoor:
-    """Embree's C functions, called by address from compiled kernels."""
+    """Embree's C functions, called by address from compiled kernels.
+
+    Parameters
+    ----------
+    library : ctypes.CDLL
+        Embree.
+    vertices : (n, 3) float32 ndarray
+        Vertices, world space, m.
+    faces : (m, 3) int32 ndarray
+        Vertex indices.
+    """
 
     def __init__(self, library: ctypes.CDLL, vertices: Array, faces: Array) -> None:
         self._buffers = (_padded(vertices, np.float32), _padded(faces, np.uint32))  # shared with Embree: keep alive
@@ -79,7 +89,15 @@ class AddressDoor:
 
 
 class RunDoor:
-    """embreex's `run`, which releases the GIL, on as many Python threads as Numba uses."""
+    """embreex's `run`, which releases the GIL, on as many Python threads as Numba uses.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float32 ndarray
+        Vertices, world space, m.
+    faces : (m, 3) int32 ndarray
+        Vertex indices.
+    """
 
     def __init__(self, vertices: Array, faces: Array) -> None:
         from embreex.mesh_construction import TriangleMesh

@@ -20,8 +20,8 @@ from refgi.rsm.projection import camera_projection, project
 from refgi.rsm.solid_angle import texel_solid_angles
 from refgi.sampling import hash_bits
 from refgi.scene import DirectionalLight, LightTable, Scene, material_table
-from refgi.truth.hemisphere import CHUNK
 from refgi.truth.light_grid import light_rays
+from refgi.truth.paths import CHUNK
 from refgi.truth.surfaces import Surfaces, around, face_cross, face_normal, shading_normal, surfaces
 
 Array = npt.NDArray[Any]

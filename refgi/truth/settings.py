@@ -17,39 +17,19 @@ PICKS, DIRECTIONS, DIRECTIONS_ALONE, BOUND = 16, 8, 16, 0.1
 class TruthSettings:
     """How the ground truth is computed and when it stops: at the first of `samples`, `seconds`, `target_error`.
 
-    Parameters
-    ----------
-    estimator : {"combined", "hemisphere", "light"}
-        Split at a bounded geometry term, hemisphere sampling alone, or light-side sampling alone.
-    samples : int
-        Samples per pixel (picks of lit points plus hemisphere directions); at least two passes are made.
-    seconds : float, optional
-        Stop after the pass in which this much time is over, s.
-    target_error : float, optional
-        Stop when the picture's root mean square standard error is below this share of its mean.
-    visibility : bool
-        False: nothing blocks between emitter and receiver (the direct light of the emitter stays shadowed).
-    bounces : int
-        Diffuse or glossy bounces before the receiver, at least 1.
-    caustics : bool
-        Add light that reaches receivers through mirror-like lobes and glass; those lobes are then left out of the
-        other estimators.
-    photons : int
-        Photons from each light in a pass, for caustics.
-    seed : int
-        Which random numbers.
-    light_grid : int
-        Directions along one side of each light's grid, fresh in every pass.
-    picks : int
-        Lit points that each receiver picks in a pass.
-    directions : int, optional
-        Hemisphere directions per receiver and pass; 8, or 16 for "hemisphere".
-    bound : float
-        Largest geometry term left to the light side, in units of 1 / footprint of a light direction.
-    checkpoint : path, optional
-        File that holds all passes so far; an existing one of the same computation is continued.
-    batch : int
-        Rays traced at a time. Changes memory, never a bit of the result.
+    - `estimator`: "combined" (split at a bounded geometry term), "hemisphere" or "light" alone.
+    - `samples` per pixel (picks of lit points plus hemisphere directions; at least two passes are made), `seconds`
+      (checked after each pass), `target_error` (root mean square standard error of the picture over its mean).
+    - `visibility=False`: nothing blocks between emitter and receiver; the emitter's direct light stays shadowed.
+    - `bounces` before the receiver, diffuse or glossy, 1 or more.
+    - `caustics`: add light through mirror-like lobes and glass, by `photons` from each light in a pass; those lobes are
+      then left out of the estimators.
+    - `seed`: which random numbers.
+    - `light_grid` directions along one side of each light's grid, `picks` of lit points and `directions` over the
+      hemisphere (8, or 16 for "hemisphere") of each receiver in a pass; `bound` is the largest geometry term left to
+      the light side, in units of 1 / footprint of a light direction.
+    - `checkpoint`: file that holds all passes so far; an existing one of the same computation is continued.
+    - `batch` rays are traced at a time, which changes memory and never a bit of the result.
     """
 
     estimator: Estimator = "combined"

@@ -145,10 +145,12 @@ def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tup
     ----------
     to : Receivers
         Receivers.
-    receivers, lights : tuple of 2 ints
-        First and one past the last of the block.
+    receivers : tuple of 2 ints
+        First receiver of the block and one past the last.
     senders : Senders
         Pixel lights.
+    lights : tuple of 2 ints
+        First sender of the block and one past the last.
     offset : float
         How far segments end above the sender, m.
     rays : tuple of 4 arrays

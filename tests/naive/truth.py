@@ -26,7 +26,7 @@ def nearest_hit(vertices, faces, origin, direction):
 
 
 def one_bounce(vertices, faces, albedo_of_face, light, x, n_x, cells, blocked=True):
-    """Return E at x by the midpoint rule over a spot's cone: cells in 1 - cos(angle) and in the turn around the axis."""
+    """Return E at x by the midpoint rule over a spot's cone: cells in 1 - cos(angle) and in the turn about the axis."""
     axis = np.asarray(light.direction) / np.linalg.norm(light.direction)
     across = np.cross(axis, [0.3, 0.5, 0.8])
     across /= np.linalg.norm(across)

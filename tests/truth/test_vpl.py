@@ -70,6 +70,7 @@ def test_shadows_only_take_light_away_and_batches_change_nothing():
     assert (shadowed[:, ~frame.gbuffer.covered] == 0).all()
 
 
+@pytest.mark.feature("REF-05")
 def test_light_is_additive():
     found = load_scene("cornell_box")
     single = Frame(found, width=24, height=24, rsm_resolution=32)

@@ -1,0 +1,98 @@
+"""Paths and shadow rays of a batch, as arrays, and the small vector algebra of their kernels.
+
+Parallel loops over paths only call a kernel for each chunk: Numba drops, without a word, what a parallel loop itself
+writes into arrays that it reached through a NamedTuple's attribute. Inside, scalars are taken one by one: a row taken
+as a view counts references, and over that count threads wait for each other.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+
+Array = npt.NDArray[Any]
+
+CHUNK = 1024  # paths or receivers that one parallel iteration owns
+
+
+class Paths(NamedTuple):
+    """The moving ends of a batch of paths: one ray each, what it found, what it carries."""
+
+    origin: Array  # (n, 3) float32, m
+    direction: Array  # (n, 3) float32, unit vectors
+    reach: Array  # (n,) float32, m; 0 once a path has ended
+    travelled: Array  # (n,) float32: distance from the receiver to the origin, m
+    cosine: Array  # (n,) float32: <n_x.w> at the receiver
+    triangle_id: Array  # (n,) int32
+    distance: Array  # (n,) float32
+    weight: Array  # (n, 3) float32: factor from found radiance to irradiance at the receiver
+
+
+class Shadows(NamedTuple):
+    """Shadow rays of a batch, and what each is worth if it is free."""
+
+    origin: Array  # (n, 3) float32
+    direction: Array  # (n, 3) float32
+    reach: Array  # (n,) float32
+    blocked: Array  # (n,) bool
+    worth: Array  # (n, 3) float32, W/m^2
+
+
+@kernel
+def dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
+    """Return the dot product of two vectors.
+
+    Parameters
+    ----------
+    a, b : tuple of 3 floats
+        The vectors.
+
+    Returns
+    -------
+    float
+        Their dot product.
+    """
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def row(rows: Array, i: int) -> tuple[float, float, float]:
+    """Return a row of three as float64 scalars.
+
+    Parameters
+    ----------
+    rows : (n, 3) ndarray
+        Vectors or colours.
+    i : int
+        Which.
+
+    Returns
+    -------
+    tuple of 3 floats
+        Its values.
+    """
+    return np.float64(rows[i, 0]), np.float64(rows[i, 1]), np.float64(rows[i, 2])
+
+
+@kernel
+def found(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return the direction back along a ray and the point it found.
+
+    Parameters
+    ----------
+    paths : Paths
+        The batch.
+    ray : int
+        Which, of those that found something.
+
+    Returns
+    -------
+    tuple of 2 tuples of 3 floats
+        Unit vector, and point (m).
+    """
+    t = np.float64(paths.distance[ray])
+    dx, dy, dz = row(paths.direction, ray)
+    ox, oy, oz = row(paths.origin, ray)
+    return (-dx, -dy, -dz), (ox + t * dx, oy + t * dy, oz + t * dz)

@@ -44,7 +44,7 @@ def disc_pattern(samples: int, seed: int, weight_squared: bool = False) -> Array
 
     Examples
     --------
-    >>> pattern = disc_pattern(1000, 0)
+    >>> pattern = disc_pattern(10_000, 0)
     >>> round(float(pattern[:, 2].mean()), 2)  # the disc's area, pi
     3.14
     """

@@ -10,20 +10,24 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from refgi.compare.comparison import Comparison, MethodResult, compare
+    from refgi.compare.comparison import compare
     from refgi.compare.measurement import Figure, Measurement, measure
+    from refgi.compare.outcome import Comparison, MethodResult
 
 __all__ = ["Comparison", "Figure", "Measurement", "MethodResult", "compare", "measure"]
 
-_HOME = {"Figure": "measurement", "Measurement": "measurement", "measure": "measurement"}
+_HOME = {
+    "Comparison": "outcome", "Figure": "measurement", "Measurement": "measurement", "MethodResult": "outcome",
+    "compare": "comparison", "measure": "measurement",
+}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
+    if name not in _HOME:
         raise AttributeError(f"module 'refgi.compare' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f"refgi.compare.{_HOME.get(name, 'comparison')}"), name)
+    return getattr(import_module(f"refgi.compare.{_HOME[name]}"), name)
 
 
 class _Callable(ModuleType):

@@ -17,77 +17,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi import stages
 from refgi.compare.environment import environment
-from refgi.compare.flip import Flip, flip
-from refgi.compare.measurement import Measurement, measure
+from refgi.compare.flip import flip
+from refgi.compare.measurement import measure
+from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS, find_method
 from refgi.scene import Scene, load_scene
 
-Array = npt.NDArray[Any]
 Progress = Callable[[str, float], None]
 
-TRUTH, UNOCCLUDED = "truth", "unoccluded"
 WARM_UP_SIZE = 16  # pixels along a side
-
-
-@dataclasses.dataclass(frozen=True)
-class Reference:
-    """What path tracing says, with or without visibility."""
-
-    name: str
-    settings: Any
-    irradiance: Array  # (3, h, w) float64 indirect, W/m^2
-    variance: Array  # (3, h, w) of its mean
-    mean_variance: Array  # (3,) of the picture's mean, with the correlation between pixels
-    samples: Array  # (h, w)
-    radiance: Array  # (3, h, w) W/m^2/sr
-    seconds: float
-    runs: tuple[stages.Run, ...]
-
-
-@dataclasses.dataclass(frozen=True)
-class MethodResult:
-    """What one method made of the scene and how far it is off."""
-
-    name: str
-    summary: str
-    settings: Any
-    irradiance: Array  # (3, h, w) indirect, W/m^2
-    radiance: Array  # (3, h, w) W/m^2/sr
-    seconds: float  # with its own buffers, without compiling
-    runs: tuple[stages.Run, ...]
-    against: Mapping[str, Measurement]  # by reference: "truth", and "unoccluded" for a method without visibility
-    flip: Flip
-
-
-@dataclasses.dataclass(frozen=True)
-class Comparison:
-    """All methods on one scene against the truth."""
-
-    scene: Scene
-    width: int
-    height: int
-    options: Mapping[str, Any]  # of the frame
-    covered: Array  # (h, w) pixels that see a surface: those that count
-    references: Mapping[str, Reference]  # "truth", and "unoccluded" where a method needs it
-    results: Mapping[str, MethodResult]
-    failures: Mapping[str, str]  # method: why it gave no picture
-    environment: Mapping[str, Any]
-
-    @property
-    def truth(self) -> Reference:
-        """The reference with visibility."""
-        return self.references[TRUTH]
-
-    @property
-    def is_sound(self) -> bool:
-        """Whether every method gave a picture without NaN and infinity."""
-        return not self.failures and not any(r.against[TRUTH].non_finite for r in self.results.values())
 
 
 def compare(

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from refgi import stages
 from refgi.compare import maps
-from refgi.compare.comparison import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
 from refgi.compare.measurement import Figure, Measurement
+from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
 from refgi.compare.plot import Point, time_against_error
 from refgi.compare.results import error_scale, plain, signed_error
 from refgi.image import png_bytes, write_text

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from refgi import stages
 from refgi.compare import maps
-from refgi.compare.comparison import TRUTH, Comparison, MethodResult, Reference
 from refgi.compare.flip import Flip
 from refgi.compare.measurement import Measurement
+from refgi.compare.outcome import TRUTH, Comparison, MethodResult, Reference
 from refgi.image import canonical_json, whole_file, write_exr, write_png, write_text
 
 Array = npt.NDArray[Any]

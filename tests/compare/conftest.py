@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from refgi.compare.comparison import Comparison, MethodResult, Reference
 from refgi.compare.flip import Flip
 from refgi.compare.measurement import measure
+from refgi.compare.outcome import Comparison, MethodResult, Reference
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
 from refgi.stages import Run
 

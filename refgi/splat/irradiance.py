@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.splat.lobe_sum import add_lobes
-from refgi.splat.packing import pack_clamp, pack_diffuse, pack_lobes, pack_widening
+from refgi.splat.packing import pack_clamp, pack_diffuse, pack_lobes, pack_spheres, pack_widening
 from refgi.splat.pair_sum import sum_pairs
-from refgi.splat.settings import PairSettings
+from refgi.splat.settings import FOOTPRINT_CLAMPS, PairSettings
+from refgi.splat.sphere_sum import sum_spheres
 from refgi.stages import report_progress, skip, stage
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def irradiance(
     settings : PairSettings
         How one light lights one receiver.
     footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamp "disc" alone.
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
 
     Returns
     -------
@@ -59,7 +60,8 @@ def irradiance(
     Raises
     ------
     InputError
-        If shapes do not fit, a light is not finite, or the clamp lacks its footprints.
+        If shapes do not fit, a light is not finite, the clamp lacks its footprints, or a light is glossy and the clamp
+        is "sphere".
 
     Notes
     -----
@@ -107,10 +109,13 @@ def _check(
         if values is not None:
             expect(values.shape == (3, count), f"lights.{key}", f"shape (3, {count})", values.shape)
             expect(bool(np.isfinite(values).all()), f"lights.{key}", "finite numbers", "NaN or infinity")
-    if settings.clamp == "disc":
+    if settings.clamp in FOOTPRINT_CLAMPS:
         expect(footprint is not None and footprint.shape == (count,), "footprint",
-               f"the area of each of {count} lights for the clamp 'disc'", None if footprint is None else
+               f"the area of each of {count} lights for the clamp {settings.clamp!r}", None if footprint is None else
                footprint.shape)
+    if settings.clamp == "sphere":
+        expect(lights.lobe_flux is None or not lights.lobe_flux.any(), "clamp",
+               "another clamp than 'sphere', which knows diffuse lights alone: the scene has glossy materials", "sphere")
 
 
 def _sum(
@@ -121,6 +126,7 @@ def _sum(
     shines: Array = (lights.flux != 0).any(axis=0)
     diffuse = pack_diffuse(lights, settings, dtype, shines)
     clamp = None if settings.clamp == "none" else pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
+    spheres = pack_spheres(settings, footprint, shines, dtype) if settings.clamp == "sphere" else None
     glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
     if glossy.any():
         lobes = pack_lobes(lights, settings, dtype, glossy)
@@ -132,7 +138,9 @@ def _sum(
     for first in range(0, points.shape[1], step):
         part = np.s_[:, first : first + step]
         here, facing, sums = (np.ascontiguousarray(array[part]) for array in (points, normals, total))
-        if diffuse.shape[1] > 1:
+        if diffuse.shape[1] > 1 and spheres is not None:
+            sum_spheres(here, facing, diffuse, spheres, sums)
+        elif diffuse.shape[1] > 1:
             sum_pairs(here, facing, diffuse, clamp, sums)
         if glossy.any():
             add_lobes(here, facing, lobes, lobe_clamp, widening, sums)

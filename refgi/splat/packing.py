@@ -119,6 +119,29 @@ def pack_clamp(settings: PairSettings, footprint: Array | None, chosen: Array, c
     return Clamp(np.dtype(dtype).type(least), softness, np.dtype(dtype).type(bound))
 
 
+def pack_spheres(settings: PairSettings, footprint: Array, chosen: Array, dtype: Any) -> Array:
+    """Size virtual spherical lights: pi r^2 is `clamp_value` times the footprint.
+
+    Parameters
+    ----------
+    settings : PairSettings
+        Says the factor; 0, the default, stands for 1.
+    footprint : (N,) ndarray
+        Surface area each light stands for, m^2.
+    chosen : (N,) ndarray of bool
+        Which lights.
+    dtype : dtype
+        Of the kernels.
+
+    Returns
+    -------
+    (M,) ndarray
+        r^2 of the M chosen lights, m^2.
+    """
+    square: Array = footprint[chosen] * ((settings.clamp_value or 1.0) / math.pi)
+    return square.astype(dtype)
+
+
 def pack_widening(lights: "PixelLights", settings: PairSettings, dtype: Any, chosen: Array) -> Widening | None:
     """Say for the kernels how exponents fall near the light (SII Sec. 3.3).
 

@@ -6,10 +6,11 @@ from typing import Literal
 
 from refgi.errors import expect
 
-ClampMode = Literal["none", "distance", "geometry", "disc"]
+ClampMode = Literal["none", "distance", "geometry", "disc", "sphere"]
 LobeNorm = Literal["none", "full_lobe", "clamped"]
 
 SWITCHES = frozenset({"sii_no_pi", "sii_widening", "sii_widening_unnorm"})
+FOOTPRINT_CLAMPS = ("disc", "sphere")  # need the surface area that each light stands for
 
 
 @dataclasses.dataclass(frozen=True)
@@ -17,8 +18,9 @@ class PairSettings:
     """How one pixel light lights one receiver.
 
     `clamp` keeps near pairs finite: not at all, by a minimum `distance` of `clamp_value` m, by a `geometry` term of
-    at most `clamp_value` 1/m^2, or by the form factor of a `disc` of the light's footprint. `offset` moves lights
-    back along their normals (m). `lobe_norm` is the norm of Phong lobes and `widening` the distance a (m) within
+    at most `clamp_value` 1/m^2, by the form factor of a `disc` of the light's footprint A, or by a virtual `sphere`
+    light of radius r, pi r^2 = `clamp_value` A (0: 1 A), for diffuse lights alone. `offset` moves lights back along
+    their normals (m). `lobe_norm` is the norm of Phong lobes and `widening` the distance a (m) within
     which their exponents fall (0: nowhere). `as_published` names forms to use as printed; see docs/methods/sii.
     """
 
@@ -30,8 +32,8 @@ class PairSettings:
     as_published: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        expect(self.clamp in ("none", "distance", "geometry", "disc"), "clamp",
-               "'none', 'distance', 'geometry' or 'disc'", self.clamp)
+        expect(self.clamp in ("none", "distance", "geometry", "disc", "sphere"), "clamp",
+               "'none', 'distance', 'geometry', 'disc' or 'sphere'", self.clamp)
         needed = self.clamp in ("distance", "geometry")
         expect(math.isfinite(self.clamp_value) and (self.clamp_value > 0 or (not needed and self.clamp_value == 0)),
                "clamp_value", f"a finite number > 0 for the clamp {self.clamp!r}" if needed else "a number >= 0",

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.splat.irradiance import Receivers, irradiance
-from refgi.splat.settings import PairSettings
+from refgi.splat.settings import FOOTPRINT_CLAMPS, PairSettings
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -56,7 +56,7 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
         Indirect irradiance, W/m^2, linear RGB, without visibility.
     """
     lights = pixel_lights(frame.rsms, settings)  # Sec. 3.1
-    footprint = light_footprints(frame.rsms, settings) if settings.clamp == "disc" else None
+    footprint = light_footprints(frame.rsms, settings) if settings.clamp in FOOTPRINT_CLAMPS else None
     buffer = frame.gbuffer
     receivers = Receivers(buffer.position, buffer.normal, buffer.covered)  # Sec. 3.2: deferred shading
     return irradiance(receivers, lights, settings, footprint)  # Eq. (2)

@@ -5,14 +5,16 @@ about the light never causes a G-buffer, and Embree is loaded only when rays are
 stage, so frames of an animation share what did not change when they run under one `stages.Memory`.
 """
 
+import warnings
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.errors import expect
+from refgi.errors import RefgiWarning, expect
 from refgi.scene.model import LightTable, MaterialTable, Scene, light_table, material_table
+from refgi.scene.values import is_count
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 Shadows = Literal["map", "exact"]
+
+# Share of the scene's extent: ray ends keep some 16 steps from surfaces, and at 1/4096 the light is off by 1e-3.
+COARSEST_STEP = 1 / 4096
 
 
 class Frame:
@@ -55,19 +60,22 @@ class Frame:
         rsm_resolution: int = 512,
         shadows: Shadows = "map",
     ) -> None:
+        expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
         self.scene = scene
         self.width = scene.camera.width if width is None else width
         self.height = scene.camera.height if height is None else height
-        self.dtype = np.dtype(dtype)
+        self.dtype = _dtype(dtype)
         self.rsm_resolution = rsm_resolution
         self.shadows = shadows
         for key in ("width", "height"):
-            expect(1 <= getattr(self, key) <= 65536, key, "1 to 65536 pixels", getattr(self, key))
-        expect(self.dtype in (np.float32, np.float64), "dtype", "float32 or float64", self.dtype.name)
-        expect(1 <= rsm_resolution <= 16384, "rsm_resolution", "1 to 16384 texels", rsm_resolution)
+            size = getattr(self, key)
+            expect(is_count(size) and 1 <= size <= 65536, key, "1 to 65536 pixels", size)
+        expect(is_count(rsm_resolution) and 1 <= rsm_resolution <= 16384, "rsm_resolution", "1 to 16384 texels",
+               rsm_resolution)
         expect(shadows in ("map", "exact"), "shadows", "'map' or 'exact'", shadows)
         expect(scene.face_count > 0, f"scene {scene.name!r}", "at least one triangle", "none")
         expect(len(scene.lights) > 0, f"scene {scene.name!r}", "at least one light", "none")
+        _warn_if_far(scene)
 
     @cached_property
     def materials(self) -> MaterialTable:
@@ -167,6 +175,24 @@ def compose(irradiances: tuple[Array, ...], buffer: "GBuffer", materials: Materi
         # a pixel without surface has id -1, whose row is masked out
         radiance += np.moveaxis(materials.emission[buffer.material_id], -1, 0) * buffer.covered
     return radiance
+
+
+def _dtype(given: npt.DTypeLike) -> np.dtype[Any]:
+    try:
+        dtype: np.dtype[Any] | None = np.dtype(given)
+    except TypeError:
+        dtype = None
+    expect(dtype in (np.float32, np.float64), "dtype", "float32 or float64", dtype.name if dtype else given)
+    assert dtype is not None
+    return dtype
+
+
+def _warn_if_far(scene: Scene) -> None:
+    step, extent = scene.geometry.float32_step, scene.geometry.diagonal
+    if step > COARSEST_STEP * extent:
+        text = (f"scene {scene.name!r}: {extent:.3g} m across, but so far from the origin that float32 steps are "
+                f"{step:.3g} m: light and shadows will be wrong; move it to the origin")
+        warnings.warn(RefgiWarning(text), stacklevel=3)
 
 
 @stage("rays.build")

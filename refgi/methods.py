@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy.typing as npt
@@ -72,17 +73,17 @@ def find_method(name: str) -> Method:
     InputError
         If there is none of that name.
     """
-    if name not in METHODS:
+    if not isinstance(name, str) or name not in METHODS:
         raise InputError(f"method: expected one of {', '.join(METHODS)}, got {name!r}")
     return METHODS[name]
 
 
-def render(scene: "Scene | str", method: str = "sii", settings: Any = None, **frame_options: Any) -> Picture:
+def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = None, **frame_options: Any) -> Picture:
     """Render a scene by one method.
 
     Parameters
     ----------
-    scene : Scene or str
+    scene : Scene, str or Path
         A scene, or what `load_scene` takes.
     method : str
         A name of `METHODS`.
@@ -107,6 +108,6 @@ def render(scene: "Scene | str", method: str = "sii", settings: Any = None, **fr
     function, settings_class = find_method(method).load()
     if settings is not None and not isinstance(settings, settings_class):
         raise InputError(f"settings: expected {settings_class.__name__}, got {type(settings).__name__}")
-    frame = Frame(load_scene(scene) if isinstance(scene, str) else scene, **frame_options)
+    frame = Frame(load_scene(scene) if isinstance(scene, str | Path) else scene, **frame_options)
     irradiance = function(frame, settings_class() if settings is None else settings)
     return Picture(frame, irradiance, frame.radiance(irradiance))

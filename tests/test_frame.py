@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from refgi import Frame, load_scene
-from refgi.errors import InputError
+from refgi.errors import InputError, RefgiWarning
 from refgi.methods import METHODS, find_method, render
 from refgi.scene import DirectionalLight, Geometry, PointLight
 from refgi.splat.sii import SiiSettings, sii
@@ -101,7 +101,11 @@ def test_several_lights_add_up(scene):
     [
         ({"width": 0}, "width: expected 1 to 65536 pixels, got 0"),
         ({"height": 10**6}, "height"),
+        ({"width": 10.5}, "width: expected 1 to 65536 pixels, got 10.5"),
+        ({"width": "10"}, "width: expected 1 to 65536 pixels, got '10'"),
         ({"dtype": np.float16}, "dtype: expected float32 or float64, got 'float16'"),
+        ({"dtype": "float33"}, "dtype: expected float32 or float64, got 'float33'"),
+        ({"rsm_resolution": 16.5}, "rsm_resolution"),
         ({"rsm_resolution": 0}, "rsm_resolution"),
         ({"shadows": "soft"}, "shadows: expected 'map' or 'exact', got 'soft'"),
     ],
@@ -117,6 +121,25 @@ def test_nothing_to_see_or_no_light_is_an_error(scene):
         Frame(dataclasses.replace(scene, geometry=empty))
     with pytest.raises(InputError, match="at least one light"):
         Frame(scene.with_lights())
+
+
+@pytest.mark.parametrize(("shift", "warned"), [(0.0, False), (100.0, False), (1e4, True), (1e5, True)])
+def test_a_scene_too_far_from_the_origin_for_float32_is_said_aloud(scene, shift, warned, recwarn):
+    """At 1e5 m the float32 steps are 8 mm, and ray ends keep several steps from the walls of a box of 0.55 m."""
+    Frame(dataclasses.replace(scene, geometry=dataclasses.replace(scene.geometry,
+                                                                  vertices=scene.geometry.vertices + shift)))
+    assert ["so far from the origin" in str(w.message) for w in recwarn] == [True] * warned
+
+
+def test_render_takes_a_path_and_refuses_what_is_no_scene(tmp_path):
+    (tmp_path / "one.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.warns(RefgiWarning, match="no camera"):
+        picture = render(tmp_path / "one.obj", width=4, height=4, rsm_resolution=8)
+    assert picture.frame.scene.name == "one"
+    with pytest.raises(InputError, match="scene: expected a Scene, got 'NoneType'"):
+        render(None)
+    with pytest.raises(InputError, match="method: expected one of"):
+        render("cornell_box", [])
 
 
 def test_methods_are_found_by_name_or_refused():

@@ -10,6 +10,7 @@ VIEW = np.array([0.55, 0.4, 1.0])  # from the middle of the mesh towards the eye
 SHINE = np.array([-0.8, 1.1, 0.7])  # ... towards the light
 VFOV = math.radians(35.0)
 LIGHT_DISTANCE = 4.0  # radii of the bounding sphere
+SMALLEST_RADIUS = 1e-9  # m; eye and target of a camera must differ
 FULL_IRRADIANCE = math.pi  # W/m^2 at the middle of the mesh: an albedo's radiance is then the albedo itself
 
 
@@ -54,7 +55,7 @@ def lit(geometry: Geometry) -> SpotLight:
 
 def _sphere(geometry: Geometry) -> tuple[Array, float]:
     low, high = geometry.bounds
-    return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-6)
+    return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, SMALLEST_RADIUS)
 
 
 def _vector(values: Array) -> Vector:

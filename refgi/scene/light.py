@@ -9,7 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.scene.values import BRIGHTEST, LARGEST, Array, Rgb, Vector, degrees, is_direction, is_place, is_vector
+from refgi.scene.values import (
+    BRIGHTEST,
+    LARGEST,
+    Array,
+    Rgb,
+    Vector,
+    degrees,
+    is_direction,
+    is_place,
+    is_vector,
+    settle,
+)
 
 SPOT, POINT, DIRECTIONAL = 0, 1, 2  # kinds of light in a LightTable
 
@@ -37,6 +48,7 @@ class SpotLight:
         expect(0 <= self.inner_half_angle <= self.outer_half_angle, "light: inner_half_angle_deg",
                "0 to outer_half_angle_deg", degrees(self.inner_half_angle))
         _expect_power(self.intensity, "intensity_w_per_sr")
+        settle(self, "position", "direction", "intensity")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +61,7 @@ class PointLight:
     def __post_init__(self) -> None:
         expect(is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
         _expect_power(self.intensity, "intensity_w_per_sr")
+        settle(self, "position", "intensity")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,6 +75,7 @@ class DirectionalLight:
         expect(is_direction(self.direction), "light: direction", "a finite vector, not zero",
                self.direction)
         _expect_power(self.irradiance, "irradiance_w_per_m2")
+        settle(self, "direction", "irradiance")
 
 
 Light = SpotLight | PointLight | DirectionalLight

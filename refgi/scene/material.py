@@ -1,7 +1,6 @@
 """Materials, and the table of them that kernels read."""
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -9,7 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.scene.values import BLACK, Array, Rgb, is_vector
+from refgi.scene.values import BLACK, BRIGHTEST, Array, Rgb, is_number, is_vector, settle
+
+SHARPEST = 1e20  # Phong exponent; far within float32
+DENSEST = 1e3  # index of refraction
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,12 +35,13 @@ class Material:
             value = getattr(self, key)
             expect(is_vector(value) and all(0 <= c <= 1 for c in value), f"material {self.name!r}: {key}",
                    "three numbers from 0 to 1", value)
-        expect(is_vector(self.emission) and min(self.emission) >= 0, f"material {self.name!r}: emission",
-               "three finite numbers >= 0", self.emission)
-        expect(math.isfinite(self.exponent) and self.exponent >= 0, f"material {self.name!r}: exponent",
-               "a finite number >= 0", self.exponent)
-        expect(self.ior == 0 or (math.isfinite(self.ior) and self.ior >= 1), f"material {self.name!r}: ior",
-               "0 (opaque) or a finite number >= 1", self.ior)
+        expect(is_vector(self.emission) and min(self.emission) >= 0 and max(self.emission) <= BRIGHTEST,
+               f"material {self.name!r}: emission", f"three numbers from 0 to {BRIGHTEST:g}", self.emission)
+        expect(is_number(self.exponent) and 0 <= self.exponent <= SHARPEST, f"material {self.name!r}: exponent",
+               f"a number from 0 to {SHARPEST:g}", self.exponent)
+        expect(is_number(self.ior) and (self.ior == 0 or 1 <= self.ior <= DENSEST), f"material {self.name!r}: ior",
+               f"0 (opaque) or a number from 1 to {DENSEST:g}", self.ior)
+        settle(self, "diffuse", "specular", "emission")
 
     @property
     def is_glossy(self) -> bool:

@@ -28,7 +28,19 @@ from refgi.scene.light import (
 )
 from refgi.scene.material import UNPAINTED, Material, MaterialTable, material_table
 from refgi.scene.room import expect_room
-from refgi.scene.values import BLACK, LARGEST, Array, Rgb, Vector, degrees, is_direction, is_place
+from refgi.scene.values import (
+    BLACK,
+    LARGEST,
+    Array,
+    Rgb,
+    Vector,
+    degrees,
+    is_count,
+    is_direction,
+    is_number,
+    is_place,
+    settle,
+)
 
 __all__ = [
     "BLACK",
@@ -99,6 +111,25 @@ class Geometry:
     material_of_face: Array
     vertex_normals: Array | None = None
 
+    def __post_init__(self) -> None:
+        if len(self.faces):
+            Mesh(self.vertices, self.faces, self.vertex_normals).expect_sound("geometry")
+        expect(np.shape(self.material_of_face) == (len(self.faces),), "geometry: material_of_face",
+               f"one index a face, shape {(len(self.faces),)}", np.shape(self.material_of_face))
+
+    @cached_property
+    def materials_needed(self) -> int:
+        """One more than the highest index in `material_of_face`."""
+        expect(self.material_of_face.min(initial=0) >= 0, "geometry: material_of_face", "indices >= 0",
+               self.material_of_face.min(initial=0))
+        return int(self.material_of_face.max(initial=-1)) + 1
+
+    @cached_property
+    def float32_step(self) -> float:
+        """Distance between float32 numbers at the coordinate farthest from the origin, m."""
+        farthest = max(abs(self.vertices.min(initial=0)), abs(self.vertices.max(initial=0)))
+        return float(np.spacing(np.float32(farthest)))
+
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Corners of the axis-aligned box of all used vertices, m."""
@@ -130,14 +161,16 @@ class Camera:
             expect(is_place(getattr(self, key)), f"camera: {key}", f"three finite numbers up to {LARGEST:g} m",
                    getattr(self, key))
         expect(is_direction(self.up), "camera: up", "a finite vector, not zero", self.up)
+        settle(self, "eye", "target", "up")
         view = np.subtract(self.target, self.eye)
         expect(bool(np.linalg.norm(view) > 1e-9), "camera: target", "a point away from eye", self.target)
         cross = np.cross(view / np.linalg.norm(view), np.asarray(self.up) / np.linalg.norm(self.up))
         expect(bool(np.linalg.norm(cross) > 1e-9), "camera: up", "a direction not along the view", self.up)
+        expect(is_number(self.vfov), "camera: vfov_deg", "a number", self.vfov)
         expect(0 < self.vfov < math.pi, "camera: vfov_deg", "more than 0 and less than 180", degrees(self.vfov))
         for key in ("width", "height"):
             size = getattr(self, key)
-            expect(isinstance(size, int) and 1 <= size <= 65536, f"camera: {key}", "1 to 65536 pixels", size)
+            expect(is_count(size) and 1 <= size <= 65536, f"camera: {key}", "1 to 65536 pixels", size)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -153,7 +186,11 @@ class Scene:
     exposure: float = 1.0  # factor before the sRGB curve in PNG pictures; of no other meaning
 
     def __post_init__(self) -> None:
-        expect(math.isfinite(self.exposure) and self.exposure > 0, "exposure", "a finite number > 0", self.exposure)
+        expect(is_number(self.exposure) and self.exposure > 0, "exposure", "a finite number > 0", self.exposure)
+        expect(self.geometry.materials_needed <= len(self.materials), "materials",
+               f"the {self.geometry.materials_needed} that the geometry names", len(self.materials))
+        for light in self.lights:
+            expect(isinstance(light, Light), "lights", "spot, point or directional lights", light)
 
     def with_camera(self, **changes: Any) -> "Scene":
         """Return the scene seen by a changed camera, sharing everything else."""

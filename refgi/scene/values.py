@@ -1,6 +1,7 @@
 """The plain values a scene is made of: colours, vectors, arrays, and what makes one usable."""
 
 import math
+import numbers
 from typing import Any
 
 import numpy.typing as npt
@@ -12,6 +13,41 @@ Vector = tuple[float, float, float]
 BLACK: Rgb = (0.0, 0.0, 0.0)
 BRIGHTEST = 1e20  # W/sr or W/m^2; falls off within float32
 LARGEST = 1e9  # m; squares and cubes of coordinates stay within float32
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value is one finite number.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+
+    Returns
+    -------
+    bool
+        False for text, and for what is no number at all.
+    """
+    try:
+        return math.isfinite(value)
+    except (TypeError, OverflowError):
+        return False
+
+
+def is_count(value: Any) -> bool:
+    """Return whether a value is a whole number, of Python or of NumPy.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+
+    Returns
+    -------
+    bool
+        False for a float, even one without a fraction.
+    """
+    return isinstance(value, numbers.Integral)
 
 
 def is_vector(value: Any) -> bool:
@@ -31,6 +67,20 @@ def is_vector(value: Any) -> bool:
         return len(value) == 3 and all(math.isfinite(c) for c in value)
     except (TypeError, OverflowError):
         return False
+
+
+def settle(owner: Any, *keys: str) -> None:
+    """Turn the vectors of a frozen dataclass into tuples of floats, so that it can be compared and hashed.
+
+    Parameters
+    ----------
+    owner : object
+        Under construction.
+    *keys : str
+        Its fields that hold three numbers.
+    """
+    for key in keys:
+        object.__setattr__(owner, key, tuple(float(c) for c in getattr(owner, key)))
 
 
 def is_place(value: Any) -> bool:

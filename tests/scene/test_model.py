@@ -1,5 +1,6 @@
 """The model: what it refuses, how meshes are joined and placed, and the tables that kernels read."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -12,14 +13,17 @@ from refgi.errors import InputError, RefgiWarning
 from refgi.scene import (
     Camera,
     DirectionalLight,
+    Geometry,
     Material,
     Mesh,
     PointLight,
+    Scene,
     SpotLight,
     light_table,
     material_table,
     merge,
 )
+from refgi.scene.framing import framed, lit
 from refgi.scene.health import mended, zero_area
 from refgi.scene.power import shining
 from refgi.scene.transform import affine, placed
@@ -70,10 +74,54 @@ def test_merge_refuses_unsound_meshes(mesh: Mesh, said: str) -> None:
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.1, math.pi / 2, (1, 1, 1)),
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.5, 0.4, (1, 1, 1)),
     lambda: PointLight(3, (1, 1, 1)),  # type: ignore[arg-type]
+    lambda: Material(exponent=1e300), lambda: Material(emission=(1e300, 0, 0)), lambda: Material(ior=1e300),
+    lambda: Material(exponent="7"),  # type: ignore[arg-type]
+    lambda: Camera((0, 0, 0), (1, 0, 0), vfov="40"),  # type: ignore[arg-type]
+    lambda: Camera((0, 0, 0), (1, 0, 0), width=1.5),  # type: ignore[arg-type]
 ])
 def test_values_that_make_no_scene(make: Any) -> None:
     with pytest.raises(InputError, match="expected"):
         make()
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"vertices": VERTICES * np.nan}, "geometry: vertex 0: expected finite"),
+    ({"faces": FACES + 9}, "geometry: face 0"), ({"material_of_face": np.zeros(2, np.int32)}, "one index a face"),
+])
+def test_geometry_that_kernels_cannot_read(change: dict[str, Any], said: str) -> None:
+    """An index without a vertex would read memory that is not the mesh's."""
+    geometry, _ = merge([Mesh(VERTICES, FACES)])
+    with pytest.raises(InputError, match=said):
+        dataclasses.replace(geometry, **change)
+
+
+@pytest.mark.parametrize("change", [
+    {"materials": ()}, {"lights": ("lamp",)}, {"exposure": "1"}, {"exposure": math.nan},
+    {"geometry": Geometry(VERTICES, FACES, np.array([-1], np.int32))},
+])
+def test_scenes_whose_parts_do_not_fit(change: dict[str, Any]) -> None:
+    geometry, materials = merge([Mesh(VERTICES, FACES)])
+    scene = Scene("one", geometry, materials, Camera((0, 0, 0), (1, 0, 0)), (PointLight((0, 0, 0), (1, 1, 1)),))
+    with pytest.raises(InputError, match="expected"):
+        dataclasses.replace(scene, **change)
+
+
+def test_vectors_given_as_arrays_compare_and_hash_like_tuples() -> None:
+    x, one = np.array([1.0, 0, 0]), np.ones(3)
+    assert Camera(np.zeros(3), x) == Camera((0, 0, 0), (1, 0, 0))  # type: ignore[arg-type]
+    assert Camera((0, 0, 0), (1, 0, 0), width=np.int64(5)).width == 5  # type: ignore[arg-type]
+    assert len({Material(diffuse=one), Material(diffuse=(1, 1, 1))}) == 1  # type: ignore[arg-type]
+    assert len({PointLight(x, one), PointLight((1, 0, 0), (1, 1, 1))}) == 1  # type: ignore[arg-type]
+    assert len({DirectionalLight(x, one), DirectionalLight((1, 0, 0), (1, 1, 1))}) == 1  # type: ignore[arg-type]
+    assert SpotLight(x, x, 0.1, 0.2, one) == SpotLight((1, 0, 0), (1, 0, 0), 0.1, 0.2, (1, 1, 1))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("size", [1e-8, 1.0, 1e8])
+def test_a_mesh_of_any_size_is_framed_and_lit(size: float) -> None:
+    geometry, _ = merge([Mesh(VERTICES * size, FACES)])
+    middle = np.mean(geometry.bounds, axis=0)
+    for place in (framed(geometry).eye, lit(geometry).position):
+        assert 1 < np.linalg.norm(middle - place) / geometry.diagonal < 5
 
 
 def test_tables() -> None:

@@ -27,6 +27,7 @@ Channels = dict[str, Array]
 
 ATTRIBUTE = "refgi"
 DIGEST = "sha256"  # reserved key of the attribute: over the other keys and all planes
+LONGEST_STEM = 48  # characters of a file's name that its temporary name keeps
 NOT_FINITE = (255, 0, 255)  # how a NaN or infinite pixel shows in a PNG
 
 
@@ -51,7 +52,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         If the file cannot be written.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    stem = path.stem[:LONGEST_STEM]  # a name as long as the file system allows leaves no room for more
+    temporary = path.with_name(f".{stem}.{secrets.token_hex(4)}.part{path.suffix}")
     try:
         yield temporary
         with temporary.open("rb+") as stream:
@@ -61,7 +63,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -76,6 +79,31 @@ def write_text(path: str | Path, text: str) -> None:
     """
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def is_text(name: str) -> bool:
+    """Return whether a file's name is text, not bytes of some other encoding.
+
+    Parameters
+    ----------
+    name : str
+        As the operating system gave it.
+
+    Returns
+    -------
+    bool
+        False where it cannot be written in UTF-8.
+
+    Examples
+    --------
+    >>> is_text("größe"), is_text("gr\udcffe")
+    (True, False)
+    """
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def canonical_json(value: Any) -> str:
@@ -126,6 +154,7 @@ def write_exr(path: str | Path, channels: Mapping[str, Array], attributes: Mappi
     """
     path = Path(path)
     expect(path.suffix.lower() == ".exr", "path", "a name that ends in .exr", str(path))
+    expect(is_text(str(path)), "path", "a name in UTF-8, which is all that OpenEXR opens", str(path))
     planes = _planes(channels)
     text = _signed(attributes or {}, planes)
     import OpenEXR

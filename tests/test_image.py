@@ -189,6 +189,20 @@ def test_a_folder_that_is_not_there_is_an_input_error(planes, tmp_path):
         write_text(tmp_path / "no" / "a.json", "{}")
 
 
+@pytest.mark.parametrize("name", ["a" * 251 + ".exr", "ß" * 125 + ".exr"])
+def test_a_name_as_long_as_the_file_system_takes(name, planes, tmp_path):
+    write_exr(tmp_path / name, planes, {})
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_names_that_are_too_long_or_not_text_are_input_errors(planes, tmp_path):
+    with pytest.raises(InputError, match="cannot be written"):
+        write_text(tmp_path / ("a" * 300), "{}")
+    with pytest.raises(InputError, match="UTF-8"):
+        write_exr(tmp_path / "a\udcff.exr", planes, {})
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_failed_write_leaves_the_old_file(tmp_path):
     write_text(tmp_path / "a.json", "old")
 

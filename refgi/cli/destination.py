@@ -5,7 +5,8 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from refgi.errors import InputError
+from refgi.errors import InputError, expect
+from refgi.image import is_text
 
 SUFFIXES = (".exr", ".png")
 
@@ -39,10 +40,11 @@ def picture_files(out: str, stem: str) -> Pictures:
     """
     path = Path(out)
     suffix = path.suffix.lower()
-    if suffix in SUFFIXES and not path.is_dir():
+    is_folder = _is_folder(path)
+    if suffix in SUFFIXES and not is_folder:
         _require(path, path.parent)
         return Pictures(path if suffix == ".exr" else None, path if suffix == ".png" else None)
-    if suffix and not path.is_dir() and not out.endswith(("/", os.sep)):
+    if suffix and not is_folder and not out.endswith(("/", os.sep)):
         raise InputError(f"--out {out}: expected a name that ends in .exr or .png, or a folder")
     folder(out)
     return Pictures(path / f"{stem}.exr", path / f"{stem}.png")
@@ -71,9 +73,18 @@ def folder(out: str) -> Path:
     return path
 
 
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError as error:  # a name longer than the file system allows
+        raise InputError(f"--out {path}: cannot be written: {error.strerror or error}") from error
+
+
 def _require(asked: Path, home: Path) -> None:
+    expect(is_text(str(asked)), "--out", "a name in UTF-8", str(asked))
     try:
         home.mkdir(parents=True, exist_ok=True)
+        asked.exists()  # raises where the name is longer than the file system allows
         with tempfile.TemporaryFile(dir=home):
             pass
     except OSError as error:

@@ -1,7 +1,7 @@
 """`refgi render`: one scene by one method."""
 
-import contextlib
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -109,6 +109,8 @@ def _run(run: Any) -> dict[str, Any]:
 
 
 def _stem(scene: str) -> str:
-    with contextlib.suppress(ValueError):
-        scene = scene[: scene.index(":")]
-    return scene.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
+    from refgi.scene import builtin_scenes
+    from refgi.scene.files import text_of
+
+    base = scene.partition(":")[0]
+    return base if base in builtin_scenes() else text_of(Path(scene).stem)

@@ -1,5 +1,6 @@
 """What one run of the command knows of itself: how to speak, and what it has warned of."""
 
+import contextlib
 import dataclasses
 import json
 import sys
@@ -33,18 +34,26 @@ class Session:
             from refgi.compare.results import plain
 
             text = json.dumps(plain({**content, "warnings": self.warnings}), indent=2, allow_nan=False)
-        click.echo(text)
+        try:
+            click.echo(text)
+        except BrokenPipeError:  # whoever read has had enough
+            raise
+        except OSError as error:
+            from refgi.errors import InputError
+
+            raise InputError(f"stdout: cannot be written: {error.strerror or error}") from error
 
 
 def say(text: str) -> None:
-    """Print one line to stderr, after the command's name.
+    """Print one line to stderr, after the command's name; where nobody listens the work goes on.
 
     Parameters
     ----------
     text : str
         The line.
     """
-    click.echo(f"refgi: {text}", file=sys.stderr)
+    with contextlib.suppress(OSError):
+        click.echo(f"refgi: {text}", file=sys.stderr)
 
 
 def table(rows: Sequence[tuple[str, ...]], *, right: frozenset[int] = frozenset()) -> str:

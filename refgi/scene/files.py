@@ -52,6 +52,46 @@ def read_bytes(path: Path) -> bytes:
     return content
 
 
+def is_there(path: Path) -> bool:
+    """Return whether a path exists.
+
+    Parameters
+    ----------
+    path : Path
+        Anything, even what no file system takes as a name.
+
+    Returns
+    -------
+    bool
+        False as well where the name is too long or holds a zero byte.
+    """
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
+def text_of(name: str) -> str:
+    """Return a file's name as text that can be written anywhere.
+
+    Parameters
+    ----------
+    name : str
+        As the operating system gave it.
+
+    Returns
+    -------
+    str
+        With a question mark for each byte that is not UTF-8.
+
+    Examples
+    --------
+    >>> text_of("gr\udcffe")
+    'gr?e'
+    """
+    return name.encode(errors="replace").decode()
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return "; did you mean ...?" for the known word nearest to a mistyped one, else nothing.
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene.builtin import SCENES, build_named
-from refgi.scene.files import did_you_mean
+from refgi.scene.files import did_you_mean, is_there, text_of
 from refgi.scene.framing import framed, lit
 from refgi.scene.health import mended, warn_of_flat_faces
 from refgi.scene.meshfile import READERS, read_mesh_file
@@ -61,7 +61,7 @@ def load_scene(
         return read_scene_file(path, camera, lights)
     if suffix in READERS:
         return _of_mesh_file(path, camera, lights)
-    if suffix or path.exists():
+    if suffix or is_there(path):
         what = "a folder" if path.is_dir() else f"the suffix {suffix!r}"
         raise InputError(f"{path}: expected a scene name or a file named .json, {', '.join(READERS)}; got {what}"
                          f"{did_you_mean(base, SCENES)}")
@@ -90,4 +90,4 @@ def _of_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] | N
     if lacking:
         text = f"{path}: the file has no {' and no '.join(lacking)}; one was placed to fit the mesh"
         warnings.warn(RefgiWarning(text), stacklevel=4)
-    return Scene(path.stem, geometry, materials, camera, shining(lights, f"{path}: lights"))
+    return Scene(text_of(path.stem), geometry, materials, camera, shining(lights, f"{path}: lights"))

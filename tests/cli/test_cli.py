@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -159,6 +160,21 @@ def test_a_reader_that_leaves_is_no_error():
     child.stderr.close()
     assert child.wait(timeout=60) == 0
     assert err == b""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_full_disk_behind_stdout_is_told_and_behind_stderr_stops_nothing(tmp_path):
+    command = [sys.executable, "-m", "refgi"]
+    with Path("/dev/full").open("w") as full:
+        told = subprocess.run([*command, "info"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        assert told.returncode == 2
+        assert told.stderr.startswith("refgi: stdout: cannot be written: ")
+        (tmp_path / "one.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        out = tmp_path / "one.png"
+        small = ["--size", "4", "--rsm-resolution", "8", "--out", str(out)]
+        warned = [*command, "render", str(tmp_path / "one.obj"), *small]
+        assert subprocess.run(warned, stderr=full, stdout=subprocess.DEVNULL, check=False).returncode == 0
+        assert out.exists()
 
 
 def test_explain_shows_the_four_rows_of_table_1(evidence):

@@ -1,6 +1,7 @@
 """`refgi render`: what it writes, what it refuses before computing, what it says aloud."""
 
 import json
+import os
 
 import imageio.v3
 import numpy as np
@@ -67,6 +68,13 @@ def test_a_folder_gets_both_and_a_png_one(tmp_path):
     assert imageio.v3.imread(tmp_path / "a.png").shape == (10, 12, 3)
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows knows neither name")
+@pytest.mark.parametrize(("name", "stem"), [("a:b.obj", "a:b"), ("gr\udcffe.obj", "gr?e"), ("größe 1.obj", "größe 1")])
+def test_files_in_a_folder_are_named_like_the_mesh(name, stem, plate, tmp_path):
+    assert run(plate.rename(tmp_path / name), *TINY, "--out", tmp_path / "new").exit_code == 0
+    assert {p.name for p in (tmp_path / "new").iterdir()} == {f"{stem}_sii.exr", f"{stem}_sii.png"}
+
+
 def test_json_is_the_only_thing_on_stdout(tmp_path):
     result = run("cornell_box", *TINY, "--out", tmp_path / "a.exr", "--json", "--seed", "7")
     content = json.loads(result.stdout)
@@ -88,7 +96,7 @@ def test_float64_and_threads(tmp_path):
 @pytest.mark.usefixtures("never_computes")
 @pytest.mark.parametrize(("arguments", "words"), [
     (["cornel_box"], ["did you mean 'cornell_box'"]),
-    (["no/such/file.json"], ["no/such/file.json"]),
+    (["no/such/file.json"], ["no/such/file.json"]), (["a" * 5000], ["expected one of cornell_box"]),
     (["cornell_box", "--method", "sij"], ["method", "sii"]),
     (["cornell_box", "--size", "12x"], ["12x"]), (["cornell_box", "--size", "0"], ["'0'"]),
     (["cornell_box", "--size", "99999x9"], ["65536"]),
@@ -130,7 +138,8 @@ def test_all_wrong_settings_are_told_at_once(tmp_path):
 
 
 @pytest.mark.usefixtures("never_computes")
-@pytest.mark.parametrize("name", ["a.jpg", "a.tiff", "file/a.exr", "file/folder/"])
+@pytest.mark.parametrize("name", ["a.jpg", "a.tiff", "file/a.exr", "file/folder/", "a" * 300 + ".png", "a" * 300,
+                                  "a\udcff.exr"])
 def test_an_out_that_cannot_be_written_is_refused_before_anything_is_computed(name, tmp_path):
     (tmp_path / "file").write_text("in the way")
     assert refused(run("cornell_box", "--out", f"{tmp_path}/{name}"), "--out")

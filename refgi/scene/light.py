@@ -17,12 +17,14 @@ from refgi.scene.values import (
     Vector,
     degrees,
     is_direction,
+    is_number,
     is_place,
     is_vector,
     settle,
 )
 
 SPOT, POINT, DIRECTIONAL = 0, 1, 2  # kinds of light in a LightTable
+NARROWEST = math.radians(1e-5)  # half-angle; the cosine of a smaller one is 1 but for rounding, and its light is lost
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,8 +45,9 @@ class SpotLight:
         expect(is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
         expect(is_direction(self.direction), "light: direction", "a finite vector, not zero",
                self.direction)
-        expect(0 < self.outer_half_angle < math.pi / 2, "light: outer_half_angle_deg",
-               "more than 0 and less than 90", degrees(self.outer_half_angle))
+        fits = is_number(self.outer_half_angle) and NARROWEST <= self.outer_half_angle < math.pi / 2
+        expect(fits, "light: outer_half_angle_deg", f"{degrees(NARROWEST):g} or more and less than 90",
+               math.degrees(self.outer_half_angle) if is_number(self.outer_half_angle) else self.outer_half_angle)
         expect(0 <= self.inner_half_angle <= self.outer_half_angle, "light: inner_half_angle_deg",
                "0 to outer_half_angle_deg", degrees(self.inner_half_angle))
         _expect_power(self.intensity, "intensity_w_per_sr")

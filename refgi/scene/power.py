@@ -28,7 +28,7 @@ def shining(lights: Sequence[Light], where: str) -> tuple[Light, ...]:
         If none has power: the picture would be silently black.
     """
     kept = tuple(light for light in lights if max(_power(light)) > 0)
-    expect(bool(kept), where, "at least one light of power above 0", f"{len(lights)} of none" if lights else "none")
+    expect(bool(kept), where, "at least one light of power above 0", f"{len(lights)} without" if lights else "none")
     if dropped := len(lights) - len(kept):
         noun = "light" if dropped == 1 else "lights"
         warnings.warn(RefgiWarning(f"{where}: {dropped} {noun} of zero power left out"), stacklevel=3)

@@ -1,5 +1,6 @@
 """Scene files: JSON that names meshes, materials, camera and lights (docs/scenes.md has the keys)."""
 
+import codecs
 import dataclasses
 import json
 from collections.abc import Sequence
@@ -46,7 +47,8 @@ def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
     InputError
         One error with all faults of the file, else one with all faults of its meshes.
     """
-    entry = _validated(read_bytes(path), path, need_camera=camera is None, need_lights=lights is None)
+    content = read_bytes(path).removeprefix(codecs.BOM_UTF8)
+    entry = _validated(content, path, need_camera=camera is None, need_lights=lights is None)
     materials = {name: given.built(name) for name, given in entry.materials.items()}
     meshes = _meshes(entry, materials, path)
     geometry, used = merge(meshes, smooth=any(mesh.normals is not None for mesh in meshes))
@@ -90,7 +92,7 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
         return tree
 
     try:
-        tree = json.loads(content.decode("utf-8-sig"), object_pairs_hook=without_repeats)
+        tree = json.loads(content.decode(), object_pairs_hook=without_repeats)
     except InputError:
         raise
     except (ValueError, RecursionError) as error:
@@ -140,9 +142,12 @@ def _meshes(entry: "SceneFile", materials: dict[str, Material], path: Path) -> l
             expect_room(vertices, faces, "all objects so far")
             for mesh in found.meshes:
                 sound, flat = mended(_dressed(mesh, given, materials, entry.smooth_normals), f"{given.mesh}")
+                if given.transform:
+                    moved = placed(sound, affine(given.transform, "transform"))
+                    sound, lost = mended(moved, f"{given.mesh}: after its transform")
+                    flat += lost
                 dropped += flat
-                matrix = affine(given.transform, "transform") if given.transform else None
-                meshes.append(sound if matrix is None else placed(sound, matrix))
+                meshes.append(sound)
         except InputError as error:
             faults.append(f"{path}: objects[{number}].mesh: {error}")
     if faults:

@@ -66,5 +66,6 @@ def placed(mesh: Mesh, matrix: Array) -> Mesh:
     if normals is not None:
         normals = np.asarray(normals, np.float64) @ np.linalg.inv(linear)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    faces = mesh.faces[:, ::-1] if np.linalg.det(linear) < 0 else mesh.faces
+    mirrors = np.linalg.det(linear / np.abs(linear).max()) < 0
+    faces = mesh.faces[:, ::-1] if mirrors else mesh.faces
     return dataclasses.replace(mesh, vertices=vertices, faces=faces, normals=normals)

@@ -72,6 +72,8 @@ def test_merge_refuses_unsound_meshes(mesh: Mesh, said: str) -> None:
     lambda: PointLight((0, 0, 0), (-1, 0, 0)), lambda: DirectionalLight((0, 0, 0), (1, 1, 1)),
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.0, 0.0, (1, 1, 1)),
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.1, math.pi / 2, (1, 1, 1)),
+    lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.0, 1e-8, (1, 1, 1)),
+    lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.0, "1", (1, 1, 1)),  # type: ignore[arg-type]
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.5, 0.4, (1, 1, 1)),
     lambda: PointLight(3, (1, 1, 1)),  # type: ignore[arg-type]
     lambda: Material(exponent=1e300), lambda: Material(emission=(1e300, 0, 0)), lambda: Material(ior=1e300),

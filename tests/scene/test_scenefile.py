@@ -159,6 +159,22 @@ def test_not_a_number_is_named(tmp_path: Path) -> None:
         load_scene(path)
 
 
+@pytest.mark.parametrize(("scale", "said"), [
+    (1e308, r"objects\[1\].mesh: square.ply: after its transform: vertex"),
+    (1e-300, "after its transform: faces: expected at least one with an area"),
+])
+def test_a_transform_that_leaves_no_mesh_names_its_object(tmp_path: Path, scale: float, said: str) -> None:
+    matrix = [scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, 1]
+    with pytest.raises(InputError, match=said):
+        load_scene(write_scene(tmp_path, objects=[*SCENE["objects"], {"mesh": "square.ply", "transform": matrix}]))
+
+
+def test_a_byte_order_mark_is_no_fault(tmp_path: Path) -> None:
+    path = write_scene(tmp_path)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert load_scene(path).name == "sample"
+
+
 def test_a_light_without_power_is_left_out_and_counted(tmp_path: Path) -> None:
     dark = SCENE["lights"][0] | {"intensity_w_per_sr": [0, 0, 0]}
     with pytest.warns(RefgiWarning, match="1 light of zero power"):

@@ -115,7 +115,7 @@ def _check(
                footprint.shape)
     if settings.clamp == "sphere":
         expect(lights.lobe_flux is None or not lights.lobe_flux.any(), "clamp",
-               "another clamp than 'sphere', which knows diffuse lights alone: the scene has glossy materials", "sphere")
+               "another one for glossy materials ('sphere' knows diffuse lights alone)", settings.clamp)
 
 
 def _sum(
@@ -126,7 +126,9 @@ def _sum(
     shines: Array = (lights.flux != 0).any(axis=0)
     diffuse = pack_diffuse(lights, settings, dtype, shines)
     clamp = None if settings.clamp == "none" else pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
-    spheres = pack_spheres(settings, footprint, shines, dtype) if settings.clamp == "sphere" else None
+    spheres = None
+    if settings.clamp == "sphere" and footprint is not None:
+        spheres = pack_spheres(settings, footprint, shines, dtype)
     glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
     if glossy.any():
         lobes = pack_lobes(lights, settings, dtype, glossy)

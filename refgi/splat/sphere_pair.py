@@ -7,8 +7,9 @@ which both cosines are integrated instead of taken at its axis:
 
 Cones wholly above both horizons have a closed form, the second moments of a cone. The others are cut into slices by
 half planes through the line where both horizons meet: there each horizon is a limit of the turn of the slice, the
-integral along a slice is a polynomial, and one smooth integral over the turn is left for a Gauss rule. Products of
-cosines, roots and quotients are all it takes: no angle is computed.
+integral along a slice is a polynomial, and one smooth integral over the turn is left for a Gauss rule of 12 points a
+quadrant, right to 1e-4 of the pixel light on its axis at worst (|d| just over r) and to 1e-10 in most places. Products
+of cosines, roots and quotients are all it takes: no angle is computed.
 
 Symbols: w0 = d / |d| cone axis, b angle between l and n_x, e and f their bisectors, c = e x f the line of both
 horizons; chi turn of a slice from e, chi0 that of w0, v(chi) the slice's direction; rho, s lengths of w0 across and
@@ -23,15 +24,15 @@ import numpy as np
 from refgi.jit import kernel
 from refgi.radiometry import orthonormal_basis
 
-POINTS = 8  # of the Gauss rule in each quadrant; tests/splat/test_sphere.py measures its error
+POINTS = 12  # of the Gauss rule in each quadrant; tests/splat/test_sphere.py measures its error
 LEAST_RATIO = 1e-12  # (r / |d|)^2 below which a horizon cuts the cone as it cuts a point
 LEAST_LENGTH = 1e-6  # of l + n_x (they face apart) and l - n_x (they face each other)
 TINY = 1e-30  # stands in for a square that rounds to 0
 
 # Gauss-Legendre on 0..1 in sqrt(y): points crowd at g = 0, where a slice grazes the rim of a wide cone
 _x, _w = np.polynomial.legendre.leggauss(POINTS)
-PLACE = ((_x + 1.0) / 2.0) ** 2
-WEIGHT = _w * (_x + 1.0) / 2.0
+PLACE = np.round(((_x + 1.0) / 2.0) ** 2, 14)  # digits that no linear algebra library gets otherwise
+WEIGHT = np.round(_w * (_x + 1.0) / 2.0, 14)
 
 
 @kernel

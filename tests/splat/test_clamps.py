@@ -89,10 +89,10 @@ def test_clamps_are_those_of_the_twin(clamp, value, twin):
     assert np.abs(got / np.maximum(irradiance(receivers, lights, PairSettings())[:, 0], 1e-9) - 1).max() > 0.01
 
 
-@pytest.mark.parametrize("clamp", ["distance", "geometry", "disc"])
+@pytest.mark.parametrize("clamp", ["distance", "geometry", "disc", "sphere"])
 def test_clamps_out_of_reach_change_no_bit_or_only_rounding(clamp):
     receivers, lights = sets.room(np.random.default_rng(2), 60)
-    value = {"distance": 1e-9, "geometry": 1e12, "disc": 0.0}[clamp]
+    value = {"distance": 1e-9, "geometry": 1e12, "disc": 0.0, "sphere": 1.0}[clamp]
     got = irradiance(receivers, lights, PairSettings(clamp=clamp, clamp_value=value), np.zeros(60))
     # the clamped term divides twice where the plain one multiplies by an inverse
     np.testing.assert_allclose(got, irradiance(receivers, lights, PairSettings()), rtol=1e-14)
@@ -102,7 +102,7 @@ MODES = {
     "none": {}, "distance 5 cm": {"clamp": "distance", "clamp_value": 0.05},
     "distance 20 cm": {"clamp": "distance", "clamp_value": 0.2},
     "G <= 100": {"clamp": "geometry", "clamp_value": 100.0}, "G <= 10": {"clamp": "geometry", "clamp_value": 10.0},
-    "disc": {"clamp": "disc"},
+    "disc": {"clamp": "disc"}, "sphere": {"clamp": "sphere"}, "sphere of 4 A": {"clamp": "sphere", "clamp_value": 4.0},
 }
 
 
@@ -123,9 +123,10 @@ def test_bias_and_variance_of_the_clamps(evidence):
     assert abs(bias["none"]) < 4 * error["none"]  # unbiased
     for name in MODES:
         assert noise[name] <= noise["none"]
-        assert bias[name] < 4 * error[name]  # a clamp only takes away
+        assert bias[name] < 4 * error[name]  # a clamp only takes away; a sphere gives back over horizons, but less
     assert bias["distance 20 cm"] < bias["distance 5 cm"] < -4 * error["distance 5 cm"]
     assert bias["G <= 10"] < bias["G <= 100"] <= 0
+    assert noise["sphere of 4 A"] < noise["sphere"] < noise["none"] / 2
     assert noise["distance 20 cm"] < noise["distance 5 cm"] < noise["none"] / 2
     evidence("bias / noise of the mean: " + ", ".join(f"{n} {bias[n]:+.1%} / {noise[n]:.0%}" for n in MODES))
 

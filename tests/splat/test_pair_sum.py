@@ -163,7 +163,7 @@ def test_coincident_and_nearly_coincident_lights_stay_finite(real):
         assert np.isfinite(got).all()
 
 
-@pytest.mark.parametrize("clamp", ["none", "distance", "geometry", "disc"])
+@pytest.mark.parametrize("clamp", ["none", "distance", "geometry", "disc", "sphere"])
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 @pytest.mark.feature("REF-19")
 def test_same_bits_for_any_threads_tiles_and_neighbours(real, clamp, evidence):
@@ -279,5 +279,6 @@ def test_arrays_are_checked():
         irradiance(receivers, lights._replace(normal=lights.normal[:, :2]), PLAIN)
     with pytest.raises(InputError, match=r"receivers\.normal"):
         irradiance(receivers._replace(normal=receivers.normal[:2]), lights, PLAIN)
-    with pytest.raises(InputError, match="footprint"):
-        irradiance(receivers, lights, PairSettings(clamp="disc"))
+    for clamp in ("disc", "sphere"):
+        with pytest.raises(InputError, match=f"footprint: .* 4 lights for the clamp '{clamp}'"):
+            irradiance(receivers, lights, PairSettings(clamp=clamp))

@@ -123,10 +123,12 @@ def test_clamps_and_offset_on_a_scene(box, evidence):
     plain = sii(box, ALL)
     found = []
     for how in ({"clamp": "distance", "clamp_value": 0.1}, {"clamp": "geometry", "clamp_value": 50.0},
-                {"clamp": "disc"}, {"offset": 0.02}):
+                {"clamp": "disc"}, {"clamp": "sphere"}, {"offset": 0.02}):
         got = sii(box, dataclasses.replace(ALL, **how))
         assert np.isfinite(got).all()
-        if "offset" not in how:
+        if how.get("clamp") == "sphere":  # reaches over horizons, where the plain term is 0
+            assert got.max() < plain.max()
+        elif "offset" not in how:
             assert (got <= plain * (1 + 1e-5)).all()
         found.append(f"{how} max {got.max():.3g} mean {got.mean() / plain.mean() - 1:+.1%}")
     evidence(f"none max {plain.max():.3g}; " + "; ".join(found))

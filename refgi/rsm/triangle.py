@@ -23,7 +23,7 @@ from refgi.rsm.projection import ORTHOGRAPHIC, Projection, view_coordinates
 Array = npt.NDArray[Any]
 
 SMALLEST_W = 1e-30  # stands for a vertex in the plane of the eye, m
-NEAREST = 1e-9  # share of a triangle's depth under which a hit is rounding: its plane holds the eye
+NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the eye
 BOX_PAD = 1e-3  # texels; far above the rounding of a projected vertex
 SPAN_CUT = 32  # texels; narrower boxes are cheaper to test whole
 LANES = 16  # texels tested at once; a map has at least as many columns in memory
@@ -208,7 +208,8 @@ def draw(corners: Array, faces: Array, part: Part, nearness: Array, ids: Array) 
         an = (a0 * ni + a1 * nj + a2 * nk) * scale
         bn = (b0 * ni + b1 * nj + b2 * nk) * scale
         cn = (c0 * ni + c1 * nj + c2 * nk) * scale
-        limit = np.float32(1.0 / (NEAREST * max(abs(wi), max(abs(wj), abs(wk)))))
+        size = max(_size(xi, yi, wi, width), max(_size(xj, yj, wj, width), _size(xk, yk, wk, width)))
+        limit = np.float32(1.0 / (NEAREST * size))
         place_of_box = face - part.base
         left, right = _integer(boxes[place_of_box, 0]), _integer(boxes[place_of_box, 1])
         upper, lower = _integer(boxes[place_of_box, 2]), _integer(boxes[place_of_box, 3])
@@ -231,6 +232,12 @@ def draw(corners: Array, faces: Array, part: Part, nearness: Array, ids: Array) 
                     if inside & (near > nearness[line, column]) & (near <= limit):
                         nearness[line, column] = near
                         ids[line, column] = face
+
+
+@kernel
+def _size(x: float, y: float, w: float, width: int) -> float:
+    """Return about how far a corner is from the eye, whatever plane holds both."""
+    return max(abs(w), max(abs(x * w), abs(y * w)) / width)
 
 
 @kernel

@@ -122,7 +122,9 @@ def walk_lights(
     numbers = halton(settings.lights, BASES[:used], shift, start=1)
     left: list[Left] = []
     for k in range(len(lights.kind)):
-        left += _paths(tracer, geometry, materials, _emit(lights, k, numbers, geometry), settings.bounces)
+        rays = _emit(lights, k, numbers, geometry)
+        rays = rays._replace(origin=rays.origin + tracer.offset * rays.direction)  # a lamp may lie in a surface
+        left += _paths(tracer, geometry, materials, rays, settings.bounces)
     return _pixel_lights(left)
 
 

@@ -103,7 +103,7 @@ def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, ra
     side = math.isqrt(photons)
     for k, light in enumerate(film.scene.lights):
         rays = light_rays(light, film.scene.geometry, random.random((side * side, 2)))
-        batch = _photons(rays.origins, rays.directions)
+        batch = _photons(rays.origins + tracer.offset * rays.directions, rays.directions)
         _power(lights, k, isinstance(light, DirectionalLight), rays.measure, rays.directions, batch.flux)
         for bounce in range(LONGEST_CHAIN):
             tracer.fill_closest(batch.origin, batch.direction, batch.reach, batch.triangle_id, batch.distance)

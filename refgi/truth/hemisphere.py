@@ -178,7 +178,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
             least = bound * length * length / (area * paths.cosine[ray])
             if least >= 1 and not has_lobe:
                 continue
-        lx, ly, lz, _, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
+        lx, ly, lz, far, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
         if max(red, green, blue) <= 0:
             continue
         light, irradiance = (lx, ly, lz), (red, green, blue)
@@ -199,7 +199,8 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
             shadows.origin[ray, c] = y[c] + offset * g[c]
             shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
         if most > 0:
-            shadows.reach[ray] = np.inf if directional else 1.0
+            # short of the light by the same offset: a lamp may lie in a surface itself
+            shadows.reach[ray] = np.inf if directional else max(0.0, 1.0 - offset / far)
 
 
 @kernel

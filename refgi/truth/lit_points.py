@@ -59,10 +59,13 @@ def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: 
     LitPoints
         In the order of the rays, without dark points, not padded.
     """
-    origins, directions = rays.origins.astype(np.float32), rays.directions.astype(np.float32)
+    # a lamp may lie in a surface: look from just beyond it
+    origins = (rays.origins + tracer.offset * rays.directions).astype(np.float32)
+    directions = rays.directions.astype(np.float32)
     count = len(origins)
     triangle_id, distance = np.empty(count, np.int32), np.empty(count, np.float32)
     tracer.fill_closest(origins, directions, np.full(count, np.inf, np.float32), triangle_id, distance)
+    distance += np.float32(tracer.offset)
     points = _empty(2 * count)
     used = _fill(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance),
                  (rays.measure, bound), points)

@@ -10,11 +10,14 @@ module it imports, directly or not**, together with the versions of numba, llvml
 A cache file that cannot be read is dropped and rebuilt.
 """
 
+import atexit
 import hashlib
 import importlib.util
 import os
 import platform
 import re
+import tempfile
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -25,6 +28,8 @@ import llvmlite
 import llvmlite.binding
 import numba
 import numpy as np
+
+from refgi.errors import RefgiWarning
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -104,11 +109,26 @@ def threads(count: int | None) -> Iterator[None]:
 def _cache_folder(module: str) -> Iterator[None]:
     config: Any = numba.config
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_root() / _key(module))
+    config.CACHE_DIR = str(_usable(cache_root()) / _key(module))
     try:
         yield
     finally:
         config.CACHE_DIR = before
+
+
+@cache
+def _usable(folder: Path) -> Path:
+    """Return the folder, or one that lasts as long as the process where that cannot be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        warnings.warn(RefgiWarning(f"{folder}: compiled kernels cannot be kept ({error.strerror or error}): "
+                                   "every start compiles again; REFGI_CACHE_DIR names another folder"), stacklevel=2)
+        rescue = tempfile.TemporaryDirectory(prefix="refgi-")
+        atexit.register(rescue.cleanup)
+        return Path(rescue.name)
 
 
 @cache
@@ -164,7 +184,9 @@ def _imports(module: str, package: str) -> tuple[str, ...]:
 
 def _mend_when_damaged(compiled: Any) -> None:
     """Make an unreadable cache file count as absent: Numba itself would fail on every later run."""
-    stored = compiled._cache
+    stored = getattr(compiled, "_cache", None)
+    if stored is None:  # NUMBA_DISABLE_JIT: the plain function
+        return
     load = stored.load_overload
 
     def load_or_drop(signature: Any, target: Any) -> Any:

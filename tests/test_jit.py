@@ -63,6 +63,22 @@ def test_a_damaged_cache_is_dropped_and_rebuilt(package, suffix, damage):
     assert run(package) == "5.0 1"
 
 
+def test_a_folder_that_cannot_be_written_is_named(package):
+    (package.parent / "cache").write_text("a file, not a folder")
+    call = "import warnings; warnings.simplefilter('always'); import package_a.outer as o; print(o.outer(1.5))"
+    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
+    done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "5.0"
+    assert done.stderr.count("compiled kernels cannot be kept") == 1
+
+
+def test_kernels_run_as_plain_python(package):
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(package.parent)}
+    call = "import package_a.outer as o; print(o.outer(1.5))"
+    done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "5.0", done.stderr
+
+
 def test_kernels_are_strict():
     """Summing 1, 1e16, -1e16 in this order must lose the 1, and a*b - a*b must be exactly rounded twice."""
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.scene.values import LARGEST
 from refgi.splat.gather_sum import GatherMap, disc_pattern, gather_discs
 from refgi.splat.interpolation import Agreement, coarse_pixels, interpolate
 from refgi.splat.irradiance import Receivers
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from refgi.rsm import Rsm
 
 Array = npt.NDArray[Any]
+
+WIDEST = 1000.0  # map widths; any disc past sqrt 2 covers the whole map
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,12 +50,12 @@ class GatherSettings:
 
     def __post_init__(self) -> None:
         expect(1 <= self.samples <= 1 << 28, "samples", "1 or more", self.samples)
-        expect(math.isfinite(self.radius) and self.radius > 0, "radius", "a finite share of the map > 0", self.radius)
+        expect(0 < self.radius <= WIDEST, "radius", f"a share of the map above 0, up to {WIDEST}", self.radius)
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
         expect(self.grid >= 0, "grid", "coarse pixels along a side, or 0", self.grid)
         expect(-1 <= self.least_cosine <= 1, "least_cosine", "-1 to 1", self.least_cosine)
         expect(self.reach >= 0, "reach", "a share of the scene's diagonal >= 0", self.reach)
-        expect(math.isfinite(self.offset), "offset", "a finite length, m", self.offset)
+        expect(abs(self.offset) <= LARGEST, "offset", f"a length up to {LARGEST:g} m", self.offset)
         object.__setattr__(self, "as_published", frozenset(self.as_published))
         expect(self.as_published <= {"rsm_weight_squared"}, "as_published", "names out of ['rsm_weight_squared']",
                sorted(self.as_published))

@@ -5,6 +5,7 @@ import math
 from typing import Literal
 
 from refgi.errors import expect
+from refgi.scene.values import LARGEST
 
 ClampMode = Literal["none", "distance", "geometry", "disc", "sphere"]
 LobeNorm = Literal["none", "full_lobe", "clamped"]
@@ -38,11 +39,10 @@ class PairSettings:
         expect(math.isfinite(self.clamp_value) and (self.clamp_value > 0 or (not needed and self.clamp_value == 0)),
                "clamp_value", f"a finite number > 0 for the clamp {self.clamp!r}" if needed else "a number >= 0",
                self.clamp_value)
-        expect(math.isfinite(self.offset), "offset", "a finite length, m", self.offset)
+        expect(abs(self.offset) <= LARGEST, "offset", f"a length up to {LARGEST:g} m", self.offset)
         expect(self.lobe_norm in ("none", "full_lobe", "clamped"), "lobe_norm",
                "'none', 'full_lobe' or 'clamped'", self.lobe_norm)
-        expect(math.isfinite(self.widening) and self.widening >= 0, "widening", "a finite length >= 0, m",
-               self.widening)
+        expect(0 <= self.widening <= LARGEST, "widening", f"0 to {LARGEST:g} m", self.widening)
         object.__setattr__(self, "as_published", frozenset(self.as_published))
         expect(self.as_published <= SWITCHES, "as_published", f"names out of {sorted(SWITCHES)}",
                sorted(self.as_published))

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 Pattern = Literal["grid", "halton", "all", "random"]
 
+MOST_LIGHTS = 1 << 24  # a map: every texel of one of 4096 x 4096
+
 
 @dataclasses.dataclass(frozen=True)
 class SiiSettings(PairSettings):
@@ -34,7 +36,7 @@ class SiiSettings(PairSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        expect(1 <= self.lights <= 1 << 28, "lights", "1 or more pixel lights", self.lights)
+        expect(1 <= self.lights <= MOST_LIGHTS, "lights", f"1 to {MOST_LIGHTS:,} pixel lights", self.lights)
         expect(self.pattern in ("grid", "halton", "all", "random"), "pattern",
                "'grid', 'halton', 'all' or 'random'", self.pattern)
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)

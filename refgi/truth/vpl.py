@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from refgi.rsm import PixelLights
 
 Array = npt.NDArray[Any]
+
+MOST_LIGHTS = 1 << 24  # a map: every texel of one of 4096 x 4096
 Pattern = Literal["grid", "halton", "all", "random"]
 
 LIGHTS_AT_A_TIME = 1024
@@ -46,7 +48,7 @@ class VplSettings:
     batch: int = 1 << 18
 
     def __post_init__(self) -> None:
-        expect(1 <= self.lights <= 1 << 28, "lights", "1 or more pixel lights", self.lights)
+        expect(1 <= self.lights <= MOST_LIGHTS, "lights", f"1 to {MOST_LIGHTS:,} pixel lights", self.lights)
         expect(self.pattern in ("grid", "halton", "all", "random"), "pattern",
                "'grid', 'halton', 'all' or 'random'", self.pattern)
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)

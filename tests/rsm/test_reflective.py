@@ -213,3 +213,27 @@ def test_a_light_that_shines_on_nothing():
         assert not rsm.covered.any()
         assert (rsm.flux == 0).all()
         assert choose_pixel_lights([rsm], count=rsm.texels, pattern="random").flux.shape == (3, 0)
+
+
+LAMP = SpotLight((0.278, 0.5488, 0.28), (0.0, -1.0, 0.0), 0.5, 0.9, (1.0, 1.0, 1.0))
+
+
+@pytest.mark.parametrize("direction", [(0.0, -1.0, 0.0), (0.3, -1.0, 0.1)])
+def test_a_lamp_in_the_ceiling_shines_down(direction):
+    """Exactly in the ceiling's plane or 10 um below it: the map differs by what 10 um can move."""
+    box = load_scene("cornell_box")
+    materials = material_table(box.materials, np.float64)
+    in_it = dataclasses.replace(LAMP, direction=direction)
+    below = dataclasses.replace(in_it, position=(0.278, 0.54879, 0.28))
+    maps = [reflective_shadow_map(box.geometry, materials, light, 64, np.float64) for light in (in_it, below)]
+    assert maps[0].flux.sum() == pytest.approx(maps[1].flux.sum(), rel=1e-3)
+    both = maps[0].covered & maps[1].covered
+    assert np.median(np.abs(maps[0].depth - maps[1].depth)[both]) < 2e-5
+
+
+def test_a_bulb_in_the_ceiling_lights_half_its_map():
+    box = load_scene("cornell_box")
+    materials = material_table(box.materials, np.float64)
+    rsm = reflective_shadow_map(box.geometry, materials, PointLight(LAMP.position, LAMP.intensity), 32, np.float64)
+    assert rsm.covered.any()
+    assert rsm.depth[rsm.covered].min() > 1e-3  # nothing at no distance: the ceiling is seen edge-on

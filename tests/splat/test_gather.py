@@ -181,6 +181,6 @@ def test_same_bits_for_any_threads_and_neighbours(box, evidence):
 
 def test_settings_are_checked():
     for change in ({"samples": 0}, {"radius": 0.0}, {"seed": -1}, {"grid": -1}, {"least_cosine": 2.0}, {"reach": -1.0},
-                   {"offset": math.inf}, {"as_published": {"xi"}}):
+                   {"offset": math.inf}, {"offset": 1e300}, {"radius": 1e300}, {"as_published": {"xi"}}):
         with pytest.raises(InputError, match=next(iter(change))):
             GatherSettings(**change)

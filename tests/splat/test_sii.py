@@ -162,6 +162,6 @@ def test_lobe_code_is_skipped_without_glossy_materials(box):
 
 
 def test_settings_are_checked():
-    for change in ({"lights": 0}, {"pattern": "spiral"}, {"seed": -1}):
+    for change in ({"lights": 0}, {"lights": 1 << 28}, {"pattern": "spiral"}, {"seed": -1}, {"offset": 1e300}):
         with pytest.raises(InputError, match=next(iter(change))):
             SiiSettings(**change)

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.options import machine, speech, view
+from refgi.cli.options import machine, shadows, speech, view
 from refgi.cli.session import FAILED, Session, say, table
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ss
 @click.option("--set", "pairs", multiple=True, metavar="METHOD.KEY=VALUE",
               help="A setting of a method or of truth, such as truth.samples=64; repeatable.")
 @machine
+@shadows("exact")
 @click.option("--out", help="Folder for EXR, PNG, error maps, results.json and index.html.")
 @speech
 @click.pass_obj

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.options import machine, speech, view
+from refgi.cli.options import machine, shadows, speech, view
 from refgi.cli.session import Session, table
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ ROWS = {  # SII Table 1
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
+@shadows("map")
 @speech
 @click.pass_obj
 def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,

@@ -98,7 +98,7 @@ def view(function: F) -> F:
 
 
 def machine(function: F) -> F:
-    """Add how it is computed: element type, threads, shadow maps.
+    """Add how it is computed: element type, size of the shadow maps, threads, seed.
 
     Parameters
     ----------
@@ -115,10 +115,25 @@ def machine(function: F) -> F:
                      help="Element type of every buffer and kernel."),
         click.option("--rsm-resolution", type=click.IntRange(1, 16384), default=512, show_default=True,
                      help="Texels along one side of a reflective shadow map."),
-        click.option("--shadows", type=click.Choice(["map", "exact"]), default="map", show_default=True,
-                     help="Direct light's shadows: from the shadow map as published, or by rays."),
         click.option("--threads", type=click.IntRange(1), help="Threads of compiled kernels; all where absent."),
         click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Which random numbers, where a method has any."),
     )):
         function = decorate(function)
     return function
+
+
+def shadows(default: str) -> Callable[[F], F]:
+    """Add where the direct light's shadows come from.
+
+    Parameters
+    ----------
+    default : str
+        "map" where nothing else needs rays, "exact" where rays are traced anyway.
+
+    Returns
+    -------
+    callable
+        Adds the option to a verb.
+    """
+    return click.option("--shadows", type=click.Choice(["map", "exact"]), default=default, show_default=True,
+                        help="Direct light's shadows: from the shadow map as published, or by rays.")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.options import machine, speech, view
+from refgi.cli.options import machine, shadows, speech, view
 from refgi.cli.session import FAILED, Session, say
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
+@shadows("map")
 @click.option("--exposure", type=float, help="Factor before the sRGB curve of a PNG; the scene's where absent.")
 @click.option("--out", required=True, help="out.exr (linear), out.png (tone-mapped), or a folder for both.")
 @speech

@@ -64,7 +64,7 @@ def compare(
     progress : callable, optional
         Called with (what runs, fraction done).
     **frame_options : object
-        Passed to `Frame`: dtype, rsm_resolution, shadows.
+        Passed to `Frame`: dtype, rsm_resolution, shadows ("exact" where absent: rays are traced anyway).
 
     Returns
     -------
@@ -80,7 +80,7 @@ def compare(
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     names = _names(methods)
     settings = _settings(names, truth_settings, method_settings or {})
-    runner = _Runner(scene, {"width": width, "height": height, **frame_options}, progress)
+    runner = _Runner(scene, {"width": width, "height": height, "shadows": "exact", **frame_options}, progress)
     if out is not None:
         _require_folder(Path(out))
     references = {TRUTH: runner.reference(TRUTH, settings[TRUTH])}

@@ -92,7 +92,7 @@ def test_figures_and_pictures_belong_together(box, truth_settings):
     assert (result.irradiance[:, got.covered] == 0.5).all()
     error = 0.5 - got.truth.irradiance[:, got.covered]
     assert result.against["truth"].figures["bias"].value == pytest.approx(error.mean())
-    frame = Frame(box, **SIZE)
+    frame = Frame(box, shadows="exact", **SIZE)
     assert np.array_equal(result.radiance, frame.radiance(result.irradiance))
 
 

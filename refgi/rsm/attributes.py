@@ -17,6 +17,9 @@ from refgi.jit import kernel, prange
 from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 
 Array = npt.NDArray[Any]
+Rows = tuple[int, int]  # first row and one past the last
+
+STRIP = 8  # rows resolved at once: their lines of float64 stay in cache
 
 
 class Wanted(NamedTuple):
@@ -139,7 +142,7 @@ def resolve(
     planes : Planes
         The result.
     workers : int
-        Threads; rows are dealt to them in turn.
+        Threads; strips of rows are dealt to them in turn.
     """
     for worker in prange(workers):
         _resolve_rows(surface, projection, triangle_id, wanted, planes, worker, workers)
@@ -149,64 +152,124 @@ def resolve(
 def _resolve_rows(
     surface: Surface, projection: Projection, triangle_id: Array, wanted: Wanted, planes: Planes, first: int, step: int
 ) -> None:
-    """Fill every `step`-th row from `first` on.
+    """Fill every `step`-th strip of rows from strip `first` on.
 
-    Inside the loop over columns functions get scalars only: arrays would cost atomic reference counts.
+    Triangles are looked up once a run of texels, into `line`: corner v_0 and N at each texel. The rest is the same
+    arithmetic for all texels of a row, free of branches, in SIMD lanes. Strips, because each call with arrays costs
+    atomic reference counts, which threads share.
     """
-    vertices, faces, shading, diffuse = surface.vertices, surface.faces, surface.normals, surface.diffuse
     height, width = triangle_id.shape
-    smooth = len(shading) > 0 and wanted.normal
-    across = 2.0 / projection.width
-    for row in range(first, height, step):
+    line, hit = np.zeros((STRIP, 6, width)), np.empty((STRIP, 5, width))
+    smooth = len(surface.normals) > 0 and wanted.normal
+    for top in range(first * STRIP, height, step * STRIP):
+        bottom = min(top + STRIP, height)
+        _look_up(surface, projection, triangle_id, (top, bottom), wanted, planes, line)
+        if wanted.depth or wanted.distance or wanted.position:
+            _meet(projection, triangle_id, (top, bottom), line, hit)
+            _store((top, bottom), wanted, planes, hit)
+        if smooth:
+            _interpolate(surface, projection, triangle_id, (top, bottom), line, planes.normal)
+
+
+@kernel
+def _look_up(
+    surface: Surface, projection: Projection, triangle_id: Array, rows: Rows, wanted: Wanted, planes: Planes,
+    line: Array,
+) -> None:
+    """Write corner and N of what each texel sees, and what is the same all over a triangle."""
+    vertices, faces, diffuse = surface.vertices, surface.faces, surface.diffuse
+    for row in range(rows[0], rows[1]):
         view, v = _row_view(projection, row)
-        last, material, i, j, k = -1, 0, 0, 0, 0
-        ix, iy, iz, jx, jy, jz, kx, ky, kz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        gx, gy, gz, nx, ny, nz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for column in range(width):
-            face = triangle_id[row, column]
+        last, material, y = -1, -1, row - rows[0]
+        ix, iy, iz, gx, gy, gz, nx, ny, nz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for x in range(triangle_id.shape[1]):
+            face = triangle_id[row, x]
             if face < 0:
-                if wanted.depth:
-                    planes.depth[row, column] = np.inf
-                if wanted.distance:
-                    planes.distance[row, column] = np.inf
                 if wanted.material_id:
-                    planes.material_id[row, column] = -1
+                    planes.material_id[row, x] = -1
                 continue
-            ray = _ray(projection.kind, view, ((column + 0.5) * across - 1.0) * projection.half[0], v)
-            ox, oy, oz, dx, dy, dz = ray
             if face != last:
                 last, material = face, surface.material_of_face[face]
                 i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
                 ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-                jx, jy, jz = vertices[j, 0], vertices[j, 1], vertices[j, 2]
-                kx, ky, kz = vertices[k, 0], vertices[k, 1], vertices[k, 2]
-                gx, gy, gz = _cross(jx - ix, jy - iy, jz - iz, kx - ix, ky - iy, kz - iz)
+                gx, gy, gz = _cross(vertices[j, 0] - ix, vertices[j, 1] - iy, vertices[j, 2] - iz,
+                                    vertices[k, 0] - ix, vertices[k, 1] - iy, vertices[k, 2] - iz)  # fmt: skip
+                u = ((x + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0]
+                _, _, _, dx, dy, dz = _ray(projection.kind, view, u, v)
                 nx, ny, nz = _towards(gx, gy, gz, -dx, -dy, -dz)  # a triangle shows one side to a projection
-            facing = dx * gx + dy * gy + dz * gz
-            t = ((ix - ox) * gx + (iy - oy) * gy + (iz - oz) * gz) / facing
-            if wanted.depth:
-                planes.depth[row, column] = t
-            if wanted.distance:
-                planes.distance[row, column] = t * math.sqrt(dx * dx + dy * dy + dz * dz)
-            if wanted.position:
-                planes.position[0, row, column] = ox + t * dx
-                planes.position[1, row, column] = oy + t * dy
-                planes.position[2, row, column] = oz + t * dz
+            line[y, 0, x], line[y, 1, x], line[y, 2, x] = ix, iy, iz
+            line[y, 3, x], line[y, 4, x], line[y, 5, x] = gx, gy, gz
             if wanted.normal:
-                sx, sy, sz = nx, ny, nz
-                if smooth:
-                    a = _weight(ray, jx, jy, jz, kx, ky, kz) / facing
-                    b = _weight(ray, kx, ky, kz, ix, iy, iz) / facing
-                    c = 1.0 - a - b
-                    sx = a * shading[i, 0] + b * shading[j, 0] + c * shading[k, 0]
-                    sy = a * shading[i, 1] + b * shading[j, 1] + c * shading[k, 1]
-                    sz = a * shading[i, 2] + b * shading[j, 2] + c * shading[k, 2]
-                    sx, sy, sz = _towards(sx, sy, sz, nx, ny, nz)
-                planes.normal[0, row, column], planes.normal[1, row, column] = sx, sy
-                planes.normal[2, row, column] = sz
+                planes.normal[0, row, x], planes.normal[1, row, x], planes.normal[2, row, x] = nx, ny, nz
             if wanted.albedo:
-                planes.albedo[0, row, column] = diffuse[material, 0]
-                planes.albedo[1, row, column] = diffuse[material, 1]
-                planes.albedo[2, row, column] = diffuse[material, 2]
+                planes.albedo[0, row, x], planes.albedo[1, row, x] = diffuse[material, 0], diffuse[material, 1]
+                planes.albedo[2, row, x] = diffuse[material, 2]
             if wanted.material_id:
-                planes.material_id[row, column] = material
+                planes.material_id[row, x] = material
+
+
+@kernel
+def _meet(projection: Projection, triangle_id: Array, rows: Rows, line: Array, hit: Array) -> None:
+    """Write t, the length of t d and the point o + t d of each texel; inf, inf and 0 where nothing is seen."""
+    across, half, kind = 2.0 / projection.width, projection.half[0], projection.kind
+    for row in range(rows[0], rows[1]):
+        view, v = _row_view(projection, row)
+        y = row - rows[0]
+        for x in range(triangle_id.shape[1]):
+            ox, oy, oz, dx, dy, dz = _ray(kind, view, ((x + 0.5) * across - 1.0) * half, v)
+            gx, gy, gz = line[y, 3, x], line[y, 4, x], line[y, 5, x]
+            facing = dx * gx + dy * gy + dz * gz
+            t = ((line[y, 0, x] - ox) * gx + (line[y, 1, x] - oy) * gy + (line[y, 2, x] - oz) * gz) / facing
+            seen = triangle_id[row, x] >= 0
+            hit[y, 0, x] = t if seen else np.inf
+            hit[y, 1, x] = t * math.sqrt(dx * dx + dy * dy + dz * dz) if seen else np.inf
+            hit[y, 2, x] = ox + t * dx if seen else 0.0
+            hit[y, 3, x] = oy + t * dy if seen else 0.0
+            hit[y, 4, x] = oz + t * dz if seen else 0.0
+
+
+@kernel
+def _store(rows: Rows, wanted: Wanted, planes: Planes, hit: Array) -> None:
+    """Round rows to the buffer's type."""
+    for row in range(rows[0], rows[1]):
+        y = row - rows[0]
+        if wanted.depth:
+            for x in range(hit.shape[2]):
+                planes.depth[row, x] = hit[y, 0, x]
+        if wanted.distance:
+            for x in range(hit.shape[2]):
+                planes.distance[row, x] = hit[y, 1, x]
+        if wanted.position:
+            for axis in range(3):
+                for x in range(hit.shape[2]):
+                    planes.position[axis, row, x] = hit[y, 2 + axis, x]
+
+
+@kernel
+def _interpolate(
+    surface: Surface, projection: Projection, triangle_id: Array, rows: Rows, line: Array, normal: Array
+) -> None:
+    """Replace face normals by interpolated ones, on the same side."""
+    vertices, faces, shading = surface.vertices, surface.faces, surface.normals
+    for row in range(rows[0], rows[1]):
+        view, v = _row_view(projection, row)
+        y = row - rows[0]
+        for x in range(triangle_id.shape[1]):
+            face = triangle_id[row, x]
+            if face < 0:
+                continue
+            i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+            ray = _ray(projection.kind, view, ((x + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0], v)
+            gx, gy, gz = line[y, 3, x], line[y, 4, x], line[y, 5, x]
+            facing = ray[3] * gx + ray[4] * gy + ray[5] * gz
+            ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+            jx, jy, jz = vertices[j, 0], vertices[j, 1], vertices[j, 2]
+            kx, ky, kz = vertices[k, 0], vertices[k, 1], vertices[k, 2]
+            a = _weight(ray, jx, jy, jz, kx, ky, kz) / facing
+            b = _weight(ray, kx, ky, kz, ix, iy, iz) / facing
+            c = 1.0 - a - b
+            sx = a * shading[i, 0] + b * shading[j, 0] + c * shading[k, 0]
+            sy = a * shading[i, 1] + b * shading[j, 1] + c * shading[k, 1]
+            sz = a * shading[i, 2] + b * shading[j, 2] + c * shading[k, 2]
+            nx, ny, nz = _towards(gx, gy, gz, -ray[3], -ray[4], -ray[5])
+            normal[0, row, x], normal[1, row, x], normal[2, row, x] = _towards(sx, sy, sz, nx, ny, nz)

@@ -1,5 +1,6 @@
 """Property tests of the kernel cache: it follows imported sources, and mends what is damaged."""
 
+import ast
 import os
 import subprocess
 import sys
@@ -105,3 +106,19 @@ def test_threads_are_put_back():
     with jit.threads(1):
         assert numba.get_num_threads() == 1
     assert numba.get_num_threads() == before
+
+
+def test_no_parallel_loop_writes_through_a_tuple():
+    """Numba drops `record.field[i] = x` directly inside a `prange` without a word: no kernel may do it."""
+    root = Path(jit.__file__).parent
+    found = []
+    for path in root.rglob("*.py"):
+        for loop in ast.walk(ast.parse(path.read_bytes())):
+            if isinstance(loop, ast.For) and isinstance(loop.iter, ast.Call) and ast.unparse(loop.iter.func) == "prange":
+                for node in ast.walk(loop):
+                    targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+                    for target in targets:
+                        for part in target.elts if isinstance(target, ast.Tuple) else [target]:
+                            if isinstance(part, ast.Subscript) and isinstance(part.value, ast.Attribute):
+                                found.append(f"{path.relative_to(root)}:{part.lineno}")
+    assert not found

@@ -82,7 +82,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def is_text(name: str) -> bool:
-    """Return whether a file's name is text, not bytes of some other encoding.
+    r"""Return whether a file's name is text, not bytes of some other encoding.
 
     Parameters
     ----------

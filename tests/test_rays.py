@@ -158,7 +158,7 @@ def test_unusable_rays_are_refused(origins, directions, reach, named):
 
 
 def test_unusable_vertices_are_refused():
-    with pytest.raises(InputError, match="vertices"):
+    with pytest.raises(InputError, match="vertex 2: expected finite coordinates"):
         Tracer(geometry([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]]))
 
 

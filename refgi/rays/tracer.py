@@ -47,7 +47,6 @@ class Tracer:
         self._vertices = np.array(geometry.vertices, np.float32).reshape(-1, 3)
         self._faces = np.array(geometry.faces, np.int32).reshape(-1, 3)
         used = self._vertices[self._faces.reshape(-1)]
-        expect(bool(np.isfinite(used).all()), "geometry.vertices", "finite numbers within float32", "others")
         self._scale = float(np.abs(used).max(initial=0.0)) or 1.0
         self._lock = threading.Lock()
 

@@ -72,7 +72,7 @@ def is_there(path: Path) -> bool:
 
 
 def text_of(name: str) -> str:
-    """Return a file's name as text that can be written anywhere.
+    r"""Return a file's name as text that can be written anywhere.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ from refgi.scene import Scene, load_scene
 
 Progress = Callable[[str, float], None]
 
-WARM_UP_SIZE = 16  # pixels along a side
+WARM_UP_SIZE = 96  # pixels along a side: more than the coarse grid of `gather`, whose interpolation then runs as well
 
 
 def compare(

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from refgi.truth.surfaces import lights_of, receivers, surfaces
 Array = npt.NDArray[Any]
 ESTIMATORS: tuple[Estimator, ...] = ("hemisphere", "light", "combined")
 TARGETS = (1e-2, 1e-3, 1e-4)
+PIECE = 1 << 17  # rays a call of `run`
 
 
 class Recorder(Tracer):
@@ -63,16 +65,16 @@ def _ray_rate(frame: Frame, task: Task, name: str, repeats: int) -> Row:
     """Time the rays of a pass alone, by embreex's run on two Python threads, against the whole pass."""
     recorder = Recorder(frame.scene.geometry)
     one_pass(task._replace(tracer=recorder), 0)
-    door = RunDoor(frame.scene.geometry.vertices, frame.scene.geometry.faces)
+    scene = RunDoor(frame.scene.geometry.vertices, frame.scene.geometry.faces)._scene
     count = sum(len(batch[0]) for batch in (*recorder.nearest, *recorder.shadows))
-    size = max(len(batch[0]) for batch in (*recorder.nearest, *recorder.shadows))
-    ids, far, blocked = np.empty(size, np.int32), np.empty(size, np.float32), np.empty(size, np.bool_)
+    # contiguous pieces made beforehand, ids or hit flags alone: nothing but `run` is timed
+    jobs = [(query, *(np.ascontiguousarray(part[i : i + PIECE]) for part in batch))
+            for query, batches in (("INTERSECT", recorder.nearest), ("OCCLUDED", recorder.shadows))
+            for batch in batches for i in range(0, len(batch[0]), PIECE)]
+    pool = ThreadPoolExecutor(2)
 
     def bare() -> None:
-        for o, d, reach in recorder.nearest:
-            door.closest(o, d, reach, ids[: len(o)], far[: len(o)])
-        for o, d, reach in recorder.shadows:
-            door.occluded(o, d, reach, blocked[: len(o)])
+        list(pool.map(lambda job: scene.run(job[1], job[2], dists=job[3], query=job[0]), jobs))
 
     found = ratio(bare, lambda: one_pass(task, 0), repeats)
     note = f"{count / found.seconds_b / 1e6:.1f} M rays/s, bare {count / found.seconds_a / 1e6:.1f}"

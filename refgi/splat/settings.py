@@ -1,16 +1,17 @@
-"""How one pixel light lights one receiver: what the pair sum of every splatting method can be set to."""
+"""How one pixel light lights one receiver, and how far it reaches: what splatting methods can be set to."""
 
 import dataclasses
 import math
-from typing import Literal
+from typing import ClassVar, Literal, get_args
 
 from refgi.errors import expect
 from refgi.scene.values import LARGEST
 
 ClampMode = Literal["none", "distance", "geometry", "disc", "sphere"]
 LobeNorm = Literal["none", "full_lobe", "clamped"]
+Bound = Literal["full", "quad", "ellipsoid", "tangent", "mesh"]
 
-SWITCHES = frozenset({"sii_no_pi", "sii_widening", "sii_widening_unnorm"})
+MESHES = (8, 20, 80, 320, 1280)  # faces of an octahedron and of icosahedra, subdivided
 FOOTPRINT_CLAMPS = ("disc", "sphere")  # need the surface area that each light stands for
 
 
@@ -32,6 +33,8 @@ class PairSettings:
     widening: float = 0.0
     as_published: frozenset[str] = frozenset()
 
+    SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_no_pi", "sii_widening", "sii_widening_unnorm"})
+
     def __post_init__(self) -> None:
         expect(self.clamp in ("none", "distance", "geometry", "disc", "sphere"), "clamp",
                "'none', 'distance', 'geometry', 'disc' or 'sphere'", self.clamp)
@@ -44,5 +47,44 @@ class PairSettings:
                "'none', 'full_lobe' or 'clamped'", self.lobe_norm)
         expect(0 <= self.widening <= LARGEST, "widening", f"0 to {LARGEST:g} m", self.widening)
         object.__setattr__(self, "as_published", frozenset(self.as_published))
-        expect(self.as_published <= SWITCHES, "as_published", f"names out of {sorted(SWITCHES)}",
+        expect(self.as_published <= self.SWITCHES, "as_published", f"names out of {sorted(self.SWITCHES)}",
                sorted(self.as_published))
+
+
+@dataclasses.dataclass(frozen=True)
+class SplatSettings(PairSettings):
+    """How far a pixel light reaches (SII Sec. 3.4 and appendix), besides how it lights a receiver.
+
+    A pair counts where B = I_0 cos^n / r^2 is at least I_low, one irradiance for all lights: `i_low` (the paper's
+    x %; 0: no cut) of the largest peak intensity I_0 over the square of `reference_length` (m), or `irradiance_low`
+    (W/m^2) where that is given. `bound` says which geometry finds the pixels that come into question; it changes no
+    bit of the picture but for a "mesh" of `mesh_faces` faces that is not made to enclose its ellipsoid (`inflate`).
+    `stochastic_range` cuts at a random share of I_low instead, drawn by `seed`, and weighs what is left: no bias.
+    """
+
+    i_low: float = 0.05
+    reference_length: float = 1.0
+    irradiance_low: float | None = None
+    bound: Bound = "tangent"
+    mesh_faces: int = 80
+    inflate: bool = True
+    stochastic_range: bool = False
+    seed: int = 0
+
+    SWITCHES: ClassVar[frozenset[str]] = PairSettings.SWITCHES | {"per_light_ilow"}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        expect(0 <= self.i_low <= LARGEST, "i_low", "a share of the brightest light's intensity, 0 or more", self.i_low)
+        expect(0 < self.reference_length <= LARGEST, "reference_length", f"a length up to {LARGEST:g} m",
+               self.reference_length)
+        expect(self.irradiance_low is None or (math.isfinite(self.irradiance_low) and self.irradiance_low >= 0),
+               "irradiance_low", "none or an irradiance of 0 or more, W/m^2", self.irradiance_low)
+        expect(self.bound in get_args(Bound), "bound", " or ".join(map(repr, get_args(Bound))), self.bound)
+        expect(self.mesh_faces in MESHES, "mesh_faces", f"one of {MESHES}", self.mesh_faces)
+        expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
+
+    @property
+    def cuts(self) -> bool:
+        """Whether any pair may be left out."""
+        return self.i_low > 0 if self.irradiance_low is None else self.irradiance_low > 0

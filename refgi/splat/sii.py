@@ -2,14 +2,17 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.scene.material import SHARPEST
+from refgi.scene.values import LARGEST
 from refgi.splat.irradiance import Receivers, irradiance
-from refgi.splat.settings import FOOTPRINT_CLAMPS, PairSettings
+from refgi.splat.settings import FOOTPRINT_CLAMPS, SplatSettings
+from refgi.splat.walk import MOST_BOUNCES
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -17,29 +20,69 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 Pattern = Literal["grid", "halton", "all", "random"]
+Source = Literal["rsm", "walk"]
+WarpMethod = Literal["none", "A", "B"]
+Importance = Literal["flux", "peak", "openness"]
+OpennessFlux = Literal["none", "scale", "roulette"]
+Refraction = Literal["none", "back_face", "two_interface"]
 
+CHOICES: dict[str, Any] = {"pattern": Pattern, "source": Source, "warp": WarpMethod, "importance": Importance,
+                           "openness_flux": OpennessFlux, "refraction": Refraction}
 MOST_LIGHTS = 1 << 24  # a map: every texel of one of 4096 x 4096
 
 
 @dataclasses.dataclass(frozen=True)
-class SiiSettings(PairSettings):
-    """What `sii` can be set to; the defaults are the paper's (768 lights as in Fig. 8 and 12, no importance).
+class SiiSettings(SplatSettings):
+    """What `sii` can be set to; the defaults are the paper's (768 lights and 5 % as in Fig. 12, no importance).
 
-    `lights` pixel lights a shadow map are taken from a `pattern` ("all": every texel, `lights` is not used) with
-    `seed`; `filtered` averages the flux over each light's cell (Sec. 4). The rest is that of `PairSettings`.
+    Lights: `lights` of a shadow map (`source` "rsm"), or as many paths of `bounces` bounces from each light ("walk",
+    Sec. 3.7), taken by a `pattern` ("all": every texel, `lights` is not used) with `seed`; `filtered` averages the
+    flux over each light's cell (Sec. 4). `refraction` at glass is that of its back faces alone, as published, of both
+    interfaces, or none; its lobes have `refraction_exponent`.
+
+    Importance (Sec. 3.5): `warp` by method "A" or "B" over `warp_levels` levels, towards flux, flux times the lobe's
+    `peak`, or that times 1 - `openness` (at least `openness_floor`), of which a share `defensive` is spread evenly;
+    `renormalise_weights` makes their sum that of unwarped lights, at the cost of bias. `openness_flux` (Sec. 3.6)
+    scales fluxes by 1 - openness, or plays roulette with them, which costs no energy in the mean. Openness is that of
+    `openness_rays` rays of length `openness_radius` (m; 0: a tenth of the scene's diagonal).
+
+    `half_resolution` lights every second pixel and interpolates (Table 3).
     """
 
     lights: int = 768
     pattern: Pattern = "halton"
-    seed: int = 0
     filtered: bool = False
+    source: Source = "rsm"
+    bounces: int = 1
+    warp: WarpMethod = "none"
+    warp_levels: int = 3
+    importance: Importance = "flux"
+    defensive: float = 0.0
+    renormalise_weights: bool = False
+    openness_radius: float = 0.0
+    openness_rays: int = 64
+    openness_floor: float = 0.05
+    openness_flux: OpennessFlux = "none"
+    refraction: Refraction = "back_face"
+    refraction_exponent: float = 1000.0
+    half_resolution: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
         expect(1 <= self.lights <= MOST_LIGHTS, "lights", f"1 to {MOST_LIGHTS:,} pixel lights", self.lights)
-        expect(self.pattern in ("grid", "halton", "all", "random"), "pattern",
-               "'grid', 'halton', 'all' or 'random'", self.pattern)
-        expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
+        for key, names in CHOICES.items():
+            expect(getattr(self, key) in get_args(names), key, " or ".join(map(repr, get_args(names))),
+                   getattr(self, key))
+        expect(1 <= self.bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", self.bounces)
+        expect(self.bounces == 1 or self.source == "walk", "bounces", "1 with the source 'rsm'", self.bounces)
+        expect(self.warp == "none" or self.source == "rsm", "warp", "'none' with the source 'walk'", self.warp)
+        expect(0 <= self.warp_levels <= 32, "warp_levels", "0 to 32", self.warp_levels)
+        expect(0 <= self.openness_radius <= LARGEST, "openness_radius", f"0 to {LARGEST:g} m", self.openness_radius)
+        expect(1 <= self.openness_rays <= 1 << 16, "openness_rays", "1 to 65536 rays", self.openness_rays)
+        for key in ("defensive", "openness_floor"):
+            expect(0 <= getattr(self, key) <= 1, key, "a share from 0 to 1", getattr(self, key))
+        expect(0 <= self.refraction_exponent <= SHARPEST, "refraction_exponent", f"0 to {SHARPEST:g}",
+               self.refraction_exponent)
 
 
 def sii(frame: "Frame", settings: SiiSettings) -> Array:

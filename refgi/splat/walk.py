@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 BASES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53)  # a pair for the light and for each bounce
+MOST_BOUNCES = len(BASES) // 2 - 1
+
 
 @dataclasses.dataclass(frozen=True)
 class WalkSettings(PairSettings):
@@ -41,7 +43,7 @@ class WalkSettings(PairSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         expect(1 <= self.lights <= 1 << 24, "lights", "1 or more paths", self.lights)
-        expect(1 <= self.bounces < len(BASES) // 2, "bounces", f"1 to {len(BASES) // 2 - 1}", self.bounces)
+        expect(1 <= self.bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", self.bounces)
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
 
 

@@ -8,19 +8,18 @@ solid angles and T / N, intensities 1 / pi, and Phong lobes conserve their flux 
 
 from refgi.splat.gather import GatherSettings, gather
 from refgi.splat.irradiance import Receivers, irradiance
-from refgi.splat.settings import PairSettings
+from refgi.splat.settings import PairSettings, SplatSettings
 from refgi.splat.sii import SiiSettings, sii
-from refgi.splat.walk import WalkSettings, walk, walk_lights
+from refgi.splat.walk import walk_lights
 
 __all__ = [
     "GatherSettings",
     "PairSettings",
     "Receivers",
     "SiiSettings",
-    "WalkSettings",
+    "SplatSettings",
     "gather",
     "irradiance",
     "sii",
-    "walk",
     "walk_lights",
 ]

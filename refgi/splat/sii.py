@@ -1,22 +1,20 @@
-"""Splatting Indirect Illumination (Dachsbacher and Stamminger 2006), without bounds: every light at every pixel."""
+"""Splatting Indirect Illumination (Dachsbacher and Stamminger 2006): settings and method."""
 
 import dataclasses
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.scene.material import SHARPEST
 from refgi.scene.values import LARGEST
 from refgi.splat.irradiance import Receivers, irradiance
+from refgi.splat.selection import choose_lights, light_footprints
 from refgi.splat.settings import FOOTPRINT_CLAMPS, SplatSettings
 from refgi.splat.walk import MOST_BOUNCES
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights, Rsm
 
 Array = npt.NDArray[Any]
 Pattern = Literal["grid", "halton", "all", "random"]
@@ -74,6 +72,8 @@ class SiiSettings(SplatSettings):
             expect(getattr(self, key) in get_args(names), key, " or ".join(map(repr, get_args(names))),
                    getattr(self, key))
         expect(1 <= self.bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", self.bounces)
+        expect(self.clamp not in FOOTPRINT_CLAMPS or self.source == "rsm", "clamp",
+               "one without footprints with the source 'walk'", self.clamp)
         expect(self.bounces == 1 or self.source == "walk", "bounces", "1 with the source 'rsm'", self.bounces)
         expect(self.warp == "none" or self.source == "rsm", "warp", "'none' with the source 'walk'", self.warp)
         expect(0 <= self.warp_levels <= 32, "warp_levels", "0 to 32", self.warp_levels)
@@ -86,84 +86,22 @@ class SiiSettings(SplatSettings):
 
 
 def sii(frame: "Frame", settings: SiiSettings) -> Array:
-    """Light every pixel by pixel lights of the reflective shadow maps.
+    """Light every pixel by pixel lights.
 
     Parameters
     ----------
     frame : Frame
         The scene, seen and lit.
     settings : SiiSettings
-        Which lights, and how each lights a receiver.
+        Which lights, how each lights a receiver and how far it reaches.
 
     Returns
     -------
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, linear RGB, without visibility.
     """
-    lights = pixel_lights(frame.rsms, settings)  # Sec. 3.1
+    lights = choose_lights(frame, settings)  # Sec. 3.1, 3.5 to 3.7
     footprint = light_footprints(frame.rsms, settings) if settings.clamp in FOOTPRINT_CLAMPS else None
     buffer = frame.gbuffer
     receivers = Receivers(buffer.position, buffer.normal, buffer.covered)  # Sec. 3.2: deferred shading
     return irradiance(receivers, lights, settings, footprint)  # Eq. (2)
-
-
-def pixel_lights(rsms: "Sequence[Rsm]", settings: SiiSettings) -> "PixelLights":
-    """Choose pixel lights as the settings say.
-
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
-    settings : SiiSettings
-        Number, pattern, seed and filtering.
-
-    Returns
-    -------
-    PixelLights
-        Lights with their share of the flux.
-    """
-    from refgi.rsm import choose_pixel_lights
-
-    count = None if settings.pattern == "all" else settings.lights
-    return choose_pixel_lights(rsms, count=count, pattern=settings.pattern, seed=settings.seed,
-                               filtered=settings.filtered)
-
-
-def light_footprints(rsms: "Sequence[Rsm]", settings: SiiSettings) -> Array:
-    """Return the surface area that each pixel light stands for: O d^2 / cos, with the same T / N as its flux.
-
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
-    settings : SiiSettings
-        The settings that the lights were chosen by.
-
-    Returns
-    -------
-    (N,) ndarray
-        Area, m^2, in the order of the lights.
-
-    Notes
-    -----
-    The area takes the place of the flux in the map, so that pattern, weights and filtering are those of the lights.
-    """
-    area: Array = pixel_lights([_with_area_as_flux(rsm) for rsm in rsms], settings).flux[0]
-    return area
-
-
-def _with_area_as_flux(rsm: "Rsm") -> "Rsm":
-    from refgi.scene import DirectionalLight
-
-    light = rsm.light
-    if isinstance(light, DirectionalLight):
-        towards: Array = -np.asarray(light.direction, np.float64)[:, None, None]
-        distance: Any = 1.0
-    else:
-        towards = np.asarray(light.position, np.float64)[:, None, None] - rsm.position
-        distance = np.sqrt((towards**2).sum(axis=0))
-    length = np.sqrt((towards**2).sum(axis=0))
-    cosine = (rsm.normal * towards).sum(axis=0) / np.where(length > 0, length, 1)
-    lit = rsm.flux.any(axis=0) if rsm.lobe_flux is None else rsm.flux.any(axis=0) | rsm.lobe_flux.any(axis=0)
-    area = np.where(lit, rsm.solid_angle * distance**2 / np.maximum(cosine, 1e-3), 0).astype(rsm.flux.dtype)
-    return rsm._replace(flux=np.broadcast_to(area, rsm.flux.shape), lobe_flux=None, lobe_axis=None, lobe_exponent=None)

@@ -5,7 +5,6 @@ bounce has the mean of the lights of a reflective shadow map; more bounces follo
 integrating sphere of albedo rho all bounces together give rho / (1 - rho) of the light's flux.
 """
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,12 +15,9 @@ from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.radiometry import DIRECTIONAL, POINT, orthonormal_basis, radiant_intensity
 from refgi.sampling import cosine_hemisphere, halton
-from refgi.splat.irradiance import Receivers, irradiance
-from refgi.splat.settings import PairSettings
 from refgi.stages import stage
 
 if TYPE_CHECKING:
-    from refgi.frame import Frame
     from refgi.rays import Tracer
     from refgi.rsm import PixelLights
     from refgi.scene import Geometry, LightTable, MaterialTable
@@ -30,21 +26,6 @@ Array = npt.NDArray[Any]
 
 BASES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53)  # a pair for the light and for each bounce
 MOST_BOUNCES = len(BASES) // 2 - 1
-
-
-@dataclasses.dataclass(frozen=True)
-class WalkSettings(PairSettings):
-    """What `walk` can be set to: `lights` paths a light (1000 as in SII Fig. 6), `bounces` of each, `seed`."""
-
-    lights: int = 1000
-    bounces: int = 1
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        expect(1 <= self.lights <= 1 << 24, "lights", "1 or more paths", self.lights)
-        expect(1 <= self.bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", self.bounces)
-        expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
 
 
 class Rays(NamedTuple):
@@ -67,32 +48,10 @@ class Left(NamedTuple):
     lobe_exponent: Array  # (n,)
 
 
-def walk(frame: "Frame", settings: WalkSettings) -> Array:
-    """Light every pixel by pixel lights of quasi-random light paths.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene, seen and lit.
-    settings : WalkSettings
-        Number of paths and bounces, and how each light lights a receiver.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Indirect irradiance of all bounces, W/m^2, linear RGB, without visibility between lights and receivers.
-    """
-    from refgi.scene import light_table, material_table
-
-    lights = walk_lights(frame.tracer, frame.scene.geometry, material_table(frame.scene.materials),
-                         light_table(frame.scene.lights), settings)
-    buffer = frame.gbuffer
-    return irradiance(Receivers(buffer.position, buffer.normal, buffer.covered), lights, settings)
-
-
 @stage("walk.lights")
 def walk_lights(
-    tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", lights: "LightTable", settings: WalkSettings
+    tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", lights: "LightTable", paths: int,
+    bounces: int = 1, seed: int = 0,
 ) -> "PixelLights":
     """Trace light paths and leave a pixel light at every bounce.
 
@@ -106,28 +65,40 @@ def walk_lights(
         Float64.
     lights : LightTable
         Float64.
-    settings : WalkSettings
-        Number of paths and bounces, seed.
+    paths : int
+        How many to trace, over all lights, at least one a light.
+    bounces : int
+        How many surfaces each path meets, up to `MOST_BOUNCES`.
+    seed : int
+        Shifts the quasi-random set modulo 1; 0 leaves it as it is.
 
     Returns
     -------
     PixelLights
-        At most paths x bounces x lights of them, float64; those without flux are dropped.
+        At most paths x bounces of them, float64; those without flux are dropped.
+
+    Raises
+    ------
+    InputError
+        If there are fewer paths than lights, or too many bounces.
 
     Notes
     -----
     Paths are not ended at random: each carries on with its power times the diffuse reflectance, so the walk adds no
     noise beyond its directions. Glossy materials leave a lobe, but paths go on by diffuse reflection alone.
     """
-    used = 2 + 2 * settings.bounces
-    shift = np.random.default_rng(settings.seed).random(used).tolist() if settings.seed else None
-    numbers = halton(settings.lights, BASES[:used], shift, start=1)
+    count = len(lights.kind)
+    expect(paths >= count, "lights", f"at least one path for each of {count} lights", paths)
+    expect(1 <= bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", bounces)
+    used = 2 + 2 * bounces
+    shift = np.random.default_rng(seed).random(used).tolist() if seed else None
     left: list[Left] = []
-    for k in range(len(lights.kind)):
+    for k in range(count):
+        numbers = halton(paths // count + (k < paths % count), BASES[:used], shift, start=1)
         rays = _emit(lights, k, numbers, geometry)
         rays = rays._replace(origin=rays.origin + tracer.offset * rays.direction)  # a lamp may lie in a surface
-        left += _paths(tracer, geometry, materials, rays, settings.bounces)
-    return _pixel_lights(left)
+        left += _paths(tracer, geometry, materials, rays, bounces)
+    return _pixel_lights(left, paths * bounces)
 
 
 def _paths(
@@ -217,13 +188,13 @@ def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: Rays)
     return position, normal, geometry.material_of_face[triangle]
 
 
-def _pixel_lights(left: list[Left]) -> "PixelLights":
+def _pixel_lights(left: list[Left], drawn: int) -> "PixelLights":
     from refgi.rsm import PixelLights
 
     position, normal, flux, lobe_flux, axis, exponent = (np.concatenate(parts).T for parts in zip(*left, strict=True))
     glossy: Array = (lobe_flux != 0).any(axis=0)
     kept: Array = glossy | (flux != 0).any(axis=0)
-    lights = PixelLights(position[:, kept], normal[:, kept], flux[:, kept], None, None, None, len(kept))
+    lights = PixelLights(position[:, kept], normal[:, kept], flux[:, kept], None, None, None, drawn)
     if not glossy.any():
         return lights
     return lights._replace(lobe_flux=lobe_flux[:, kept], lobe_axis=axis[:, kept], lobe_exponent=exponent[kept])

@@ -10,20 +10,20 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Material, PointLight, light_table, load_scene, material_table
-from refgi.splat import SiiSettings, WalkSettings, sii, walk, walk_lights
+from refgi.splat import SiiSettings, sii, walk_lights
 
 
 def lights_of(scene, **settings):
     return walk_lights(Tracer(scene.geometry), scene.geometry, material_table(scene.materials),
-                       light_table(scene.lights), WalkSettings(**settings))
+                       light_table(scene.lights), **settings)
 
 
 @pytest.mark.feature("SII-17")
 def test_first_bounce_has_the_mean_of_the_map(evidence):
     frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=512)
-    clamp = {"clamp": "distance", "clamp_value": 0.05}
+    clamp = {"clamp": "distance", "clamp_value": 0.05, "i_low": 0}
     reference = sii(frame, SiiSettings(pattern="all", **clamp)).astype(float).mean(axis=(1, 2))
-    runs = np.array([walk(frame, WalkSettings(lights=1000, seed=s, **clamp)).astype(float).mean(axis=(1, 2))
+    runs = np.array([sii(frame, SiiSettings(source="walk", lights=1000, seed=s, **clamp)).mean(axis=(1, 2), dtype=float)
                      for s in range(1, 31)])
     error = runs.std(axis=0) / math.sqrt(30)
     # the map's texels on silhouettes count whole: 1e-3 of the light at 512^2
@@ -40,7 +40,7 @@ def test_flux_of_other_lights_is_that_of_their_maps(light, evidence):
     scene = load_scene("cornell_box").with_lights(light)
     frame = Frame(scene, width=4, height=4, rsm_resolution=256)
     expected = frame.rsms[0].flux.astype(float).sum(axis=(1, 2))
-    got = lights_of(scene, lights=60_000).flux.sum(axis=1)
+    got = lights_of(scene, paths=60_000).flux.sum(axis=1)
     np.testing.assert_allclose(got, expected, rtol=0.01)  # 60,000 quasi-random paths and texels of 1/256
     evidence(f"{type(light).__name__}: reflected flux {np.abs(got / expected - 1).max():.2%} off the map's")
 
@@ -52,7 +52,7 @@ def test_bounces_in_a_sphere_are_the_geometric_series(evidence):
     light = scene.lights[0]
     half = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
     emitted = light.intensity[0] * 2 * math.pi * ((1 - half[0]) + 0.5 * (half[0] - half[1]))
-    flux = np.array([lights_of(scene, lights=2000, bounces=b).flux[0].sum() for b in range(1, 8)])
+    flux = np.array([lights_of(scene, paths=2000, bounces=b).flux[0].sum() for b in range(1, 8)])
     series = emitted * rho * (1 - rho ** np.arange(1, 8)) / (1 - rho)
     np.testing.assert_allclose(flux, series, rtol=2e-3)  # 2000 paths sample the spot's falloff
     # every bounce keeps exactly rho of the one before
@@ -68,7 +68,7 @@ def test_irradiance_of_all_bounces_in_a_sphere(evidence):
     rho, bounces = 0.5, 6
     scene = load_scene(f"integrating_sphere:faces=20000,albedo={rho}")
     frame = Frame(scene, width=16, height=16)
-    got = walk(frame, WalkSettings(lights=3000, bounces=bounces))
+    got = sii(frame, SiiSettings(source="walk", lights=3000, bounces=bounces, i_low=0))
     light = scene.lights[0]
     half = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
     emitted = light.intensity[0] * 2 * math.pi * ((1 - half[0]) + 0.5 * (half[0] - half[1]))
@@ -79,7 +79,7 @@ def test_irradiance_of_all_bounces_in_a_sphere(evidence):
 
 def test_same_paths_for_the_same_seed():
     scene = load_scene("cornell_box")
-    first, again, other = (lights_of(scene, lights=200, bounces=3, seed=s) for s in (5, 5, 6))
+    first, again, other = (lights_of(scene, paths=200, bounces=3, seed=s) for s in (5, 5, 6))
     for a, b in zip(first[:3], again[:3], strict=True):
         np.testing.assert_array_equal(a, b)
     assert first.flux.shape != other.flux.shape or (first.flux != other.flux).any()
@@ -87,7 +87,7 @@ def test_same_paths_for_the_same_seed():
 
 def test_lights_lie_on_surfaces_and_face_the_path():
     scene = load_scene("cornell_box")
-    lights = lights_of(scene, lights=500)
+    lights = lights_of(scene, paths=500)
     towards = np.asarray(scene.lights[0].position)[:, None] - lights.position
     assert ((towards * lights.normal).sum(axis=0) > 0).all()
     np.testing.assert_allclose((lights.normal**2).sum(axis=0), 1, rtol=1e-12)
@@ -98,7 +98,7 @@ def test_glossy_surfaces_leave_lobes_around_the_mirror_direction():
     scene = load_scene("parallel_plates")
     shiny = tuple(dataclasses.replace(m, diffuse=(0.0, 0.0, 0.0), specular=(0.4, 0.4, 0.4), exponent=30.0)
                   for m in scene.materials)
-    lights = lights_of(dataclasses.replace(scene, materials=shiny), lights=300)
+    lights = lights_of(dataclasses.replace(scene, materials=shiny), paths=300)
     assert not lights.flux.any()
     assert (lights.lobe_exponent == 30).all()
     away = lights.position - np.asarray(scene.lights[0].position)[:, None]
@@ -109,10 +109,20 @@ def test_glossy_surfaces_leave_lobes_around_the_mirror_direction():
 def test_glass_and_black_leave_nothing():
     scene = load_scene("cornell_box")
     glass = dataclasses.replace(scene, materials=tuple(Material(m.name, ior=1.5) for m in scene.materials))
-    assert lights_of(glass, lights=100).flux.shape == (3, 0)
+    assert lights_of(glass, paths=100).flux.shape == (3, 0)
 
 
-def test_settings_are_checked():
-    for change in ({"lights": 0}, {"bounces": 0}, {"bounces": 99}, {"seed": -1}):
-        with pytest.raises(InputError, match=next(iter(change))):
-            WalkSettings(**change)
+def test_bad_numbers_are_refused():
+    scene = load_scene("cornell_box")
+    for change in ({"paths": 0}, {"paths": 9, "bounces": 0}, {"paths": 9, "bounces": 99}):
+        with pytest.raises(InputError, match=r"lights|bounces"):
+            lights_of(scene, **change)
+
+
+def test_paths_are_shared_out_among_lights():
+    scene = load_scene("cornell_box")
+    lamps = (PointLight((0.278, 0.4, -0.2), (1.0, 1.0, 1.0)), PointLight((0.2, 0.3, -0.2), (1.0, 1.0, 1.0)))
+    both = lights_of(scene.with_lights(*lamps), paths=7)
+    assert both.drawn == 7
+    first, second = (lights_of(scene.with_lights(lamp), paths=n) for lamp, n in zip(lamps, (4, 3), strict=True))
+    np.testing.assert_array_equal(both.position, np.hstack([first.position, second.position]))

@@ -75,11 +75,19 @@ def _look_up(
     maps: Projection, position: Array, normal: Array, covered: Array, stored: Stored, visible: Array
 ) -> None:
     for row in prange(covered.shape[0]):
-        for column in range(covered.shape[1]):
-            if covered[row, column]:
-                point = position[0, row, column], position[1, row, column], position[2, row, column]
-                facing = normal[0, row, column], normal[1, row, column], normal[2, row, column]
-                visible[row, column] = _reached(maps, stored, point, facing)
+        _look_up_row(maps, position, normal, covered, stored, row, visible)
+
+
+@kernel
+def _look_up_row(
+    maps: Projection, position: Array, normal: Array, covered: Array, stored: Stored, row: int, visible: Array
+) -> None:
+    # a function of its own: what it is passed is counted once a row, not once a pixel by both threads
+    for column in range(covered.shape[1]):
+        if covered[row, column]:
+            point = position[0, row, column], position[1, row, column], position[2, row, column]
+            facing = normal[0, row, column], normal[1, row, column], normal[2, row, column]
+            visible[row, column] = _reached(maps, stored, point, facing)
 
 
 @kernel
@@ -96,6 +104,8 @@ def _reached(maps: Projection, stored: Stored, point: Any, facing: Any) -> Any:
     above = 0.0
     for axis in range(3):
         above += facing[axis] * (stored.position[axis, i, j] - point[axis])
+    if above <= 1e-6 * far:  # most of what is lit: the margin is dear
+        return True
     return above <= _margin(maps, i // maps.height, point, facing) + 1e-6 * far
 
 

@@ -126,11 +126,11 @@ def reflective_shadow_map(
     incident = _incident_flux(light, maps, solid_angle, np.dtype(dtype))
     lobe: tuple[Array, ...] = ()
     if material:
-        opaque = (materials.ior == 0)[material[0]]
-        incident = incident * opaque
+        incident *= (materials.ior == 0)[material[0]]
         if glossy:
             lobe = _lobe(materials, maps, material[0], normal, incident * view.covered)
-    return Rsm(light, maps, view.triangle_id, depth, position, normal, solid_angle.astype(dtype), albedo * incident,
+    incident *= albedo
+    return Rsm(light, maps, view.triangle_id, depth, position, normal, solid_angle.astype(dtype), incident,
                view.covered, *lobe)  # fmt: skip
 
 
@@ -194,7 +194,9 @@ def _incident_flux(light: Light, maps: Projection, solid_angle: Array, dtype: np
         else:
             solid_angle = spot_power(maps, *cosines)
     strength = light.irradiance if isinstance(light, DirectionalLight) else light.intensity
-    incident: Array = np.multiply.outer(np.asarray(strength), solid_angle).astype(dtype)
+    incident = np.empty((3, *solid_angle.shape), dtype)
+    for channel, one in zip(incident, strength, strict=True):
+        np.multiply(solid_angle, one, out=channel, casting="same_kind")  # in float64, rounded once
     return incident
 
 

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.radiometry import corner_solid_angle_paraboloid, corner_solid_angle_perspective, spot_falloff
 from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, PERSPECTIVE, Projection
+from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
@@ -53,7 +54,7 @@ def texel_solid_angles(projection: Projection) -> Array:
     if projection.kind == ORTHOGRAPHIC:
         area = 4.0 * projection.half[0] * projection.half[1] / (projection.height * projection.width)
         return np.full(projection.shape, area)
-    return _mirrored(projection, 1.0, 1.0, 1.0)
+    return _stacked(projection, _texel_integrals(_intrinsics(projection), 1.0, 1.0, 1.0))
 
 
 def spot_power(projection: Projection, cos_inner: float, cos_outer: float) -> Array:
@@ -72,10 +73,20 @@ def spot_power(projection: Projection, cos_inner: float, cos_outer: float) -> Ar
         Sr, float64: the texel's power is this times the on-axis intensity. Sums to
         2 pi (1 - (cos_inner + cos_outer)/2) when the map encloses the cone.
     """
-    return _mirrored(projection, cos_inner, cos_outer, 0.0)
+    return _stacked(projection, _texel_integrals(_intrinsics(projection), cos_inner, cos_outer, 0.0))
 
 
-def _mirrored(projection: Projection, cos_inner: float, cos_outer: float, everywhere: float) -> Array:
+def _intrinsics(projection: Projection) -> Projection:
+    """Return one such map at the origin: what integrals over texels depend on, wherever the light moves."""
+    return projection._replace(origin=np.zeros((1, 3)), frame=np.eye(3)[None], reach=math.inf)
+
+
+def _stacked(projection: Projection, one: Array) -> Array:
+    return one if projection.maps == 1 else np.tile(one, (projection.maps, 1))
+
+
+@stage("rsm.solid_angles")
+def _texel_integrals(projection: Projection, cos_inner: float, cos_outer: float, everywhere: float) -> Array:
     height, width = projection.height, projection.width
     quadrant = np.zeros(((height + 1) // 2, (width + 1) // 2))
     _fill_quadrant(projection, np.array([cos_inner, cos_outer, everywhere]), quadrant)
@@ -88,7 +99,7 @@ def _mirrored(projection: Projection, cos_inner: float, cos_outer: float, everyw
         whole[:, width // 2] *= 2.0
     if height % 2:
         whole[height // 2] *= 2.0
-    return np.tile(whole, (projection.maps, 1))
+    return whole
 
 
 @kernel(parallel=True)

@@ -13,7 +13,7 @@ from refgi.splat import SiiSettings, sii
 from refgi.splat.selection import light_footprints, pixel_lights
 from refgi.stages import observe
 
-ALL = SiiSettings(pattern="all")
+ALL = SiiSettings(pattern="all", i_low=0)  # the sum without a cut
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,8 @@ def test_irradiance_does_not_depend_on_the_number_of_lights(plates, evidence):
     """T/N: over 200 draws the mean is that of all texels, at every N; without it E would fall by 16 and 256."""
     reference, found = sii(plates, ALL).mean(), []
     for count in (16, 64, 256):
-        runs = np.array([sii(plates, SiiSettings(lights=count, pattern="random", seed=s)).mean() for s in range(200)])
+        runs = np.array([sii(plates, SiiSettings(lights=count, pattern="random", seed=s, i_low=0)).mean()
+                         for s in range(200)])
         error = runs.std() / math.sqrt(200)
         assert abs(runs.mean() - reference) < 4 * error
         found.append(f"N = {count}: {runs.mean() / reference - 1:+.2%} +- {error / reference:.2%}")
@@ -70,8 +71,8 @@ def test_error_slopes_of_random_and_low_discrepancy_patterns(plates, evidence):
     slopes = {}
     for pattern in ("random", "halton", "grid"):
         seeds = range(100) if pattern != "grid" else range(1)
-        errors = [math.sqrt(np.mean([rms(sii(plates, SiiSettings(lights=n, pattern=pattern, seed=s)), reference) ** 2
-                                     for s in seeds])) for n in counts]
+        errors = [math.sqrt(np.mean([rms(sii(plates, SiiSettings(lights=n, pattern=pattern, seed=s, i_low=0)),
+                                         reference) ** 2 for s in seeds])) for n in counts]
         slopes[pattern] = float(np.polyfit(np.log(counts), np.log(errors), 1)[0])
     assert slopes["random"] == pytest.approx(-0.5, abs=0.1)
     assert slopes["halton"] < slopes["random"] - 0.15
@@ -84,7 +85,7 @@ def test_presets_come_nearer_to_the_sum_over_all_texels(box, evidence):
     clamp = {"clamp": "distance", "clamp_value": 0.05}  # else the nearest pair alone decides the error
     reference = sii(box, dataclasses.replace(ALL, **clamp))
     presets = (108, 256, 768, 1000, 4096)
-    errors = [math.sqrt(np.mean([rms(sii(box, SiiSettings(lights=n, seed=s, **clamp)), reference) ** 2
+    errors = [math.sqrt(np.mean([rms(sii(box, SiiSettings(lights=n, seed=s, i_low=0, **clamp)), reference) ** 2
                                  for s in range(1, 9)])) for n in presets]
     assert errors == sorted(errors, reverse=True)
     evidence("RMSE / mean: " + ", ".join(f"{n} lights {e:.3f}" for n, e in zip(presets, errors, strict=True)))
@@ -102,7 +103,8 @@ def test_filtered_flux_is_steadier_under_a_moving_light(box, evidence):
         moved = scene.with_lights(dataclasses.replace(light, direction=tuple(turned)))
         frame = Frame(moved, width=16, height=16, rsm_resolution=128)
         for filtered in means:
-            how = SiiSettings(lights=64, pattern="grid", filtered=filtered, clamp="distance", clamp_value=0.05)
+            how = SiiSettings(lights=64, pattern="grid", filtered=filtered, clamp="distance", clamp_value=0.05,
+                              i_low=0)
             means[filtered].append(sii(frame, how).mean(axis=(1, 2)))
 
     def unsteady(values):

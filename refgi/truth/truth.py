@@ -3,12 +3,14 @@
 import hashlib
 import math
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from refgi.errors import RefgiWarning
 from refgi.scene import Scene
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, film
@@ -77,9 +79,12 @@ def trace_truth(frame: "Frame", settings: TruthSettings | None = None) -> TruthR
     InputError
         If the checkpoint file is damaged or of another computation.
     """
+    settings = settings or TruthSettings()
+    if not settings.caustics and any(material.is_dielectric for material in frame.scene.materials):
+        warnings.warn(RefgiWarning(f"scene {frame.scene.name!r}: its glass is opaque and black in the truth; "
+                                   "caustics=True lets light through"), stacklevel=3)
     buffer = frame.gbuffer
-    return accumulate(frame.scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id,
-                      settings or TruthSettings())
+    return accumulate(frame.scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id, settings)
 
 
 @stage("truth.accumulate")

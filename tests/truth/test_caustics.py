@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.scene import Camera, Material, SpotLight
 from refgi.truth import TruthSettings, trace_truth
@@ -81,3 +82,12 @@ def test_a_scene_without_mirror_or_glass_sends_no_photons():
     light = SpotLight((0.0, 1.0, 0.0), (1.0, -0.35, 0.0), 0.3, 0.4, (3.0, 2.0, 1.0))
     assert film(scene([floor()], light), (4, 4)) is None
     assert film(mirror_over_floor(light), (4, 4)) is not None
+
+
+def test_glass_without_the_option_is_announced():
+    light = SpotLight((0.0, 1.0, 0.0), (1.0, -0.35, 0.0), 0.3, 0.4, (3.0, 2.0, 1.0))
+    glass = rectangle((1, 0, 2), (0, 0, -4), (0, 3, 0), Material("pane", ior=1.5))
+    frame = Frame(scene([floor(3.0), glass], light), width=4, height=4)
+    with pytest.warns(RefgiWarning, match="glass is opaque and black"):
+        trace_truth(frame, TruthSettings(samples=24))
+    trace_truth(frame, TruthSettings(samples=24, caustics=True, photons=1024))  # says nothing

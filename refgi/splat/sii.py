@@ -102,6 +102,5 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     """
     lights = choose_lights(frame, settings)  # Sec. 3.1, 3.5 to 3.7
     footprint = light_footprints(frame.rsms, settings) if settings.clamp in FOOTPRINT_CLAMPS else None
-    buffer = frame.gbuffer
-    receivers = Receivers(buffer.position, buffer.normal, buffer.covered)  # Sec. 3.2: deferred shading
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading
     return irradiance(receivers, lights, settings, footprint)  # Eq. (2)

@@ -1,0 +1,71 @@
+"""Figure 12: gathering from the reflective shadow map against splatting, quality and speed."""
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from refgi.papers import pictures
+from refgi.papers.judging import errors_of
+from refgi.papers.records import Bar, Figure, Ratios, Table
+from refgi.papers.sii.subjects import BOX, full_sum, unshadowed_truth
+from refgi.papers.timing import interleaved
+from refgi.splat import GatherSettings, SiiSettings, gather, sii
+
+if TYPE_CHECKING:
+    from refgi.papers.workbench import Workbench
+
+
+class Subject(NamedTuple):
+    """One picture of the figure."""
+
+    name: str
+    title: str
+    settings: Any
+    fps: float  # in the paper
+
+
+def figure12(bench: "Workbench") -> Figure:
+    """Make Figure 12 again.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Sizes and frames.
+
+    Returns
+    -------
+    Figure
+        Six pictures, their speed and their errors.
+    """
+    frame, full, truth = bench.frame(BOX), full_sum(bench, BOX), unshadowed_truth(bench, BOX)
+    covered, subjects = frame.gbuffer.covered, _subjects(bench)
+    run = {s.name: partial(gather if isinstance(s.settings, GatherSettings) else sii, frame, s.settings)
+           for s in subjects}
+    seconds = interleaved(run, bench.scale.repeats)
+    made = {s.name: run[s.name]() for s in subjects}
+    exposure = pictures.exposure_of(full, covered)
+    judged = {name: (errors_of(light, full, covered), errors_of(light, truth, covered))
+              for name, light in made.items()}
+    shown = [pictures.indirect(s.name, s.title, f"RMSE {judged[s.name][0].rmse:.1f} % of the mean, "
+                               f"{1e3 * seconds[s.name]:.1f} ms", made[s.name], exposure, s.settings)
+             for s in subjects]
+    shown += pictures.errors({s.name: (s.title, made[s.name]) for s in subjects}, full, covered)
+    slowest = subjects[0]
+    rows = tuple((s.title, 1e3 * seconds[s.name], 1 / seconds[s.name], s.fps, *judged[s.name][0][:2],
+                  *judged[s.name][1][:2]) for s in subjects)
+    return Figure(
+        "Gathering with 1020, 308 and 156 samples, interpolated from every eighth pixel, against 768 and 108 splats.",
+        (BOX, "indirect light alone"), tuple(shown),
+        (Ratios(f"frames per second, relative to {slowest.title}",
+                tuple(Bar(s.title, seconds[slowest.name] / seconds[s.name], s.fps / slowest.fps) for s in subjects)),),
+        (Table("Time and error, in % of the mean irradiance", (
+            "", "ms", "fps", "fps, paper", "RMSE to every texel", "MAE to every texel",
+            "RMSE to truth without visibility", "MAE to truth without visibility"), rows, frozenset({3})),))
+
+
+def _subjects(bench: "Workbench") -> list[Subject]:
+    grid = bench.scale.size // 8
+    samples = [Subject(f"gather{n}", f"RSM, {n} samples", GatherSettings(samples=n, grid=grid), fps)
+               for n, fps in ((1020, 14), (308, 44), (156, 82))]
+    splats = [Subject(f"sii{n}_{x}", f"SII, {n} lights, {x} %", SiiSettings(lights=n, i_low=x / 100), fps)
+              for n, x, fps in ((768, 5, 48), (768, 10, 83), (108, 5, 254))]
+    return samples + splats

@@ -1,0 +1,73 @@
+"""Figure 6: a thousand lights, splatted without visibility and ray-traced with it."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.papers import pictures
+from refgi.papers.judging import errors_of
+from refgi.papers.records import Figure, Table
+from refgi.splat import SiiSettings, sii
+from refgi.splat.selection import choose_lights
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+    from refgi.papers.workbench import Workbench
+
+Array = npt.NDArray[Any]
+
+SCENE = "cornell_box"
+LIGHTS = 1000
+TITLES = {"walk": "quasi-random walk", "rsm": "shadow map"}
+
+
+def figure6(bench: "Workbench") -> Figure:
+    """Make Figure 6 again.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Sizes and frames.
+
+    Returns
+    -------
+    Figure
+        Lights of a walk and of the shadow map, splatted and with shadow rays, and path tracing.
+    """
+    from refgi.truth import TruthSettings, trace_truth
+
+    half = bench.scale.size // 2  # a shadow ray for each of 1000 lights at each pixel
+    frame = bench.frame(SCENE, width=half, height=half)
+    covered = frame.gbuffer.covered
+    truth = trace_truth(frame, TruthSettings(samples=bench.scale.truth_samples)).mean
+    shown, rows = [], []
+    for source, title in TITLES.items():
+        settings = SiiSettings(lights=LIGHTS, source=source, i_low=0.0)  # type: ignore[arg-type]
+        splatted, shadowed = sii(frame, settings), _instant_radiosity(frame, settings)
+        off = errors_of(splatted, shadowed, covered)
+        shown += [
+            pictures.seen(f"{source}_sii", f"SII, lights of the {title}", f"RMSE to instant radiosity {off.rmse:.0f} %",
+                          frame, splatted, settings),
+            pictures.seen(f"{source}_vpl", f"Instant radiosity, {title}", "a shadow ray for each light and pixel",
+                          frame, shadowed, settings)]
+        rows += [(f"SII, {title}", *off, *errors_of(splatted, truth, covered)),
+                 (f"instant radiosity, {title}", None, None, None, *errors_of(shadowed, truth, covered))]
+    shown.append(pictures.seen("truth", "Path tracing", "one bounce", frame, truth))
+    columns = ("", "RMSE to instant radiosity", "MAE", "darker by", "RMSE to path tracing", "MAE", "darker by")
+    return Figure(
+        "Splatting beside instant radiosity in a ray tracer, both with 1000 lights of a quasi-random walk: the latter "
+        "has soft shadows of indirect light, yet the results are comparable.",
+        (SCENE, f"{half} by {half} pixels", f"{LIGHTS} lights, one bounce, no cut"), tuple(shown), (),
+        (Table("Errors, in % of the mean irradiance", columns, tuple(rows)),))
+
+
+def _instant_radiosity(frame: "Frame", settings: SiiSettings) -> Array:
+    from refgi.truth import VplSettings
+    from refgi.truth.surfaces import receivers
+    from refgi.truth.vpl import shadowed_sum
+
+    buffer, light = frame.gbuffer, np.zeros((3, frame.height, frame.width), frame.dtype)
+    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
+    light.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, choose_lights(frame, settings), VplSettings())
+    return light

@@ -1,0 +1,49 @@
+"""The full sum of 1024 lights at every pixel, beside what splats cut off."""
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from refgi.papers.judging import errors_of
+from refgi.papers.records import Figure, Table
+from refgi.papers.sii.subjects import BOX, full_sum
+from refgi.papers.timing import interleaved
+from refgi.splat import SiiSettings, sii
+
+if TYPE_CHECKING:
+    from refgi.papers.workbench import Workbench
+
+LIGHTS = 1024
+SHARES = (0, 1, 5, 7, 10)  # I_low in % of I_0
+PAPER_FPS = {1: 14, 5: 48}  # 768 lights: 1 % from Figure 11, 5 % from Figure 12
+
+
+def headline(bench: "Workbench") -> Figure:
+    """Time the sum that cuts nothing, and measure what cuts cost.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Sizes and frames.
+
+    Returns
+    -------
+    Figure
+        Time and error by I_low.
+    """
+    frame, full = bench.frame(BOX), full_sum(bench, BOX)
+    covered = frame.gbuffer.covered
+    run = {share: partial(sii, frame, SiiSettings(lights=LIGHTS, i_low=share / 100)) for share in SHARES}
+    seconds = interleaved({str(share): work for share, work in run.items()}, bench.scale.repeats)
+    rows = []
+    for share, work in run.items():
+        off = errors_of(work(), full, covered)
+        taken = seconds[str(share)]
+        rows.append((f"{share} %" if share else "0: every light at every pixel", 1e3 * taken, 1 / taken,
+                     PAPER_FPS.get(share), *off))
+    pairs = LIGHTS * int(covered.sum()) / seconds["0"]
+    return Figure(
+        "The paper has no such row: on its hardware every splat had to be cut.",
+        (BOX, f"{LIGHTS} lights", f"{pairs / 1e9:.2f} thousand million pairs a second"), (), (),
+        (Table("Time, and error against every texel in % of the mean irradiance",
+               ("I_low", "ms", "fps", "fps, paper, 768 lights", "RMSE", "MAE", "energy lost"), tuple(rows),
+               frozenset({3})),))

@@ -1,0 +1,101 @@
+"""Table 1: what a frame of the caustic ring costs when light and camera move or rest."""
+
+import dataclasses
+import statistics
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from refgi.frame import Frame
+from refgi.papers.records import Bar, Figure, Ratios, Table
+from refgi.splat import SiiSettings, sii
+from refgi.stages import Memory, observe
+
+if TYPE_CHECKING:
+    from refgi.papers.workbench import Workbench
+    from refgi.scene import Scene
+
+SCENE = "ring"
+SETTINGS = SiiSettings(lights=4096, warp="B", warp_levels=3, importance="peak")
+STEP = 1e-4  # m, from frame to frame
+
+
+class Row(NamedTuple):
+    """One line of the table."""
+
+    title: str
+    light_moves: bool
+    camera_moves: bool
+    paper: float  # ms
+
+
+ROWS = (Row("dynamic light and camera", True, True, 10.4), Row("dynamic light, static camera", True, False, 10.8),
+        Row("static light, dynamic camera", False, True, 9.3), Row("static scene, just render", False, False, 6.9))
+
+
+class Buffers(Memory):
+    """Keeps what the paper's textures keep: splats are drawn in every frame."""
+
+    def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
+        """Return whether a result for these inputs is kept, and the result; of splats none is."""
+        return (False, None) if name.startswith("splat") else super().recall(name, inputs)
+
+
+def table1(bench: "Workbench") -> Figure:
+    """Make Table 1 again.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Sizes and repeats.
+
+    Returns
+    -------
+    Figure
+        Milliseconds and their ratios, with splats drawn in every frame as in the paper and with all reused.
+    """
+    scene = bench.scene(SCENE)
+    drawn = {row.title: _Animation(scene, row, Buffers(), bench) for row in ROWS}
+    kept = {row.title: _Animation(scene, row, Memory(), bench) for row in ROWS}
+    for _ in range(1 + bench.scale.repeats):
+        for animation in (*drawn.values(), *kept.values()):
+            animation.next_frame()
+    seconds = {title: animation.seconds for title, animation in drawn.items()}
+    both = seconds[ROWS[0].title]
+    rows = tuple((row.title, 1e3 * seconds[row.title], row.paper, 1e3 * kept[row.title].seconds,
+                  ", ".join(drawn[row.title].reused) or "nothing") for row in ROWS)
+    return Figure(
+        "Milliseconds a frame of the caustic ring with 4096 importance-sampled lights (three levels, method B).",
+        (SCENE, "4096 lights"), (),
+        (Ratios("time, relative to dynamic light and camera",
+                tuple(Bar(row.title, seconds[row.title] / both, row.paper / ROWS[0].paper) for row in ROWS)),),
+        (Table("Time of a frame", ("", "ms", "ms, paper", "ms, splats kept too", "reused"), rows, frozenset({2})),))
+
+
+class _Animation:
+    """Frames one after another, in which light, camera, both or nothing move."""
+
+    def __init__(self, scene: "Scene", row: Row, memory: Memory, bench: "Workbench") -> None:
+        self.scene, self.row, self.memory, self.resolution = scene, row, memory, bench.scale.rsm_resolution
+        self.spent: list[float] = []
+        self.reused: list[str] = []
+
+    @property
+    def seconds(self) -> float:
+        """Median of a frame after the first, which has nothing to reuse."""
+        return statistics.median(self.spent[1:])
+
+    def next_frame(self) -> None:
+        scene, offset = self.scene, STEP * len(self.spent)
+        if self.row.light_moves:
+            light: Any = scene.lights[0]
+            x, y, z = light.position
+            scene = scene.with_lights(dataclasses.replace(light, position=(x + offset, y, z)))
+        if self.row.camera_moves:
+            x, y, z = scene.camera.eye
+            scene = scene.with_camera(eye=(x + offset, y, z))
+        with observe(memory=self.memory) as log:
+            started = time.perf_counter()
+            frame = Frame(scene, rsm_resolution=self.resolution)
+            frame.radiance(sii(frame, SETTINGS))
+            self.spent.append(time.perf_counter() - started)
+        self.reused = sorted({run.name for run in log.runs if run.status == "reused"})

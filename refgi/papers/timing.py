@@ -1,0 +1,36 @@
+"""Run times that can be compared with each other: warm, in turn, medians."""
+
+import statistics
+import time
+from collections.abc import Callable, Mapping
+
+
+def interleaved(work: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
+    """Time several pieces of work in turn, A B C A B C ..., after one run of each that compiles what it needs.
+
+    Parameters
+    ----------
+    work : mapping of str to callable
+        What to time.
+    repeats : int
+        Rounds, 1 or more.
+
+    Returns
+    -------
+    dict of str to float
+        Median seconds of each.
+
+    Examples
+    --------
+    >>> sorted(interleaved({"a": list, "b": dict}, 3))
+    ['a', 'b']
+    """
+    for run in work.values():
+        run()
+    spent: dict[str, list[float]] = {name: [] for name in work}
+    for _ in range(repeats):
+        for name, run in work.items():
+            started = time.perf_counter()
+            run()
+            spent[name].append(time.perf_counter() - started)
+    return {name: statistics.median(times) for name, times in spent.items()}

@@ -1,4 +1,4 @@
-"""Rays against a scene's triangles: closest hits and occlusion. The only importer of Embree.
+"""Rays against a scene's triangles: closest hits, occlusion, openness. The only importer of Embree.
 
 `Tracer` copies the triangles into Embree once and answers batches of rays. Embree works in float32 and, although its
 robust mode closes the seams between triangles, lets a few rays aimed exactly at vertices through; `Tracer` finds
@@ -8,6 +8,7 @@ library of the wheel cannot be found).
 """
 
 from refgi.rays.embree import MISS
+from refgi.rays.openness import openness
 from refgi.rays.tracer import Hits, Tracer
 
-__all__ = ["MISS", "Hits", "Tracer"]
+__all__ = ["MISS", "Hits", "Tracer", "openness"]

@@ -9,10 +9,12 @@ second pass, only those that are asked for.
 from refgi.rsm.depth_maps import paraboloid_depth_maps
 from refgi.rsm.direct import direct_irradiance, shadow_map_visibility
 from refgi.rsm.gbuffer import GBuffer, gbuffer
+from refgi.rsm.importance import importance
 from refgi.rsm.pixel_lights import PixelLights, choose_pixel_lights
 from refgi.rsm.projection import Projection, camera_projection, project
 from refgi.rsm.raster import Visibility, rasterize
 from refgi.rsm.reflective import Rsm, reflective_shadow_map
+from refgi.rsm.warp import Warp, importance_pyramid, warp_samples
 
 __all__ = [
     "GBuffer",
@@ -20,13 +22,17 @@ __all__ = [
     "Projection",
     "Rsm",
     "Visibility",
+    "Warp",
     "camera_projection",
     "choose_pixel_lights",
     "direct_irradiance",
     "gbuffer",
+    "importance",
+    "importance_pyramid",
     "paraboloid_depth_maps",
     "project",
     "rasterize",
     "reflective_shadow_map",
     "shadow_map_visibility",
+    "warp_samples",
 ]

@@ -1,8 +1,9 @@
 """Pixel lights: texels of reflective shadow maps taken as point lights (papers.md section 0 and procedure P1).
 
 N texels of a map of T are chosen with equal chance, so each stands for T/N texels: Phi_i = Phi_t T / N. Texels
-without flux count in N but are dropped from the list. `filtered` replaces T/N times one texel's flux by the sum over
-the texel's cell (SII's filtered flux look-up); the cells partition the map, so the flux sum is that of the map.
+without flux count in N but are dropped from the list. With a `warp` texels are drawn after their importance, and each
+light's flux is T/N w Phi_t with the weight w of `refgi.rsm.warp`. `filtered` replaces T/N times one texel's flux by the
+sum over the texel's cell (SII's filtered flux look-up); the cells partition the map, so the flux sum is the map's.
 
 With several maps each gets an equal share of the count, the first ones one more where it does not divide.
 """
@@ -16,7 +17,9 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.cells import cell_sums, cells_of_grid, cells_of_nearest, lit_texels
+from refgi.rsm.importance import importance as importance_of
 from refgi.rsm.reflective import Rsm
+from refgi.rsm.warp import Warp, texel_of, warp_stacked
 from refgi.sampling import grid, halton
 from refgi.stages import stage
 
@@ -34,6 +37,8 @@ class PixelLights(NamedTuple):
     lobe_axis: Array | None  # (3, N') unit vectors
     lobe_exponent: Array | None  # (N',)
     drawn: int  # N: those without flux included
+    texel: Array | None = None  # (N',) int32: row * W + column on the stacked maps; None: not from a map
+    map_index: Array | None = None  # (N',) int32: which of the given maps
 
 
 @stage("rsm.pixel_lights")
@@ -44,6 +49,9 @@ def choose_pixel_lights(
     pattern: Pattern,
     seed: int = 0,
     filtered: bool = False,
+    warp: Warp | None = None,
+    importance: Sequence[Array] | None = None,
+    renormalise: bool = False,
 ) -> PixelLights:
     """Choose texels as pixel lights.
 
@@ -60,6 +68,12 @@ def choose_pixel_lights(
         Of the random pattern, and of the Halton set's shift modulo 1; seed 0 leaves the Halton set unshifted.
     filtered : bool
         Let each light carry the flux of its cell: the grid's cell, or the texels nearest to it.
+    warp : Warp, optional
+        Move the pattern to where the map is important; stacked maps are chosen by importance first.
+    importance : sequence of (H, W) ndarray, optional
+        Importance of each map's texels for the warp; the flux if absent.
+    renormalise : bool
+        Scale each map's weights w to a sum of N. Biased, and noisier where the warp goes down to texels.
 
     Returns
     -------
@@ -69,23 +83,33 @@ def choose_pixel_lights(
     Raises
     ------
     InputError
-        If the pattern is unknown or the count does not suit it.
+        If the pattern is unknown, the count does not suit it, or there is nothing for the warp to move.
 
     Notes
     -----
-    A filtered light whose own texel has no flux moves to the nearest texel of its cell that has.
+    A filtered light whose own texel has no flux moves to the nearest texel of its cell that has. Filtered lights of a
+    warped pattern stand at warped places and carry the flux of the texels nearest to them, without weight: the cells
+    already are small where the lights are dense. Of several on one texel the first has it all.
     """
     expect(len(rsms) > 0, "rsms", "at least one map", "none")
     expect(pattern in get_args(Pattern), "pattern", " or ".join(get_args(Pattern)), pattern)
+    expect(warp is None or pattern != "all", "pattern", "'grid', 'halton' or 'random' with a warp", pattern)
+    expect(warp is not None or importance is None, "importance", "None without a warp", "maps")
+    expect(importance is None or len(importance) == len(rsms), "importance", f"one for each of {len(rsms)} maps",
+           importance and len(importance))
     parts = []
     for index, (rsm, share) in enumerate(zip(rsms, _shares(rsms, count, pattern), strict=True)):
-        texel = _choose(rsm, share, pattern, seed, index)
-        if filtered and pattern != "all":
-            parts.append(_filtered_lights(rsm, texel, pattern))
+        if warp is None:
+            texel, weight = _choose(rsm, share, pattern, seed, index), None
         else:
-            scale = rsm.flux.dtype.type(rsm.texels / share)  # T/N
-            lobe = None if rsm.lobe_flux is None else _taken(rsm.lobe_flux, texel) * scale
-            parts.append(_lights(rsm, texel, _taken(rsm.flux, texel) * scale, lobe))
+            worth = importance_of(rsm) if importance is None else importance[index]
+            texel, weight = _warped(rsm, _points(rsm, share, pattern, seed, index), worth, warp)
+            weight = weight * (share / weight.sum()) if renormalise else weight
+        if filtered and pattern != "all":
+            part = _filtered_lights(rsm, texel, on_grid=pattern == "grid" and warp is None)
+        else:
+            part = _weighted_lights(rsm, texel, rsm.texels / share if weight is None else rsm.texels / share * weight)
+        parts.append(part._replace(map_index=np.full(part.flux.shape[1], index, np.int32)))
     return parts[0] if len(parts) == 1 else _joined(parts)
 
 
@@ -127,23 +151,43 @@ def _choose(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Ar
     if pattern == "grid":
         maps, rows = rsm.projection.maps, rsm.projection.height
         points = grid(math.isqrt(share // maps))
-        row = np.add.outer(np.arange(maps) * rows, _texel(points[:, 1], rows))
-        return np.ravel(row * width + _texel(points[:, 0], width))
+        row = np.add.outer(np.arange(maps) * rows, texel_of(points[:, 1], rows))
+        return np.ravel(row * width + texel_of(points[:, 0], width))
+    points = _points(rsm, share, pattern, seed, index)
+    return np.asarray(texel_of(points[:, 1], height) * width + texel_of(points[:, 0], width))
+
+
+def _points(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Array:
+    """Return the pattern as points (u, v) of the unit square over the stacked maps."""
+    if pattern == "grid":
+        maps = rsm.projection.maps
+        one = grid(math.isqrt(share // maps))
+        return np.concatenate([np.stack([one[:, 0], (k + one[:, 1]) / maps], axis=1) for k in range(maps)])
     generator = np.random.default_rng([seed, index])
     if pattern == "random":
-        points = generator.random((share, 2))
-    else:
-        shift = None if seed == 0 and index == 0 else (generator.random(), generator.random())
-        points = halton(share, shift=shift)
-    return np.asarray(_texel(points[:, 1], height) * width + _texel(points[:, 0], width))
+        return generator.random((share, 2))
+    shift = None if seed == 0 and index == 0 else (generator.random(), generator.random())
+    return halton(share, shift=shift)
 
 
-def _texel(coordinate: Array, size: int) -> Array:
-    return np.minimum((coordinate * size).astype(np.int64), size - 1)
+def _warped(rsm: Rsm, points: Array, importance: Array, warp: Warp) -> tuple[Array, Array]:
+    """Return the texels that the warped points fall on, and their weights 1 / (T q)."""
+    height, width = rsm.depth.shape
+    expect(np.shape(importance) == (height, width), "importance", f"shape {(height, width)} as its map",
+           np.shape(importance))
+    warped, weight = warp_stacked(points, importance, rsm.projection.maps, warp)
+    return texel_of(warped[:, 1], height) * width + texel_of(warped[:, 0], width), weight
 
 
-def _filtered_lights(rsm: Rsm, texel: Array, pattern: Pattern) -> PixelLights:
-    cell = cells_of_grid(rsm.projection, len(texel)) if pattern == "grid" else cells_of_nearest(rsm.projection, texel)
+def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array) -> PixelLights:
+    """Return the texels as lights with T/N, or T/N w, times their flux."""
+    scale = np.asarray(weight).astype(rsm.flux.dtype)
+    lobe = None if rsm.lobe_flux is None else _taken(rsm.lobe_flux, texel) * scale
+    return _lights(rsm, texel, _taken(rsm.flux, texel) * scale, lobe)
+
+
+def _filtered_lights(rsm: Rsm, texel: Array, on_grid: bool) -> PixelLights:
+    cell = cells_of_grid(rsm.projection, len(texel)) if on_grid else cells_of_nearest(rsm.projection, texel)
     flux = cell_sums(rsm.flux, cell, len(texel))
     lobe = None if rsm.lobe_flux is None else cell_sums(rsm.lobe_flux, cell, len(texel))
     power = rsm.flux.sum(axis=0) if rsm.lobe_flux is None else (rsm.flux + rsm.lobe_flux).sum(axis=0)
@@ -166,6 +210,7 @@ def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None) -> PixelLig
         None if rsm.lobe_axis is None else _taken(rsm.lobe_axis, kept),
         None if rsm.lobe_exponent is None else _taken(rsm.lobe_exponent, kept),
         len(texel),
+        kept.astype(np.int32),
     )
 
 
@@ -178,7 +223,8 @@ def _joined(parts: Sequence[PixelLights]) -> PixelLights:
     def joined(field: int) -> Array:
         return np.concatenate([part[field] for part in parts], axis=-1)
 
-    together = PixelLights(joined(0), joined(1), joined(2), None, None, None, sum(part.drawn for part in parts))
+    together = PixelLights(joined(0), joined(1), joined(2), None, None, None, sum(part.drawn for part in parts),
+                           joined(7), joined(8))
     if glossy:
         together = together._replace(lobe_flux=joined(3), lobe_axis=joined(4), lobe_exponent=joined(5))
     return together

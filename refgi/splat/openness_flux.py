@@ -1,0 +1,102 @@
+"""Pixel lights in the open made smaller or fewer (SII Sec. 3.6): near nothing, they light little but cost as much.
+
+The paper scales the flux "by the ambient occlusion term" on an unwarped pattern. With O the share of free directions
+the intended factor is 1 - O: `scale_flux` darkens lights in the open and so loses energy, the sum of Phi O. `roulette`
+instead removes them at random and lets the survivors make up for it, so the mean is kept.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.rsm import PixelLights
+
+Array = npt.NDArray[Any]
+
+
+@stage("splat.scale_flux")
+def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Array]":
+    """Scale each light's flux by 1 - O.
+
+    Parameters
+    ----------
+    lights : PixelLights
+        N' lights.
+    openness : (N',) ndarray
+        Share O of unoccluded directions of each light, 0 to 1.
+
+    Returns
+    -------
+    lights : PixelLights
+        All of them, in the same order; those with O = 1 are dark.
+    lost : (3,) ndarray of float64
+        Flux removed, W, diffuse and lobe together.
+
+    Raises
+    ------
+    InputError
+        If openness does not fit.
+    """
+    _check(lights, openness)
+    kept = (1 - openness).astype(lights.flux.dtype)
+    scaled = lights._replace(flux=lights.flux * kept)
+    if lights.lobe_flux is not None:
+        scaled = scaled._replace(lobe_flux=lights.lobe_flux * kept)
+    return scaled, _power(lights) - _power(scaled)
+
+
+@stage("splat.roulette")
+def roulette(lights: "PixelLights", openness: Array, floor: float, seed: int) -> "PixelLights":
+    """Keep each light with chance p = max(floor, 1 - O) and divide its flux by p.
+
+    Parameters
+    ----------
+    lights : PixelLights
+        N' lights.
+    openness : (N',) ndarray
+        Share O of unoccluded directions of each light, 0 to 1.
+    floor : float
+        Least chance, above 0 to 1: no light's flux grows by more than 1 / floor.
+    seed : int
+        Which random choice: one number a light, in their order.
+
+    Returns
+    -------
+    PixelLights
+        The survivors, in order. Sums over them have the mean of sums over `lights`.
+
+    Raises
+    ------
+    InputError
+        If openness does not fit or a number is out of range.
+    """
+    _check(lights, openness)
+    expect(0 < floor <= 1, "floor", "above 0, up to 1", floor)
+    expect(seed >= 0, "seed", "a whole number >= 0", seed)
+    chance = np.maximum(1 - np.asarray(openness, np.float64), floor)
+    kept = np.random.default_rng(seed).random(len(chance)) < chance
+    gain = (1 / chance[kept]).astype(lights.flux.dtype)
+    taken: dict[str, Any] = {name: part[..., kept] for name, part in lights._asdict().items()
+                             if isinstance(part, np.ndarray)}
+    survivors = lights._replace(**taken)
+    survivors = survivors._replace(flux=survivors.flux * gain)
+    if survivors.lobe_flux is not None:
+        survivors = survivors._replace(lobe_flux=survivors.lobe_flux * gain)
+    return survivors
+
+
+def _check(lights: "PixelLights", openness: Array) -> None:
+    count = lights.flux.shape[1]
+    expect(np.shape(openness) == (count,), "openness", f"shape ({count},), one for each light", np.shape(openness))
+    expect(bool(((openness >= 0) & (openness <= 1)).all()), "openness", "numbers from 0 to 1", "others")
+
+
+def _power(lights: "PixelLights") -> Array:
+    """Return the flux of all lights, (3,) W."""
+    power: Array = lights.flux.sum(axis=1, dtype=np.float64)
+    return power if lights.lobe_flux is None else power + lights.lobe_flux.sum(axis=1, dtype=np.float64)

@@ -12,9 +12,10 @@ from refgi.rsm.gbuffer import GBuffer, gbuffer
 from refgi.rsm.importance import importance
 from refgi.rsm.pixel_lights import PixelLights, choose_pixel_lights
 from refgi.rsm.projection import Projection, camera_projection, project
+from refgi.rsm.pyramid import importance_pyramid
 from refgi.rsm.raster import Visibility, rasterize
 from refgi.rsm.reflective import Rsm, reflective_shadow_map
-from refgi.rsm.warp import Warp, importance_pyramid, warp_samples
+from refgi.rsm.warp import Warp, warp_samples, warp_stacked
 
 __all__ = [
     "GBuffer",
@@ -35,4 +36,5 @@ __all__ = [
     "reflective_shadow_map",
     "shadow_map_visibility",
     "warp_samples",
+    "warp_stacked",
 ]

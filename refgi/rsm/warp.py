@@ -5,14 +5,11 @@ proportion to the half's importance and its local coordinate is stretched over t
 method A by the columns of the half it has chosen, method B by the columns of the whole cell. Its weight w is what
 uniform samples would be worth there, 1 / density, so that (T/N) sum w_i Phi(s_i) is unbiased for every level.
 
-Sides need not be powers of two. Level l has 2^l x 2^l cells with borders at rows floor(i H / 2^l) and columns
-floor(j W / 2^l), hence halves may differ by a texel (or be empty) and the halves' shares a and 1 - a of the cell's
-texels take the place of the 1/2 in Eq. (5) and (6). No sample is lost to padding.
+Sides need not be powers of two. Halves may then differ by a texel (or one be empty), and the halves' shares a and
+1 - a of the cell's texels take the place of the 1/2 in Eq. (5) and (6). No sample is lost to padding.
 """
 
 import dataclasses
-import math
-from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +17,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
+from refgi.rsm.pyramid import Levels, border, cell_sum, importance_pyramid, packed
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
@@ -41,90 +39,7 @@ class Warp:
                self.levels)
 
 
-def importance_pyramid(importance: Array) -> tuple[Array, ...]:
-    """Sum an importance map over ever larger cells.
-
-    Parameters
-    ----------
-    importance : (H, W) ndarray
-        Importance of each texel, >= 0, any unit.
-
-    Returns
-    -------
-    tuple of ndarray
-        S_0 (1, 1) .. S_L, L = ceil(log2(max(H, W))): S_l has (2^l, 2^l) sums, float64, and S_L is the map itself.
-
-    Raises
-    ------
-    InputError
-        If the map is empty or not two-dimensional, or holds negative or infinite numbers or NaN.
-
-    Examples
-    --------
-    >>> [s.tolist() for s in importance_pyramid(np.array([[1.0, 2.0], [3.0, 4.0]]))]
-    [[[10.0]], [[1.0, 2.0], [3.0, 4.0]]]
-    """
-    importance = np.asarray(importance)
-    expect(importance.ndim == 2 and importance.size > 0, "importance", "shape (H, W) with texels", importance.shape)
-    finest = np.ascontiguousarray(importance, np.float64)
-    depth = _depth(*finest.shape)
-    expect(bool(finest.min() >= 0), "importance", "numbers >= 0", "negative numbers or NaN")
-    levels = [finest]
-    for level in range(depth - 1, -1, -1):
-        sums = np.empty((1 << level, 1 << level))
-        if len(levels) == 1:
-            _sum_texels(finest, sums)
-        else:
-            _sum_quarters(levels[-1], sums)
-        levels.append(sums)
-    expect(math.isfinite(levels[-1].sum()), "importance", "numbers with a finite sum", "infinity")
-    return tuple(reversed(levels))
-
-
 @stage("rsm.warp")
-def warp_samples(points: Array, pyramid: Sequence[Array], levels: int, method: Method) -> tuple[Array, Array]:
-    """Move points of the unit square to where the map is important (Eq. 4 to 6).
-
-    Parameters
-    ----------
-    points : (n, 2) array_like
-        Points (u, v) in [0, 1): u along columns, v along rows, downwards.
-    pyramid : sequence of ndarray
-        As from `importance_pyramid`.
-    levels : int
-        Levels of halving; at the pyramid's depth the cells are texels and the warp stops.
-    method : {"A", "B"}
-        Columns of the chosen half, or of the whole cell.
-
-    Returns
-    -------
-    points : (n, 2) ndarray of float64
-        Warped points in [0, 1).
-    weights : (n,) ndarray of float64
-        1 / density. Their sum is n in the mean only and is not rescaled: with method A down to the texels every
-        weight times the importance it found is the map's mean, and rescaling would spoil that.
-
-    Raises
-    ------
-    InputError
-        If a point lies outside [0, 1), or a name or number is not usable.
-
-    Notes
-    -----
-    "Top" in Eq. (4) is read as the rows with v < 1/2, rows growing downwards. A cell without importance keeps its
-    samples as they are: none gets there unless the whole map is black (method B: or by its product of marginals).
-    """
-    Warp(method, levels)
-    given = np.ascontiguousarray(points, np.float64)
-    expect(given.ndim == 2 and given.shape[1] == 2, "points", "shape (n, 2)", given.shape)
-    expect(bool(((given >= 0) & (given < 1)).all()), "points", "coordinates in [0, 1)", "others")
-    used = min(levels, len(pyramid) - 1)
-    coarse = np.concatenate([sums.reshape(-1) for sums in pyramid[: min(used + 1, len(pyramid) - 1)]] or [np.empty(0)])
-    warped, weights = np.empty_like(given), np.empty(len(given))
-    _warp(given, coarse, pyramid[-1], used, len(pyramid) - 1, method == "A", warped, weights)
-    return warped, weights
-
-
 def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tuple[Array, Array]:
     """Warp points of the unit square over several maps that are stacked along rows.
 
@@ -151,10 +66,10 @@ def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tup
     SII Sec. 3.6 mentions such a "pre-warping step". v chooses the map in proportion to its importance and, stretched
     over the map's share, becomes the coordinate on it: strata of the points remain strata of each map.
     """
-    if maps == 1:
-        return warp_samples(points, importance_pyramid(importance), warp.levels, warp.method)
     pyramids = [importance_pyramid(one) for one in np.split(np.asarray(importance), maps)]
-    given = np.ascontiguousarray(points, np.float64)
+    if maps == 1:
+        return warp_samples(points, pyramids[0], warp.levels, warp.method)
+    given = _checked(points)
     chosen, v, weights = _choose_map(given[:, 1], np.array([float(pyramid[0].sum()) for pyramid in pyramids]))
     warped = np.stack([given[:, 0], v], axis=1)
     height = len(importance) // maps
@@ -162,8 +77,48 @@ def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tup
         here = chosen == k
         on_map, its_weights = warp_samples(warped[here], pyramids[k], warp.levels, warp.method)
         row = k * height + on_map[:, 1] * height
-        warped[here] = np.stack([on_map[:, 0], _held(row, maps * height)], axis=1)
+        warped[here] = np.stack([on_map[:, 0], _kept_in_texel(row, maps * height)], axis=1)
         weights[here] *= its_weights
+    return warped, weights
+
+
+def warp_samples(points: Array, pyramid: tuple[Array, ...], levels: int, method: Method) -> tuple[Array, Array]:
+    """Move points of the unit square to where the map is important (Eq. 4 to 6).
+
+    Parameters
+    ----------
+    points : (n, 2) array_like
+        Points (u, v) in [0, 1): u along columns, v along rows, downwards.
+    pyramid : tuple of ndarray
+        As from `importance_pyramid`.
+    levels : int
+        Levels of halving; at the pyramid's depth the cells are texels and the warp stops.
+    method : {"A", "B"}
+        Columns of the chosen half, or of the whole cell.
+
+    Returns
+    -------
+    points : (n, 2) ndarray of float64
+        Warped points in [0, 1).
+    weights : (n,) ndarray of float64
+        1 / density. Their sum is n in the mean only and is not rescaled: with method A down to the texels every
+        weight times the importance it found is the map's mean, and rescaling would spoil that.
+
+    Raises
+    ------
+    InputError
+        If a point lies outside [0, 1), or a name or number is not usable.
+
+    Notes
+    -----
+    "Top" in Eq. (4) is read as the rows with v < 1/2, rows growing downwards. A cell without importance keeps its
+    samples as they are; none gets there with method A unless the whole map is black, some do with method B.
+    """
+    Warp(method, levels)
+    given = _checked(points)
+    used = min(levels, len(pyramid) - 1)
+    warped, weights = np.empty_like(given), np.empty(len(given))
+    _warp(given, packed(pyramid, used), used, method == "A", warped, weights)
     return warped, weights
 
 
@@ -180,19 +135,21 @@ def texel_of(coordinate: Array, size: int) -> Array:
     Returns
     -------
     (n,) ndarray of int64
-        0 to size - 1.
+        From 0 to size - 1.
     """
     return np.asarray(np.minimum((coordinate * size).astype(np.int64), size - 1))
 
 
-def _depth(height: int, width: int) -> int:
-    return (max(height, width) - 1).bit_length()
+def _checked(points: Array) -> Array:
+    given = np.ascontiguousarray(points, np.float64)
+    expect(given.ndim == 2 and given.shape[1] == 2, "points", "shape (n, 2)", given.shape)
+    expect(bool(((given >= 0) & (given < 1)).all()), "points", "coordinates in [0, 1)", "others")
+    return given
 
 
 def _choose_map(v: Array, sums: Array) -> tuple[Array, Array, Array]:
     """Return the map that each coordinate falls on, the coordinate there, and the weight."""
-    shares = sums / sums.sum() if sums.any() else np.full(len(sums), 1 / len(sums))
-    ends = np.cumsum(shares)
+    ends = np.cumsum(sums if sums.any() else np.ones(len(sums)))
     ends /= ends[-1]
     chosen = np.searchsorted(ends, v, side="right")  # a map without importance has no width
     starts = np.concatenate([[0.0], ends[:-1]])
@@ -200,53 +157,11 @@ def _choose_map(v: Array, sums: Array) -> tuple[Array, Array, Array]:
     return chosen, np.clip((v - starts[chosen]) / width, 0, BELOW_1), 1 / (len(sums) * width)
 
 
-def _held(row: Array, rows: int) -> Array:
-    """Return row / rows so that it lies in the same texel when multiplied by `rows` again."""
+def _kept_in_texel(row: Array, rows: int) -> Array:
+    """Return row / rows, by a rounding step off where needed, so that `texel_of` finds the same row."""
     v = row / rows
-    v = np.where((v * rows).astype(np.int64) < row.astype(np.int64), np.nextafter(v, 1), v)
-    return np.asarray(np.where((v * rows).astype(np.int64) > row.astype(np.int64), np.nextafter(v, 0), v))
-
-
-@kernel
-def _sum_texels(finest: Array, sums: Array) -> None:
-    """Sum the texels of each cell of the level above the map's."""
-    height, width = finest.shape
-    cells = sums.shape[0]
-    for i in range(cells):
-        for j in range(cells):
-            total = 0.0
-            for row in range(i * height // cells, (i + 1) * height // cells):
-                for column in range(j * width // cells, (j + 1) * width // cells):
-                    total += finest[row, column]
-            sums[i, j] = total
-
-
-@kernel
-def _sum_quarters(below: Array, sums: Array) -> None:
-    for i in range(sums.shape[0]):
-        for j in range(sums.shape[1]):
-            sums[i, j] = ((below[2 * i, 2 * j] + below[2 * i, 2 * j + 1])
-                          + (below[2 * i + 1, 2 * j] + below[2 * i + 1, 2 * j + 1]))
-
-
-@kernel
-def _cell(coarse: Array, finest: Array, level: int, depth: int, i: int, j: int) -> Any:
-    """Return S_level[i, j]; on the last level a cell is a texel or empty."""
-    if level < depth:
-        return coarse[((1 << (2 * level)) - 1) // 3 + (i << level) + j]
-    height, width = finest.shape
-    row, column = (i * height) >> level, (j * width) >> level
-    if row == ((i + 1) * height) >> level or column == ((j + 1) * width) >> level:
-        return 0.0
-    return finest[row, column]
-
-
-@kernel
-def _share(index: int, level: int, size: int) -> float:
-    """Return the first half's share of the texels of cell `index` of the level above, along a side of `size`."""
-    start, middle = (2 * index * size) >> level, ((2 * index + 1) * size) >> level
-    end = ((2 * index + 2) * size) >> level
-    return 0.5 if middle - start == end - middle else (middle - start) / (end - start)
+    v = np.where(np.floor(v * rows) < np.floor(row), np.nextafter(v, 1), v)
+    return np.asarray(np.where(np.floor(v * rows) > np.floor(row), np.nextafter(v, 0), v))
 
 
 @kernel
@@ -262,10 +177,18 @@ def _halve(y: float, first: float, second: float, share: float) -> Any:
 
 
 @kernel
+def _share(index: int, level: int, size: int) -> float:
+    """Return the first half's share of the texels of cell `index` of the level above, along a side of `size`."""
+    start, middle = border(2 * index, level, size), border(2 * index + 1, level, size)
+    end = border(2 * index + 2, level, size)
+    return 0.5 if middle - start == end - middle else (middle - start) / (end - start)
+
+
+@kernel
 def _place(index: int, level: int, size: int, local: float) -> float:
     """Return the coordinate on the map of a local coordinate in a cell, in the texel that holds it."""
-    start = (index * size) >> level
-    texels = (((index + 1) * size) >> level) - start
+    start = border(index, level, size)
+    texels = border(index + 1, level, size) - start
     texel = start + min(int(local * texels), texels - 1)
     place = (start + local * texels) / size
     while int(place * size) < texel:
@@ -276,18 +199,17 @@ def _place(index: int, level: int, size: int, local: float) -> float:
 
 
 @kernel
-def _warp_one(x: float, y: float, coarse: Array, finest: Array, levels: int, depth: int, rows_first: bool) -> Any:
-    height, width = finest.shape
+def _warp_one(x: float, y: float, pyramid: Levels, levels: int, by_half: bool) -> Any:
+    height, width = pyramid.finest.shape
     i, j, weight = 0, 0, 1.0
     for level in range(1, levels + 1):
-        top_left = _cell(coarse, finest, level, depth, 2 * i, 2 * j)
-        top_right = _cell(coarse, finest, level, depth, 2 * i, 2 * j + 1)
-        bottom_left = _cell(coarse, finest, level, depth, 2 * i + 1, 2 * j)
-        bottom_right = _cell(coarse, finest, level, depth, 2 * i + 1, 2 * j + 1)
+        top_left, top_right = cell_sum(pyramid, level, 2 * i, 2 * j), cell_sum(pyramid, level, 2 * i, 2 * j + 1)
+        bottom_left = cell_sum(pyramid, level, 2 * i + 1, 2 * j)
+        bottom_right = cell_sum(pyramid, level, 2 * i + 1, 2 * j + 1)
         down, y, factor = _halve(y, top_left + top_right, bottom_left + bottom_right, _share(i, level, height))
         weight *= factor
         left, right = top_left + bottom_left, top_right + bottom_right
-        if rows_first:
+        if by_half:
             left, right = (bottom_left, bottom_right) if down else (top_left, top_right)
         across, x, factor = _halve(x, left, right, _share(j, level, width))
         weight *= factor
@@ -296,8 +218,7 @@ def _warp_one(x: float, y: float, coarse: Array, finest: Array, levels: int, dep
 
 
 @kernel
-def _warp(points: Array, coarse: Array, finest: Array, levels: int, depth: int, rows_first: bool, warped: Array,
-          weights: Array) -> None:
+def _warp(points: Array, pyramid: Levels, levels: int, by_half: bool, warped: Array, weights: Array) -> None:
     for k in range(len(points)):
-        x, y, weight = _warp_one(points[k, 0], points[k, 1], coarse, finest, levels, depth, rows_first)
+        x, y, weight = _warp_one(points[k, 0], points[k, 1], pyramid, levels, by_half)
         warped[k, 0], warped[k, 1], weights[k] = x, y, weight

@@ -23,6 +23,7 @@ from refgi.errors import expect
 from refgi.rsm.gbuffer import GBuffer
 from refgi.rsm.raster import rasterize
 from refgi.rsm.reflective import Rsm, _incident_flux
+from refgi.rsm.snell import refract
 from refgi.rsm.solid_angle import texel_solid_angles
 from refgi.scene.material import SHARPEST
 from refgi.scene.model import DirectionalLight, Geometry, MaterialTable
@@ -98,20 +99,21 @@ def refracted(
     expect(mode in get_args(Mode), "mode", "'back_face' or 'two_interface'", mode)
     expect(0 <= exponent <= SHARPEST, "exponent", f"a Phong exponent from 0 to {SHARPEST:g}", exponent)
     expect(mode == "back_face" or tracer is not None, "tracer", "one for the mode 'two_interface'", None)
-    seen = rsm.triangle_id.reshape(-1)
-    texel = np.flatnonzero(np.append(materials.ior[geometry.material_of_face] > 0, False)[seen])  # -1: nothing
-    if not len(texel):
-        skip("rsm.refraction", "light meets no glass")
+    if not materials.ior.any():
+        skip("rsm.refraction", "no material is glass")
         return rsm
-    return _refracted(rsm, geometry, materials, texel, exponent, tracer if mode == "two_interface" else None, fresnel)
+    return _refracted(rsm, geometry, materials, exponent, tracer if mode == "two_interface" else None, fresnel)
 
 
 @stage("rsm.refraction")
 def _refracted(
-    rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: Array, exponent: float, tracer: Rays | None,
-    fresnel: bool,
+    rsm: Rsm, geometry: Geometry, materials: MaterialTable, exponent: float, tracer: Rays | None, fresnel: bool
 ) -> Rsm:
     """Find the exits of the light through glass texels and put lobes there."""
+    glass = np.append(materials.ior[geometry.material_of_face] > 0, False)  # the last for -1, nothing seen
+    texel = np.flatnonzero(glass[rsm.triangle_id.reshape(-1)])
+    if not len(texel):
+        return rsm
     if tracer is None:
         exits = _straight_exits(rsm, geometry, materials, texel)
     else:
@@ -123,77 +125,47 @@ def _refracted(
     return _with_lobes(rsm, exits, axis, exits.share * share, exponent)
 
 
-def refract(direction: Array, normal: Array, eta: Array) -> tuple[Array, Array]:
-    """Bend rays at smooth interfaces (Snell) and return what passes (Fresnel, unpolarised).
-
-    Parameters
-    ----------
-    direction : (3, n) ndarray
-        Unit vectors of the incoming light.
-    normal : (3, n) ndarray
-        Unit normals on the side that light goes to.
-    eta : (n,) ndarray
-        Index of refraction on the near side over that on the far side.
-
-    Returns
-    -------
-    direction : (3, n) ndarray
-        Unit vectors behind the interface; the incoming ones where nothing passes.
-    transmittance : (n,) ndarray
-        Share of the flux that passes; 0 at total reflection and for light that comes from the normal's side.
-    """
-    cos_in = (direction * normal).sum(axis=0)
-    sin2 = eta**2 * (1 - cos_in**2)
-    passes = (sin2 < 1) & (cos_in > 0)
-    cos_out = np.sqrt(np.where(passes, 1 - sin2, 1))
-    bent = eta * direction + (cos_out - eta * cos_in) * normal
-    bent /= np.linalg.norm(bent, axis=0)
-    near = np.where(passes, cos_in, 1)
-    along = (eta * near - cos_out) / (eta * near + cos_out)  # amplitude reflected, perpendicular polarisation
-    across = (near - eta * cos_out) / (near + eta * cos_out)
-    return np.where(passes, bent, direction), np.where(passes, 1 - (along**2 + across**2) / 2, 0)
-
-
 def _straight_exits(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: Array) -> Exits:
     """Find the first glass face along each texel's ray that looks away from the light."""
     behind = _without_fronts(rsm, geometry, materials)
     view = GBuffer(behind, materials, rsm.projection, rasterize(behind, rsm.projection), rsm.position.dtype)
-    position, inward, material = (part.reshape(-1, rsm.texels) for part in
+    position, inward, material = (part.reshape(-1, rsm.texels)[:, texel] for part in
                                   view.resolve("position", "normal", "material_id"))
-    eta = np.append(materials.ior, 0)[material[0, texel]].astype(np.float64)
-    front = _fronts(rsm, geometry, materials, texel)
+    front, enters = _fronts(rsm, geometry, materials, texel)
     _, share = refract(front.direction, front.normal, 1 / front.eta)
-    found = eta > 0  # else something opaque, or nothing
-    return Exits(texel[found], position[:, texel[found]].astype(np.float64),
-                 -inward[:, texel[found]].astype(np.float64), front.direction[:, found], eta[found],
-                 np.where(front.share > 0, share, 1)[found])
+    eta = np.append(materials.ior, 0)[material[0]]  # -1: nothing
+    exits = front._replace(position=position.astype(np.float64), normal=-inward.astype(np.float64),
+                           eta=eta.astype(np.float64), share=np.where(enters, share, 1))
+    return _taken(exits, eta > 0)
 
 
 def _bent_exits(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: Array, tracer: Rays) -> Exits:
     """Refract at the front and trace to the next glass face from within."""
-    front = _fronts(rsm, geometry, materials, texel)
+    front, enters = _fronts(rsm, geometry, materials, texel)
     bent, share = refract(front.direction, front.normal, 1 / front.eta)
-    going = np.flatnonzero(front.share * share > 0)
-    start, bent = front.position[:, going] + tracer.offset * bent[:, going], bent[:, going]
+    start = front.position + tracer.offset * bent
     hits = tracer.closest(start.T, bent.T)
-    triangle = np.where(hits.triangle_id >= 0, hits.triangle_id, 0)
-    through = start + np.where(hits.triangle_id >= 0, hits.distance, 0) * bent
-    outward = _outward_normals(geometry, triangle, through)
-    eta = np.where(hits.triangle_id >= 0, materials.ior[geometry.material_of_face[triangle]], 0).astype(np.float64)
-    found = (eta > 0) & ((bent * outward).sum(axis=0) > 0)
-    far = Exits(texel[going], through, outward, bent, eta, share[going])
-    at_once = Exits(*(part[..., front.share == 0] for part in front))._replace(share=np.ones((front.share == 0).sum()))
-    return Exits(*(np.concatenate([a[..., found], b], axis=-1) for a, b in zip(far, at_once, strict=True)))
+    triangle = np.maximum(hits.triangle_id, 0)
+    position = start + np.where(hits.triangle_id >= 0, hits.distance, 0) * bent
+    normal = _outward_normals(geometry, triangle, position)
+    eta = materials.ior[geometry.material_of_face[triangle]].astype(np.float64)
+    found = enters & (hits.triangle_id >= 0) & (eta > 0) & ((bent * normal).sum(axis=0) > 0)
+    far, at_once = _taken(Exits(texel, position, normal, bent, eta, share), found), _taken(front, ~enters)
+    return Exits(*(np.concatenate(parts, axis=-1) for parts in zip(far, at_once, strict=True)))
 
 
-def _fronts(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: Array) -> Exits:
-    """Return where light meets glass, normals along it; share 0 where it is inside already and leaves there."""
+def _taken(exits: Exits, chosen: Array) -> Exits:
+    return Exits(*(part[..., chosen] for part in exits))
+
+
+def _fronts(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: Array) -> tuple[Exits, Array]:
+    """Return where light meets glass, normals along it, and whether it enters: a light inside leaves there."""
     triangle = rsm.triangle_id.reshape(-1)[texel]
     position, against = (part.reshape(3, -1)[:, texel].astype(np.float64) for part in (rsm.position, rsm.normal))
     direction = _light_direction(rsm, position)
-    enters = (_face_cross(geometry, triangle) * direction).sum(axis=0) < 0
-    return Exits(texel, position, -against, direction,
-                 materials.ior[geometry.material_of_face[triangle]].astype(np.float64), enters.astype(np.float64))
+    enters: Array = (_face_cross(geometry, triangle) * direction).sum(axis=0) < 0
+    eta = materials.ior[geometry.material_of_face[triangle]].astype(np.float64)
+    return Exits(texel, position, -against, direction, eta, np.ones(len(texel))), enters
 
 
 def _without_fronts(rsm: Rsm, geometry: Geometry, materials: MaterialTable) -> Geometry:

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.splat.settings import FOOTPRINT_CLAMPS
+from refgi.stages import skip
+
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.rsm import PixelLights, Rsm
@@ -30,8 +33,106 @@ def choose_lights(frame: "Frame", settings: "SiiSettings") -> "PixelLights":
         Lights with their share of the flux.
     """
     if settings.source == "walk":
-        return _walked(frame, settings)
-    return pixel_lights(frame.rsms, settings)
+        lights = _walked(frame, settings)
+    else:
+        rsms = light_maps(frame, settings)
+        lights = pixel_lights(rsms, settings, importance_maps(frame, rsms, settings))
+        if "sii_no_tn" in settings.as_published:
+            lights = _without_weight(lights, rsms, settings)
+    return thinned(frame, lights, settings)
+
+
+def light_maps(frame: "Frame", settings: "SiiSettings") -> "tuple[Rsm, ...]":
+    """Return the maps that lights are taken from: those of the frame, with what glass lets through.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, lit.
+    settings : SiiSettings
+        Says how glass refracts.
+
+    Returns
+    -------
+    tuple of Rsm
+        One a light.
+    """
+    from refgi.rsm.refraction import refracted
+
+    if settings.refraction == "none":
+        return frame.rsms
+    tracer = frame.tracer if settings.refraction == "two_interface" else None
+    return tuple(refracted(rsm, frame.scene.geometry, frame.materials, settings.refraction,
+                           settings.refraction_exponent, tracer=tracer) for rsm in frame.rsms)
+
+
+def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: "SiiSettings") -> list[Array] | None:
+    """Return what each texel is worth to the warp (Sec. 3.5).
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, whose triangles block what is not open.
+    rsms : sequence of Rsm
+        Reflective shadow maps, one a light.
+    settings : SiiSettings
+        Says the kind of importance.
+
+    Returns
+    -------
+    list of (H, W) ndarray, or None
+        None where no pattern is warped.
+    """
+    from refgi.rsm import importance
+
+    if settings.warp == "none":
+        skip("rsm.warp", "lights follow their pattern alone")
+        return None
+    maps = []
+    for rsm in rsms:
+        free = None
+        if settings.importance == "openness":
+            lit: Array = rsm.flux.any(axis=0) if rsm.lobe_flux is None else (rsm.flux + rsm.lobe_flux).any(axis=0)
+            free = _openness(frame, rsm.position, rsm.normal, settings, lit)
+        maps.append(importance(rsm, settings.importance, free, settings.openness_floor, settings.defensive))
+    return maps
+
+
+def thinned(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") -> "PixelLights":
+    """Darken or remove lights in the open, if the settings ask for it (Sec. 3.6).
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, whose triangles block what is not open.
+    lights : PixelLights
+        The lights.
+    settings : SiiSettings
+        Says how.
+
+    Returns
+    -------
+    PixelLights
+        What is left of them.
+    """
+    from refgi.splat.openness_flux import roulette, scale_flux
+
+    if settings.openness_flux == "none":
+        return lights
+    free = _openness(frame, lights.position, lights.normal, settings)
+    if settings.openness_flux == "scale":
+        return scale_flux(lights, free)[0]
+    return roulette(lights, free, settings.openness_floor, settings.seed)
+
+
+def _openness(
+    frame: "Frame", position: Array, normal: Array, settings: "SiiSettings", covered: Array | None = None
+) -> Array:
+    from refgi.rays import openness
+
+    radius = settings.openness_radius or frame.scene.geometry.diagonal / 10
+    return openness(frame.tracer, position, normal, covered, radius=radius, rays=settings.openness_rays,
+                    seed=settings.seed)
 
 
 def _walked(frame: "Frame", settings: "SiiSettings") -> "PixelLights":
@@ -43,29 +144,70 @@ def _walked(frame: "Frame", settings: "SiiSettings") -> "PixelLights":
                        settings.lights, settings.bounces, settings.seed)
 
 
-def pixel_lights(rsms: "Sequence[Rsm]", settings: "SiiSettings") -> "PixelLights":
-    """Choose pixel lights as the settings say.
+def pixel_lights(
+    rsms: "Sequence[Rsm]", settings: "SiiSettings", importance: "Sequence[Array] | None" = None
+) -> "PixelLights":
+    """Choose pixel lights from maps as the settings say.
 
     Parameters
     ----------
     rsms : sequence of Rsm
         Reflective shadow maps, one a light.
     settings : SiiSettings
-        Number, pattern, seed and filtering.
+        Number, pattern, seed, filtering and warp.
+    importance : sequence of (H, W) ndarray, optional
+        What each texel is worth to the warp.
 
     Returns
     -------
     PixelLights
         Lights with their share of the flux.
     """
-    from refgi.rsm import choose_pixel_lights
+    from refgi.rsm import Warp, choose_pixel_lights
 
     count = None if settings.pattern == "all" else settings.lights
+    warp = None if settings.warp == "none" else Warp(settings.warp, settings.warp_levels)
     return choose_pixel_lights(rsms, count=count, pattern=settings.pattern, seed=settings.seed,
-                               filtered=settings.filtered)
+                               filtered=settings.filtered, warp=warp, importance=importance,
+                               renormalise=settings.renormalise_weights)
 
 
-def light_footprints(rsms: "Sequence[Rsm]", settings: "SiiSettings") -> Array:
+def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: "SiiSettings") -> "PixelLights":
+    """Return lights as the paper has them: each with its texel's flux, T/N left out."""
+    if settings.pattern == "all" or lights.map_index is None:
+        return lights
+    count = len(rsms)
+    drawn = [settings.lights // count + (k < settings.lights % count) for k in range(count)]
+    share = np.array([n / rsm.texels for n, rsm in zip(drawn, rsms, strict=True)], lights.flux.dtype)
+    factor = share[lights.map_index]
+    lobe = None if lights.lobe_flux is None else lights.lobe_flux * factor
+    return lights._replace(flux=lights.flux * factor, lobe_flux=lobe)
+
+
+def footprints(frame: "Frame", settings: "SiiSettings") -> Array | None:
+    """Return the surface area of each light of `choose_lights`, where the clamp asks for it.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, lit.
+    settings : SiiSettings
+        What the lights were chosen by.
+
+    Returns
+    -------
+    (N,) ndarray or None
+        Area, m^2.
+    """
+    if settings.clamp not in FOOTPRINT_CLAMPS:
+        return None
+    rsms = light_maps(frame, settings)
+    return light_footprints(rsms, settings, importance_maps(frame, rsms, settings))
+
+
+def light_footprints(
+    rsms: "Sequence[Rsm]", settings: "SiiSettings", importance: "Sequence[Array] | None" = None
+) -> Array:
     """Return the surface area that each pixel light stands for: O d^2 / cos, with the same T / N as its flux.
 
     Parameters
@@ -74,6 +216,8 @@ def light_footprints(rsms: "Sequence[Rsm]", settings: "SiiSettings") -> Array:
         Reflective shadow maps, one a light.
     settings : SiiSettings
         The settings that the lights were chosen by.
+    importance : sequence of (H, W) ndarray, optional
+        The importance they were chosen by.
 
     Returns
     -------
@@ -84,7 +228,7 @@ def light_footprints(rsms: "Sequence[Rsm]", settings: "SiiSettings") -> Array:
     -----
     The area takes the place of the flux in the map, so that pattern, weights and filtering are those of the lights.
     """
-    area: Array = pixel_lights([_with_area_as_flux(rsm) for rsm in rsms], settings).flux[0]
+    area: Array = pixel_lights([_with_area_as_flux(rsm) for rsm in rsms], settings, importance).flux[0]
     return area
 
 

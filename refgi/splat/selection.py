@@ -92,8 +92,7 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: "SiiSetting
     for rsm in rsms:
         free = None
         if settings.importance == "openness":
-            lit: Array = rsm.flux.any(axis=0) if rsm.lobe_flux is None else (rsm.flux + rsm.lobe_flux).any(axis=0)
-            free = _openness(frame, rsm.position, rsm.normal, settings, lit)
+            free = _openness(frame, rsm.position, rsm.normal, settings, _lit(rsm))
         maps.append(importance(rsm, settings.importance, free, settings.openness_floor, settings.defensive))
     return maps
 
@@ -244,6 +243,11 @@ def _with_area_as_flux(rsm: "Rsm") -> "Rsm":
         distance = np.sqrt((towards**2).sum(axis=0))
     length = np.sqrt((towards**2).sum(axis=0))
     cosine = (rsm.normal * towards).sum(axis=0) / np.where(length > 0, length, 1)
-    lit = rsm.flux.any(axis=0) if rsm.lobe_flux is None else rsm.flux.any(axis=0) | rsm.lobe_flux.any(axis=0)
-    area = np.where(lit, rsm.solid_angle * distance**2 / np.maximum(cosine, 1e-3), 0).astype(rsm.flux.dtype)
+    area = np.where(_lit(rsm), rsm.solid_angle * distance**2 / np.maximum(cosine, 1e-3), 0).astype(rsm.flux.dtype)
     return rsm._replace(flux=np.broadcast_to(area, rsm.flux.shape), lobe_flux=None, lobe_axis=None, lobe_exponent=None)
+
+
+def _lit(rsm: "Rsm") -> Array:
+    """Return where a map reflects anything, (H, W) bool."""
+    lit: Array = np.asarray(rsm.flux.any(axis=0))
+    return lit if rsm.lobe_flux is None else lit | rsm.lobe_flux.any(axis=0)

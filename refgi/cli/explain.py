@@ -33,7 +33,7 @@ ROWS = {  # SII Table 1
 @click.pass_obj
 def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
             threads: int | None, seed: int | None, **options: Any) -> None:
-    """Show which stages a method runs, skips and reuses for SCENE.
+    """Show which stages a method runs, skips and reuses for SCENE, and where the power of its lights goes.
 
     The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving.
     """
@@ -41,6 +41,7 @@ def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: st
     from refgi.cli.settings import read_settings
     from refgi.cli.threads import on_threads
     from refgi.cli.view import View
+    from refgi.compare.results import ledger_json
     from refgi.methods import find_method
 
     settings = read_settings(find_method(method).load()[1], pairs, seed, method)
@@ -53,10 +54,12 @@ def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: st
         for row, (light, camera) in ROWS.items():
             animation[row] = _second_frame(scene, method, settings, frame_options, light, camera)
             tell(method, 0.2 + 0.2 * len(animation))
+        ledger = _ledger(scene, method, settings, frame_options)
     content = {"scene": scene.name, "method": method, "settings": settings,
                "stages": [dataclasses.asdict(line) for line in summed(first)],
-               "animation": {row: {line.name: line.what for line in summed(runs)} for row, runs in animation.items()}}
-    session.result(_text(content), content)
+               "animation": {row: {line.name: line.what for line in summed(runs)} for row, runs in animation.items()},
+               "ledger": None if ledger is None else ledger_json(ledger)}
+    session.result(_text(content) + _ledger_text(ledger), content)
 
 
 command = _explain
@@ -140,6 +143,29 @@ def _moved(light: "Light", step: float) -> "Light":
         return dataclasses.replace(light, direction=(x + STEP, y, z + STEP))
     x, y, z = light.position
     return dataclasses.replace(light, position=(x + step, y, z))
+
+
+def _ledger(scene: "Scene", method: str, settings: Any, options: dict[str, Any]) -> Any:
+    """Return the method's account of the lights' power, or None where it keeps none."""
+    from refgi.compare.comparison import find_ledger
+    from refgi.frame import Frame
+    from refgi.methods import find_method
+
+    account = find_ledger(find_method(method))
+    return account(Frame(scene, **options), settings) if account else None
+
+
+def _ledger_text(ledger: Any) -> str:
+    from refgi.compare.report import ledger_cells
+
+    if ledger is None:
+        return ""
+    parts = [row.is_part for row in ledger.rows]
+    rows = [("  " * is_part + name, *cells)
+            for (name, *cells), is_part in zip(ledger_cells(ledger), [*parts, False], strict=True)]
+    head = ("", "R, W", "G, W", "B, W", "of emitted", "")
+    text = table([head, *rows], right=frozenset(range(1, 5)))
+    return f"\n\nWhere the power of the lights goes (indented lines sum to the first)\n\n{text}"
 
 
 def _text(content: dict[str, Any]) -> str:

@@ -13,6 +13,7 @@ import dataclasses
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from refgi.compare.measurement import measure
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
-from refgi.methods import METHODS, find_method
+from refgi.methods import METHODS, Method, find_method
 from refgi.scene import Scene, load_scene
 
 Progress = Callable[[str, float], None]
@@ -89,7 +90,7 @@ def compare(
     results, failures = {}, {}
     for name in names:
         try:
-            results[name] = runner.method(name, settings[name], references)
+            results[name] = runner.method(name, settings[name], references, accounts=out is not None)
         except RefgiError as error:
             failures[name] = str(error)
     frame = runner.frame
@@ -98,6 +99,24 @@ def compare(
     if out is not None:
         _write(comparison, Path(out), progress)
     return comparison
+
+
+def find_ledger(method: Method) -> Callable[[Frame, Any], Any] | None:
+    """Return the function that accounts for the power of the lights under a method.
+
+    Parameters
+    ----------
+    method : Method
+        A row of `METHODS`.
+
+    Returns
+    -------
+    callable or None
+        Takes frame and settings; its result has `rows` and `difference` as those of `refgi.splat.ledger.Ledger`. None
+        for a method without one.
+    """
+    module, _, function = getattr(method, "ledger", "").partition(":")
+    return getattr(import_module(module), function) if module else None
 
 
 class _Runner:
@@ -121,7 +140,9 @@ class _Runner:
         return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
                          radiance, seconds, runs)
 
-    def method(self, name: str, settings: Any, references: Mapping[str, Reference]) -> MethodResult:
+    def method(
+        self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool
+    ) -> MethodResult:
         method = METHODS[name]
         function, _ = method.load()
         self._warm_up(function, settings)
@@ -131,7 +152,9 @@ class _Runner:
         against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered,
                               references[j].mean_variance) for j in judges}
         seen = flip(radiance, references[TRUTH].radiance, covered)
-        return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen)
+        account = find_ledger(method) if accounts else None
+        ledger = account(self.frame, settings) if account else None
+        return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen, ledger)
 
     def _warm_up(self, function: Callable[[Frame, Any], Any], settings: Any) -> None:
         with warnings.catch_warnings(), contextlib.suppress(RefgiError):  # the real run will say it

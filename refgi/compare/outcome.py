@@ -44,6 +44,7 @@ class MethodResult:
     runs: tuple[stages.Run, ...]
     against: Mapping[str, Measurement]  # by reference: "truth", and "unoccluded" for a method without visibility
     flip: Flip
+    ledger: Any = None  # where the light's power went, of a method that accounts for it; only where files are written
 
 
 @dataclasses.dataclass(frozen=True)

@@ -75,6 +75,7 @@ def page(comparison: Comparison) -> str:
         quantities=_quantities(comparison), pictures=pictures, left=names[0], right=TRUTH,
         columns=[{"label": label, "about": about} for label, about in (*COLUMNS.values(), ("FLIP", "of the picture"))],
         rows=_rows(comparison), notes=_notes(comparison), plot=Markup(_plot(comparison)), made=_made(comparison),
+        ledgers=[_ledger(result) for result in comparison.results.values() if result.ledger is not None],
         versions=comparison.environment["versions"], machine=_machine(comparison.environment),
     )
 
@@ -108,6 +109,30 @@ def number(value: float) -> str:
         return f"{float(mantissa):g}e{int(exponent)}".replace("-", MINUS)
     rounded = float(f"{value:.3g}")
     return f"{rounded:.10f}".rstrip("0").rstrip(".").replace("-", MINUS)
+
+
+def ledger_cells(ledger: Any) -> list[tuple[str, ...]]:
+    """Write a ledger as cells of a table.
+
+    Parameters
+    ----------
+    ledger : object
+        What a method's ledger function gave.
+
+    Returns
+    -------
+    list of tuple of str
+        Name, R, G, B in W, percent of the first row, meaning; the last row is what the sum is off by.
+    """
+    whole = float(np.sum(ledger.rows[0].watts))
+    rows = [(row.name.replace("_", " "), row.watts, row.meaning) for row in ledger.rows]
+    rows.append(("difference", ledger.difference, "of emitted and the sum of its parts"))
+    return [(name, *(number(float(w)) for w in watts), _percent(float(np.sum(watts)), whole), meaning)
+            for name, watts, meaning in rows]
+
+
+def _percent(part: float, whole: float) -> str:
+    return DASH if whole == 0 else f"{round(100 * part / whole, 2) + 0.0:.2f} %".replace("-", MINUS)
 
 
 def _seconds(value: float) -> str:
@@ -245,6 +270,11 @@ def _made(comparison: Comparison) -> list[dict[str, Any]]:
              "summary": made.summary if isinstance(made, MethodResult) else "path tracing",
              "settings": plain(made.settings) or {}, "stages": [_stage(run) for run in made.runs]}
             for made in everything]
+
+
+def _ledger(result: MethodResult) -> dict[str, Any]:
+    parts = [row.is_part for row in result.ledger.rows]
+    return {"name": result.name, "rows": list(zip(ledger_cells(result.ledger), [*parts, False], strict=True))}
 
 
 def _stage(run: stages.Run) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from refgi.image import canonical_json, whole_file, write_exr, write_png, write_
 Array = npt.NDArray[Any]
 
 SCHEMA = 1
-UNITS = {"irradiance": "W/m^2", "radiance": "W/m^2/sr", "variance": "(W/m^2)^2", "seconds": "s"}
+UNITS = {"irradiance": "W/m^2", "radiance": "W/m^2/sr", "variance": "(W/m^2)^2", "seconds": "s", "ledger": "W"}
 CONTENT = "irradiance.*: indirect, without albedo/pi; R, G, B: emission + albedo/pi (direct + indirect)"
 
 
@@ -116,6 +116,23 @@ def plain(value: Any) -> Any:
     return value if value is None or isinstance(value, bool | int | float | str) else str(value)
 
 
+def ledger_json(ledger: Any) -> dict[str, Any]:
+    """Return a ledger as values for JSON.
+
+    Parameters
+    ----------
+    ledger : object
+        What a method's ledger function gave.
+
+    Returns
+    -------
+    dict
+        The rows by name, R, G, B in W; which of them sum to the first; and what the sum is off by.
+    """
+    return {"rows": {row.name: row.watts for row in ledger.rows},
+            "parts": [row.name for row in ledger.rows if row.is_part], "difference": ledger.difference}
+
+
 def signed_error(comparison: Comparison, result: MethodResult, judge: str = TRUTH) -> Array:
     """Return the luminance of a method's indirect irradiance less the reference's.
 
@@ -194,6 +211,7 @@ def _method(result: MethodResult) -> dict[str, Any]:
         "stages": _stages(result.runs),
         "against": {judge: _measurement(m) for judge, m in result.against.items()},
         "flip": _flip(result.flip),
+        "ledger": None if result.ledger is None else ledger_json(result.ledger),
         "files": [f"{result.name}.exr", f"{result.name}.png", f"{result.name}_false_colour.png",
                   *(_error_name(result.name, judge) for judge in result.against)],
     }

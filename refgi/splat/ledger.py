@@ -33,7 +33,7 @@ stochastic range, `cut` are signed, below 0 where power was added. The cut of th
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -57,44 +57,62 @@ Array = npt.NDArray[Any]
 PRINTED_WIDENINGS = frozenset({"sii_widening", "sii_widening_unnorm"})
 
 
+MEANING = {
+    "emitted": "by all lights", "missed": "met no surface", "absorbed": "by the first surface",
+    "glass": "met glass that did not hand it on", "reflected": "handed on by the first surface",
+    "refracted": "handed on by glass", "sampling": "lost by drawing pixel lights",
+    "bounced": "sent again by later bounces", "scaled": "taken by openness", "lights": "flux of the pixel lights",
+    "printed": "left out by norms as printed", "arrived": "on visible surfaces", "interpolated": "lost between pixels",
+    "cut": "out of range", "clamped": "taken from near pairs", "behind": "behind a light's or a visible surface",
+    "off_screen": "met no visible surface, less what met several",
+}
+SUBTOTALS = ("reflected", "refracted", "lights")
+
+
+class Row(NamedTuple):
+    """One row of a ledger as it is shown."""
+
+    name: str
+    watts: Array  # (3,)
+    meaning: str
+    is_part: bool  # of the sum; else the whole, or a subtotal on the way
+
+
 @dataclasses.dataclass(frozen=True)
 class Ledger:
-    """The account: (3,) float64 each, W, in the order in which light takes its way."""
+    """The account: (3,) float64 each, W, in the order in which light takes its way; `MEANING` says what each is.
 
-    emitted: Array  # by all lights, in closed form
-    missed: Array  # met no surface
-    absorbed: Array  # by the surfaces that the lights see
-    glass: Array  # met glass that did not hand it on
-    sampling: Array  # lost by drawing pixel lights from texels
-    bounced: Array  # sent again by later bounces of a walk: 0 or less
-    scaled: Array  # taken by openness
-    printed: Array  # left out by norms as printed in the paper
-    arrived: Array  # on visible surfaces: what the picture holds
-    interpolated: Array  # lost between pixels that are lit and those that are interpolated
-    cut: Array  # left out by the range I_low
-    clamped: Array  # taken from near pairs by the clamp
-    behind: Array  # went into the light's own surface, or met visible surfaces from behind
-    off_screen: Array  # met no visible surface
-    reflected: Array  # subtotal: handed on by opaque surfaces
-    refracted: Array  # subtotal: handed on by glass
-    lights: Array  # subtotal: flux of the pixel lights
+    `emitted` is the whole; `reflected`, `refracted` and `lights` are subtotals on the way; all others are its parts.
+    """
 
-    @property
-    def lines(self) -> dict[str, Array]:
-        """The lines that sum to `emitted`."""
-        names = [field.name for field in dataclasses.fields(self)]
-        return {name: getattr(self, name) for name in names[1 : names.index("reflected")]}
+    emitted: Array
+    missed: Array
+    absorbed: Array
+    glass: Array
+    reflected: Array
+    refracted: Array
+    sampling: Array
+    bounced: Array
+    scaled: Array
+    lights: Array
+    printed: Array
+    arrived: Array
+    interpolated: Array
+    cut: Array
+    clamped: Array
+    behind: Array
+    off_screen: Array
 
     @property
-    def subtotals(self) -> dict[str, Array]:
-        """What the lines add up to on the way, not part of the sum."""
-        return {name: getattr(self, name) for name in ("reflected", "refracted", "lights")}
+    def rows(self) -> list[Row]:
+        """All rows, in order."""
+        return [Row(name, getattr(self, name), meaning, name not in ("emitted", *SUBTOTALS))
+                for name, meaning in MEANING.items()]
 
     @property
     def difference(self) -> Array:
-        """`emitted` less all lines: what the account is off by, (3,) W."""
-        rest: Array = self.emitted - sum(self.lines.values())
-        return rest
+        """`emitted` less the sum of its parts: what the account is off by, (3,) W."""
+        return np.asarray(self.emitted - sum(row.watts for row in self.rows if row.is_part))
 
 
 @stage("splat.ledger")
@@ -126,11 +144,10 @@ def energy_ledger(frame: "Frame", settings: "SiiSettings") -> Ledger:
     full, turned = screen.full(), screen.full(turned=True)
     arrived, interpolated = screen.arrived()
     return Ledger(
-        emitted=side.emitted, missed=side.missed, absorbed=side.absorbed, glass=side.glass,
-        sampling=side.reflected + side.refracted - first, bounced=first - drawn, scaled=drawn - flux,
+        *side[:4], reflected=side.reflected, refracted=side.refracted,
+        sampling=side.reflected + side.refracted - first, bounced=first - drawn, scaled=drawn - flux, lights=flux,
         printed=printed + screen.printed_widening(full), arrived=arrived, interpolated=interpolated, cut=screen.cut(),
         clamped=screen.clamped(), behind=inwards + turned, off_screen=sent - full - turned,
-        reflected=side.reflected, refracted=side.refracted, lights=flux,
     )
 
 
@@ -192,10 +209,11 @@ class _Screen:
         self.area = pixel_areas(buffer, frame.scene.geometry)
         self.footprint = light_footprints(frame.rsms, settings) if settings.clamp in FOOTPRINT_CLAMPS else None
 
-    def full(self, turned: bool = False, **changes: Any) -> Array:
-        """Sum all pairs, without range or clamp unless `changes` say so; `turned`: on the receivers' other side."""
-        plain = {"clamp": "none", "as_published": self.settings.as_published - PRINTED_WIDENINGS}
-        settings = dataclasses.replace(self.settings, **plain | changes)
+    def full(self, *, turned: bool = False, clamp: bool = False, widening: bool = False) -> Array:
+        """Sum all pairs within any range: on the receivers' other side, with the clamp, with widenings as printed."""
+        settings = dataclasses.replace(
+            self.settings, clamp=self.settings.clamp if clamp else "none",
+            as_published=self.settings.as_published - (frozenset() if widening else PRINTED_WIDENINGS))
         receivers = self.receivers._replace(normal=-self.receivers.normal) if turned else self.receivers
         return self._flux(irradiance(receivers, self.lights, settings, self.footprint))
 
@@ -203,14 +221,13 @@ class _Screen:
         """Return what a widening as printed takes."""
         if self.settings.widening == 0 or not self.settings.as_published & PRINTED_WIDENINGS:
             return np.zeros(3)
-        return full - self.full(as_published=self.settings.as_published)
+        return full - self.full(widening=True)
 
     def clamped(self) -> Array:
         """Return what the clamp takes."""
         if self.settings.clamp == "none":
             return np.zeros(3)
-        published = {"as_published": self.settings.as_published}
-        return self.full(**published) - self.full(clamp=self.settings.clamp, **published)
+        return self.full(widening=True) - self.full(widening=True, clamp=True)
 
     def arrived(self) -> tuple[Array, Array]:
         """Return what the picture holds, and what its interpolation lost."""
@@ -229,4 +246,4 @@ class _Screen:
                                          self.frame.gbuffer.projection))
 
     def _flux(self, values: Array) -> Array:
-        return np.einsum("chw,hw->c", values, self.area, dtype=np.float64)
+        return np.asarray(np.einsum("chw,hw->c", values, self.area, dtype=np.float64))

@@ -1,6 +1,7 @@
 """A comparison made by hand: three methods with known errors, no rendering."""
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,6 +17,23 @@ from refgi.stages import Run
 class Knobs:
     lights: int | None = 1024
     pattern: str = "grid"
+
+
+class Row(NamedTuple):
+    name: str
+    watts: np.ndarray
+    meaning: str
+    is_part: bool
+
+
+class Account:
+    """A ledger made by hand: 8 W out, 6 and 2.5 W spent, so off by -0.5 W."""
+
+    rows = (Row("emitted", np.array([2.0, 4.0, 2.0]), "by all", False),
+            Row("off_screen", np.array([1.0, 3.0, 2.0]), "met <nothing>", True),
+            Row("subtotal", np.array([1.0, 1.0, 1.0]), "on the way", False),
+            Row("arrived", np.array([1.0, 1.5, 0.0]), "on the screen", True))
+    difference = np.array([0.0, -0.5, 0.0])
 
 
 @pytest.fixture
@@ -59,6 +77,7 @@ def make_comparison(scene, height=36, width=48):
         "gather": result("gather", ideal * 1.6 - 0.2 * covered, ("truth", "unoccluded"), 0.55, Flip(skipped="no")),
         "vpl": result("vpl", ideal, ("truth",), 1.4, Flip(0.004, None, (-1.0, 2.0, 3))),
     }
+    results["sii"] = dataclasses.replace(results["sii"], ledger=Account())
     environment = {"versions": {"refgi": "0.1.0", "python": "3.11", "flip-evaluator": None}, "platform": "Linux x86_64",
                    "cpu": "generic", "simd": ["avx2"], "threads": 2}
     return Comparison(scene, width, height, {"dtype": "float32", "rsm_resolution": 512, "shadows": "map"}, covered,

@@ -139,6 +139,30 @@ def test_non_finite_pixels_are_counted_and_unsound(box, truth_settings):
     assert not got.is_sound
 
 
+class MethodWithLedger(Method):
+    ledger = "fake_methods:account"
+
+
+@pytest.mark.filterwarnings("ignore:a fake method")
+def test_a_ledger_is_asked_for_only_where_files_are_written(box, truth_settings, tmp_path, fakes):
+    asked = []
+
+    def account(frame, settings):
+        asked.append((frame.width, settings.level))
+        row = types.SimpleNamespace(name="emitted", watts=np.ones(3), meaning="", is_part=False)
+        return types.SimpleNamespace(rows=[row], difference=np.zeros(3))
+
+    sys.modules["fake_methods"].account = account
+    fakes["seeing"] = MethodWithLedger(*fakes["seeing"])
+    assert compare(box, truth_settings=truth_settings, **SIZE).results["seeing"].ledger is None
+    assert not asked
+    compare(box, truth_settings=truth_settings, out=tmp_path, **SIZE)
+    assert asked == [(20, 0.25)]
+    methods = json.loads((tmp_path / "results.json").read_text())["methods"]
+    assert methods["seeing"]["ledger"] == {"rows": {"emitted": [1.0] * 3}, "parts": [], "difference": [0.0] * 3}
+    assert methods["blind"]["ledger"] is None
+
+
 @pytest.mark.usefixtures("fakes")
 @pytest.mark.filterwarnings("ignore:a fake method")
 def test_progress_names_what_runs(box, truth_settings, tmp_path):

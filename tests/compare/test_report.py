@@ -4,6 +4,7 @@ import base64
 import dataclasses
 import io
 import re
+import types
 from html.parser import HTMLParser
 
 import imageio.v3
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from refgi.compare.plot import Point, time_against_error
-from refgi.compare.report import PAGE, number, page, write_report
+from refgi.compare.report import PAGE, ledger_cells, number, page, write_report
 from refgi.errors import RefgiWarning
 from refgi.image import tone_map
 
@@ -97,6 +98,27 @@ def test_stages_settings_and_reasons_are_told(html):
     text = " ".join(Outline(html).text)
     for said in ("splat.irradiance", "no glossy material", "pattern", "grid", "truth without visibility"):
         assert said in text
+
+
+def test_ledgers_are_shown_of_methods_that_have_one(html):
+    ledger = re.search(r'<table class="ledger">.*?</table>', html, re.DOTALL)[0]
+    assert html.count("<table class=\"ledger\">") == 1
+    rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in ledger.split("<tr")[1:]]
+    assert rows[0] == ["sii", "R, W", "G, W", "B, W", "of emitted", ""]
+    assert rows[2] == ["off screen", "1", "3", "2", "75.00 %", "met &lt;nothing&gt;"]
+    assert rows[5][:5] == ["difference", "0", "\N{MINUS SIGN}0.5", "0", "\N{MINUS SIGN}6.25 %"]
+    assert [' class="part"' in row for row in ledger.split("<tr")[2:]] == [False, True, False, True, False]
+
+
+def test_a_page_without_ledgers_has_no_section_for_them(comparison):
+    results = {name: dataclasses.replace(result, ledger=None) for name, result in comparison.results.items()}
+    assert "power of the lights" not in page(dataclasses.replace(comparison, results=results))
+
+
+def test_a_ledger_of_nothing_has_no_percent():
+    nothing = types.SimpleNamespace(watts=np.zeros(3), name="emitted", meaning="", is_part=False)
+    cells = ledger_cells(types.SimpleNamespace(rows=[nothing], difference=np.zeros(3)))
+    assert [row[4] for row in cells] == ["\N{EN DASH}"] * 2
 
 
 def test_non_finite_pixels_are_told(comparison):

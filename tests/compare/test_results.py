@@ -49,6 +49,12 @@ class FlipJson(Strict):
     skipped: str
 
 
+class LedgerJson(Strict):
+    rows: dict[str, list[float]]
+    parts: list[str]
+    difference: list[float]
+
+
 class Method(Strict):
     summary: str
     settings: dict
@@ -56,6 +62,7 @@ class Method(Strict):
     stages: list[Stage]
     against: dict[str, Measured]
     flip: FlipJson
+    ledger: LedgerJson | None
     files: list[str]
 
 
@@ -118,6 +125,15 @@ def test_results_json_keeps_its_schema(comparison, tmp_path):
     assert set(results.methods["vpl"].against) == {"truth"}
     figure = results.methods["vpl"].against["truth"].figures["relmse"]
     assert figure.value == comparison.results["vpl"].against["truth"].figures["relmse"].value
+
+
+def test_a_ledger_is_kept_of_methods_that_have_one(comparison):
+    methods = validated(as_json(comparison)).methods
+    kept = methods["sii"].ledger
+    assert kept.rows["arrived"] == [1.0, 1.5, 0.0]
+    parts = np.sum([kept.rows[name] for name in kept.parts], axis=0)
+    assert np.array_equal(np.array(kept.rows["emitted"]) - parts, kept.difference)
+    assert methods["gather"].ledger is None
 
 
 def test_every_file_that_results_json_names_is_there_and_no_other(comparison, tmp_path):

@@ -24,6 +24,7 @@ class Method(NamedTuple):
     settings: str  # name of the settings class in the same module
     visibility: bool  # whether it knows what blocks indirect light
     summary: str
+    ledger: str = ""  # module and function that accounts for the power of the lights; empty: the method keeps none
 
     def load(self) -> tuple[Callable[["Frame", Any], Array], type]:
         """Return the method's function and its settings class."""
@@ -36,7 +37,8 @@ METHODS = {
     method.name: method
     for method in (
         Method("sii", "refgi.splat.sii:sii", "SiiSettings", False,
-               "Splatting Indirect Illumination (2006): every pixel light at every pixel"),
+               "Splatting Indirect Illumination (2006): pixel lights shine where they are significant",
+               "refgi.splat.ledger:energy_ledger"),
         Method("gather", "refgi.splat.gather:gather", "GatherSettings", False,
                "Reflective Shadow Maps (2005): gathering around the projected point"),
         Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
-from refgi.rsm import choose_pixel_lights, reflective_shadow_map
+from refgi.rsm import Warp, choose_pixel_lights, importance, reflective_shadow_map
 from refgi.scene import Material, PointLight, SpotLight, load_scene, material_table
 from tests.naive import pixel_lights as naive
 from tests.rsm.shapes import geometry, sphere
@@ -159,6 +159,89 @@ def test_lobes_carry_the_same_weight_as_the_diffuse_part():
     assert lights.lobe_flux.sum() == pytest.approx(rsm.lobe_flux.sum())
 
 
+def flat(plane):
+    return plane.reshape(3, -1)
+
+
+@pytest.mark.feature("SII-13")
+@pytest.mark.parametrize("method", ["A", "B"])
+@pytest.mark.parametrize("source", ["spot", "cube", "uneven"])
+def test_warped_lights_have_the_maps_flux_in_the_mean_for_every_count(source, method, evidence):
+    rsm = {"spot": lambda: box_map(32), "cube": cube_map, "uneven": lambda: box_map(37)}[source]()
+    total = rsm.flux.sum(axis=(1, 2))
+    worst = 0.0
+    for count in (3, 200):
+        for levels in (2, 20):
+            sums = np.array([choose_pixel_lights([rsm], count=count, pattern="random", seed=seed,
+                                                 warp=Warp(method, levels)).flux.sum(axis=1)
+                             for seed in range(100)])  # fmt: skip
+            z = np.abs((sums.mean(axis=0) - total) / (sums.std(axis=0, ddof=1) / math.sqrt(100)))
+            worst = max(worst, z[sums.std(axis=0) > ROUNDING * total].max())
+    assert worst < 4
+    evidence(f"{source}, method {method}, N = 3 and 200: mean of 100 draws {worst:.1f} standard errors off")
+
+
+def test_warped_lights_are_texels_with_their_weight_times_t_over_n():
+    for rsm in (box_map(), cube_map()):
+        lights = choose_pixel_lights([rsm], count=200, pattern="halton", seed=4, warp=Warp("A", 20))
+        np.testing.assert_array_equal(lights.position, flat(rsm.position)[:, lights.texel])
+        np.testing.assert_array_equal(lights.normal, flat(rsm.normal)[:, lights.texel])
+        brightest = lights.flux.max(axis=0)  # w Phi is the map's mean at full depth
+        np.testing.assert_allclose(brightest, rsm.flux.max(axis=0).sum() / 200, rtol=ROUNDING)
+        assert lights.texel.dtype == lights.map_index.dtype == np.int32
+        assert lights.flux.shape[1] == lights.drawn == 200
+
+
+def test_no_levels_give_the_lights_of_no_warp():
+    rsm = box_map(31)
+    for pattern, count in (("grid", 49), ("halton", 60), ("random", 60)):
+        plain, warped = (choose_pixel_lights([rsm], count=count, pattern=pattern, seed=2, warp=warp)
+                         for warp in (None, Warp("B", 0)))
+        np.testing.assert_array_equal(plain.texel, warped.texel)
+        np.testing.assert_array_equal(plain.flux, warped.flux)
+
+
+@pytest.mark.feature("SII-03")
+@pytest.mark.parametrize("source", ["spot", "cube"])
+def test_filtered_warped_lights_carry_the_flux_nearest_to_them_without_weight(source, evidence):
+    rsm = box_map() if source == "spot" else cube_map()
+    for pattern, count in (("grid", 54 if source == "cube" else 49), ("halton", 40), ("random", 500)):
+        warp = Warp("A", 3)
+        lights = choose_pixel_lights([rsm], count=count, pattern=pattern, warp=warp, filtered=True)
+        error = np.abs(lights.flux.sum(axis=1) / rsm.flux.sum(axis=(1, 2)) - 1).max()
+        assert error < ROUNDING
+        assert lights.drawn == count
+        if source == "spot" and pattern == "halton":
+            places = choose_pixel_lights([rsm._replace(flux=np.ones_like(rsm.flux))], count=count, pattern=pattern,
+                                         warp=warp, importance=[importance(rsm)]).texel  # fmt: skip
+            expected = np.array(naive.nearest_cell_sums(rsm.flux, [divmod(int(t), 24) for t in places]))
+            np.testing.assert_allclose(lights.flux, expected[:, expected.any(axis=0)], rtol=ROUNDING)
+    evidence(f"{source}: a warped, filtered set has the map's flux to {error:.0e}")
+
+
+def test_lights_name_their_texel_and_map():
+    first, second = box_map(), cube_map()
+    for options in ({"pattern": "halton", "count": 64}, {"pattern": "all", "count": None},
+                    {"pattern": "random", "count": 64, "warp": Warp("B", 3)},
+                    {"pattern": "halton", "count": 64, "filtered": True}):  # fmt: skip
+        lights = choose_pixel_lights([first, second], **options)
+        for index, rsm in enumerate((first, second)):
+            here = lights.map_index == index
+            assert here.any()
+            np.testing.assert_array_equal(lights.position[:, here], flat(rsm.position)[:, lights.texel[here]])
+
+
+def test_renormalised_weights_sum_to_the_count_and_bring_variance_back():
+    rsm = box_map()
+    worth = importance(rsm)
+    plain, scaled = (choose_pixel_lights([rsm], count=100, pattern="halton", seed=1, warp=Warp("A", 20),
+                                         importance=[worth], renormalise=flag) for flag in (False, True))
+    assert plain.flux.max(axis=0).sum() == pytest.approx(worth.sum(), rel=ROUNDING)
+    weights = scaled.flux.max(axis=0) / worth.reshape(-1)[scaled.texel] * 100 / rsm.texels
+    assert weights.sum() == pytest.approx(100, rel=ROUNDING)
+    assert abs(scaled.flux.max(axis=0).sum() / worth.sum() - 1) > 1e-3
+
+
 def test_same_seed_same_lights_other_seed_others():
     rsm = box_map()
     for pattern in ("halton", "random"):
@@ -168,8 +251,9 @@ def test_same_seed_same_lights_other_seed_others():
 
 
 def test_float32_maps_give_float32_lights():
-    lights = choose_pixel_lights([box_map(dtype=np.float32)], count=16, pattern="grid", filtered=True)
-    assert lights.flux.dtype == lights.position.dtype == np.float32
+    for options in ({"filtered": True}, {"warp": Warp("A", 2)}):
+        lights = choose_pixel_lights([box_map(dtype=np.float32)], count=16, pattern="grid", **options)
+        assert lights.flux.dtype == lights.position.dtype == np.float32
 
 
 @pytest.mark.parametrize(
@@ -181,6 +265,11 @@ def test_float32_maps_give_float32_lights():
         ({"count": 10, "pattern": "all"}, "None or 576 with pattern 'all', got 10"),
         ({"count": 10, "pattern": "hex"}, "grid or halton or all or random, got 'hex'"),
         ({"count": 625, "pattern": "grid", "filtered": True}, "at most 576 with filtering, got 625"),
+        ({"count": None, "pattern": "all", "warp": Warp("A", 1)}, "'halton' or 'random' with a warp, got 'all'"),
+        ({"count": 9, "pattern": "grid", "importance": [np.ones((24, 24))]}, "importance: expected None without a"),
+        ({"count": 9, "pattern": "grid", "warp": Warp("A", 1), "importance": []}, "importance: expected one for each"),
+        ({"count": 9, "pattern": "grid", "warp": Warp("A", 1), "importance": [np.ones((3, 3))]},
+         r"importance: expected shape \(24, 24\) as its map, got \(3, 3\)"),
     ],
 )
 def test_errors_name_what_is_wrong(options, message):
@@ -202,5 +291,6 @@ def test_a_map_without_flux_gives_no_lights():
     empty = reflective_shadow_map(geometry(np.zeros((0, 3)), np.zeros((0, 3))), material_table([GLOSSY]), light, 4)
     for pattern, count in (("grid", 24), ("halton", 5), ("all", None)):
         for filtered in (False, True):
-            lights = choose_pixel_lights([empty], count=count, pattern=pattern, filtered=filtered)
-            assert lights.flux.shape == (3, 0)
+            for warp in (None, Warp("A", 3)) if count else (None,):
+                lights = choose_pixel_lights([empty], count=count, pattern=pattern, filtered=filtered, warp=warp)
+                assert lights.flux.shape == (3, 0)

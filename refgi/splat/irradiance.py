@@ -4,15 +4,17 @@ What the lights do not need does not run: pixels without surface are left out, a
 diffuse light, and without a glossy light no lobe code is compiled. The picture is the same to the bit either way.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.splat.blocks import block_by_block, put, taken
 from refgi.splat.lobe_sum import add_lobes
-from refgi.splat.packing import pack_clamp, pack_diffuse, pack_lobes, pack_spheres, pack_widening
-from refgi.splat.pair_sum import sum_pairs
+from refgi.splat.packing import Packed, pack
+from refgi.splat.pair_sum import TILE, sum_pairs
 from refgi.splat.settings import FOOTPRINT_CLAMPS, PairSettings
 from refgi.splat.sphere_sum import sum_spheres
 from refgi.stages import report_progress, skip, stage
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 PAIRS_AT_ONCE = 1 << 31  # between two reports of progress
-BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
 
 
 class Receivers(NamedTuple):
@@ -69,36 +70,89 @@ def irradiance(
     light that coincides with a receiver adds 0. Results do not depend on the number of threads, on how receivers
     are split into calls or on where a pixel stands in the picture, to the bit.
     """
-    position, normal, covered = (np.asarray(part) for part in receivers)
-    normal, covered = normal.astype(position.dtype, copy=False), covered.astype(np.bool_, copy=False)
-    _check(position, normal, covered, lights, settings, footprint)
-    places = _block_by_block(covered)
-    points, normals = (np.take(part.reshape(3, -1), places, axis=1) for part in (position, normal))
-    total = np.zeros_like(points)
-    _sum(points, normals, lights, settings, footprint, total)
-    result = np.zeros_like(position)
-    result.reshape(3, -1)[:, places] = total
+    packed = checked(receivers, lights, settings, footprint)
+
+    def add(here: Array, facing: Array, _: Array, sums: Array) -> None:
+        if packed.diffuse.shape[1] > 1 and packed.spheres is not None:
+            sum_spheres(here, facing, packed.diffuse, packed.spheres, None, sums)
+        elif packed.diffuse.shape[1] > 1:
+            sum_pairs(here, facing, packed.diffuse, packed.clamp, sums)
+        if packed.lobes is not None:
+            add_lobes(here, facing, *packed.lobes, None, None, sums)
+
+    return over_receivers(receivers, packed, add)
+
+
+def checked(
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None
+) -> Packed:
+    """Check what a sum over pairs is given and pack its lights.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        Points that are lit.
+    lights : PixelLights
+        Lights to sum.
+    settings : PairSettings
+        How one light lights one receiver.
+    footprint : (N,) ndarray or None
+        Surface area each light stands for, m^2.
+
+    Returns
+    -------
+    Packed
+        The lights, in the dtype of the receivers.
+
+    Raises
+    ------
+    InputError
+        As `irradiance`.
+    """
+    _check(receivers, lights, settings, footprint)
+    packed = pack(lights, settings, footprint, receivers.position.dtype)
+    if packed.lobes is None:
+        skip("splat.lobes", "no pixel light is glossy")
+    return packed
+
+
+def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, Array, Array, Array], None]) -> Array:
+    """Sum something over the lights at every pixel with a surface, some pixels at a time.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        Points that are lit.
+    packed : Packed
+        The lights; their number says how many pixels go at a time.
+    add : callable
+        Given positions and normals (3, n) of receivers, their flat indices (n,) in the picture and zeros (3, n), to
+        which it adds. All but the last call have whole tiles.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        The sums; 0 where there is no surface.
+    """
+    position, covered = np.asarray(receivers.position), np.asarray(receivers.covered, np.bool_)
+    normal = np.asarray(receivers.normal, position.dtype)
+    places = block_by_block(covered)
+    result = np.zeros(position.shape, position.dtype)
+    step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
+    for first in range(0, len(places), step):
+        part = places[first : first + step]
+        points, normals = taken(position, part), taken(normal, part)
+        sums = np.zeros_like(points)
+        add(points, normals, part, sums)
+        put(result, part, sums)
+        report_progress(min(1.0, (first + step) / len(places)))
     return result
 
 
-def _block_by_block(covered: Array) -> Array:
-    """Return the flat indices of covered pixels, 16 x 16 of them after another: a kernel's tile is one block.
-
-    Blocks are compact, so that more lights lie behind all their receivers than behind those of a piece of a row.
-    """
-    index = np.arange(covered.size).reshape(covered.shape)
-    index[~covered] = -1
-    height, width = (-(-size // BLOCK) * BLOCK for size in covered.shape)
-    padded = np.full((height, width), -1)
-    padded[: covered.shape[0], : covered.shape[1]] = index
-    blocks = padded.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK).transpose(0, 2, 1, 3).reshape(-1)
-    return blocks[blocks >= 0]
-
-
 def _check(
-    position: Array, normal: Array, covered: Array, lights: "PixelLights", settings: PairSettings,
-    footprint: Array | None,
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None
 ) -> None:
+    position, normal, covered = (np.asarray(part) for part in receivers)
     expect(position.ndim == 3 and len(position) == 3, "receivers.position", "shape (3, h, w)", position.shape)
     expect(position.dtype in (np.float32, np.float64), "receivers.position", "float32 or float64", position.dtype)
     expect(normal.shape == position.shape, "receivers.normal", f"shape {position.shape}", normal.shape)
@@ -116,35 +170,3 @@ def _check(
     if settings.clamp == "sphere":
         expect(lights.lobe_flux is None or not lights.lobe_flux.any(), "clamp",
                "another one for glossy materials ('sphere' knows diffuse lights alone)", settings.clamp)
-
-
-def _sum(
-    points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None, total: Array
-) -> None:
-    """Run the kernels that the lights need, some receivers at a time."""
-    dtype = points.dtype
-    shines: Array = (lights.flux != 0).any(axis=0)
-    diffuse = pack_diffuse(lights, settings, dtype, shines)
-    clamp = None if settings.clamp == "none" else pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
-    spheres = None
-    if settings.clamp == "sphere" and footprint is not None:
-        spheres = pack_spheres(settings, footprint, shines, dtype)
-    glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
-    if glossy.any():
-        lobes = pack_lobes(lights, settings, dtype, glossy)
-        lobe_clamp = pack_clamp(settings, footprint, glossy, lobes.shape[1], dtype)
-        widening = pack_widening(lights, settings, dtype, glossy)
-    else:
-        skip("splat.lobes", "no pixel light is glossy")
-    step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(shines)))
-    for first in range(0, points.shape[1], step):
-        part = np.s_[:, first : first + step]
-        here, facing, sums = (np.ascontiguousarray(array[part]) for array in (points, normals, total))
-        if diffuse.shape[1] > 1 and spheres is not None:
-            sum_spheres(here, facing, diffuse, spheres, sums)
-        elif diffuse.shape[1] > 1:
-            sum_pairs(here, facing, diffuse, clamp, sums)
-        if glossy.any():
-            add_lobes(here, facing, lobes, lobe_clamp, widening, sums)
-        total[part] = sums
-        report_progress(min(1.0, (first + step) / points.shape[1]))

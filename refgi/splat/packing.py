@@ -4,12 +4,13 @@ Everything is computed in float64 and rounded once, to the dtype of the receiver
 """
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.jit import kernel
 from refgi.splat.lobe_sum import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
 from refgi.splat.pair_sum import Clamp
 from refgi.splat.settings import PairSettings
@@ -20,6 +21,59 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 NORMS = {"none": NO_NORM, "full_lobe": FULL_LOBE, "clamped": CLAMPED}
+
+
+class PackedLobes(NamedTuple):
+    """What `add_lobes` reads of the lights."""
+
+    lights: Array  # (13, K), of `pack_lobes`
+    clamp: Clamp
+    widening: Widening | None
+
+
+class Packed(NamedTuple):
+    """Everything the kernels read of the lights."""
+
+    diffuse: Array  # (9, M + 1), of `pack_diffuse`
+    clamp: Clamp | None  # of the diffuse lights
+    spheres: Array | None  # (M,), of `pack_spheres`
+    lobes: PackedLobes | None  # None: no light is glossy
+    shines: Array  # (N,) bool: which lights are among the M
+    glossy: Array  # (N,) bool: which are among the K
+
+
+def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None, dtype: npt.DTypeLike) -> Packed:
+    """Pack the lights that shine, each part for its kernel.
+
+    Parameters
+    ----------
+    lights : PixelLights
+        Lights.
+    settings : PairSettings
+        How one light lights one receiver.
+    footprint : (N,) ndarray or None
+        Surface area each light stands for, m^2.
+    dtype : dtype
+        Of the kernels.
+
+    Returns
+    -------
+    Packed
+        Without lights that have no flux.
+    """
+    shines: Array = (lights.flux != 0).any(axis=0)
+    glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
+    diffuse = pack_diffuse(lights, settings, dtype, shines)
+    clamp = None if settings.clamp == "none" else pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
+    spheres = None
+    if settings.clamp == "sphere" and footprint is not None:
+        spheres = pack_spheres(settings, footprint, shines, dtype)
+    lobes = None
+    if glossy.any():
+        packed = pack_lobes(lights, settings, dtype, glossy)
+        lobe_clamp = pack_clamp(settings, footprint, glossy, packed.shape[1], dtype)
+        lobes = PackedLobes(packed, lobe_clamp, pack_widening(lights, settings, dtype, glossy))
+    return Packed(diffuse, clamp, spheres, lobes, shines, glossy)
 
 
 def pack_diffuse(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:
@@ -72,10 +126,16 @@ def pack_lobes(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLi
         Packed lights.
     """
     flux, axis, exponent = _lobes(lights, chosen)
-    cos_theta = (lights.normal[:, chosen] * axis).sum(axis=0)
-    norm = [lobe_norm_factor(float(c), float(p), NORMS[settings.lobe_norm])
-            for c, p in zip(cos_theta, exponent, strict=True)]
+    cos_theta = (np.asarray(lights.normal[:, chosen], np.float64) * axis).sum(axis=0)
+    norm = np.empty_like(exponent)
+    _fill_norms(cos_theta, exponent, NORMS[settings.lobe_norm], norm)
     return np.concatenate([*_place(lights, settings, chosen), -axis, exponent[None], flux * norm]).astype(dtype)
+
+
+@kernel
+def _fill_norms(cos_theta: Array, exponent: Array, norm: int, factor: Array) -> None:
+    for k in range(len(factor)):
+        factor[k] = lobe_norm_factor(cos_theta[k], exponent[k], norm)
 
 
 def _lobes(lights: "PixelLights", chosen: Array) -> tuple[Array, Array, Array]:

@@ -144,7 +144,7 @@ def load_tile(tile: Array, position: Array, normal: Array, first: int, size: int
 
     Parameters
     ----------
-    tile : (>= 6, TILE) ndarray
+    tile : (>= 6, >= size) ndarray
         Filled in rows X and NX.
     position, normal : (3, n) ndarray
         Receivers.
@@ -163,11 +163,11 @@ def close_group(tile: Array) -> None:
 
     Parameters
     ----------
-    tile : (>= ROWS, TILE) ndarray
+    tile : (>= ROWS, n) ndarray
         Rows SUM are added to rows TOTAL and cleared; rows LOST keep the rounding.
     """
     for c in range(3):
-        for i in range(TILE):
+        for i in range(tile.shape[1]):
             part = tile[SUM + c, i] - tile[LOST + c, i]
             total = tile[TOTAL + c, i] + part
             tile[LOST + c, i] = (total - tile[TOTAL + c, i]) - part

@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.splat.pair_sum import GROUP, LEAST_SQUARE, NX, ROWS, SUM, TILE, TOTAL, X, close_group, load_tile
+from refgi.splat.range import Range
+from refgi.splat.ranged_sum import range_factor
 from refgi.splat.sphere_pair import LEAST_RATIO, cone_term, cut_cone_term
 
 Array = npt.NDArray[Any]
@@ -20,7 +22,9 @@ TERM, RATIO = range(ROWS, ROWS + 2)  # further rows of a tile: of one light, 1/m
 
 
 @kernel(parallel=True)
-def sum_spheres(position: Array, normal: Array, lights: Array, square_radius: Array, irradiance: Array) -> None:
+def sum_spheres(
+    position: Array, normal: Array, lights: Array, square_radius: Array, reach: Range | None, irradiance: Array
+) -> None:
     """Add up the irradiance of every spherical light at every receiver (Hasan et al. 2009).
 
     Parameters
@@ -31,6 +35,8 @@ def sum_spheres(position: Array, normal: Array, lights: Array, square_radius: Ar
         Packed lights: position, reversed normal, flux / pi; the last one is black and is left out.
     square_radius : (N,) ndarray
         Squares of the lights' radii, m^2.
+    reach : Range or None
+        Which pairs count, and how much, by the point light in the middle of the sphere; None: all.
     irradiance : (3, n) ndarray
         Filled with W/m^2; without albedo/pi and visibility.
 
@@ -49,6 +55,8 @@ def sum_spheres(position: Array, normal: Array, lights: Array, square_radius: Ar
                 light = lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k]
                 _whole_cones(tile, light, square_radius[k])
                 _cut_cones(tile, light, square_radius[k], size)
+                if reach is not None:
+                    _weigh(tile, light, reach.square[k], reach.scale[k], reach.outside)
                 for i in range(TILE):
                     tile[SUM, i] += tile[TERM, i] * lights[6, k]
                     tile[SUM + 1, i] += tile[TERM, i] * lights[7, k]
@@ -95,3 +103,12 @@ def _cut_cones(tile: Array, light: Any, square_radius: Any, size: int) -> None:
             axis = dx * inverse, dy * inverse, dz * inverse
             normal = tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
             tile[TERM, i] = cut_cone_term(axis, (lx, ly, lz), normal, ratio) / max(square, square_radius)
+
+
+@kernel
+def _weigh(tile: Array, light: Any, square_range: Any, scale: Any, outside: bool) -> None:
+    """Multiply row TERM by what the range makes of each pair."""
+    px, py, pz, lx, ly, lz = light
+    for i in range(TILE):
+        dx, dy, dz = px - tile[X, i], py - tile[X + 1, i], pz - tile[X + 2, i]
+        tile[TERM, i] *= range_factor(dx, dy, dz, lx, ly, lz, square_range, scale, outside)

@@ -1,0 +1,121 @@
+"""The pixels of a picture in an order that keeps neighbours together, which is the order kernels see them in.
+
+Blocks of 16 x 16 pixels go row by row; within a block 8 x 8 after 8 x 8, within these 4 x 4 after 4 x 4. Pixels
+without surface are left out, so the tiles of the kernels are filled and still compact: fewer lights reach into them
+than into a piece of a row.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+
+Array = npt.NDArray[Any]
+
+BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
+CHUNK = 1 << 13  # pixels a thread copies at once
+
+
+def block_by_block(covered: Array) -> Array:
+    """Return the flat indices of covered pixels, block by block.
+
+    Parameters
+    ----------
+    covered : (h, w) ndarray of bool
+        Whether there is a surface.
+
+    Returns
+    -------
+    (n,) ndarray of int64
+        Indices.
+    """
+    rows, columns = (-(-size // BLOCK) for size in covered.shape)
+    counts = np.zeros(rows * columns, np.int64)
+    _count(covered, columns, counts)
+    ends = np.cumsum(counts)
+    places = np.empty(int(ends[-1]) if len(ends) else 0, np.int64)
+    _fill(covered, columns, ends - counts, _path(), places)
+    return places
+
+
+def taken(plane: Array, places: Array) -> Array:
+    """Return the values of three channels at some pixels.
+
+    Parameters
+    ----------
+    plane : (3, h, w) ndarray
+        Values.
+    places : (n,) ndarray of int64
+        Flat indices.
+
+    Returns
+    -------
+    (3, n) ndarray
+        The values there.
+    """
+    values = np.empty((3, len(places)), plane.dtype)
+    _take(np.ascontiguousarray(plane).reshape(3, -1), places, values)
+    return values
+
+
+def put(plane: Array, places: Array, values: Array) -> None:
+    """Store the values of three channels at some pixels.
+
+    Parameters
+    ----------
+    plane : (3, h, w) ndarray
+        Changed; contiguous.
+    places : (n,) ndarray of int64
+        Flat indices, each once.
+    values : (3, n) ndarray
+        What to store.
+    """
+    _put(values, places, plane.reshape(3, -1))
+
+
+def _path() -> Array:
+    """Return row and column within a block in the order of its pixels, (2, BLOCK^2)."""
+    index = np.arange(BLOCK * BLOCK).reshape(2, 2, 4, 2, 2, 4).transpose(0, 3, 1, 4, 2, 5).reshape(-1)
+    return np.stack([index // BLOCK, index % BLOCK])
+
+
+@kernel(parallel=True)
+def _count(covered: Array, columns: int, counts: Array) -> None:
+    height, width = covered.shape
+    for block in prange(len(counts)):
+        top, left = block // columns * BLOCK, block % columns * BLOCK
+        count = 0
+        for row in range(top, min(top + BLOCK, height)):
+            for column in range(left, min(left + BLOCK, width)):
+                count += covered[row, column]
+        counts[block] = count
+
+
+@kernel(parallel=True)
+def _fill(covered: Array, columns: int, starts: Array, path: Array, places: Array) -> None:
+    height, width = covered.shape
+    for block in prange(len(starts)):
+        top, left, place = block // columns * BLOCK, block % columns * BLOCK, starts[block]
+        for i in range(BLOCK * BLOCK):
+            row, column = top + path[0, i], left + path[1, i]
+            if row < height and column < width and covered[row, column]:
+                places[place] = row * width + column
+                place += 1
+
+
+@kernel(parallel=True)
+def _take(plane: Array, places: Array, values: Array) -> None:
+    for chunk in prange((len(places) + CHUNK - 1) // CHUNK):
+        for c in range(3):
+            for i in range(chunk * CHUNK, min((chunk + 1) * CHUNK, len(places))):
+                values[c, i] = plane[c, places[i]]
+
+
+@kernel(parallel=True)
+def _put(values: Array, places: Array, plane: Array) -> None:
+    for chunk in prange((len(places) + CHUNK - 1) // CHUNK):
+        for c in range(3):
+            for i in range(chunk * CHUNK, min((chunk + 1) * CHUNK, len(places))):
+                plane[c, places[i]] = values[c, i]

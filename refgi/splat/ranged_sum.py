@@ -1,0 +1,227 @@
+"""The sum over the pairs of diffuse light and receiver that the threshold I_low keeps (SII Sec. 3.4, procedure P3).
+
+A pair counts where B = I_0 cos / r^2 >= xi I_low, cos being the light's. With R_0^2 = I_0 / I_low and the cosine not
+divided by r, c_l = r cos, that is s >= xi r for s = R_0^2 c_l / r^2: no root, and nothing leaves the range of float32
+between 1e-6 and 1e6 m. The test is part of the pair's arithmetic, so the picture does not depend on which bound found
+the pairs. Tiles are a quarter of `pair_sum`'s, 8 x 8 pixels, each with lights of its own; groups and order of the
+lights are the same.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.splat.pair_sum import (
+    GROUP,
+    LEAST_SQUARE,
+    NX,
+    ROWS,
+    SUM,
+    TOTAL,
+    Clamp,
+    X,
+    clamped_term,
+    close_group,
+    geometry_term,
+    load_tile,
+)
+from refgi.splat.range import Range
+
+Array = npt.NDArray[Any]
+
+LANES = 64  # receivers a list of lights belongs to
+
+
+@kernel
+def reached(dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, square_range: Any) -> Any:
+    """Tell whether B >= xi I_low for one pair.
+
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Vector from the receiver to the light, m, not normalised.
+    lx, ly, lz : float
+        Reversed unit normal of the light.
+    square_range : float
+        I_0 / (xi I_low), m^2.
+
+    Returns
+    -------
+    bool
+        Whether the pair counts; never behind the light.
+    """
+    real = type(dx)
+    zero = real(0.0)
+    square = dx * dx + dy * dy + dz * dz
+    square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
+    cl = dx * lx + dy * ly + dz * lz
+    s = square_range * ((cl if cl > zero else zero) * (real(1.0) / square))
+    return s * s >= square
+
+
+@kernel
+def range_factor(
+    dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, square_range: Any, scale: Any, outside: bool
+) -> Any:
+    """Return what a pair's term is multiplied by: max(1, I_low / B) where B >= xi I_low, else 0 (E = sum of factor g).
+
+    Parameters
+    ----------
+    dx, dy, dz, lx, ly, lz : float
+        As in `reached`.
+    square_range : float
+        I_0 / I_low, m^2.
+    scale : float
+        The light's xi.
+    outside : bool
+        Return 1 minus the factor.
+
+    Returns
+    -------
+    float
+        The factor; exactly 0 or 1 for xi = 1.
+    """
+    real = type(dx)
+    zero, one = real(0.0), real(1.0)
+    square = dx * dx + dy * dy + dz * dz
+    square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
+    cl = dx * lx + dy * ly + dz * lz
+    s = square_range * ((cl if cl > zero else zero) * (one / square))
+    factor = one if s * s >= square else np.sqrt(square) / s
+    factor = factor if reached(dx, dy, dz, lx, ly, lz, square_range / scale) else zero
+    return one - factor if outside else factor
+
+
+@kernel(parallel=True)
+def sum_pairs_in_range(
+    position: Array, normal: Array, lights: Array, clamp: Clamp | None, reach: Range, listed: Array, irradiance: Array
+) -> None:
+    """Add up E = sum over lights of (Phi / pi) g over the pairs with B >= I_low, for every receiver.
+
+    Parameters
+    ----------
+    position, normal : (3, n) ndarray
+        Receivers, world space; m and unit vectors.
+    lights : (9, N + 1) ndarray
+        Packed lights: position, reversed normal, flux / pi. The last one is black and stands in for an odd partner.
+    clamp : Clamp or None
+        How near pairs are kept finite; None sums the plain term.
+    reach : Range
+        Of all packed lights; xi counts as 1.
+    listed : (ceil(n / LANES), N) ndarray of bool
+        Lights that may count for each tile; the others must not count for any of its receivers.
+    irradiance : (3, n) ndarray
+        Filled with W/m^2; without albedo/pi and visibility.
+    """
+    count = position.shape[1]
+    for block in prange((count + LANES - 1) // LANES):
+        first = block * LANES
+        size = min(LANES, count - first)
+        tile = np.zeros((ROWS, LANES), position.dtype)
+        load_tile(tile, position, normal, first, size)
+        chosen = np.empty(GROUP + 1, np.int64)
+        black = lights.shape[1] - 1
+        for group in range(0, black, GROUP):
+            found = _chosen(listed, block, group, min(group + GROUP, black), chosen)
+            chosen[found] = black
+            for pair in range(0, found, 2):
+                a, b = chosen[pair], chosen[pair + 1]
+                one, two = _light(lights, a), _light(lights, b)
+                square_a, square_b = reach.square[a], reach.square[b]
+                for i in range(LANES):
+                    receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
+                    g1, g2 = _kept(one, receiver, clamp, a, square_a), _kept(two, receiver, clamp, b, square_b)
+                    # written out: a loop over the channels would cost the compiler its even split into lanes
+                    tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
+                    tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
+                    tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8]
+            close_group(tile)
+        for c in range(3):
+            for i in range(size):
+                irradiance[c, first + i] = tile[TOTAL + c, i]
+
+
+@kernel(parallel=True)
+def sum_weighed_pairs(
+    position: Array, normal: Array, lights: Array, clamp: Clamp | None, reach: Range, listed: Array, irradiance: Array
+) -> None:
+    """Add up E = sum over lights of (Phi / pi) g times the factor of `range_factor`, for every receiver.
+
+    Parameters
+    ----------
+    position, normal : (3, n) ndarray
+        As for `sum_pairs_in_range`.
+    lights : (9, N + 1) ndarray
+        As there.
+    clamp : Clamp or None
+        As there.
+    reach : Range
+        Of all packed lights, with xi.
+    listed : (ceil(n / LANES), N) ndarray of bool
+        As there; outside the range every light must be listed.
+    irradiance : (3, n) ndarray
+        Filled with W/m^2.
+    """
+    count = position.shape[1]
+    for block in prange((count + LANES - 1) // LANES):
+        first = block * LANES
+        size = min(LANES, count - first)
+        tile = np.zeros((ROWS, LANES), position.dtype)
+        load_tile(tile, position, normal, first, size)
+        for group in range(0, lights.shape[1] - 1, GROUP):
+            for k in range(group, min(group + GROUP, lights.shape[1] - 1)):
+                if listed[block, k]:
+                    one, square, xi = _light(lights, k), reach.square[k], reach.scale[k]
+                    for i in range(LANES):
+                        x, y, z, nx, ny, nz = (tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i],
+                                               tile[NX + 1, i], tile[NX + 2, i])
+                        g = _weighed(one, (x, y, z, nx, ny, nz), clamp, k, square, xi, reach.outside)
+                        tile[SUM, i] = tile[SUM, i] + g * one[6]
+                        tile[SUM + 1, i] = tile[SUM + 1, i] + g * one[7]
+                        tile[SUM + 2, i] = tile[SUM + 2, i] + g * one[8]
+            close_group(tile)
+        for c in range(3):
+            for i in range(size):
+                irradiance[c, first + i] = tile[TOTAL + c, i]
+
+
+@kernel
+def _chosen(listed: Array, block: int, first: int, last: int, chosen: Array) -> int:
+    count = 0
+    for k in range(first, last):
+        chosen[count] = k
+        count += listed[block, k]
+    return count
+
+
+@kernel
+def _light(lights: Array, k: int) -> Any:
+    return (lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k], lights[6, k],
+            lights[7, k], lights[8, k])
+
+
+@kernel
+def _kept(light: Any, receiver: Any, clamp: Clamp | None, k: int, square_range: Any) -> Any:
+    dx, dy, dz = light[0] - receiver[0], light[1] - receiver[1], light[2] - receiver[2]
+    term = _term(dx, dy, dz, light, receiver, clamp, k)
+    return term if reached(dx, dy, dz, light[3], light[4], light[5], square_range) else type(dx)(0.0)
+
+
+@kernel
+def _weighed(
+    light: Any, receiver: Any, clamp: Clamp | None, k: int, square_range: Any, scale: Any, outside: bool
+) -> Any:
+    dx, dy, dz = light[0] - receiver[0], light[1] - receiver[1], light[2] - receiver[2]
+    term = _term(dx, dy, dz, light, receiver, clamp, k)
+    return term * range_factor(dx, dy, dz, light[3], light[4], light[5], square_range, scale, outside)
+
+
+@kernel
+def _term(dx: Any, dy: Any, dz: Any, light: Any, receiver: Any, clamp: Clamp | None, k: int) -> Any:
+    lx, ly, lz = light[3], light[4], light[5]
+    nx, ny, nz = receiver[3], receiver[4], receiver[5]
+    if clamp is None:
+        return geometry_term(dx, dy, dz, lx, ly, lz, nx, ny, nz)
+    return clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, clamp, k)

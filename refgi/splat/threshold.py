@@ -1,0 +1,122 @@
+"""I_low, the irradiance below which a pair is left out, and the range it gives each light (E-SII-11, E-SII-15).
+
+The paper sets I_low to "x % of I_0", an irradiance to an intensity. Here it is one irradiance for all lights,
+I_low = x max I_0 / L_ref^2: dim lights reach less far, as Sec. 3.6 says they do. The intensity of an RGB light is its
+largest channel.
+"""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.splat.packing import Packed, pack
+from refgi.splat.range import Range
+from refgi.splat.settings import SplatSettings
+
+if TYPE_CHECKING:
+    from refgi.rsm import PixelLights
+
+Array = npt.NDArray[Any]
+
+DIFFUSE, GLOSSY = 0, 1  # streams of random numbers: the two parts of a light have each their own xi
+
+
+def low_irradiance(lights: "PixelLights", settings: SplatSettings) -> float:
+    """Return I_low = x max I_0 / L_ref^2, or what `irradiance_low` says.
+
+    Parameters
+    ----------
+    lights : PixelLights
+        Lights; the peak of a lobe is its flux times its norm.
+    settings : SplatSettings
+        Share, reference length and norms.
+
+    Returns
+    -------
+    float
+        Irradiance, W/m^2; 0 without lights.
+
+    Notes
+    -----
+    With `per_light_ilow` this is the I_low of the brightest light.
+    """
+    packed = pack(lights, settings, np.zeros(lights.flux.shape[1]), np.float64)
+    return threshold(np.concatenate(all_peaks(packed)), settings)
+
+
+def all_peaks(packed: Packed) -> tuple[Array, Array]:
+    """Return the scalar peak intensity I_0 of all packed lights: the largest channel.
+
+    Parameters
+    ----------
+    packed : Packed
+        The lights.
+
+    Returns
+    -------
+    diffuse : (M + 1,) ndarray of float64
+        Of the diffuse lights and the black one, W/sr.
+    lobes : (K,) ndarray of float64
+        Of the lobes, W/sr.
+    """
+    lobes = np.zeros((3, 0)) if packed.lobes is None else packed.lobes.lights[10:13]
+    return packed.diffuse[6:9].max(axis=0).astype(np.float64), lobes.max(axis=0).astype(np.float64)
+
+
+def threshold(peak: Array, settings: SplatSettings) -> float:
+    """Return I_low for lights of these peak intensities.
+
+    Parameters
+    ----------
+    peak : (N,) ndarray
+        I_0 of all lights, W/sr.
+    settings : SplatSettings
+        Share and reference length, or the irradiance itself.
+
+    Returns
+    -------
+    float
+        Irradiance, W/m^2.
+    """
+    if settings.irradiance_low is not None:
+        return settings.irradiance_low
+    return settings.i_low * float(peak.max(initial=0.0)) / settings.reference_length**2
+
+
+def light_range(
+    peak: Array, low: float, settings: SplatSettings, stream: int, dtype: npt.DTypeLike, outside: bool = False
+) -> Range:
+    """Return how far lights reach.
+
+    Parameters
+    ----------
+    peak : (N,) ndarray
+        I_0 of each light, W/sr.
+    low : float
+        I_low, W/m^2, above 0.
+    settings : SplatSettings
+        Whether the range is random, and the seed.
+    stream : int
+        DIFFUSE or GLOSSY.
+    dtype : dtype
+        Of the kernels.
+    outside : bool
+        Sum what the cut loses.
+
+    Returns
+    -------
+    Range
+        R_0^2 and xi of each light.
+    """
+    square = peak / low
+    if "per_light_ilow" in settings.as_published and settings.irradiance_low is None:
+        # I_low = x I_0 of the light itself
+        square = np.where(peak > 0, settings.reference_length**2 / settings.i_low, 0.0)
+    scale = np.ones(len(peak))
+    if settings.stochastic_range:
+        scale = 1.0 - np.random.default_rng([settings.seed, stream]).random(len(peak))  # (0, 1]
+    # far from the largest numbers, whose squares are taken, and from 0, which xi must not round to
+    square = np.minimum(square, math.sqrt(float(np.finfo(dtype).max)))
+    return Range(square.astype(dtype), np.maximum(scale, 1e-30).astype(dtype), outside)

@@ -1,11 +1,12 @@
 """The sum over all pairs of glossy pixel light and receiver (SII Eq. 3 in Eq. 2), Phong lobes clamped to the surface.
 
 The lobe of light p is I(w) = Phi c(P) <r . w>^P where n . w > 0, with c(P) by `lobe_norm`. The power is taken as
-exp(P ln(1 - h)), h = |r - w|^2 / 2 = 1 - r . w: near the axis, where a lobe of exponent 10^6 lives, h keeps its
-digits and r . w does not.
+2^(P log2(1 - h)), h = |r - w|^2 / 2 = 1 - r . w: near the axis, where a lobe of exponent 10^6 lives, h keeps its
+digits and r . w does not. A light's terms are found in a few short passes over a tile of receivers, each of which
+runs in lanes; a light that lights none of the tile is passed over before (`lobe_culling`) or after the first pass.
 
 Symbols as in `pair_sum`; w unit vector from light to receiver, th angle between lobe axis and normal, a the distance
-from which on the exponent is whole (0: not widened), P' the exponent after widening.
+from which on the exponent is whole (0: not widened), P' the exponent after widening, s = (1 - h)^P' c(P') / c(P).
 """
 
 import math
@@ -14,15 +15,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.elementary import exp, log1p
+from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
 from refgi.radiometry import lobe_fraction
-from refgi.splat.pair_sum import GROUP, LEAST_SQUARE, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, close_group, load_tile
+from refgi.splat.lobe_culling import bound_by_ball, lobes_in_reach, vanishing_limits
+from refgi.splat.pair_sum import GROUP, LEAST_SQUARE, LOST, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, load_tile
+from refgi.splat.range import Range
 
 Array = npt.NDArray[Any]
 
 NO_NORM, FULL_LOBE, CLAMPED = 0, 1, 2  # lobe_norm as a kernel sees it
-H, TERM, R, EXPONENT = range(ROWS, ROWS + 4)  # further rows of a tile, of one light
+H, TERM, SQUARE, EXPONENT, RATIO = range(ROWS, ROWS + 5)  # further rows of a tile, of one light
 CORRECTED, LITERAL = 0, 1  # slope of the widened exponent: P min(1, r / a), or min(P, P / (r a)) as printed
 
 
@@ -62,7 +65,8 @@ def lobe_norm_factor(cos_theta: Any, exponent: Any, norm: int) -> Any:
 
 @kernel(parallel=True)
 def add_lobes(
-    position: Array, normal: Array, lights: Array, clamp: Clamp, widening: Widening | None, irradiance: Array
+    position: Array, normal: Array, lights: Array, clamp: Clamp, widening: Widening | None, reach: Range | None,
+    listed: Array | None, irradiance: Array,
 ) -> None:
     """Add E = sum over glossy lights of I(w) c_x / r^2 to the irradiance of every receiver (SII Eq. 2 and 3).
 
@@ -76,25 +80,53 @@ def add_lobes(
         How near pairs are kept finite; the bound applies to c_x / r^2.
     widening : Widening or None
         How exponents fall near the light; None keeps them.
+    reach : Range or None
+        Which pairs count, and how much (procedure P3); None: all.
+    listed : (ceil(n / TILE), N) ndarray of bool or None
+        Lights that may count for each tile; the others must not count for any of its receivers. None: all may.
     irradiance : (3, n) ndarray
         Added to, W/m^2.
     """
     count = position.shape[1]
+    limits = vanishing_limits(lights, widening is not None)
     for block in prange((count + TILE - 1) // TILE):
         first = block * TILE
         size = min(TILE, count - first)
-        tile = np.zeros((ROWS + 4, TILE), position.dtype)
+        tile = np.zeros((ROWS + 5, TILE), position.dtype)
         load_tile(tile, position, normal, first, size)
+        ball = bound_by_ball(tile, size)
+        passed, chosen = np.zeros(GROUP, np.bool_), np.empty(GROUP, np.int64)
         for group in range(0, lights.shape[1], GROUP):
-            for k in range(group, min(group + GROUP, lights.shape[1])):
-                _shine(tile, _light(lights, k), clamp.least, clamp.softness[k], clamp.bound)
-                if widening is not None:
-                    _widen(tile, lights[9, k], widening, k)
-                _add(tile, lights[9, k], lights[10, k], lights[11, k], lights[12, k], widening is not None)
-            close_group(tile)
+            last = min(group + GROUP, lights.shape[1])
+            row = None if listed is None else listed[block]
+            found = lobes_in_reach(lights, limits, group, last, ball, row, passed, chosen)
+            for i in range(found):
+                _add_light(tile, lights, chosen[i], limits[chosen[i]], clamp, widening, reach)
+            if found > 0:
+                _close_group(tile)
         for c in range(3):
             for i in range(size):
                 irradiance[c, first + i] += tile[TOTAL + c, i]
+
+
+@kernel
+def _add_light(
+    tile: Array, lights: Array, k: int, limit: Any, clamp: Clamp, widening: Widening | None, reach: Range | None
+) -> None:
+    """Add flux s c_x / r^2 of one light to the group's sum; Eq. (3), whose norm is part of the flux."""
+    if not _shine(tile, _light(lights, k), limit, clamp.least, clamp.softness[k], clamp.bound):
+        return
+    _take_logarithm(tile)
+    if widening is None:
+        _raise(tile, lights[9, k])
+    else:
+        _widen(tile, lights[9, k], widening, k)
+        _raise_each(tile)
+    if reach is None:
+        _weigh(tile)
+    else:
+        _weigh_in_range(tile, reach.square[k], reach.scale[k], reach.outside)
+    _sum_up(tile, lights[10, k], lights[11, k], lights[12, k])
 
 
 @kernel
@@ -104,17 +136,20 @@ def _light(lights: Array, k: int) -> Any:
 
 
 @kernel
-def _shine(tile: Array, light: Any, least: Any, softness: Any, bound: Any) -> None:
-    """Fill rows H with 1 - r . w, TERM with c_x / r^2 where the lobe reaches (0 elsewhere) and R with r."""
+def _shine(tile: Array, light: Any, limit: Any, least: Any, softness: Any, bound: Any) -> bool:
+    """Fill rows H with 1 - r . w, TERM with c_x / r^2 where the lobe reaches (both 0 elsewhere) and SQUARE with r^2.
+
+    Return whether any TERM is not 0.
+    """
     real = tile.dtype.type
     zero, half, one = real(0.0), real(0.5), real(1.0)
     x, y, z, lx, ly, lz, ax, ay, az = light
-    for i in range(TILE):
+    lit = np.int32(0)
+    for i in range(tile.shape[1]):
         dx, dy, dz = x - tile[X, i], y - tile[X + 1, i], z - tile[X + 2, i]
         square = dx * dx + dy * dy + dz * dz
         square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
-        r = math.sqrt(square)
-        inverse = one / r
+        inverse = one / math.sqrt(square)
         cx = (dx * tile[NX, i] + dy * tile[NX + 1, i] + dz * tile[NX + 2, i]) * inverse
         ox, oy, oz = ax - dx * inverse, ay - dy * inverse, az - dz * inverse
         h = half * (ox * ox + oy * oy + oz * oz)
@@ -122,38 +157,87 @@ def _shine(tile: Array, light: Any, least: Any, softness: Any, bound: Any) -> No
         term = (cx if cx > zero else zero) / kept
         term = term if term < bound else bound
         above = dx * lx + dy * ly + dz * lz
-        reach = h if above > zero else one
-        tile[H, i] = reach if reach < one else zero
-        tile[TERM, i] = term if reach < one else zero
-        tile[R, i] = r
+        away = h if above > zero else one
+        tile[H, i] = away if away < limit else zero
+        tile[TERM, i] = term if away < limit else zero
+        tile[SQUARE, i] = square
+        lit |= np.int32(away < limit)
+    return bool(lit)
+
+
+@kernel
+def _take_logarithm(tile: Array) -> None:
+    for i in range(tile.shape[1]):
+        tile[H, i] = log2p1(-tile[H, i])
+
+
+@kernel
+def _raise(tile: Array, exponent: Any) -> None:
+    for i in range(tile.shape[1]):
+        tile[H, i] = exp2(exponent * tile[H, i])
+
+
+@kernel
+def _raise_each(tile: Array) -> None:
+    for i in range(tile.shape[1]):
+        tile[H, i] = exp2(tile[EXPONENT, i] * tile[H, i]) * tile[RATIO, i]
 
 
 @kernel
 def _widen(tile: Array, exponent: Any, widening: Widening, k: int) -> None:
-    """Fill row EXPONENT with P' (Sec. 3.3) and scale TERM by c(P') / c(P)."""
+    """Fill rows EXPONENT with P' (Sec. 3.3) and RATIO with c(P') / c(P)."""
     real = tile.dtype.type
     one = real(1.0)
     cos_theta = widening.cos_theta[k]
     whole = lobe_norm_factor(cos_theta, exponent, widening.norm)
-    for i in range(TILE):
-        r = tile[R, i]
+    for i in range(tile.shape[1]):
+        r = math.sqrt(tile[SQUARE, i])
         share = r / widening.distance if widening.slope == CORRECTED else one / (r * widening.distance)
         tile[EXPONENT, i] = exponent * (share if share < one else one)
+        tile[RATIO, i] = one
         if widening.norm >= 0 and share < one and tile[TERM, i] > real(0.0):
-            tile[TERM, i] *= lobe_norm_factor(cos_theta, tile[EXPONENT, i], widening.norm) / whole
+            tile[RATIO, i] = lobe_norm_factor(cos_theta, tile[EXPONENT, i], widening.norm) / whole
 
 
 @kernel
-def _add(tile: Array, exponent: Any, red: Any, green: Any, blue: Any, widened: bool) -> None:
-    """Add flux (1 - h)^P c_x / r^2 of one light to the group's sum; Eq. (3), whose norm is part of the flux."""
-    if not widened:
-        for i in range(TILE):
-            tile[EXPONENT, i] = exponent
-    for i in range(TILE):
-        tile[H, i] = log1p(-tile[H, i])
-    for i in range(TILE):
-        tile[TERM, i] *= exp(tile[EXPONENT, i] * tile[H, i])
-    for i in range(TILE):
+def _weigh(tile: Array) -> None:
+    for i in range(tile.shape[1]):
+        tile[TERM, i] *= tile[H, i]
+
+
+@kernel
+def _weigh_in_range(tile: Array, square_range: Any, scale: Any, outside: bool) -> None:
+    """Multiply TERM by s and max(1, I_low / B) where B >= xi I_low, by 0 elsewhere; or by 1 less that factor."""
+    real = tile.dtype.type
+    zero, one = real(0.0), real(1.0)
+    for i in range(tile.shape[1]):
+        square = tile[SQUARE, i]
+        b = square_range * tile[H, i]  # (B / I_low) r^2
+        factor = one if b >= square else square / b
+        factor = factor if b >= scale * square else zero
+        tile[TERM, i] *= tile[H, i] * (one - factor if outside else factor)
+
+
+@kernel
+def _sum_up(tile: Array, red: Any, green: Any, blue: Any) -> None:
+    for i in range(tile.shape[1]):
         tile[SUM, i] += tile[TERM, i] * red
         tile[SUM + 1, i] += tile[TERM, i] * green
         tile[SUM + 2, i] += tile[TERM, i] * blue
+
+
+@kernel
+def _close_group(tile: Array) -> None:
+    """Add the group's sum to the total as `pair_sum.close_group`, but leave a receiver that it does not light as it is.
+
+    So the bits do not depend on whether a group that lights nothing was passed over.
+    """
+    zero = tile.dtype.type(0.0)
+    for c in range(3):
+        for i in range(tile.shape[1]):
+            part = tile[SUM + c, i] - tile[LOST + c, i]
+            total = tile[TOTAL + c, i] + part
+            lost = (total - tile[TOTAL + c, i]) - part
+            tile[LOST + c, i] = lost if tile[SUM + c, i] != zero else tile[LOST + c, i]
+            tile[TOTAL + c, i] = total if tile[SUM + c, i] != zero else tile[TOTAL + c, i]
+            tile[SUM + c, i] = zero

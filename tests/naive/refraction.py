@@ -1,6 +1,6 @@
-"""Slow literal twins of light through a ball of glass and off a round mirror, ray by ray, from Snell and Fresnel alone.
+"""Slow literal twin of light through a ball of glass, ray by ray, from Snell and Fresnel alone.
 
-A ball has centre c, radius R and index n in air. The paper's simplification crosses the front unbent.
+The ball has centre c, radius R and index n, in air. The paper's simplification crosses the front unbent.
 """
 
 import math
@@ -55,35 +55,7 @@ def through_ball(origin, direction, centre, radius, index, *, front):
 
 def mean_transmittance(index, *, front, rays=4_000):
     """Share of parallel light over a ball's disc that gets through: the midpoint rule in h^2."""
-    origin, centre, ahead = np.zeros(3), np.array([0.0, 0.0, 10.0]), np.array([0.0, 0.0, 1.0])
+    centre, ahead = np.array([0.0, 0.0, 10.0]), np.array([0.0, 0.0, 1.0])
     heights = np.sqrt((np.arange(rays) + 0.5) / rays)
-    return float(np.mean([through_ball(origin + [h, 0, 0], ahead, centre, 1.0, index, front=front)[3]
+    return float(np.mean([through_ball(np.array([h, 0.0, 0.0]), ahead, centre, 1.0, index, front=front)[3]
                           for h in heights]))
-
-
-def reflected_in_ring(source, radius, height, count, rows):
-    """Rays from a point reflected once inside an upright mirror cylinder around y: landing points on y = 0.
-
-    Returns points (x, z), directions and solid angles (each ray's share of 4 pi) of count x rows patches of the wall
-    whose inner side the source sees.
-    """
-    turn = 2 * math.pi * (np.arange(count) + 0.5) / count
-    level = height * (np.arange(rows) + 0.5) / rows
-    landed, directions, solid_angles = [], [], []
-    patch = 2 * math.pi * radius / count * height / rows
-    for phi in turn:
-        normal = -np.array([math.cos(phi), 0.0, math.sin(phi)])
-        for y in level:
-            point = -radius * normal + np.array([0.0, y, 0.0])
-            d = point - source
-            distance = np.linalg.norm(d)
-            d = d / distance
-            cosine = -float(d @ normal)
-            if cosine <= 0:
-                continue
-            r = d + 2 * cosine * normal
-            landing = point - point[1] / r[1] * r
-            landed.append((landing[0], landing[2]))
-            directions.append(r)
-            solid_angles.append(patch * cosine / distance**2)
-    return np.array(landed), np.array(directions), np.array(solid_angles)

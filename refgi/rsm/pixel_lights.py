@@ -96,7 +96,7 @@ def choose_pixel_lights(
     expect(warp is None or pattern != "all", "pattern", "'grid', 'halton' or 'random' with a warp", pattern)
     expect(warp is not None or importance is None, "importance", "None without a warp", "maps")
     expect(importance is None or len(importance) == len(rsms), "importance", f"one for each of {len(rsms)} maps",
-           importance and len(importance))
+           None if importance is None else len(importance))
     parts = []
     for index, (rsm, share) in enumerate(zip(rsms, _shares(rsms, count, pattern), strict=True)):
         if warp is None:

@@ -191,10 +191,11 @@ def _place(index: int, level: int, size: int, local: float) -> float:
     texels = border(index + 1, level, size) - start
     texel = start + min(int(local * texels), texels - 1)
     place = (start + local * texels) / size
-    while int(place * size) < texel:
-        place = np.nextafter(place, 1.0)
-    while int(place * size) > texel:
-        place = np.nextafter(place, 0.0)
+    for _ in range(2):  # rounding is off by two steps at most
+        if int(place * size) < texel:
+            place = np.nextafter(place, 1.0)
+        elif int(place * size) > texel:
+            place = np.nextafter(place, 0.0)
     return place
 
 

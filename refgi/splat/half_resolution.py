@@ -56,10 +56,11 @@ def half_resolution(
     position, normal, covered = (np.asarray(part) for part in receivers)
     chosen = _chosen(covered)
     flat = [part.reshape(*part.shape[:-2], -1) for part in (position, normal, covered)]
-    coarse = evaluate(Receivers(*(np.ascontiguousarray(part[..., chosen]) for part in flat)))
+    blocks = Receivers(*(np.ascontiguousarray(part[..., chosen]) for part in flat))
+    coarse = evaluate(blocks)
     result = np.zeros(position.shape, coarse.dtype)
     agreed = np.zeros(covered.shape, np.bool_)
-    _interpolate(position, normal, covered, chosen, coarse, joint, result, agreed)
+    _interpolate(Receivers(position, normal, covered), blocks, chosen, coarse, joint, result, agreed)
     alone = np.flatnonzero(covered & ~agreed)
     if len(alone):
         here = Receivers(*(np.ascontiguousarray(part[..., alone][..., None, :]) for part in flat))
@@ -80,62 +81,59 @@ def _chosen(covered: Array) -> Array:
 
 @kernel(parallel=True)
 def _interpolate(
-    position: Array, normal: Array, covered: Array, chosen: Array, coarse: Array, joint: bool, result: Array,
-    agreed: Array,
+    pixels: Receivers, blocks: Receivers, chosen: Array, coarse: Array, joint: bool, result: Array, agreed: Array
 ) -> None:
-    for i in prange(covered.shape[0]):
-        for j in range(covered.shape[1]):
-            if covered[i, j]:
-                agreed[i, j] = _fill_pixel(position, normal, covered, chosen, coarse, joint, result, i, j)
+    for i in prange(agreed.shape[0]):
+        _fill_row(pixels, blocks, chosen, coarse, joint, result, agreed, i)
 
 
 @kernel
-def _fill_pixel(
-    position: Array, normal: Array, covered: Array, chosen: Array, coarse: Array, joint: bool, result: Array, i: int,
-    j: int,
-) -> bool:
-    """Give one pixel its mean of four blocks, or return False."""
-    width = covered.shape[1]
-    top, left = i // 2, j // 2
-    if chosen[top, left] == i * width + j:
-        for c in range(3):
-            result[c, i, j] = coarse[c, top, left]
-        return True
-    total, red, green, blue = 0.0, 0.0, 0.0, 0.0
-    for corner in range(4):
-        row, column = top + corner // 2, left + corner % 2
-        if row >= chosen.shape[0] or column >= chosen.shape[1]:
+def _fill_row(
+    pixels: Receivers, blocks: Receivers, chosen: Array, coarse: Array, joint: bool, result: Array, agreed: Array,
+    i: int,
+) -> None:
+    """Give the covered pixels of row i their mean of up to four blocks, and mark those that got one."""
+    real = coarse.dtype.type
+    x, n, xk, nk = pixels.position, pixels.normal, blocks.position, blocks.normal
+    height, width = chosen.shape
+    top = i // 2
+    for j in range(agreed.shape[1]):
+        if not pixels.covered[i, j]:
             continue
-        r, s = chosen[row, column] // width, chosen[row, column] % width
-        if not covered[r, s]:
-            continue
-        weight = (0.5 * (i % 2) if corner // 2 else 1.0 - 0.5 * (i % 2)) * (
-            0.5 * (j % 2) if corner % 2 else 1.0 - 0.5 * (j % 2))
-        weight *= _agreement(position, normal, i, j, r, s) if joint else 1.0
-        total += weight
-        # differences to the own block's value: a constant is then exact
-        red += weight * (coarse[0, row, column] - coarse[0, top, left])
-        green += weight * (coarse[1, row, column] - coarse[1, top, left])
-        blue += weight * (coarse[2, row, column] - coarse[2, top, left])
-    if total < LEAST_WEIGHT:
-        return False
-    result[0, i, j] = coarse[0, top, left] + red / total
-    result[1, i, j] = coarse[1, top, left] + green / total
-    result[2, i, j] = coarse[2, top, left] + blue / total
-    return True
+        left = j // 2
+        total, red, green, blue = real(0.0), real(0.0), real(0.0), real(0.0)
+        for corner in range(1 if chosen[top, left] == i * agreed.shape[1] + j else 4):
+            row, column = top + corner // 2, left + corner % 2
+            weight = real(0.25 * (2 - i % 2 if corner < 2 else i % 2) * (j % 2 if corner % 2 else 2 - j % 2))
+            if weight == real(0.0) or row >= height or column >= width or not blocks.covered[row, column]:
+                continue
+            if joint:
+                weight *= _agreement(
+                    xk[0, row, column] - x[0, i, j], xk[1, row, column] - x[1, i, j], xk[2, row, column] - x[2, i, j],
+                    n[0, i, j], n[1, i, j], n[2, i, j], nk[0, row, column], nk[1, row, column], nk[2, row, column])
+            total += weight
+            # differences to the own block's value: a constant is then exact
+            red += weight * (coarse[0, row, column] - coarse[0, top, left])
+            green += weight * (coarse[1, row, column] - coarse[1, top, left])
+            blue += weight * (coarse[2, row, column] - coarse[2, top, left])
+        if total >= real(LEAST_WEIGHT):
+            agreed[i, j] = True
+            result[0, i, j] = coarse[0, top, left] + red / total
+            result[1, i, j] = coarse[1, top, left] + green / total
+            result[2, i, j] = coarse[2, top, left] + blue / total
 
 
 @kernel
-def _agreement(position: Array, normal: Array, i: int, j: int, r: int, s: int) -> float:
-    cosine, height, square = 0.0, 0.0, 0.0
-    for axis in range(3):
-        step = position[axis, r, s] - position[axis, i, j]
-        cosine += normal[axis, r, s] * normal[axis, i, j]
-        height += normal[axis, i, j] * step
-        square += step * step
-    if cosine <= 0.0:
-        return 0.0
-    sine = min(1.0, abs(height) / math.sqrt(square)) if square > 0.0 else 0.0
+def _agreement(dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any, mx: Any, my: Any, mz: Any) -> Any:
+    """Return a of a block's pixel d away, given both normals."""
+    real = type(dx)
+    one, zero = real(1.0), real(0.0)
+    cosine = nx * mx + ny * my + nz * mz
+    square = dx * dx + dy * dy + dz * dz
+    if cosine <= zero:
+        return zero
+    sine = abs(dx * nx + dy * ny + dz * nz) / math.sqrt(square) if square > zero else zero
+    flat = one - (sine if sine < one else one)
     power = cosine * cosine
     power *= power
-    return power * power * (1.0 - sine) ** 2
+    return power * power * (flat * flat)

@@ -1,16 +1,18 @@
 """Splatting Indirect Illumination (Dachsbacher and Stamminger 2006): settings and method."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.scene.material import SHARPEST
 from refgi.scene.values import LARGEST
-from refgi.splat.irradiance import Receivers, irradiance
-from refgi.splat.selection import choose_lights, light_footprints
+from refgi.splat.half_resolution import half_resolution
+from refgi.splat.irradiance import Receivers
+from refgi.splat.selection import choose_lights, footprints
 from refgi.splat.settings import FOOTPRINT_CLAMPS, SplatSettings
+from refgi.splat.splat import splat
 from refgi.splat.walk import MOST_BOUNCES
 
 if TYPE_CHECKING:
@@ -58,12 +60,14 @@ class SiiSettings(SplatSettings):
     defensive: float = 0.0
     renormalise_weights: bool = False
     openness_radius: float = 0.0
-    openness_rays: int = 64
+    openness_rays: int = 16
     openness_floor: float = 0.05
     openness_flux: OpennessFlux = "none"
     refraction: Refraction = "back_face"
     refraction_exponent: float = 1000.0
     half_resolution: bool = False
+
+    SWITCHES: ClassVar[frozenset[str]] = SplatSettings.SWITCHES | {"sii_no_tn"}
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -74,8 +78,13 @@ class SiiSettings(SplatSettings):
         expect(1 <= self.bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", self.bounces)
         expect(self.clamp not in FOOTPRINT_CLAMPS or self.source == "rsm", "clamp",
                "one without footprints with the source 'walk'", self.clamp)
+        expect(self.clamp not in FOOTPRINT_CLAMPS or self.openness_flux != "roulette", "openness_flux",
+               f"'none' or 'scale' with the clamp {self.clamp!r}", self.openness_flux)
         expect(self.bounces == 1 or self.source == "walk", "bounces", "1 with the source 'rsm'", self.bounces)
         expect(self.warp == "none" or self.source == "rsm", "warp", "'none' with the source 'walk'", self.warp)
+        expect(self.warp == "none" or self.pattern != "all", "warp", "'none' with the pattern 'all'", self.warp)
+        expect(not self.half_resolution or self.bound not in ("quad", "mesh"), "bound",
+               "one in space, not on the screen, at half resolution", self.bound)
         expect(0 <= self.warp_levels <= 32, "warp_levels", "0 to 32", self.warp_levels)
         expect(0 <= self.openness_radius <= LARGEST, "openness_radius", f"0 to {LARGEST:g} m", self.openness_radius)
         expect(1 <= self.openness_rays <= 1 << 16, "openness_rays", "1 to 65536 rays", self.openness_rays)
@@ -101,6 +110,10 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
         Indirect irradiance, W/m^2, linear RGB, without visibility.
     """
     lights = choose_lights(frame, settings)  # Sec. 3.1, 3.5 to 3.7
-    footprint = light_footprints(frame.rsms, settings) if settings.clamp in FOOTPRINT_CLAMPS else None
+    footprint = footprints(frame, settings)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading
-    return irradiance(receivers, lights, settings, footprint)  # Eq. (2)
+
+    def lit(some: Receivers) -> Array:
+        return splat(some, lights, settings, footprint, frame.gbuffer.projection)  # Eq. (2), Sec. 3.4
+
+    return half_resolution(receivers, lit) if settings.half_resolution else lit(receivers)

@@ -163,7 +163,60 @@ def test_lobe_code_is_skipped_without_glossy_materials(box):
     assert log.status("splat.irradiance") == ["ran"]
 
 
+@pytest.mark.parametrize("change", [
+    {"warp": "A"}, {"warp": "B", "importance": "peak", "defensive": 0.2}, {"warp": "A", "importance": "openness"},
+    {"warp": "B", "filtered": True}, {"warp": "A", "renormalise_weights": True}, {"openness_flux": "scale"},
+    {"openness_flux": "roulette"}, {"source": "walk", "bounces": 2}, {"stochastic_range": True},
+    {"half_resolution": True}, {"clamp": "disc", "warp": "A"}, {"as_published": {"per_light_ilow"}},
+])
+@pytest.mark.parametrize("lamps", [1, 2])
+def test_settings_work_together_and_again(box, change, lamps):
+    light = box.scene.lights[0]
+    frame = Frame(box.scene.with_lights(*[light] * lamps), width=13, height=9, rsm_resolution=32)
+    settings = SiiSettings(lights=50, reference_length=0.3, **change)
+    picture = sii(frame, settings)
+    assert np.isfinite(picture).all()
+    assert picture.any()
+    assert (picture >= 0).all()
+    np.testing.assert_array_equal(sii(frame, settings), picture)
+
+
+def test_bounds_change_no_bit_of_the_picture(box):
+    pictures = [sii(box, SiiSettings(lights=100, reference_length=0.2, bound=bound))
+                for bound in ("full", "quad", "ellipsoid", "tangent", "mesh")]
+    for picture in pictures[1:]:
+        np.testing.assert_array_equal(picture, pictures[0])
+    assert pictures[0].sum() < 0.99 * sii(box, SiiSettings(lights=100, i_low=0)).sum()
+
+
+@pytest.mark.feature("REF-20")
+@pytest.mark.parametrize("lamps", [1, 2])
+def test_without_the_weight_a_picture_has_its_lights_share_of_the_texels(box, lamps, evidence):
+    """Section 0: what the paper leaves out is T/N."""
+    frame = Frame(box.scene.with_lights(*[box.scene.lights[0]] * lamps), width=12, height=12, rsm_resolution=64)
+    printed, calibrated = (sii(frame, SiiSettings(lights=64, i_low=0, as_published=names)).astype(float)
+                           for names in ({"sii_no_tn"}, ()))
+    factor = printed.sum() / calibrated.sum()
+    assert factor == pytest.approx(64 / (lamps * 64**2), rel=1e-6)
+    evidence(f"sii_no_tn, {lamps} maps of 64^2, 64 lights: {factor:.6g} = N/T to {factor * lamps * 64 - 1:.0e}")
+
+
+def test_scene_without_glass_is_not_searched_for_refraction(box):
+    with observe() as log:
+        with_it = sii(box, SiiSettings(lights=64))
+    assert log.status("rsm.refraction") == ["skipped"]
+    np.testing.assert_array_equal(with_it, sii(box, SiiSettings(lights=64, refraction="none")))
+
+
 def test_settings_are_checked():
-    for change in ({"lights": 0}, {"lights": 1 << 28}, {"pattern": "spiral"}, {"seed": -1}, {"offset": 1e300}):
+    for change in ({"lights": 0}, {"lights": 1 << 28}, {"pattern": "spiral"}, {"seed": -1}, {"offset": 1e300},
+                   {"i_low": -1}, {"i_low": math.nan}, {"reference_length": 0}, {"irradiance_low": math.inf},
+                   {"bound": "box"}, {"mesh_faces": 12}, {"source": "rays"}, {"warp": "C"}, {"warp_levels": -1},
+                   {"importance": "luck"}, {"defensive": 2}, {"openness_radius": -1}, {"openness_rays": 0},
+                   {"openness_floor": math.nan}, {"openness_flux": "on"}, {"refraction": "front"},
+                   {"refraction_exponent": -1}, {"bounces": 2}, {"warp": "A", "source": "walk"},
+                   {"warp": "A", "pattern": "all"}, {"clamp": "disc", "source": "walk"},
+                   {"bound": "quad", "half_resolution": True}, {"openness_flux": "roulette", "clamp": "disc"},
+                   {"as_published": {"sii_no_luck"}}):
         with pytest.raises(InputError, match=next(iter(change))):
             SiiSettings(**change)

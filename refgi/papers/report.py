@@ -80,7 +80,8 @@ def _failures(made: Reproduction) -> list[tuple[str, str]]:
 def _figure(outcome: Outcome, figure: Figure) -> dict[str, Any]:
     return {
         "key": outcome.entry.key, "label": outcome.entry.label, "title": outcome.entry.title, "shows": figure.shows,
-        "facts": figure.facts, "notes": figure.notes, "columns": figure.columns, "seconds": f"{number(outcome.seconds)} s",
+        "facts": figure.facts, "notes": figure.notes, "columns": figure.columns,
+        "seconds": f"{number(outcome.seconds)} s",
         "pictures": [_picture(picture) for picture in figure.pictures],
         "ratios": [_ratios(ratios) for ratios in figure.ratios],
         "tables": [_table(table) for table in figure.tables],

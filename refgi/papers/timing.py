@@ -3,6 +3,17 @@
 import statistics
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
+
+from refgi.stages import Memory
+
+
+class Redrawing(Memory):
+    """Keeps what the papers keep in textures between frames, and draws splats in every frame."""
+
+    def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
+        """Return whether a result for these inputs is kept, and the result; of splats none is."""
+        return (False, None) if name.startswith("splat.") else super().recall(name, inputs)
 
 
 def interleaved(work: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:

@@ -22,8 +22,8 @@ class Scale:
     photons: int  # of caustics, a pass
 
 
-FULL = Scale("full", 512, 256, 7, 192, 1 << 19)
-QUICK = Scale("quick", 256, 128, 3, 48, 1 << 18)
+FULL = Scale("full", 512, 256, 7, 192, 1 << 20)
+QUICK = Scale("quick", 256, 128, 3, 48, 1 << 19)
 
 
 class Workbench:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from refgi.papers import pictures
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Bar, Figure, Ratios, Table
-from refgi.papers.sii.subjects import BOX, full_sum, unshadowed_truth
+from refgi.papers.sii.subjects import BOX, full_sum, splats, unshadowed_truth
 from refgi.papers.timing import interleaved
-from refgi.splat import GatherSettings, SiiSettings, gather, sii
+from refgi.splat import GatherSettings, gather, sii
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench
@@ -53,19 +53,20 @@ def figure12(bench: "Workbench") -> Figure:
     rows = tuple((s.title, 1e3 * seconds[s.name], 1 / seconds[s.name], s.fps, *judged[s.name][0][:2],
                   *judged[s.name][1][:2]) for s in subjects)
     return Figure(
-        "Gathering with 1020, 308 and 156 samples, interpolated from every eighth pixel, against 768 and 108 splats.",
-        (BOX, "indirect light alone"), tuple(shown),
-        (Ratios(f"frames per second, relative to {slowest.title}",
+        shows="Gathering with 1020, 308 and 156 samples, interpolated from every eighth pixel, beside 768 and 108 "
+              "splats.",
+        facts=(BOX, "indirect light alone"), pictures=tuple(shown), columns=3,
+        ratios=(Ratios(f"frames per second, relative to {slowest.title}",
                 tuple(Bar(s.title, seconds[slowest.name] / seconds[s.name], s.fps / slowest.fps) for s in subjects)),),
-        (Table("Time and error, in % of the mean irradiance", (
+        tables=(Table("Time and error, in % of the mean irradiance", (
             "", "ms", "fps", "fps, paper", "RMSE to every texel", "MAE to every texel",
             "RMSE to truth without visibility", "MAE to truth without visibility"), rows, frozenset({3})),))
 
 
 def _subjects(bench: "Workbench") -> list[Subject]:
     grid = bench.scale.size // 8
-    samples = [Subject(f"gather{n}", f"RSM, {n} samples", GatherSettings(samples=n, grid=grid), fps)
+    gathered = [Subject(f"gather{n}", f"RSM, {n} samples", GatherSettings(samples=n, grid=grid), fps)
                for n, fps in ((1020, 14), (308, 44), (156, 82))]
-    splats = [Subject(f"sii{n}_{x}", f"SII, {n} lights, {x} %", SiiSettings(lights=n, i_low=x / 100), fps)
+    splatted = [Subject(f"sii{n}_{x}", f"SII, {n} lights, {x} %", splats(bench, BOX, lights=n, i_low=x / 100), fps)
               for n, x, fps in ((768, 5, 48), (768, 10, 83), (108, 5, 254))]
-    return samples + splats
+    return gathered + splatted

@@ -56,10 +56,10 @@ def figure6(bench: "Workbench") -> Figure:
     shown.append(pictures.seen("truth", "Path tracing", "one bounce", frame, truth))
     columns = ("", "RMSE to instant radiosity", "MAE", "darker by", "RMSE to path tracing", "MAE", "darker by")
     return Figure(
-        "Splatting beside instant radiosity in a ray tracer, both with 1000 lights of a quasi-random walk: the latter "
-        "has soft shadows of indirect light, yet the results are comparable.",
-        (SCENE, f"{half} by {half} pixels", f"{LIGHTS} lights, one bounce, no cut"), tuple(shown), (),
-        (Table("Errors, in % of the mean irradiance", columns, tuple(rows)),))
+        shows="Splatting beside instant radiosity in a ray tracer, both with 1000 lights of a quasi-random walk: the "
+              "latter has soft shadows of indirect light, yet the results are comparable.",
+        facts=(SCENE, f"{half} by {half} pixels", f"{LIGHTS} lights, one bounce, no cut"), pictures=tuple(shown),
+        columns=5, tables=(Table("Errors, in % of the mean irradiance", columns, tuple(rows)),))
 
 
 def _instant_radiosity(frame: "Frame", settings: SiiSettings) -> Array:

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Table
-from refgi.papers.sii.subjects import BOX, full_sum
+from refgi.papers.sii.subjects import BOX, full_sum, splats
 from refgi.papers.timing import interleaved
-from refgi.splat import SiiSettings, sii
+from refgi.splat import sii
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench
@@ -32,7 +32,7 @@ def headline(bench: "Workbench") -> Figure:
     """
     frame, full = bench.frame(BOX), full_sum(bench, BOX)
     covered = frame.gbuffer.covered
-    run = {share: partial(sii, frame, SiiSettings(lights=LIGHTS, i_low=share / 100)) for share in SHARES}
+    run = {share: partial(sii, frame, splats(bench, BOX, lights=LIGHTS, i_low=share / 100)) for share in SHARES}
     seconds = interleaved({str(share): work for share, work in run.items()}, bench.scale.repeats)
     rows = []
     for share, work in run.items():
@@ -42,8 +42,8 @@ def headline(bench: "Workbench") -> Figure:
                      PAPER_FPS.get(share), *off))
     pairs = LIGHTS * int(covered.sum()) / seconds["0"]
     return Figure(
-        "The paper has no such row: on its hardware every splat had to be cut.",
-        (BOX, f"{LIGHTS} lights", f"{pairs / 1e9:.2f} thousand million pairs a second"), (), (),
-        (Table("Time, and error against every texel in % of the mean irradiance",
+        shows="The paper has no such row: on its hardware every splat had to be cut.",
+        facts=(BOX, f"{LIGHTS} lights", f"{pairs / 1e9:.2f} thousand million pairs a second"),
+        tables=(Table("Time, and error against every texel in % of the mean irradiance",
                ("I_low", "ms", "fps", "fps, paper, 768 lights", "RMSE", "MAE", "energy lost"), tuple(rows),
                frozenset({3})),))

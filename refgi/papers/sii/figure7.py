@@ -1,0 +1,115 @@
+"""Figure 7: where the hierarchical warp puts lights, by level and method, and what that does to the picture."""
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.papers.judging import errors_of
+from refgi.papers.records import Figure, Picture, Table
+from refgi.papers.sii.subjects import full_sum
+from refgi.rays.openness import openness
+from refgi.rsm.importance import importance
+from refgi.rsm.pyramid import importance_pyramid
+from refgi.rsm.warp import warp_samples
+from refgi.sampling import halton
+from refgi.splat import SiiSettings, sii
+
+if TYPE_CHECKING:
+    from refgi.papers.workbench import Workbench
+
+Array = npt.NDArray[Any]
+
+SCENE = "stage"
+LIGHTS = 1024
+SEEDS = (1, 2, 3, 4)
+DOT = np.array((255, 176, 32), np.uint8)
+BASE = SiiSettings(lights=LIGHTS, i_low=0.0, importance="openness")
+
+
+def figure7(bench: "Workbench") -> Figure:
+    """Make Figure 7 again.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Sizes and frames.
+
+    Returns
+    -------
+    Figure
+        Samples over the importance map, and the error of the picture by level and method.
+    """
+    worth = importance_of(bench, SCENE)
+    points, pyramid = halton(LIGHTS), importance_pyramid(worth)
+    cases: list[tuple[Any, int]] = [("none", 0), *(("A", n) for n in range(1, 5)), *(("B", n) for n in range(1, 5))]
+    shown, rows = [], []
+    for method, levels in cases:
+        warped, weight = (points, np.ones(LIGHTS)) if method == "none" else warp_samples(
+            points, pyramid, levels, method)
+        title = "not warped" if method == "none" else f"method {method}, {levels} level{'s' * (levels > 1)}"
+        found = worth[_texels(warped, worth.shape)] > 0
+        shown.append(Picture(f"{method}{levels}", title, f"{found.mean():.0%} of the samples find light",
+                             _dotted(worth, warped)))
+        rmse, mae = _errors(bench, method, levels)
+        rows.append((title, 100 * float(found.mean()), float(weight.max()), rmse, mae))
+    shown.insert(5, Picture("importance", "the importance map", "flux times lobe peak times (1 - openness)",
+                            _dotted(worth, np.zeros((0, 2)))))
+    return Figure(
+        shows="Importance sampling by flux times (1 - openness) times lobe peak: three or more levels give good "
+              "samplings, and both methods comparable ones.",
+        facts=(SCENE, f"{LIGHTS} lights", f"errors: means over {len(SEEDS)} shifts of the points"),
+        pictures=tuple(shown), columns=5,
+        tables=(Table("Samples, and errors against every texel in % of the mean irradiance",
+                      ("", "find light, %", "largest weight", "RMSE", "MAE"), tuple(rows)),))
+
+
+def importance_of(bench: "Workbench", scene: str) -> Array:
+    """Return the importance map that the figure warps by.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Holds the frame.
+    scene : str
+        Name of the scene.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Flux times lobe peak times at least `openness_floor` of 1 - openness.
+    """
+    frame = bench.frame(scene)
+    rsm = frame.rsms[0]
+    radius = BASE.openness_radius or 0.1 * frame.scene.geometry.diagonal
+    covered = np.isfinite(rsm.depth)
+    share = openness(frame.tracer, rsm.position, rsm.normal, covered, radius=radius, rays=BASE.openness_rays, seed=0)
+    return importance(rsm, "openness", share, BASE.openness_floor)
+
+
+def _errors(bench: "Workbench", method: Any, levels: int) -> tuple[float, float]:
+    frame, full = bench.frame(SCENE), full_sum(bench, SCENE)
+    off = []
+    for seed in SEEDS:
+        settings = dataclasses.replace(BASE, warp=method, warp_levels=levels, seed=seed)
+        off.append(errors_of(sii(frame, settings), full, frame.gbuffer.covered)[:2])
+    rmse, mae = np.mean(off, axis=0)
+    return float(rmse), float(mae)
+
+
+def _texels(points: Array, shape: tuple[int, int]) -> tuple[Array, Array]:
+    height, width = shape
+    return (points[:, 1] * height).astype(np.int64), (points[:, 0] * width).astype(np.int64)
+
+
+def _dotted(worth: Array, points: Array) -> npt.NDArray[np.uint8]:
+    """Return the map in greys with a dot at each point."""
+    factor = max(1, 512 // len(worth))
+    grey = np.sqrt(np.clip(worth / (np.percentile(worth[worth > 0], 99) if worth.any() else 1.0), 0, 1))
+    large = np.repeat(np.repeat((grey * 190 + 0.5).astype(np.uint8), factor, axis=0), factor, axis=1)
+    pixels = np.repeat(large[..., None], 3, axis=2)
+    height, width = large.shape
+    for row, column in zip(*_texels(points, (height, width)), strict=True):
+        pixels[max(0, row - 1) : row + 2, max(0, column - 1) : column + 2] = DOT
+    return pixels

@@ -39,12 +39,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.radiometry import lobe_fraction
-from refgi.splat.irradiance import Receivers, irradiance
 from refgi.splat.light_side import LightSide, light_side
-from refgi.splat.pixel_area import pixel_areas
-from refgi.splat.selection import choose_lights, light_footprints
-from refgi.splat.settings import FOOTPRINT_CLAMPS
-from refgi.splat.sii import sii
+from refgi.splat.screen_side import screen_side
+from refgi.splat.selection import choose_lights, light_maps
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -53,8 +50,6 @@ if TYPE_CHECKING:
     from refgi.splat.sii import SiiSettings
 
 Array = npt.NDArray[Any]
-
-PRINTED_WIDENINGS = frozenset({"sii_widening", "sii_widening_unnorm"})
 
 
 MEANING = {
@@ -140,20 +135,19 @@ def energy_ledger(frame: "Frame", settings: "SiiSettings") -> Ledger:
     first, drawn, lights = _pixel_lights(frame, settings)
     flux = _flux(lights)
     sent, inwards, printed = _sent(lights, settings)
-    screen = _Screen(frame, settings, lights)
-    full, turned = screen.full(), screen.full(turned=True)
-    arrived, interpolated = screen.arrived()
+    screen = screen_side(frame, lights, settings)
     return Ledger(
         *side[:4], reflected=side.reflected, refracted=side.refracted,
         sampling=side.reflected + side.refracted - first, bounced=first - drawn, scaled=drawn - flux, lights=flux,
-        printed=printed + screen.printed_widening(full), arrived=arrived, interpolated=interpolated, cut=screen.cut(),
-        clamped=screen.clamped(), behind=inwards + turned, off_screen=sent - full - turned,
+        printed=printed + screen.printed, arrived=screen.arrived, interpolated=screen.interpolated, cut=screen.cut,
+        clamped=screen.clamped, behind=inwards + screen.behind, off_screen=sent - screen.full - screen.behind,
     )
 
 
 def _light_side(frame: "Frame", settings: "SiiSettings") -> LightSide:
     """Return the account of all lights together."""
-    sides = [light_side(rsm, frame.scene.geometry, frame.materials) for rsm in frame.rsms]
+    maps = frame.rsms if settings.source == "walk" else light_maps(frame, settings)
+    sides = [light_side(rsm, frame.scene.geometry, frame.materials) for rsm in maps]
     return LightSide(*(sum(line, np.zeros(3)) for line in zip(*sides, strict=True)))
 
 
@@ -197,53 +191,3 @@ def _lobe_shares(lights: "PixelLights", settings: "SiiSettings") -> tuple[Array,
     kept = np.array([lobe_fraction(c, p) for c, p in zip(cosine, exponent, strict=True)])
     whole = np.ones(count) if settings.lobe_norm == "full_lobe" else 2.0 * math.pi / (exponent + 1.0)
     return whole, kept * whole
-
-
-class _Screen:
-    """Sums over the pixels of one picture: irradiance times area, W."""
-
-    def __init__(self, frame: "Frame", settings: "SiiSettings", lights: "PixelLights") -> None:
-        buffer = frame.gbuffer
-        self.frame, self.settings, self.lights = frame, settings, lights
-        self.receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
-        self.area = pixel_areas(buffer, frame.scene.geometry)
-        self.footprint = light_footprints(frame.rsms, settings) if settings.clamp in FOOTPRINT_CLAMPS else None
-
-    def full(self, *, turned: bool = False, clamp: bool = False, widening: bool = False) -> Array:
-        """Sum all pairs within any range: on the receivers' other side, with the clamp, with widenings as printed."""
-        settings = dataclasses.replace(
-            self.settings, clamp=self.settings.clamp if clamp else "none",
-            as_published=self.settings.as_published - (frozenset() if widening else PRINTED_WIDENINGS))
-        receivers = self.receivers._replace(normal=-self.receivers.normal) if turned else self.receivers
-        return self._flux(irradiance(receivers, self.lights, settings, self.footprint))
-
-    def printed_widening(self, full: Array) -> Array:
-        """Return what a widening as printed takes."""
-        if self.settings.widening == 0 or not self.settings.as_published & PRINTED_WIDENINGS:
-            return np.zeros(3)
-        return full - self.full(widening=True)
-
-    def clamped(self) -> Array:
-        """Return what the clamp takes."""
-        if self.settings.clamp == "none":
-            return np.zeros(3)
-        return self.full(widening=True) - self.full(widening=True, clamp=True)
-
-    def arrived(self) -> tuple[Array, Array]:
-        """Return what the picture holds, and what its interpolation lost."""
-        arrived = self._flux(sii(self.frame, self.settings))
-        if not self.settings.half_resolution:
-            return arrived, np.zeros(3)
-        return arrived, self._flux(sii(self.frame, dataclasses.replace(self.settings, half_resolution=False))) - arrived
-
-    def cut(self) -> Array:
-        """Return what the range leaves out."""
-        if not self.settings.cuts:
-            return np.zeros(3)
-        from refgi.splat.splat import cut_irradiance
-
-        return self._flux(cut_irradiance(self.receivers, self.lights, self.settings, self.footprint,
-                                         self.frame.gbuffer.projection))
-
-    def _flux(self, values: Array) -> Array:
-        return np.asarray(np.einsum("chw,hw->c", values, self.area, dtype=np.float64))

@@ -202,6 +202,20 @@ def test_explain_says_what_is_skipped_and_why():
     assert "SII Table 1" in text
 
 
+@pytest.mark.feature("REF-04")
+def test_explain_tells_where_the_power_goes(evidence):
+    options = ("explain", "cornell_box", *TINY, "--set", "lights=16")
+    ledger = json.loads(run(*options, "--json").stdout)["ledger"]
+    parts = np.sum([ledger["rows"][name] for name in ledger["parts"]], axis=0)
+    assert parts == pytest.approx(ledger["rows"]["emitted"], rel=1e-5)
+    text = run(*options).stdout
+    table = text[text.index("Where the power of the lights goes"):]
+    for name in ("emitted", "reflected", "clamped", "cut", "behind", "off screen", "difference"):
+        assert name in table
+    assert json.loads(run("explain", "cornell_box", *TINY, "--method", "gather", "--json").stdout)["ledger"] is None
+    evidence(f"sii on the Cornell box: {len(ledger['parts'])} lines sum to what is emitted to 1e-5")
+
+
 def test_compare_writes_everything_and_prints_a_table(tmp_path):
     result = run("compare", "cornell_box", *TINY, "--methods", "sii", "--set", "sii.lights=16", "--set",
                  "truth.samples=24", "--out", tmp_path / "new" / "out")
@@ -213,6 +227,7 @@ def test_compare_writes_everything_and_prints_a_table(tmp_path):
     assert content["methods"]["sii"]["settings"]["lights"] == 16
     assert content["references"]["truth"]["settings"]["samples"] == 24
     assert content["size"] == [12, 10]
+    assert content["methods"]["sii"]["ledger"]["rows"]["arrived"][0] > 0
     assert "truth without visibility" in result.stdout
     assert read_exr(folder / "sii.exr")[0]["R"].shape == (10, 12)
 

@@ -139,10 +139,6 @@ def test_non_finite_pixels_are_counted_and_unsound(box, truth_settings):
     assert not got.is_sound
 
 
-class MethodWithLedger(Method):
-    ledger = "fake_methods:account"
-
-
 @pytest.mark.filterwarnings("ignore:a fake method")
 def test_a_ledger_is_asked_for_only_where_files_are_written(box, truth_settings, tmp_path, fakes):
     asked = []
@@ -153,7 +149,7 @@ def test_a_ledger_is_asked_for_only_where_files_are_written(box, truth_settings,
         return types.SimpleNamespace(rows=[row], difference=np.zeros(3))
 
     sys.modules["fake_methods"].account = account
-    fakes["seeing"] = MethodWithLedger(*fakes["seeing"])
+    fakes["seeing"] = fakes["seeing"]._replace(ledger="fake_methods:account")
     assert compare(box, truth_settings=truth_settings, **SIZE).results["seeing"].ledger is None
     assert not asked
     compare(box, truth_settings=truth_settings, out=tmp_path, **SIZE)

@@ -1,0 +1,66 @@
+"""A slow literal twin of the screen's side of the energy ledger: every pixel with every light, in float64."""
+
+import math
+
+import numpy as np
+
+from tests.naive import eq2
+
+
+def corner(x, y):
+    """Solid angle of the rectangle [0, x] x [0, y] on the plane z = 1."""
+    return math.atan2(x * y, math.sqrt(1 + x * x + y * y))
+
+
+def pixel_solid_angle(camera, width, height, i, j):
+    """Solid angle of pixel (row i, column j), from its four corners on the image plane."""
+    half = math.tan(camera.vfov / 2)
+    y0, y1 = ((2 * k / height - 1) * half for k in (i, i + 1))
+    x0, x1 = ((2 * k / width - 1) * half * width / height for k in (j, j + 1))
+    return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
+
+
+def area(camera, width, height, i, j, position, triangle):
+    """A = O d^2 / cos with the normal of the triangle (3 corners)."""
+    normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+    view = position - np.asarray(camera.eye)
+    distance = np.linalg.norm(view)
+    cosine = abs(normal @ view) / (np.linalg.norm(normal) * distance)
+    return pixel_solid_angle(camera, width, height, i, j) * distance**2 / cosine
+
+
+def bound(x, p, peak, axis, exponent):
+    """B = I_0 <axis . w>^n / r^2, the receiver's cosine taken as 1."""
+    r = np.linalg.norm(x - p)
+    return peak * max(0.0, float(axis @ ((x - p) / r))) ** exponent / r**2
+
+
+def screen(pixels, lights, threshold, least):
+    """Return arrived, cut, clamped and what meets visible surfaces from behind, (3,) W each.
+
+    `pixels` are (area, position, normal), the clamp is a minimum distance `least`, pairs count where B >= threshold.
+    """
+    lines = {name: np.zeros(3) for name in ("arrived", "cut", "clamped", "behind")}
+    for size, x, normal in pixels:
+        for k in range(lights.position.shape[1]):
+            for whole, clamped, behind, strength in terms(x, normal, lights, k, least):
+                lines["arrived" if strength >= threshold else "cut"] += size * clamped
+                lines["clamped"] += size * (whole - clamped)
+                lines["behind"] += size * behind
+    return lines
+
+
+def terms(x, normal, lights, k, least):
+    """Return of the diffuse part and of the lobe of light k: plain and clamped E, E on the other side, and B."""
+    p, n, flux = lights.position[:, k], lights.normal[:, k], lights.flux[:, k]
+    found = []
+    if flux.any():
+        found.append((eq2.pair(x, normal, p, n, flux), eq2.clamped_pair(x, normal, p, n, flux, least=least),
+                      eq2.pair(x, -normal, p, n, flux), bound(x, p, flux.max() / math.pi, n, 1.0)))
+    if lights.lobe_flux is not None and lights.lobe_flux[:, k].any():
+        axis, exponent, lobe = lights.lobe_axis[:, k], float(lights.lobe_exponent[k]), lights.lobe_flux[:, k]
+        e = eq2.lobe_pair(x, normal, p, n, axis, exponent, lobe)
+        r = np.linalg.norm(x - p)
+        found.append((e, e * r**2 / max(r, least) ** 2, eq2.lobe_pair(x, -normal, p, n, axis, exponent, lobe),
+                      bound(x, p, eq2.lobe_intensity(axis, n, axis, exponent, lobe).max(), axis, exponent)))
+    return found

@@ -170,8 +170,10 @@ def test_a_light_inside_glass_refracts_once(mode):
     row, column = np.argwhere(sent(glass))[len(np.argwhere(sent(glass))) // 3]
     ahead = glass.position[:, row, column] - inside
     ahead /= np.linalg.norm(ahead)
-    out, _ = bend(ahead, glass.normal[:, row, column], INDEX, 1.0)
+    out, share = bend(ahead, glass.normal[:, row, column], INDEX, 1.0)
+    incident = through(glass_ball(), light, mode, 32, fresnel=False)[1].lobe_flux[:, row, column]
     assert glass.lobe_axis[:, row, column] == pytest.approx(out, abs=1e-6)
+    assert glass.lobe_flux[:, row, column] == pytest.approx(share * incident, rel=1e-6)  # no front has reflected any
     assert glass.lobe_flux[0].sum() < 4 * math.pi
     assert glass.lobe_flux[0].sum() > 0.5 * 4 * math.pi
 

@@ -24,7 +24,6 @@ from refgi.rsm.gbuffer import GBuffer
 from refgi.rsm.raster import rasterize
 from refgi.rsm.reflective import Rsm, _incident_flux
 from refgi.rsm.snell import refract
-from refgi.rsm.solid_angle import texel_solid_angles
 from refgi.scene.material import SHARPEST
 from refgi.scene.model import DirectionalLight, Geometry, MaterialTable
 from refgi.stages import skip, stage
@@ -111,14 +110,18 @@ def _refracted(
     rsm: Rsm, geometry: Geometry, materials: MaterialTable, exponent: float, tracer: Rays | None, fresnel: bool
 ) -> Rsm:
     """Find the exits of the light through glass texels and put lobes there."""
-    glass = np.append(materials.ior[geometry.material_of_face] > 0, False)  # the last for -1, nothing seen
-    texel = np.flatnonzero(glass[rsm.triangle_id.reshape(-1)])
+    glass = materials.ior[geometry.material_of_face] > 0
+    texel = np.flatnonzero(np.append(glass, False)[rsm.triangle_id.reshape(-1)])  # the last for -1, nothing seen
     if not len(texel):
         return rsm
+    away = _looks_away(rsm, geometry, glass)
+    front = _fronts(rsm, geometry, materials, texel)
+    enters = ~away[rsm.triangle_id.reshape(-1)[texel]]  # a light inside the glass meets its exit at once
     if tracer is None:
-        exits = _straight_exits(rsm, geometry, materials, texel)
+        behind = _without_fronts(geometry, glass, away)
+        exits = _straight_exits(rsm, behind, materials, front, enters)
     else:
-        exits = _bent_exits(rsm, geometry, materials, texel, tracer)
+        exits = _bent_exits(geometry, materials, front, enters, tracer)
     axis, share = refract(exits.direction, exits.normal, exits.eta)
     if not fresnel:
         share = np.where(share > 0, 1.0, 0.0)
@@ -126,13 +129,18 @@ def _refracted(
     return _with_lobes(rsm, exits, axis, exits.share * share, exponent)
 
 
-def _straight_exits(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: Array) -> Exits:
-    """Find the first glass face along each texel's ray that looks away from the light."""
-    behind = _without_fronts(rsm, geometry, materials)
+def _fronts(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: Array) -> Exits:
+    """Return where light meets glass, with normals along it."""
+    position, against = (part.reshape(3, -1)[:, texel].astype(np.float64) for part in (rsm.position, rsm.normal))
+    eta = materials.ior[geometry.material_of_face[rsm.triangle_id.reshape(-1)[texel]]].astype(np.float64)
+    return Exits(texel, position, -against, _light_direction(rsm, position), eta, np.ones(len(texel)))
+
+
+def _straight_exits(rsm: Rsm, behind: Geometry, materials: MaterialTable, front: Exits, enters: Array) -> Exits:
+    """Find what lies first behind each front: glass that looks away from the light lets light out."""
     view = GBuffer(behind, materials, rsm.projection, rasterize(behind, rsm.projection), rsm.position.dtype)
-    position, inward, material = (part.reshape(-1, rsm.texels)[:, texel] for part in
+    position, inward, material = (part.reshape(-1, rsm.texels)[:, front.texel] for part in
                                   view.resolve("position", "normal", "material_id"))
-    front, enters = _fronts(rsm, geometry, materials, texel)
     _, share = refract(front.direction, front.normal, 1 / front.eta)
     eta = np.append(materials.ior, 0)[material[0]]  # -1: nothing
     exits = front._replace(position=position.astype(np.float64), normal=-inward.astype(np.float64),
@@ -140,9 +148,8 @@ def _straight_exits(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texe
     return _taken(exits, eta > 0)
 
 
-def _bent_exits(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: Array, tracer: Rays) -> Exits:
+def _bent_exits(geometry: Geometry, materials: MaterialTable, front: Exits, enters: Array, tracer: Rays) -> Exits:
     """Refract at the front and trace to the next glass face from within."""
-    front, enters = _fronts(rsm, geometry, materials, texel)
     bent, share = refract(front.direction, front.normal, 1 / front.eta)
     start = front.position + tracer.offset * bent
     hits = tracer.closest(start.T, bent.T)
@@ -151,7 +158,8 @@ def _bent_exits(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: A
     normal = _outward_normals(geometry, triangle, position)
     eta = materials.ior[geometry.material_of_face[triangle]].astype(np.float64)
     found = enters & (hits.triangle_id >= 0) & (eta > 0) & ((bent * normal).sum(axis=0) > 0)
-    far, at_once = _taken(Exits(texel, position, normal, bent, eta, share), found), _taken(front, ~enters)
+    far = _taken(Exits(front.texel, position, normal, bent, eta, share), found)
+    at_once = _taken(front, ~enters)
     return Exits(*(np.concatenate(parts, axis=-1) for parts in zip(far, at_once, strict=True)))
 
 
@@ -159,27 +167,21 @@ def _taken(exits: Exits, chosen: Array) -> Exits:
     return Exits(*(part[..., chosen] for part in exits))
 
 
-def _fronts(rsm: Rsm, geometry: Geometry, materials: MaterialTable, texel: Array) -> tuple[Exits, Array]:
-    """Return where light meets glass, normals along it, and whether it enters: a light inside leaves there."""
-    triangle = rsm.triangle_id.reshape(-1)[texel]
-    position, against = (part.reshape(3, -1)[:, texel].astype(np.float64) for part in (rsm.position, rsm.normal))
-    direction = _light_direction(rsm, position)
-    enters: Array = (_face_cross(geometry, triangle) * direction).sum(axis=0) < 0
-    eta = materials.ior[geometry.material_of_face[triangle]].astype(np.float64)
-    return Exits(texel, position, -against, direction, eta, np.ones(len(texel))), enters
+def _looks_away(rsm: Rsm, geometry: Geometry, glass: Array) -> Array:
+    """Tell which triangles are glass whose outer side looks away from the light."""
+    away = np.zeros(len(glass), np.bool_)
+    place = geometry.vertices[geometry.faces[glass, 0]].T
+    away[glass] = (_face_cross(geometry, np.flatnonzero(glass)) * _light_direction(rsm, place)).sum(axis=0) > 0
+    return away
 
 
-def _without_fronts(rsm: Rsm, geometry: Geometry, materials: MaterialTable) -> Geometry:
+def _without_fronts(geometry: Geometry, glass: Array, away: Array) -> Geometry:
     """Return the glass that looks away from the light, and the opaque triangles that may lie in front of it."""
-    glass = materials.ior[geometry.material_of_face] > 0
-    corner = geometry.vertices[geometry.faces[glass]]
-    away = (_face_cross(geometry, np.flatnonzero(glass)) * _light_direction(rsm, corner[:, 0].T)).sum(axis=0) > 0
+    corner = geometry.vertices[np.unique(geometry.faces[glass])]
     # one bit a side of the glass's box: a triangle whose corners share one lies outside
-    low, high = corner.min(axis=(0, 1)), corner.max(axis=(0, 1))
-    side = np.packbits(np.concatenate([geometry.vertices < low, geometry.vertices > high], axis=1), axis=1)[:, 0]
-    outside = np.bitwise_and.reduce(side[geometry.faces], axis=1) != 0
-    kept = ~glass & ~outside
-    kept[glass] = away
+    beyond = np.concatenate([geometry.vertices < corner.min(axis=0), geometry.vertices > corner.max(axis=0)], axis=1)
+    side = np.packbits(beyond, axis=1)[:, 0][geometry.faces]
+    kept = away | (~glass & (side[:, 0] & side[:, 1] & side[:, 2] == 0))
     return Geometry(geometry.vertices, geometry.faces[kept], geometry.material_of_face[kept], geometry.vertex_normals)
 
 
@@ -213,7 +215,7 @@ def _outward_normals(geometry: Geometry, triangle: Array, position: Array) -> Ar
 
 def _with_lobes(rsm: Rsm, exits: Exits, axis: Array, share: Array, exponent: float) -> Rsm:
     """Return the map with lobes of the given axes and shares of the incident flux at the exits."""
-    incident = _incident_flux(rsm.light, rsm.projection, texel_solid_angles(rsm.projection), np.dtype(np.float64))
+    incident = _incident_flux(rsm.light, rsm.projection, rsm.solid_angle, rsm.flux.dtype)
     lit = share > 0
     texel = exits.texel[lit]
     if rsm.lobe_flux is None or rsm.lobe_axis is None or rsm.lobe_exponent is None:

@@ -201,6 +201,15 @@ def test_no_levels_give_the_lights_of_no_warp():
         np.testing.assert_array_equal(plain.flux, warped.flux)
 
 
+def test_equally_important_faces_get_the_lights_of_no_warp():
+    rsm = cube_map()
+    for pattern in ("grid", "halton"):
+        plain, warped = (choose_pixel_lights([rsm], count=54, pattern=pattern, seed=2, warp=warp, importance=worth)
+                         for warp, worth in ((None, None), (Warp("A", 0), [np.ones(rsm.depth.shape)])))
+        np.testing.assert_array_equal(plain.texel, warped.texel)
+        np.testing.assert_allclose(plain.flux, warped.flux, rtol=ROUNDING)
+
+
 @pytest.mark.feature("SII-03")
 @pytest.mark.parametrize("source", ["spot", "cube"])
 def test_filtered_warped_lights_carry_the_flux_nearest_to_them_without_weight(source, evidence):

@@ -94,9 +94,11 @@ def ground_and_walls(n):
 
 @pytest.fixture(scope="module")
 def chosen(scene):
-    """256 lights of an unwarped pattern, as in Table 3, and their openness."""
+    """256 lights of an unwarped pattern, as in Table 3, each with a broad lobe too, and their openness."""
     rsm, share, _, _ = scene
     lights = choose_pixel_lights([rsm], count=256, pattern="grid")
+    lights = lights._replace(lobe_flux=0.2 * lights.flux, lobe_axis=lights.normal,
+                             lobe_exponent=np.full_like(lights.lobe_exponent, 3.0))
     return lights, share.reshape(-1)[lights.texel]
 
 

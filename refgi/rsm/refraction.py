@@ -74,7 +74,7 @@ def refracted(
         Phong exponent P of the lobes around the refracted rays; the paper states none. A lobe is about a way / sqrt(P)
         wide where it lands, which should be near the distance between lights on the glass: 3000 suits 4096 lights.
     tracer : Rays, optional
-        Traces rays through `geometry`; "two_interface" needs it.
+        Traces rays through `geometry`; "two_interface" needs it where a material is glass.
     fresnel : bool
         Leave out what the faces reflect; False lets all through that is not totally reflected.
 
@@ -98,10 +98,10 @@ def refracted(
     """
     expect(mode in get_args(Mode), "mode", "'back_face' or 'two_interface'", mode)
     expect(0 <= exponent <= SHARPEST, "exponent", f"a Phong exponent from 0 to {SHARPEST:g}", exponent)
-    expect(mode == "back_face" or tracer is not None, "tracer", "one for the mode 'two_interface'", None)
     if not materials.ior.any():
         skip("rsm.refraction", "no material is glass")
         return rsm
+    expect(mode == "back_face" or tracer is not None, "tracer", "one for the mode 'two_interface'", None)
     return _refracted(rsm, geometry, materials, exponent, tracer if mode == "two_interface" else None, fresnel)
 
 

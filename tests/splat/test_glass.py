@@ -6,10 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.rsm import choose_pixel_lights, reflective_shadow_map
 from refgi.rsm.refraction import refracted
-from refgi.scene import DirectionalLight, Material, material_table, merge
+from refgi.scene import DirectionalLight, Material, load_scene, material_table, merge
 from refgi.scene.builtin.surfaces import sphere
 from tests.naive.refraction import through_ball
 from tests.splat.pictures import Picture, on_floor, published_lights
@@ -127,3 +128,23 @@ def test_the_balls_caustic_lies_where_the_truth_has_it(source, data_dir, evidenc
     error, flux, away = found["back_face"]  # the simplification: too long a focus, and half of the light is lost
     assert flux == pytest.approx(0.5, abs=0.05)
     assert away < 5e-3
+
+
+@pytest.mark.feature("SII-09")
+def test_the_exponent_balances_blur_and_noise(evidence):
+    frame = Frame(load_scene("glass_ball"))
+    x, z = np.meshgrid(np.linspace(-0.2, 0.08, 48), np.linspace(-0.17, 0.11, 48))
+
+    def lit(rsm, exponent, count):
+        glass = refracted(rsm, frame.scene.geometry, frame.materials, "two_interface", exponent, tracer=frame.tracer)
+        glass = glass._replace(flux=np.zeros_like(glass.flux))  # the caustic alone
+        return on_floor(choose_pixel_lights([glass], count=count, pattern="halton" if count else "all"), x, z)
+
+    dense = lit(reflective_shadow_map(frame.scene.geometry, frame.materials, frame.scene.lights[0], 1024), 3e4, None)
+    errors = {}
+    for exponent in (300.0, 3000.0, 30000.0):
+        some = lit(frame.rsms[0], exponent, 25_000)  # 4096 of them fall on the ball
+        errors[exponent] = np.sqrt(((some - dense) ** 2).mean() / (dense**2).mean())
+    evidence("RMSE of the caustic of 4096 lights on the ball: "
+             + ", ".join(f"P = {exponent:.0f}: {error:.1%}" for exponent, error in errors.items()))
+    assert errors[3000.0] == min(errors.values())

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.jit import kernel
 from refgi.rsm.reflective import Rsm
 from refgi.stages import stage
 
@@ -61,16 +62,30 @@ def importance(
     expect(0 <= floor <= 1, "floor", "0 to 1", floor)
     expect(0 <= defensive <= 1, "defensive", "0 to 1", defensive)
     real = rsm.flux.dtype.type
-    flux = rsm.flux
-    if rsm.lobe_flux is not None and rsm.lobe_exponent is not None:
-        peak = real(1) if kind == "flux" else (rsm.lobe_exponent + real(1)) / real(2)
-        flux = flux + rsm.lobe_flux * peak
-    worth: Array = flux.max(axis=0)
+    if rsm.lobe_flux is None or rsm.lobe_exponent is None:
+        worth: Array = rsm.flux.max(axis=0)
+    else:
+        worth = np.empty_like(rsm.flux[0])
+        _add_lobes(rsm.flux, rsm.lobe_flux, rsm.lobe_exponent, kind != "flux", worth)
     if kind == "openness":
         worth = worth * _hidden(rsm, openness, real(floor))
     if defensive:
         worth = real(1 - defensive) * worth + real(defensive * worth.mean(dtype=np.float64))
     return worth
+
+
+@kernel
+def _add_lobes(flux: Array, lobe_flux: Array, exponent: Array, by_peak: bool, worth: Array) -> None:
+    """Fill the largest channel of Phi_diffuse + g(P) Phi_lobe; g = 1 unless `by_peak`."""
+    real = worth.dtype.type
+    one, half = real(1), real(0.5)
+    for row in range(worth.shape[0]):
+        for column in range(worth.shape[1]):
+            peak = half * (exponent[row, column] + one) if by_peak else one
+            most = real(0)
+            for c in range(3):
+                most = max(most, flux[c, row, column] + peak * lobe_flux[c, row, column])
+            worth[row, column] = most
 
 
 def _hidden(rsm: Rsm, openness: Array | None, floor: Any) -> Array:

@@ -1,7 +1,7 @@
 """Indirect light at half the resolution of the picture (SII Table 3): one pixel of each 2 x 2 is lit.
 
 The paper gives frame rates of a 256^2 indirect image under a 512^2 picture and no filter. Here a pixel takes the
-bilinear mean of the four blocks around it, each weighted by how much its surface is the pixel's own:
+bilinear mean of the four blocks around it, each weighted by how much its surface is the pixel's own::
 
     a = max(0, n . n_k)^8 (1 - |n . (x_k - x)| / |x_k - x|)^2,
 

@@ -24,6 +24,7 @@ Array = npt.NDArray[Any]
 SCENE = "stage"
 LIGHTS = 1024
 SEEDS = (1, 2, 3, 4)
+CASES: list[tuple[Any, int]] = [("none", 0), *((method, n) for method in "AB" for n in range(1, 5))]
 DOT = np.array((255, 176, 32), np.uint8)
 BASE = SiiSettings(lights=LIGHTS, i_low=0.0, importance="openness")
 
@@ -43,17 +44,16 @@ def figure7(bench: "Workbench") -> Figure:
     """
     worth = importance_of(bench, SCENE)
     points, pyramid = halton(LIGHTS), importance_pyramid(worth)
-    cases: list[tuple[Any, int]] = [("none", 0), *(("A", n) for n in range(1, 5)), *(("B", n) for n in range(1, 5))]
-    shown, rows = [], []
-    for method, levels in cases:
+    shown, rows, off = [], [], {}
+    for method, levels in CASES:
         warped, weight = (points, np.ones(LIGHTS)) if method == "none" else warp_samples(
             points, pyramid, levels, method)
         title = "not warped" if method == "none" else f"method {method}, {levels} level{'s' * (levels > 1)}"
-        found = worth[_texels(warped, worth.shape)] > 0
-        shown.append(Picture(f"{method}{levels}", title, f"{found.mean():.0%} of the samples find light",
+        found = 100 * float((worth[_texels(warped, worth.shape)] > 0).mean())
+        off[method, levels] = _errors(bench, method, levels)
+        shown.append(Picture(f"{method}{levels}", title, f"{found:.0f} % of the samples find light",
                              _dotted(worth, warped)))
-        rmse, mae = _errors(bench, method, levels)
-        rows.append((title, 100 * float(found.mean()), float(weight.max()), rmse, mae))
+        rows.append((title, found, float(weight.max()), *off[method, levels]))
     shown.insert(5, Picture("importance", "the importance map", "flux times lobe peak times (1 - openness)",
                             _dotted(worth, np.zeros((0, 2)))))
     return Figure(
@@ -62,7 +62,21 @@ def figure7(bench: "Workbench") -> Figure:
         facts=(SCENE, f"{LIGHTS} lights", f"errors: means over {len(SEEDS)} shifts of the points"),
         pictures=tuple(shown), columns=5,
         tables=(Table("Samples, and errors against every texel in % of the mean irradiance",
-                      ("", "find light, %", "largest weight", "RMSE", "MAE"), tuple(rows)),))
+                      ("", "find light, %", "largest weight", "RMSE", "MAE"), tuple(rows)),),
+        notes=_notes(off))
+
+
+def _notes(off: dict[tuple[str, int], tuple[float, float]]) -> tuple[str, ...]:
+    plain, a, b = (off[case] for case in (("none", 0), ("A", 3), ("B", 3)))
+    best = min(off, key=lambda case: off[case][0])
+    return (
+        f"Three levels bring the RMSE from {plain[0]:.0f} % to {a[0]:.0f} % by method A and {b[0]:.0f} % by method B, "
+        f"the MAE from {plain[1]:.1f} % to {a[1]:.1f} % and {b[1]:.1f} %. The least RMSE is that of method {best[0]} "
+        f"with {best[1]} levels ({off[best][0]:.0f} %).",
+        "The importance is that of light near other surfaces, not of flux alone, so lights gather along edges. It "
+        "shows in the RMSE, which a few pixels next to such edges lead, more than in the MAE. A sample in a dark part "
+        "of a cell keeps a large weight, which is why the errors do not fall with every single level.",
+    )
 
 
 def importance_of(bench: "Workbench", scene: str) -> Array:

@@ -16,7 +16,7 @@ PAPER_PIXELS = 512 * 512
 SAMPLES = 308  # of the gathering that Section 6 is about
 MEGABYTE = 8 * 2**20  # bits
 GREYS = Scale(0.0, 256.0, "gray", "splats")
-BOUNDS = {"full": "none", "quad": "screen quad", "mesh": "mesh of 80 faces", "ellipsoid": "ellipsoid of the appendix",
+BOUNDS = {"full": "none", "quad": "screen quad", "ellipsoid": "ellipsoid of the appendix",
           "tangent": "tangent-family ellipsoid"}
 
 

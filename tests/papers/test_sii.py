@@ -1,0 +1,89 @@
+"""Every figure of the 2006 paper, made tiny: what it holds, and that the printed numbers are the paper's."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.papers.catalogue import find_paper
+from refgi.papers.files import as_json
+from refgi.papers.report import page
+from refgi.papers.runner import reproduce
+from refgi.papers.workbench import Scale
+
+TINY = Scale("tiny", 32, 32, 1, 2, 256)
+KEYS = ["fig4", "fig6", "fig7", "fig8", "fig11", "fig12", "table1", "table2", "table3", "full"]
+
+
+@pytest.fixture(scope="module")
+def made():
+    return reproduce("sii", scale=TINY)
+
+
+@pytest.fixture(scope="module")
+def figures(made):
+    assert made.failures == {}
+    return {outcome.entry.key: outcome.figure for outcome in made.outcomes}
+
+
+def ratios(figure):
+    return {bar.label: bar.paper for one in figure.ratios for bar in one.bars}
+
+
+def test_every_figure_is_made_and_has_a_place_on_the_page(made, figures):
+    assert [entry.key for entry in find_paper("sii").load()] == KEYS == list(figures)
+    assert made.is_sound
+    html = page(made)
+    for outcome in made.outcomes:
+        assert f'<section id="{outcome.entry.key}"' in html
+        assert outcome.figure.notes, f"{outcome.entry.key} does not say how its shape compares"
+    assert html.count("<img width") == sum(len(figure.pictures) for figure in figures.values())
+    assert as_json(made)["sound"] is True
+
+
+def test_pictures_are_of_the_runs_size_and_finite(figures):
+    for key, figure in figures.items():
+        for picture in figure.pictures:
+            assert picture.pixels.dtype == np.uint8
+            for name, plane in picture.planes.items():
+                assert np.isfinite(plane).all(), (key, picture.name, name)
+                assert plane.shape == picture.pixels.shape[:2]
+        assert len({picture.name for picture in figure.pictures}) == len(figure.pictures)
+
+
+def test_every_number_is_finite(figures):
+    for key, figure in figures.items():
+        values = [value for one in figure.ratios for bar in one.bars for value in bar[1:]]
+        values += [cell for table in figure.tables for row in table.rows for cell in row]
+        assert all(math.isfinite(value) for value in values if isinstance(value, float)), key
+        assert all(len(row) == len(table.columns) for table in figure.tables for row in table.rows)
+
+
+# as printed: frames per second of Figures 4, 11 and 12 and Table 3, milliseconds of Tables 1 and 2
+@pytest.mark.parametrize(("key", "label", "ratio"), [
+    ("fig4", "glass ball, back faces alone", 150 / 95), ("fig11", "5 %", 54 / 14), ("fig11", "7 %", 74 / 14),
+    ("fig12", "RSM, 308 samples", 44 / 14), ("fig12", "RSM, 156 samples", 82 / 14),
+    ("fig12", "SII, 768 lights, 5 %", 48 / 14), ("fig12", "SII, 768 lights, 10 %", 83 / 14),
+    ("fig12", "SII, 108 lights, 5 %", 254 / 14),
+    ("table1", "dynamic light, static camera", 10.8 / 10.4), ("table1", "static light, dynamic camera", 9.3 / 10.4),
+    ("table1", "static scene, just render", 6.9 / 10.4),
+    ("table2", "A, 4096 samples, 4 levels", 3.484 / 0.123), ("table2", "B, 1024 samples, 1 level", 0.111 / 0.123),
+    ("table3", "full resolution", 37 / 27), ("table3", "half resolution", 85 / 63),
+])
+def test_the_papers_ratios_are_the_printed_ones(figures, key, label, ratio):
+    assert ratios(figures[key])[label] == pytest.approx(ratio, rel=1e-12)
+
+
+def test_the_overdraw_is_that_of_figure_8(figures):
+    rows = {name: (here, paper) for name, here, paper in figures["fig8"].tables[0].rows}
+    assert rows["fragments a light"][1] == pytest.approx(42667, abs=1)  # 512^2 * 125 / 768
+    here, paper = rows["mean overdraw"]
+    assert here == pytest.approx(paper, rel=0.1)  # the reference length is sought on 64 x 64 pixels
+
+
+def test_a_larger_cut_loses_more(figures):
+    lost = [row[-1] for row in figures["fig11"].tables[0].rows]
+    drawn = [row[4] for row in figures["fig11"].tables[0].rows]
+    assert lost[0] == 0
+    assert lost == sorted(lost)
+    assert drawn == sorted(drawn, reverse=True)

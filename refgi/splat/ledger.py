@@ -4,7 +4,8 @@ Light, exact (`light_side`):
 
     emitted = missed + absorbed + glass + reflected + refracted
 
-Pixel lights. N draws estimate what is handed on, later bounces of a walk and openness change it:
+Pixel lights. N draws estimate what is handed on (without T/N, `sii_no_tn`, they lose most of it), later bounces of a
+walk and openness change it:
 
     reflected + refracted - sampling - bounced - scaled = sum of Phi_i
 

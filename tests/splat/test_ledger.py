@@ -38,7 +38,7 @@ CASES = [
     ("cornell_box", {"warp": "B", "openness_flux": "roulette"}),
     ("cornell_box", {"as_published": {"sii_no_pi", "sii_no_tn", "per_light_ilow"}}),
     ("ring", {"lobe_norm": "full_lobe", "i_low": 0.5}),
-    ("ring", {"lobe_norm": "none", "widening": 0.02, "as_published": {"sii_widening"}, "clamp": "distance",
+    ("ring", {"lobe_norm": "none", "widening": 0.5, "as_published": {"sii_widening"}, "clamp": "distance",
               "clamp_value": 0.05}),
     ("ring", {"stochastic_range": True, "i_low": 0.5, "clamp": "disc"}),
     ("glass_ball", {"refraction": "back_face"}),

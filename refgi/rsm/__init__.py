@@ -14,7 +14,8 @@ from refgi.rsm.pixel_lights import PixelLights, choose_pixel_lights
 from refgi.rsm.projection import Projection, camera_projection, project
 from refgi.rsm.pyramid import importance_pyramid
 from refgi.rsm.raster import Visibility, rasterize
-from refgi.rsm.reflective import Rsm, reflective_shadow_map
+from refgi.rsm.reflective import Rsm, incident_flux, reflective_shadow_map, texel_shares
+from refgi.rsm.refraction import refracted
 from refgi.rsm.warp import Warp, warp_samples, warp_stacked
 
 __all__ = [
@@ -30,11 +31,14 @@ __all__ = [
     "gbuffer",
     "importance",
     "importance_pyramid",
+    "incident_flux",
     "paraboloid_depth_maps",
     "project",
     "rasterize",
     "reflective_shadow_map",
+    "refracted",
     "shadow_map_visibility",
+    "texel_shares",
     "warp_samples",
     "warp_stacked",
 ]

@@ -123,7 +123,7 @@ def reflective_shadow_map(
     channels = ("depth", "position", "normal", "albedo", *(("material_id",) if glossy or materials.ior.any() else ()))
     depth, position, normal, albedo, *material = view.resolve(*channels)
     solid_angle = texel_solid_angles(maps)
-    incident = _incident_flux(light, maps, solid_angle, np.dtype(dtype))
+    incident = incident_flux(light, maps, solid_angle, dtype)
     lobe: tuple[Array, ...] = ()
     if material:
         incident *= (materials.ior == 0)[material[0]]
@@ -184,19 +184,59 @@ def light_projection(light: Light, geometry: Geometry, resolution: int, shape: M
     return makers[name]()
 
 
-def _incident_flux(light: Light, maps: Projection, solid_angle: Array, dtype: np.dtype[Any]) -> Array:
-    """Return the flux that arrives through each texel, (3, H, W), W."""
+def texel_shares(light: Light, maps: Projection, solid_angle: Array | None = None) -> Array:
+    """Return how much of a light each texel of its maps takes in.
+
+    Parameters
+    ----------
+    light : Light
+        Whose maps.
+    maps : Projection
+        The maps.
+    solid_angle : (H, W) ndarray, optional
+        `texel_solid_angles(maps)`, where it is known.
+
+    Returns
+    -------
+    (H, W) ndarray
+        What the intensity on the axis is multiplied by, sr: the solid angle, weighed by a spot's falloff. Directional:
+        the area perpendicular to the light, m^2.
+    """
     if isinstance(light, SpotLight):
         cosines = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
-        if maps.maps > 1:
-            axis = np.asarray(light.direction) / np.linalg.norm(light.direction)
-            solid_angle = solid_angle * sampled_spot_share(maps, axis, *cosines)
-        else:
-            solid_angle = spot_power(maps, *cosines)
+        if maps.maps == 1:
+            return spot_power(maps, *cosines)
+    share = texel_solid_angles(maps) if solid_angle is None else solid_angle
+    if isinstance(light, SpotLight):
+        axis = np.asarray(light.direction) / np.linalg.norm(light.direction)
+        share = share * sampled_spot_share(maps, axis, *cosines)
+    return share
+
+
+def incident_flux(light: Light, maps: Projection, solid_angle: Array | None, dtype: npt.DTypeLike) -> Array:
+    """Return the flux that arrives through each texel of a light's maps.
+
+    Parameters
+    ----------
+    light : Light
+        Whose maps.
+    maps : Projection
+        The maps.
+    solid_angle : (H, W) ndarray, optional
+        `texel_solid_angles(maps)`, where it is known.
+    dtype : dtype
+        Of the result.
+
+    Returns
+    -------
+    (3, H, W) ndarray
+        W, whatever is met.
+    """
+    share = texel_shares(light, maps, solid_angle)
     strength = light.irradiance if isinstance(light, DirectionalLight) else light.intensity
-    incident = np.empty((3, *solid_angle.shape), dtype)
+    incident = np.empty((3, *share.shape), dtype)
     for channel, one in zip(incident, strength, strict=True):
-        np.multiply(solid_angle, one, out=channel, casting="same_kind")  # in float64, rounded once
+        np.multiply(share, one, out=channel, casting="same_kind")  # in the dtype of the share, rounded once
     return incident
 
 

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.rsm.gbuffer import GBuffer
 from refgi.rsm.raster import rasterize
-from refgi.rsm.reflective import Rsm, _incident_flux
+from refgi.rsm.reflective import Rsm, incident_flux
 from refgi.rsm.snell import refract
 from refgi.scene.material import SHARPEST
 from refgi.scene.model import DirectionalLight, Geometry, MaterialTable
@@ -215,7 +215,7 @@ def _outward_normals(geometry: Geometry, triangle: Array, position: Array) -> Ar
 
 def _with_lobes(rsm: Rsm, exits: Exits, axis: Array, share: Array, exponent: float) -> Rsm:
     """Return the map with lobes of the given axes and shares of the incident flux at the exits."""
-    incident = _incident_flux(rsm.light, rsm.projection, rsm.solid_angle, rsm.flux.dtype)
+    incident = incident_flux(rsm.light, rsm.projection, rsm.solid_angle, rsm.flux.dtype)
     lit = share > 0
     texel = exits.texel[lit]
     if rsm.lobe_flux is None or rsm.lobe_axis is None or rsm.lobe_exponent is None:

@@ -57,11 +57,12 @@ def light_maps(frame: "Frame", settings: "SiiSettings") -> "tuple[Rsm, ...]":
     tuple of Rsm
         One a light.
     """
-    from refgi.rsm.refraction import refracted
+    from refgi.rsm import refracted
 
     if settings.refraction == "none":
         return frame.rsms
-    tracer = frame.tracer if settings.refraction == "two_interface" else None
+    traced = settings.refraction == "two_interface" and frame.materials.ior.any()
+    tracer = frame.tracer if traced else None
     return tuple(refracted(rsm, frame.scene.geometry, frame.materials, settings.refraction,
                            settings.refraction_exponent, tracer=tracer) for rsm in frame.rsms)
 
@@ -242,7 +243,7 @@ def _with_area_as_flux(rsm: "Rsm") -> "Rsm":
         towards = np.asarray(light.position, np.float64)[:, None, None] - rsm.position
         distance = np.sqrt((towards**2).sum(axis=0))
     length = np.sqrt((towards**2).sum(axis=0))
-    cosine = (rsm.normal * towards).sum(axis=0) / np.where(length > 0, length, 1)
+    cosine = np.abs((rsm.normal * towards).sum(axis=0)) / np.where(length > 0, length, 1)
     area = np.where(_lit(rsm), rsm.solid_angle * distance**2 / np.maximum(cosine, 1e-3), 0).astype(rsm.flux.dtype)
     return rsm._replace(flux=np.broadcast_to(area, rsm.flux.shape), lobe_flux=None, lobe_axis=None, lobe_exponent=None)
 

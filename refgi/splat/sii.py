@@ -64,7 +64,7 @@ class SiiSettings(SplatSettings):
     openness_floor: float = 0.05
     openness_flux: OpennessFlux = "none"
     refraction: Refraction = "back_face"
-    refraction_exponent: float = 1000.0
+    refraction_exponent: float = 3000.0
     half_resolution: bool = False
 
     SWITCHES: ClassVar[frozenset[str]] = SplatSettings.SWITCHES | {"sii_no_tn"}

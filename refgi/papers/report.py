@@ -107,13 +107,15 @@ def _ratios(ratios: Ratios) -> dict[str, Any]:
 
 
 def _table(table: Table) -> dict[str, Any]:
-    return {"title": table.title, "columns": list(table.columns), "paper": table.paper,
+    texts = {i for row in table.rows for i, cell in enumerate(row) if i and isinstance(cell, str)}
+    return {"title": table.title, "columns": list(table.columns), "paper": table.paper, "texts": texts,
             "rows": [[_cell(cell) for cell in row] for row in table.rows]}
 
 
-def _cell(cell: Cell) -> dict[str, Any]:
-    said = "" if cell is None else cell if isinstance(cell, str) else number(cell)
-    return {"said": said, "is_text": isinstance(cell, str)}
+def _cell(cell: Cell) -> str:
+    if cell is None:
+        return ""
+    return cell if isinstance(cell, str) else number(cell)
 
 
 def _machine(environment: Any) -> str:

@@ -23,7 +23,7 @@ class Scale:
 
 
 FULL = Scale("full", 512, 256, 7, 192, 1 << 20)
-QUICK = Scale("quick", 256, 128, 3, 48, 1 << 19)
+QUICK = Scale("quick", 256, 128, 3, 48, 1 << 18)
 
 
 class Workbench:

@@ -58,7 +58,7 @@ def figure12(bench: "Workbench") -> Figure:
     return Figure(
         shows="Gathering with 1020, 308 and 156 samples, interpolated from every eighth pixel, beside 768 and 108 "
               "splats.",
-        facts=(BOX, "indirect light alone"), pictures=tuple(shown), columns=4,
+        facts=(BOX, "indirect light alone"), pictures=tuple(shown), columns=7,
         ratios=(Ratios(f"frames per second, relative to {slowest.title}",
                 tuple(Bar(s.title, seconds[slowest.name] / seconds[s.name], s.fps and s.fps / (slowest.fps or 1))
                               for s in subjects)),),
@@ -78,8 +78,8 @@ def _notes(subjects: list[Subject], seconds: dict[str, float], off: dict[str, Er
         "here than on hardware that is bound by fragments.",
         f"Gathering looks around each pixel's own place in the map, to 0.3 of its width as its paper proposes. What "
         f"lights from further away is missing whatever the number of samples: {off[most].lost:.0f} % of the energy. "
-        f"Over the whole map 1020 samples lose {round(off[whole].lost)} %, with a MAE of {off[whole].mae:.1f} %. The "
-        "paper shows bright pictures of gathering and does not state its radius.",
+        f"Over the whole map 1020 samples lose {round(off[whole].lost)} %, with a MAE of {off[whole].mae:.1f} %: near "
+        "each pixel they lie dense, so no light outshines its neighbours. The paper does not state its radius.",
         f"From {subjects[0].settings.samples} to {subjects[2].settings.samples} samples gathering gains "
         f"{seconds[most] / seconds[least]:.1f} times (paper 5.9): pixels that cannot be interpolated and the "
         "interpolation itself take their share.",

@@ -54,8 +54,8 @@ def figure8(bench: "Workbench") -> Figure:
                 Table("Pairs that the kernels look at, by bound: the picture is the same to the bit",
                       ("bound", "a pixel", "a fragment"), bounds)),
         notes=("The paper counts what its meshes cover, this count is of pairs with B ≥ I_low, which the meshes "
-               "enclose. The mean is no finding: the reference length was chosen for it. The spread is: splats pile up "
-               f"where the lit surface and its neighbours meet, to {most} of {PAPER_LIGHTS}.",
+               "enclose. The mean is no finding: the reference length was chosen for it. The spread is: on the "
+               f"ball, which stands within reach of most lights, {most} of {PAPER_LIGHTS} count at one pixel.",
                f"Lights are listed for tiles of 8 by 8 pixels, which costs {wasted:.2f} pairs a fragment with the "
                "tangent-family ellipsoid. A tile reads its receivers once for all of its lights, so the traffic of "
                "Section 6 is the graphics hardware's and not this program's."))

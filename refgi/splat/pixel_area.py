@@ -35,10 +35,10 @@ def pixel_areas(buffer: "GBuffer", geometry: "Geometry") -> Array:
     from refgi.rsm.solid_angle import texel_solid_angles
 
     areas = np.zeros(buffer.covered.shape)
-    seen = np.nonzero(buffer.covered)
+    seen = buffer.covered
     corners = geometry.vertices[geometry.faces[buffer.triangle_id[seen]]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    view = buffer.position[:, *seen].T - buffer.projection.origin[0]
+    view = buffer.position[:, seen].T - buffer.projection.origin[0]
     square = (view**2).sum(axis=1)
     facing = np.abs((normal * view).sum(axis=1))  # |n| d cos
     length = np.sqrt((normal**2).sum(axis=1) * square)

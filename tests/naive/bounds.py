@@ -44,9 +44,8 @@ def widened_region(r, cosine, exponent, widening):
 def captured_share(distance, radius, exponent):
     """Return the share of a light's flux that a plane across its axis receives from within the range.
 
-    By quadrature over the polar angle: flux goes as (n + 1) cos^n sin, and the plane lies at r = D / cos.
+    By the midpoint rule over the polar angle: flux goes as (n + 1) cos^n, and the plane lies at r = D / cos.
     """
-    x, w = np.polynomial.legendre.leggauss(20001)
-    cosine = 0.5 * (x + 1)
+    cosine = (np.arange(100_000) + 0.5) / 100_000
     kept = cosine**exponent * radius**2 >= (distance / cosine) ** 2
-    return float((0.5 * w * (exponent + 1) * cosine**exponent * kept).sum())
+    return float(((exponent + 1) * cosine**exponent * kept).mean())

@@ -98,24 +98,11 @@ def _strength(light: "Light") -> Array:
     return np.asarray(light.irradiance if isinstance(light, DirectionalLight) else light.intensity, np.float64)
 
 
-def _texel_shares(rsm: "Rsm") -> Array:
-    """Return each texel's power over the light's strength, (H, W): sr weighted by a spot's falloff, or m^2."""
-    from refgi.rsm.solid_angle import sampled_spot_share, spot_power, texel_solid_angles
-    from refgi.scene import SpotLight
-
-    light, maps = rsm.light, rsm.projection
-    if not isinstance(light, SpotLight):
-        return texel_solid_angles(maps)
-    cosines = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
-    if maps.maps == 1:
-        return spot_power(maps, *cosines)
-    axis = np.asarray(light.direction) / np.linalg.norm(light.direction)
-    return texel_solid_angles(maps) * sampled_spot_share(maps, axis, *cosines)
-
-
 def _shares(rsm: "Rsm", geometry: "Geometry", materials: int) -> tuple[Array, float]:
     """Return the summed shares of the texels that met each material, and of those that met nothing."""
-    met, share = rsm.covered, _texel_shares(rsm)
+    from refgi.rsm import texel_shares
+
+    met, share = rsm.covered, texel_shares(rsm.light, rsm.projection)
     material = geometry.material_of_face[rsm.triangle_id[met]]
     return np.bincount(material, share[met], minlength=materials), float(share[~met].sum())
 

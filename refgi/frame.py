@@ -5,15 +5,15 @@ about the light never causes a G-buffer, and Embree is loaded only when rays are
 stage, so frames of an animation share what did not change when they run under one `stages.Memory`.
 """
 
-import warnings
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.errors import RefgiWarning, expect
+from refgi.errors import expect
 from refgi.scene.model import LightTable, MaterialTable, Scene, light_table, material_table
+from refgi.scene.origin import near_origin
 from refgi.scene.values import is_count
 from refgi.stages import stage
 
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 Shadows = Literal["map", "exact"]
-
-# Share of the scene's extent: ray ends keep some 16 steps from surfaces, and at 1/4096 the light is off by 1e-3.
-COARSEST_STEP = 1 / 4096
 
 
 class Frame:
@@ -44,6 +41,13 @@ class Frame:
     shadows : {"map", "exact"}
         Direct light's shadows: from the RSM's depth as published, or by rays.
 
+    Attributes
+    ----------
+    scene : Scene
+        What is seen; moved near the origin if it was many times its size away (`near_origin`).
+    origin : tuple of 3 floats
+        Where the origin of `scene` and of all positions in buffers lies, m; 0 unless the scene was moved.
+
     Raises
     ------
     InputError
@@ -61,7 +65,6 @@ class Frame:
         shadows: Shadows = "map",
     ) -> None:
         expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
-        self.scene = scene
         self.width = scene.camera.width if width is None else width
         self.height = scene.camera.height if height is None else height
         self.dtype = _dtype(dtype)
@@ -75,7 +78,7 @@ class Frame:
         expect(shadows in ("map", "exact"), "shadows", "'map' or 'exact'", shadows)
         expect(scene.face_count > 0, f"scene {scene.name!r}", "at least one triangle", "none")
         expect(len(scene.lights) > 0, f"scene {scene.name!r}", "at least one light", "none")
-        _warn_if_far(scene)
+        self.scene, self.origin = near_origin(scene)
 
     @cached_property
     def materials(self) -> MaterialTable:
@@ -185,14 +188,6 @@ def _dtype(given: npt.DTypeLike) -> np.dtype[Any]:
     expect(dtype in (np.float32, np.float64), "dtype", "float32 or float64", dtype.name if dtype else given)
     assert dtype is not None
     return dtype
-
-
-def _warn_if_far(scene: Scene) -> None:
-    step, extent = scene.geometry.float32_step, scene.geometry.diagonal
-    if step > COARSEST_STEP * extent:
-        text = (f"scene {scene.name!r}: {extent:.3g} m across, but so far from the origin that float32 steps are "
-                f"{step:.3g} m: light and shadows will be wrong; move it to the origin")
-        warnings.warn(RefgiWarning(text), stacklevel=3)
 
 
 @stage("rays.build")

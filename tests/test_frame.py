@@ -123,12 +123,18 @@ def test_nothing_to_see_or_no_light_is_an_error(scene):
         Frame(scene.with_lights())
 
 
-@pytest.mark.parametrize(("shift", "warned"), [(0.0, False), (100.0, False), (1e4, True), (1e5, True)])
-def test_a_scene_too_far_from_the_origin_for_float32_is_said_aloud(scene, shift, warned, recwarn):
-    """At 1e5 m the float32 steps are 8 mm, and ray ends keep several steps from the walls of a box of 0.55 m."""
-    Frame(dataclasses.replace(scene, geometry=dataclasses.replace(scene.geometry,
-                                                                  vertices=scene.geometry.vertices + shift)))
+@pytest.mark.parametrize(("shift", "size", "warned"), [(0.0, 1.0, False), (1e5, 1.0, False), (1e8, 1e-6, True)])
+def test_a_scene_too_far_from_the_origin_is_said_aloud(scene, shift, size, warned, recwarn):
+    """At 1e8 m float64 numbers are 1.5e-8 m apart, and the box, made small, is 1e-6 m across."""
+    vertices = size * scene.geometry.vertices + shift
+    frame = Frame(dataclasses.replace(scene, geometry=dataclasses.replace(scene.geometry, vertices=vertices)))
     assert ["so far from the origin" in str(w.message) for w in recwarn] == [True] * warned
+    np.testing.assert_array_equal(frame.scene.geometry.vertices + frame.origin, vertices)
+
+
+def test_a_scene_near_the_origin_is_left_as_it_is(scene):
+    assert Frame(scene).scene is scene
+    assert Frame(scene).origin == (0, 0, 0)
 
 
 def test_render_takes_a_path_and_refuses_what_is_no_scene(tmp_path):

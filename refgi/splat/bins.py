@@ -107,7 +107,7 @@ def _list(position: Array, normal: Array, solids: Array, balls: bool, listed: Ar
         _bound_parts(position, normal, block * TILE, here, low, high)
         passed = np.empty(solids.shape[1], np.bool_)
         _reach(solids, solids.shape[1], low[parts], high[parts], balls, passed)
-        near, chosen = np.empty_like(solids), np.empty(solids.shape[1], np.int64)
+        near, chosen = np.empty_like(solids), np.empty(solids.shape[1], np.uint32)
         found = _gather(solids, passed, near, chosen)
         for part in range(here):
             _reach(near, found, low[part], high[part], balls, passed)

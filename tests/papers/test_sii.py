@@ -7,6 +7,7 @@ import pytest
 
 from refgi.papers.catalogue import find_paper
 from refgi.papers.files import as_json
+from refgi.papers.judging import errors_of
 from refgi.papers.report import page
 from refgi.papers.runner import reproduce
 from refgi.papers.workbench import Scale
@@ -72,6 +73,22 @@ def test_every_number_is_finite(figures):
 ])
 def test_the_papers_ratios_are_the_printed_ones(figures, key, label, ratio):
     assert ratios(figures[key])[label] == pytest.approx(ratio, rel=1e-12)
+
+
+@pytest.mark.parametrize(("key", "is_speed"), [("fig4", True), ("fig12", True), ("table1", False)])
+def test_ratios_here_are_those_of_the_times_in_the_table(figures, key, is_speed):
+    milliseconds = [row[1] for row in figures[key].tables[0].rows]
+    for bar, own in zip(figures[key].ratios[0].bars, milliseconds, strict=True):
+        assert bar.here == pytest.approx(milliseconds[0] / own if is_speed else own / milliseconds[0])
+
+
+def test_errors_are_shares_of_the_references_mean():
+    reference = np.zeros((3, 2, 2))
+    reference[:, 0] = (1.0, 3.0)  # mean 2 over the covered row
+    covered = np.array([[True, True], [False, False]])
+    assert errors_of(reference + 0.2, reference, covered) == pytest.approx((10.0, 10.0, -10.0))
+    assert errors_of(reference * (1, 0), reference, covered) == pytest.approx((100 * math.sqrt(4.5) / 2, 75.0, 75.0))
+    assert all(map(math.isnan, errors_of(reference, 0 * reference, covered)))
 
 
 def test_the_overdraw_is_that_of_figure_8(figures):

@@ -12,6 +12,7 @@ from refgi.errors import InputError
 from refgi.rsm.projection import camera_projection, cube_projection
 from refgi.scene import Camera
 from refgi.splat.bins import list_lights, pack_solids
+from refgi.splat.blocks import block_by_block
 from refgi.splat.bounds import (
     Ellipsoid,
     appendix_ellipsoid,
@@ -24,7 +25,7 @@ from refgi.splat.bounds import (
 )
 from refgi.splat.mesh_bounds import covered_pixels, inflation, sphere_mesh
 from refgi.splat.ranged_sum import LANES, reached
-from refgi.splat.screen_bounds import screen_quads
+from refgi.splat.screen_bounds import screen_quads, tiles_of_quads
 from tests.naive import bounds as naive
 from tests.splat import sets
 
@@ -217,6 +218,22 @@ def test_quad_of_a_ball_ahead_is_its_tangents():
     assert behind[0] > behind[1]
     with pytest.raises(InputError, match="projection: expected one perspective map"):
         screen_quads(cube_projection((0, 0, 0), 8), eye[:, None], np.ones(1))
+
+
+def test_tiles_meet_the_quads_that_hold_their_pixels():
+    """Tiles of a picture in the kernels' order against each pixel's centre in each rectangle."""
+    rng = np.random.default_rng(6)
+    places = block_by_block(rng.random((40, 56)) < 0.9)
+    top, left = rng.uniform(-10, 50, (2, 80))
+    quads = np.stack([top, top + rng.uniform(0, 9, 80), left, left + rng.uniform(0, 9, 80)])
+    row, column = places // 56 + 0.5, places % 56 + 0.5
+    for tile, listed in enumerate(tiles_of_quads(quads, places, 56)):
+        y, x = row[tile * LANES : (tile + 1) * LANES, None], column[tile * LANES : (tile + 1) * LANES, None]
+        held = ((y >= quads[0]) & (y <= quads[1]) & (x >= quads[2]) & (x <= quads[3])).any(axis=0)
+        assert not (held & ~listed).any()
+        near = (y.max() >= quads[0] - 0.1) & (y.min() <= quads[1] + 0.1)
+        near &= (x.max() >= quads[2] - 0.1) & (x.min() <= quads[3] + 0.1)
+        assert not (listed & ~near).any()
 
 
 @settings(max_examples=30)

@@ -281,6 +281,27 @@ def test_counts_and_traffic(corner, evidence):
              f"{counted.evaluated / counted.total:.2f} a fragment; Fig. 8: 281 MB a frame, 308 samples: 1078 MiB")
 
 
+@pytest.mark.parametrize("widening", [0.0, 0.7])
+@pytest.mark.feature("SII-23")
+def test_lobes_are_counted_as_the_twin_counts_them(widening, evidence):
+    rng = np.random.default_rng(9)
+    receivers, lights = sets.room(rng, 60)
+    exponent, low = 6.0, 0.05
+    lights = sets.glossy(lights.position, lights.normal, sets.random_directions(rng, 60), exponent)
+    how = SplatSettings(irradiance_low=low, lobe_norm="full_lobe", widening=widening)
+    expected = np.zeros(60, int)
+    for i, k in np.ndindex(60, 60):
+        x, p = row(receivers.position)[:, i], lights.position[:, k]
+        r = np.linalg.norm(x - p)
+        here = exponent * min(1, r / widening) if widening else exponent
+        if lights.normal[:, k] @ (x - p) > 0:
+            expected[k] += naive.counts(x, p, lights.lobe_axis[:, k], here, (here + 1) / (2 * math.pi), low)
+    counted = fragments(receivers, lights, how)
+    np.testing.assert_array_equal(counted.of_light, expected)
+    assert counted.overdraw.sum() == expected.sum() > 100
+    evidence(f"lobes, a = {widening:g} m: the twin's {expected.sum()} fragments, light by light")
+
+
 @pytest.mark.parametrize(("scene", "length"), [("cornell_horse", 0.1667), ("sponza", 8.37), ("quake_e1m1", 4.38)])
 @pytest.mark.feature("SII-23")
 def test_tiles_keep_to_the_fragments(data_dir, scene, length, evidence):

@@ -10,14 +10,13 @@ from which on the exponent is whole (0: not widened), P' the exponent after wide
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
-from refgi.radiometry import lobe_fraction
 from refgi.splat.lobe_culling import (
     LIMIT,
     MEASURES,
@@ -28,48 +27,15 @@ from refgi.splat.lobe_culling import (
     lobes_in_reach,
     parts_in_reach,
 )
+from refgi.splat.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor, widened
 from refgi.splat.pair_sum import GROUP, LEAST_SQUARE, LOST, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, load_tile
 from refgi.splat.range import Range
 
+__all__ = ["CLAMPED", "CORRECTED", "FULL_LOBE", "LITERAL", "NO_NORM", "Widening", "add_lobes", "lobe_norm_factor"]
+
 Array = npt.NDArray[Any]
 
-NO_NORM, FULL_LOBE, CLAMPED = 0, 1, 2  # lobe_norm as a kernel sees it
 H, TERM, SQUARE, EXPONENT, RATIO = range(ROWS, ROWS + 5)  # further rows of a tile, of one light
-CORRECTED, LITERAL = 0, 1  # slope of the widened exponent: P min(1, r / a), or min(P, P / (r a)) as printed
-
-
-class Widening(NamedTuple):
-    """How exponents fall near the light."""
-
-    distance: Any  # a, m
-    slope: int  # CORRECTED or LITERAL
-    norm: int  # the lobe_norm that follows P', or -1: the one of P stays
-    cos_theta: Array  # (N,) n . r of each light
-
-
-@kernel
-def lobe_norm_factor(cos_theta: Any, exponent: Any, norm: int) -> Any:
-    """Return c(P): the peak intensity of a lobe of unit flux.
-
-    Parameters
-    ----------
-    cos_theta : float
-        Cosine between lobe axis and surface normal.
-    exponent : float
-        P.
-    norm : int
-        NO_NORM: 1 as printed in Eq. 3; FULL_LOBE: (P + 1) / 2 pi; CLAMPED: (P + 1) / (2 pi K(th, P)).
-
-    Returns
-    -------
-    float
-        1/sr, of the type of `cos_theta`.
-    """
-    real = type(cos_theta)
-    if norm == NO_NORM:
-        return real(1.0)
-    factor = (exponent + real(1.0)) * real(1.0 / (2.0 * math.pi))
-    return factor if norm == FULL_LOBE else factor / lobe_fraction(cos_theta, exponent)
 
 
 @kernel(parallel=True)
@@ -95,6 +61,14 @@ def add_lobes(
         Lights that may count for each tile; the others must not count for any of its receivers. None: all may.
     irradiance : (3, n) ndarray
         Added to, W/m^2.
+
+    Notes
+    -----
+    In float32, with U = 2^-24, a term t = flux s c_x / r^2 is off by at most U (t (17 + 5 L + 6.5 P (sqrt(2 h) + h) /
+    (1 - h)) + 4 flux s / r^2), where L = -P log2(1 - h): roundings of w reach h, those of the cosine c_x are absolute.
+    Less than 2^-126 of the peak is 0. Within 8 U of the light's plane or 1e-3 of h = 1, where lobes of P < 1 end
+    steeply, rounding may decide on which side a pair lies. A sum is off by at most 66 U of E more. Distances below
+    1e-15 m count as that; above them powers of 2 in flux and length scale E to the bit.
     """
     count = position.shape[1]
     bounds = bound_lobes(lights[9], _whole_from(widening))
@@ -225,18 +199,12 @@ def _raise_each(tile: Array, lanes: Any) -> None:
 
 @kernel
 def _widen(tile: Array, lanes: Any, exponent: Any, widening: Widening, k: int) -> None:
-    """Fill rows EXPONENT with P' (Sec. 3.3) and RATIO with c(P') / c(P)."""
+    """Fill rows EXPONENT and RATIO for the receivers that are lit."""
     real = tile.dtype.type
-    one = real(1.0)
-    cos_theta = widening.cos_theta[k]
-    whole = lobe_norm_factor(cos_theta, exponent, widening.norm)
+    whole = lobe_norm_factor(widening.cos_theta[k], exponent, widening.norm)
     for i in range(lanes[0], lanes[1]):
-        r = math.sqrt(tile[SQUARE, i])
-        share = r / widening.distance if widening.slope == CORRECTED else one / (r * widening.distance)
-        tile[EXPONENT, i] = exponent * (share if share < one else one)
-        tile[RATIO, i] = one
-        if widening.norm >= 0 and share < one and tile[TERM, i] > real(0.0):
-            tile[RATIO, i] = lobe_norm_factor(cos_theta, tile[EXPONENT, i], widening.norm) / whole
+        lit = tile[TERM, i] > real(0.0)
+        tile[EXPONENT, i], tile[RATIO, i] = widened(tile[SQUARE, i], exponent, whole, widening, k, lit)
 
 
 @kernel

@@ -8,7 +8,9 @@ import pytest
 
 from refgi.jit import threads
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.lobe_sum import CLAMPED, FULL_LOBE, NO_NORM, lobe_norm_factor
+from refgi.splat.lobe_sum import CLAMPED, FULL_LOBE, NO_NORM, add_lobes, lobe_norm_factor
+from refgi.splat.packing import pack_clamp, pack_lobes, pack_widening
+from refgi.splat.range import Range
 from tests.naive import eq2
 from tests.naive.radiometry import lobe_fraction
 from tests.splat import sets
@@ -247,3 +249,101 @@ def test_black_lobes_run_no_lobe_code_and_change_nothing():
     dark = lights._replace(lobe_flux=np.zeros((3, 50)), lobe_axis=np.zeros((3, 50)), lobe_exponent=np.zeros(50))
     np.testing.assert_array_equal(irradiance(receivers, dark, PairSettings()),
                                   irradiance(receivers, lights, PairSettings()))
+
+
+def wall_and_lobes(real, count=300, side=64):
+    """Return a wall of side^2 receivers, block by block of 8 x 8 in 16 x 16, and sharp and blunt lobes above it."""
+    rng = np.random.default_rng(10)
+    index = np.arange(side * side).reshape(side // 16, 2, 8, side // 16, 2, 8).transpose(0, 3, 1, 4, 2, 5).reshape(-1)
+    across = (np.arange(side) + 0.5) / side
+    x, y = (part.reshape(-1)[index] for part in np.meshgrid(across, across))
+    facing = np.zeros((3, side * side))
+    facing[2] = 1
+    wall = sets.receivers(np.stack([x, y, 0.05 * np.sin(9 * x)]), facing, real)
+    place = np.concatenate([rng.uniform(-0.2, 1.2, (2, count)), rng.uniform(0.05, 0.6, (1, count))])
+    axis = sets.unit(np.concatenate([rng.normal(0, 0.6, (2, count)), np.full((1, count), -1.0)]))
+    normal = sets.unit(axis + 0.3 * sets.random_directions(rng, count))
+    lights = sets.glossy(place, normal, axis, 1.0, real=real)
+    return wall, lights._replace(lobe_exponent=(10 ** rng.uniform(-2, 6, count)).astype(real),
+                                 lobe_flux=rng.random((3, count)).astype(real))
+
+
+def sum_of(wall, lights, reach=None, listed=None, order=None, **how):
+    """Call the kernel on receivers in a given order and put the result back into theirs."""
+    settings, every = PairSettings(**how), np.ones(lights.position.shape[1], bool)
+    real = wall.position.dtype
+    order = np.arange(wall.position.shape[2]) if order is None else order
+    position, normal = (np.ascontiguousarray(part[:, 0, order]) for part in wall[:2])
+    got = np.zeros_like(position)
+    add_lobes(position, normal, pack_lobes(lights, settings, real, every),
+              pack_clamp(settings, None, every, len(every), real), pack_widening(lights, settings, real, every), reach,
+              listed, got)
+    back = np.empty_like(got)
+    back[:, order] = got
+    return back
+
+
+def some_range(lights, real, outside=False, stochastic=False):
+    """Return thresholds that cut most of each lobe."""
+    rng, count = np.random.default_rng(11), lights.position.shape[1]
+    square = (10 ** rng.uniform(-2, 2, count)).astype(real)
+    scale = (1 - rng.random(count) if stochastic else np.ones(count)).astype(real)
+    return Range(square, scale, outside)
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.parametrize("widening", [0.0, 0.2])
+@pytest.mark.feature("SII-18")
+def test_lights_and_parts_passed_over_change_no_bit(real, widening, evidence):
+    """Receivers of a tile lie together or, shuffled, all over the wall, where no light can be passed over."""
+    wall, lights = wall_and_lobes(real)
+    shuffled = np.random.default_rng(12).permutation(wall.position.shape[2])
+    tiles = -(-len(shuffled) // 256)
+    for reach in (None, some_range(lights, real), some_range(lights, real, stochastic=True)):
+        together, apart = (sum_of(wall, lights, reach, order=order, widening=widening) for order in (None, shuffled))
+        np.testing.assert_array_equal(together, apart)
+        if reach is not None:
+            everywhere = np.ones((tiles, 300), bool)
+            np.testing.assert_array_equal(sum_of(wall, lights, reach, everywhere, widening=widening), together)
+        assert (together > 0).any()
+    evidence(f"{np.dtype(real).name}, a = {widening}: tiles of 16 x 16 or of scattered pixels, equal bits, with and "
+             "without a range")
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.feature("SII-18")
+def test_the_range_keeps_the_pairs_with_b_above_the_threshold(real, evidence):
+    """Procedure P3, pair by pair in float64: inside where R_0^2 (r . w)^P >= xi r^2, there times max(1, I_low / B)."""
+    wall, lights = wall_and_lobes(real, count=40, side=32)
+    for stochastic in (False, True):
+        reach = some_range(lights, real, stochastic=stochastic)
+        d = wall.position[:, 0, :, None].astype(float) - lights.position[:, None].astype(float)
+        r = np.sqrt((d**2).sum(axis=0))
+        w = d / r
+        cosine = (lights.lobe_axis[:, None] * w).sum(axis=0)
+        above = ((lights.normal[:, None] * w).sum(axis=0) > 0) & (cosine > 0)
+        shape = np.where(above, np.maximum(cosine, 0) ** lights.lobe_exponent, 0)
+        b = reach.square * shape / r**2
+        factor = np.where(b >= reach.scale, np.maximum(1, 1 / np.maximum(b, 1e-300)), 0)
+        term = shape * np.maximum(0, -w[2]) / r**2
+        sharp = lights.lobe_exponent * np.finfo(real).eps * 1e3 > 0.1  # lobes that this naive cosine cannot follow
+        doubtful = (np.abs(b / reach.scale - 1) < 1e-3).any(axis=1)  # receivers that rounding may decide
+        weak = lights._replace(lobe_flux=lights.lobe_flux * ~sharp)
+        got = sum_of(wall, weak, reach, lobe_norm="none")
+        np.testing.assert_allclose(got[:, ~doubtful], (weak.lobe_flux @ (term * factor).T)[:, ~doubtful], rtol=2e-3)
+        assert (factor > 0).mean() < 0.5
+        assert doubtful.mean() < 0.5
+    evidence(f"{np.dtype(real).name}: sums over pairs with B >= xi I_low are those of the naive twin, with xi too")
+
+
+@pytest.mark.parametrize("stochastic", [False, True])
+@pytest.mark.feature("SII-21")
+def test_what_is_kept_and_what_is_cut_is_all(stochastic, evidence):
+    wall, lights = wall_and_lobes(np.float64)
+    kept, cut = (sum_of(wall, lights, some_range(lights, np.float64, outside, stochastic)) for outside in (False, True))
+    whole = sum_of(wall, lights)
+    error = np.abs(kept + cut - whole).max() / np.abs(whole).max()
+    assert error < 1e-14
+    assert stochastic or (cut >= 0).all()
+    assert np.abs(cut).sum() / whole.sum() > 0.01
+    evidence(f"xi {'drawn' if stochastic else '1'}: kept + cut = all to {error:.0e}; cut {cut.sum() / whole.sum():.1%}")

@@ -12,9 +12,8 @@ import numba
 import numpy as np
 from numba import njit, prange
 
-from benchmarks.harness import Row, ratio, seconds
+from benchmarks.harness import Row, ratio
 from refgi.jit import threads
-from refgi.splat.lobe_sum import add_lobes
 from refgi.splat.pair_sum import Clamp, sum_pairs
 
 
@@ -68,9 +67,6 @@ def rows(quick: bool) -> Iterator[Row]:
         clamp = Clamp(dtype(1e-4), np.zeros(lights, dtype), dtype(np.inf))
         clamped = partial(sum_pairs, position, normal, packed, clamp, out)
         yield Row(f"Eq. 2 {name} with a clamp, time over without", ratio(clamped, strict, repeats).median, "ratio")
-        lobes = np.concatenate([packed[:6], packed[3:6], np.full((1, lights), 20, dtype), packed[6:]])
-        took = seconds(partial(add_lobes, position, normal, lobes, clamp, None, out))
-        yield Row(f"Eq. 3 {name}, Phong lobes", pixels * lights / took / 1e9, "G pairs/s")
 
 
 def on_threads(count: int, function: partial) -> None:

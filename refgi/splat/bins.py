@@ -94,8 +94,12 @@ def of_whole_tiles(listed: Array) -> Array:
     (ceil(m LANES / TILE), N) ndarray of bool
         Lists of tiles of TILE receivers.
     """
-    starts = np.arange(0, len(listed), TILE // LANES)
-    return np.logical_or.reduceat(listed, starts, axis=0) if len(listed) else listed
+    parts = TILE // LANES
+    whole = listed[::parts].copy()
+    for part in range(1, parts):
+        some = listed[part::parts]
+        whole[: len(some)] |= some
+    return whole
 
 
 @kernel(parallel=True)

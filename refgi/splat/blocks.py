@@ -2,7 +2,7 @@
 
 Blocks of 16 x 16 pixels go row by row; within a block 8 x 8 after 8 x 8, within these 4 x 4 after 4 x 4. Pixels
 without surface are left out, so the tiles of the kernels are filled and still compact: fewer lights reach into them
-than into a piece of a row.
+than into a piece of a row. One thread does it: copying a picture takes less than it may take another to start.
 """
 
 from typing import Any
@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel, prange
+from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
 
 BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
-CHUNK = 1 << 13  # pixels a thread copies at once
 
 
 def block_by_block(covered: Array) -> Array:
@@ -31,13 +30,9 @@ def block_by_block(covered: Array) -> Array:
     (n,) ndarray of int64
         Indices.
     """
-    rows, columns = (-(-size // BLOCK) for size in covered.shape)
-    counts = np.zeros(rows * columns, np.int64)
-    _count(covered, columns, counts)
-    ends = np.cumsum(counts)
-    places = np.empty(int(ends[-1]) if len(ends) else 0, np.int64)
-    _fill(covered, columns, ends - counts, _path(), places)
-    return places
+    places = np.empty(covered.size, np.int64)
+    count = _fill(covered, _path(), places)
+    return places[:count]
 
 
 def taken(plane: Array, places: Array) -> Array:
@@ -81,41 +76,29 @@ def _path() -> Array:
     return np.stack([index // BLOCK, index % BLOCK])
 
 
-@kernel(parallel=True)
-def _count(covered: Array, columns: int, counts: Array) -> None:
+@kernel
+def _fill(covered: Array, path: Array, places: Array) -> int:
     height, width = covered.shape
-    for block in prange(len(counts)):
-        top, left = block // columns * BLOCK, block % columns * BLOCK
-        count = 0
-        for row in range(top, min(top + BLOCK, height)):
-            for column in range(left, min(left + BLOCK, width)):
-                count += covered[row, column]
-        counts[block] = count
+    count = 0
+    for top in range(0, height, BLOCK):
+        for left in range(0, width, BLOCK):
+            for i in range(BLOCK * BLOCK):
+                row, column = top + path[0, i], left + path[1, i]
+                if row < height and column < width and covered[row, column]:
+                    places[count] = row * width + column
+                    count += 1
+    return count
 
 
-@kernel(parallel=True)
-def _fill(covered: Array, columns: int, starts: Array, path: Array, places: Array) -> None:
-    height, width = covered.shape
-    for block in prange(len(starts)):
-        top, left, place = block // columns * BLOCK, block % columns * BLOCK, starts[block]
-        for i in range(BLOCK * BLOCK):
-            row, column = top + path[0, i], left + path[1, i]
-            if row < height and column < width and covered[row, column]:
-                places[place] = row * width + column
-                place += 1
-
-
-@kernel(parallel=True)
+@kernel
 def _take(plane: Array, places: Array, values: Array) -> None:
-    for chunk in prange((len(places) + CHUNK - 1) // CHUNK):
-        for c in range(3):
-            for i in range(chunk * CHUNK, min((chunk + 1) * CHUNK, len(places))):
-                values[c, i] = plane[c, places[i]]
+    for c in range(3):
+        for i in range(len(places)):
+            values[c, i] = plane[c, places[i]]
 
 
-@kernel(parallel=True)
+@kernel
 def _put(values: Array, places: Array, plane: Array) -> None:
-    for chunk in prange((len(places) + CHUNK - 1) // CHUNK):
-        for c in range(3):
-            for i in range(chunk * CHUNK, min((chunk + 1) * CHUNK, len(places))):
-                plane[c, places[i]] = values[c, i]
+    for c in range(3):
+        for i in range(len(places)):
+            plane[c, places[i]] = values[c, i]

@@ -165,14 +165,20 @@ def close_group(tile: Array) -> None:
     ----------
     tile : (>= ROWS, n) ndarray
         Rows SUM are added to rows TOTAL and cleared; rows LOST keep the rounding.
+
+    Notes
+    -----
+    A sum of 0 changes nothing, so that a group which reaches no receiver of a tile may as well be left out.
     """
+    zero = tile.dtype.type(0.0)
     for c in range(3):
         for i in range(tile.shape[1]):
-            part = tile[SUM + c, i] - tile[LOST + c, i]
-            total = tile[TOTAL + c, i] + part
-            tile[LOST + c, i] = (total - tile[TOTAL + c, i]) - part
-            tile[TOTAL + c, i] = total
-            tile[SUM + c, i] = tile.dtype.type(0.0)
+            added, old, lost = tile[SUM + c, i], tile[TOTAL + c, i], tile[LOST + c, i]
+            part = added - lost
+            total = old + part
+            tile[LOST + c, i] = lost if added == zero else (total - old) - part
+            tile[TOTAL + c, i] = old if added == zero else total
+            tile[SUM + c, i] = zero
 
 
 @kernel

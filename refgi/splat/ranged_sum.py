@@ -124,7 +124,10 @@ def sum_pairs_in_range(
         chosen = np.empty(GROUP + 1, np.int64)
         black = lights.shape[1] - 1
         for group in range(0, black, GROUP):
-            found = _chosen(listed, block, group, min(group + GROUP, black), chosen)
+            end = min(group + GROUP, black)
+            if not any_listed(listed, block, group, end):
+                continue
+            found = _chosen(listed, block, group, end, chosen)
             chosen[found] = black
             for pair in range(0, found, 2):
                 a, b = chosen[pair], chosen[pair + 1]
@@ -185,6 +188,30 @@ def sum_weighed_pairs(
         for c in range(3):
             for i in range(size):
                 irradiance[c, first + i] = tile[TOTAL + c, i]
+
+
+@kernel
+def any_listed(listed: Array, block: int, first: int, last: int) -> bool:
+    """Tell whether a tile's list holds any light of a group.
+
+    Parameters
+    ----------
+    listed : (m, N) ndarray of bool
+        Lists of tiles.
+    block : int
+        Which tile.
+    first, last : int
+        The group: lights first to last - 1.
+
+    Returns
+    -------
+    bool
+        Whether there is one.
+    """
+    some = False
+    for k in range(first, last):
+        some |= listed[block, k]
+    return some
 
 
 @kernel

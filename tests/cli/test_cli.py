@@ -254,7 +254,7 @@ def test_compare_refuses_what_it_cannot_do(arguments, words):
 def test_compare_fails_with_1_when_a_method_fails(monkeypatch):
     from refgi.compare import comparison
 
-    def fail(*_):
+    def fail(*_, **__):
         raise refgi.errors.InputError("lobes: expected none, got some")
 
     monkeypatch.setattr(comparison._Runner, "method", fail)

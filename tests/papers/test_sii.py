@@ -104,3 +104,27 @@ def test_a_larger_cut_loses_more(figures):
     assert lost[0] == 0
     assert lost == sorted(lost)
     assert drawn == sorted(drawn, reverse=True)
+
+
+@pytest.mark.feature("SII-29")
+def test_what_rests_is_not_drawn_again(figures, evidence):
+    """Table 1: which stages a frame runs is checked, how long they take is only told."""
+    rows = {row[0]: row for row in figures["table1"].tables[0].rows}
+    reused = {title: set(row[-1].split(", ")) for title, row in rows.items()}
+    light, camera = "rsm.reflective_shadow_map", "rsm.gbuffer"
+    both, moving_light, moving_camera, still = rows
+    assert not {light, camera} & reused[both]
+    assert camera in reused[moving_light]
+    assert light not in reused[moving_light]
+    assert {light, "rsm.warp"} & reused[moving_camera]
+    assert camera not in reused[moving_camera]
+    assert {light, camera} <= reused[still]
+    evidence("Table 1 at 32 x 32: " + ", ".join(f"{title} {row[1]:.0f} ms" for title, row in rows.items()))
+
+
+@pytest.mark.feature("SII-29")
+def test_warps_are_timed_by_method_samples_and_level(figures, evidence):
+    rows = figures["table2"].tables[0].rows
+    assert [row[0][:1] for row in rows[:4]] == ["A", "A", "B", "B"]
+    assert all(cell > 0 for row in rows[:4] for cell in row[1:5])
+    evidence("Table 2, levels 1 and 4: " + ", ".join(f"{row[0]} {row[1]:.2f} and {row[4]:.2f} ms" for row in rows[:4]))

@@ -80,13 +80,15 @@ class Memory:
 _log: ContextVar[Log | None] = ContextVar("refgi_stage_log", default=None)
 
 
-def stage(name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def stage(name: str, *, kept: bool = True) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Name a pure function as one step of a method.
 
     Parameters
     ----------
     name : str
         The step's name in logs and test vectors, such as ``"splat.irradiance"``.
+    kept : bool
+        Whether a `Memory` keeps its results; not worth it where the inputs are made anew in every call.
 
     Returns
     -------
@@ -100,7 +102,7 @@ def stage(name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
             log = _log.get()
             if log is None:
                 return function(*args, **kwargs)
-            return _observed(log, name, function, args, kwargs)
+            return _observed(log, name, function, args, kwargs, log.memory if kept else None)
 
         call.stage_name = name  # type: ignore[attr-defined]
         return call
@@ -164,11 +166,12 @@ def report_progress(fraction: float) -> None:
 
 
 def _observed(
-    log: Log, name: str, function: Callable[..., R], args: tuple[Any, ...], kwargs: dict[str, Any]
+    log: Log, name: str, function: Callable[..., R], args: tuple[Any, ...], kwargs: dict[str, Any],
+    memory: Memory | None,
 ) -> R:
     inputs = (*args, *(item for pair in sorted(kwargs.items()) for item in pair))
-    if log.memory is not None:
-        known, output = log.memory.recall(name, inputs)
+    if memory is not None:
+        known, output = memory.recall(name, inputs)
         if known:
             log.runs.append(Run(name, "reused", depth=log._depth, reason="inputs unchanged"))
             return output  # type: ignore[no-any-return]
@@ -189,8 +192,8 @@ def _observed(
     named = {str(k): v for k, v in (*enumerate(args), *kwargs.items())} if log.record else None
     run = Run(name, "ran", seconds, log._depth, inputs=named, output=output if log.record else None)
     log.runs.insert(position, run)
-    if log.memory is not None:
-        log.memory.keep(name, inputs, output)
+    if memory is not None:
+        memory.keep(name, inputs, output)
     return output
 
 

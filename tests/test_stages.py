@@ -109,6 +109,13 @@ def test_memory_forgets_the_oldest():
     assert log.status("test.double")[-2:] == ["ran", "reused"]
 
 
+def test_a_stage_that_is_not_kept_runs_again():
+    fresh = stages.stage("test.fresh", kept=False)(lambda value: value + 1)
+    with stages.observe(memory=stages.Memory()) as log:
+        assert fresh(1) == fresh(1) == 2
+    assert log.status("test.fresh") == ["ran", "ran"]
+
+
 def test_an_error_leaves_the_log_usable():
     @stages.stage("test.fails")
     def fails():

@@ -14,8 +14,8 @@ from refgi.rsm import Warp, rasterize, warp_stacked
 from refgi.sampling import halton
 from refgi.scene import Scene
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.fragments import fragments
-from refgi.splat.selection import choose_lights
+from refgi.splat.lights.selection import choose_lights
+from refgi.splat.reach.fragments import fragments
 from refgi.stages import Memory, observe
 
 ROOM = "cornell_sphere:faces=17000"

@@ -38,8 +38,8 @@ METHODS = {
     for method in (
         Method("sii", "refgi.splat.sii:sii", "SiiSettings", False,
                "Splatting Indirect Illumination (2006): pixel lights shine where they are significant",
-               "refgi.splat.ledger:energy_ledger"),
-        Method("gather", "refgi.splat.gather:gather", "GatherSettings", False,
+               "refgi.splat.account.ledger:energy_ledger"),
+        Method("gather", "refgi.splat.gathering.gather:gather", "GatherSettings", False,
                "Reflective Shadow Maps (2005): gathering around the projected point"),
         Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,
                "the same pixel lights with ray-traced visibility"),

@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.splat.blocks import block_by_block, put, taken
-from refgi.splat.lobe_sum import add_lobes
-from refgi.splat.packing import Packed, pack
-from refgi.splat.pair_sum import TILE, sum_pairs
+from refgi.splat.pairs.blocks import block_by_block, put, taken
+from refgi.splat.pairs.lobe_sum import add_lobes
+from refgi.splat.pairs.packing import Packed, pack
+from refgi.splat.pairs.pair_sum import TILE, sum_pairs
+from refgi.splat.pairs.sphere_sum import sum_spheres
 from refgi.splat.settings import FOOTPRINT_CLAMPS, PairSettings
-from refgi.splat.sphere_sum import sum_spheres
 from refgi.stages import report_progress, skip, stage
 
 if TYPE_CHECKING:

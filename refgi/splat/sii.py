@@ -10,10 +10,10 @@ from refgi.scene.material import SHARPEST
 from refgi.scene.values import LARGEST
 from refgi.splat.half_resolution import half_resolution
 from refgi.splat.irradiance import Receivers
-from refgi.splat.selection import choose_lights, footprints
+from refgi.splat.lights.selection import choose_lights, footprints
+from refgi.splat.lights.walk import MOST_BOUNCES
 from refgi.splat.settings import FOOTPRINT_CLAMPS, SplatSettings
 from refgi.splat.splat import splat
-from refgi.splat.walk import MOST_BOUNCES
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

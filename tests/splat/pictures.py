@@ -9,8 +9,8 @@ from refgi.rsm import choose_pixel_lights
 from refgi.rsm.importance import importance
 from refgi.rsm.warp import Warp
 from refgi.scene import load_scene
+from refgi.splat.account.pixel_area import pixel_areas
 from refgi.splat.irradiance import Receivers, irradiance
-from refgi.splat.pixel_area import pixel_areas
 from refgi.splat.settings import PairSettings
 from refgi.truth import TruthSettings, trace_truth
 

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from refgi.errors import InputError
 from refgi.rsm.projection import camera_projection, cube_projection
 from refgi.scene import Camera
-from refgi.splat.bins import list_lights, pack_solids
-from refgi.splat.blocks import block_by_block
-from refgi.splat.bounds import (
+from refgi.splat.pairs.blocks import block_by_block
+from refgi.splat.pairs.ranged_sum import LANES, reached
+from refgi.splat.reach.bins import list_lights, pack_solids
+from refgi.splat.reach.bounds import (
     Ellipsoid,
     appendix_ellipsoid,
     half_ball_radius,
@@ -23,9 +24,8 @@ from refgi.splat.bounds import (
     tangent_ellipsoid,
     waste,
 )
-from refgi.splat.mesh_bounds import covered_pixels, inflation, sphere_mesh
-from refgi.splat.ranged_sum import LANES, reached
-from refgi.splat.screen_bounds import screen_quads, tiles_of_quads
+from refgi.splat.reach.mesh_bounds import covered_pixels, inflation, sphere_mesh
+from refgi.splat.reach.screen_bounds import screen_quads, tiles_of_quads
 from tests.naive import bounds as naive
 from tests.splat import sets
 

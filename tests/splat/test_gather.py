@@ -10,9 +10,9 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.splat import GatherSettings, Receivers, SiiSettings, gather, sii
-from refgi.splat.gather import gather_counted, gather_irradiance
-from refgi.splat.gather_sum import disc_pattern
-from refgi.splat.interpolation import Agreement, coarse_pixels, interpolate
+from refgi.splat.gathering.gather import gather_counted, gather_irradiance
+from refgi.splat.gathering.gather_sum import disc_pattern
+from refgi.splat.gathering.interpolation import Agreement, coarse_pixels, interpolate
 from tests.naive import eq2
 
 WHOLE_MAP = 1.5  # a disc around any texel with this radius holds the map

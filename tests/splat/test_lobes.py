@@ -8,9 +8,9 @@ import pytest
 
 from refgi.jit import threads
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.lobe_sum import CLAMPED, FULL_LOBE, NO_NORM, add_lobes, lobe_norm_factor
-from refgi.splat.packing import pack_clamp, pack_lobes, pack_widening
-from refgi.splat.range import Range
+from refgi.splat.pairs.lobe_sum import CLAMPED, FULL_LOBE, NO_NORM, add_lobes, lobe_norm_factor
+from refgi.splat.pairs.packing import pack_clamp, pack_lobes, pack_widening
+from refgi.splat.pairs.range import Range
 from tests.naive import eq2
 from tests.naive.radiometry import lobe_fraction
 from tests.splat import sets

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.culling import bound_tile, lights_in_reach
-from refgi.splat.packing import pack_diffuse
-from refgi.splat.pair_sum import GROUP, TILE, geometry_term, sum_pairs
+from refgi.splat.pairs.culling import bound_tile, lights_in_reach
+from refgi.splat.pairs.packing import pack_diffuse
+from refgi.splat.pairs.pair_sum import GROUP, TILE, geometry_term, sum_pairs
 from tests.naive import eq2
 from tests.splat import sets
 

@@ -10,7 +10,7 @@ from refgi.rays import Tracer, openness
 from refgi.rsm import Warp, choose_pixel_lights, importance, reflective_shadow_map
 from refgi.scene import Material, SpotLight, load_scene, material_table
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.openness_flux import roulette, scale_flux
+from refgi.splat.lights.openness_flux import roulette, scale_flux
 from tests.rsm.shapes import geometry
 
 ROUNDING = 1e-12

@@ -10,7 +10,7 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.scene import SpotLight, load_scene
 from refgi.splat import SiiSettings, sii
-from refgi.splat.selection import light_footprints, pixel_lights
+from refgi.splat.lights.selection import light_footprints, pixel_lights
 from refgi.stages import observe
 
 ALL = SiiSettings(pattern="all", i_low=0)  # the sum without a cut

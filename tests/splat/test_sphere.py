@@ -9,7 +9,7 @@ import pytest
 from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.splat import PairSettings, irradiance
-from refgi.splat.sphere_pair import cone_term, cut_cone_term
+from refgi.splat.pairs.sphere_pair import cone_term, cut_cone_term
 from tests.naive import eq2
 from tests.naive.sphere import cone_integral, spherical_pair
 from tests.splat import sets

@@ -13,14 +13,14 @@ from refgi.jit import threads
 from refgi.rsm import choose_pixel_lights
 from refgi.scene import load_scene
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.bounds import light_solids
-from refgi.splat.fragments import fragments, gather_bits
-from refgi.splat.mesh_bounds import covered_pixels
-from refgi.splat.ranged_sum import LANES, range_factor
-from refgi.splat.screen_bounds import screen_quads
+from refgi.splat.pairs.ranged_sum import LANES, range_factor
+from refgi.splat.reach.bounds import light_solids
+from refgi.splat.reach.fragments import fragments, gather_bits
+from refgi.splat.reach.mesh_bounds import covered_pixels
+from refgi.splat.reach.screen_bounds import screen_quads
+from refgi.splat.reach.threshold import low_irradiance
 from refgi.splat.settings import SplatSettings
 from refgi.splat.splat import cut_irradiance, splat
-from refgi.splat.threshold import low_irradiance
 from tests.naive import bounds as naive
 from tests.splat import sets
 

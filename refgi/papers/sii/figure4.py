@@ -16,7 +16,7 @@ from refgi.papers.records import Bar, Cell, Figure, Picture, Ratios, Table
 from refgi.papers.sii.subjects import CAUSTIC
 from refgi.papers.timing import interleaved
 from refgi.splat import SiiSettings, sii
-from refgi.splat.selection import choose_lights
+from refgi.splat.lights.selection import choose_lights
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

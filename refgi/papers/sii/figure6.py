@@ -9,7 +9,7 @@ from refgi.papers import pictures
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.records import Figure, Table
 from refgi.splat import SiiSettings, sii
-from refgi.splat.selection import choose_lights
+from refgi.splat.lights.selection import choose_lights
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

@@ -7,7 +7,7 @@ from refgi.papers import pictures
 from refgi.papers.records import Cell, Figure, Table
 from refgi.papers.sii.subjects import BOX, PAPER_LIGHTS, PAPER_OVERDRAW, counted, full_sum, reference_length, splats
 from refgi.splat import sii
-from refgi.splat.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
+from refgi.splat.reach.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy.typing as npt
 
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.fragments import Fragments, fragments
-from refgi.splat.selection import choose_lights
+from refgi.splat.lights.selection import choose_lights
+from refgi.splat.reach.fragments import Fragments, fragments
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -177,6 +177,6 @@ def low_irradiance_of(bench: "Workbench", scene: str, settings: SiiSettings) -> 
     float
         Irradiance, W/m^2.
     """
-    from refgi.splat.threshold import low_irradiance
+    from refgi.splat.reach.threshold import low_irradiance
 
     return low_irradiance(choose_lights(bench.frame(scene), settings), settings)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
-from refgi.splat.lobe_culling import (
+from refgi.splat.pairs.lobe_culling import (
     LIMIT,
     MEASURES,
     PARTS,
@@ -27,9 +27,18 @@ from refgi.splat.lobe_culling import (
     lobes_in_reach,
     parts_in_reach,
 )
-from refgi.splat.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor, widened
-from refgi.splat.pair_sum import GROUP, LEAST_SQUARE, LOST, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, load_tile
-from refgi.splat.range import Range
+from refgi.splat.pairs.lobe_shape import (
+    CLAMPED,
+    CORRECTED,
+    FULL_LOBE,
+    LITERAL,
+    NO_NORM,
+    Widening,
+    lobe_norm_factor,
+    widened,
+)
+from refgi.splat.pairs.pair_sum import GROUP, LEAST_SQUARE, LOST, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, load_tile
+from refgi.splat.pairs.range import Range
 
 __all__ = ["CLAMPED", "CORRECTED", "FULL_LOBE", "LITERAL", "NO_NORM", "Widening", "add_lobes", "lobe_norm_factor"]
 

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
-from refgi.splat.lobe_sum import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
-from refgi.splat.pair_sum import Clamp
+from refgi.splat.pairs.lobe_sum import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
+from refgi.splat.pairs.pair_sum import Clamp
 from refgi.splat.settings import PairSettings
 
 if TYPE_CHECKING:

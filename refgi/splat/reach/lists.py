@@ -6,15 +6,15 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.splat.bins import list_lights, of_whole_tiles, pack_solids
-from refgi.splat.bounds import Solids, light_solids
-from refgi.splat.mesh_bounds import covered_pixels
-from refgi.splat.packing import Packed
-from refgi.splat.range import Range
-from refgi.splat.ranged_sum import LANES
-from refgi.splat.screen_bounds import screen_quads, tiles_of_pixels, tiles_of_quads
+from refgi.splat.pairs.packing import Packed
+from refgi.splat.pairs.range import Range
+from refgi.splat.pairs.ranged_sum import LANES
+from refgi.splat.reach.bins import list_lights, of_whole_tiles, pack_solids
+from refgi.splat.reach.bounds import Solids, light_solids
+from refgi.splat.reach.mesh_bounds import covered_pixels
+from refgi.splat.reach.screen_bounds import screen_quads, tiles_of_pixels, tiles_of_quads
+from refgi.splat.reach.threshold import DIFFUSE, GLOSSY, all_peaks, light_range, threshold
 from refgi.splat.settings import SplatSettings
-from refgi.splat.threshold import DIFFUSE, GLOSSY, all_peaks, light_range, threshold
 
 if TYPE_CHECKING:
     from refgi.rsm import Projection

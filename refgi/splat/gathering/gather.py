@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.scene.values import LARGEST
-from refgi.splat.gather_sum import GatherMap, disc_pattern, gather_discs
-from refgi.splat.interpolation import Agreement, coarse_pixels, interpolate
+from refgi.splat.gathering.gather_sum import GatherMap, disc_pattern, gather_discs
+from refgi.splat.gathering.interpolation import Agreement, coarse_pixels, interpolate
 from refgi.splat.irradiance import Receivers
 from refgi.stages import skip, stage
 

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.bounds import Solids
-from refgi.splat.pair_sum import TILE
-from refgi.splat.ranged_sum import LANES
+from refgi.splat.pairs.pair_sum import TILE
+from refgi.splat.pairs.ranged_sum import LANES
+from refgi.splat.reach.bounds import Solids
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]

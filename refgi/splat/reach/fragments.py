@@ -12,11 +12,11 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.splat.irradiance import Receivers, checked, over_receivers
-from refgi.splat.lists import Lists
-from refgi.splat.lobe_sum import CORRECTED, Widening, lobe_norm_factor
-from refgi.splat.pair_sum import TILE
-from refgi.splat.range import Range
-from refgi.splat.ranged_sum import LANES, reached
+from refgi.splat.pairs.lobe_sum import CORRECTED, Widening, lobe_norm_factor
+from refgi.splat.pairs.pair_sum import TILE
+from refgi.splat.pairs.range import Range
+from refgi.splat.pairs.ranged_sum import LANES, reached
+from refgi.splat.reach.lists import Lists
 from refgi.splat.settings import SplatSettings
 
 if TYPE_CHECKING:

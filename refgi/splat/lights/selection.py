@@ -115,7 +115,7 @@ def thinned(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") -> "
     PixelLights
         What is left of them.
     """
-    from refgi.splat.openness_flux import roulette, scale_flux
+    from refgi.splat.lights.openness_flux import roulette, scale_flux
 
     if settings.openness_flux == "none":
         return lights
@@ -137,7 +137,7 @@ def _openness(
 
 def _walked(frame: "Frame", settings: "SiiSettings") -> "PixelLights":
     from refgi.scene import light_table, material_table
-    from refgi.splat.walk import walk_lights
+    from refgi.splat.lights.walk import walk_lights
 
     scene = frame.scene
     return walk_lights(frame.tracer, scene.geometry, material_table(scene.materials), light_table(scene.lights),

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sampling import halton
-from refgi.splat.pair_sum import geometry_term
+from refgi.splat.pairs.pair_sum import geometry_term
 
 Array = npt.NDArray[Any]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.splat.bounds import Solids
+from refgi.splat.reach.bounds import Solids
 
 if TYPE_CHECKING:
     from refgi.rsm import Projection

@@ -125,12 +125,6 @@ class Geometry:
         return int(self.material_of_face.max(initial=-1)) + 1
 
     @cached_property
-    def float32_step(self) -> float:
-        """Distance between float32 numbers at the coordinate farthest from the origin, m."""
-        farthest = max(abs(self.vertices.min(initial=0)), abs(self.vertices.max(initial=0)))
-        return float(np.spacing(np.float32(farthest)))
-
-    @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Corners of the axis-aligned box of all used vertices, m."""
         if not len(self.faces):

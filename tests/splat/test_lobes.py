@@ -8,7 +8,8 @@ import pytest
 
 from refgi.jit import threads
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.pairs.lobe_sum import CLAMPED, FULL_LOBE, NO_NORM, add_lobes, lobe_norm_factor
+from refgi.splat.pairs.lobe_shape import CLAMPED, FULL_LOBE, NO_NORM, lobe_norm_factor
+from refgi.splat.pairs.lobe_sum import add_lobes
 from refgi.splat.pairs.packing import pack_clamp, pack_lobes, pack_widening
 from refgi.splat.pairs.range import Range
 from tests.naive import eq2

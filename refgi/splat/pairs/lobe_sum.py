@@ -28,19 +28,13 @@ from refgi.splat.pairs.lobe_culling import (
     parts_in_reach,
 )
 from refgi.splat.pairs.lobe_shape import (
-    CLAMPED,
     CORRECTED,
-    FULL_LOBE,
-    LITERAL,
-    NO_NORM,
     Widening,
     lobe_norm_factor,
     widened,
 )
 from refgi.splat.pairs.pair_sum import GROUP, LEAST_SQUARE, LOST, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, load_tile
 from refgi.splat.pairs.range import Range
-
-__all__ = ["CLAMPED", "CORRECTED", "FULL_LOBE", "LITERAL", "NO_NORM", "Widening", "add_lobes", "lobe_norm_factor"]
 
 Array = npt.NDArray[Any]
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.splat.irradiance import Receivers, checked, over_receivers
-from refgi.splat.pairs.lobe_sum import CORRECTED, Widening, lobe_norm_factor
+from refgi.splat.pairs.lobe_shape import CORRECTED, Widening, lobe_norm_factor
 from refgi.splat.pairs.pair_sum import TILE
 from refgi.splat.pairs.range import Range
 from refgi.splat.pairs.ranged_sum import LANES, reached

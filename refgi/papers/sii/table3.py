@@ -75,9 +75,9 @@ def _notes(seconds: dict[str, float], fragments: dict[str, int], rows: list[Any]
     kept = fragments["scale"] / fragments["none"]
     return (
         f"Scaled fluxes leave {kept:.2f} of the fragments, a speed-up of {1 / kept:.2f} if fragments were all of the "
-        f"time (paper: 1.37 and 1.35). They are not: the frames gain {gain['full']:.2f} and {gain['half']:.2f} times. The "
-        f"paper does not say how far its rays reach; {RADIUS:g} of the diagonal was taken because fragments then fall "
-        "about as far as its speed-up asks for, so their share is no finding.",
+        f"time (paper: 1.37 and 1.35). They are not: the frames gain {gain['full']:.2f} and {gain['half']:.2f} times. "
+        f"How far the paper's rays reach it does not say; {RADIUS:g} of the diagonal was taken because fragments then "
+        "fall about as far as its speed-up asks for, so their share is no finding.",
         f"The energy of {rows[1][5]:.0f} % that goes with it is not mentioned in the paper. It takes the ambient "
         "occlusion term for the share of open directions; what is meant to scale the flux is its complement, used "
         "here. Roulette keeps the mean instead, at the cost of noise from lights that come and go.",

@@ -107,8 +107,9 @@ def _read(values: dict[str, Any], key: str, text: str, hint: Any) -> str | None:
         else:
             return None
     assert first is not None
-    reasons = dict.fromkeys(error["msg"] for error in first.errors() if error["type"] != "none_required")
-    return f"{key}: {' or '.join(reasons).lower()}, got {text!r}"
+    reasons = dict.fromkeys(error["msg"][:1].lower() + error["msg"][1:] for error in first.errors()
+                            if error["type"] != "none_required")
+    return f"{key}: {' or '.join(reasons)}, got {text!r}"
 
 
 def _candidates(text: str, hint: Any) -> list[Any]:

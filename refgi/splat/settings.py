@@ -5,7 +5,7 @@ import math
 from typing import ClassVar, Literal, get_args
 
 from refgi.errors import expect
-from refgi.scene.values import LARGEST
+from refgi.scene.values import LARGEST, is_count
 
 ClampMode = Literal["none", "distance", "geometry", "disc", "sphere"]
 LobeNorm = Literal["none", "full_lobe", "clamped"]
@@ -13,6 +13,8 @@ Bound = Literal["full", "quad", "ellipsoid", "tangent", "mesh"]
 
 MESHES = (8, 20, 80, 320, 1280)  # faces of an octahedron and of icosahedra, subdivided
 FOOTPRINT_CLAMPS = ("disc", "sphere")  # need the surface area that each light stands for
+STRONGEST_CLAMP = 1e18  # m, 1/m^2 or 1: its square stays within float32
+LAST_SEED = 2**32 - 1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,8 +41,8 @@ class PairSettings:
         expect(self.clamp in ("none", "distance", "geometry", "disc", "sphere"), "clamp",
                "'none', 'distance', 'geometry', 'disc' or 'sphere'", self.clamp)
         needed = self.clamp in ("distance", "geometry")
-        expect(math.isfinite(self.clamp_value) and (self.clamp_value > 0 or (not needed and self.clamp_value == 0)),
-               "clamp_value", f"a finite number > 0 for the clamp {self.clamp!r}" if needed else "a number >= 0",
+        expect(0 <= self.clamp_value <= STRONGEST_CLAMP and (self.clamp_value > 0 or not needed), "clamp_value",
+               f"{f'a number > 0 for the clamp {self.clamp!r},' if needed else '0'} up to {STRONGEST_CLAMP:g}",
                self.clamp_value)
         expect(abs(self.offset) <= LARGEST, "offset", f"a length up to {LARGEST:g} m", self.offset)
         expect(self.lobe_norm in ("none", "full_lobe", "clamped"), "lobe_norm",
@@ -76,13 +78,14 @@ class SplatSettings(PairSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         expect(0 <= self.i_low <= LARGEST, "i_low", "a share of the brightest light's intensity, 0 or more", self.i_low)
-        expect(0 < self.reference_length <= LARGEST, "reference_length", f"a length up to {LARGEST:g} m",
-               self.reference_length)
+        expect(1 / LARGEST <= self.reference_length <= LARGEST, "reference_length",
+               f"{1 / LARGEST:g} to {LARGEST:g} m", self.reference_length)
         expect(self.irradiance_low is None or (math.isfinite(self.irradiance_low) and self.irradiance_low >= 0),
                "irradiance_low", "none or an irradiance of 0 or more, W/m^2", self.irradiance_low)
         expect(self.bound in get_args(Bound), "bound", " or ".join(map(repr, get_args(Bound))), self.bound)
         expect(self.mesh_faces in MESHES, "mesh_faces", f"one of {MESHES}", self.mesh_faces)
-        expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
+        expect(is_count(self.seed) and 0 <= self.seed <= LAST_SEED, "seed", f"a whole number, 0 to {LAST_SEED}",
+               self.seed)
 
     @property
     def cuts(self) -> bool:

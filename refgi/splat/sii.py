@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.scene.material import SHARPEST
-from refgi.scene.values import LARGEST
+from refgi.scene.values import LARGEST, is_count
 from refgi.splat.half_resolution import half_resolution
 from refgi.splat.irradiance import Receivers
 from refgi.splat.lights.selection import choose_lights, footprints
@@ -28,7 +28,8 @@ Refraction = Literal["none", "back_face", "two_interface"]
 
 CHOICES: dict[str, Any] = {"pattern": Pattern, "source": Source, "warp": WarpMethod, "importance": Importance,
                            "openness_flux": OpennessFlux, "refraction": Refraction}
-MOST_LIGHTS = 1 << 24  # a map: every texel of one of 4096 x 4096
+# least and most; lights: every texel of a map of 4096 x 4096
+COUNTS = (("lights", 1, 1 << 24), ("bounces", 1, MOST_BOUNCES), ("warp_levels", 0, 32), ("openness_rays", 1, 1 << 16))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,11 +72,12 @@ class SiiSettings(SplatSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        expect(1 <= self.lights <= MOST_LIGHTS, "lights", f"1 to {MOST_LIGHTS:,} pixel lights", self.lights)
+        for key, least, most in COUNTS:
+            count = getattr(self, key)
+            expect(is_count(count) and least <= count <= most, key, f"a whole number, {least} to {most:,}", count)
         for key, names in CHOICES.items():
             expect(getattr(self, key) in get_args(names), key, " or ".join(map(repr, get_args(names))),
                    getattr(self, key))
-        expect(1 <= self.bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", self.bounces)
         expect(self.clamp not in FOOTPRINT_CLAMPS or self.source == "rsm", "clamp",
                "one without footprints with the source 'walk'", self.clamp)
         expect(self.clamp not in FOOTPRINT_CLAMPS or self.openness_flux != "roulette", "openness_flux",
@@ -85,11 +87,11 @@ class SiiSettings(SplatSettings):
         expect(self.warp == "none" or self.pattern != "all", "warp", "'none' with the pattern 'all'", self.warp)
         expect(not self.half_resolution or self.bound not in ("quad", "mesh"), "bound",
                "one in space, not on the screen, at half resolution", self.bound)
-        expect(0 <= self.warp_levels <= 32, "warp_levels", "0 to 32", self.warp_levels)
         expect(0 <= self.openness_radius <= LARGEST, "openness_radius", f"0 to {LARGEST:g} m", self.openness_radius)
-        expect(1 <= self.openness_rays <= 1 << 16, "openness_rays", "1 to 65536 rays", self.openness_rays)
         for key in ("defensive", "openness_floor"):
             expect(0 <= getattr(self, key) <= 1, key, "a share from 0 to 1", getattr(self, key))
+        expect(self.openness_floor > 0 or self.openness_flux != "roulette", "openness_floor",
+               "more than 0 for roulette", self.openness_floor)
         expect(0 <= self.refraction_exponent <= SHARPEST, "refraction_exponent", f"0 to {SHARPEST:g}",
                self.refraction_exponent)
 

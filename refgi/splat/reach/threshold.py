@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
+LEAST_THRESHOLD = 1e-200  # W/m^2: any light over it is a number
 DIFFUSE, GLOSSY = 0, 1  # streams of random numbers: the two parts of a light have each their own xi
 
 
@@ -95,7 +96,7 @@ def light_range(
     peak : (N,) ndarray
         I_0 of each light, W/sr.
     low : float
-        I_low, W/m^2, above 0.
+        I_low, W/m^2; counts as at least `LEAST_THRESHOLD`.
     settings : SplatSettings
         Whether the range is random, and the seed.
     stream : int
@@ -110,7 +111,7 @@ def light_range(
     Range
         R_0^2 and xi of each light.
     """
-    square = peak / low
+    square = peak / max(low, LEAST_THRESHOLD)
     if "per_light_ilow" in settings.as_published and settings.irradiance_low is None:
         # I_low = x I_0 of the light itself
         square = np.where(peak > 0, settings.reference_length**2 / settings.i_low, 0.0)

@@ -15,6 +15,7 @@ class Knobs:
     share: float = 0.5
     exact: bool = False
     mode: Literal["grid", "halton"] = "grid"
+    warp: Literal["A", "B"] = "A"
     shift: tuple[float, float] = (0.0, 0.0)
     switches: frozenset[str] = frozenset()
     name: str | None = None
@@ -50,7 +51,8 @@ def test_the_seed_option_is_a_setting():
 @pytest.mark.parametrize(("pair", "words"), [
     ("count", ["'count' is not key=value"]), ("coutn=3", ["'coutn'", "did you mean 'count'"]),
     ("count=3.5", ["count", "'3.5'"]), ("exact=perhaps", ["exact", "'perhaps'"]),
-    ("mode=spiral", ["'grid' or 'halton'", "'spiral'"]), ("shift=1", ["shift", "'1'"]), ("share=2", ["share", "2.0"]),
+    ("mode=spiral", ["mode: input should be 'grid' or 'halton'", "'spiral'"]),
+    ("warp=a", ["'A' or 'B'", "'a'"]), ("shift=1", ["shift", "'1'"]), ("share=2", ["share", "2.0"]),
     ("share=nan", ["share", "nan"]), ("mode=none", ["mode"]),
 ])
 def test_what_is_wrong_is_named(pair, words):

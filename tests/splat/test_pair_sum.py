@@ -264,6 +264,7 @@ def test_no_lights_and_no_pixels():
 @pytest.mark.parametrize(("change", "message"), [
     ({"clamp": "soft"}, "clamp: expected"), ({"clamp": "distance"}, "clamp_value: expected"),
     ({"clamp": "geometry", "clamp_value": math.inf}, "clamp_value"), ({"offset": math.nan}, "offset"),
+    ({"clamp_value": 1e19, "clamp": "sphere"}, "clamp_value"),
     ({"widening": -1.0}, "widening"), ({"lobe_norm": "x"}, "lobe_norm"), ({"as_published": {"no_pi"}}, "as_published"),
 ])
 def test_settings_are_checked(change, message):

@@ -217,6 +217,8 @@ def test_settings_are_checked():
                    {"refraction_exponent": -1}, {"bounces": 2}, {"warp": "A", "source": "walk"},
                    {"warp": "A", "pattern": "all"}, {"clamp": "disc", "source": "walk"},
                    {"bound": "quad", "half_resolution": True}, {"openness_flux": "roulette", "clamp": "disc"},
-                   {"as_published": {"sii_no_luck"}}):
+                   {"as_published": {"sii_no_luck"}}, {"lights": 10.5}, {"openness_rays": 2.5}, {"warp_levels": 33},
+                   {"bounces": 1.5, "source": "walk"}, {"seed": 1.5}, {"seed": 1 << 32},
+                   {"openness_floor": 0, "openness_flux": "roulette"}, {"reference_length": 1e-300}):
         with pytest.raises(InputError, match=next(iter(change))):
             SiiSettings(**change)

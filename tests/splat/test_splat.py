@@ -191,6 +191,15 @@ def test_threshold_is_one_irradiance_for_all_lights():
     assert low_irradiance(none, settings) == 0
 
 
+@pytest.mark.parametrize("how", [{"irradiance_low": 1e-320}, {"i_low": 1e-320, "reference_length": 1e9},
+                                 {"i_low": 1e-320, "as_published": {"per_light_ilow"}}])
+def test_thresholds_near_0_cut_nothing(how):
+    receivers, lights = sets.room(np.random.default_rng(31), 50)
+    settings = SplatSettings(**how)
+    np.testing.assert_array_equal(splat(receivers, lights, settings), irradiance(receivers, lights, settings))
+    assert not cut_irradiance(receivers, lights, settings).any()
+
+
 def test_range_of_a_light_is_that_of_its_flux():
     """On the axis a light counts up to sqrt(I_0 / I_low); as published, all up to x^(-1/2) reference lengths."""
     z = np.linspace(0.01, 5, 4000)

@@ -102,6 +102,7 @@ def _fill_row(
             continue
         left = j // 2
         total, red, green, blue = real(0.0), real(0.0), real(0.0), real(0.0)
+        most, p, q, r = real(0.0), real(0.0), real(0.0), real(0.0)
         for corner in range(1 if chosen[top, left] == i * agreed.shape[1] + j else 4):
             row, column = top + corner // 2, left + corner % 2
             weight = real(0.25 * (2 - i % 2 if corner < 2 else i % 2) * (j % 2 if corner % 2 else 2 - j % 2))
@@ -111,16 +112,18 @@ def _fill_row(
                 weight *= _agreement(
                     xk[0, row, column] - x[0, i, j], xk[1, row, column] - x[1, i, j], xk[2, row, column] - x[2, i, j],
                     n[0, i, j], n[1, i, j], n[2, i, j], nk[0, row, column], nk[1, row, column], nk[2, row, column])
+            a, b, c = coarse[0, row, column], coarse[1, row, column], coarse[2, row, column]
+            # differences to p, q, r, the block of most weight: constants are exact, what hardly counts costs no digits
+            if weight > most:
+                red, green, blue = red + total * (p - a), green + total * (q - b), blue + total * (r - c)
+                most, p, q, r = weight, a, b, c
             total += weight
-            # differences to the own block's value: a constant is then exact
-            red += weight * (coarse[0, row, column] - coarse[0, top, left])
-            green += weight * (coarse[1, row, column] - coarse[1, top, left])
-            blue += weight * (coarse[2, row, column] - coarse[2, top, left])
+            red, green, blue = red + weight * (a - p), green + weight * (b - q), blue + weight * (c - r)
         if total >= real(LEAST_WEIGHT):
             agreed[i, j] = True
-            result[0, i, j] = coarse[0, top, left] + red / total
-            result[1, i, j] = coarse[1, top, left] + green / total
-            result[2, i, j] = coarse[2, top, left] + blue / total
+            result[0, i, j] = p + red / total
+            result[1, i, j] = q + green / total
+            result[2, i, j] = r + blue / total
 
 
 @kernel

@@ -101,6 +101,20 @@ def test_constants_are_exact_and_a_plane_keeps_its_ramp(joint, real, evidence):
     evidence(f"{np.dtype(real).name}, joint={joint}: constants to the bit, a ramp to 1e-5, at 1/4 of the pixels")
 
 
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_a_bright_block_that_disagrees_costs_its_neighbours_no_digits(real):
+    """Analytic: stripes of bumpy wall that face away from each other, in the same blocks, one of them bright."""
+    receivers = rough(np.random.default_rng(8), 40, 45)
+    behind = receivers.position[0] % 6 > 2.5
+    receivers.normal[2] = np.where(behind, -3, 3)
+    receivers.normal[:] /= np.linalg.norm(receivers.normal, axis=0)
+    receivers = Receivers(receivers.position.astype(real), receivers.normal.astype(real), receivers.covered)
+    for dark in (0.0, 0.3):
+        light = half_resolution(
+            receivers, lambda some, dark=dark: np.stack([np.where(some.normal[2] < 0, dark, 1e9).astype(real)] * 3))
+        np.testing.assert_array_equal(light[:, behind & receivers.covered], real(dark))
+
+
 @pytest.mark.feature("SII-22")
 def test_nothing_bleeds_over_edges_or_from_the_background(evidence):
     """Analytic: two walls of constant light, apart in depth or turned; with the joint filter none tints the other."""

@@ -26,6 +26,7 @@ Importance = Literal["flux", "peak", "openness"]
 OpennessFlux = Literal["none", "scale", "roulette"]
 Refraction = Literal["none", "back_face", "two_interface"]
 
+FOR_MAPS = {"pattern": "halton", "filtered": False, "warp": "none", "renormalise_weights": False}  # else no effect
 CHOICES: dict[str, Any] = {"pattern": Pattern, "source": Source, "warp": WarpMethod, "importance": Importance,
                            "openness_flux": OpennessFlux, "refraction": Refraction}
 # least and most; lights: every texel of a map of 4096 x 4096
@@ -83,7 +84,11 @@ class SiiSettings(SplatSettings):
         expect(self.clamp not in FOOTPRINT_CLAMPS or self.openness_flux != "roulette", "openness_flux",
                f"'none' or 'scale' with the clamp {self.clamp!r}", self.openness_flux)
         expect(self.bounces == 1 or self.source == "walk", "bounces", "1 with the source 'rsm'", self.bounces)
-        expect(self.warp == "none" or self.source == "rsm", "warp", "'none' with the source 'walk'", self.warp)
+        if self.source == "walk":
+            for key, only in FOR_MAPS.items():
+                expect(getattr(self, key) == only, key, f"{only!r} with the source 'walk'", getattr(self, key))
+            expect("sii_no_tn" not in self.as_published, "as_published", "no 'sii_no_tn' with the source 'walk'",
+                   sorted(self.as_published))
         expect(self.warp == "none" or self.pattern != "all", "warp", "'none' with the pattern 'all'", self.warp)
         expect(not self.half_resolution or self.bound not in ("quad", "mesh"), "bound",
                "one in space, not on the screen, at half resolution", self.bound)

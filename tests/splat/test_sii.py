@@ -215,6 +215,8 @@ def test_settings_are_checked():
                    {"importance": "luck"}, {"defensive": 2}, {"openness_radius": -1}, {"openness_rays": 0},
                    {"openness_floor": math.nan}, {"openness_flux": "on"}, {"refraction": "front"},
                    {"refraction_exponent": -1}, {"bounces": 2}, {"warp": "A", "source": "walk"},
+                   {"pattern": "grid", "source": "walk"},
+                   {"filtered": True, "source": "walk"}, {"as_published": {"sii_no_tn"}, "source": "walk"},
                    {"warp": "A", "pattern": "all"}, {"clamp": "disc", "source": "walk"},
                    {"bound": "quad", "half_resolution": True}, {"openness_flux": "roulette", "clamp": "disc"},
                    {"as_published": {"sii_no_luck"}}, {"lights": 10.5}, {"openness_rays": 2.5}, {"warp_levels": 33},

@@ -1,12 +1,9 @@
-"""Progress on stderr: a bar on a terminal, a plain line every few seconds elsewhere. Heeds interrupts."""
+"""Progress on stderr: a bar on a terminal, a plain line every few seconds elsewhere."""
 
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from refgi.cli.session import say
 
@@ -23,52 +20,12 @@ def progress() -> Iterator[Tell]:
     ------
     callable
         To be called with (what runs, fraction done).
-
-    Raises
-    ------
-    KeyboardInterrupt
-        Where the user interrupts; at the next call or at the end if Python dropped the interrupt, as it does when one
-        arrives inside a callback of the compiler.
     """
-    with _interrupts() as heed:
-        if sys.stderr.isatty():
-            with _bar() as tell:
-                yield _heeding(tell, heed)
-        else:
-            yield _heeding(_lines(), heed)
-        heed()
-
-
-@contextmanager
-def _interrupts() -> Iterator[Callable[[], None]]:
-    """Remember SIGINT while the block runs, and yield what raises it again."""
-    seen = False
-
-    def remember(*_: Any) -> None:
-        nonlocal seen
-        seen = True
-        raise KeyboardInterrupt
-
-    def heed() -> None:
-        if seen:
-            raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield heed
-        return
-    before = signal.signal(signal.SIGINT, remember)
-    try:
-        yield heed
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _heeding(tell: Tell, heed: Callable[[], None]) -> Tell:
-    def tell_or_stop(what: str, done: float) -> None:
-        heed()
-        tell(what, done)
-
-    return tell_or_stop
+    if sys.stderr.isatty():
+        with _bar() as tell:
+            yield tell
+    else:
+        yield _lines()
 
 
 @contextmanager

@@ -140,7 +140,8 @@ def test_ctrl_c_leaves_with_130_and_no_file(tmp_path):
     child = subprocess.Popen(
         [sys.executable, "-m", "refgi", "render", "cornell_box", "--method", "truth", "--size", "64", "--set",
          "samples=100000000", "--out", str(tmp_path / "a.exr")], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True)
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # a shell's background job ignores it
     child.stderr.readline()  # the first line of progress: it is computing
     child.send_signal(signal.SIGINT)
     out, err = child.communicate(timeout=120)

@@ -1,10 +1,6 @@
 """Progress: lines now and then where there is no terminal, a bar where there is one, never on stdout."""
 
-import os
-import signal
 import sys
-
-import pytest
 
 from refgi.cli import progress as module
 from refgi.cli.progress import progress
@@ -30,29 +26,3 @@ def test_a_terminal_gets_a_bar(monkeypatch, capsys):
     captured = capsys.readouterr()
     assert captured.out == ""
     assert "sii" in captured.err
-
-
-def interrupt():
-    """Send this process SIGINT where Python drops the exception, as in a callback from compiled code."""
-    try:
-        os.kill(os.getpid(), signal.SIGINT)
-        for _ in range(10_000):
-            pass  # signals are handled between two steps of the interpreter
-    except KeyboardInterrupt:
-        pass
-
-
-def test_an_interrupt_that_was_dropped_stops_the_work_at_the_next_report():
-    showing = progress()
-    tell = showing.__enter__()
-    tell("truth", 0.1)
-    interrupt()
-    with pytest.raises(KeyboardInterrupt) as stopped:
-        tell("truth", 0.2)
-    assert not showing.__exit__(KeyboardInterrupt, stopped.value, None)  # goes on to whoever called
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_an_interrupt_that_was_dropped_counts_at_the_end():
-    with pytest.raises(KeyboardInterrupt), progress():
-        interrupt()

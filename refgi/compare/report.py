@@ -3,7 +3,7 @@
 import base64
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, R
 from refgi.compare.plot import Point, time_against_error
 from refgi.compare.results import error_scale, plain, signed_error
 from refgi.image import png_bytes, write_text
+
+if TYPE_CHECKING:
+    import jinja2
 
 Array = npt.NDArray[Any]
 
@@ -48,6 +51,25 @@ def write_report(comparison: Comparison, folder: Path) -> None:
     write_text(Path(folder) / "index.html", page(comparison))
 
 
+def templates(folder: Path) -> "jinja2.Environment":
+    """Return the templates of a page: everything escaped, and nothing left out in silence.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they lie.
+
+    Returns
+    -------
+    jinja2.Environment
+        Its templates by file name.
+    """
+    import jinja2
+
+    return jinja2.Environment(loader=jinja2.FileSystemLoader(folder), autoescape=True, trim_blocks=True,
+                              lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+
+
 def page(comparison: Comparison) -> str:
     """Return the page as HTML that refers to nothing outside itself.
 
@@ -61,14 +83,11 @@ def page(comparison: Comparison) -> str:
     str
         The same text for equal input.
     """
-    import jinja2
     from markupsafe import Markup
 
-    templates = jinja2.Environment(loader=jinja2.FileSystemLoader(PAGE), autoescape=True, trim_blocks=True,
-                                   lstrip_blocks=True, undefined=jinja2.StrictUndefined)
     pictures = _pictures(comparison)
     names = [picture["name"] for picture in pictures]
-    return templates.get_template("report.html.j2").render(
+    return templates(PAGE).get_template("report.html.j2").render(
         style=Markup((PAGE / "style.css").read_text("utf-8")), viewer=Markup((PAGE / "viewer.js").read_text("utf-8")),
         title=comparison.scene.name, description=comparison.scene.description, facts=_facts(comparison),
         verdict=_verdict(comparison), failures=comparison.failures, width=comparison.width, height=comparison.height,

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from refgi.compare.report import PAGE as COMMON
-from refgi.compare.report import TIMES, number
+from refgi.compare.report import TIMES, number, templates
 from refgi.compare.results import plain
 from refgi.image import png_bytes, write_text
 from refgi.papers.outcome import Outcome, Reproduction
@@ -45,13 +45,10 @@ def page(made: Reproduction) -> str:
     str
         The same text for equal input.
     """
-    import jinja2
     from markupsafe import Markup
 
-    templates = jinja2.Environment(loader=jinja2.FileSystemLoader(PAGE), autoescape=True, trim_blocks=True,
-                                   lstrip_blocks=True, undefined=jinja2.StrictUndefined)
     style = (COMMON / "style.css").read_text("utf-8") + (PAGE / "paper.css").read_text("utf-8")
-    return templates.get_template("paper.html.j2").render(
+    return templates(PAGE).get_template("paper.html.j2").render(
         style=Markup(style), script=Markup((PAGE / "lightbox.js").read_text("utf-8")),
         paper=made.paper, facts=_facts(made), verdict=_verdict(made), failures=_failures(made),
         figures=[_figure(outcome, outcome.figure) for outcome in made.outcomes if outcome.figure is not None],

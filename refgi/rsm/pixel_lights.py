@@ -127,16 +127,28 @@ def _shares(rsms: Sequence[Rsm], count: int | None, pattern: Pattern) -> list[in
         above = next((n for n in range(count + 1, 4 * count + 64 * len(rsms)) if _is_grid(rsms, n)), None)
         near = " or ".join(str(n) for n in (below, above) if n is not None)
         expect(False, "count", f"n x n cells on each map for pattern 'grid', nearest {near or 'none'}", count)
-    return _split(count, len(rsms))
+    return equal_shares(count, len(rsms))
 
 
-def _split(count: int, parts: int) -> list[int]:
+def equal_shares(count: int, parts: int) -> list[int]:
+    """Return how many of `count` things each of some parts gets, the first ones one more where it does not divide.
+
+    Parameters
+    ----------
+    count, parts : int
+        Things, and parts to give them to.
+
+    Returns
+    -------
+    list of int
+        One number a part.
+    """
     return [count // parts + (index < count % parts) for index in range(parts)]
 
 
 def _is_grid(rsms: Sequence[Rsm], count: int) -> bool:
     """Tell whether each map's share is n x n cells on each of its stacked maps."""
-    for share, rsm in zip(_split(count, len(rsms)), rsms, strict=True):
+    for share, rsm in zip(equal_shares(count, len(rsms)), rsms, strict=True):
         cells, rest = divmod(share, rsm.projection.maps)
         if rest or cells == 0 or math.isqrt(cells) ** 2 != cells:
             return False

@@ -70,8 +70,7 @@ def _splat(
 
 @stage("splat.cut")
 def cut_irradiance(
-    receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None = None,
-    projection: "Projection | None" = None,
+    receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None = None
 ) -> Array:
     """Sum the irradiance of the pairs that `splat` leaves out.
 
@@ -85,8 +84,6 @@ def cut_irradiance(
         Those of `splat`; the bound does not matter.
     footprint : (N,) ndarray, optional
         As for `splat`.
-    projection : Projection, optional
-        Not needed.
 
     Returns
     -------
@@ -94,7 +91,6 @@ def cut_irradiance(
         Irradiance, W/m^2, linear RGB: with that of `splat` it makes the full sum, but for rounding. With a random
         range it is the full sum less the weighed one, and may be below 0.
     """
-    del projection
     if not settings.cuts:
         return np.zeros_like(np.asarray(receivers.position))
     return _sum_in_range(receivers, lights, settings, footprint, None, outside=True)

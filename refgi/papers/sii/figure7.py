@@ -9,12 +9,11 @@ import numpy.typing as npt
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Table
 from refgi.papers.sii.subjects import full_sum
-from refgi.rays.openness import openness
-from refgi.rsm.importance import importance
 from refgi.rsm.pyramid import importance_pyramid
 from refgi.rsm.warp import warp_samples
 from refgi.sampling import halton
 from refgi.splat import SiiSettings, sii
+from refgi.splat.lights.selection import importance_maps
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench
@@ -42,7 +41,10 @@ def figure7(bench: "Workbench") -> Figure:
     Figure
         Samples over the importance map, and the error of the picture by level and method.
     """
-    worth = importance_of(bench, SCENE)
+    frame = bench.frame(SCENE)
+    maps = importance_maps(frame, frame.rsms, dataclasses.replace(BASE, warp="A"))
+    assert maps is not None  # the pattern is warped
+    worth = maps[0]
     points, pyramid = halton(LIGHTS), importance_pyramid(worth)
     shown, rows, off = [], [], {}
     for method, levels in CASES:
@@ -77,29 +79,6 @@ def _notes(off: dict[tuple[str, int], tuple[float, float]]) -> tuple[str, ...]:
         "shows in the RMSE, which a few pixels next to such edges lead, more than in the MAE. A sample in a dark part "
         "of a cell keeps a large weight, which is why the errors do not fall with every single level.",
     )
-
-
-def importance_of(bench: "Workbench", scene: str) -> Array:
-    """Return the importance map that the figure warps by.
-
-    Parameters
-    ----------
-    bench : Workbench
-        Holds the frame.
-    scene : str
-        Name of the scene.
-
-    Returns
-    -------
-    (H, W) ndarray
-        Flux times lobe peak times at least `openness_floor` of 1 - openness.
-    """
-    frame = bench.frame(scene)
-    rsm = frame.rsms[0]
-    radius = BASE.openness_radius or 0.1 * frame.scene.geometry.diagonal
-    covered = np.isfinite(rsm.depth)
-    share = openness(frame.tracer, rsm.position, rsm.normal, covered, radius=radius, rays=BASE.openness_rays, seed=0)
-    return importance(rsm, "openness", share, BASE.openness_floor)
 
 
 def _errors(bench: "Workbench", method: Any, levels: int) -> tuple[float, float]:

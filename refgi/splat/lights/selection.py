@@ -174,10 +174,11 @@ def pixel_lights(
 
 def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: "SiiSettings") -> "PixelLights":
     """Return lights as the paper has them: each with its texel's flux, T/N left out."""
+    from refgi.rsm.pixel_lights import equal_shares
+
     if settings.pattern == "all" or lights.map_index is None:
         return lights
-    count = len(rsms)
-    drawn = [settings.lights // count + (k < settings.lights % count) for k in range(count)]
+    drawn = equal_shares(settings.lights, len(rsms))
     share = np.array([n / rsm.texels for n, rsm in zip(drawn, rsms, strict=True)], lights.flux.dtype)
     factor = share[lights.map_index]
     lobe = None if lights.lobe_flux is None else lights.lobe_flux * factor

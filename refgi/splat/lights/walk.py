@@ -87,14 +87,16 @@ def walk_lights(
     Paths are not ended at random: each carries on with its power times the diffuse reflectance, so the walk adds no
     noise beyond its directions. Glossy materials leave a lobe, but paths go on by diffuse reflection alone.
     """
+    from refgi.rsm.pixel_lights import equal_shares
+
     count = len(lights.kind)
     expect(paths >= count, "lights", f"at least one path for each of {count} lights", paths)
     expect(1 <= bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", bounces)
     used = 2 + 2 * bounces
     shift = np.random.default_rng(seed).random(used).tolist() if seed else None
     left: list[Left] = []
-    for k in range(count):
-        numbers = halton(paths // count + (k < paths % count), BASES[:used], shift, start=1)
+    for k, share in enumerate(equal_shares(paths, count)):
+        numbers = halton(share, BASES[:used], shift, start=1)
         rays = _emit(lights, k, numbers, geometry)
         rays = rays._replace(origin=rays.origin + tracer.offset * rays.direction)  # a lamp may lie in a surface
         left += _paths(tracer, geometry, materials, rays, bounces)

@@ -13,11 +13,12 @@ from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.rays.embree import RunDoor
 from refgi.scene import Geometry, load_scene
+from refgi.shadowed import receivers
 from refgi.truth import TruthSettings
 from refgi.truth.moments import add_pass, no_passes
 from refgi.truth.passes import Task, one_pass
 from refgi.truth.settings import Estimator
-from refgi.truth.surfaces import lights_of, receivers, surfaces
+from refgi.truth.surfaces import lights_of, surfaces
 
 Array = npt.NDArray[Any]
 ESTIMATORS: tuple[Estimator, ...] = ("hemisphere", "light", "combined")

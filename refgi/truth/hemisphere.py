@@ -17,8 +17,9 @@ from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
+from refgi.shadowed import Receivers
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, found, row
-from refgi.truth.surfaces import Receivers, Surfaces, around, face_cross, lobe_pattern, shading_normal
+from refgi.truth.surfaces import Surfaces, around, face_cross, lobe_pattern, shading_normal
 
 Array = npt.NDArray[Any]
 

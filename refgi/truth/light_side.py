@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sampling import hash_bits
+from refgi.shadowed import Receivers
 from refgi.truth.lit_points import BLOCK, LitPoints
-from refgi.truth.surfaces import Receivers
 
 Array = npt.NDArray[Any]
 
@@ -181,29 +181,3 @@ def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Arra
                 reach[ray] = _aim(points, j, to, low + i, offset, origins, directions, ray)
                 for c in range(3):
                     worth[ray, c] = share * points.colour[c, j]
-
-
-@kernel(parallel=True)
-def add_free(sums: Array, first: int, receivers: int, per_receiver: int, blocked: Array, worth: Array) -> None:
-    """Add to each receiver what its unblocked rays are worth, in their order.
-
-    Parameters
-    ----------
-    sums : (3, r) float64 ndarray
-        Added to.
-    first : int
-        Receiver of the first ray.
-    receivers : int
-        How many receivers the rays belong to.
-    per_receiver : int
-        Rays of each.
-    blocked : (n,) bool ndarray
-        Which rays are blocked.
-    worth : (n, 3) float32 ndarray
-        What each is worth, W/m^2.
-    """
-    for r in prange(receivers):
-        for ray in range(r * per_receiver, (r + 1) * per_receiver):
-            if not blocked[ray]:
-                for c in range(3):
-                    sums[c, first + r] += worth[ray, c]

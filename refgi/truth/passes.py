@@ -7,15 +7,16 @@ import numpy.typing as npt
 
 from refgi.rays import Tracer
 from refgi.scene import LightTable, Scene
+from refgi.shadowed import Receivers, add_free
 from refgi.truth.caustics import Film, photon_pass
 from refgi.truth.hemisphere import gather, scrambled_points, send
 from refgi.truth.light_grid import footprint, light_rays
-from refgi.truth.light_side import add_free, pick
+from refgi.truth.light_side import pick
 from refgi.truth.lit_points import LitPoints, join, trace_lit_points
 from refgi.truth.paths import Paths, Shadows
 from refgi.truth.scattering import pass_through, scatter
 from refgi.truth.settings import TruthSettings
-from refgi.truth.surfaces import Receivers, Surfaces
+from refgi.truth.surfaces import Surfaces
 
 Array = npt.NDArray[Any]
 

@@ -10,9 +10,10 @@ from refgi.jit import kernel, prange
 from refgi.radiometry import lobe_fraction
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
+from refgi.shadowed import Receivers
 from refgi.truth.hemisphere import cosine_direction
 from refgi.truth.paths import Paths, dot, found, row
-from refgi.truth.surfaces import Receivers, Surfaces, around, face_normal, shading_normal
+from refgi.truth.surfaces import Surfaces, around, face_normal, shading_normal
 
 Array = npt.NDArray[Any]
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.radiometry import lobe_fraction, orthonormal_basis
-from refgi.scene import Geometry, LightTable, Scene, light_table, material_table
+from refgi.scene import LightTable, Scene, light_table, material_table
 
 Array = npt.NDArray[Any]
 
@@ -33,16 +33,6 @@ class Surfaces(NamedTuple):
     diffuse: Array  # (k, 3) float64 reflectances by material; dielectrics are black
     specular: Array  # (k, 3) float64
     exponent: Array  # (k,) float64
-
-
-class Receivers(NamedTuple):
-    """The points whose irradiance is asked for, without the pixels that see nothing."""
-
-    pixel: Array  # (r,) int64, flat index into the picture
-    position: Array  # (3, r) float32, m
-    normal: Array  # (3, r) float32: the G-buffer's
-    facing: Array  # (3, r) float32: the face's normal on the same side
-    origin: Array  # (3, r) float32: where rays start, lifted off the face, m
 
 
 def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
@@ -84,34 +74,6 @@ def lights_of(scene: Scene) -> LightTable:
         One row a light.
     """
     return light_table(scene.lights)
-
-
-def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: Array, offset: float) -> Receivers:
-    """Take the covered pixels of a G-buffer as receivers.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    position, normal : (3, h, w) ndarray
-        The G-buffer's, world space.
-    triangle_id : (h, w) int ndarray
-        Which triangle each pixel sees; -1 for none.
-    offset : float
-        How far rays start above the face, m.
-
-    Returns
-    -------
-    Receivers
-        In picture order.
-    """
-    pixel = np.flatnonzero(triangle_id.reshape(-1) >= 0)
-    at = np.ascontiguousarray(position.reshape(3, -1)[:, pixel], np.float64)
-    up = np.ascontiguousarray(normal.reshape(3, -1)[:, pixel], np.float64)
-    corner = geometry.vertices[geometry.faces[triangle_id.reshape(-1)[pixel]]]
-    face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]).T
-    face *= np.where((face * up).sum(axis=0) < 0, -1.0, 1.0) / np.linalg.norm(face, axis=0)
-    return Receivers(pixel, *(np.ascontiguousarray(a, np.float32) for a in (at, up, face, at + offset * face)))
 
 
 @kernel

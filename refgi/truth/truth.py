@@ -12,12 +12,13 @@ import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
 from refgi.scene import Scene
+from refgi.shadowed import Receivers, receivers
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, film
 from refgi.truth.moments import Moments, add_pass, load, no_passes, save
 from refgi.truth.passes import Task, one_pass
 from refgi.truth.settings import TruthSettings
-from refgi.truth.surfaces import Receivers, lights_of, receivers, surfaces
+from refgi.truth.surfaces import lights_of, surfaces
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

@@ -1,34 +1,24 @@
 """Pixel lights with ray-traced visibility: what every method of pixel lights converges to.
 
 E(x) = sum_i Phi_i / pi <n_i.w> <n_x.-w> / r^2 V(x, x_i), and the same with a lobe (papers' Eq. 2 and 3, calibrated).
-A shadow ray is traced for each pair whose unshadowed term is not zero. Pairs are made in batches and never all held.
 """
 
 import dataclasses
-import math
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.jit import kernel, prange
-from refgi.radiometry import lobe_fraction
-from refgi.rays import Tracer
-from refgi.stages import report_progress, stage
-from refgi.truth.light_side import add_free
-from refgi.truth.surfaces import Receivers, receivers
+from refgi.shadowed import BATCH, receivers, shadowed_sum
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
 
 Array = npt.NDArray[Any]
 
 MOST_LIGHTS = 1 << 24  # a map: every texel of one of 4096 x 4096
 Pattern = Literal["grid", "halton", "all", "random"]
-
-LIGHTS_AT_A_TIME = 1024
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +35,7 @@ class VplSettings:
     seed: int = 0
     filtered: bool = False
     visibility: bool = True
-    batch: int = 1 << 18
+    batch: int = BATCH
 
     def __post_init__(self) -> None:
         expect(1 <= self.lights <= MOST_LIGHTS, "lights", f"1 to {MOST_LIGHTS:,} pixel lights", self.lights)
@@ -53,17 +43,6 @@ class VplSettings:
                "'grid', 'halton', 'all' or 'random'", self.pattern)
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
         expect(1 <= self.batch <= 2**30, "batch", "1 or more pairs", self.batch)
-
-
-class Senders(NamedTuple):
-    """Pixel lights for the kernel, in float64; without lobes the last three have no columns."""
-
-    position: Array  # (3, n), m
-    normal: Array  # (3, n)
-    flux: Array  # (3, n), W
-    lobe_flux: Array  # (3, n or 0), W
-    lobe_axis: Array  # (3, n or 0)
-    lobe_exponent: Array  # (n or 0,)
 
 
 def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
@@ -89,134 +68,6 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     buffer = frame.gbuffer
     to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
     irradiance = np.zeros((3, frame.height, frame.width), frame.dtype)
-    irradiance.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, lights, settings)
+    irradiance.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, lights, visibility=settings.visibility,
+                                                           batch=settings.batch)
     return irradiance
-
-
-@stage("truth.shadowed_sum")
-def shadowed_sum(tracer: Tracer, to: Receivers, lights: "PixelLights", settings: VplSettings) -> Array:
-    """Sum the irradiance of every pixel light at every receiver, each pair with its visibility.
-
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's rays.
-    to : Receivers
-        Receivers.
-    lights : PixelLights
-        The lights.
-    settings : VplSettings
-        Visibility and batch size.
-
-    Returns
-    -------
-    (3, r) ndarray of float64
-        Irradiance, W/m^2.
-    """
-    senders, total = _senders(lights), np.zeros((3, len(to.pixel)))
-    step = max(1, settings.batch // LIGHTS_AT_A_TIME)
-    for first in range(0, total.shape[1], step):
-        last = min(first + step, total.shape[1])
-        for light in range(0, senders.flux.shape[1], LIGHTS_AT_A_TIME):
-            count = min(LIGHTS_AT_A_TIME, senders.flux.shape[1] - light)
-            _add_lights(tracer, to, (first, last), senders, (light, light + count), settings.visibility, total)
-        report_progress(last / total.shape[1])
-    return total
-
-
-def _add_lights(tracer: Tracer, to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int],
-                visibility: bool, total: Array) -> None:
-    count = lights[1] - lights[0]
-    pairs = (receivers[1] - receivers[0]) * count
-    origin, direction, worth = (np.empty((pairs, 3), np.float32) for _ in range(3))
-    reach, blocked = np.empty(pairs, np.float32), np.empty(pairs, np.bool_)
-    aim(to, receivers, senders, lights, tracer.offset, (origin, direction, reach, worth))
-    if visibility:
-        tracer.fill_occluded(origin, direction, reach, blocked)
-    else:
-        np.less_equal(reach, 0, out=blocked)
-    add_free(total, receivers[0], receivers[1] - receivers[0], count, blocked, worth)
-
-
-@kernel(parallel=True)
-def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int], offset: float,
-        rays: tuple[Array, Array, Array, Array]) -> None:
-    """Write the shadow ray of each pair of a block, and what the pair is worth.
-
-    Parameters
-    ----------
-    to : Receivers
-        Receivers.
-    receivers : tuple of 2 ints
-        First receiver of the block and one past the last.
-    senders : Senders
-        Pixel lights.
-    lights : tuple of 2 ints
-        First sender of the block and one past the last.
-    offset : float
-        How far segments end above the sender, m.
-    rays : tuple of 4 arrays
-        Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2, float32, light by light for each receiver;
-        the reach is 0 where a pair has nothing to give.
-    """
-    count = lights[1] - lights[0]
-    for i in prange(receivers[1] - receivers[0]):
-        _aim_all(to, receivers[0] + i, senders, lights, offset, rays, i * count)
-
-
-@kernel
-def _aim_all(to: Receivers, r: int, senders: Senders, lights: tuple[int, int], offset: float,
-             rays: tuple[Array, Array, Array, Array], ray: int) -> None:
-    for k in range(lights[0], lights[1]):
-        _aim(to, r, senders, k, offset, rays, ray + k - lights[0])
-
-
-@kernel
-def _aim(to: Receivers, r: int, senders: Senders, j: int, offset: float, rays: tuple[Array, Array, Array, Array],
-         ray: int) -> None:
-    origins, directions, reach, worth = rays
-    reach[ray] = 0
-    r2, cos_x, cos_y, above = 0.0, 0.0, 0.0, 0.0
-    for c in range(3):
-        d = senders.position[c, j] - to.position[c, r]
-        r2 += d * d
-        cos_x += to.normal[c, r] * d
-        cos_y -= senders.normal[c, j] * d
-        above += to.facing[c, r] * d
-        origins[ray, c] = to.origin[c, r]
-        directions[ray, c] = senders.position[c, j] + offset * senders.normal[c, j] - to.origin[c, r]
-    if cos_x <= 0 or cos_y <= 0 or above <= 0:
-        return
-    diffuse, lobe = cos_x * cos_y / (np.pi * r2 * r2), 0.0
-    if senders.lobe_exponent.shape[0] > 0:
-        lobe = _lobe(to, r, senders, j) * cos_x / (r2 * math.sqrt(r2))
-    for c in range(3):
-        worth[ray, c] = senders.flux[c, j] * diffuse
-        if senders.lobe_exponent.shape[0] > 0:
-            worth[ray, c] += senders.lobe_flux[c, j] * lobe
-        if worth[ray, c] > 0:
-            reach[ray] = 1
-
-
-@kernel
-def _lobe(to: Receivers, r: int, senders: Senders, j: int) -> Any:
-    """Return (P + 1) / (2 pi K) <r.w>^P for the direction from sender j to receiver r."""
-    # Eq. (3), normalised
-    r2, along, cos_theta = 0.0, 0.0, 0.0
-    for c in range(3):
-        d = to.position[c, r] - senders.position[c, j]
-        r2 += d * d
-        along += senders.lobe_axis[c, j] * d
-        cos_theta += senders.lobe_axis[c, j] * senders.normal[c, j]
-    if along <= 0:
-        return 0.0
-    exponent = senders.lobe_exponent[j]
-    norm = (exponent + 1) / (2 * np.pi * lobe_fraction(cos_theta, exponent))
-    return norm * (along / math.sqrt(r2)) ** exponent
-
-
-def _senders(lights: "PixelLights") -> Senders:
-    none = (np.zeros((3, 0)), np.zeros((3, 0)), np.zeros(0))
-    lobes = none if lights.lobe_flux is None else (lights.lobe_flux, lights.lobe_axis, lights.lobe_exponent)
-    arrays = (lights.position, lights.normal, lights.flux, *lobes)
-    return Senders(*(np.ascontiguousarray(array, np.float64) for array in arrays))

@@ -134,8 +134,9 @@ def agree(room, evidence, label, kinds=("combined", "hemisphere"), **settings):
 
 def pixel_means(room, tracer, position, normal, ids, options, passes=24):
     """Return mean and variance of each row of equal receivers, which share the light's rays: pass by pass."""
+    from refgi.shadowed import receivers
     from refgi.truth.passes import Task, one_pass
-    from refgi.truth.surfaces import lights_of, receivers, surfaces
+    from refgi.truth.surfaces import lights_of, surfaces
 
     to = receivers(room.geometry, position, normal, ids, tracer.offset)
     task = Task(room, options, tracer, surfaces(room), lights_of(room), to)

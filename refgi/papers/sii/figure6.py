@@ -75,11 +75,9 @@ def _notes(blocked: Errors, noise: dict[str, Errors]) -> tuple[str, ...]:
 
 
 def _instant_radiosity(frame: "Frame", settings: SiiSettings) -> Array:
-    from refgi.truth import VplSettings
-    from refgi.truth.surfaces import receivers
-    from refgi.truth.vpl import shadowed_sum
+    from refgi.shadowed import receivers, shadowed_sum
 
     buffer, light = frame.gbuffer, np.zeros((3, frame.height, frame.width), frame.dtype)
     to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
-    light.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, choose_lights(frame, settings), VplSettings())
+    light.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, choose_lights(frame, settings))
     return light

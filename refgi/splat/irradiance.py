@@ -73,14 +73,29 @@ def irradiance(
     packed = checked(receivers, lights, settings, footprint)
 
     def add(here: Array, facing: Array, _: Array, sums: Array) -> None:
-        if packed.diffuse.shape[1] > 1 and packed.spheres is not None:
-            sum_spheres(here, facing, packed.diffuse, packed.spheres, None, sums)
-        elif packed.diffuse.shape[1] > 1:
-            sum_pairs(here, facing, packed.diffuse, packed.clamp, sums)
-        if packed.lobes is not None:
-            add_lobes(here, facing, *packed.lobes, None, None, sums)
+        add_lights(here, facing, packed, sums)
 
     return over_receivers(receivers, packed, add)
+
+
+def add_lights(position: Array, normal: Array, packed: Packed, irradiance: Array) -> None:
+    """Add every light, uncut, to points in the order in which they are given.
+
+    Parameters
+    ----------
+    position, normal : (3, n) ndarray
+        Points; neighbours should follow each other. Contiguous.
+    packed : Packed
+        Lights, in the same dtype.
+    irradiance : (3, n) ndarray
+        W/m^2; zeros, which are filled.
+    """
+    if packed.diffuse.shape[1] > 1 and packed.spheres is not None:
+        sum_spheres(position, normal, packed.diffuse, packed.spheres, None, irradiance)
+    elif packed.diffuse.shape[1] > 1:
+        sum_pairs(position, normal, packed.diffuse, packed.clamp, irradiance)
+    if packed.lobes is not None:
+        add_lobes(position, normal, *packed.lobes, None, None, irradiance)
 
 
 def checked(

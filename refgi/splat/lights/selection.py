@@ -1,4 +1,4 @@
-"""Which pixel lights `sii` uses: texels of the maps, or quasi-random paths (SII Sec. 3.1, 3.5 to 3.7)."""
+"""Which pixel lights a splatting method uses: texels of the maps, or quasi-random paths (SII Sec. 3.1, 3.5 to 3.7)."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -6,25 +6,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.splat.lights.solid_angle import with_equal_solid_angles
 from refgi.splat.settings import FOOTPRINT_CLAMPS
 from refgi.stages import skip
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.rsm import PixelLights, Rsm
-    from refgi.splat.sii import SiiSettings
+    from refgi.splat.lights.settings import LightSettings
 
 Array = npt.NDArray[Any]
 
 
-def choose_lights(frame: "Frame", settings: "SiiSettings") -> "PixelLights":
+def choose_lights(frame: "Frame", settings: "LightSettings") -> "PixelLights":
     """Return the pixel lights of a frame.
 
     Parameters
     ----------
     frame : Frame
         The scene, lit.
-    settings : SiiSettings
+    settings : LightSettings
         Where lights come from, and how many.
 
     Returns
@@ -42,14 +43,14 @@ def choose_lights(frame: "Frame", settings: "SiiSettings") -> "PixelLights":
     return thinned(frame, lights, settings)
 
 
-def light_maps(frame: "Frame", settings: "SiiSettings") -> "tuple[Rsm, ...]":
+def light_maps(frame: "Frame", settings: "LightSettings") -> "tuple[Rsm, ...]":
     """Return the maps that lights are taken from: those of the frame, with what glass lets through.
 
     Parameters
     ----------
     frame : Frame
         The scene, lit.
-    settings : SiiSettings
+    settings : LightSettings
         Says how glass refracts.
 
     Returns
@@ -59,15 +60,17 @@ def light_maps(frame: "Frame", settings: "SiiSettings") -> "tuple[Rsm, ...]":
     """
     from refgi.rsm import refracted
 
+    equal = "equal_solid_angle" in settings.as_published
+    rsms = tuple(map(with_equal_solid_angles, frame.rsms)) if equal else frame.rsms
     if settings.refraction == "none":
-        return frame.rsms
+        return rsms
     traced = settings.refraction == "two_interface" and frame.materials.ior.any()
     tracer = frame.tracer if traced else None
     return tuple(refracted(rsm, frame.scene.geometry, frame.materials, settings.refraction,
-                           settings.refraction_exponent, tracer=tracer) for rsm in frame.rsms)
+                           settings.refraction_exponent, tracer=tracer) for rsm in rsms)
 
 
-def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: "SiiSettings") -> list[Array] | None:
+def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: "LightSettings") -> list[Array] | None:
     """Return what each texel is worth to the warp (Sec. 3.5).
 
     Parameters
@@ -76,7 +79,7 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: "SiiSetting
         The scene, whose triangles block what is not open.
     rsms : sequence of Rsm
         Reflective shadow maps, one a light.
-    settings : SiiSettings
+    settings : LightSettings
         Says the kind of importance.
 
     Returns
@@ -98,7 +101,7 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: "SiiSetting
     return maps
 
 
-def thinned(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") -> "PixelLights":
+def thinned(frame: "Frame", lights: "PixelLights", settings: "LightSettings") -> "PixelLights":
     """Darken or remove lights in the open, if the settings ask for it (Sec. 3.6).
 
     Parameters
@@ -107,7 +110,7 @@ def thinned(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") -> "
         The scene, whose triangles block what is not open.
     lights : PixelLights
         The lights.
-    settings : SiiSettings
+    settings : LightSettings
         Says how.
 
     Returns
@@ -126,7 +129,7 @@ def thinned(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") -> "
 
 
 def _openness(
-    frame: "Frame", position: Array, normal: Array, settings: "SiiSettings", covered: Array | None = None
+    frame: "Frame", position: Array, normal: Array, settings: "LightSettings", covered: Array | None = None
 ) -> Array:
     from refgi.rays import openness
 
@@ -135,7 +138,7 @@ def _openness(
                     seed=settings.seed)
 
 
-def _walked(frame: "Frame", settings: "SiiSettings") -> "PixelLights":
+def _walked(frame: "Frame", settings: "LightSettings") -> "PixelLights":
     from refgi.scene import light_table, material_table
     from refgi.splat.lights.walk import walk_lights
 
@@ -145,7 +148,7 @@ def _walked(frame: "Frame", settings: "SiiSettings") -> "PixelLights":
 
 
 def pixel_lights(
-    rsms: "Sequence[Rsm]", settings: "SiiSettings", importance: "Sequence[Array] | None" = None
+    rsms: "Sequence[Rsm]", settings: "LightSettings", importance: "Sequence[Array] | None" = None
 ) -> "PixelLights":
     """Choose pixel lights from maps as the settings say.
 
@@ -153,7 +156,7 @@ def pixel_lights(
     ----------
     rsms : sequence of Rsm
         Reflective shadow maps, one a light.
-    settings : SiiSettings
+    settings : LightSettings
         Number, pattern, seed, filtering and warp.
     importance : sequence of (H, W) ndarray, optional
         What each texel is worth to the warp.
@@ -172,7 +175,7 @@ def pixel_lights(
                                renormalise=settings.renormalise_weights)
 
 
-def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: "SiiSettings") -> "PixelLights":
+def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: "LightSettings") -> "PixelLights":
     """Return lights as the paper has them: each with its texel's flux, T/N left out."""
     from refgi.rsm.pixel_lights import equal_shares
 
@@ -185,14 +188,14 @@ def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: "Sii
     return lights._replace(flux=lights.flux * factor, lobe_flux=lobe)
 
 
-def footprints(frame: "Frame", settings: "SiiSettings") -> Array | None:
+def footprints(frame: "Frame", settings: "LightSettings") -> Array | None:
     """Return the surface area of each light of `choose_lights`, where the clamp asks for it.
 
     Parameters
     ----------
     frame : Frame
         The scene, lit.
-    settings : SiiSettings
+    settings : LightSettings
         What the lights were chosen by.
 
     Returns
@@ -207,7 +210,7 @@ def footprints(frame: "Frame", settings: "SiiSettings") -> Array | None:
 
 
 def light_footprints(
-    rsms: "Sequence[Rsm]", settings: "SiiSettings", importance: "Sequence[Array] | None" = None
+    rsms: "Sequence[Rsm]", settings: "LightSettings", importance: "Sequence[Array] | None" = None
 ) -> Array:
     """Return the surface area that each pixel light stands for: O d^2 / cos, with the same T / N as its flux.
 
@@ -215,7 +218,7 @@ def light_footprints(
     ----------
     rsms : sequence of Rsm
         Reflective shadow maps, one a light.
-    settings : SiiSettings
+    settings : LightSettings
         The settings that the lights were chosen by.
     importance : sequence of (H, W) ndarray, optional
         The importance they were chosen by.

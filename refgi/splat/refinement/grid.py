@@ -113,8 +113,9 @@ def representative(covered: Array, level: int, i: int, j: int) -> int:
     side, half = 1 << level, (1 << level) >> 1
     top, left = i * side, j * side
     row, column = min(top + half, height - 1), min(left + half, width - 1)
+    found: int = row * width + column
     if covered[row, column]:
-        return row * width + column
+        return found
     found, nearest = -1, 2 * side * side + 1
     for y in range(top, min(top + side, height)):
         for x in range(left, min(left + side, width)):
@@ -140,7 +141,8 @@ def representatives(covered: Array, top: int) -> tuple[Array, ...]:
     tuple of (h_l, w_l) ndarray of int32
         Flat indices for levels 0 to `top`; -1 where a cell shows no surface.
     """
-    places = tuple(np.empty(level_shape(*covered.shape, level), np.int32) for level in range(top + 1))
+    height, width = covered.shape
+    places = tuple(np.empty(level_shape(height, width, level), np.int32) for level in range(top + 1))
     for level, place in enumerate(places):
         _fill(covered, level, place)
     return places

@@ -1,0 +1,120 @@
+"""Light at the subsplats alone, by the same sum over pairs as at every pixel (Sec. 3.4, Eq. 2)."""
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.splat.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
+from refgi.splat.pairs.blocks import taken
+from refgi.splat.pairs.pair_sum import TILE
+from refgi.splat.refinement.grid import Subsplats
+from refgi.splat.settings import PairSettings
+from refgi.stages import report_progress, stage
+
+if TYPE_CHECKING:
+    from refgi.rsm import GBuffer, PixelLights
+
+Array = npt.NDArray[Any]
+Representative = Literal["pixel", "mean"]
+
+
+@stage("splat.representative_points")
+def at_subsplats(
+    buffer: "GBuffer", subsplats: Subsplats, representative: Representative = "pixel"
+) -> tuple[Array, Array]:
+    """Return where each subsplat is lit.
+
+    Parameters
+    ----------
+    buffer : GBuffer
+        What the camera sees.
+    subsplats : Subsplats
+        The subsplats.
+    representative : {"pixel", "mean"}
+        Position and normal of the pixel that stands for the cell, or the mean over the cell's surface.
+
+    Returns
+    -------
+    points, normals : (3, n) ndarray
+        World space, m, and unit vectors.
+    """
+    position, normal = buffer.resolve("position", "normal")
+    points, normals = taken(position, subsplats.pixel), taken(normal, subsplats.pixel)
+    if representative == "mean":
+        cells = np.stack([subsplats.level, subsplats.row, subsplats.column]).astype(np.int64)
+        _average(position, normal, buffer.covered, cells, points, normals)
+    return points, normals
+
+
+@stage("splat.irradiance")
+def evaluate(
+    points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
+) -> Array:
+    """Sum the irradiance of every pixel light at some points (Eq. 2).
+
+    Parameters
+    ----------
+    points, normals : (3, n) ndarray
+        World space, m, and unit vectors; neighbours should follow each other.
+    lights : PixelLights
+        Lights to sum.
+    settings : PairSettings
+        How one light lights one receiver.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+
+    Returns
+    -------
+    (3, n) ndarray
+        Irradiance, W/m^2, linear RGB: that of `irradiance` at the same points, to the bit.
+
+    Raises
+    ------
+    InputError
+        As `irradiance`.
+
+    Notes
+    -----
+    Eq. 2 prints the vector to the light from the wrong end, both BRDFs and a pi. Here a light holds the flux it
+    reflects, and the receiver's albedo/pi is multiplied in after upsampling, pixel by pixel.
+    """
+    count = points.shape[1]
+    receivers = Receivers(points[:, None], normals[:, None], np.ones((1, count), np.bool_))
+    packed = checked(receivers, lights, settings, footprint)
+    result = np.zeros_like(points)
+    step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
+    for first in range(0, count, step):
+        part = slice(first, first + step)
+        sums = np.zeros_like(np.ascontiguousarray(points[:, part]))
+        add_lights(np.ascontiguousarray(points[:, part]), np.ascontiguousarray(normals[:, part]), packed, sums)
+        result[:, part] = sums
+        report_progress(min(1.0, (first + step) / count))
+    return result
+
+
+@kernel(parallel=True)
+def _average(position: Array, normal: Array, covered: Array, cells: Array, points: Array, normals: Array) -> None:
+    for k in prange(cells.shape[1]):
+        _average_cell(position, normal, covered, cells, points, normals, k)
+
+
+@kernel
+def _average_cell(
+    position: Array, normal: Array, covered: Array, cells: Array, points: Array, normals: Array, k: int
+) -> None:
+    height, width = covered.shape
+    level, row, column = cells[0, k], cells[1, k], cells[2, k]
+    x, y, z, p, q, r, count = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
+    for i in range(row << level, min((row + 1) << level, height)):
+        for j in range(column << level, min((column + 1) << level, width)):
+            if covered[i, j]:
+                x, y, z = x + position[0, i, j], y + position[1, i, j], z + position[2, i, j]
+                p, q, r = p + normal[0, i, j], q + normal[1, i, j], r + normal[2, i, j]
+                count += 1
+    length = np.sqrt(p * p + q * q + r * r)
+    if count <= 1 or length == 0:  # opposite normals have no mean: the pixel's stays
+        return
+    points[0, k], points[1, k], points[2, k] = x / count, y / count, z / count
+    normals[0, k], normals[1, k], normals[2, k] = p / length, q / length, r / length

@@ -4,13 +4,17 @@ A texel at the centre of a square 90 degree frustum subtends 1.910 times the mea
 with equal ones lights come out too dim inside and too bright outside (Nichols and Wyman 2009, Fig. 13).
 """
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from refgi.errors import expect
+
 if TYPE_CHECKING:
-    from refgi.rsm import Rsm
+    from refgi.rsm import PixelLights, Rsm
+    from refgi.scene.model import Light
 
 Array = npt.NDArray[Any]
 
@@ -41,19 +45,33 @@ def with_equal_solid_angles(rsm: "Rsm") -> "Rsm":
     return rsm._replace(solid_angle=equal, flux=rsm.flux * factor, lobe_flux=lobe)
 
 
-def demo_footprints(distance: Array, count: int) -> Array:
+def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]") -> Array:
     """Return the disc that each light stands for in the authors' demo: pi L^2 / (1.5 N).
 
     Parameters
     ----------
-    distance : (N,) ndarray
-        L, of each pixel light from its light, m.
-    count : int
-        N, lights of the map.
+    lights : PixelLights
+        Of maps.
+    sources : sequence of Light
+        The light of each map.
 
     Returns
     -------
-    (N,) ndarray
+    (N',) ndarray
         Area, m^2: that of equal shares of a square 90 degree frustum, seen from the front.
+
+    Raises
+    ------
+    InputError
+        If a light is directional and so has no distance L.
     """
-    return np.asarray(np.pi / (DEMO_CONSTANT * count) * distance**2)
+    from refgi.rsm.pixel_lights import equal_shares
+
+    area = np.zeros(lights.position.shape[1])
+    for index, (source, count) in enumerate(zip(sources, equal_shares(lights.drawn, len(sources)), strict=True)):
+        place = getattr(source, "position", None)
+        expect(place is not None, "as_published", "no 'ams_disc' under a directional light", "ams_disc")
+        mine = lights.map_index == index
+        away = lights.position[:, mine] - np.asarray(place, np.float64)[:, None]
+        area[mine] = np.pi / (DEMO_CONSTANT * max(1, count)) * (away**2).sum(axis=0)
+    return area

@@ -3,6 +3,7 @@
 import math
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -10,7 +11,7 @@ from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.radiometry import incident_light
 from refgi.rsm.gbuffer import GBuffer
-from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection, texel_of
+from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection, image_point, texel_coordinates
 from refgi.rsm.reflective import Rsm
 from refgi.scene.model import Light, LightTable, light_table
 from refgi.stages import stage
@@ -25,9 +26,17 @@ NO_SHADOW = np.zeros((0, 0), np.bool_)
 class Stored(NamedTuple):
     """What a light's map tells about its nearest surface."""
 
-    depth: Array  # (H, W) m
-    position: Array  # (3, H, W) m
+    depth: Array  # (T,) m
+    position: Array  # (3, T) m
     bias: float  # m; negative: compare with the receiver's plane
+
+
+class Receivers(NamedTuple):
+    """Surface points that may be lit."""
+
+    position: Array  # (3, h, w) m
+    normal: Array  # (3, h, w) unit vectors
+    covered: Array  # (h, w) bool
 
 
 @stage("rsm.shadow_map_visibility")
@@ -64,49 +73,77 @@ def shadow_map_visibility(
     the receiver, hence above the receiver's plane; a neighbouring point of the same surface does not, at any slope.
     """
     expect(bias is None or (math.isfinite(bias) and bias >= 0), "bias", "a finite number >= 0, m", bias)
-    visible = np.zeros(covered.shape, np.bool_)
-    stored = Stored(rsm.depth, rsm.position, -1.0 if bias is None else bias)
-    _look_up(rsm.projection, position, normal, covered, stored, visible)
+    visible = np.empty(covered.shape, np.bool_)
+    stored = Stored(rsm.depth.reshape(-1), rsm.position.reshape(3, -1), -1.0 if bias is None else bias)
+    _look_up(rsm.projection, Receivers(position, normal, covered), stored, numba.get_num_threads(), visible)
     return visible
 
 
 @kernel(parallel=True)
-def _look_up(
-    maps: Projection, position: Array, normal: Array, covered: Array, stored: Stored, visible: Array
-) -> None:
-    for row in prange(covered.shape[0]):
-        _look_up_row(maps, position, normal, covered, stored, row, visible)
+def _look_up(maps: Projection, receivers: Receivers, stored: Stored, workers: int, visible: Array) -> None:
+    for worker in prange(workers):
+        _look_up_rows(maps, receivers, stored, worker, workers, visible)
 
 
 @kernel
-def _look_up_row(
-    maps: Projection, position: Array, normal: Array, covered: Array, stored: Stored, row: int, visible: Array
+def _look_up_rows(
+    maps: Projection, receivers: Receivers, stored: Stored, first: int, step: int, visible: Array
 ) -> None:
-    # a function of its own: what it is passed is counted once a row, not once a pixel by both threads
-    for column in range(covered.shape[1]):
-        if covered[row, column]:
-            point = position[0, row, column], position[1, row, column], position[2, row, column]
-            facing = normal[0, row, column], normal[1, row, column], normal[2, row, column]
-            visible[row, column] = _reached(maps, stored, point, facing)
+    """Look up every `step`-th row; what needs no branch is done for a whole row first, in SIMD lanes."""
+    position, normal, covered = receivers.position, receivers.normal, receivers.covered
+    width = visible.shape[1]
+    place, far, above = np.empty(width, np.int32), np.empty(width), np.empty(width)
+    fixed, relative = _largest_margin(maps)
+    for row in range(first, len(visible), step):
+        _project_row(maps, position, row, place, far)
+        for x in range(width):
+            texel = max(place[x], 0)
+            # in the receivers' type, as the sum's parts are
+            along = normal[0, row, x] * (stored.position[0, texel] - position[0, row, x])
+            down = normal[1, row, x] * (stored.position[1, texel] - position[1, row, x])
+            ahead = normal[2, row, x] * (stored.position[2, texel] - position[2, row, x])
+            above[x] = 0.0 + along + np.float64(down) + np.float64(ahead)
+        for x in range(width):
+            if not covered[row, x] or place[x] < 0:
+                visible[row, x] = False
+            elif stored.bias >= 0.0:
+                visible[row, x] = far[x] <= stored.depth[place[x]] + stored.bias
+            elif far[x] <= stored.depth[place[x]] or above[x] <= 1e-6 * far[x]:
+                visible[row, x] = True
+            elif above[x] > fixed + relative * far[x]:  # most of what is in shadow: the margin is dear
+                visible[row, x] = False
+            else:
+                point = position[0, row, x], position[1, row, x], position[2, row, x]
+                facing = normal[0, row, x], normal[1, row, x], normal[2, row, x]
+                margin = _margin(maps, place[x] // (maps.height * maps.width), point, facing)
+                visible[row, x] = above[x] <= margin + 1e-6 * far[x]
 
 
 @kernel
-def _reached(maps: Projection, stored: Stored, point: Any, facing: Any) -> Any:
-    """Tell whether one receiver is lit."""
-    row, column, far = texel_of(maps, point[0], point[1], point[2])
-    if far != far:  # outside the map
-        return False
-    i, j = min(int(row), stored.depth.shape[0] - 1), min(int(column), stored.depth.shape[1] - 1)
-    if stored.bias >= 0.0:
-        return far <= stored.depth[i, j] + stored.bias
-    if far <= stored.depth[i, j]:
-        return True
-    above = 0.0
-    for axis in range(3):
-        above += facing[axis] * (stored.position[axis, i, j] - point[axis])
-    if above <= 1e-6 * far:  # most of what is lit: the margin is dear
-        return True
-    return above <= _margin(maps, i // maps.height, point, facing) + 1e-6 * far
+def _project_row(maps: Projection, position: Array, row: int, place: Array, far: Array) -> None:
+    """Write the texel of the first map that sees each point, as `texel_of` does, or -1, and the point's depth."""
+    half, rows = maps.half, len(maps.origin) * maps.height
+    place[:] = -1
+    for m in range(len(maps.origin)):
+        for x in range(len(place)):
+            u, v, depth = image_point(maps, m, position[0, row, x], position[1, row, x], position[2, row, x])
+            seen = (place[x] < 0) & (abs(u) <= half[0]) & (abs(v) <= half[1])
+            column, line = texel_coordinates(maps, m, u if seen else 0.0, v if seen else 0.0)
+            texel = min(int(line), rows - 1) * maps.width + min(int(column), maps.width - 1)
+            place[x] = texel if seen else place[x]
+            far[x] = depth if seen else far[x]
+
+
+@kernel
+def _largest_margin(maps: Projection) -> tuple[float, float]:
+    """Return (a, b): the margin and what rounding adds are less than a + b depth, whatever the receiver's slope."""
+    width = 2.0 * max(maps.half[0] / maps.width, maps.half[1] / maps.height)
+    most = (1.0 + 1e-3) * MARGIN * (1.0 + STEEPEST) * width
+    if maps.kind == ORTHOGRAPHIC:
+        return most, 2e-6
+    if maps.kind == PARABOLOID:
+        return 0.0, 2.0 * most + 2e-6
+    return 0.0, most * math.sqrt(1.0 + maps.half[0] * maps.half[0] + maps.half[1] * maps.half[1]) + 2e-6
 
 
 @kernel

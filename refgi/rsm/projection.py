@@ -252,21 +252,62 @@ def texel_of(projection: Projection, x: float, y: float, z: float) -> tuple[floa
         Continuous row and column in the stacked maps, and depth as in `project`.
     """
     for m in range(projection.origin.shape[0]):
-        a, b, depth = view_coordinates(projection, m, x, y, z)
-        u, v = np.nan, np.nan
-        if projection.kind == ORTHOGRAPHIC:
-            u, v = a, b
-        elif projection.kind == PARABOLOID:
-            axial, depth = depth, math.sqrt(a * a + b * b + depth * depth)
-            if axial >= 0.0 and depth > 0.0:
-                u, v = a / (depth + axial), b / (depth + axial)
-        elif depth > 0.0:
-            u, v = a / depth, b / depth
+        u, v, depth = image_point(projection, m, x, y, z)
         if abs(u) <= projection.half[0] and abs(v) <= projection.half[1]:
-            column = (u / projection.half[0] + 1.0) * 0.5 * projection.width
-            row = (v / projection.half[1] + 1.0) * 0.5 * projection.height
-            return min(row, projection.height * (1.0 - 1e-16)) + m * projection.height, column, depth
+            column, row = texel_coordinates(projection, m, u, v)
+            return row, column, depth
     return np.nan, np.nan, np.nan
+
+
+@kernel
+def image_point(projection: Projection, m: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return where map `m` sees a world point on its image plane, nan where it looks away, and its depth.
+
+    Parameters
+    ----------
+    projection : Projection
+        The maps.
+    m : int
+        Which map.
+    x, y, z : float
+        The point, world space, m.
+
+    Returns
+    -------
+    tuple of 3 floats
+        Horizontal and vertical coordinate, perhaps beyond the map, and depth as in `project`.
+    """
+    a, b, depth = view_coordinates(projection, m, x, y, z)
+    if projection.kind == ORTHOGRAPHIC:
+        return a, b, depth
+    scale, ahead = depth, depth > 0.0
+    if projection.kind == PARABOLOID:
+        distance = math.sqrt(a * a + b * b + depth * depth)
+        scale, ahead, depth = distance + depth, (depth >= 0.0) & (distance > 0.0), distance
+    return (a / scale if ahead else np.nan), (b / scale if ahead else np.nan), depth
+
+
+@kernel
+def texel_coordinates(projection: Projection, m: int, u: float, v: float) -> tuple[float, float]:
+    """Return continuous column and row, in the stacked maps, of a point of the image plane of map `m`.
+
+    Parameters
+    ----------
+    projection : Projection
+        The maps.
+    m : int
+        Which map.
+    u, v : float
+        Horizontal and vertical coordinate.
+
+    Returns
+    -------
+    tuple of 2 floats
+        Column and row.
+    """
+    column = (u / projection.half[0] + 1.0) * 0.5 * projection.width
+    row = (v / projection.half[1] + 1.0) * 0.5 * projection.height
+    return column, min(row, projection.height * (1.0 - 1e-16)) + m * projection.height
 
 
 @kernel

@@ -1,0 +1,151 @@
+"""From subsplats to pixels (Nichols and Wyman 2009, Sec. 3.5).
+
+Each level of the illumination buffer holds all light of its texels or none, so that plain interpolation of it makes
+halos and rings (Fig. 7). Instead the coarsest level is doubled, put together with the next one, filtered among the
+texels that hold light and doubled again, down to the pixels.
+"""
+
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.jit import kernel, prange
+from refgi.splat.refinement.demo import demo_pass
+from refgi.splat.refinement.grid import Subsplats
+from refgi.splat.refinement.layers import filled_cells, layer, sorted_by_row
+from refgi.splat.refinement.tent import tent_pass
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+Mode = Literal["tent", "demo", "nearest", "naive_bilinear"]
+
+
+@stage("splat.upsample", kept=False)
+def upsample(
+    values: Array, subsplats: Subsplats, covered: Array, mode: Mode = "tent", *, filter_all: bool = False,
+    corner_rule: bool = True,
+) -> Array:
+    """Make a picture of what was lit at the subsplats.
+
+    Parameters
+    ----------
+    values : (3, n) ndarray
+        Irradiance at the subsplats, W/m^2.
+    subsplats : Subsplats
+        Which texels of which levels these are.
+    covered : (h, w) ndarray of bool
+        Whether there is a surface.
+    mode : str
+        "tent": each texel is the mean of the 3 x 3 around it that hold light; "demo": of the coarser texels around,
+        as in the authors' demo; "nearest": each pixel has the light of its subsplat; "naive_bilinear": the sum of all
+        levels, each interpolated as if it were black where it holds no light.
+    filter_all : bool
+        Filter texels that were lit at a level as well, not only those that come from a coarser one ("tent", "demo").
+    corner_rule : bool
+        Count a texel across a corner only where one of the two beside it holds light ("tent").
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2; 0 where there is no surface.
+
+    Raises
+    ------
+    InputError
+        If the mode is unknown or shapes do not belong together.
+
+    Notes
+    -----
+    The paper gives no weights; those of "tent" interpolate bilinearly where all texels hold light. It filters every
+    texel, even those of the finest level, which blurs pixels that were lit one by one; `filter_all` and no
+    `corner_rule` are the paper to the letter. A constant stays that constant to the bit, but for "naive_bilinear".
+    """
+    expect(mode in get_args(Mode), "mode", " or ".join(map(repr, get_args(Mode))), mode)
+    expect(values.shape == (3, len(subsplats.level)), "values", f"shape (3, {len(subsplats.level)})", values.shape)
+    expect(covered.shape == subsplats.shape, "covered", f"shape {subsplats.shape}", covered.shape)
+    values, covered = np.ascontiguousarray(values), np.ascontiguousarray(covered)
+    if mode == "tent":
+        return _tent(values, subsplats, covered, filter_all, corner_rule)
+    if mode == "demo":
+        return _demo(values, subsplats, covered, filter_all)
+    result = np.zeros((3, *covered.shape), values.dtype)
+    if mode == "nearest":
+        _spread(values, subsplats.level, subsplats.row, subsplats.column, covered, result)
+        return result
+    for level in np.flatnonzero(subsplats.counts):
+        _add_bilinear(layer(values, subsplats, level), int(level), covered, result)
+    return result
+
+
+def _tent(values: Array, subsplats: Subsplats, covered: Array, filter_all: bool, corner_rule: bool) -> Array:
+    starts, order = sorted_by_row(subsplats)
+    filled = filled_cells(covered, subsplats.top)
+    corner = 0.0 if corner_rule else 1.0
+    result, mask = _nothing(-(-np.array(filled[-1].shape) // 2), values.dtype)
+    for level in range(subsplats.top, -1, -1):
+        coarse, coarse_mask = result, mask
+        result, mask = _room(filled[level], values.dtype)
+        tent_pass(values, order, starts[level], subsplats.column, coarse, coarse_mask, filled[level], filter_all,
+                  corner, result, mask)
+    return result
+
+
+def _demo(values: Array, subsplats: Subsplats, covered: Array, filter_all: bool) -> Array:
+    filled = filled_cells(covered, subsplats.top)
+    result, mask = layer(values, subsplats, subsplats.top), subsplats.leaf[-1]
+    for level in range(subsplats.top - 1, -1, -1):
+        coarse, coarse_mask = result, mask
+        result, mask = _room(filled[level], values.dtype)
+        demo_pass(layer(values, subsplats, level), subsplats.leaf[level], coarse, coarse_mask, filled[level],
+                  filter_all, result, mask)
+    return result
+
+
+def _room(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
+    """Return irradiance and mask of a level, not yet filled in."""
+    return np.empty((3, *filled.shape), dtype), np.empty(filled.shape, np.bool_)
+
+
+def _nothing(shape: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
+    """Return irradiance and mask of a level without texels."""
+    return np.zeros((3, *shape), dtype), np.zeros(shape, np.bool_)
+
+
+@kernel(parallel=True)
+def _spread(values: Array, level: Array, row: Array, column: Array, covered: Array, result: Array) -> None:
+    """Give the pixels of each subsplat its light."""
+    height, width = covered.shape
+    for k in prange(len(level)):
+        side = 1 << np.int64(level[k])
+        top, left = row[k] * side, column[k] * side
+        for c in range(3):
+            for y in range(top, min(top + side, height)):
+                for x in range(left, min(left + side, width)):
+                    if covered[y, x]:
+                        result[c, y, x] = values[c, k]
+
+
+@kernel(parallel=True)
+def _add_bilinear(texels: Array, level: int, covered: Array, result: Array) -> None:
+    """Add a level, interpolated between the centres of its texels."""
+    height, width = covered.shape
+    for y in prange(height):
+        i0, i1, down = _between(y, level, texels.shape[1])
+        for x in range(width):
+            j0, j1, across = _between(x, level, texels.shape[2])
+            for c in range(3):
+                f, g = result.dtype.type(down), result.dtype.type(across)
+                upper = texels[c, i0, j0] + g * (texels[c, i0, j1] - texels[c, i0, j0])
+                lower = texels[c, i1, j0] + g * (texels[c, i1, j1] - texels[c, i1, j0])
+                if covered[y, x]:
+                    result[c, y, x] += upper + f * (lower - upper)
+
+
+@kernel
+def _between(x: int, level: int, count: int) -> Any:
+    """Return the texels on both sides of a pixel and where between them it is, 0 to 1."""
+    place = (x + 0.5) / (1 << level) - 0.5
+    left = int(np.floor(place))
+    return max(left, 0), min(left + 1, count - 1), place - left

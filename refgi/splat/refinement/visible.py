@@ -49,7 +49,7 @@ def evaluate_visible(
 
     Notes
     -----
-    Pairs are calibrated and not clamped, summed in float64: the same code as `vpl`. Settings that change a pair (clamps,
+    Pairs are calibrated and not clamped, summed in float64: the code of `vpl`. Settings that change a pair (clamps,
     offsets, lobes' norms and widening, published forms) and means over a cell, which lie on no triangle, have no
     counterpart here.
     """

@@ -116,10 +116,11 @@ class Frame:
     @cached_property
     def direct(self) -> Array:
         """Direct irradiance of all lights with shadows, (3, h, w), W/m^2."""
-        total = np.zeros((3, self.height, self.width), self.dtype)
-        for one in self._direct_of_lights:
-            total += one
-        return total
+        from refgi.rsm import direct_irradiance
+
+        parts = [direct_irradiance(self.gbuffer, light, self._visible_from_light(index))
+                 for index, light in enumerate(self.scene.lights)]
+        return parts[0] if len(parts) == 1 else np.asarray(sum(parts[1:], start=parts[0]))
 
     def radiance(self, indirect: Array | None = None) -> Array:
         """Return what the camera receives: emission + albedo/pi (direct + indirect).
@@ -134,15 +135,7 @@ class Frame:
         (3, h, w) ndarray
             Radiance, W/m^2/sr, linear RGB. Receivers reflect by their diffuse part alone.
         """
-        parts = (*self._direct_of_lights, *(() if indirect is None else (indirect,)))
-        return compose(parts, self.gbuffer, self.materials)
-
-    @cached_property
-    def _direct_of_lights(self) -> tuple[Array, ...]:
-        from refgi.rsm import direct_irradiance
-
-        return tuple(direct_irradiance(self.gbuffer, light, self._visible_from_light(index))
-                     for index, light in enumerate(self.scene.lights))
+        return compose(self.direct, indirect, self.gbuffer, self.materials)
 
     def _visible_from_light(self, index: int) -> Array:
         buffer, light = self.gbuffer, self.scene.lights[index]
@@ -155,13 +148,15 @@ class Frame:
 
 
 @stage("frame.compose")
-def compose(irradiances: tuple[Array, ...], buffer: "GBuffer", materials: MaterialTable) -> Array:
+def compose(direct: Array, indirect: Array | None, buffer: "GBuffer", materials: MaterialTable) -> Array:
     """Turn irradiance into what the camera receives.
 
     Parameters
     ----------
-    irradiances : tuple of (3, h, w) ndarray
-        What arrives, in parts: direct light of each light, indirect light; W/m^2.
+    direct : (3, h, w) ndarray
+        Direct irradiance, W/m^2.
+    indirect : (3, h, w) ndarray, optional
+        Indirect irradiance, W/m^2.
     buffer : GBuffer
         What the camera sees.
     materials : MaterialTable
@@ -172,12 +167,9 @@ def compose(irradiances: tuple[Array, ...], buffer: "GBuffer", materials: Materi
     (3, h, w) ndarray
         Radiance, W/m^2/sr, linear RGB.
     """
-    irradiance: Array = sum(irradiances[1:], start=irradiances[0])
-    radiance: Array = irradiance * buffer.albedo / irradiance.dtype.type(np.pi)
-    if materials.emission.any():
-        # a pixel without surface has id -1, whose row is masked out
-        radiance += np.moveaxis(materials.emission[buffer.material_id], -1, 0) * buffer.covered
-    return radiance
+    from refgi.rsm import leaving_radiance
+
+    return leaving_radiance(direct, indirect, buffer, materials)
 
 
 def _dtype(given: npt.DTypeLike) -> np.dtype[Any]:

@@ -10,6 +10,7 @@ from refgi.rsm.depth_maps import paraboloid_depth_maps
 from refgi.rsm.direct import direct_irradiance, shadow_map_visibility
 from refgi.rsm.gbuffer import GBuffer, gbuffer
 from refgi.rsm.importance import importance
+from refgi.rsm.leaving import leaving_radiance
 from refgi.rsm.pixel_lights import PixelLights, choose_pixel_lights
 from refgi.rsm.projection import Projection, camera_projection, project
 from refgi.rsm.pyramid import importance_pyramid
@@ -32,6 +33,7 @@ __all__ = [
     "importance",
     "importance_pyramid",
     "incident_flux",
+    "leaving_radiance",
     "paraboloid_depth_maps",
     "project",
     "rasterize",

@@ -34,7 +34,7 @@ class Wanted(NamedTuple):
 
 
 class Planes(NamedTuple):
-    """Where a pass writes, in the buffer's type; zero before."""
+    """Where a pass writes, in the buffer's type."""
 
     depth: Array  # (H, W) m: axial in perspective and orthographic maps, else distance
     distance: Array  # (H, W) m: from the centre of projection; orthographic: the depth
@@ -127,7 +127,7 @@ def _weight(ray: Any, ax: float, ay: float, az: float, bx: float, by: float, bz:
 def resolve(
     surface: Surface, projection: Projection, triangle_id: Array, wanted: Wanted, planes: Planes, workers: int
 ) -> None:
-    """Fill the wanted planes at every texel that sees a triangle.
+    """Fill the wanted planes.
 
     Parameters
     ----------
@@ -185,6 +185,11 @@ def _look_up(
         for x in range(triangle_id.shape[1]):
             face = triangle_id[row, x]
             if face < 0:
+                last = -1
+                if wanted.normal:
+                    planes.normal[0, row, x], planes.normal[1, row, x], planes.normal[2, row, x] = 0, 0, 0
+                if wanted.albedo:
+                    planes.albedo[0, row, x], planes.albedo[1, row, x], planes.albedo[2, row, x] = 0, 0, 0
                 if wanted.material_id:
                     planes.material_id[row, x] = -1
                 continue

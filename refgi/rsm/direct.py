@@ -11,6 +11,7 @@ from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.radiometry import incident_light
 from refgi.rsm.gbuffer import GBuffer
+from refgi.rsm.memory import plane
 from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection, image_point, texel_coordinates
 from refgi.rsm.reflective import Rsm
 from refgi.scene.model import Light, LightTable, light_table
@@ -73,7 +74,7 @@ def shadow_map_visibility(
     the receiver, hence above the receiver's plane; a neighbouring point of the same surface does not, at any slope.
     """
     expect(bias is None or (math.isfinite(bias) and bias >= 0), "bias", "a finite number >= 0, m", bias)
-    visible = np.empty(covered.shape, np.bool_)
+    visible = plane(covered.shape, np.bool_)
     stored = Stored(rsm.depth.reshape(-1), rsm.position.reshape(3, -1), -1.0 if bias is None else bias)
     _look_up(rsm.projection, Receivers(position, normal, covered), stored, numba.get_num_threads(), visible)
     return visible
@@ -181,7 +182,7 @@ def direct_irradiance(buffer: GBuffer, light: Light, visible: Array | None = Non
         Irradiance, W/m^2, linear RGB. Excludes albedo/pi; zero where there is no surface.
     """
     position, normal, covered = buffer.resolve("position", "normal", "covered")
-    out = np.zeros_like(position)
+    out = plane(position.shape, position.dtype)
     table = light_table((light,), buffer.dtype)
     _irradiance(table, position, normal, covered, NO_SHADOW if visible is None else visible, out)
     return out
@@ -194,6 +195,7 @@ def _irradiance(
     real = position.dtype.type
     for row in prange(covered.shape[0]):
         for column in range(covered.shape[1]):
+            out[0, row, column], out[1, row, column], out[2, row, column] = real(0.0), real(0.0), real(0.0)
             if covered[row, column] and (visible.size == 0 or visible[row, column]):
                 x, y, z = position[0, row, column], position[1, row, column], position[2, row, column]
                 wx, wy, wz, _, er, eg, eb = incident_light(lights, 0, x, y, z)

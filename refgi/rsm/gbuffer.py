@@ -8,8 +8,9 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.attributes import Planes, Surface, Wanted, resolve
+from refgi.rsm.memory import plane
 from refgi.rsm.projection import Projection, camera_projection
-from refgi.rsm.raster import Visibility, fresh, rasterize
+from refgi.rsm.raster import Visibility, rasterize
 from refgi.scene.model import Camera, Geometry, MaterialTable
 from refgi.stages import stage
 
@@ -71,7 +72,8 @@ class GBuffer:
     def covered(self) -> Array:
         """Whether any surface is seen, (h, w) bool."""
         if "covered" not in self._channels:
-            self._channels["covered"] = self.visibility.triangle_id >= 0
+            covered = plane(self.visibility.triangle_id.shape, np.bool_)
+            self._channels["covered"] = np.greater_equal(self.visibility.triangle_id, 0, out=covered)
         return self._channels["covered"]
 
     @property
@@ -186,7 +188,7 @@ def _resolve(
     planes["material_id"] = np.empty((0, 0), np.int32)
     for name in names:
         full = (3, *shape) if planes[name].ndim == 3 else shape
-        planes[name] = fresh(full, planes[name].dtype)
+        planes[name] = plane(full, planes[name].dtype)
     normals = np.zeros((0, 3)) if geometry.vertex_normals is None else geometry.vertex_normals
     diffuse = materials.diffuse.astype(dtype, copy=False)
     surface = Surface(geometry.vertices, geometry.faces, normals, geometry.material_of_face, diffuse)

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.rsm.memory import plane
 from refgi.rsm.paraboloid import draw_paraboloids
 from refgi.rsm.projection import PARABOLOID, Projection
 from refgi.rsm.triangle import LANES, Part, draw, project_vertex, texel_box
@@ -20,7 +21,6 @@ from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
-PAGE = 4096  # bytes
 BATCH = 1024  # triangles whose boxes are found before they are drawn on one of several maps
 CHUNKS = 32  # pieces of the list of triangles that are counted and listed on their own
 
@@ -75,7 +75,8 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     vertices, faces = geometry.vertices, geometry.faces
     height, width = projection.shape
     columns = max(width, LANES)
-    seen = Visibility(np.full((height, columns), -1, np.int32), fresh((height, columns), np.float32))
+    seen = Visibility(plane((height, columns), np.int32), plane((height, columns), np.float32))
+    _clear(seen.triangle_id, seen.inverse_depth)
     workers = numba.get_num_threads()
     if projection.kind == PARABOLOID:
         draw_paraboloids(projection, vertices, faces, workers, seen.inverse_depth, seen.triangle_id)
@@ -89,26 +90,6 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     if width < LANES:
         seen = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in seen))
     return seen
-
-
-def fresh(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
-    """Return an array of zeros whose memory is already there.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Its shape.
-    dtype : dtype
-        Its type.
-
-    Returns
-    -------
-    ndarray
-        Zeros. Each page was touched once: pages first touched by several threads at once cost several times as much.
-    """
-    array = np.zeros(shape, dtype)
-    array.reshape(-1)[:: PAGE // array.itemsize] = 0
-    return array
 
 
 def scratch(workers: int, vertices: int) -> Scratch:
@@ -159,6 +140,13 @@ def bands(corners: Array, faces: Array, width: int, height: int, rows: int) -> B
     members = np.empty(ends[-1, -1], np.int32)
     _list(boxes, rows, np.ascontiguousarray((ends - counts.T).T), members)
     return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)
+
+
+@kernel(parallel=True)
+def _clear(triangle_id: Array, inverse_depth: Array) -> None:
+    for row in prange(len(triangle_id)):
+        triangle_id[row] = -1
+        inverse_depth[row] = 0.0
 
 
 @kernel(parallel=True)

@@ -39,6 +39,8 @@ PAPERS = {
     for paper in (
         Paper("sii", "Splatting Indirect Illumination", "Carsten Dachsbacher and Marc Stamminger, I3D 2006",
               "refgi.papers.sii"),
+        Paper("multires", "Interactive Indirect Illumination Using Adaptive Multiresolution Splatting",
+              "Greg Nichols and Chris Wyman, IEEE TVCG 2010", "refgi.papers.multires"),
     )
 }
 

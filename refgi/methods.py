@@ -39,6 +39,8 @@ METHODS = {
         Method("sii", "refgi.splat.sii:sii", "SiiSettings", False,
                "Splatting Indirect Illumination (2006): pixel lights shine where they are significant",
                "refgi.splat.account.ledger:energy_ledger"),
+        Method("multires", "refgi.splat.multires:multires", "MultiresSettings", False,
+               "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes"),
         Method("gather", "refgi.splat.gathering.gather:gather", "GatherSettings", False,
                "Reflective Shadow Maps (2005): gathering around the projected point"),
         Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,

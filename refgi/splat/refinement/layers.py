@@ -51,7 +51,7 @@ def filled_cells(covered: Array, top: int) -> list[Array]:
     """
     levels = [covered]
     for level in range(1, top + 1):
-        levels.append(np.empty(level_shape(*covered.shape, level), np.bool_))
+        levels.append(np.empty(level_shape(covered.shape[0], covered.shape[1], level), np.bool_))
         _any_of_four(levels[-2], levels[-1])
     return levels
 

@@ -74,8 +74,8 @@ def upsample(
     if mode == "nearest":
         _spread(values, subsplats.level, subsplats.row, subsplats.column, covered, result)
         return result
-    for level in np.flatnonzero(subsplats.counts):
-        _add_bilinear(layer(values, subsplats, level), int(level), covered, result)
+    for level in map(int, np.flatnonzero(subsplats.counts)):
+        _add_bilinear(layer(values, subsplats, level), level, covered, result)
     return result
 
 

@@ -41,15 +41,15 @@ def needs(buffer: "GBuffer", settings: "MultiresSettings", top: int) -> tuple[Ar
     tuple of (h_l, w_l) ndarray of bool
         For levels 0 to `top`; False at levels up to `finest`, which is never refined, and where no surface is.
     """
-    shape = buffer.covered.shape
-    sizes = layout(*shape, top, first=1)
+    height, width = buffer.covered.shape
+    sizes = layout(height, width, top, first=1)
     need = np.zeros(room(sizes) if top else 0, np.bool_)
     begin = sizes[settings.finest + 1, START] if settings.finest < top else len(need)
     if begin < len(need):
         buffer.resolve(*(name for criterion in sorted(settings.criteria) for name in CHANNELS[criterion]))
         for criterion in sorted(settings.criteria):
             _JUDGES[criterion](buffer, settings, top, need, begin)
-    return (np.zeros(shape, np.bool_), *views(need, sizes, first=1))
+    return (np.zeros((height, width), np.bool_), *views(need, sizes, first=1))
 
 
 def _judge_depth(buffer: "GBuffer", settings: "MultiresSettings", top: int, need: Array, begin: int) -> None:

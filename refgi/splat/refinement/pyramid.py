@@ -1,10 +1,10 @@
-"""Where the levels of a mip lie in one array, and how a level follows from the one below it.
+"""Mips: where their levels lie in one array, and how a level follows from the one below it.
 
 Levels lie one after another, each row by row, so that what holds for every cell of every level is one loop. A row of
 cells of the coarsest level belongs to one thread, which makes all finer levels inside it while they are in its cache.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,24 @@ from refgi.splat.refinement.grid import level_shape
 Array = npt.NDArray[Any]
 
 START, ROWS, COLUMNS = range(3)  # columns of a layout
+
+
+class Mip(NamedTuple):
+    """Least and largest values within the cells of levels 0 to top, or the largest alone (a max mip).
+
+    Level 0 of a min-max mip is the channel as it came, on both sides. Elsewhere a cell without any surface has `low`
+    inf and `high` -inf; in a max mip it has 0.
+    """
+
+    low: tuple[Array, ...]  # (h_l, w_l) or (c, h_l, w_l) for each level; () for a max mip
+    high: tuple[Array, ...]
+    lows: Array  # (c, n): levels 1 to top one after another, which `low` shows; (0, 0) for a max mip
+    highs: Array  # (c, n)
+
+    @property
+    def top(self) -> int:
+        """Coarsest level."""
+        return len(self.high) - 1
 
 
 def layout(height: int, width: int, top: int, first: int = 0) -> Array:
@@ -36,7 +54,7 @@ def layout(height: int, width: int, top: int, first: int = 0) -> Array:
 
     Examples
     --------
-    >>> layout(4, 3, 1).tolist()
+    >>> layout(4, 3, top=1).tolist()
     [[0, 4, 3], [12, 2, 2]]
     """
     shapes = np.array([level_shape(height, width, level) for level in range(top + 1)], np.int64)
@@ -84,16 +102,60 @@ def views(values: Array, sizes: Array, first: int = 0) -> tuple[Array, ...]:
 
 
 @kernel
-def least_of_four(upper: Array, lower: Array, out: Array) -> None:
-    """Store the smallest value of each 2 x 2 cells of two rows.
+def rows_of(strip: int, level: int, sizes: Array) -> tuple[int, int]:
+    """Return which rows of a level lie in a row of cells of the coarsest level.
 
     Parameters
     ----------
-    upper, lower : (2 n or 2 n - 1,) ndarray
-        Neighbouring rows of a level; the same one twice at its lower border.
-    out : (n,) ndarray
-        A row of the next coarser level.
+    strip : int
+        Row of the coarsest level.
+    level : int
+        The level.
+    sizes : (top + 1, 3) ndarray
+        The layout.
+
+    Returns
+    -------
+    tuple of 2 ints
+        The first row and one past the last.
     """
+    along = len(sizes) - 1 - level
+    return strip << along, min((strip + 1) << along, sizes[level, ROWS])
+
+
+@kernel
+def coarsen(strip: int, level: int, sizes: Array, values: Array, least: bool) -> None:
+    """Fill the rows of a level that lie in a row of cells of the coarsest level, from the level below.
+
+    Parameters
+    ----------
+    strip : int
+        Row of the coarsest level.
+    level : int
+        The level, above the finest that is kept.
+    sizes : (top + 1, 3) ndarray
+        The layout.
+    values : (n,) ndarray
+        All levels.
+    least : bool
+        Whether each cell takes the smallest value of the finer ones inside it, or the largest.
+    """
+    below, rows, fine = sizes[level - 1]
+    here, _, columns = sizes[level]
+    begin, end = rows_of(strip, level, sizes)
+    for i in range(begin, end):
+        upper = below + 2 * i * fine
+        lower = below + min(2 * i + 1, rows - 1) * fine
+        out = values[here + i * columns : here + (i + 1) * columns]
+        if least:
+            _least_of_four(values[upper : upper + fine], values[lower : lower + fine], out)
+        else:
+            _most_of_four(values[upper : upper + fine], values[lower : lower + fine], out)
+
+
+@kernel
+def _least_of_four(upper: Array, lower: Array, out: Array) -> None:
+    """Store the smallest value of each 2 x 2 cells of two rows, of which the lower may be the upper again."""
     pairs = len(upper) // 2
     for j in range(pairs):
         above = upper[2 * j] if upper[2 * j] < upper[2 * j + 1] else upper[2 * j + 1]
@@ -104,16 +166,8 @@ def least_of_four(upper: Array, lower: Array, out: Array) -> None:
 
 
 @kernel
-def most_of_four(upper: Array, lower: Array, out: Array) -> None:
-    """Store the largest value of each 2 x 2 cells of two rows.
-
-    Parameters
-    ----------
-    upper, lower : (2 n or 2 n - 1,) ndarray
-        Neighbouring rows of a level; the same one twice at its lower border.
-    out : (n,) ndarray
-        A row of the next coarser level.
-    """
+def _most_of_four(upper: Array, lower: Array, out: Array) -> None:
+    """Store the largest value of each 2 x 2 cells of two rows, of which the lower may be the upper again."""
     pairs = len(upper) // 2
     for j in range(pairs):
         above = upper[2 * j] if upper[2 * j] > upper[2 * j + 1] else upper[2 * j + 1]

@@ -19,7 +19,8 @@ from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 Array = npt.NDArray[Any]
 Rows = tuple[int, int]  # first row and one past the last
 
-STRIP = 8  # rows resolved at once: their lines of float64 stay in cache
+STRIP = 8  # rows resolved at once: their runs stay in cache
+ALBEDO = 9  # first of its columns in `Runs.fixed`
 
 
 class Wanted(NamedTuple):
@@ -32,6 +33,14 @@ class Wanted(NamedTuple):
     albedo: bool
     material_id: bool
 
+
+class Runs(NamedTuple):
+    """Stretches of texels that see one triangle, in some rows; run 0 is all that sees nothing."""
+
+    slot: Array  # (rows, W) uint32: run of each texel
+    start: Array  # (n, 3) int32: triangle, row and first column of each run
+    fixed: Array  # (n, 12) float64: corner v_0, N, normal on the side that is seen, albedo
+    corner: Array  # (n, 4) int32: vertices, material
 
 class Planes(NamedTuple):
     """Where a pass writes, in the buffer's type."""
@@ -154,118 +163,157 @@ def _resolve_rows(
 ) -> None:
     """Fill every `step`-th strip of rows from strip `first` on.
 
-    Triangles are looked up once a run of texels, into `line`: corner v_0 and N at each texel. The rest is the same
-    arithmetic for all texels of a row, free of branches, in SIMD lanes. Strips, because each call with arrays costs
-    atomic reference counts, which threads share.
+    Triangles are looked up once a run of texels. The rest is the same arithmetic for all texels of a row, free of
+    branches, in SIMD lanes. Strips, because each call with arrays costs atomic reference counts, which threads share.
     """
     height, width = triangle_id.shape
-    line, hit = np.zeros((STRIP, 6, width)), np.empty((STRIP, 5, width))
-    smooth = len(surface.normals) > 0 and wanted.normal
+    most = STRIP * width + 1
+    runs = Runs(np.empty((STRIP, width), np.uint32), np.empty((most, 3), np.int32), np.zeros((most, 12)),
+                np.full((most, 4), -1, np.int32))  # fmt: skip
     for top in range(first * STRIP, height, step * STRIP):
-        bottom = min(top + STRIP, height)
-        _look_up(surface, projection, triangle_id, (top, bottom), wanted, planes, line)
+        rows = (top, min(top + STRIP, height))
+        _describe(surface, projection, _find_runs(triangle_id, rows, runs), runs)
         if wanted.depth or wanted.distance or wanted.position:
-            _meet(projection, triangle_id, (top, bottom), line, hit)
-            _store((top, bottom), wanted, planes, hit)
-        if smooth:
-            _interpolate(surface, projection, triangle_id, (top, bottom), line, planes.normal)
+            _meet(projection, rows, runs, wanted, planes)
+        _spread(rows, runs, wanted, planes)
+        if len(surface.normals) > 0 and wanted.normal:
+            _interpolate(surface, projection, rows, runs, planes.normal)
 
 
 @kernel
-def _look_up(
-    surface: Surface, projection: Projection, triangle_id: Array, rows: Rows, wanted: Wanted, planes: Planes,
-    line: Array,
-) -> None:
-    """Write corner and N of what each texel sees, and what is the same all over a triangle."""
-    vertices, faces, diffuse = surface.vertices, surface.faces, surface.diffuse
+def _find_runs(triangle_id: Array, rows: Rows, runs: Runs) -> int:
+    """Write run and first texel of each run; return how many there are, run 0 included."""
+    slot, start, count = runs.slot, runs.start, 1
     for row in range(rows[0], rows[1]):
-        view, v = _row_view(projection, row)
-        last, material, y = -1, -1, row - rows[0]
-        ix, iy, iz, gx, gy, gz, nx, ny, nz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        last, run = -1, 0
         for x in range(triangle_id.shape[1]):
             face = triangle_id[row, x]
-            if face < 0:
-                last = -1
-                if wanted.normal:
-                    planes.normal[0, row, x], planes.normal[1, row, x], planes.normal[2, row, x] = 0, 0, 0
-                if wanted.albedo:
-                    planes.albedo[0, row, x], planes.albedo[1, row, x], planes.albedo[2, row, x] = 0, 0, 0
-                if wanted.material_id:
-                    planes.material_id[row, x] = -1
-                continue
             if face != last:
-                last, material = face, surface.material_of_face[face]
-                i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-                ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-                gx, gy, gz = _cross(vertices[j, 0] - ix, vertices[j, 1] - iy, vertices[j, 2] - iz,
-                                    vertices[k, 0] - ix, vertices[k, 1] - iy, vertices[k, 2] - iz)  # fmt: skip
-                u = ((x + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0]
-                _, _, _, dx, dy, dz = _ray(projection.kind, view, u, v)
-                nx, ny, nz = _towards(gx, gy, gz, -dx, -dy, -dz)  # a triangle shows one side to a projection
-            line[y, 0, x], line[y, 1, x], line[y, 2, x] = ix, iy, iz
-            line[y, 3, x], line[y, 4, x], line[y, 5, x] = gx, gy, gz
-            if wanted.normal:
-                planes.normal[0, row, x], planes.normal[1, row, x], planes.normal[2, row, x] = nx, ny, nz
-            if wanted.albedo:
-                planes.albedo[0, row, x], planes.albedo[1, row, x] = diffuse[material, 0], diffuse[material, 1]
-                planes.albedo[2, row, x] = diffuse[material, 2]
-            if wanted.material_id:
-                planes.material_id[row, x] = material
+                last, run = face, 0
+                if face >= 0:
+                    run = count
+                    start[run, 0], start[run, 1], start[run, 2] = face, row, x
+                    count += 1
+            slot[row - rows[0], x] = run
+    return count
 
 
 @kernel
-def _meet(projection: Projection, triangle_id: Array, rows: Rows, line: Array, hit: Array) -> None:
-    """Write t, the length of t d and the point o + t d of each texel; inf, inf and 0 where nothing is seen."""
+def _describe(surface: Surface, projection: Projection, count: int, runs: Runs) -> None:
+    """Write what is the same all along each run but run 0.
+
+    Parameters
+    ----------
+    surface : Surface
+        The triangles.
+    projection : Projection
+        The maps.
+    count : int
+        One past the last run.
+    runs : Runs
+        `start` is read, `fixed` and `corner` are written.
+    """
+    vertices, faces, diffuse, start, fixed = surface.vertices, surface.faces, surface.diffuse, runs.start, runs.fixed
+    corner = runs.corner
+    # loads that wait for memory in loops of their own, where many are under way at once
+    for run in range(1, count):
+        face = start[run, 0]
+        corner[run, 0], corner[run, 1], corner[run, 2] = faces[face, 0], faces[face, 1], faces[face, 2]
+        corner[run, 3] = surface.material_of_face[face]
+    for run in range(1, count):
+        i, j, k = corner[run, 0], corner[run, 1], corner[run, 2]
+        for axis in range(3):
+            fixed[run, axis] = vertices[i, axis]
+            fixed[run, 3 + axis] = vertices[j, axis]
+            fixed[run, 6 + axis] = vertices[k, axis]
+    for run in range(1, count):
+        ix, iy, iz = fixed[run, 0], fixed[run, 1], fixed[run, 2]
+        gx, gy, gz = _cross(fixed[run, 3] - ix, fixed[run, 4] - iy, fixed[run, 5] - iz,
+                            fixed[run, 6] - ix, fixed[run, 7] - iy, fixed[run, 8] - iz)  # fmt: skip
+        _, _, _, dx, dy, dz = texel_ray(projection, start[run, 1], start[run, 2])
+        nx, ny, nz = _towards(gx, gy, gz, -dx, -dy, -dz)  # a triangle shows one side to a projection
+        fixed[run, 3], fixed[run, 4], fixed[run, 5] = gx, gy, gz
+        fixed[run, 6], fixed[run, 7], fixed[run, 8] = nx, ny, nz
+        for channel in range(3):
+            fixed[run, ALBEDO + channel] = diffuse[corner[run, 3], channel]
+
+
+@kernel
+def _meet(projection: Projection, rows: Rows, runs: Runs, wanted: Wanted, planes: Planes) -> None:
+    """Write t, the length of t d and the point o + t d of each texel: inf, inf and 0 where nothing is seen."""
     across, half, kind = 2.0 / projection.width, projection.half[0], projection.kind
+    slot, fixed, width = runs.slot, runs.fixed, runs.slot.shape[1]
+    line, hit = np.empty((6, width)), np.empty((4, width))
     for row in range(rows[0], rows[1]):
         view, v = _row_view(projection, row)
         y = row - rows[0]
-        for x in range(triangle_id.shape[1]):
+        for x in range(width):
+            run = np.uint64(slot[y, x])
+            line[0, x], line[1, x], line[2, x] = fixed[run, 0], fixed[run, 1], fixed[run, 2]
+            line[3, x], line[4, x], line[5, x] = fixed[run, 3], fixed[run, 4], fixed[run, 5]
+        for x in range(width):
             ox, oy, oz, dx, dy, dz = _ray(kind, view, ((x + 0.5) * across - 1.0) * half, v)
-            gx, gy, gz = line[y, 3, x], line[y, 4, x], line[y, 5, x]
+            gx, gy, gz = line[3, x], line[4, x], line[5, x]
             facing = dx * gx + dy * gy + dz * gz
-            t = ((line[y, 0, x] - ox) * gx + (line[y, 1, x] - oy) * gy + (line[y, 2, x] - oz) * gz) / facing
-            seen = triangle_id[row, x] >= 0
-            hit[y, 0, x] = t if seen else np.inf
-            hit[y, 1, x] = t * math.sqrt(dx * dx + dy * dy + dz * dz) if seen else np.inf
-            hit[y, 2, x] = ox + t * dx if seen else 0.0
-            hit[y, 3, x] = oy + t * dy if seen else 0.0
-            hit[y, 4, x] = oz + t * dz if seen else 0.0
+            t = ((line[0, x] - ox) * gx + (line[1, x] - oy) * gy + (line[2, x] - oz) * gz) / facing
+            seen = slot[y, x] > 0
+            hit[0, x] = t if seen else np.inf
+            hit[1, x] = ox + t * dx if seen else 0.0
+            hit[2, x] = oy + t * dy if seen else 0.0
+            hit[3, x] = oz + t * dz if seen else 0.0
+        if wanted.distance:
+            for x in range(width):
+                _, _, _, dx, dy, dz = _ray(kind, view, ((x + 0.5) * across - 1.0) * half, v)
+                planes.distance[row, x] = hit[0, x] * math.sqrt(dx * dx + dy * dy + dz * dz)
+        _round(hit, row, wanted, planes)
 
 
 @kernel
-def _store(rows: Rows, wanted: Wanted, planes: Planes, hit: Array) -> None:
-    """Round rows to the buffer's type."""
+def _round(hit: Array, row: int, wanted: Wanted, planes: Planes) -> None:
+    """Round depths and points of a row to the buffer's type."""
+    if wanted.depth:
+        for x in range(hit.shape[1]):
+            planes.depth[row, x] = hit[0, x]
+    if wanted.position:
+        for axis in range(3):
+            for x in range(hit.shape[1]):
+                planes.position[axis, row, x] = hit[1 + axis, x]
+
+
+@kernel
+def _spread(rows: Rows, runs: Runs, wanted: Wanted, planes: Planes) -> None:
+    """Write along each run what is the same all along it."""
+    slot, fixed, corner = runs.slot, runs.fixed, runs.corner
+    normal, albedo = planes.normal, planes.albedo
     for row in range(rows[0], rows[1]):
         y = row - rows[0]
-        if wanted.depth:
-            for x in range(hit.shape[2]):
-                planes.depth[row, x] = hit[y, 0, x]
-        if wanted.distance:
-            for x in range(hit.shape[2]):
-                planes.distance[row, x] = hit[y, 1, x]
-        if wanted.position:
-            for axis in range(3):
-                for x in range(hit.shape[2]):
-                    planes.position[axis, row, x] = hit[y, 2 + axis, x]
+        if wanted.normal:
+            for x in range(slot.shape[1]):
+                run = np.uint64(slot[y, x])
+                normal[0, row, x], normal[1, row, x], normal[2, row, x] = fixed[run, 6], fixed[run, 7], fixed[run, 8]
+        if wanted.albedo:
+            for x in range(slot.shape[1]):
+                run = np.uint64(slot[y, x])
+                albedo[0, row, x], albedo[1, row, x], albedo[2, row, x] = fixed[run, 9], fixed[run, 10], fixed[run, 11]
+        if wanted.material_id:
+            for x in range(slot.shape[1]):
+                planes.material_id[row, x] = corner[np.uint64(slot[y, x]), 3]
 
 
 @kernel
-def _interpolate(
-    surface: Surface, projection: Projection, triangle_id: Array, rows: Rows, line: Array, normal: Array
-) -> None:
+def _interpolate(surface: Surface, projection: Projection, rows: Rows, runs: Runs, normal: Array) -> None:
     """Replace face normals by interpolated ones, on the same side."""
-    vertices, faces, shading = surface.vertices, surface.faces, surface.normals
+    vertices, faces, shading, fixed = surface.vertices, surface.faces, surface.normals, runs.fixed
     for row in range(rows[0], rows[1]):
         view, v = _row_view(projection, row)
-        y = row - rows[0]
-        for x in range(triangle_id.shape[1]):
-            face = triangle_id[row, x]
-            if face < 0:
+        for x in range(normal.shape[2]):
+            run = runs.slot[row - rows[0], x]
+            if run == 0:
                 continue
+            face = runs.start[run, 0]
             i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
             ray = _ray(projection.kind, view, ((x + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0], v)
-            gx, gy, gz = line[y, 3, x], line[y, 4, x], line[y, 5, x]
+            gx, gy, gz = fixed[run, 3], fixed[run, 4], fixed[run, 5]
             facing = ray[3] * gx + ray[4] * gy + ray[5] * gz
             ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
             jx, jy, jz = vertices[j, 0], vertices[j, 1], vertices[j, 2]

@@ -63,6 +63,8 @@ def drawn(curves: Sequence[Curve], axes: Axes) -> str:
 
 
 def _draw(plot: Any, curves: Sequence[Curve], axes: Axes) -> None:
+    from matplotlib.ticker import LogLocator
+
     plot.patch.set_alpha(0)
     plot.set(xlabel=axes.x, ylabel=axes.y)
     plot.spines[["top", "right"]].set_visible(False)
@@ -80,7 +82,9 @@ def _draw(plot: Any, curves: Sequence[Curve], axes: Axes) -> None:
         axis.set_minor_formatter("")
     if axes.log_x:
         plot.set_xticks(_steps(curves))
-    if not axes.log_y:
+    if axes.log_y:
+        plot.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    else:
         plot.set_ylim(bottom=0)
     plot.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=9, facecolor=CARD)
 

@@ -167,6 +167,6 @@ def _notes(artefact: dict[tuple[str, str], float], seconds: dict[str, float],
         f"The dragon's stand-in has {more['rim']:.2f} times the subsplats with a rim and takes {slower['rim']:+.0%} of "
         "time (paper: up to 40 %).",
         f"What the paper says of diagonals, read to the letter, gives {more['literal']:.2f} times the subsplats and "
-        f"{slower['literal']:+.0%} of time, not 2 to 3 %: its rule must be another. Refining across a bare corner "
-        f"alone gives {more['corner']:.2f} times and {slower['corner']:+.0%}, which is the default.",
+        f"{slower['literal']:+.0%} of time where the paper has 2 to 3 %: its rule may be another. Refining across a "
+        f"bare corner alone gives {more['corner']:.2f} times and {slower['corner']:+.0%}, which is the default.",
     )

@@ -82,7 +82,8 @@ def _blocks(frame: "Frame", settings: MultiresSettings, subsplats: Subsplats) ->
 
 def _passes(subsplats: Subsplats) -> tuple[tuple[Cell, ...], ...]:
     """Return one row a resolution: what the published list holds when it has come to it."""
-    counts, rows, before = subsplats.counts, [], None
+    counts, before = subsplats.counts, None
+    rows: list[tuple[Cell, ...]] = []
     for level in range(subsplats.top, -1, -1):
         left = int(counts[level])
         here = _filled(subsplats, level)
@@ -103,7 +104,7 @@ def _filled(subsplats: Subsplats, level: int) -> int:
 
 
 def _notes(rows: tuple[tuple[Cell, ...], ...], share: float) -> tuple[str, ...]:
-    growth = [float(row[3]) for row in rows if row[3] is not None]
+    growth = [row[3] for row in rows if isinstance(row[3], float)]
     said = f"{min(growth):.2f} to {max(growth):.2f}" if growth else "no"
     return (
         f"Each pass multiplies the list by {said}, towards the {PAPER_GROWTH:g} of discontinuities that are lines "

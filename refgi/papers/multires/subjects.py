@@ -6,7 +6,7 @@ Pictures are of the run's size; counts and times are of twice that, 1024 x 1024 
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,10 +16,8 @@ from refgi.frame import Frame
 from refgi.papers.multires.scenes import BUILDERS
 from refgi.splat.irradiance import Receivers, irradiance
 from refgi.splat.lights.selection import choose_lights, footprints
-from refgi.splat.multires import MultiresSettings, multires
-from refgi.splat.refinement.criteria import needs
-from refgi.splat.refinement.grid import Subsplats, top_level
-from refgi.splat.refinement.refine import refine
+from refgi.splat.multires import MultiresSettings, multires, shared_subsplats
+from refgi.splat.refinement.grid import Subsplats
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench
@@ -112,7 +110,7 @@ def settings_of(bench: "Workbench", scene: str, **changes: Any) -> MultiresSetti
     MultiresSettings
         The settings.
     """
-    clamp = {"clamp": "distance", "clamp_value": CLAMP * scene_of(bench, scene).geometry.diagonal}
+    clamp: dict[str, Any] = {"clamp": "distance", "clamp_value": CLAMP * scene_of(bench, scene).geometry.diagonal}
     return MultiresSettings(**(clamp | changes))
 
 
@@ -156,6 +154,29 @@ def drawing(bench: "Workbench", scene: "Scene", settings: MultiresSettings) -> C
     return draw
 
 
+def without_indirect(bench: "Workbench", scene: "Scene") -> Callable[[], Array]:
+    """Return what draws a frame of twice the run's size and all that indirect light needs, but not that light.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Sizes.
+    scene : Scene
+        What is drawn.
+
+    Returns
+    -------
+    callable
+        Gives radiance of direct light.
+    """
+    def draw() -> Array:
+        frame = seen_by(bench, scene, LARGE)
+        frame.gbuffer.resolve("depth", "position", "normal", "albedo")
+        return frame.radiance() if frame.rsms else np.zeros(0)
+
+    return draw
+
+
 def subsplats_of(frame: Frame, settings: MultiresSettings) -> Subsplats:
     """Return the subsplats that all lights share.
 
@@ -171,8 +192,7 @@ def subsplats_of(frame: Frame, settings: MultiresSettings) -> Subsplats:
     Subsplats
         The leaves.
     """
-    need = needs(frame.gbuffer, settings, top_level(frame.height, frame.width, settings.coarsest))
-    return refine(need, frame.gbuffer.covered, settings)
+    return shared_subsplats(frame.gbuffer, settings)
 
 
 def full_sum(frame: Frame, settings: MultiresSettings) -> Array:
@@ -247,19 +267,3 @@ def share_lit(subsplats: Subsplats, covered: Array) -> float:
         1 where nothing is saved.
     """
     return len(subsplats.pixel) / max(1, int(np.count_nonzero(covered)))
-
-
-def fps(seconds: Mapping[str, float]) -> dict[str, float]:
-    """Return frames per second.
-
-    Parameters
-    ----------
-    seconds : mapping of str to float
-        Of a frame.
-
-    Returns
-    -------
-    dict of str to float
-        The reciprocals.
-    """
-    return {name: 1 / taken for name, taken in seconds.items()}

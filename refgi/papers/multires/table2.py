@@ -76,7 +76,7 @@ def table2(bench: "Workbench") -> Figure:
 
 
 def _settings(bench: "Workbench") -> dict[Key, MultiresSettings]:
-    found = {}
+    found: dict[Key, MultiresSettings] = {}
     for name in TITLES:
         frame, base = frame_of(bench, name, LARGE), settings_of(bench, name)
         side = LARGE * bench.scale.size

@@ -72,8 +72,7 @@ def _modulate_row(
         square = x * x + y * y + z * z
         along = x * normal[0, i, j] + y * normal[1, i, j] + z * normal[2, i, j]
         cosine = along / math.sqrt(square) if square > zero else one
-        # [Nichols09] Eq. (3), with what rounding adds to the cosine taken off
+        # Eq. (3); a cosine may be more than 1 by rounding
         factor = a * min(max(cosine, zero), one) + (one - a)
-        factor = min(max(factor, one - a), one) if covered[i, j] else zero
         for c in range(3):
-            result[c, i, j] = irradiance[c, i, j] * factor
+            result[c, i, j] = irradiance[c, i, j] * (factor if covered[i, j] else zero)

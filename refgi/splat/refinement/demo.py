@@ -50,15 +50,15 @@ def _filtered(lit: Array, leaf: Array, coarse: Array, coarse_mask: Array, i: int
     """Return the weighted mean of the taps around a texel, by differences to the tap in the middle."""
     real = lit.dtype.type
     down, across = _weights(real, i), _weights(real, j)
-    _, x, y, z = _tap(lit, leaf, coarse, coarse_mask, i, j, 0, 0)
+    vertical = _holds(leaf, coarse_mask, i, j, -1, 0), True, _holds(leaf, coarse_mask, i, j, 1, 0)
+    horizontal = _holds(leaf, coarse_mask, i, j, 0, -1), True, _holds(leaf, coarse_mask, i, j, 0, 1)
+    x, y, z = _tap(lit, coarse, coarse_mask, i, j, 0, 0)
     total, red, green, blue = real(0.0), real(0.0), real(0.0), real(0.0)
     for k in range(9):
         di, dj = k // 3 - 1, k % 3 - 1
-        there, r, g, b = _tap(lit, leaf, coarse, coarse_mask, i, j, di, dj)
-        if there and di != 0 and dj != 0:
-            there = _tap(lit, leaf, coarse, coarse_mask, i, j, di, 0)[0] or (
-                _tap(lit, leaf, coarse, coarse_mask, i, j, 0, dj)[0])
-        if there:
+        beside = vertical[di + 1] or horizontal[dj + 1]  # of the taps that touch a corner
+        if beside and _holds(leaf, coarse_mask, i, j, di, dj):
+            r, g, b = _tap(lit, coarse, coarse_mask, i, j, di, dj)
             weight = down[di + 1] * across[dj + 1]
             total += weight
             red, green, blue = red + weight * (r - x), green + weight * (g - y), blue + weight * (b - z)
@@ -73,12 +73,26 @@ def _weights(real: Any, i: int) -> Any:
 
 
 @kernel
-def _tap(lit: Array, leaf: Array, coarse: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) -> Any:
-    """Return whether there is light one texel further, of the coarser level or else of this one, and the light."""
-    row = min(max((i >> 1) + di, 0), coarse_mask.shape[0] - 1)
-    column = min(max((j >> 1) + dj, 0), coarse_mask.shape[1] - 1)
+def _holds(leaf: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) -> Any:
+    """Return whether there is light one texel further, of the coarser level or of this one."""
+    row, column = _inside(coarse_mask, (i >> 1) + di, (j >> 1) + dj)
     if coarse_mask[row, column]:
-        return True, coarse[0, row, column], coarse[1, row, column], coarse[2, row, column]
-    row = min(max(i + di, 0), leaf.shape[0] - 1)
-    column = min(max(j + dj, 0), leaf.shape[1] - 1)
-    return leaf[row, column], lit[0, row, column], lit[1, row, column], lit[2, row, column]
+        return True
+    row, column = _inside(leaf, i + di, j + dj)
+    return leaf[row, column]
+
+
+@kernel
+def _tap(lit: Array, coarse: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) -> Any:
+    """Return the light one texel further, of the coarser level where that has any."""
+    row, column = _inside(coarse_mask, (i >> 1) + di, (j >> 1) + dj)
+    if coarse_mask[row, column]:
+        return coarse[0, row, column], coarse[1, row, column], coarse[2, row, column]
+    row, column = _inside(lit[0], i + di, j + dj)
+    return lit[0, row, column], lit[1, row, column], lit[2, row, column]
+
+
+@kernel
+def _inside(plane: Array, i: int, j: int) -> Any:
+    """Return the nearest texel of the picture."""
+    return min(max(i, 0), plane.shape[0] - 1), min(max(j, 0), plane.shape[1] - 1)

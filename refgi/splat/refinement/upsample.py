@@ -127,25 +127,30 @@ def _spread(values: Array, level: Array, row: Array, column: Array, covered: Arr
                         result[c, y, x] = values[c, k]
 
 
-@kernel(parallel=True)
 def _add_bilinear(texels: Array, level: int, covered: Array, result: Array) -> None:
     """Add a level, interpolated between the centres of its texels."""
-    height, width = covered.shape
-    for y in prange(height):
-        i0, i1, down = _between(y, level, texels.shape[1])
-        for x in range(width):
-            j0, j1, across = _between(x, level, texels.shape[2])
-            for c in range(3):
-                f, g = result.dtype.type(down), result.dtype.type(across)
-                upper = texels[c, i0, j0] + g * (texels[c, i0, j1] - texels[c, i0, j0])
-                lower = texels[c, i1, j0] + g * (texels[c, i1, j1] - texels[c, i1, j0])
+    rows, columns = (_between(*sizes, level, result.dtype)
+                     for sizes in zip(covered.shape, texels.shape[1:], strict=True))
+    _add_between(texels, *rows, *columns, covered, result)
+
+
+def _between(pixels: int, texels: int, level: int, dtype: np.dtype[Any]) -> tuple[Array, Array, Array]:
+    """Return the texels before and behind each pixel of a row or column, and how far from one to the other it is."""
+    place = (np.arange(pixels) + 0.5) / 2**level - 0.5
+    before = np.floor(place).astype(np.int64)
+    return np.maximum(before, 0), np.minimum(before + 1, texels - 1), (place - before).astype(dtype)
+
+
+@kernel(parallel=True)
+def _add_between(
+    texels: Array, above: Array, below: Array, down: Array, left: Array, right: Array, across: Array, covered: Array,
+    result: Array,
+) -> None:
+    for y in prange(len(above)):
+        for c in range(3):
+            upper, lower, pixels = texels[c, above[y]], texels[c, below[y]], result[c, y]
+            for x in range(len(left)):
+                first = upper[left[x]] + across[x] * (upper[right[x]] - upper[left[x]])
+                second = lower[left[x]] + across[x] * (lower[right[x]] - lower[left[x]])
                 if covered[y, x]:
-                    result[c, y, x] += upper + f * (lower - upper)
-
-
-@kernel
-def _between(x: int, level: int, count: int) -> Any:
-    """Return the texels on both sides of a pixel and where between them it is, 0 to 1."""
-    place = (x + 0.5) / (1 << level) - 0.5
-    left = int(np.floor(place))
-    return max(left, 0), min(left + 1, count - 1), place - left
+                    pixels[x] += first + down[y] * (second - first)

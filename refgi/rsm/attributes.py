@@ -17,7 +17,7 @@ from refgi.jit import kernel, prange
 from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 
 Array = npt.NDArray[Any]
-Rows = tuple[int, int]  # first row and one past the last
+Rows = tuple[int, int]  # first row of the planes and one past the last
 
 STRIP = 8  # rows resolved at once: their runs stay in cache
 ALBEDO = 9  # first of its columns in `Runs.fixed`
@@ -35,10 +35,12 @@ class Wanted(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """Stretches of texels that see one triangle, in some rows; run 0 is all that sees nothing."""
+    """Stretches of texels that see one triangle, in some rows of texels; run 0 is all that sees nothing."""
 
-    slot: Array  # (rows, W) uint32: run of each texel
-    start: Array  # (n, 3) int32: triangle, row and first column of each run
+    row: Array  # (rows,) int32: row on the maps
+    column: Array  # (rows,) int32: column of the first texel
+    slot: Array  # (rows, texels) uint32: run of each texel
+    start: Array  # (n, 3) int32: triangle, row and first column of each run on the maps
     fixed: Array  # (n, 12) float64: corner v_0, N, normal on the side that is seen, albedo
     corner: Array  # (n, 4) int32: vertices, material
 
@@ -167,25 +169,64 @@ def _resolve_rows(
     branches, in SIMD lanes. Strips, because each call with arrays costs atomic reference counts, which threads share.
     """
     height, width = triangle_id.shape
-    most = STRIP * width + 1
-    runs = Runs(np.empty((STRIP, width), np.uint32), np.empty((most, 3), np.int32), np.zeros((most, 12)),
-                np.full((most, 4), -1, np.int32))  # fmt: skip
+    runs = _room(STRIP, width)
     for top in range(first * STRIP, height, step * STRIP):
         rows = (top, min(top + STRIP, height))
-        _describe(surface, projection, _find_runs(triangle_id, rows, runs), runs)
-        if wanted.depth or wanted.distance or wanted.position:
-            _meet(projection, rows, runs, wanted, planes)
-        _spread(rows, runs, wanted, planes)
-        if len(surface.normals) > 0 and wanted.normal:
-            _interpolate(surface, projection, rows, runs, planes.normal)
+        _fill(surface, projection, _find_runs(triangle_id, rows, runs), runs, rows, wanted, planes)
+
+
+@kernel
+def resolve_at(
+    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, wanted: Wanted, planes: Planes
+) -> None:
+    """Fill the wanted planes at some texels, with the bits that `resolve` gives there.
+
+    Parameters
+    ----------
+    surface : Surface
+        The triangles.
+    projection : Projection
+        The maps that `triangle_id` was drawn on.
+    triangle_id : (H, W) ndarray
+        Triangle at each texel, -1 for none.
+    texel : (n,) ndarray
+        Texels of the flattened maps.
+    wanted : Wanted
+        Which planes to fill.
+    planes : Planes
+        The result, n rows of one texel.
+    """
+    runs = _room(len(texel), 1)
+    _fill(surface, projection, _take_runs(triangle_id, texel, runs), runs, (0, len(texel)), wanted, planes)
+
+
+@kernel
+def _room(rows: int, texels: int) -> Any:
+    most = rows * texels + 1
+    return Runs(np.empty(rows, np.int32), np.empty(rows, np.int32), np.empty((rows, texels), np.uint32),
+                np.empty((most, 3), np.int32), np.zeros((most, 12)), np.full((most, 4), -1, np.int32))  # fmt: skip
+
+
+@kernel
+def _fill(
+    surface: Surface, projection: Projection, count: int, runs: Runs, rows: Rows, wanted: Wanted, planes: Planes
+) -> None:
+    """Fill some rows of the planes; `count` is one past the last run."""
+    _describe(surface, projection, count, runs)
+    if wanted.depth or wanted.distance or wanted.position:
+        _meet(projection, rows, runs, wanted, planes)
+    _spread(rows, runs, wanted, planes)
+    if len(surface.normals) > 0 and wanted.normal:
+        _interpolate(surface, projection, rows, runs, planes.normal)
 
 
 @kernel
 def _find_runs(triangle_id: Array, rows: Rows, runs: Runs) -> int:
-    """Write run and first texel of each run; return how many there are, run 0 included."""
+    """Find the runs of whole rows; return how many there are, run 0 included."""
     slot, start, count = runs.slot, runs.start, 1
     for row in range(rows[0], rows[1]):
-        last, run = -1, 0
+        last, run, y = -1, 0, row - rows[0]
+        runs.row[y], runs.column[y] = row, 0
         for x in range(triangle_id.shape[1]):
             face = triangle_id[row, x]
             if face != last:
@@ -194,7 +235,24 @@ def _find_runs(triangle_id: Array, rows: Rows, runs: Runs) -> int:
                     run = count
                     start[run, 0], start[run, 1], start[run, 2] = face, row, x
                     count += 1
-            slot[row - rows[0], x] = run
+            slot[y, x] = run
+    return count
+
+
+@kernel
+def _take_runs(triangle_id: Array, texel: Array, runs: Runs) -> int:
+    """Find the runs that some texels belong to, one for each; return how many there are, run 0 included."""
+    slot, start, count, width = runs.slot, runs.start, 1, triangle_id.shape[1]
+    for y in range(len(texel)):
+        row, x = texel[y] // width, texel[y] % width
+        runs.row[y], runs.column[y], slot[y, 0] = row, x, 0
+        face = triangle_id[row, x]
+        if face >= 0:
+            while x > 0 and triangle_id[row, x - 1] == face:
+                x -= 1
+            slot[y, 0] = count
+            start[count, 0], start[count, 1], start[count, 2] = face, row, x
+            count += 1
     return count
 
 
@@ -245,14 +303,15 @@ def _meet(projection: Projection, rows: Rows, runs: Runs, wanted: Wanted, planes
     slot, fixed, width = runs.slot, runs.fixed, runs.slot.shape[1]
     line, hit = np.empty((6, width)), np.empty((4, width))
     for row in range(rows[0], rows[1]):
-        view, v = _row_view(projection, row)
         y = row - rows[0]
+        view, v = _row_view(projection, runs.row[y])
+        middle = runs.column[y] + 0.5
         for x in range(width):
             run = np.uint64(slot[y, x])
             line[0, x], line[1, x], line[2, x] = fixed[run, 0], fixed[run, 1], fixed[run, 2]
             line[3, x], line[4, x], line[5, x] = fixed[run, 3], fixed[run, 4], fixed[run, 5]
         for x in range(width):
-            ox, oy, oz, dx, dy, dz = _ray(kind, view, ((x + 0.5) * across - 1.0) * half, v)
+            ox, oy, oz, dx, dy, dz = _ray(kind, view, ((x + middle) * across - 1.0) * half, v)
             gx, gy, gz = line[3, x], line[4, x], line[5, x]
             facing = dx * gx + dy * gy + dz * gz
             t = ((line[0, x] - ox) * gx + (line[1, x] - oy) * gy + (line[2, x] - oz) * gz) / facing
@@ -263,7 +322,7 @@ def _meet(projection: Projection, rows: Rows, runs: Runs, wanted: Wanted, planes
             hit[3, x] = oz + t * dz if seen else 0.0
         if wanted.distance:
             for x in range(width):
-                _, _, _, dx, dy, dz = _ray(kind, view, ((x + 0.5) * across - 1.0) * half, v)
+                _, _, _, dx, dy, dz = _ray(kind, view, ((x + middle) * across - 1.0) * half, v)
                 planes.distance[row, x] = hit[0, x] * math.sqrt(dx * dx + dy * dy + dz * dz)
         _round(hit, row, wanted, planes)
 
@@ -305,14 +364,16 @@ def _interpolate(surface: Surface, projection: Projection, rows: Rows, runs: Run
     """Replace face normals by interpolated ones, on the same side."""
     vertices, faces, shading, fixed = surface.vertices, surface.faces, surface.normals, runs.fixed
     for row in range(rows[0], rows[1]):
-        view, v = _row_view(projection, row)
+        y = row - rows[0]
+        view, v = _row_view(projection, runs.row[y])
+        middle = runs.column[y] + 0.5
         for x in range(normal.shape[2]):
-            run = runs.slot[row - rows[0], x]
+            run = runs.slot[y, x]
             if run == 0:
                 continue
             face = runs.start[run, 0]
             i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-            ray = _ray(projection.kind, view, ((x + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0], v)
+            ray = _ray(projection.kind, view, ((x + middle) * (2.0 / projection.width) - 1.0) * projection.half[0], v)
             gx, gy, gz = fixed[run, 3], fixed[run, 4], fixed[run, 5]
             facing = ray[3] * gx + ray[4] * gy + ray[5] * gz
             ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]

@@ -75,7 +75,8 @@ def shadow_map_visibility(
     """
     expect(bias is None or (math.isfinite(bias) and bias >= 0), "bias", "a finite number >= 0, m", bias)
     visible = plane(covered.shape, np.bool_)
-    stored = Stored(rsm.depth.reshape(-1), rsm.position.reshape(3, -1), -1.0 if bias is None else bias)
+    depth, stored_position = rsm.resolve("depth", "position")
+    stored = Stored(depth.reshape(-1), stored_position.reshape(3, -1), -1.0 if bias is None else bias)
     _look_up(rsm.projection, Receivers(position, normal, covered), stored, numba.get_num_threads(), visible)
     return visible
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.rsm.attributes import Planes, Surface, Wanted, resolve
+from refgi.rsm.attributes import Planes, Surface, Wanted, resolve, resolve_at
 from refgi.rsm.memory import plane
 from refgi.rsm.projection import Projection, camera_projection
 from refgi.rsm.raster import Visibility, rasterize
@@ -15,6 +15,8 @@ from refgi.scene.model import Camera, Geometry, MaterialTable
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
+
+MANY = 8  # as soon as one texel in so many is asked for, all are computed
 
 
 class GBuffer:
@@ -132,6 +134,51 @@ class GBuffer:
                                            self.visibility.triangle_id, self.dtype, tuple(missing)))  # fmt: skip
         return tuple(self._channels[n] if n in self._channels else getattr(self, n) for n in names)
 
+    def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
+        """Return channels at some texels alone, computing there those not yet known.
+
+        Parameters
+        ----------
+        texel : (n,) ndarray of int
+            Texels, row * w + column.
+        *names : str
+            As for `resolve`.
+
+        Returns
+        -------
+        tuple of (n,) or (3, n) ndarray
+            The channels, in the order asked for, with the bits that `resolve` gives.
+        """
+        if MANY * len(texel) > self.visibility.triangle_id.size:
+            self.resolve(*names)
+        missing = tuple(name for name in Wanted._fields if name in names and name not in self._channels)
+        there = {}
+        if missing:
+            planes = _planes(missing, (len(texel), 1), self.dtype)
+            surface = _surface(self._geometry, self._materials, self.dtype)
+            wanted = Wanted(*(name in missing for name in Wanted._fields))
+            resolve_at(surface, self.projection, self.visibility.triangle_id, texel, wanted, planes)
+            there = {name: getattr(planes, name)[..., 0] for name in missing}
+        return tuple(there[n] if n in there else taken(self.resolve(n)[0], texel) for n in names)
+
+
+def taken(channel: Array, texel: Array) -> Array:
+    """Return a channel's values at some texels.
+
+    Parameters
+    ----------
+    channel : (..., h, w) ndarray
+        The channel.
+    texel : (n,) ndarray of int
+        Texels, row * w + column.
+
+    Returns
+    -------
+    (..., n) ndarray
+        The values.
+    """
+    return channel.reshape(*channel.shape[:-2], -1)[..., texel]
+
 
 @stage("rsm.gbuffer")
 def gbuffer(
@@ -182,16 +229,23 @@ def _resolve(
     names: tuple[str, ...],
 ) -> dict[str, Array]:
     """Return the named channels, computed in one pass."""
-    shape = triangle_id.shape
-    planes = {name: np.empty((3, 0, 0) if name in ("position", "normal", "albedo") else (0, 0), dtype)
-              for name in Wanted._fields}  # fmt: skip
-    planes["material_id"] = np.empty((0, 0), np.int32)
-    for name in names:
-        full = (3, *shape) if planes[name].ndim == 3 else shape
-        planes[name] = plane(full, planes[name].dtype)
-    normals = np.zeros((0, 3)) if geometry.vertex_normals is None else geometry.vertex_normals
-    diffuse = materials.diffuse.astype(dtype, copy=False)
-    surface = Surface(geometry.vertices, geometry.faces, normals, geometry.material_of_face, diffuse)
+    planes = _planes(names, triangle_id.shape, dtype)
     wanted = Wanted(*(name in names for name in Wanted._fields))
-    resolve(surface, projection, triangle_id, wanted, Planes(**planes), numba.get_num_threads())
-    return {name: planes[name] for name in names}
+    resolve(_surface(geometry, materials, dtype), projection, triangle_id, wanted, planes, numba.get_num_threads())
+    return {name: getattr(planes, name) for name in names}
+
+
+def _planes(names: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype[Any]) -> Planes:
+    """Return room for the named channels."""
+    planes = {}
+    for name in Wanted._fields:
+        size = shape if name in names else (0, 0)
+        planes[name] = plane((3, *size) if name in ("position", "normal", "albedo") else size,
+                             np.int32 if name == "material_id" else dtype)  # fmt: skip
+    return Planes(**planes)
+
+
+def _surface(geometry: Geometry, materials: MaterialTable, dtype: np.dtype[Any]) -> Surface:
+    normals = np.zeros((0, 3)) if geometry.vertex_normals is None else geometry.vertex_normals
+    return Surface(geometry.vertices, geometry.faces, normals, geometry.material_of_face,
+                   materials.diffuse.astype(dtype, copy=False))  # fmt: skip

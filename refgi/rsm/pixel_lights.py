@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.cells import cell_sums, cells_of_grid, cells_of_nearest, lit_texels
+from refgi.rsm.gbuffer import taken
 from refgi.rsm.importance import importance as importance_of
 from refgi.rsm.reflective import Rsm
 from refgi.rsm.warp import Warp, texel_of, warp_stacked
@@ -157,7 +158,7 @@ def _is_grid(rsms: Sequence[Rsm], count: int) -> bool:
 
 def _choose(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Array:
     """Return the chosen texels as indices into the flattened map."""
-    height, width = rsm.depth.shape
+    height, width = rsm.projection.shape
     if pattern == "all":
         return np.arange(rsm.texels)
     if pattern == "grid":
@@ -184,7 +185,7 @@ def _points(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Ar
 
 def _warped(rsm: Rsm, points: Array, importance: Array, warp: Warp) -> tuple[Array, Array]:
     """Return the texels that the warped points fall on, and their weights 1 / (T q)."""
-    height, width = rsm.depth.shape
+    height, width = rsm.projection.shape
     expect(np.shape(importance) == (height, width), "importance", f"shape {(height, width)} as its map",
            np.shape(importance))
     warped, weight = warp_stacked(points, importance, rsm.projection.maps, warp)
@@ -193,9 +194,10 @@ def _warped(rsm: Rsm, points: Array, importance: Array, warp: Warp) -> tuple[Arr
 
 def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array) -> PixelLights:
     """Return the texels as lights with T/N, or T/N w, times their flux."""
-    scale = np.asarray(weight).astype(rsm.flux.dtype)
-    lobe = None if rsm.lobe_flux is None else _taken(rsm.lobe_flux, texel) * scale
-    return _lights(rsm, texel, _taken(rsm.flux, texel) * scale, lobe)
+    (flux,) = rsm.at(texel, "flux")
+    scale = np.asarray(weight).astype(flux.dtype)
+    lobe = None if rsm.lobe_flux is None else taken(rsm.lobe_flux, texel) * scale
+    return _lights(rsm, texel, flux * scale, lobe)
 
 
 def _filtered_lights(rsm: Rsm, texel: Array, on_grid: bool) -> PixelLights:
@@ -206,21 +208,18 @@ def _filtered_lights(rsm: Rsm, texel: Array, on_grid: bool) -> PixelLights:
     return _lights(rsm, lit_texels(texel, cell, power > 0), flux, lobe)
 
 
-def _taken(plane: Array, texel: Array) -> Array:
-    return plane.reshape(*plane.shape[:-2], -1)[..., texel]
-
-
 def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None) -> PixelLights:
     """Gather the chosen texels, leaving out those without flux."""
     lit = flux.any(axis=0) if lobe is None else flux.any(axis=0) | lobe.any(axis=0)
     kept = texel[lit]
+    position, normal = rsm.at(kept, "position", "normal")
     return PixelLights(
-        _taken(rsm.position, kept),
-        _taken(rsm.normal, kept),
+        position,
+        normal,
         flux[:, lit],
         None if lobe is None else lobe[:, lit],
-        None if rsm.lobe_axis is None else _taken(rsm.lobe_axis, kept),
-        None if rsm.lobe_exponent is None else _taken(rsm.lobe_exponent, kept),
+        None if rsm.lobe_axis is None else taken(rsm.lobe_axis, kept),
+        None if rsm.lobe_exponent is None else taken(rsm.lobe_exponent, kept),
         len(texel),
         kept.astype(np.int32),
     )

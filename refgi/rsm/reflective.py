@@ -6,8 +6,8 @@ the mirror direction r = d - 2 (n . d) n of the incoming direction d, with its o
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, Literal, NamedTuple, get_args
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.attributes import texel_ray
-from refgi.rsm.gbuffer import GBuffer
+from refgi.rsm.gbuffer import GBuffer, taken
 from refgi.rsm.projection import (
     Projection,
     cube_projection,
@@ -26,36 +26,178 @@ from refgi.rsm.projection import (
     spot_projection,
 )
 from refgi.rsm.raster import rasterize
-from refgi.rsm.solid_angle import sampled_spot_share, spot_power, texel_solid_angles
+from refgi.rsm.solid_angle import sampled_spot_share, spot_power, spot_power_at, texel_solid_angles
 from refgi.scene.model import DirectionalLight, Geometry, Light, MaterialTable, PointLight, SpotLight
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 MapShape = Literal["auto", "perspective", "cube", "paraboloid", "orthographic"]
 
+SEEN = ("depth", "position", "normal")  # channels of the light's view
+LOBE = ("lobe_flux", "lobe_axis", "lobe_exponent")
 WIDEST_PERSPECTIVE = math.radians(75)  # beyond, texels on the axis span over 60 times the solid angle of the rim's
 
 
-class Rsm(NamedTuple):
-    """What one light sees and reflects, on H x W texels (stacked maps)."""
+class Rsm:
+    """What one light sees and reflects, on H x W texels (stacked maps); a channel is computed when first asked for.
 
-    light: Light
-    projection: Projection
-    triangle_id: Array  # (H, W) int32, -1: nothing
-    depth: Array  # (H, W) m: axial, or distance on a paraboloid map; inf: nothing
-    position: Array  # (3, H, W) m, world space
-    normal: Array  # (3, H, W) unit vector on the lit side
-    solid_angle: Array  # (H, W) sr of the whole texel; directional: perpendicular area, m^2
-    flux: Array  # (3, H, W) W, reflected by the diffuse part
-    covered: Array  # (H, W) bool
-    lobe_flux: Array | None = None  # (3, H, W) W, reflected by the lobe; None: no material has one
-    lobe_axis: Array | None = None  # (3, H, W) unit vector, mirror direction
-    lobe_exponent: Array | None = None  # (H, W)
+    Parameters
+    ----------
+    light : Light
+        Whose view.
+    view : GBuffer
+        What it sees.
+    materials : MaterialTable
+        What that is made of.
+    given : mapping of str to ndarray or None, optional
+        Channels that are known to be others than those of the view.
+    """
+
+    def __init__(
+        self, light: Light, view: GBuffer, materials: MaterialTable, given: Mapping[str, Array | None] | None = None
+    ) -> None:
+        self.light = light
+        self.projection = view.projection
+        self._view = view
+        self._materials = materials
+        self._given = dict(given or {})
+        self._glossy = bool((materials.specular.any(axis=1) & (materials.ior == 0)).any())
+
+    def _replace(self, **channels: Array | None) -> "Rsm":
+        """Return the map with other channels."""
+        return Rsm(self.light, self._view, self._materials, {**self._given, **channels})
+
+    @property
+    def triangle_id(self) -> Array:
+        """Triangle that is seen, (H, W) int32, -1 for none."""
+        return self._view.triangle_id
+
+    @property
+    def covered(self) -> Array:
+        """Whether any surface is seen, (H, W) bool."""
+        return self._view.covered
+
+    @property
+    def depth(self) -> Array:
+        """Axial depth, or distance on a paraboloid map, (H, W), m; inf where nothing is seen."""
+        return self.resolve("depth")[0]
+
+    @property
+    def position(self) -> Array:
+        """Surface point, (3, H, W), world space, m."""
+        return self.resolve("position")[0]
+
+    @property
+    def normal(self) -> Array:
+        """Unit normal on the lit side, (3, H, W)."""
+        return self.resolve("normal")[0]
+
+    @property
+    def solid_angle(self) -> Array:
+        """Solid angle of the whole texel, (H, W), sr; directional: its area perpendicular to the light, m^2."""
+        return self.resolve("solid_angle")[0]
+
+    @property
+    def flux(self) -> Array:
+        """Flux that the diffuse part reflects, (3, H, W), W."""
+        return self.resolve("flux")[0]
+
+    @property
+    def lobe_flux(self) -> Array | None:
+        """Flux that the lobe reflects, (3, H, W), W; None where no material has one."""
+        return self._lobe("lobe_flux")
+
+    @property
+    def lobe_axis(self) -> Array | None:
+        """Mirror direction, (3, H, W) unit vectors."""
+        return self._lobe("lobe_axis")
+
+    @property
+    def lobe_exponent(self) -> Array | None:
+        """Phong exponent of the lobe, (H, W)."""
+        return self._lobe("lobe_exponent")
+
+    def resolve(self, *names: str) -> tuple[Array, ...]:
+        """Return channels by name, computing in one pass those of the view not yet known.
+
+        Parameters
+        ----------
+        *names : str
+            Among depth, position, normal, solid_angle, flux.
+
+        Returns
+        -------
+        tuple of ndarray
+            The channels, in the order asked for.
+        """
+        self._view.resolve(*(name for name in names if name in SEEN and name not in self._given))
+        return tuple(self._whole(name) for name in names)
+
+    def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
+        """Return channels at some texels alone, computing there those not yet known.
+
+        Parameters
+        ----------
+        texel : (n,) ndarray of int
+            Texels, row * W + column.
+        *names : str
+            Among depth, position, normal, flux.
+
+        Returns
+        -------
+        tuple of (n,) or (3, n) ndarray
+            The channels, in the order asked for, with the bits that they have on the whole map.
+        """
+        parts = {name: taken(self._whole(name), texel) for name in names if name in self._given}
+        absent = [name for name in names if name not in parts]
+        wanted = dict.fromkeys([*(n for n in absent if n in SEEN), *(self._reflecting if "flux" in absent else ())])
+        seen = dict(zip(wanted, self._view.at(texel, *wanted), strict=True))
+        if "flux" in absent:
+            seen["flux"] = self._flux(incident_flux(self.light, self.projection, None, self._view.dtype, texel), seen)
+        parts.update(seen)
+        return tuple(parts[name] for name in names)
+
+    @property
+    def _reflecting(self) -> tuple[str, ...]:
+        """Channels of the view that the flux depends on."""
+        return ("albedo", "material_id") if self._glossy or self._materials.ior.any() else ("albedo",)
+
+    def _flux(self, incident: Array, seen: Mapping[str, Array]) -> Array:
+        """Return what the diffuse part reflects of the incident flux, in its place."""
+        if "material_id" in seen:
+            incident *= (self._materials.ior == 0)[seen["material_id"]]
+        incident *= seen["albedo"]
+        return incident
+
+    def _whole(self, name: str) -> Array:
+        if name in SEEN and name not in self._given:
+            return self._view.resolve(name)[0]
+        if name not in self._given:
+            if name == "solid_angle":
+                self._given[name] = texel_solid_angles(self.projection).astype(self._view.dtype)
+            else:
+                incident = incident_flux(self.light, self.projection, None, self._view.dtype)
+                seen = zip(self._reflecting, self._view.resolve(*self._reflecting), strict=True)
+                self._given[name] = self._flux(incident, dict(seen))
+        channel = self._given[name]
+        assert channel is not None
+        return channel
+
+    def _lobe(self, name: str) -> Array | None:
+        if name not in self._given and not self._glossy:
+            return None
+        if name not in self._given:
+            normal, material = self._view.resolve("normal", "material_id")
+            incident = incident_flux(self.light, self.projection, None, self._view.dtype)
+            incident *= (self._materials.ior == 0)[material]
+            lobe = _lobe(self._materials, self.projection, material, normal, incident * self.covered)
+            self._given = {**dict(zip(LOBE, lobe, strict=True)), **self._given}
+        return self._given[name]
 
     @property
     def texels(self) -> int:
         """Number of texels, those without surface included."""
-        return self.depth.size
+        return self.triangle_id.size
 
     def project(self, position: Array) -> tuple[Array, Array, Array]:
         """Return continuous row, column and depth of points on the stacked maps, nan outside.
@@ -104,7 +246,7 @@ def reflective_shadow_map(
     Returns
     -------
     Rsm
-        All of its channels.
+        Its visibility is known, its channels are computed when asked for.
 
     Raises
     ------
@@ -118,20 +260,7 @@ def reflective_shadow_map(
     """
     expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
     maps = light_projection(light, geometry, resolution, projection)
-    view = GBuffer(geometry, materials, maps, rasterize(geometry, maps), dtype)
-    glossy = bool((materials.specular.any(axis=1) & (materials.ior == 0)).any())
-    channels = ("depth", "position", "normal", "albedo", *(("material_id",) if glossy or materials.ior.any() else ()))
-    depth, position, normal, albedo, *material = view.resolve(*channels)
-    solid_angle = texel_solid_angles(maps)
-    incident = incident_flux(light, maps, solid_angle, dtype)
-    lobe: tuple[Array, ...] = ()
-    if material:
-        incident *= (materials.ior == 0)[material[0]]
-        if glossy:
-            lobe = _lobe(materials, maps, material[0], normal, incident * view.covered)
-    incident *= albedo
-    return Rsm(light, maps, view.triangle_id, depth, position, normal, solid_angle.astype(dtype), incident,
-               view.covered, *lobe)  # fmt: skip
+    return Rsm(light, GBuffer(geometry, materials, maps, rasterize(geometry, maps), dtype), materials)
 
 
 def light_projection(light: Light, geometry: Geometry, resolution: int, shape: MapShape = "auto") -> Projection:
@@ -184,7 +313,9 @@ def light_projection(light: Light, geometry: Geometry, resolution: int, shape: M
     return makers[name]()
 
 
-def texel_shares(light: Light, maps: Projection, solid_angle: Array | None = None) -> Array:
+def texel_shares(
+    light: Light, maps: Projection, solid_angle: Array | None = None, texel: Array | None = None
+) -> Array:
     """Return how much of a light each texel of its maps takes in.
 
     Parameters
@@ -195,25 +326,29 @@ def texel_shares(light: Light, maps: Projection, solid_angle: Array | None = Non
         The maps.
     solid_angle : (H, W) ndarray, optional
         `texel_solid_angles(maps)`, where it is known.
+    texel : (n,) ndarray of int, optional
+        Texels of the flattened maps; all where absent.
 
     Returns
     -------
-    (H, W) ndarray
+    (H, W) or (n,) ndarray
         What the intensity on the axis is multiplied by, sr: the solid angle, weighed by a spot's falloff. Directional:
         the area perpendicular to the light, m^2.
     """
     if isinstance(light, SpotLight):
         cosines = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
         if maps.maps == 1:
-            return spot_power(maps, *cosines)
+            return spot_power(maps, *cosines) if texel is None else spot_power_at(maps, *cosines, texel)
     share = texel_solid_angles(maps) if solid_angle is None else solid_angle
     if isinstance(light, SpotLight):
         axis = np.asarray(light.direction) / np.linalg.norm(light.direction)
         share = share * sampled_spot_share(maps, axis, *cosines)
-    return share
+    return share if texel is None else share.reshape(-1)[texel]
 
 
-def incident_flux(light: Light, maps: Projection, solid_angle: Array | None, dtype: npt.DTypeLike) -> Array:
+def incident_flux(
+    light: Light, maps: Projection, solid_angle: Array | None, dtype: npt.DTypeLike, texel: Array | None = None
+) -> Array:
     """Return the flux that arrives through each texel of a light's maps.
 
     Parameters
@@ -226,13 +361,15 @@ def incident_flux(light: Light, maps: Projection, solid_angle: Array | None, dty
         `texel_solid_angles(maps)`, where it is known.
     dtype : dtype
         Of the result.
+    texel : (n,) ndarray of int, optional
+        Texels of the flattened maps; all where absent.
 
     Returns
     -------
-    (3, H, W) ndarray
+    (3, H, W) or (3, n) ndarray
         W, whatever is met.
     """
-    share = texel_shares(light, maps, solid_angle)
+    share = texel_shares(light, maps, solid_angle, texel)
     strength = light.irradiance if isinstance(light, DirectionalLight) else light.intensity
     incident = np.empty((3, *share.shape), dtype)
     for channel, one in zip(incident, strength, strict=True):

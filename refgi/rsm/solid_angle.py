@@ -76,6 +76,30 @@ def spot_power(projection: Projection, cos_inner: float, cos_outer: float) -> Ar
     return _stacked(projection, _texel_integrals(_intrinsics(projection), cos_inner, cos_outer, 0.0))
 
 
+def spot_power_at(projection: Projection, cos_inner: float, cos_outer: float, texel: Array) -> Array:
+    """Return what `spot_power` gives at some texels.
+
+    Parameters
+    ----------
+    projection : Projection
+        A perspective or paraboloid map.
+    cos_inner, cos_outer : float
+        Cosines of the spot's half-angles.
+    texel : (n,) ndarray of int
+        Texels of the flattened map.
+
+    Returns
+    -------
+    (n,) ndarray
+        Sr, float64.
+    """
+    if projection.kind == PARABOLOID:  # whose rim texels hold what their neighbours give them
+        return spot_power(projection, cos_inner, cos_outer).reshape(-1)[texel]
+    power = np.empty(len(texel))
+    _fill_texels(_intrinsics(projection), np.array([cos_inner, cos_outer, 0.0]), texel, power)
+    return power
+
+
 def _intrinsics(projection: Projection) -> Projection:
     """Return one such map at the origin: what integrals over texels depend on, wherever the light moves."""
     return projection._replace(origin=np.zeros((1, 3)), frame=np.eye(3)[None], reach=math.inf)
@@ -104,19 +128,42 @@ def _texel_integrals(projection: Projection, cos_inner: float, cos_outer: float,
 
 @kernel(parallel=True)
 def _fill_quadrant(projection: Projection, spot: Array, quadrant: Array) -> None:
+    for i in prange(quadrant.shape[0]):
+        for j in range(quadrant.shape[1]):
+            quadrant[i, j] = _integral(projection, spot, i, j)
+
+
+@kernel
+def _fill_texels(projection: Projection, spot: Array, texel: Array, power: Array) -> None:
+    height, width = projection.height, projection.width
+    for k in range(len(texel)):
+        row, column = texel[k] // width, texel[k] % width
+        i, j = _from_axis(row, height), _from_axis(column, width)
+        # half of a middle row or column lies on either side of the axis
+        twice = (2.0 if height % 2 and i == 0 else 1.0) * (2.0 if width % 2 and j == 0 else 1.0)
+        power[k] = _integral(projection, spot, i, j) * twice
+
+
+@kernel
+def _from_axis(place: int, size: int) -> int:
+    """Return the row of the quadrant for a row of the map, or the column for a column."""
+    half = (size + 1) // 2
+    return half - 1 - place if place < half else place - half + size % 2
+
+
+@kernel
+def _integral(projection: Projection, spot: Array, i: int, j: int) -> Any:
+    """Return the integral over one texel of the quadrant."""
     kind, (hx, hy) = projection.kind, (projection.half[0], projection.half[1])
     dx, dy = 2.0 * hx / projection.width, 2.0 * hy / projection.height
     shift_x, shift_y = 0.5 * (projection.width % 2), 0.5 * (projection.height % 2)
-    for i in prange(quadrant.shape[0]):
-        y0, y1 = max((i - shift_y) * dy, 0.0), (i + 1 - shift_y) * dy
-        for j in range(quadrant.shape[1]):
-            x0, x1 = max((j - shift_x) * dx, 0.0), (j + 1 - shift_x) * dx
-            if spot[2] > 0.0 and (kind == PERSPECTIVE or x1 * x1 + y1 * y1 <= 1.0):
-                quadrant[i, j] = _rectangle(kind, x0, x1, y0, y1)
-            elif spot[2] > 0.0:
-                quadrant[i, j] = _power(kind, x0, x1, y0, y1, 0.0, 0.0)
-            else:
-                quadrant[i, j] = _power(kind, x0, x1, y0, y1, spot[0], spot[1])
+    y0, y1 = max((i - shift_y) * dy, 0.0), (i + 1 - shift_y) * dy
+    x0, x1 = max((j - shift_x) * dx, 0.0), (j + 1 - shift_x) * dx
+    if spot[2] > 0.0 and (kind == PERSPECTIVE or x1 * x1 + y1 * y1 <= 1.0):
+        return _rectangle(kind, x0, x1, y0, y1)
+    if spot[2] > 0.0:
+        return _power(kind, x0, x1, y0, y1, 0.0, 0.0)
+    return _power(kind, x0, x1, y0, y1, spot[0], spot[1])
 
 
 @kernel

@@ -27,6 +27,8 @@ NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its 
 BOX_PAD = 1e-3  # texels; far above the rounding of a projected vertex
 SPAN_CUT = 32  # texels; narrower boxes are cheaper to test whole
 LANES = 16  # texels tested at once; a map has at least as many columns in memory
+BATCH = 64  # triangles set up at once
+LIMIT, CORNERS, ROWS = 15 * BATCH, 16 * BATCH, 28  # where a batch's limits and corners start, and its rows in all
 SMALLEST = 1e-300  # an edge that owns its line needs e >= 0, another needs e >= SMALLEST
 
 
@@ -191,47 +193,76 @@ def draw(corners: Array, faces: Array, part: Part, nearness: Array, ids: Array) 
     The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
     """
     width, members, boxes = nearness.shape[1], part.members, part.boxes
-    for place in range(part.start, part.stop):
-        face = members[place]
+    setup = np.zeros(ROWS * BATCH)
+    for base in range(part.start, part.stop, BATCH):
+        count = min(BATCH, part.stop - base)
+        _gather(corners, faces, members, base, count, setup)
+        _set_up(setup, width)
+        for b in range(count):
+            face, limit = members[base + b], np.float32(setup[LIMIT + b])
+            a0, b0, c0, t0 = setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b]
+            a1, b1, c1, t1 = setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b]
+            a2, b2, c2, t2 = setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b]
+            an, bn, cn = setup[12 * BATCH + b], setup[13 * BATCH + b], setup[14 * BATCH + b]
+            place_of_box = face - part.base
+            left, right = _integer(boxes[place_of_box, 0]), _integer(boxes[place_of_box, 1])
+            upper, lower = _integer(boxes[place_of_box, 2]), _integer(boxes[place_of_box, 3])
+            for row in range(max(upper, part.top), min(lower, part.bottom) + 1):
+                y = row + 0.5
+                r0, r1, r2, rn = b0 * y + c0, b1 * y + c1, b2 * y + c2, bn * y + cn
+                first, last = left, right
+                if last - first > SPAN_CUT:
+                    first, last = _cut(first, last, a0, r0)
+                    first, last = _cut(first, last, a1, r1)
+                    first, last = _cut(first, last, a2, r2)
+                for block in range((last - first + LANES) // LANES):
+                    # a fixed number of lanes becomes straight SIMD code; those outside the span fail by themselves
+                    start = min(first + block * LANES, width - LANES)
+                    line, place_0, x0 = np.uint64(row), np.uint64(start), start + 0.5
+                    for lane in range(LANES):
+                        x, column = x0 + lane, place_0 + np.uint64(lane)
+                        near = np.float32(an * x + rn)
+                        inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
+                        if inside & (near > nearness[line, column]) & (near <= limit):
+                            nearness[line, column] = near
+                            ids[line, column] = face
+
+
+@kernel
+def _gather(corners: Array, faces: Array, members: Array, base: int, count: int, setup: Array) -> None:
+    """Write the corners of some triangles: loads that wait for memory, many under way at once."""
+    for b in range(count):
+        face = members[base + b]
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-        xi, yi, wi, ni = corners[i, 0], corners[i, 1], corners[i, 2], corners[i, 3]
-        xj, yj, wj, nj = corners[j, 0], corners[j, 1], corners[j, 2], corners[j, 3]
-        xk, yk, wk, nk = corners[k, 0], corners[k, 1], corners[k, 2], corners[k, 3]
+        for c in range(4):
+            setup[CORNERS + c * BATCH + b] = corners[i, c]
+            setup[CORNERS + (4 + c) * BATCH + b] = corners[j, c]
+            setup[CORNERS + (8 + c) * BATCH + b] = corners[k, c]
+
+
+@kernel
+def _set_up(setup: Array, width: int) -> None:
+    """Write edges, plane of nearness and limit of a batch from its corners, in SIMD lanes."""
+    for b in range(BATCH):
+        at = CORNERS + b
+        xi, yi, wi, ni = setup[at], setup[at + BATCH], setup[at + 2 * BATCH], setup[at + 3 * BATCH]
+        xj, yj, wj, nj = setup[at + 4 * BATCH], setup[at + 5 * BATCH], setup[at + 6 * BATCH], setup[at + 7 * BATCH]
+        xk, yk, wk, nk = setup[at + 8 * BATCH], setup[at + 9 * BATCH], setup[at + 10 * BATCH], setup[at + 11 * BATCH]
         det = ((xj - xi) * (yk - yi) - (xk - xi) * (yj - yi)) * (wi * wj * wk)
-        if det == 0.0:  # no area, or seen edge-on
-            continue
         sign = 1.0 if det > 0.0 else -1.0
         a0, b0, c0, t0 = edge(xj, yj, wj, xk, yk, wk, sign)
         a1, b1, c1, t1 = edge(xk, yk, wk, xi, yi, wi, sign)
         a2, b2, c2, t2 = edge(xi, yi, wi, xj, yj, wj, sign)
         scale = sign / det
-        an = (a0 * ni + a1 * nj + a2 * nk) * scale
-        bn = (b0 * ni + b1 * nj + b2 * nk) * scale
-        cn = (c0 * ni + c1 * nj + c2 * nk) * scale
+        setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b] = a0, b0, c0, t0
+        setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b] = a1, b1, c1, t1
+        setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b] = a2, b2, c2, t2
+        setup[12 * BATCH + b] = (a0 * ni + a1 * nj + a2 * nk) * scale
+        setup[13 * BATCH + b] = (b0 * ni + b1 * nj + b2 * nk) * scale
+        setup[14 * BATCH + b] = (c0 * ni + c1 * nj + c2 * nk) * scale
         size = max(_size(xi, yi, wi, width), max(_size(xj, yj, wj, width), _size(xk, yk, wk, width)))
-        limit = np.float32(1.0 / (NEAREST * size))
-        place_of_box = face - part.base
-        left, right = _integer(boxes[place_of_box, 0]), _integer(boxes[place_of_box, 1])
-        upper, lower = _integer(boxes[place_of_box, 2]), _integer(boxes[place_of_box, 3])
-        for row in range(max(upper, part.top), min(lower, part.bottom) + 1):
-            y = row + 0.5
-            r0, r1, r2, rn = b0 * y + c0, b1 * y + c1, b2 * y + c2, bn * y + cn
-            first, last = left, right
-            if last - first > SPAN_CUT:
-                first, last = _cut(first, last, a0, r0)
-                first, last = _cut(first, last, a1, r1)
-                first, last = _cut(first, last, a2, r2)
-            for block in range((last - first + LANES) // LANES):
-                # a fixed number of lanes becomes straight SIMD code; those outside the span fail the test by themselves
-                start = min(first + block * LANES, width - LANES)
-                line, place_0, x0 = np.uint64(row), np.uint64(start), start + 0.5
-                for lane in range(LANES):
-                    x, column = x0 + lane, place_0 + np.uint64(lane)
-                    near = np.float32(an * x + rn)
-                    inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
-                    if inside & (near > nearness[line, column]) & (near <= limit):
-                        nearness[line, column] = near
-                        ids[line, column] = face
+        # no area, or seen edge-on: nothing is near enough
+        setup[LIMIT + b] = 1.0 / (NEAREST * size) if det != 0.0 else 0.0
 
 
 @kernel

@@ -53,10 +53,11 @@ def blends(position: Array, normal: Array, places: tuple[Array, ...]) -> tuple[B
         For every level but the coarsest.
     """
     flat_position, flat_normal = (np.ascontiguousarray(plane).reshape(3, -1) for plane in (position, normal))
-    made = []
+    made: list[Blend] = []
     for here, above in itertools.pairwise(places):
         blend = Blend(np.zeros((4, *here.shape), position.dtype), np.zeros(here.shape, position.dtype))
-        _weigh(flat_position, flat_normal, here, above, blend.weight, blend.residual)
+        across = np.array([0.25, 0.25] if made else [0.5, 0.0], position.dtype)
+        _weigh(flat_position, flat_normal, here, above, across, blend.weight, blend.residual)
         made.append(blend)
     return tuple(made)
 
@@ -86,16 +87,19 @@ def residuals(made: tuple[Blend, ...], coarsest: tuple[int, int]) -> tuple[Array
 
 
 @kernel(parallel=True)
-def _weigh(position: Array, normal: Array, here: Array, above: Array, weight: Array, residual: Array) -> None:
+def _weigh(
+    position: Array, normal: Array, here: Array, above: Array, across: Array, weight: Array, residual: Array
+) -> None:
     for i in prange(here.shape[0]):
         for j in range(here.shape[1]):
             if here[i, j] >= 0:
-                _weigh_cell(position, normal, here, above, weight, residual, i, j)
+                _weigh_cell(position, normal, here, above, across, weight, residual, i, j)
 
 
 @kernel
 def _weigh_cell(
-    position: Array, normal: Array, here: Array, above: Array, weight: Array, residual: Array, i: int, j: int
+    position: Array, normal: Array, here: Array, above: Array, across: Array, weight: Array, residual: Array, i: int,
+    j: int,
 ) -> None:
     real = position.dtype.type
     p, total = here[i, j], real(0.0)
@@ -105,7 +109,8 @@ def _weigh_cell(
         if not (0 <= row < above.shape[0] and 0 <= column < above.shape[1]) or above[row, column] < 0:
             continue
         q = above[row, column]
-        tent = real((3 - 2 * (corner // 2)) * (3 - 2 * (corner % 2)) / 16)
+        vertical = across[i % 2] if corner // 2 else real(1.0) - across[i % 2]
+        tent = vertical * (across[j % 2] if corner % 2 else real(1.0) - across[j % 2])
         share = tent * (_agreement(position, normal, p, q) + real(LEAST_AGREEMENT))
         weight[corner, i, j] = share
         total += share

@@ -10,8 +10,8 @@ from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
 
-DEVIATIONS = 3.0  # standard errors between the estimate and either bound
-STRATA = 32  # along the shorter side, before their largest size is met
+DEVIATIONS = 4.0  # standard errors between the estimate and either bound
+STRATA = 48  # along the shorter side, before their largest size is met
 LARGEST = 8  # pixels along a stratum
 
 
@@ -54,7 +54,7 @@ def stratified(covered: Array, seed: int) -> Samples:
 
 
 def estimate(samples: Samples, light: Array, exact: Array, mean: float) -> Estimate:
-    """Estimate the relative RMSE of a picture, with bounds of three standard errors.
+    """Estimate the relative RMSE of a picture, with bounds of four standard errors.
 
     Parameters
     ----------

@@ -1,0 +1,251 @@
+"""Refinement to an error: the promise on several scenes, what it costs, and each part against closed forms."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from refgi.errors import InputError
+from refgi.frame import Frame
+from refgi.jit import threads
+from refgi.rsm import PixelLights
+from refgi.scene import load_scene
+from refgi.splat import Receivers, irradiance
+from refgi.splat.lights.selection import choose_lights, footprints
+from refgi.splat.multires import MultiresSettings
+from refgi.splat.refinement import error_driven as module
+from refgi.splat.refinement.error_driven import error_driven
+from refgi.splat.refinement.grid import representatives
+from refgi.splat.refinement.interpolate import blends, descend, residuals
+from refgi.splat.refinement.near import near_light
+from refgi.splat.refinement.samples import estimate, stratified
+
+ROUNDING = 1e-5  # float32 sums of 64 terms, the largest many times the rest
+LINEAR = 1e-5  # of values up to 10: float32 means of four
+TARGETS = (0.2, 0.05, 0.02)
+SCENES = ("cornell_box", "metaballs", "stage", "atrium")
+
+
+def seen(name, width=120, height=90):
+    return Frame(load_scene(name), width=width, height=height, rsm_resolution=64)
+
+
+def full_sum(frame, settings):
+    buffer, lights, area = frame.gbuffer, choose_lights(frame, settings), footprints(frame, settings)
+    full = irradiance(Receivers(*buffer.resolve("position", "normal", "covered")), lights, settings, area)
+    return lights, area, full
+
+
+class Blank(NamedTuple):
+    """What the camera sees, as far as it is asked for."""
+
+    position: np.ndarray
+    normal: np.ndarray
+    covered: np.ndarray
+    height: int = 20
+    width: int = 30
+
+    def resolve(self, *names):
+        return tuple(getattr(self, name) for name in names)
+
+
+def relative_error(picture, full, covered):
+    difference = (picture - full.astype(float))[:, covered]
+    return math.sqrt((difference**2).mean()) / full[:, covered].mean(dtype=float)
+
+
+@pytest.fixture(scope="module")
+def box():
+    return seen("cornell_box")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_promise_is_kept_against_the_full_sum(name):
+    """Picture: the error measured at all pixels, floor 0."""
+    frame = seen(name)
+    covered = frame.gbuffer.covered
+    for clamp in ("none", "disc") if name == "cornell_box" else ("none",):
+        lights, area, full = full_sum(frame, MultiresSettings(lights=64, clamp=clamp))
+        for target in TARGETS:
+            for seed in (0, 1):
+                settings = MultiresSettings(lights=64, clamp=clamp, target_error=target, seed=seed)
+                found = error_driven(frame.gbuffer, lights, settings, area)
+                assert relative_error(found.irradiance, full, covered) <= target
+                assert found.low <= found.error <= found.high <= target
+                assert found.pairs <= 2 * found.full_pairs
+
+
+def test_pairs_are_saved_and_all_counted(monkeypatch):
+    frame = seen("cornell_box", 300, 300)
+    settings = MultiresSettings(lights=64, target_error=0.05)
+    lights, area, full = full_sum(frame, settings)
+    lit, near, evaluate, near_light = [], [], module.evaluate, module.near_light
+    monkeypatch.setattr(module, "evaluate", lambda p, *how: lit.append(p.T) or evaluate(p, *how))
+    monkeypatch.setattr(module, "near_light", lambda *how: near.append(near_light(*how)) or near[-1])
+    found = error_driven(frame.gbuffer, lights, settings, area)
+    points = np.concatenate(lit)
+    assert len(np.unique(points, axis=0)) == len(points)  # no pixel twice
+    count = lights.flux.shape[1]
+    assert found.pairs == count * len(points) + near[0][1]
+    assert found.full_pairs == count * np.count_nonzero(frame.gbuffer.covered)
+    assert found.pairs < 0.25 * found.full_pairs
+    assert relative_error(found.irradiance, full, frame.gbuffer.covered) <= 0.05
+
+
+def test_subsplats_are_the_pictures(box):
+    settings = MultiresSettings(lights=64, target_error=0.05)
+    lights, area, full = full_sum(box, settings)
+    found = error_driven(box.gbuffer, lights, settings, area)
+    times = sum(np.kron(leaf, np.ones((1 << level, 1 << level)))[:90, :120]
+                for level, leaf in enumerate(found.subsplats.leaf))
+    assert (times[box.gbuffer.covered] == 1).all()
+    pixels = found.subsplats.leaf[0]
+    assert pixels.any()
+    np.testing.assert_array_equal(found.irradiance[:, pixels], full[:, pixels])
+    finer = error_driven(box.gbuffer, lights, MultiresSettings(lights=64, target_error=0.02), area)
+    assert len(finer.subsplats.level) > len(found.subsplats.level)
+    assert finer.pairs > found.pairs
+
+
+def test_no_error_at_all_is_the_full_sum_to_the_bit(box):
+    settings = MultiresSettings(lights=64, target_error=1e-12)
+    lights, area, full = full_sum(box, settings)
+    found = error_driven(box.gbuffer, lights, settings, area)
+    np.testing.assert_array_equal(found.irradiance, full)
+    assert found.error == found.high == 0
+    assert found.subsplats.counts[1:].sum() == 0
+
+
+def test_threads_change_no_bit(box):
+    settings = MultiresSettings(lights=64, target_error=0.05)
+    lights, area, _ = full_sum(box, settings)
+    found = error_driven(box.gbuffer, lights, settings, area)
+    with threads(1):
+        alone = error_driven(box.gbuffer, lights, settings, area)
+    np.testing.assert_array_equal(found.irradiance, alone.irradiance)
+    assert found[2:] == alone[2:]
+
+
+@pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 40), (33, 1), (17, 40)])
+def test_small_pictures(width, height):
+    frame = seen("metaballs", width, height)
+    settings = MultiresSettings(lights=64, target_error=0.1, coarsest=4)
+    lights, area, full = full_sum(frame, settings)
+    found = error_driven(frame.gbuffer, lights, settings, area)
+    assert np.isfinite(found.irradiance).all()
+    assert relative_error(found.irradiance, full, frame.gbuffer.covered) <= 0.1
+
+
+def test_nothing_to_see_and_no_light(box):
+    settings = MultiresSettings(lights=64, target_error=0.1)
+    lights, area, _ = full_sum(box, settings)
+    dark = error_driven(box.gbuffer, lights._replace(flux=np.zeros_like(lights.flux)), settings, area)
+    assert (dark.irradiance == 0).all()
+    assert dark.error == dark.high == 0
+    buffer = Blank(np.zeros((3, 20, 30), np.float32), np.zeros((3, 20, 30), np.float32), np.zeros((20, 30), bool))
+    empty = error_driven(buffer, lights, settings, area)
+    assert (empty.irradiance == 0).all()
+    assert empty.error == empty.pairs == len(empty.subsplats.level) == 0
+
+
+def test_a_target_is_needed(box):
+    lights = choose_lights(box, MultiresSettings(lights=16))
+    with pytest.raises(InputError, match="target_error"):
+        error_driven(box.gbuffer, lights, MultiresSettings())
+
+
+def plane(height, width, turn=None):
+    """Pixels of a floor 0.1 m apart; from column `turn` on it is a wall."""
+    i, j = np.mgrid[:height, :width].astype(np.float32)
+    flat = np.stack([0.1 * j, np.zeros_like(i), 0.1 * i])
+    normal = np.zeros_like(flat)
+    normal[1] = 1
+    if turn is not None:
+        wall = j >= turn
+        flat[0][wall], flat[1][wall] = 0.1 * turn, (0.1 * (j - turn))[wall]
+        normal[:, wall] = np.array([[-1], [0], [0]], np.float32)
+    return flat, normal
+
+
+def from_level(level, image, position, normal, covered):
+    """Interpolate a picture's values at the pixels of one level down to all."""
+    places = representatives(covered, level)
+    made, values = blends(position, normal, places), np.stack([image.reshape(-1)] * 3)
+    light = np.where(places[level] >= 0, values[:, places[level]], np.float32(0))
+    for k in range(level - 1, -1, -1):
+        shape = places[k].shape
+        fine = np.zeros((3, *shape), np.float32)
+        descend(light, made[k].weight, np.zeros(shape, bool), places[k], values, fine, np.zeros(shape, np.float32))
+        light = fine
+    return light[0]
+
+
+def test_light_linear_on_a_plane_is_interpolated_exactly():
+    """Analytic: away from the border, where a neighbour is missing."""
+    position, normal = plane(48, 64)
+    image = (0.7 * position[0] + 0.3 * position[2] + 1).astype(np.float32)
+    got = from_level(2, image, position, normal, np.ones((48, 64), bool))
+    np.testing.assert_allclose(got[4:-4, 4:-4], image[4:-4, 4:-4], atol=LINEAR)
+    assert np.abs(got - image).max() > 10 * LINEAR  # the border does tell
+
+
+def test_light_does_not_cross_an_edge_nor_come_from_empty_pixels():
+    position, normal = plane(32, 32, turn=13)
+    image = np.where(np.arange(32) < 13, 1, 3) * np.ones((32, 1))
+    covered = np.ones((32, 32), bool)
+    covered[5:9, 20:30] = False
+    got = from_level(2, image.astype(np.float32), position, normal, covered)
+    np.testing.assert_allclose(got[covered], image[covered], rtol=1e-6)
+    assert (got[~covered] == 0).all()
+
+
+def test_residuals_are_those_of_the_interpolated_normals():
+    """Analytic: none on a plane; a pixel turned by 90 degrees against all around is off by sqrt 2."""
+    position, normal = plane(16, 16)
+    places = representatives(np.ones((16, 16), bool), 2)
+    flat = residuals(blends(position, normal, places), places[2].shape)
+    assert max(part.max() for part in flat) < 1e-12
+    normal[:, 4, 6] = 1, 0, 0  # an even row and column: it stands for no coarser cell
+    sums = residuals(blends(position, normal, places), places[2].shape)
+    assert sums[1][2, 3] == pytest.approx(2, rel=1e-5)
+    assert sums[2][1, 1] == pytest.approx(2, rel=1e-5)
+    assert sums[2].sum() == pytest.approx(2, rel=1e-5)
+
+
+@pytest.mark.parametrize("clamp", [{}, {"clamp": "distance", "clamp_value": 0.05}])
+def test_near_light_is_what_exceeds_the_bound(clamp):
+    """Analytic: sum of (Phi / pi) max(0, g - b) over all pairs."""
+    rng = np.random.default_rng(5)
+    position, normal = plane(23, 37)
+    at = rng.uniform((0, 0.01, 0), (3.7, 0.3, 2.3), (64, 3)).T
+    lights = PixelLights(at, np.tile([[0.0], [-1.0], [0.0]], 64), rng.uniform(0.1, 1, (3, 64)), *(None,) * 3, 64)
+    covered = rng.random((23, 37)) < 0.9
+    most, settings = 2.0, MultiresSettings(**clamp)
+    got, pairs = near_light(Receivers(position, normal, covered), lights, settings, None, most)
+    away = at.astype(np.float32).astype(float)[:, None, None] - position[..., None]
+    square = (away**2).sum(axis=0)
+    kept = np.maximum(square, 0.05**2) if clamp else square
+    term = np.maximum(away[1], 0) ** 2 / (square * kept)
+    bound = most * math.pi / lights.flux.max(axis=0)
+    excess = (lights.flux[:, None, None] / math.pi * np.maximum(0, term - bound)).sum(axis=-1) * covered
+    assert excess.max() > 10 * most
+    np.testing.assert_allclose(got, excess, rtol=ROUNDING, atol=ROUNDING * most)
+    assert 0 < pairs < 64 * covered.sum()
+
+
+def test_samples_stand_for_all_covered_pixels_and_bound_the_error():
+    """Statistical: the bounds hold the true error of a heavy-tailed difference for every seed."""
+    rng = np.random.default_rng(2)
+    covered = rng.random((200, 230)) < 0.8
+    full = rng.uniform(0.5, 1.5, (3, 200, 230)).astype(np.float32)
+    picture = full + (0.02 * rng.standard_t(4, full.shape)).astype(np.float32)
+    error = relative_error(picture, full, covered)
+    for seed in range(20):
+        samples = stratified(covered, seed)
+        assert covered.reshape(-1)[samples.pixel].all()
+        assert samples.share.sum() == pytest.approx(1)
+        assert len(np.unique(samples.pixel)) == len(samples.pixel) < covered.sum() / 8
+        mean = picture[:, covered].mean(dtype=float)
+        found = estimate(samples, *(part.reshape(3, -1)[:, samples.pixel] for part in (picture, full)), mean)
+        assert found.low < error < found.high < 1.4 * error

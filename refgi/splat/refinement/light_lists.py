@@ -98,14 +98,15 @@ def _refine(
         cell[n], child[n] = n, -1
     start = last = 0
     stop = cells.roots
-    largest = light.dtype.type(0.0)
+    most = np.zeros(TILE, light.dtype)
+    largest = most[0]
     while last < stop:
         for first in range(last, stop, TILE):
             size = min(TILE, stop - first)
             load_cells(tile, cells.points, cells.normals, cell[first : first + size])
             light_tile(tile, size, lights, k, clamp, spheres, lobe_clamp, widening)
-            largest = max(largest, _unload(tile, size, light, first))
-        end = stop
+            _unload(tile, size, light, first, most)
+        end, largest = stop, most.max()
         if last > 0:
             end = _keep(cells, cell, child, light, start, last, threshold[0] + threshold[1] * largest)
         start, last = last, end
@@ -155,14 +156,13 @@ def leaves(first: Array, roots: int, cell: Array, child: Array, light: Array, ce
 
 
 @kernel
-def _unload(tile: Array, size: int, light: Array, first: int) -> Any:
-    """Store the sums of a tile; return the largest."""
-    largest = tile.dtype.type(0.0)
+def _unload(tile: Array, size: int, light: Array, first: int, most: Array) -> None:
+    """Store the sums of a tile, and keep the largest that each of its places has held."""
     for c in range(3):
         for i in range(size):
-            light[c, first + i] = tile[SUM + c, i]
-            largest = max(largest, tile[SUM + c, i])
-    return largest
+            value = tile[SUM + c, i]
+            light[c, first + i] = value
+            most[i] = value if value > most[i] else most[i]
 
 
 @kernel
@@ -202,6 +202,8 @@ def _spread(light: Array, sample: int, size: int) -> Any:
     for c in range(3):
         upper = lower = light[c, sample]
         for i in range(1, size):
-            upper, lower = max(upper, light[c, sample + i]), min(lower, light[c, sample + i])
-        spread = max(spread, upper - lower)
+            value = light[c, sample + i]
+            upper = value if value > upper else upper
+            lower = value if value < lower else lower
+        spread = upper - lower if upper - lower > spread else spread
     return spread

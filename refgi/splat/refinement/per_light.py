@@ -12,7 +12,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel, prange
+from refgi.jit import kernel, prange, threads
 from refgi.splat.irradiance import Receivers, checked
 from refgi.splat.refinement.evaluate import at_subsplats, evaluate
 from refgi.splat.refinement.grid import Subsplats, top_level
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 ROOM = 1 << 28  # bytes for the lists of a batch of lights, unless one light for each thread needs more
+SMALL_PICTURE = 1 << 18  # pixels up to which threads would wait for each other longer than they upsample one light
 
 
 @stage("splat.per_light")
@@ -71,6 +72,10 @@ def per_light(
     every cell. Samples may miss a narrow highlight, or an edge: with `start`, the authors' plan for later (Sec. 6),
     what the geometry calls for is refined in any case, and light only adds to it.
 
+    Receivers are diffuse, as they are for every method: a Phong receiver weighs each light by its direction to the
+    eye, which no irradiance holds. That would take the radiance towards the eye beside the irradiance, from here, from
+    `Frame.radiance` and from the truth alike.
+
     Lights that need no split beyond the list they started from share its leaves; they are added up before they are
     upsampled, once. All sums are compensated, in the order of the lights.
     """
@@ -79,8 +84,11 @@ def per_light(
     picture = _Sum((3, *tree.shape), buffer.dtype)
     shared, shared_cells = _Sum((3, 0, 0), buffer.dtype), None
 
+    few = 1 if buffer.covered.size <= SMALL_PICTURE else None
+
     def add(values: Array, cells: Array) -> None:
-        picture.add(upsample(values, cut(tree, cells), buffer.covered, settings.upsampling, filter_all=filter_all))
+        with threads(few):
+            picture.add(upsample(values, cut(tree, cells), buffer.covered, settings.upsampling, filter_all=filter_all))
 
     least = tree.roots if start is None else len(start.level)
     for cells, values in lists:

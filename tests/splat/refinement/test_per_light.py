@@ -25,7 +25,7 @@ from tests.naive import upsample as naive_upsample
 from tests.splat import sets
 
 TWIN = 1e-12  # float64 against unit vectors and printed terms; a lobe of exponent 20 takes 20 roundings to its power
-ROUNDING = 2.0**-24  # float32; a compensated sum of terms >= 0 is off by 2 of these, lobes are added after diffuse light
+ROUNDING = 2.0**-24  # float32; a compensated sum of terms >= 0 is off by 2 of these, lobes are added to it at last
 COUNTS = 0.25  # of Table 1's shares: of another scene, with the threshold that comes nearest
 
 
@@ -145,6 +145,10 @@ def test_lights_that_split_nothing_stay_with_the_shared_list():
     start = shared_list(seen, settings)
     expected = upsample(evaluate(*at_subsplats(seen, start), lights, settings), start, seen.covered)
     np.testing.assert_array_equal(per_light_counts(seen, lights, settings, None, start), 7 * start.counts)
+    tree, lists = module._lists(seen, lights, settings, None, start)
+    for mine, theirs in zip(module.cut(tree, next(lists)[0]), start, strict=True):
+        for one, other in zip(mine, theirs, strict=True):
+            np.testing.assert_array_equal(one, other)  # fields and their order, masks
     np.testing.assert_allclose(per_light(seen, lights, settings, None, start), expected, rtol=8 * ROUNDING)
 
 

@@ -65,6 +65,17 @@ def test_ends_of_the_range(real, evidence):
     evidence(f"{np.dtype(real).name}: head on 1, side on 1 - a, a = 0 to the bit")
 
 
+@pytest.mark.feature("AMS-14")
+def test_rounding_adds_no_energy(evidence):
+    """Property: normals towards the eye, whose float32 cosines are at times above 1."""
+    _, position, _, covered = surfaces(np.float32, 60, 70)
+    view = np.array(EYE, np.float32)[:, None, None] - position
+    normal = view / np.sqrt((view * view).sum(axis=0))
+    got = surface_detail(np.ones_like(position), position, normal, np.ones_like(covered), EYE, 1.0)
+    evidence(f"seen head on with a = 1 in float32: factors {got.min():.7f} to {got.max():.7f}")
+    assert 1 - ROUNDING[np.float32] < got.min() < got.max() == 1.0
+
+
 def test_it_does_not_depend_on_threads_and_takes_any_size():
     for size in ((1, 1), (1, 9), (130, 1)):
         planes = surfaces(np.float32, *size)

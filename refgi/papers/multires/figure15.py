@@ -35,7 +35,7 @@ Array = npt.NDArray[Any]
 WHITE, RED = Material("white", (0.7, 0.7, 0.7)), Material("sender", (0.8, 0.5, 0.35))
 AWAY, HALF = 2.0, 0.5  # m from camera to wall; half of what the camera sees of the wall
 PLATE = 0.5  # m, of the plate from the wall
-NEAR = 16  # pixels to either side of the edge within which its artefact is measured
+NEAR = 32  # its artefact is measured within this part of the picture's side, to either side of the edge
 RULES: dict[str, dict[str, Any]] = {
     "no rule": {"diagonal": "off"}, "corner": {"diagonal": "corner"}, "literal": {"diagonal": "literal"},
     "all eight": {"diagonal": "full8"}, "rim": {"diagonal": "off", "rim": 1},
@@ -86,8 +86,9 @@ def figure15(bench: "Workbench") -> Figure:
         pictures=tuple(shown), columns=4,
         ratios=(Ratios("time of a frame, relative to no rule", tuple(
             Bar(rule, seconds[rule] / seconds["no rule"], PAPER_TIME.get(rule)) for rule in RULES)),),
-        tables=(Table(f"Subsplats, and errors against every pixel in % of the mean: in all, within {NEAR} pixels of "
-                      "the edge", ("", "subsplats", "RMSE", "RMSE near the edge"), tuple(rows)),
+        tables=(Table("Subsplats, and errors against every pixel in % of the mean: in all, and within "
+                      f"{bench.scale.size // NEAR} pixels of the edge",
+                      ("", "subsplats", "RMSE", "RMSE near the edge"), tuple(rows)),
                 Table("What the rules cost on the dragon's stand-in",
                       ("rule", "subsplats", "times as many", "times the time"), costs)),
         notes=_notes(artefact, seconds, counts))
@@ -138,7 +139,8 @@ def _pictures(edge: Edge, made: dict[str, Array]) -> list[Picture]:
 def _judged(frame: Frame, made: dict[str, Array]) -> dict[str, tuple[int, float, float]]:
     covered, depth = frame.gbuffer.covered, frame.gbuffer.depth
     front = depth < AWAY - PLATE / 2
-    near = binary_dilation(front, iterations=NEAR) & binary_dilation(~front, iterations=NEAR)
+    reach = max(1, frame.height // NEAR)
+    near = binary_dilation(front, iterations=reach) & binary_dilation(~front, iterations=reach)
     found = {}
     for rule in RULES:
         off = errors_of(made[rule], made["full"], covered).rmse

@@ -18,7 +18,8 @@ from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
-ACROSS, ABOVE, BELOW, APART = range(4)  # rows of pairs that a thread keeps: within a row, to the next ones, distances
+ACROSS, APART, DOWN = range(3)  # rows of pairs that a thread keeps: within a row, their distances; from DOWN on two
+# rows of pairs with the row below, taking turns
 
 
 @stage("splat.depth_slopes")
@@ -97,18 +98,23 @@ def _max_mip(values: Array, sizes: Array) -> Mip:
 
 @kernel(parallel=True)
 def _build_slopes(depth: Array, covered: Array, sizes: Array, rows: Array, values: Array) -> None:
-    height, width = depth.shape
     for strip in prange(len(rows)):
-        across, above, below = rows[strip, ACROSS], rows[strip, ABOVE], rows[strip, BELOW]
-        begin, end = rows_of(strip, 0, sizes)
-        _steps(depth, covered, max(begin - 1, 0), begin, 0, above)
-        for y in range(begin, end):
-            _steps(depth, covered, y, y, 1, across[1:])
-            _steps(depth, covered, y, min(y + 1, height - 1), 0, below)
-            _slopes_of_row(depth[y], covered[y], across, above, below, values[y * width : (y + 1) * width])
-            above[:] = below
-        for level in range(1, len(sizes)):
-            coarsen(strip, level, sizes, values, False)
+        _slopes_of_strip(np.int64(strip), depth, covered, sizes, rows, values)
+
+
+@kernel
+def _slopes_of_strip(strip: Any, depth: Array, covered: Array, sizes: Array, rows: Array, values: Array) -> None:
+    """Fill all levels in a row of cells of the coarsest one."""
+    height, width = depth.shape
+    across = rows[strip, ACROSS]
+    begin, end = rows_of(strip, 0, sizes)
+    _steps(depth, covered, max(begin - 1, 0), begin, 0, rows[strip, DOWN + begin % 2])
+    for y in range(begin, end):
+        above, below = rows[strip, DOWN + y % 2], rows[strip, DOWN + (y + 1) % 2]
+        _steps(depth, covered, y, y, 1, across[1:])
+        _steps(depth, covered, y, min(y + 1, height - 1), 0, below)
+        _slopes_of_row(depth[y], covered[y], across, above, below, values[y * width : (y + 1) * width])
+    coarsen(strip, 0, sizes, values[:0], values)
 
 
 @kernel
@@ -135,19 +141,25 @@ def _slopes_of_row(depth: Array, covered: Array, across: Array, above: Array, be
 def _build_curvatures(
     normal: Array, position: Array, covered: Array, rate: bool, sizes: Array, rows: Array, values: Array
 ) -> None:
-    height, width = covered.shape
     for strip in prange(len(rows)):
-        across, above, below, apart = (
-            rows[strip, ACROSS], rows[strip, ABOVE], rows[strip, BELOW], rows[strip, APART])
-        begin, end = rows_of(strip, 0, sizes)
-        _bends(normal, position, covered, max(begin - 1, 0), begin, 0, rate, apart, above)
-        for y in range(begin, end):
-            _bends(normal, position, covered, y, y, 1, rate, apart, across[1:])
-            _bends(normal, position, covered, y, min(y + 1, height - 1), 0, rate, apart, below)
-            _largest_of_row(across, above, below, values[y * width : (y + 1) * width])
-            above[:] = below
-        for level in range(1, len(sizes)):
-            coarsen(strip, level, sizes, values, False)
+        _curvatures_of_strip(np.int64(strip), normal, position, covered, rate, sizes, rows, values)
+
+
+@kernel
+def _curvatures_of_strip(
+    strip: Any, normal: Array, position: Array, covered: Array, rate: bool, sizes: Array, rows: Array, values: Array
+) -> None:
+    """Fill all levels in a row of cells of the coarsest one."""
+    height, width = covered.shape
+    across, apart = rows[strip, ACROSS], rows[strip, APART]
+    begin, end = rows_of(strip, 0, sizes)
+    _bends(normal, position, covered, max(begin - 1, 0), begin, 0, rate, apart, rows[strip, DOWN + begin % 2])
+    for y in range(begin, end):
+        above, below = rows[strip, DOWN + y % 2], rows[strip, DOWN + (y + 1) % 2]
+        _bends(normal, position, covered, y, y, 1, rate, apart, across[1:])
+        _bends(normal, position, covered, y, min(y + 1, height - 1), 0, rate, apart, below)
+        _largest_of_row(across, above, below, values[y * width : (y + 1) * width])
+    coarsen(strip, 0, sizes, values[:0], values)
 
 
 @kernel

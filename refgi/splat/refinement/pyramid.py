@@ -124,33 +124,29 @@ def rows_of(strip: int, level: int, sizes: Array) -> tuple[int, int]:
 
 
 @kernel
-def coarsen(strip: int, level: int, sizes: Array, values: Array, least: bool) -> None:
-    """Fill the rows of a level that lie in a row of cells of the coarsest level, from the level below.
+def coarsen(strip: int, finest: int, sizes: Array, lows: Array, highs: Array) -> None:
+    """Fill the levels above the finest, as far as they lie in one row of cells of the coarsest level.
 
     Parameters
     ----------
     strip : int
         Row of the coarsest level.
-    level : int
-        The level, above the finest that is kept.
+    finest : int
+        Level that is known.
     sizes : (top + 1, 3) ndarray
         The layout.
-    values : (n,) ndarray
-        All levels.
-    least : bool
-        Whether each cell takes the smallest value of the finer ones inside it, or the largest.
+    lows, highs : (n,) ndarray
+        All levels of the least and of the largest values; `lows` is empty in a max mip.
     """
-    below, rows, fine = sizes[level - 1]
-    here, _, columns = sizes[level]
-    begin, end = rows_of(strip, level, sizes)
-    for i in range(begin, end):
-        upper = below + 2 * i * fine
-        lower = below + min(2 * i + 1, rows - 1) * fine
-        out = values[here + i * columns : here + (i + 1) * columns]
-        if least:
-            _least_of_four(values[upper : upper + fine], values[lower : lower + fine], out)
-        else:
-            _most_of_four(values[upper : upper + fine], values[lower : lower + fine], out)
+    for level in range(finest + 1, len(sizes)):
+        below, rows, fine = sizes[level - 1]
+        here, _, columns = sizes[level]
+        begin, end = rows_of(strip, level, sizes)
+        for i in range(begin, end):
+            upper, lower, at = below + 2 * i * fine, below + min(2 * i + 1, rows - 1) * fine, here + i * columns
+            if len(lows):
+                _least_of_four(lows[upper : upper + fine], lows[lower : lower + fine], lows[at : at + columns])
+            _most_of_four(highs[upper : upper + fine], highs[lower : lower + fine], highs[at : at + columns])
 
 
 @kernel

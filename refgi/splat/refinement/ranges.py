@@ -88,54 +88,33 @@ def _build_ranges(
     plane: Array, covered: Array, rim: int, sizes: Array, rows: Array, lows: Array, highs: Array
 ) -> None:
     for strip in prange(len(rows)):
-        least, most = rows[strip, 0], rows[strip, 1]
-        least[:] = math.inf
-        most[:] = -math.inf
-        _finest_ranges(strip, plane, covered, rim, sizes, least, most, lows, highs)
-        for c in range(len(plane)):
-            for level in range(2, len(sizes)):
-                coarsen(strip, level, sizes, lows[c], True)
-                coarsen(strip, level, sizes, highs[c], False)
+        _ranges_of_strip(np.int64(strip), plane, covered, rim, sizes, rows, lows, highs)
 
 
 @kernel
-def _finest_ranges(
-    strip: int, plane: Array, covered: Array, rim: int, sizes: Array, least: Array, most: Array,
-    lows: Array, highs: Array,
+def _ranges_of_strip(
+    strip: Any, plane: Array, covered: Array, rim: int, sizes: Array, rows: Array, lows: Array, highs: Array
 ) -> None:
-    """Fill the rows of level 1 in a strip; `least` and `most` hold ranges over columns of pixels."""
+    """Fill all levels in a row of cells of the coarsest one."""
     height, width = covered.shape
-    columns = sizes[1, COLUMNS]
-    begin, end = rows_of(strip, 1, sizes)
+    start, _, columns = sizes[1]
+    least, most = rows[strip, 0], rows[strip, 1]
     inner_least, inner_most = least[rim : rim + width], most[rim : rim + width]
+    begin, end = rows_of(strip, 1, sizes)
     for c in range(len(plane)):
         for i in range(begin, end):
-            here = sizes[1, START] + i * columns
-            last = min(2 * i + 1, height - 1)
-            _over_two_rows(plane[c, 2 * i], plane[c, last], covered[2 * i], covered[last], inner_least, inner_most)
+            least[:] = math.inf
+            most[:] = -math.inf
             for y in range(max(0, 2 * i - rim), min(height, 2 * i + 2 + rim)):
-                if y < 2 * i or y > last:
-                    _over_one_row_more(plane[c, y], covered[y], inner_least, inner_most)
-            low, high = lows[c, here : here + columns], highs[c, here : here + columns]
-            _over_columns(least, most, rim, low, high)
+                _over_row(plane[c, y], covered[y], inner_least, inner_most)
+            here = start + i * columns
+            _over_columns(least, most, rim, lows[c, here : here + columns], highs[c, here : here + columns])
+        coarsen(strip, 1, sizes, lows[c], highs[c])
 
 
 @kernel
-def _over_two_rows(
-    upper: Array, lower: Array, upper_covered: Array, lower_covered: Array, least: Array, most: Array
-) -> None:
-    infinity = upper.dtype.type(math.inf)
-    for x in range(len(least)):
-        a, b = upper[x], lower[x]
-        a, b = a if upper_covered[x] else infinity, b if lower_covered[x] else infinity
-        least[x] = a if a < b else b
-        a, b = upper[x], lower[x]
-        a, b = a if upper_covered[x] else -infinity, b if lower_covered[x] else -infinity
-        most[x] = a if a > b else b
-
-
-@kernel
-def _over_one_row_more(values: Array, covered: Array, least: Array, most: Array) -> None:
+def _over_row(values: Array, covered: Array, least: Array, most: Array) -> None:
+    """Widen the ranges over columns of pixels by one row more."""
     infinity = values.dtype.type(math.inf)
     for x in range(len(least)):
         a, b = values[x] if covered[x] else infinity, values[x] if covered[x] else -infinity

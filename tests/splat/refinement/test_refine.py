@@ -72,7 +72,7 @@ def refined(seen, top=None, **settings):
 
 
 @pytest.mark.feature("AMS-06")
-@pytest.mark.parametrize("shape", [(1, 1), (1, 13), (9, 1), (32, 32), (37, 53)])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 13), (9, 1), (6, 5), (32, 32), (37, 53)])
 @pytest.mark.parametrize("rule", RULES)
 def test_subsplats_are_the_published_list(shape, rule):
     seen = busy(shape)

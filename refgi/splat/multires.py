@@ -14,8 +14,10 @@ from refgi.splat.lights.settings import LightSettings, Pattern, expect_choices
 from refgi.splat.lights.solid_angle import demo_footprints
 from refgi.splat.refinement.criteria import needs
 from refgi.splat.refinement.detail import surface_detail
+from refgi.splat.refinement.error_driven import error_driven
 from refgi.splat.refinement.evaluate import at_subsplats, evaluate
 from refgi.splat.refinement.grid import Subsplats, top_level
+from refgi.splat.refinement.per_light import per_light
 from refgi.splat.refinement.refine import refine
 from refgi.splat.refinement.upsample import upsample
 from refgi.splat.refinement.visible import evaluate_visible
@@ -142,11 +144,7 @@ def _indirect(
     frame: "Frame", buffer: "GBuffer", lights: "PixelLights", footprint: Array | None, settings: MultiresSettings
 ) -> Array:
     """Light the pixels of one buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
-    from refgi.splat.refinement.per_light import per_light
-
     if settings.target_error is not None:
-        from refgi.splat.refinement.error_driven import error_driven
-
         light = error_driven(buffer, lights, settings, footprint).irradiance
     elif settings.per_light == "light":
         light = per_light(buffer, lights, settings, footprint, None)  # Sec. 3.3.1

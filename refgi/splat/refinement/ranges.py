@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.splat.refinement.changes import curvatures, depth_slopes
-from refgi.splat.refinement.pyramid import COLUMNS, ROWS, START, Mip, coarsen, layout, room, rows_of, views
+from refgi.splat.refinement.pyramid import COLUMNS, ROWS, Mip, coarsen, layout, room, rows_of, views
 from refgi.stages import stage
 
 __all__ = ["Mip", "curvatures", "depth_ranges", "depth_slopes", "normal_ranges"]

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.jit import kernel, prange
+from refgi.jit import kernel, prange, threads
 from refgi.splat.refinement.demo import demo_pass
 from refgi.splat.refinement.grid import Subsplats
 from refgi.splat.refinement.layers import filled_cells, layer, sorted_by_row
@@ -20,6 +20,8 @@ from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 Mode = Literal["tent", "demo", "nearest", "naive_bilinear"]
+
+FEW_TEXELS = 1 << 16  # of a level, that one thread fills before others are awake
 
 
 @stage("splat.upsample", kept=False)
@@ -87,8 +89,9 @@ def _tent(values: Array, subsplats: Subsplats, covered: Array, filter_all: bool,
     for level in range(subsplats.top, -1, -1):
         coarse, coarse_mask = result, mask
         result, mask = _room(filled[level], values.dtype)
-        tent_pass(values, order, starts[level], subsplats.column, coarse, coarse_mask, filled[level], filter_all,
-                  corner, result, mask)
+        with threads(1 if mask.size <= FEW_TEXELS else None):
+            tent_pass(values, order, starts[level], subsplats.column, coarse, coarse_mask, filled[level], filter_all,
+                      corner, result, mask)
     return result
 
 

@@ -199,7 +199,7 @@ def test_energy_across_an_edge_by_the_rules_of_refinement(evidence):
 
 def test_the_picture_does_not_depend_on_threads_and_hardly_on_precision():
     """Property: bits for 1 and 2 threads; float32 within rounding of float64."""
-    subsplats, covered = ragged(150, 131, 0.8)
+    subsplats, covered = ragged(290, 260, 0.8)  # smaller levels are filled by one thread anyway
     values = np.random.default_rng(5).random((3, len(subsplats.level)))
     for mode, options in (MODES[1], *MODES[-3:]):
         pictures = []

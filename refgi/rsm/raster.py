@@ -15,7 +15,7 @@ from refgi.jit import kernel, prange
 from refgi.rsm.memory import plane
 from refgi.rsm.paraboloid import draw_paraboloids
 from refgi.rsm.projection import PARABOLOID, Projection
-from refgi.rsm.triangle import LANES, Part, draw, project_vertex, texel_box
+from refgi.rsm.triangle import LANES, Part, bound_triangles, draw, project_vertices
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
@@ -45,6 +45,7 @@ class Scratch(NamedTuple):
     """Room for each worker that draws whole maps."""
 
     corners: Array  # (workers, n, 4) float64
+    cells: Array  # (workers, n, 4) int32
     boxes: Array  # (workers, BATCH, 4) uint16
     members: Array  # (workers, BATCH) int32
 
@@ -83,10 +84,10 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     elif projection.maps > 1:
         _draw_maps(projection, vertices, faces, scratch(workers, len(vertices)), seen)
     else:
-        corners = np.empty((len(vertices), 4))
-        _project(projection, vertices, corners)
+        corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
+        _project(projection, vertices, corners, cells)
         rows = band_rows or min(max(projection.height // 32, 4), 32)
-        _draw_bands(corners, faces, bands(corners, faces, width, height, rows), workers, seen)
+        _draw_bands(corners, faces, bands(corners, cells, faces, width, height, rows), workers, seen)
     if width < LANES:
         seen = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in seen))
     return seen
@@ -108,19 +109,22 @@ def scratch(workers: int, vertices: int) -> Scratch:
         Uninitialised arrays.
     """
     return Scratch(
-        np.empty((workers, vertices, 4)),
+        plane((workers, vertices, 4), np.float64),
+        plane((workers, vertices, 4), np.int32),
         np.empty((workers, BATCH, 4), np.uint16),
         np.empty((workers, BATCH), np.int32),
     )
 
 
-def bands(corners: Array, faces: Array, width: int, height: int, rows: int) -> Bands:
+def bands(corners: Array, cells: Array, faces: Array, width: int, height: int, rows: int) -> Bands:
     """List the triangles of each band of rows.
 
     Parameters
     ----------
     corners : (n, 4) ndarray
         Projected vertices.
+    cells : (n, 4) ndarray of int
+        The texels that each lies between.
     faces : (m, 3) ndarray
         Vertices of each triangle.
     width, height : int
@@ -133,11 +137,11 @@ def bands(corners: Array, faces: Array, width: int, height: int, rows: int) -> B
     Bands
         The lists, in mesh order.
     """
-    boxes = np.empty((len(faces), 4), np.uint16)
+    boxes = plane((len(faces), 4), np.uint16)
     counts = np.zeros((CHUNKS, -(-height // rows)), np.int64)
-    _count(corners, faces, np.array([width, height, rows]), boxes, counts)
+    _count(corners, cells, faces, np.array([width, height, rows]), boxes, counts)
     ends = np.cumsum(counts.T).reshape(counts.T.shape)  # band by band, chunk by chunk
-    members = np.empty(ends[-1, -1], np.int32)
+    members = plane((int(ends[-1, -1]),), np.int32)
     _list(boxes, rows, np.ascontiguousarray((ends - counts.T).T), members)
     return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)
 
@@ -150,32 +154,23 @@ def _clear(triangle_id: Array, inverse_depth: Array) -> None:
 
 
 @kernel(parallel=True)
-def _project(projection: Projection, vertices: Array, corners: Array) -> None:
-    for i in prange(len(vertices)):
-        project_vertex(projection, 0, vertices, i, corners)
+def _project(projection: Projection, vertices: Array, corners: Array, cells: Array) -> None:
+    step = -(-len(vertices) // CHUNKS)
+    for chunk in prange(CHUNKS):
+        last = min((chunk + 1) * step, len(vertices))
+        project_vertices(projection, 0, vertices, chunk * step, last, corners, cells)
 
 
 @kernel(parallel=True)
-def _count(corners: Array, faces: Array, size: Array, boxes: Array, counts: Array) -> None:
+def _count(corners: Array, cells: Array, faces: Array, size: Array, boxes: Array, counts: Array) -> None:
     step = -(-len(faces) // CHUNKS)
     for chunk in prange(CHUNKS):
-        for face in range(chunk * step, min((chunk + 1) * step, len(faces))):
-            if _store_box(corners, faces, face, size[0], size[1], boxes, face):
+        first, last = min(chunk * step, len(faces)), min((chunk + 1) * step, len(faces))
+        bound_triangles(corners, cells, faces, first, last, (size[0], size[1]), boxes[first:last])
+        for face in range(first, last):
+            if boxes[face, 0] <= boxes[face, 1]:
                 for band in range(boxes[face, 2] // size[2], boxes[face, 3] // size[2] + 1):
                     counts[chunk, band] += 1
-
-
-@kernel
-def _store_box(corners: Array, faces: Array, face: int, width: int, height: int, boxes: Array, place: int) -> bool:
-    i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-    left, right, top, bottom = texel_box(
-        corners[i, 0], corners[i, 1], corners[i, 2], corners[j, 0], corners[j, 1], corners[j, 2],
-        corners[k, 0], corners[k, 1], corners[k, 2], (width, height),
-    )  # fmt: skip
-    empty = left > right or top > bottom
-    boxes[place, 0], boxes[place, 1] = (1, 0) if empty else (left, right)
-    boxes[place, 2], boxes[place, 3] = (1, 0) if empty else (top, bottom)
-    return not empty
 
 
 @kernel(parallel=True)
@@ -204,15 +199,16 @@ def _draw_bands(corners: Array, faces: Array, lists: Bands, workers: int, seen: 
 def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: Scratch, seen: Visibility) -> None:
     workers, height = len(scratch.corners), projection.height
     for worker in prange(workers):
-        corners, boxes, members = scratch.corners[worker], scratch.boxes[worker], scratch.members[worker]
+        corners, cells = scratch.corners[worker], scratch.cells[worker]
+        boxes, members = scratch.boxes[worker], scratch.members[worker]
         for m in range(worker, len(projection.origin), workers):
             rows = slice(m * height, (m + 1) * height)
-            for i in range(len(vertices)):
-                project_vertex(projection, m, vertices, i, corners)
+            project_vertices(projection, m, vertices, 0, len(vertices), corners, cells)
             for base in range(0, len(faces), BATCH):
-                count = 0
-                for face in range(base, min(base + BATCH, len(faces))):
-                    if _store_box(corners, faces, face, projection.width, height, boxes, face - base):
+                count, last = 0, min(base + BATCH, len(faces))
+                bound_triangles(corners, cells, faces, base, last, (projection.width, height), boxes)
+                for face in range(base, last):
+                    if boxes[face - base, 0] <= boxes[face - base, 1]:
                         members[count] = face
                         count += 1
                 part = Part(members, 0, count, boxes, base, 0, height - 1)

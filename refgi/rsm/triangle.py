@@ -26,6 +26,7 @@ SMALLEST_W = 1e-30  # stands for a vertex in the plane of the eye, m
 NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the eye
 BOX_PAD = 1e-3  # texels; far above the rounding of a projected vertex
 SPAN_CUT = 32  # texels; narrower boxes are cheaper to test whole
+BEHIND = -1  # column of a vertex that is not in front of the eye
 LANES = 16  # texels tested at once; a map has at least as many columns in memory
 BATCH = 64  # triangles set up at once
 LIMIT, CORNERS, ROWS = 15 * BATCH, 16 * BATCH, 28  # where a batch's limits and corners start, and its rows in all
@@ -45,8 +46,10 @@ class Part(NamedTuple):
 
 
 @kernel
-def project_vertex(projection: Projection, m: int, vertices: Array, i: int, corners: Array) -> None:
-    """Fill row `i` of `corners` with the vertex as seen on map `m`.
+def project_vertices(
+    projection: Projection, m: int, vertices: Array, first: int, last: int, corners: Array, cells: Array
+) -> None:
+    """Fill rows of `corners` and `cells` with vertices as seen on map `m`.
 
     Parameters
     ----------
@@ -56,52 +59,68 @@ def project_vertex(projection: Projection, m: int, vertices: Array, i: int, corn
         Which map.
     vertices : (n, 3) ndarray
         World space, m.
-    i : int
-        Which vertex.
+    first, last : int
+        First vertex and one past the last.
     corners : (n, 4) ndarray
         Column, row, w, n.
+    cells : (n, 4) ndarray of int
+        First column whose centre is not left of the vertex, last one whose centre is not right of it, and the same of
+        rows, a little widened; `BEHIND` first where the vertex is not in front of the eye.
     """
-    x, y, depth = view_coordinates(projection, m, vertices[i, 0], vertices[i, 1], vertices[i, 2])
-    w, nearness = depth, 1.0
-    if projection.kind == ORTHOGRAPHIC:
-        w, nearness = 1.0, 1.0 - depth / projection.reach
-    elif abs(w) < SMALLEST_W:
-        w = SMALLEST_W
-    corners[i, 0] = (x / w / projection.half[0] + 1.0) * (0.5 * projection.width)
-    corners[i, 1] = (y / w / projection.half[1] + 1.0) * (0.5 * projection.height)
-    corners[i, 2] = w
-    corners[i, 3] = nearness
+    width, height = projection.width, projection.height
+    for i in range(first, last):
+        x, y, depth = view_coordinates(projection, m, vertices[i, 0], vertices[i, 1], vertices[i, 2])
+        w, nearness = depth, 1.0
+        if projection.kind == ORTHOGRAPHIC:
+            w, nearness = 1.0, 1.0 - depth / projection.reach
+        elif abs(w) < SMALLEST_W:
+            w = SMALLEST_W
+        x = (x / w / projection.half[0] + 1.0) * (0.5 * width)
+        y = (y / w / projection.half[1] + 1.0) * (0.5 * height)
+        corners[i, 0], corners[i, 1], corners[i, 2], corners[i, 3] = x, y, w, nearness
+        left, right = centres_between(x, x, width)
+        cells[i, 0], cells[i, 1] = left if w > 0.0 else BEHIND, right
+        cells[i, 2], cells[i, 3] = centres_between(y, y, height)
 
 
 @kernel
-def texel_box(
-    x0: float, y0: float, w0: float, x1: float, y1: float, w1: float, x2: float, y2: float, w2: float, size: Any
-) -> tuple[int, int, int, int]:
-    """Return the texels whose centres a triangle may cover.
+def bound_triangles(
+    corners: Array, cells: Array, faces: Array, first: int, last: int, size: tuple[int, int], boxes: Array
+) -> None:
+    """Write the texels whose centres triangles may cover.
 
     Parameters
     ----------
-    x0, y0, w0, x1, y1, w1, x2, y2, w2 : float
-        Column, row and w of the corners.
+    corners : (n, 4) ndarray
+        Projected vertices.
+    cells : (n, 4) ndarray of int
+        The texels that each lies between.
+    faces : (m, 3) ndarray
+        Vertices of each triangle.
+    first, last : int
+        First triangle and one past the last.
     size : tuple of 2 int
         Columns and rows of the map.
+    boxes : (last - first, 4) ndarray
+        First and last column, first and last row; first > last where a triangle covers nothing.
 
-    Returns
-    -------
-    tuple of 4 int
-        First and last column, first and last row; first > last where the triangle covers nothing.
+    Notes
+    -----
+    The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
     """
-    if w0 > 0.0 and w1 > 0.0 and w2 > 0.0:
-        left, right = min(x0, min(x1, x2)), max(x0, max(x1, x2))
-        top, bottom = min(y0, min(y1, y2)), max(y0, max(y1, y2))
-    elif w0 > 0.0 or w1 > 0.0 or w2 > 0.0:
-        left, right = _open_interval((x0, x1, x2, x0), (w0, w1, w2, w0))
-        top, bottom = _open_interval((y0, y1, y2, y0), (w0, w1, w2, w0))
-    else:
-        return 1, 0, 1, 0
-    first_x, last_x = centres_between(left, right, size[0])
-    first_y, last_y = centres_between(top, bottom, size[1])
-    return first_x, last_x, first_y, last_y
+    for face in range(first, last):
+        i, j, k, place = faces[face, 0], faces[face, 1], faces[face, 2], face - first
+        left, right = min(cells[i, 0], cells[j, 0], cells[k, 0]), max(cells[i, 1], cells[j, 1], cells[k, 1])
+        top, bottom = min(cells[i, 2], cells[j, 2], cells[k, 2]), max(cells[i, 3], cells[j, 3], cells[k, 3])
+        if left == BEHIND:
+            w = corners[i, 2], corners[j, 2], corners[k, 2], corners[i, 2]
+            low, high = _open_interval((corners[i, 0], corners[j, 0], corners[k, 0], corners[i, 0]), w)
+            left, right = centres_between(low, high, size[0])
+            low, high = _open_interval((corners[i, 1], corners[j, 1], corners[k, 1], corners[i, 1]), w)
+            top, bottom = centres_between(low, high, size[1])
+        if left > right or top > bottom:
+            left, right, top, bottom = 1, 0, 1, 0
+        boxes[place, 0], boxes[place, 1], boxes[place, 2], boxes[place, 3] = left, right, top, bottom
 
 
 @kernel

@@ -1,7 +1,8 @@
 """From level to level by what surfaces have in common: an interpolation that edges do not need to stop.
 
 The tent of P7 mixes what lies next to each other on the screen. Here each of its four neighbours k of the coarser level
-is weighed by how much its surface is that of the finer cell's pixel as well::
+is weighed by how much its surface is that of the finer cell's pixel as well (and pixels by where the pixels that stand
+for cells of level 1 are: half a pixel off these cells' centres)::
 
     a = <n . n_k>^128 (1 - |n . (x_k - x)| / |x_k - x|)^4,
 
@@ -105,12 +106,14 @@ def _weigh_cell(
     p, total = here[i, j], real(0.0)
     nx, ny, nz = real(0.0), real(0.0), real(0.0)
     for corner in range(4):
-        row, column = i // 2 + (corner // 2) * (2 * (i % 2) - 1), j // 2 + (corner % 2) * (2 * (j % 2) - 1)
-        if not (0 <= row < above.shape[0] and 0 <= column < above.shape[1]) or above[row, column] < 0:
+        row, column = (i >> 1) + (corner >> 1) * (2 * (i & 1) - 1), (j >> 1) + (corner & 1) * (2 * (j & 1) - 1)
+        vertical = across[i & 1] if corner >> 1 else real(1.0) - across[i & 1]
+        tent = vertical * (across[j & 1] if corner & 1 else real(1.0) - across[j & 1])
+        if tent == real(0.0) or not (0 <= row < above.shape[0] and 0 <= column < above.shape[1]):
             continue
         q = above[row, column]
-        vertical = across[i % 2] if corner // 2 else real(1.0) - across[i % 2]
-        tent = vertical * (across[j % 2] if corner % 2 else real(1.0) - across[j % 2])
+        if q < 0:
+            continue
         share = tent * (_agreement(position, normal, p, q) + real(LEAST_AGREEMENT))
         weight[corner, i, j] = share
         total += share
@@ -178,9 +181,9 @@ def descend(
     real = fine.dtype.type
     height, width = coarse.shape[1:]
     for i in prange(fine.shape[1]):
-        up, down = i // 2, min(max(i // 2 + 2 * (i % 2) - 1, 0), height - 1)
+        up, down = i >> 1, min(max((i >> 1) + 2 * (i & 1) - 1, 0), height - 1)
         for j in range(fine.shape[2]):
-            left, right = j // 2, min(max(j // 2 + 2 * (j % 2) - 1, 0), width - 1)
+            left, right = j >> 1, min(max((j >> 1) + 2 * (j & 1) - 1, 0), width - 1)
             surplus[i, j] = real(0.0)
             if place[i, j] < 0:
                 continue

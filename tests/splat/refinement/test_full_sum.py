@@ -82,7 +82,7 @@ def test_a_clamp_takes_light_from_around_the_lights_alone(box, evidence):
     map_of_loss = (free - clamped).sum(axis=0) / free.sum(axis=0, where=covered, initial=1e-9)
     peaks = [part[:, covered].max() / mean for part in (free, clamped, all_free)]
     evidence(
-        f"r >= {math.sqrt(LEAST_SQUARE):.2f} m takes {lost:.1%} of the light of 64 lights and {all_lost:.1%} of that of "
+        f"r >= {math.sqrt(LEAST_SQUARE):.2f} m takes {lost:.1%} of the light of 64 lights, {all_lost:.1%} of that of "
         f"every texel, all of it on {near[covered].mean():.0%} of the pixels (up to {map_of_loss.max():.0%} of a "
         f"pixel's); peaks of {peaks[0]:.1f}, clamped {peaks[1]:.1f}, every texel {peaks[2]:.1f} times the mean")
     assert np.abs(free - clamped)[:, covered & ~near].max() < SAME_TERM * mean

@@ -48,10 +48,9 @@ def separate(packed: Packed) -> Separate:
     places = np.full((2, len(packed.shines)), -1, np.int32)
     for row, there in zip(places, (packed.shines, packed.glossy), strict=True):
         row[there] = np.arange(np.count_nonzero(there))
-    real = packed.diffuse.dtype
-    lobes = np.empty((13, 0), real) if packed.lobes is None else packed.lobes.lights
-    limits = np.empty(0, real) if packed.lobes is None else bound_lobes(lobes[9], -1.0)[LIMIT]
-    return Separate(places, packed.diffuse, lobes, limits)
+    diffuse = np.ascontiguousarray(packed.diffuse)  # of one layout, or kernels are compiled for each
+    lobes = np.empty((13, 0), diffuse.dtype) if packed.lobes is None else np.ascontiguousarray(packed.lobes.lights)
+    return Separate(places, diffuse, lobes, bound_lobes(lobes[9], -1.0)[LIMIT])
 
 
 @kernel

@@ -26,6 +26,7 @@ from tests.splat import sets
 
 TWIN = 1e-12  # float64 against unit vectors and printed terms; a lobe of exponent 20 takes 20 roundings to its power
 ROUNDING = 2.0**-24  # float32; a compensated sum of terms >= 0 is off by 2 of these, lobes are added to it at last
+WIDENING = 0.8  # m, of lobes in float64
 COUNTS = 0.25  # of Table 1's shares: of another scene, with the threshold that comes nearest
 
 
@@ -88,7 +89,7 @@ def by_hand(seen, lights, settings, threshold, shared=None):
         def lit_at(pixel, one=one, k=k):
             x, n = seen.position[:, *pixel], seen.normal[:, *pixel]
             return (eq2.pair(x, n, *one[:3])
-                    + eq2.lobe_pair(x, n, *one[:2], one[3], lights.lobe_exponent[k], one[4]))
+                    + eq2.lobe_pair(x, n, *one[:2], one[3], lights.lobe_exponent[k], one[4], widening=WIDENING))
 
         cells = naive.subsplats(covered, lit_at, top, settings.finest, threshold, shared)
         for level, _, _ in cells:
@@ -104,7 +105,7 @@ def brightest_sum(seen, lights, top):
     places = [naive.representative(seen.covered, top, i, j) for i in range(rows) for j in range(columns)]
     at = tuple(np.array([place for place in places if place]).T)
     points = sets.receivers(seen.position[:, *at], seen.normal[:, *at])
-    return float(irradiance(points, lights, MultiresSettings()).max())
+    return float(irradiance(points, lights, MultiresSettings(widening=WIDENING)).max())
 
 
 @pytest.mark.parametrize("finest", [0, 1])
@@ -113,7 +114,8 @@ def test_lists_are_the_published_ones(form, finest):
     """Oracle: the paper's pseudo-code in float64, for each form of the threshold (E-AMS-07)."""
     seen, lights = wall(21, 30, holes=0.15, bumps=0.1), lamps(5)
     given = {"absolute": 0.02, "relative": 0.15, "brightest": 0.3}[form]
-    settings = MultiresSettings(coarsest=4, finest=finest, light_threshold=given, threshold_form=form)
+    settings = MultiresSettings(coarsest=4, finest=finest, light_threshold=given, threshold_form=form,
+                                widening=WIDENING)
     fixed = given if form == "absolute" else given * brightest_sum(seen, lights, 3) / 5
     expected, counts = by_hand(seen, lights, settings, lambda most: given * most if form == "relative" else fixed)
     assert 0 < counts[finest] < counts.sum() < 5 * seen.covered.sum()
@@ -124,7 +126,7 @@ def test_lists_are_the_published_ones(form, finest):
 def test_lists_go_on_from_the_shared_one():
     """Oracle: the pseudo-code that is told which cells the shared list refines."""
     seen, lights = wall(21, 30, holes=0.15), lamps(5)
-    settings = MultiresSettings(coarsest=4, light_threshold=0.4, diagonal="off")
+    settings = MultiresSettings(coarsest=4, light_threshold=0.4, diagonal="off", widening=WIDENING)
     rng = np.random.default_rng(11)
     need = tuple(rng.random(level_shape(21, 30, level)) < 0.5 * (level > 0) for level in range(4))
     start = refine(need, seen.covered, settings)
@@ -167,7 +169,7 @@ def test_threshold_0_is_the_full_sum(shape):
 
 
 @pytest.mark.parametrize("change", [{"clamp": "sphere", "clamp_value": 8.0},
-                                    {"clamp": "disc", "widening": 0.8, "offset": 0.1}])
+                                    {"clamp": "disc", "offset": 0.1}])
 def test_pairs_are_those_of_the_full_sum(change):
     """Limit, with each kind of pair: the same terms, to the bit for a light alone."""
     seen, lights = wall(9, 12, np.float32, bumps=0.3), lamps(2, np.float32)
@@ -218,7 +220,7 @@ def test_nothing_seen_nothing_lit():
 def test_levels_of_two_lights_cannot_be_added_before_upsampling():
     """Property: where one light's subsplats are finer, copying them (as upsampling does) drops the other's light."""
     seen, both = wall(32, 32), lamps(2)
-    settings = MultiresSettings(coarsest=4, light_threshold=0.2)
+    settings = MultiresSettings(coarsest=4, light_threshold=0.2, widening=WIDENING)
     together, merged = per_light(seen, both, settings), {}
     for k in range(2):
         tree, lists = module._lists(seen, alone(both, k), settings, None, None)

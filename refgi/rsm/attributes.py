@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection
+from refgi.rsm.projection import Projection
+from refgi.rsm.runs import Rows, Runs, Surface, cross, describe_runs, find_runs, room_for_runs, take_runs, towards
+from refgi.rsm.texel_rays import image_ray, row_view
 
 Array = npt.NDArray[Any]
-Rows = tuple[int, int]  # first row of the planes and one past the last
 
 STRIP = 8  # rows resolved at once: their runs stay in cache
-ALBEDO = 9  # first of its columns in `Runs.fixed`
 
 
 class Wanted(NamedTuple):
@@ -34,16 +34,6 @@ class Wanted(NamedTuple):
     material_id: bool
 
 
-class Runs(NamedTuple):
-    """Stretches of texels that see one triangle, in some rows of texels; run 0 is all that sees nothing."""
-
-    row: Array  # (rows,) int32: row on the maps
-    column: Array  # (rows,) int32: column of the first texel
-    slot: Array  # (rows, texels) uint32: run of each texel
-    start: Array  # (n, 3) int32: triangle, row and first column of each run on the maps
-    fixed: Array  # (n, 12) float64: corner v_0, N, normal on the side that is seen, albedo
-    corner: Array  # (n, 4) int32: vertices, material
-
 class Planes(NamedTuple):
     """Where a pass writes, in the buffer's type."""
 
@@ -53,85 +43,6 @@ class Planes(NamedTuple):
     normal: Array  # (3, H, W) unit vector on the side that is seen
     albedo: Array  # (3, H, W) diffuse reflectance
     material_id: Array  # (H, W) int32
-
-
-class Surface(NamedTuple):
-    """What the triangles are made of."""
-
-    vertices: Array  # (n, 3) float64, m
-    faces: Array  # (m, 3) int32
-    normals: Array  # (n, 3) float64, or (0, 3): the faces' normals count
-    material_of_face: Array  # (m,) int32
-    diffuse: Array  # (materials, 3)
-
-
-@kernel
-def texel_ray(projection: Projection, row: int, column: int) -> tuple[float, float, float, float, float, float]:
-    """Return the ray through a texel centre of the stacked maps.
-
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
-    row, column : int
-        Texel of the stacked maps.
-
-    Returns
-    -------
-    tuple of 6 floats
-        Origin (m) and direction in world space; the direction's length is one unit of depth.
-    """
-    view, v = _row_view(projection, row)
-    u = ((column + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0]
-    return _ray(projection.kind, view, u, v)
-
-
-@kernel
-def _row_view(projection: Projection, row: int) -> Any:
-    """Return origin, right, down and forward of a row's map as 12 floats, and the row's image coordinate."""
-    m = row // projection.height
-    v = ((row - m * projection.height + 0.5) * (2.0 / projection.height) - 1.0) * projection.half[1]
-    o, f = projection.origin, projection.frame
-    return (o[m, 0], o[m, 1], o[m, 2], f[m, 0, 0], f[m, 0, 1], f[m, 0, 2], f[m, 1, 0], f[m, 1, 1], f[m, 1, 2],
-            f[m, 2, 0], f[m, 2, 1], f[m, 2, 2]), v  # fmt: skip
-
-
-@kernel
-def _ray(kind: int, view: Any, u: float, v: float) -> tuple[float, float, float, float, float, float]:
-    """Return origin and direction at image coordinates (u, v)."""
-    ox, oy, oz, rx, ry, rz, qx, qy, qz, fx, fy, fz = view
-    if kind == ORTHOGRAPHIC:
-        return ox + u * rx + v * qx, oy + u * ry + v * qy, oz + u * rz + v * qz, fx, fy, fz
-    ahead = 1.0
-    if kind == PARABOLOID:
-        scale = 1.0 / (1.0 + u * u + v * v)
-        ahead = (1.0 - u * u - v * v) * scale
-        u, v = 2.0 * u * scale, 2.0 * v * scale
-    return ox, oy, oz, u * rx + v * qx + ahead * fx, u * ry + v * qy + ahead * fy, u * rz + v * qz + ahead * fz
-
-
-@kernel
-def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-
-
-@kernel
-def _towards(nx: float, ny: float, nz: float, tx: float, ty: float, tz: float) -> tuple[float, float, float]:
-    """Return the unit vector along n on the side of t; along t where n has no length."""
-    square = nx * nx + ny * ny + nz * nz
-    if not square > 0.0:
-        nx, ny, nz = tx, ty, tz
-        square = nx * nx + ny * ny + nz * nz
-    scale = math.copysign(1.0 / math.sqrt(square), nx * tx + ny * ty + nz * tz)
-    return nx * scale, ny * scale, nz * scale
-
-
-@kernel
-def _weight(ray: Any, ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
-    """Return d . (a x b), relative to the ray's origin: a barycentric coordinate up to the common factor d . N."""
-    ox, oy, oz, dx, dy, dz = ray
-    cx, cy, cz = _cross(ax - ox, ay - oy, az - oz, bx - ox, by - oy, bz - oz)
-    return dx * cx + dy * cy + dz * cz
 
 
 @kernel(parallel=True)
@@ -169,10 +80,10 @@ def _resolve_rows(
     branches, in SIMD lanes. Strips, because each call with arrays costs atomic reference counts, which threads share.
     """
     height, width = triangle_id.shape
-    runs = _room(STRIP, width)
+    runs = room_for_runs(STRIP, width)
     for top in range(first * STRIP, height, step * STRIP):
         rows = (top, min(top + STRIP, height))
-        _fill(surface, projection, _find_runs(triangle_id, rows, runs), runs, rows, wanted, planes)
+        _fill(surface, projection, find_runs(triangle_id, rows, runs), runs, rows, wanted, planes)
 
 
 @kernel
@@ -196,15 +107,8 @@ def resolve_at(
     planes : Planes
         The result, n rows of one texel.
     """
-    runs = _room(len(texel), 1)
-    _fill(surface, projection, _take_runs(triangle_id, texel, runs), runs, (0, len(texel)), wanted, planes)
-
-
-@kernel
-def _room(rows: int, texels: int) -> Any:
-    most = rows * texels + 1
-    return Runs(np.empty(rows, np.int32), np.empty(rows, np.int32), np.empty((rows, texels), np.uint32),
-                np.empty((most, 3), np.int32), np.zeros((most, 12)), np.full((most, 4), -1, np.int32))  # fmt: skip
+    runs = room_for_runs(len(texel), 1)
+    _fill(surface, projection, take_runs(triangle_id, texel, runs), runs, (0, len(texel)), wanted, planes)
 
 
 @kernel
@@ -212,88 +116,12 @@ def _fill(
     surface: Surface, projection: Projection, count: int, runs: Runs, rows: Rows, wanted: Wanted, planes: Planes
 ) -> None:
     """Fill some rows of the planes; `count` is one past the last run."""
-    _describe(surface, projection, count, runs)
+    describe_runs(surface, projection, count, runs)
     if wanted.depth or wanted.distance or wanted.position:
         _meet(projection, rows, runs, wanted, planes)
     _spread(rows, runs, wanted, planes)
     if len(surface.normals) > 0 and wanted.normal:
         _interpolate(surface, projection, rows, runs, planes.normal)
-
-
-@kernel
-def _find_runs(triangle_id: Array, rows: Rows, runs: Runs) -> int:
-    """Find the runs of whole rows; return how many there are, run 0 included."""
-    slot, start, count = runs.slot, runs.start, 1
-    for row in range(rows[0], rows[1]):
-        last, run, y = -1, 0, row - rows[0]
-        runs.row[y], runs.column[y] = row, 0
-        for x in range(triangle_id.shape[1]):
-            face = triangle_id[row, x]
-            if face != last:
-                last, run = face, 0
-                if face >= 0:
-                    run = count
-                    start[run, 0], start[run, 1], start[run, 2] = face, row, x
-                    count += 1
-            slot[y, x] = run
-    return count
-
-
-@kernel
-def _take_runs(triangle_id: Array, texel: Array, runs: Runs) -> int:
-    """Find the runs that some texels belong to, one for each; return how many there are, run 0 included."""
-    slot, start, count, width = runs.slot, runs.start, 1, triangle_id.shape[1]
-    for y in range(len(texel)):
-        row, x = texel[y] // width, texel[y] % width
-        runs.row[y], runs.column[y], slot[y, 0] = row, x, 0
-        face = triangle_id[row, x]
-        if face >= 0:
-            while x > 0 and triangle_id[row, x - 1] == face:
-                x -= 1
-            slot[y, 0] = count
-            start[count, 0], start[count, 1], start[count, 2] = face, row, x
-            count += 1
-    return count
-
-
-@kernel
-def _describe(surface: Surface, projection: Projection, count: int, runs: Runs) -> None:
-    """Write what is the same all along each run but run 0.
-
-    Parameters
-    ----------
-    surface : Surface
-        The triangles.
-    projection : Projection
-        The maps.
-    count : int
-        One past the last run.
-    runs : Runs
-        `start` is read, `fixed` and `corner` are written.
-    """
-    vertices, faces, diffuse, start, fixed = surface.vertices, surface.faces, surface.diffuse, runs.start, runs.fixed
-    corner = runs.corner
-    # loads that wait for memory in loops of their own, where many are under way at once
-    for run in range(1, count):
-        face = start[run, 0]
-        corner[run, 0], corner[run, 1], corner[run, 2] = faces[face, 0], faces[face, 1], faces[face, 2]
-        corner[run, 3] = surface.material_of_face[face]
-    for run in range(1, count):
-        i, j, k = corner[run, 0], corner[run, 1], corner[run, 2]
-        for axis in range(3):
-            fixed[run, axis] = vertices[i, axis]
-            fixed[run, 3 + axis] = vertices[j, axis]
-            fixed[run, 6 + axis] = vertices[k, axis]
-    for run in range(1, count):
-        ix, iy, iz = fixed[run, 0], fixed[run, 1], fixed[run, 2]
-        gx, gy, gz = _cross(fixed[run, 3] - ix, fixed[run, 4] - iy, fixed[run, 5] - iz,
-                            fixed[run, 6] - ix, fixed[run, 7] - iy, fixed[run, 8] - iz)  # fmt: skip
-        _, _, _, dx, dy, dz = texel_ray(projection, start[run, 1], start[run, 2])
-        nx, ny, nz = _towards(gx, gy, gz, -dx, -dy, -dz)  # a triangle shows one side to a projection
-        fixed[run, 3], fixed[run, 4], fixed[run, 5] = gx, gy, gz
-        fixed[run, 6], fixed[run, 7], fixed[run, 8] = nx, ny, nz
-        for channel in range(3):
-            fixed[run, ALBEDO + channel] = diffuse[corner[run, 3], channel]
 
 
 @kernel
@@ -304,14 +132,14 @@ def _meet(projection: Projection, rows: Rows, runs: Runs, wanted: Wanted, planes
     line, hit = np.empty((6, width)), np.empty((4, width))
     for row in range(rows[0], rows[1]):
         y = row - rows[0]
-        view, v = _row_view(projection, runs.row[y])
+        view, v = row_view(projection, runs.row[y])
         middle = runs.column[y] + 0.5
         for x in range(width):
             run = np.uint64(slot[y, x])
             line[0, x], line[1, x], line[2, x] = fixed[run, 0], fixed[run, 1], fixed[run, 2]
             line[3, x], line[4, x], line[5, x] = fixed[run, 3], fixed[run, 4], fixed[run, 5]
         for x in range(width):
-            ox, oy, oz, dx, dy, dz = _ray(kind, view, ((x + middle) * across - 1.0) * half, v)
+            ox, oy, oz, dx, dy, dz = image_ray(kind, view, ((x + middle) * across - 1.0) * half, v)
             gx, gy, gz = line[3, x], line[4, x], line[5, x]
             facing = dx * gx + dy * gy + dz * gz
             t = ((line[0, x] - ox) * gx + (line[1, x] - oy) * gy + (line[2, x] - oz) * gz) / facing
@@ -322,7 +150,7 @@ def _meet(projection: Projection, rows: Rows, runs: Runs, wanted: Wanted, planes
             hit[3, x] = oz + t * dz if seen else 0.0
         if wanted.distance:
             for x in range(width):
-                _, _, _, dx, dy, dz = _ray(kind, view, ((x + middle) * across - 1.0) * half, v)
+                _, _, _, dx, dy, dz = image_ray(kind, view, ((x + middle) * across - 1.0) * half, v)
                 planes.distance[row, x] = hit[0, x] * math.sqrt(dx * dx + dy * dy + dz * dz)
         _round(hit, row, wanted, planes)
 
@@ -360,12 +188,20 @@ def _spread(rows: Rows, runs: Runs, wanted: Wanted, planes: Planes) -> None:
 
 
 @kernel
+def _weight(ray: Any, ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
+    """Return d . (a x b), relative to the ray's origin: a barycentric coordinate up to the common factor d . N."""
+    ox, oy, oz, dx, dy, dz = ray
+    cx, cy, cz = cross(ax - ox, ay - oy, az - oz, bx - ox, by - oy, bz - oz)
+    return dx * cx + dy * cy + dz * cz
+
+
+@kernel
 def _interpolate(surface: Surface, projection: Projection, rows: Rows, runs: Runs, normal: Array) -> None:
     """Replace face normals by interpolated ones, on the same side."""
     vertices, faces, shading, fixed = surface.vertices, surface.faces, surface.normals, runs.fixed
     for row in range(rows[0], rows[1]):
         y = row - rows[0]
-        view, v = _row_view(projection, runs.row[y])
+        view, v = row_view(projection, runs.row[y])
         middle = runs.column[y] + 0.5
         for x in range(normal.shape[2]):
             run = runs.slot[y, x]
@@ -373,7 +209,8 @@ def _interpolate(surface: Surface, projection: Projection, rows: Rows, runs: Run
                 continue
             face = runs.start[run, 0]
             i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-            ray = _ray(projection.kind, view, ((x + middle) * (2.0 / projection.width) - 1.0) * projection.half[0], v)
+            u = ((x + middle) * (2.0 / projection.width) - 1.0) * projection.half[0]
+            ray = image_ray(projection.kind, view, u, v)
             gx, gy, gz = fixed[run, 3], fixed[run, 4], fixed[run, 5]
             facing = ray[3] * gx + ray[4] * gy + ray[5] * gz
             ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
@@ -385,5 +222,5 @@ def _interpolate(surface: Surface, projection: Projection, rows: Rows, runs: Run
             sx = a * shading[i, 0] + b * shading[j, 0] + c * shading[k, 0]
             sy = a * shading[i, 1] + b * shading[j, 1] + c * shading[k, 1]
             sz = a * shading[i, 2] + b * shading[j, 2] + c * shading[k, 2]
-            nx, ny, nz = _towards(gx, gy, gz, -ray[3], -ray[4], -ray[5])
-            normal[0, row, x], normal[1, row, x], normal[2, row, x] = _towards(sx, sy, sz, nx, ny, nz)
+            nx, ny, nz = towards(gx, gy, gz, -ray[3], -ray[4], -ray[5])
+            normal[0, row, x], normal[1, row, x], normal[2, row, x] = towards(sx, sy, sz, nx, ny, nz)

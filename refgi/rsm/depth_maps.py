@@ -8,9 +8,10 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.rsm.attributes import Planes, Surface, Wanted, resolve
+from refgi.rsm.attributes import Planes, Wanted, resolve
 from refgi.rsm.paraboloid import draw_paraboloids
 from refgi.rsm.projection import Projection, paraboloid_projection
+from refgi.rsm.runs import Surface
 from refgi.rsm.triangle import LANES
 from refgi.scene.model import Geometry
 from refgi.stages import stage

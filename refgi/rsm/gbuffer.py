@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.rsm.attributes import Planes, Surface, Wanted, resolve, resolve_at
+from refgi.rsm.attributes import Planes, Wanted, resolve, resolve_at
 from refgi.rsm.memory import plane
 from refgi.rsm.projection import Projection, camera_projection
 from refgi.rsm.raster import Visibility, rasterize
+from refgi.rsm.runs import Surface
 from refgi.scene.model import Camera, Geometry, MaterialTable
 from refgi.stages import stage
 

@@ -6,36 +6,30 @@ the mirror direction r = d - 2 (n . d) n of the incoming direction d, with its o
 """
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, Literal, get_args
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.rsm.attributes import texel_ray
 from refgi.rsm.gbuffer import GBuffer, taken
-from refgi.rsm.projection import (
-    Projection,
-    cube_projection,
-    directional_projection,
-    dual_paraboloid_projection,
-    paraboloid_projection,
-    project,
-    spot_projection,
-)
+from refgi.rsm.incident import incident_flux, texel_shares
+from refgi.rsm.light_projection import MapShape, light_projection
+from refgi.rsm.projection import Projection, project
 from refgi.rsm.raster import rasterize
-from refgi.rsm.solid_angle import sampled_spot_share, spot_power, spot_power_at, texel_solid_angles
-from refgi.scene.model import DirectionalLight, Geometry, Light, MaterialTable, PointLight, SpotLight
+from refgi.rsm.solid_angle import texel_solid_angles
+from refgi.rsm.texel_rays import texel_ray
+from refgi.scene.model import Geometry, Light, MaterialTable
 from refgi.stages import stage
 
+__all__ = ["Rsm", "incident_flux", "reflective_shadow_map", "texel_shares"]
+
 Array = npt.NDArray[Any]
-MapShape = Literal["auto", "perspective", "cube", "paraboloid", "orthographic"]
 
 SEEN = ("depth", "position", "normal")  # channels of the light's view
 LOBE = ("lobe_flux", "lobe_axis", "lobe_exponent")
-WIDEST_PERSPECTIVE = math.radians(75)  # beyond, texels on the axis span over 60 times the solid angle of the rim's
 
 
 class Rsm:
@@ -261,120 +255,6 @@ def reflective_shadow_map(
     expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
     maps = light_projection(light, geometry, resolution, projection)
     return Rsm(light, GBuffer(geometry, materials, maps, rasterize(geometry, maps), dtype), materials)
-
-
-def light_projection(light: Light, geometry: Geometry, resolution: int, shape: MapShape = "auto") -> Projection:
-    """Return the maps that enclose what a light shines on.
-
-    Parameters
-    ----------
-    light : Light
-        Whose view.
-    geometry : Geometry
-        What a directional light must enclose.
-    resolution : int
-        Texels along a side of one map.
-    shape : str
-        As in `reflective_shadow_map`.
-
-    Returns
-    -------
-    Projection
-        The maps.
-
-    Raises
-    ------
-    InputError
-        If the resolution or shape does not suit the light.
-    """
-    expect(isinstance(resolution, int | np.integer) and 1 <= resolution <= 16384, "resolution",
-           "1 to 16384 texels", resolution)  # fmt: skip
-    expect(shape in get_args(MapShape), "projection", " or ".join(get_args(MapShape)), shape)
-    makers: dict[str, Callable[[], Projection]]
-    if isinstance(light, DirectionalLight):
-        usual = "orthographic"
-        makers = {usual: lambda: directional_projection(light, geometry.bounds, resolution)}
-    elif isinstance(light, PointLight):
-        usual = "cube"
-        makers = {
-            usual: lambda: cube_projection(light.position, resolution),
-            "paraboloid": lambda: dual_paraboloid_projection(light.position, resolution),
-        }
-    else:
-        half = math.tan(light.outer_half_angle / 2)
-        usual = "perspective" if light.outer_half_angle <= WIDEST_PERSPECTIVE else "paraboloid"
-        makers = {
-            "perspective": lambda: spot_projection(light, resolution),
-            "cube": lambda: cube_projection(light.position, resolution),
-            "paraboloid": lambda: paraboloid_projection([light.position], [light.direction], resolution, half),
-        }
-    name = usual if shape == "auto" else shape
-    expect(name in makers, "projection", f"one that suits a {type(light).__name__}: {', '.join(makers)}", shape)
-    return makers[name]()
-
-
-def texel_shares(
-    light: Light, maps: Projection, solid_angle: Array | None = None, texel: Array | None = None
-) -> Array:
-    """Return how much of a light each texel of its maps takes in.
-
-    Parameters
-    ----------
-    light : Light
-        Whose maps.
-    maps : Projection
-        The maps.
-    solid_angle : (H, W) ndarray, optional
-        `texel_solid_angles(maps)`, where it is known.
-    texel : (n,) ndarray of int, optional
-        Texels of the flattened maps; all where absent.
-
-    Returns
-    -------
-    (H, W) or (n,) ndarray
-        What the intensity on the axis is multiplied by, sr: the solid angle, weighed by a spot's falloff. Directional:
-        the area perpendicular to the light, m^2.
-    """
-    if isinstance(light, SpotLight):
-        cosines = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
-        if maps.maps == 1:
-            return spot_power(maps, *cosines) if texel is None else spot_power_at(maps, *cosines, texel)
-    share = texel_solid_angles(maps) if solid_angle is None else solid_angle
-    if isinstance(light, SpotLight):
-        axis = np.asarray(light.direction) / np.linalg.norm(light.direction)
-        share = share * sampled_spot_share(maps, axis, *cosines)
-    return share if texel is None else share.reshape(-1)[texel]
-
-
-def incident_flux(
-    light: Light, maps: Projection, solid_angle: Array | None, dtype: npt.DTypeLike, texel: Array | None = None
-) -> Array:
-    """Return the flux that arrives through each texel of a light's maps.
-
-    Parameters
-    ----------
-    light : Light
-        Whose maps.
-    maps : Projection
-        The maps.
-    solid_angle : (H, W) ndarray, optional
-        `texel_solid_angles(maps)`, where it is known.
-    dtype : dtype
-        Of the result.
-    texel : (n,) ndarray of int, optional
-        Texels of the flattened maps; all where absent.
-
-    Returns
-    -------
-    (3, H, W) or (3, n) ndarray
-        W, whatever is met.
-    """
-    share = texel_shares(light, maps, solid_angle, texel)
-    strength = light.irradiance if isinstance(light, DirectionalLight) else light.intensity
-    incident = np.empty((3, *share.shape), dtype)
-    for channel, one in zip(incident, strength, strict=True):
-        np.multiply(share, one, out=channel, casting="same_kind")  # in the dtype of the share, rounded once
-    return incident
 
 
 def _lobe(

@@ -7,6 +7,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.rsm import direct_irradiance, gbuffer, reflective_shadow_map, shadow_map_visibility
+from refgi.rsm.projection import PARABOLOID
 from refgi.scene import Camera, DirectionalLight, Material, PointLight, SpotLight, load_scene, material_table
 from tests.rsm.shapes import geometry, sphere
 
@@ -121,6 +122,41 @@ def test_map_shadows_are_those_of_rays_away_from_their_edges(name, evidence):
     wrong = (visible[lit] == blocked).mean()
     assert wrong < 0.01  # texels and pixels that straddle a shadow's edge
     evidence(f"{name}: {wrong:.2%} of the unshadowed pixels differ from rays, all along edges")
+
+
+def reached(point, normal, rsm):
+    """The published rule with the receiver's plane, literally: (lit, how far the closest decision was, m)."""
+    row, column, far = (float(number) for number in rsm.project(point))
+    if math.isnan(far):
+        return False, math.inf
+    row, column = int(row), int(column)
+    stored, depth = rsm.position[:, row, column], rsm.depth[row, column]
+    above = normal @ (stored - point) - 1e-6 * far if np.isfinite(depth) else -math.inf
+    maps = rsm.projection
+    along, texel = maps.frame[row // maps.height, 2], 2 * maps.half[0] / maps.width
+    if not isinstance(rsm.light, DirectionalLight):
+        along = (point - rsm.light.position) / np.linalg.norm(point - rsm.light.position)
+        texel *= np.linalg.norm(point - rsm.light.position) * (2 if maps.kind == PARABOLOID else 1)
+    cosine = abs(along @ normal)
+    margin = 0.1 * texel * (1 + min(math.sqrt(1 - min(cosine, 1) ** 2) / max(cosine, 1e-6), 10))
+    doubt = min(abs(far - depth), abs(above - margin))
+    return far <= depth or above <= margin, doubt
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_the_look_up_is_its_literal_twin(name):
+    ball = sphere(10, 0.5, (0.4, 0.8, 0.1))
+    shape = geometry(np.concatenate([FLOOR.vertices, ball.vertices]), [*FLOOR.faces, *(ball.faces + 4)])
+    seen = view(shape, camera=Camera((0, 3, 4), (0, 0.3, 0), width=45, height=40))
+    rsm = reflective_shadow_map(shape, material_table([Material()], np.float64), LIGHTS[name], 24, np.float64)
+    visible = shadow_map_visibility(seen.position, seen.normal, seen.covered, rsm)
+    shadowed = 0
+    for row, column in np.argwhere(seen.covered):
+        lit, doubt = reached(seen.position[:, row, column], seen.normal[:, row, column], rsm)
+        if doubt > 1e-9:  # m; closer decisions are rounding of float64
+            assert visible[row, column] == lit
+            shadowed += not lit
+    assert shadowed > 20
 
 
 def test_a_given_bias_is_used_as_it_is():

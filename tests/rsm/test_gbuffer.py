@@ -105,6 +105,19 @@ def test_channels_alone_equal_channels_together(name):
         assert getattr(alone, channel) is getattr(alone, channel)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("name", shapes())
+def test_channels_at_some_texels_are_those_of_the_whole(name, dtype):
+    rng = np.random.default_rng(4)
+    whole = buffer(shapes()[name], dtype)
+    for texel in (rng.integers(0, 36 * 44, 150), np.arange(36 * 44), np.zeros(0, np.int64), np.array([7, 7])):
+        some = buffer(shapes()[name], dtype)
+        for given, channel in zip(some.at(texel, *CHANNELS), CHANNELS, strict=True):
+            full = getattr(whole, channel)
+            np.testing.assert_array_equal(given, full.reshape(*full.shape[:-2], -1)[..., texel])
+            assert given.dtype == full.dtype
+
+
 def test_a_channel_is_computed_only_when_asked_for():
     seen = buffer(shapes()["flat"])
     assert set(seen._channels) == set()

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from refgi.rsm.attributes import texel_ray
 from refgi.rsm.projection import (
     camera_projection,
     cube_projection,
@@ -16,6 +15,7 @@ from refgi.rsm.projection import (
     project,
     spot_projection,
 )
+from refgi.rsm.texel_rays import texel_ray
 from refgi.scene import Camera, DirectionalLight, SpotLight
 
 ROUND_TRIP = 1e-12  # float64 rounding of a few operations on numbers of order one, in texels over a map of hundreds

@@ -188,6 +188,37 @@ def test_same_bits_for_any_threads_and_bands(name, evidence):
     evidence(f"{name}: equal bits for 1 and 2 threads and 5 band heights")
 
 
+def odd(rng):
+    """Slivers, huge and tiny triangles, some twice, some through the eyes of `projections`."""
+    common = soup(rng, 60).vertices.reshape(-1, 3, 3)
+    slivers = common[:20] * 1.0
+    slivers[:, 2] = slivers[:, 0] + (slivers[:, 1] - slivers[:, 0]) * 0.7 + rng.normal(0, 1e-5, (20, 3))
+    tiny, huge = common[20:35] * 0.8 + rng.normal(0, 1e-3, (15, 3, 3)), common[35:45] * 0.3
+    huge[:, 1] += rng.normal(0, 300, (10, 3))
+    tiny = tiny.mean(axis=1, keepdims=True) + (tiny - tiny.mean(axis=1, keepdims=True)) * 0.02
+    through = np.array([0.1, 0.05, -0.1]) + rng.normal(0, 0.5, (15, 1, 3)) + rng.normal(0, 0.05, (15, 3, 3))
+    through[:, 1] += rng.normal(0, 4, (15, 3))  # long, thin, many across the plane of the eye
+    parts = np.concatenate([common, slivers, tiny, huge, through, common[:10]])
+    return geometry(parts, np.arange(3 * len(parts)))
+
+
+@pytest.mark.parametrize("name", projections())
+def test_all_at_once_is_each_alone_to_the_bit(name):
+    """Whatever bounds, batches and bands do: nearest of the triangles drawn one by one, ties to the lowest id."""
+    shape, projection = odd(np.random.default_rng(21)), projections()[name]
+    assert len(shape.faces) == 130  # two batches and two triangles
+    near = np.zeros(projection.shape, np.float32)
+    ids = np.full(projection.shape, -1)
+    for number, face in enumerate(shape.faces):
+        one = rasterize(geometry(shape.vertices[face], [0, 1, 2]), projection)
+        nearer = (one.triangle_id >= 0) & (one.inverse_depth > near)
+        near[nearer], ids[nearer] = one.inverse_depth[nearer], number
+    seen = rasterize(shape, projection)
+    np.testing.assert_array_equal(seen.triangle_id, ids)
+    np.testing.assert_array_equal(seen.inverse_depth, near)
+    assert len(np.unique(ids)) > 10  # and not one triangle in front of all
+
+
 def test_of_equal_triangles_the_first_is_seen():
     one = height_field(200)
     twice = geometry(one.vertices, np.concatenate([one.faces, one.faces]))

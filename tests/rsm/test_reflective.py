@@ -10,6 +10,7 @@ from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.rsm import choose_pixel_lights, reflective_shadow_map
 from refgi.scene import DirectionalLight, Material, PointLight, SpotLight, load_scene, material_table
+from refgi.stages import observe
 from tests.naive import pixel_lights as naive
 from tests.rsm.shapes import geometry, sphere
 
@@ -204,6 +205,35 @@ def test_same_bits_for_any_threads_and_float32_is_the_rounded_float64(evidence):
 def test_errors_name_what_is_wrong(light, options, message):
     with pytest.raises(InputError, match=message):
         in_a_ball(light, **options)
+
+
+VIEWED = ("depth", "position", "normal", "flux")
+
+
+@pytest.mark.parametrize("materials", [(DIFFUSE,), (DIFFUSE, GLOSSY, GLASS)])
+@pytest.mark.parametrize("light", [
+    SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), 0.4, 0.8, (3.0, 2.0, 1.0)),
+    SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), 0.4, 1.5, (3.0, 2.0, 1.0)),
+    PointLight((0.3, 0.2, -0.4), (3.0, 2.0, 1.0)),
+    DirectionalLight((0.3, -1.0, 0.2), (3.0, 2.0, 1.0)),
+])  # fmt: skip
+def test_channels_at_some_texels_are_those_of_the_whole_map(light, materials):
+    whole, some = in_a_ball(light, 33, materials), in_a_ball(light, 33, materials)
+    texel = np.random.default_rng(3).integers(0, whole.texels, whole.texels // 10)
+    for given, channel in zip(some.at(texel, *VIEWED), VIEWED, strict=True):
+        full = getattr(whole, channel)
+        np.testing.assert_array_equal(given, full.reshape(*full.shape[:-2], -1)[..., texel])
+    other = whole._replace(flux=2 * whole.flux)
+    np.testing.assert_array_equal(other.at(texel, "flux")[0], 2 * whole.at(texel, "flux")[0])
+    assert other.depth is whole.depth
+
+
+def test_few_lights_need_no_whole_map():
+    with observe() as log:
+        rsm = in_a_ball(SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), 0.4, 0.8, (3.0, 2.0, 1.0)), 64)
+        lights = choose_pixel_lights([rsm], count=64, pattern="grid")
+    assert lights.flux.any()
+    assert not {"rsm.resolve", "rsm.solid_angles"} & {run.name for run in log.runs}
 
 
 def test_a_light_that_shines_on_nothing():

@@ -12,7 +12,7 @@ from refgi.rsm.projection import (
     paraboloid_projection,
     spot_projection,
 )
-from refgi.rsm.solid_angle import sampled_spot_share, spot_power, texel_solid_angles
+from refgi.rsm.solid_angle import sampled_spot_share, spot_power, spot_power_at, texel_solid_angles
 from refgi.scene import DirectionalLight, SpotLight
 from tests.naive import raster as naive
 
@@ -137,3 +137,13 @@ def test_sampled_share_tends_to_the_exact_one():
     exact = spot_power(projection, *cosines)
     assert np.abs(sampled - exact).max() < 1e-3 * exact.max()
     assert sampled.sum() == pytest.approx(exact.sum(), rel=1e-5)
+
+
+@pytest.mark.parametrize("n", [1, 2, 9, 16])
+@pytest.mark.parametrize("half", [math.radians(40), math.radians(85)])
+def test_power_of_some_texels_is_that_of_the_whole_map(n, half):
+    light = spot(half / 2, half)
+    maps = spot_projection(light, n) if half < 1 else paraboloid_projection([(0, 0, 0)], [light.direction], n)
+    cosines = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
+    texel = np.arange(n * n)[::-1]
+    np.testing.assert_array_equal(spot_power_at(maps, *cosines, texel), spot_power(maps, *cosines).reshape(-1)[texel])

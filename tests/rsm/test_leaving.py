@@ -1,0 +1,28 @@
+"""Radiance towards the camera: to the bit the plain sum, product and quotient of arrays."""
+
+import numpy as np
+import pytest
+
+from refgi.rsm import gbuffer, leaving_radiance
+from refgi.scene import Camera, Material, material_table
+from tests.rsm.shapes import geometry, soup
+
+CAMERA = Camera((0.4, 0.3, 2.5), (0.1, 0, 0), width=44, height=36)
+
+
+@pytest.mark.parametrize("emission", [(0.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_radiance_equals_its_definition(dtype, emission):
+    flat = soup(np.random.default_rng(11), 20)
+    shape = geometry(flat.vertices, flat.faces, materials=np.arange(20) % 2)
+    materials = material_table([Material(diffuse=(0.1, 0.2, 0.3)), Material(emission=emission)], dtype)
+    seen = gbuffer(shape, materials, CAMERA, dtype=dtype)
+    direct, indirect = np.random.default_rng(2).random((2, 3, 36, 44)).astype(dtype)
+    emitted = np.zeros_like(direct)
+    emitted[:, seen.material_id == 1] = np.array(emission, dtype)[:, None]
+    assert (~seen.covered).any()
+    for more in (None, indirect):
+        arriving = direct if more is None else direct + more
+        radiance = leaving_radiance(direct, more, seen, materials)
+        np.testing.assert_array_equal(radiance, arriving * seen.albedo / dtype(np.pi) + emitted)
+        assert radiance.dtype == dtype

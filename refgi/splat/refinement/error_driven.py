@@ -116,8 +116,8 @@ def error_driven(
 
     Notes
     -----
-    The promise is that of a sample: four standard errors of a mean over one pixel in 64. Depths are not looked at:
-    without visibility, light changes across them by position and normal alone.
+    The promise is that of a sample of one pixel in 64 (`estimate`). Depths are not looked at: without visibility, light
+    changes across them by position and normal alone.
     """
     target = settings.target_error
     expect(target is not None, "target_error", "a share of the mean above 0", target)

@@ -199,7 +199,7 @@ def test_subsplats_do_not_follow_triangles(figures, evidence):
 
 def test_the_headline_has_every_way_on_both_scenes(figures):
     rows = table(figures["error"])
-    assert len(figures["error"].plots) == 4
+    assert len(figures["error"].plots) == 8
     for name, row in rows.items():
         if "target error" in name:
             assert row["RMSE"] <= float(name.split("target error ")[1].removesuffix(" %")), name

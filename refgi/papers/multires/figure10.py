@@ -121,9 +121,9 @@ def _notes(sweep: Sweep, sides: list[int]) -> tuple[str, ...]:
     return (
         "From threshold 0 to 2 the frame rate rises by a factor of "
         f"{', '.join(f'{gain(n, sweep.rest):.2f} at {n}²' for n in coarse)} and of {gain(fine, sweep.rest):.2f} at "
-        f"{fine}²: flat where the paper's is flat, for there is hardly a subsplat to save. At {fine}² their number "
-        f"falls by a factor of {more:.1f}, and the indirect part alone becomes {gain(fine):.1f} times as fast; shadow "
-        "map, buffers and direct light stay.",
+        f"{fine}². The paper's is flat up to {COARSE}², where there is hardly a subsplat to save. At {fine}² their "
+        f"number falls by a factor of {more:.1f}, and the indirect part alone becomes {gain(fine):.1f} times as fast; "
+        "shadow map, buffers and direct light stay.",
         f"What the paper's figure leaves out is the error: at {fine}² it rises from {sweep.rmse[fine, 0.25]:.2f} % of "
         f"the mean with a threshold of 0.25 to {sweep.rmse[fine, 1.4]:.2f} % with 1.4. A threshold of 0 still leaves "
         f"{sweep.rmse[fine, 0.0]:.2f} % where surfaces are plane.")

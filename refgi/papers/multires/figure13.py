@@ -136,8 +136,8 @@ def _notes(near: Errors, clamp: Errors, solid: Any, against: dict[str, tuple[Err
     blocked = against["texels"][1].lost
     changed = errors_of(lights["equal"], lights["texels"], covered)
     return (
-        f"The method differs from the same lights at every pixel by an RMSE of {near.rmse:.1f} % of the mean: near "
-        "indistinguishable, as printed.",
+        f"The method differs from the same lights at every pixel by an RMSE of {near.rmse:.1f} % and a MAE of "
+        f"{near.mae:.1f} % of the mean; the paper calls the two near indistinguishable.",
         f"The clamp loses {clamp.lost:.0f} % of the energy of every texel. That no clamp is needed with every texel "
         f"holds for how bright a single dot is, not for the sum: its RMSE to path tracing without visibility is "
         f"{against['texels'][0].rmse:.0f} % with a MAE of {against['texels'][0].mae:.1f} %, from pixels beside edges "

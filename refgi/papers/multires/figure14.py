@@ -120,9 +120,8 @@ def _notes(seconds: dict[str, float], subsplats: dict[int, int], noise: list[flo
     order = float(np.polyfit(seen[:, 0], seen[:, 1], 1)[0]) if len(seen) > 1 else 0.0
     return (
         f"The time of the indirect part follows the number of pairs of subsplat and light: {fixed:.1f} ms and "
-        f"{1e6 * slope:.2f} ms for each million pairs, with a correlation of {fit:.3f} over all {len(pairs)} runs. The "
-        "curves have the paper's shape: flat while the rest of a frame leads, then falling as one over the number of "
-        "lights.",
+        f"{1e6 * slope:.2f} ms for each million pairs, with a correlation of {fit:.3f} over all {len(pairs)} runs. "
+        "Curves are flat while the rest of a frame leads, and fall as one over the number of lights where pairs do.",
         f"Flicker falls with the number of lights N as N to the {order:.2f}: {at[16]:.1f} % of the mean at 16² lights, "
         f"{at[32]:.1f} % at 32², {at[64]:.1f} % at 64². The paper's judgement that 16² to 32² show little of it was "
         "by eye, with clamped lights as here.",

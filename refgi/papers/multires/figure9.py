@@ -173,8 +173,8 @@ def _notes(flights: dict[str, Flight]) -> tuple[str, ...]:
     worst = max(flights, key=lambda name: flights[name].rmse)
     return (
         f"The number of subsplats varies along the way by a factor of {varied['depth, normal']:.1f} with depth and "
-        f"normals and of {reached:.1f} at most: the paper's variation of up to 300 % is {verdict}. Frame times follow "
-        f"it with a correlation of {linked:.2f}.",
+        f"normals and of {reached:.1f} at most: the paper's variation of up to 300 % is {verdict}. Frame times have "
+        f"a correlation of {linked:.2f} with it.",
         "Time against depth and normals: " + ", ".join(f"{name} {cost[name]:.2f}" for name in list(WAYS)[1:]) + ". The "
         "paper finds the derivative slightly slower at like quality and curvature slower by more, for gradual bends "
         f"need a very low threshold. Curvature came to {flights['depth, curvature'].settings.curvature_threshold:g} "

@@ -59,14 +59,11 @@ def headline(bench: "Workbench") -> Figure:
     """
     cases = {(scene, clamped): _measured(bench, scene, clamped) for scene in SCENES for clamped in (True, False)}
     rows: list[tuple[Cell, ...]] = []
-    plots = []
+    plots: list[Plot] = []
     for (scene, clamped), (points, seconds) in cases.items():
         title = f"{scene}, {'clamped' if clamped else 'no clamp'}"
         rows += [(f"{title}: {p.said}", 1e3 * seconds / p.speedup, p.speedup, p.saved, p.rmse) for p in points]
-        curves = [Curve(name, [p.speedup for p in points if p.family == name],
-                        [p.rmse for p in points if p.family == name]) for name in FAMILIES]
-        plots.append(Plot(drawn(curves, Axes("speed-up over every pixel", "RMSE, % of the mean", log_x=True,
-                                             log_y=True)), f"{title}: error over speed-up."))
+        plots += _plots(title, points)
     return Figure(
         shows="The paper compares frame rates of pictures that look alike. How far a picture is off, and what each "
               "part of the error buys, it does not say.",
@@ -99,6 +96,16 @@ def _lit(frame: "Frame", settings: MultiresSettings) -> tuple[Array, float]:
         return multires(frame, settings), 1 / share_lit(subsplats_of(frame, settings), frame.gbuffer.covered)
     driven = error_driven(frame.gbuffer, choose_lights(frame, settings), settings, footprints(frame, settings))
     return driven.irradiance, driven.full_pairs / max(1, driven.pairs)
+
+
+def _plots(title: str, points: list[Point]) -> list[Plot]:
+    found = []
+    for what, said in (("speedup", "speed-up over every pixel"), ("saved", "all pairs over those evaluated")):
+        curves = [Curve(name, [getattr(p, what) for p in points if p.family == name],
+                        [p.rmse for p in points if p.family == name]) for name in FAMILIES]
+        axes = Axes(said, "RMSE, % of the mean", log_x=True, log_y=True)
+        found.append(Plot(drawn(curves, axes), f"{title}: error over {said}."))
+    return found
 
 
 def _points(base: MultiresSettings) -> list[Point]:

@@ -101,6 +101,6 @@ def _notes(seconds: dict[str, float], counts: dict[str, int], off: dict[str, Err
         f"and direct light stay. The RMSE rises from {off['low'].rmse:.1f} to {off['high'].rmse:.1f} % of the "
         "mean.",
         f"Eq. 3 costs {1e3 * (seconds['detail alone'] - seconds['high alone']):+.1f} ms and only ever darkens: it "
-        f"takes {off['detail'].lost - off['high'].lost:.0f} % of the light away. It looks like the lost detail and is not "
-        f"it: its RMSE is {off['detail'].rmse:.1f} %, {better} than the {off['high'].rmse:.1f} % without.",
+        f"takes {off['detail'].lost - off['high'].lost:.0f} % of the light away. It looks like the lost detail and is "
+        f"not it: its RMSE is {off['detail'].rmse:.1f} %, {better} than the {off['high'].rmse:.1f} % without.",
     )

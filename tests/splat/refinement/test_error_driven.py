@@ -200,6 +200,19 @@ def test_light_does_not_cross_an_edge_nor_come_from_empty_pixels():
     assert (got[~covered] == 0).all()
 
 
+def test_light_stays_on_its_facet_and_on_its_step():
+    """Analytic: 30 degrees leave 1e-8 of a weight, a step of 1 m between pixels 0.1 m apart less than 1e-3."""
+    beyond = np.arange(32) >= 13
+    image = np.where(beyond, 3, 1).astype(np.float32) * np.ones((32, 1), np.float32)
+    covered = np.ones((32, 32), bool)
+    position, normal = plane(32, 32)
+    normal[:, :, beyond] = np.array([-0.5, math.sqrt(0.75), 0], np.float32)[:, None, None]
+    np.testing.assert_allclose(from_level(2, image, position, normal, covered), image, rtol=1e-6)
+    position, normal = plane(32, 32)
+    position[1][:, beyond] = 1
+    np.testing.assert_allclose(from_level(2, image, position, normal, covered), image, rtol=1e-3)
+
+
 def test_residuals_are_those_of_the_interpolated_normals():
     """Analytic: none on a plane; a pixel turned by 90 degrees against all around is off by sqrt 2."""
     position, normal = plane(16, 16)

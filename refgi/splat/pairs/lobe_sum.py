@@ -117,17 +117,37 @@ def _add_lights(
             if first < last:
                 low, high = min(low, first), max(high, last)
                 lanes = np.uint64(first * (TILE // PARTS)), np.uint64(last * (TILE // PARTS))
-                _add_light(tile, lanes, lights, k, bounds[LIMIT, k], clamp, widening, reach)
+                add_lobe(tile, lanes, lights, k, bounds[LIMIT, k], clamp, widening, reach)
         if low < high:
             _close_group(tile, (np.uint64(low * (TILE // PARTS)), np.uint64(high * (TILE // PARTS))))
 
 
 @kernel
-def _add_light(
+def add_lobe(
     tile: Array, lanes: Any, lights: Array, k: int, limit: Any, clamp: Clamp, widening: Widening | None,
     reach: Range | None,
 ) -> None:
-    """Add flux s c_x / r^2 of one light to the group's sum; Eq. (3), whose norm is part of the flux."""
+    """Add flux s c_x / r^2 of one light to the group's sum (Eq. 3, whose norm is part of the flux).
+
+    Parameters
+    ----------
+    tile : (ROWS, TILE) ndarray
+        Receivers and their sums.
+    lanes : tuple of 2 unsigned ints
+        First lane and one past the last.
+    lights : (13, N) ndarray
+        Packed lobes, of `pack_lobes`.
+    k : int
+        The light.
+    limit : float
+        Height of the lobe beyond which it counts as 0; not used where it is widened.
+    clamp : Clamp
+        How near pairs are kept finite.
+    widening : Widening or None
+        How exponents fall near the lights.
+    reach : Range or None
+        How far lights reach; None: everywhere.
+    """
     if widening is not None:
         limit = type(limit)(1.0)
     if not _shine(tile, lanes, _light(lights, k), limit, clamp.least, clamp.softness[k], clamp.bound):

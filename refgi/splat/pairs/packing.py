@@ -98,7 +98,7 @@ def pack_diffuse(lights: "PixelLights", settings: PairSettings, dtype: npt.DType
     scale = 1.0 if "sii_no_pi" in settings.as_published else 1.0 / math.pi
     packed = np.concatenate([*_place(lights, settings, chosen), np.asarray(lights.flux[:, chosen], np.float64) * scale])
     packed = np.concatenate([packed, np.zeros((9, 1))], axis=1)
-    return packed.astype(dtype)
+    return packed.astype(dtype, order="C")  # one layout: kernels are compiled once
 
 
 def _place(lights: "PixelLights", settings: PairSettings, chosen: Array) -> tuple[Array, Array]:
@@ -129,7 +129,8 @@ def pack_lobes(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLi
     cos_theta = (np.asarray(lights.normal[:, chosen], np.float64) * axis).sum(axis=0)
     norm = np.empty_like(exponent)
     _fill_norms(cos_theta, exponent, NORMS[settings.lobe_norm], norm)
-    return np.concatenate([*_place(lights, settings, chosen), -axis, exponent[None], flux * norm]).astype(dtype)
+    packed = np.concatenate([*_place(lights, settings, chosen), -axis, exponent[None], flux * norm])
+    return packed.astype(dtype, order="C")
 
 
 @kernel

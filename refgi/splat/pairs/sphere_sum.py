@@ -53,8 +53,8 @@ def sum_spheres(
         for group in range(0, lights.shape[1] - 1, GROUP):
             for k in range(group, min(group + GROUP, lights.shape[1] - 1)):
                 light = lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k]
-                _whole_cones(tile, light, square_radius[k])
-                _cut_cones(tile, light, square_radius[k], size)
+                whole_cones(tile, light, square_radius[k])
+                cut_cones(tile, light, square_radius[k], size)
                 if reach is not None:
                     _weigh(tile, light, reach.square[k], reach.scale[k], reach.outside)
                 for i in range(TILE):
@@ -68,8 +68,18 @@ def sum_spheres(
 
 
 @kernel
-def _whole_cones(tile: Array, light: Any, square_radius: Any) -> None:
-    """Fill row TERM where no horizon cuts the cone, and mark the other receivers in row RATIO."""
+def whole_cones(tile: Array, light: Any, square_radius: Any) -> None:
+    """Fill row TERM where no horizon cuts the cone, and mark the other receivers in row RATIO.
+
+    Parameters
+    ----------
+    tile : (>= RATIO + 1, TILE) ndarray
+        Receivers.
+    light : tuple of 6 floats
+        Position and reversed normal.
+    square_radius : float
+        Of the sphere, m^2.
+    """
     real = tile.dtype.type
     one, zero = real(1.0), real(0.0)
     px, py, pz, lx, ly, lz = light
@@ -90,8 +100,20 @@ def _whole_cones(tile: Array, light: Any, square_radius: Any) -> None:
 
 
 @kernel
-def _cut_cones(tile: Array, light: Any, square_radius: Any, size: int) -> None:
-    """Fill row TERM of the receivers that are marked."""
+def cut_cones(tile: Array, light: Any, square_radius: Any, size: int) -> None:
+    """Fill row TERM of the receivers that are marked.
+
+    Parameters
+    ----------
+    tile : (>= RATIO + 1, TILE) ndarray
+        Receivers, of `whole_cones`.
+    light : tuple of 6 floats
+        Position and reversed normal.
+    square_radius : float
+        Of the sphere, m^2.
+    size : int
+        How many receivers there are.
+    """
     real = tile.dtype.type
     px, py, pz, lx, ly, lz = light
     for i in range(size):

@@ -12,10 +12,10 @@ import numpy.typing as npt
 from refgi.jit import kernel
 from refgi.splat.pairs.lobe_culling import LIMIT, bound_lobes
 from refgi.splat.pairs.lobe_shape import Widening
-from refgi.splat.pairs.lobe_sum import _add_light
+from refgi.splat.pairs.lobe_sum import add_lobe
 from refgi.splat.pairs.packing import Packed
 from refgi.splat.pairs.pair_sum import NX, ROWS, SUM, Clamp, X, clamped_term, geometry_term
-from refgi.splat.pairs.sphere_sum import TERM, _cut_cones, _whole_cones
+from refgi.splat.pairs.sphere_sum import TERM, cut_cones, whole_cones
 
 Array = npt.NDArray[Any]
 
@@ -84,7 +84,7 @@ def light_tile(
         _add_diffuse(tile, size, lights.diffuse, diffuse, clamp, spheres)
     if lobe_clamp is not None and lobe >= 0:
         lanes = np.uint64(0), np.uint64(size)
-        _add_light(tile, lanes, lights.lobes, lobe, lights.limits[lobe], lobe_clamp, widening, None)
+        add_lobe(tile, lanes, lights.lobes, lobe, lights.limits[lobe], lobe_clamp, widening, None)
 
 
 @kernel
@@ -93,8 +93,8 @@ def _add_diffuse(tile: Array, size: int, lights: Array, k: int, clamp: Clamp | N
     x, y, z, lx, ly, lz = lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k]
     red, green, blue = lights[6, k], lights[7, k], lights[8, k]
     if spheres is not None:
-        _whole_cones(tile, (x, y, z, lx, ly, lz), spheres[k])
-        _cut_cones(tile, (x, y, z, lx, ly, lz), spheres[k], size)
+        whole_cones(tile, (x, y, z, lx, ly, lz), spheres[k])
+        cut_cones(tile, (x, y, z, lx, ly, lz), spheres[k], size)
     else:
         for i in range(size):
             dx, dy, dz = x - tile[X, i], y - tile[X + 1, i], z - tile[X + 2, i]

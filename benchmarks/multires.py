@@ -22,7 +22,6 @@ from refgi.splat.refinement.evaluate import at_subsplats, evaluate
 from refgi.splat.refinement.grid import top_level
 from refgi.splat.refinement.refine import refine
 from refgi.splat.refinement.upsample import upsample
-from refgi.stages import Memory, observe
 
 DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 STAND_INS = {"dragon_bunny": "atrium:faces=405000", "flying_bunnies": "atrium:faces=417000,seed=2",
@@ -50,13 +49,11 @@ def _scene(name: str) -> Scene:
 
 def _frames(name: str, size: int, repeats: int, paper: int) -> Iterator[Row]:
     """Frames a second with light and camera moving, and what of a frame is the method's own."""
-    scene, memory, moves = _scene(name), Memory(), iter(range(1, 1000))
-    settings = MultiresSettings()
+    scene, settings, moves = _scene(name), MultiresSettings(), iter(range(1, 1000))
 
     def frame() -> None:
-        with observe(memory=memory):
-            moved = Frame(_moved(scene, 1e-4 * next(moves)), width=size, height=size)
-            moved.radiance(multires(moved, settings))
+        moved = Frame(_moved(scene, 1e-4 * next(moves)), width=size, height=size)
+        moved.radiance(multires(moved, settings))
 
     whole = seconds(frame, repeats)
     yield Row(f"{name}: light and camera move", 1 / whole, "frames/s", f">= {2 * paper}", f"paper {paper}")

@@ -21,6 +21,7 @@ from refgi.splat.refinement.per_light import per_light
 from refgi.splat.refinement.refine import refine
 from refgi.splat.refinement.upsample import upsample
 from refgi.splat.refinement.visible import evaluate_visible
+from refgi.splat.settings import PairSettings
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -39,6 +40,15 @@ CHOICES: dict[str, Any] = {
     "refinement": Refinement, "per_light": PerLight, "threshold_form": Threshold, "upsampling": Upsampling,
     "representative": Literal["pixel", "mean"], "visibility": Literal["none", "rays"]}
 THRESHOLDS = ("depth_threshold", "derivative_threshold", "normal_threshold", "curvature_threshold", "light_threshold")
+# settings and printed forms that a mode would not heed: pairs with rays are those of `vpl`, an error sets its own cells
+UNHEEDED = {
+    "visibility": (("clamp", "offset", "lobe_norm", "widening", "representative", "per_light", "target_error"),
+                   PairSettings.SWITCHES),
+    "target_error": (("finest", "criteria", *THRESHOLDS, "normal_components", "curvature", "rim", "diagonal",
+                      "refinement", "per_light", "threshold_form", "representative", "upsampling"),
+                     {"ams_rho_in_splat", "ams_filter_all"}),
+    "per_light": ((), {"ams_rho_in_splat"}),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,18 +111,19 @@ class MultiresSettings(LightSettings):
         expect(0 <= self.detail <= 1, "detail", "a share from 0 to 1", self.detail)
         expect(self.target_error is None or (math.isfinite(self.target_error) and self.target_error > 0),
                "target_error", "none or a share of the mean above 0", self.target_error)
-        self._expect_together()
+        self._expect_heeded()
 
-    def _expect_together(self) -> None:
-        by_rays = self.visibility == "rays"
-        expect(not by_rays or self.clamp == "none", "visibility", f"'none' with the clamp {self.clamp!r}", "rays")
-        for special in ("per_light", "target_error"):
-            unused = getattr(self, special) in ("shared", None)
-            expect(unused or not by_rays, "visibility", f"'none' with {special}", self.visibility)
-            expect(unused or "ams_rho_in_splat" not in self.as_published, "as_published",
-                   f"no 'ams_rho_in_splat' with {special}", sorted(self.as_published))
-        expect(self.target_error is None or self.per_light == "shared", "per_light", "'shared' with target_error",
-               self.per_light)
+    def _expect_heeded(self) -> None:
+        left = {field.name: field.default for field in dataclasses.fields(self)}
+        for mode, (keys, switches) in UNHEEDED.items():
+            chosen = getattr(self, mode)
+            if chosen == left[mode]:
+                continue
+            for key in keys:
+                expect(getattr(self, key) == left[key], key, f"{left[key]!r} with {mode} {chosen!r}",
+                       getattr(self, key))
+            expect(self.as_published.isdisjoint(switches), "as_published",
+                   f"none of {sorted(switches)} with {mode} {chosen!r}", sorted(self.as_published))
         expect(self.clamp == "disc" or "ams_disc" not in self.as_published, "as_published",
                "'ams_disc' with the clamp 'disc' alone", sorted(self.as_published))
 
@@ -144,6 +155,7 @@ def _indirect(
     frame: "Frame", buffer: "GBuffer", lights: "PixelLights", footprint: Array | None, settings: MultiresSettings
 ) -> Array:
     """Light the pixels of one buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
+    buffer.resolve("depth", "position", "normal")  # in one pass
     if settings.target_error is not None:
         light = error_driven(buffer, lights, settings, footprint).irradiance
     elif settings.per_light == "light":

@@ -17,13 +17,13 @@ from refgi.splat.refinement.grid import representatives
 from refgi.stages import observe
 
 DEMO_CLAMP = {"clamp": "distance", "clamp_value": math.sqrt(0.2)}  # r^2 >= 0.2 in the demo's unit
-# relative RMSE that each mode keeps below at 61 x 45: geometry does not say where light bends, and cells of 4 pixels of 61
-# miss its bends near the corners; naive modes add blocks, and halos of the size of the light itself
+# relative RMSE that each mode keeps below at 61 x 45: geometry does not say where light bends, and cells of 4 pixels of
+# 61 miss its bends near the corners; naive modes add blocks, and halos of the size of the light itself
 FLOORS = {"tent": 0.10, "demo": 0.10, "nearest": 0.15, "naive_bilinear": 1.0}
 
 
 def frame(name="cornell_box", width=61, height=45, **options):
-    return Frame(load_scene(name), width=width, height=height, rsm_resolution=options.pop("rsm_resolution", 64), **options)
+    return Frame(load_scene(name), width=width, height=height, **{"rsm_resolution": 64} | options)
 
 
 def full_sum(at, settings):
@@ -159,6 +159,10 @@ def test_settings_are_checked():
                    {"representative": "corner"}, {"visibility": "map"}, {"upsampling": "cubic"}, {"detail": 1.5},
                    {"target_error": 0}, {"target_error": math.inf}, {"lights": 0}, {"pattern": "spiral"},
                    {"visibility": "rays", "clamp": "disc"}, {"visibility": "rays", "target_error": 0.1},
+                   {"visibility": "rays", "offset": 0.1}, {"visibility": "rays", "representative": "mean"},
+                   {"visibility": "rays", "as_published": {"sii_no_pi"}}, {"target_error": 0.1, "rim": 1},
+                   {"target_error": 0.1, "criteria": {"depth"}}, {"target_error": 0.1, "normal_threshold": 1},
+                   {"target_error": 0.1, "as_published": {"ams_filter_all"}},
                    {"per_light": "light", "target_error": 0.1}, {"as_published": {"ams_luck"}},
                    {"as_published": {"ams_disc"}}, {"as_published": {"ams_rho_in_splat"}, "per_light": "light"}):
         with pytest.raises(InputError, match=next(iter(change))):

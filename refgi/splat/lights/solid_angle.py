@@ -38,7 +38,7 @@ def with_equal_solid_angles(rsm: "Rsm") -> "Rsm":
 
     exact = rsm.solid_angle
     inside = incident_flux(rsm.light, rsm.projection, exact, exact.dtype).any(axis=0)
-    mean = exact.sum(dtype=np.float64) / max(1, np.count_nonzero(inside))
+    mean = exact[inside].sum(dtype=np.float64) / max(1, np.count_nonzero(inside))
     equal = np.where(inside, mean, exact).astype(exact.dtype)
     factor = np.divide(equal, exact, out=np.zeros_like(exact), where=inside)
     lobe = None if rsm.lobe_flux is None else rsm.lobe_flux * factor

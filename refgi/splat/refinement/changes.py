@@ -74,7 +74,7 @@ def curvatures(normal: Array, position: Array, covered: Array, top: int, rate: b
 
     Notes
     -----
-    Eq. 1, 2 sin(arccos(N1 . N2) / 2), is the chord |N1 - N2| and computed as that: the arc cosine has no digits near 0
+    Eq. 1, 2 sin(arccos(N1 . N2) / 2), is the length of N1 - N2 and computed as that: the arc cosine has no digits near 0
     and no value where rounding makes the product exceed 1.
     """
     sizes, rows, values = _room(normal[0], top)

@@ -24,7 +24,7 @@ Mode = Literal["tent", "demo", "nearest", "naive_bilinear"]
 FEW_TEXELS = 1 << 16  # of a level, that one thread fills before others are awake
 
 
-@stage("splat.upsample", kept=False)
+@stage("splat.upsample")
 def upsample(
     values: Array, subsplats: Subsplats, covered: Array, mode: Mode = "tent", *, filter_all: bool = False,
     corner_rule: bool = True,

@@ -139,7 +139,8 @@ def error_driven(
         if found.high <= target:
             break
         threshold *= min(max(0.9 * target / found.high, 0.3), 0.8)
-    subsplats = refine(trial.split, covered, dataclasses.replace(settings, diagonal="off", refinement="single_pass"))
+    as_chosen = dataclasses.replace(settings, target_error=None, diagonal="off", refinement="single_pass")
+    subsplats = refine(trial.split, covered, as_chosen)
     count = lights.flux.shape[1]
     return ErrorDriven(picture, subsplats, *found, threshold, trials, int(known.has.sum()) * count + near_pairs,
                        int(covered.sum()) * count)

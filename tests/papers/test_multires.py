@@ -106,6 +106,14 @@ def test_the_list_of_figure_5_adds_up(figures, evidence):
     evidence("Fig. 5 at 32 x 32, in the list pass by pass: " + ", ".join(str(row[0]) for row in rows))
 
 
+def test_the_levels_of_figure_5_make_the_picture(figures):
+    """Every pixel is shown at exactly one level, with its subsplat's light."""
+    planes = {picture.name: sum(picture.planes.values()) for picture in figures["fig5"].pictures}
+    levels = [plane for name, plane in planes.items() if name.startswith("level") and name != "levels"]
+    assert (sum((plane > 0).astype(int) for plane in levels) == (planes["blocks"] > 0)).all()
+    np.testing.assert_allclose(sum(levels), planes["blocks"], rtol=1e-6)  # a float32 sum of three
+
+
 @pytest.mark.feature("AMS-11")
 def test_the_tent_is_nearest_to_every_pixel(figures, evidence):
     off = {name: row["RMSE"] for name, row in table(figures["fig7"]).items()}

@@ -42,11 +42,10 @@ def figure5(bench: "Workbench") -> Figure:
     covered, subsplats = frame.gbuffer.covered, subsplats_of(frame, settings)
     exposure = pictures.exposure_of(full_sum(frame, settings), covered)
     blocks = _blocks(frame, settings, subsplats)
-    level = np.asarray(level_picture(subsplats))
-    shown = [_left_at(subsplats, level, n, blocks, exposure) for n in range(subsplats.top, -1, -1)]
+    shown = [_left_at(subsplats, n, blocks, exposure) for n in range(subsplats.top, -1, -1)]
     shown += [
-        pictures.mapped("levels", "all levels", "dark: coarse; light: single pixels", level.astype(np.float32), covered,
-                        Scale(0.0, float(max(1, subsplats.top)), "viridis_r", "level")),
+        pictures.mapped("levels", "all levels", "dark: coarse; light: single pixels", level_picture(subsplats), covered,
+                        Scale(0.0, 1.0, "viridis", "level")),
         pictures.indirect("blocks", "their sum", "one value a subsplat", blocks, exposure),
         pictures.indirect("upsampled", "interpolated", "what the method shows", multires(frame, settings), exposure,
                           settings)]
@@ -65,13 +64,14 @@ def figure5(bench: "Workbench") -> Figure:
         notes=_notes(rows, share))
 
 
-def _left_at(subsplats: Subsplats, level: Array, number: int, blocks: Array, exposure: float) -> Picture:
+def _left_at(subsplats: Subsplats, level: int, blocks: Array, exposure: float) -> Picture:
     """Show the irradiance of one level's subsplats, black elsewhere."""
-    count = int(subsplats.counts[number])
-    grey = np.where(level == number, blocks.mean(axis=0), 0)
-    side = 1 << number
+    count, side = int(subsplats.counts[level]), 1 << level
+    height, width = subsplats.shape
+    here = subsplats.leaf[level].repeat(side, axis=0).repeat(side, axis=1)[:height, :width]
+    grey = np.where(here, blocks.mean(axis=0), 0)
     said = "single pixels" if side == 1 else f"{side} by {side} pixels each"
-    return pictures.indirect(f"level{number}", f"{count} subsplats", said, np.repeat(grey[None], 3, axis=0), exposure)
+    return pictures.indirect(f"level{level}", f"{count} subsplats", said, np.repeat(grey[None], 3, axis=0), exposure)
 
 
 def _blocks(frame: "Frame", settings: MultiresSettings, subsplats: Subsplats) -> Array:

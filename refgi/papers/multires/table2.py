@@ -131,6 +131,7 @@ def _notes(bench: "Workbench", seconds: dict[str, float], counts: dict[Key, int]
         f"{max(PAPER[128]) / min(PAPER[128]):.2f}). Triangles cost time to rasterize on this machine's cores, whatever "
         f"is lit; subsplats, {min(lit)} to {max(lit)} of them, cost the rest.",
         f"Frames per second here are {min(rates):.0f} to {max(rates):.0f} at {LARGE * bench.scale.size}², the paper's "
-        f"{min(paper)} to {max(paper)} at {PAPER_SIZE}² on a graphics processor of 2008. Over all {len(pairs)} entries time and number "
-        f"of subsplats have a correlation of {fit:.2f}: where it is low, what does not depend on subsplats leads.",
+        f"{min(paper)} to {max(paper)} at {PAPER_SIZE}² on a graphics processor of 2008.",
+        f"Over all {len(pairs)} entries time and number of subsplats have a correlation of {fit:.2f}: where it is low, "
+        "what does not depend on subsplats leads.",
     )

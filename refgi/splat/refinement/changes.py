@@ -74,8 +74,8 @@ def curvatures(normal: Array, position: Array, covered: Array, top: int, rate: b
 
     Notes
     -----
-    Eq. 1, 2 sin(arccos(N1 . N2) / 2), is the length of N1 - N2 and computed as that: the arc cosine has no digits near 0
-    and no value where rounding makes the product exceed 1.
+    Eq. 1, 2 sin(arccos(N1 . N2) / 2), is the length of N1 - N2 and computed as that: the arc cosine has no digits near
+    0 and no value where rounding makes the product exceed 1.
     """
     sizes, rows, values = _room(normal[0], top)
     _build_curvatures(np.ascontiguousarray(normal), np.ascontiguousarray(position), np.ascontiguousarray(covered),

@@ -135,8 +135,7 @@ def _usable(folder: Path) -> Path:
 def _key(module: str) -> str:
     digest = hashlib.sha256(_platform_key().encode())
     for name in sorted(_sources_of(module)):
-        path = _source_path(name)
-        digest.update(name.encode() + b"\0" + (path.read_bytes() if path else b""))
+        digest.update(name.encode() + b"\0" + _source(name))
     return f"{module.rpartition('.')[2]}-{digest.hexdigest()[:16]}"
 
 
@@ -159,6 +158,13 @@ def _source_path(module: str) -> Path | None:
     return next((path for path in candidates if path.is_file()), None)
 
 
+@cache
+def _source(module: str) -> bytes:
+    """Return a module's source as it was when first asked for: what runs does not follow a file edited since."""
+    path = _source_path(module)
+    return path.read_bytes() if path else b""
+
+
 def _sources_of(module: str) -> set[str]:
     """Return `module` and every module of its package that it imports, directly or not."""
     found: set[str] = set()
@@ -173,11 +179,8 @@ def _sources_of(module: str) -> set[str]:
 
 @cache
 def _imports(module: str, package: str) -> tuple[str, ...]:
-    path = _source_path(module)
-    if path is None:
-        return ()
     names = set()
-    for plain, parent, members in IMPORT.findall(path.read_text(encoding="utf-8")):
+    for plain, parent, members in IMPORT.findall(_source(module).decode()):
         names |= {plain or parent, *(f"{parent}.{member}" for member in re.findall(r"\w+", members) if parent)}
     return tuple(name for name in names if name.partition(".")[0] == package and _source_path(name))
 

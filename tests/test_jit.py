@@ -52,6 +52,19 @@ def test_a_changed_import_recompiles_the_caller(package):
     assert run(package) == "7.0 0"
 
 
+def test_a_caller_imported_after_an_edit_does_not_pass_for_the_edited_one(package):
+    code = """\
+        import package_a.inner, pathlib
+        inner = pathlib.Path(package_a.inner.__file__)
+        inner.write_text(inner.read_text().replace("1.0", "2.0"))
+        import package_a.outer as o
+        o.outer(1.5)
+        """
+    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
+    subprocess.run([sys.executable, "-c", textwrap.dedent(code)], env=environment, check=True)
+    assert run(package) == "7.0 0"
+
+
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
 @pytest.mark.parametrize("damage", [b"", b"\x80\x05garbage"])
 def test_a_damaged_cache_is_dropped_and_rebuilt(package, suffix, damage):

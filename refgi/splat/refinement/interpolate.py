@@ -10,7 +10,10 @@ as at half resolution, but sharper: facets a few degrees apart must not mix at a
 agrees with takes the plain tent.
 
 How well the normal itself is interpolated says, before any light is known, where light cannot be: without visibility, E
-is a smooth function of position and normal. `residuals` adds that up over all pixels of each cell.
+is a smooth function of position and normal. The squares of what it misses are added up over all pixels of each cell.
+
+Coarser cells are the SIMD lanes. The four finer cells of each, its *children*, are seen to one after the other: child
+2 v + u lies below (v = 1) and to the right (u = 1), so that its neighbours lie to that side.
 
 Symbols: x, n position and normal of the finer cell's pixel, x_k, n_k those of a coarser neighbour.
 """
@@ -22,177 +25,188 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel, prange
+from refgi.jit import kernel, prange, threads
+from refgi.rsm.memory import plane
+from refgi.splat.refinement.levels import Level
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
 LEAST_AGREEMENT = 1e-12  # of 1; leaves the plain tent where nothing agrees
+LANES = 128  # coarser cells a thread works on at once
+ROWS = 22
+OWN, OTHER, WEIGHT, TOTAL, MADE = 0, 7, 14, 18, 19  # first rows of a tile: x, n and whether there is a surface, ...
 
 
 class Blend(NamedTuple):
-    """How each cell of a level is made of the coarser level."""
+    """How the cells of a level are made of the coarser level."""
 
-    weight: Array  # (4, h_l, w_l), of the parent, its neighbours in column, row and both; sums to 1, or 0 where empty
-    residual: Array  # (h_l, w_l), square of the error of the interpolated normal
+    weight: Array  # (16, h_l+1, w_l+1): 4 child + corner; corners: the parent, its neighbours in column, row and both
+    across: Array  # (2,) the tent's share of a neighbour for even and odd cells; weights of those with 0 are not filled
+    rest: Array  # (h_l+1, w_l+1), squares of the error of the interpolated normal, over all pixels of each coarser cell
 
 
 @stage("splat.blends")
-def blends(position: Array, normal: Array, places: tuple[Array, ...]) -> tuple[Blend, ...]:
+def blends(levels: tuple[Level, ...]) -> tuple[Blend, ...]:
     """Weigh the coarser neighbours of every cell.
 
     Parameters
     ----------
-    position, normal : (3, h, w) ndarray
-        World space, m, and unit vectors.
-    places : tuple of (h_l, w_l) ndarray
-        The pixel that stands for each cell, of `representatives`.
+    levels : tuple of Level
+        Surfaces, from level 0.
 
     Returns
     -------
     tuple of Blend
-        For every level but the coarsest.
+        For every level but the coarsest. Weights of a cell sum to 1, or 0 where it is empty.
     """
-    flat_position, flat_normal = (np.ascontiguousarray(plane).reshape(3, -1) for plane in (position, normal))
     made: list[Blend] = []
-    for here, above in itertools.pairwise(places):
-        blend = Blend(np.zeros((4, *here.shape), position.dtype), np.zeros(here.shape, position.dtype))
-        across = np.array([0.25, 0.25] if made else [0.5, 0.0], position.dtype)
-        _weigh(flat_position, flat_normal, here, above, across, blend.weight, blend.residual)
+    for fine, coarse in itertools.pairwise(levels):
+        real = fine.position.dtype
+        across = np.array([0.25, 0.25] if made else [0.5, 0.0], real)
+        blend = Blend(plane((16, *coarse.covered.shape), real), across, plane(coarse.covered.shape, real))
+        below = made[-1].rest if made else np.zeros((0, 0), real)
+        with threads(fine.crew):
+            _weigh(fine[:3], coarse[:3], across, below, 4.0 ** len(made), blend.weight, blend.rest)
         made.append(blend)
     return tuple(made)
 
 
-def residuals(made: tuple[Blend, ...], coarsest: tuple[int, int]) -> tuple[Array, ...]:
-    """Add up, for every cell, what stopping there does to the normals of its pixels.
+@kernel(parallel=True)
+def _weigh(
+    fine: Any, coarse: Any, across: Array, below: Array, pixels: float, weight: Array, rest: Array
+) -> None:
+    for i in prange(rest.shape[0]):
+        rest[i] = 0
+        for first in range(0, rest.shape[1], LANES):
+            for child in range(4):
+                if 2 * i + (child >> 1) < fine[2].shape[0]:
+                    _weigh_child(fine, coarse, across, below, pixels, child, i, first, weight, rest)
+
+
+@kernel
+def tent_of(across: Array, child: int, corner: int) -> Any:
+    """Return the plain tent's weight of a corner for a child.
 
     Parameters
     ----------
-    made : tuple of Blend
-        Of all levels but the coarsest.
-    coarsest : tuple of 2 ints
-        Cells of the coarsest level.
+    across : (2,) ndarray
+        Of a `Blend`.
+    child, corner : int
+        0 to 3 each.
 
     Returns
     -------
-    tuple of (h_l, w_l) ndarray
-        Sums of squares over a cell's pixels, for levels 0 (all 0) to the coarsest.
+    float
+        0 where the weights of a `Blend` are not filled.
     """
-    sums = [np.zeros(made[0].residual.shape if made else coarsest, made[0].residual.dtype if made else np.float32)]
-    for level, blend in enumerate(made):
-        shape = made[level + 1].residual.shape if level + 1 < len(made) else coarsest
-        above = np.zeros(shape, blend.residual.dtype)
-        _collect(blend.residual, sums[level], 4.0**level, above)
-        sums.append(above)
-    return tuple(sums)
-
-
-@kernel(parallel=True)
-def _weigh(
-    position: Array, normal: Array, here: Array, above: Array, across: Array, weight: Array, residual: Array
-) -> None:
-    for i in prange(here.shape[0]):
-        for j in range(here.shape[1]):
-            if here[i, j] >= 0:
-                _weigh_cell(position, normal, here, above, across, weight, residual, i, j)
+    one = across.dtype.type(1.0)
+    down, right = across[child >> 1], across[child & 1]
+    return (down if corner >> 1 else one - down) * (right if corner & 1 else one - right)
 
 
 @kernel
-def _weigh_cell(
-    position: Array, normal: Array, here: Array, above: Array, across: Array, weight: Array, residual: Array, i: int,
-    j: int,
+def _weigh_child(
+    fine: Any, coarse: Any, across: Array, below: Array, pixels: float, child: int, i: int, first: int, weight: Array,
+    rest: Array,
 ) -> None:
-    real = position.dtype.type
-    p, total = here[i, j], real(0.0)
-    nx, ny, nz = real(0.0), real(0.0), real(0.0)
+    """Weigh the neighbours of one child of each of LANES cells."""
+    v, u = child >> 1, child & 1
+    tile = np.zeros((ROWS, LANES), rest.dtype)
+    _load(fine, 2 * i + v, 2 * first + u, 2, tile[OWN : OWN + 7])
     for corner in range(4):
-        row, column = (i >> 1) + (corner >> 1) * (2 * (i & 1) - 1), (j >> 1) + (corner & 1) * (2 * (j & 1) - 1)
-        vertical = across[i & 1] if corner >> 1 else real(1.0) - across[i & 1]
-        tent = vertical * (across[j & 1] if corner & 1 else real(1.0) - across[j & 1])
-        if tent == real(0.0) or not (0 <= row < above.shape[0] and 0 <= column < above.shape[1]):
-            continue
-        q = above[row, column]
-        if q < 0:
-            continue
-        share = tent * (_agreement(position, normal, p, q) + real(LEAST_AGREEMENT))
-        weight[corner, i, j] = share
-        total += share
-        nx, ny, nz = nx + share * normal[0, q], ny + share * normal[1, q], nz + share * normal[2, q]
+        tent = tent_of(across, child, corner)
+        if tent > 0:
+            _load(coarse, i + (corner >> 1) * (2 * v - 1), first + (corner & 1) * (2 * u - 1), 1,
+                  tile[OTHER : OTHER + 7])
+            _share(tile, tent, corner)
     for corner in range(4):
-        weight[corner, i, j] /= total
-    nx, ny, nz = nx / total - normal[0, p], ny / total - normal[1, p], nz / total - normal[2, p]
-    residual[i, j] = nx * nx + ny * ny + nz * nz
+        if tent_of(across, child, corner) > 0:
+            _normalise(tile[WEIGHT + corner], tile[TOTAL], weight[4 * child + corner, i, first : first + LANES])
+    _add_rest(tile, below, rest.dtype.type(pixels), child, i, first, rest)
 
 
 @kernel
-def _agreement(position: Array, normal: Array, p: int, q: int) -> Any:
-    """Return a of pixel q for pixel p."""
-    real = position.dtype.type
+def _load(surface: Any, row: int, column: int, step: int, rows: Array) -> None:
+    """Copy every `step`-th cell of a row, from a column on; nothing is there outside."""
+    position, normal, covered = surface
+    height, width = covered.shape
+    inside = 0 <= row < height
+    begin = 1 if column < 0 else 0
+    end = max(begin, min(LANES, (width - column + step - 1) // step)) if inside else begin
+    rows[6] = 0
+    if begin < end:
+        first = column + step * begin
+        _copy(covered[row, first:], step, rows[6, begin:end])
+        for c in range(3):
+            _copy(position[c, row, first:], step, rows[c, begin:end])
+            _copy(normal[c, row, first:], step, rows[3 + c, begin:end])
+
+
+@kernel
+def _copy(cells: Array, step: int, row: Array) -> None:
+    if step == 1:
+        for k in range(len(row)):
+            row[k] = cells[k]
+    else:
+        for k in range(len(row)):
+            row[k] = cells[2 * k]
+
+
+@kernel
+def _share(tile: Array, tent: Any, corner: int) -> None:
+    """Weigh one neighbour of each cell, without branches."""
+    real = type(tent)
     zero, one = real(0.0), real(1.0)
-    dx, dy, dz = position[0, q] - position[0, p], position[1, q] - position[1, p], position[2, q] - position[2, p]
-    nx, ny, nz = normal[0, p], normal[1, p], normal[2, p]
-    cosine = nx * normal[0, q] + ny * normal[1, q] + nz * normal[2, q]
-    if cosine <= zero:
-        return zero
-    square = dx * dx + dy * dy + dz * dz
-    sine = abs(dx * nx + dy * ny + dz * nz) / math.sqrt(square) if square > zero else zero
-    flat = one - (sine if sine < one else one)
-    power = (cosine if cosine < one else one)
-    for _ in range(7):
-        power *= power
-    flat *= flat
-    return power * (flat * flat)
+    for k in range(LANES):
+        nx, ny, nz = tile[OWN + 3, k], tile[OWN + 4, k], tile[OWN + 5, k]
+        mx, my, mz = tile[OTHER + 3, k], tile[OTHER + 4, k], tile[OTHER + 5, k]
+        dx, dy, dz = tile[OTHER, k] - tile[OWN, k], tile[OTHER + 1, k] - tile[OWN + 1, k], (
+            tile[OTHER + 2, k] - tile[OWN + 2, k])
+        square = dx * dx + dy * dy + dz * dz
+        away = dx * nx + dy * ny + dz * nz
+        sine = math.sqrt(away * away / (square if square > zero else one))
+        flat = one - (sine if sine < one else one)
+        power = nx * mx + ny * my + nz * mz
+        power = power if power > zero else zero
+        power = power if power < one else one
+        power = power * power  # unrolled: a loop in here would keep the lanes apart
+        power = power * power
+        power = power * power
+        power = power * power
+        power = power * power
+        power = power * power
+        power = power * power
+        flat = flat * flat
+        share = tent * (power * (flat * flat) + real(LEAST_AGREEMENT)) * (tile[OWN + 6, k] * tile[OTHER + 6, k])
+        tile[WEIGHT + corner, k] = share
+        tile[TOTAL, k] += share
+        tile[MADE, k] += share * mx
+        tile[MADE + 1, k] += share * my
+        tile[MADE + 2, k] += share * mz
 
 
-@kernel(parallel=True)
-def _collect(residual: Array, below: Array, pixels: float, above: Array) -> None:
-    height, width = residual.shape
-    scale = residual.dtype.type(pixels)
-    for i in prange(above.shape[0]):
-        for j in range(above.shape[1]):
-            for y in range(2 * i, min(2 * i + 2, height)):
-                for x in range(2 * j, min(2 * j + 2, width)):
-                    above[i, j] += scale * residual[y, x] + below[y, x]
+@kernel
+def _normalise(share: Array, total: Array, weight: Array) -> None:
+    zero = share.dtype.type(0.0)
+    for k in range(len(weight)):
+        weight[k] = share[k] / total[k] if total[k] > zero else zero
 
 
-@kernel(parallel=True)
-def descend(
-    coarse: Array, weight: Array, known: Array, place: Array, values: Array, fine: Array, surplus: Array
-) -> None:
-    """Fill a level: with light where it is known, elsewhere with what the coarser level makes of it.
-
-    Parameters
-    ----------
-    coarse : (3, h_l+1, w_l+1) ndarray
-        The coarser level.
-    weight : (4, h_l, w_l) ndarray
-        Of the level's `Blend`.
-    known : (h_l, w_l) ndarray of bool
-        Cells whose light is known.
-    place : (h_l, w_l) ndarray
-        The pixel that stands for each.
-    values : (3, n) ndarray
-        Light of pixels, where known.
-    fine : (3, h_l, w_l) ndarray
-        Filled; zeros before.
-    surplus : (h_l, w_l) ndarray
-        Filled with the square of what known cells differ by from their interpolation, all channels; 0 elsewhere.
-    """
-    real = fine.dtype.type
-    height, width = coarse.shape[1:]
-    for i in prange(fine.shape[1]):
-        up, down = i >> 1, min(max((i >> 1) + 2 * (i & 1) - 1, 0), height - 1)
-        for j in range(fine.shape[2]):
-            left, right = j >> 1, min(max((j >> 1) + 2 * (j & 1) - 1, 0), width - 1)
-            surplus[i, j] = real(0.0)
-            if place[i, j] < 0:
-                continue
-            a, b, c, d = weight[0, i, j], weight[1, i, j], weight[2, i, j], weight[3, i, j]
-            for channel in range(3):
-                made = ((a * coarse[channel, up, left] + b * coarse[channel, up, right])
-                        + (c * coarse[channel, down, left] + d * coarse[channel, down, right]))
-                if known[i, j]:
-                    value = values[channel, place[i, j]]
-                    surplus[i, j] += (value - made) * (value - made)
-                    made = value
-                fine[channel, i, j] = made
+@kernel
+def _add_rest(tile: Array, below: Array, pixels: Any, child: int, i: int, first: int, rest: Array) -> None:
+    """Add what stopping at the coarser cells does to the normals of the pixels of one child of each."""
+    zero, one = type(pixels)(0.0), type(pixels)(1.0)
+    for k in range(LANES):
+        there = tile[TOTAL, k] > zero
+        scale = one / (tile[TOTAL, k] if there else one)
+        x = tile[MADE, k] * scale - tile[OWN + 3, k]
+        y = tile[MADE + 1, k] * scale - tile[OWN + 4, k]
+        z = tile[MADE + 2, k] * scale - tile[OWN + 5, k]
+        tile[MADE, k] = pixels * (x * x + y * y + z * z) if there else zero
+    for k in range(min(LANES, rest.shape[1] - first)):
+        rest[i, first + k] += tile[MADE, k]
+    if below.size:
+        column = 2 * first + (child & 1)
+        for k in range(min(LANES, (below.shape[1] - column + 1) // 2)):
+            rest[i, first + k] += below[2 * i + (child >> 1), column + 2 * k]

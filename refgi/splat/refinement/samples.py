@@ -54,44 +54,61 @@ def stratified(covered: Array, seed: int) -> Samples:
     return Samples(pixel[drawn], count[drawn] / max(1.0, count.sum()))
 
 
-def estimate(samples: Samples, light: Array, exact: Array, mean: float) -> Estimate:
+def mean_of(samples: Samples, exact: Array) -> tuple[float, float]:
+    """Estimate the mean of the full sum.
+
+    Parameters
+    ----------
+    samples : Samples
+        Where it is known.
+    exact : (3, n) ndarray
+        Irradiance there, W/m^2.
+
+    Returns
+    -------
+    mean, error : float
+        Over covered pixels and channels, and three standard errors of it, W/m^2.
+
+    Notes
+    -----
+    Neighbouring strata stand in for two draws from one, which overestimates the standard error where light changes.
+    """
+    light = exact.mean(axis=0, dtype=np.float64)
+    steps = np.diff(light, append=light[:1])
+    return (float((samples.share * light).sum()),
+            DEVIATIONS * math.sqrt(float((samples.share**2 * steps**2).sum()) / 2))
+
+
+def estimate(samples: Samples, missed: Array, mean: tuple[float, float]) -> Estimate:
     """Estimate the relative RMSE of a picture, with bounds of three standard errors.
 
     Parameters
     ----------
     samples : Samples
         Where the picture was compared.
-    light, exact : (3, n) ndarray
-        Irradiance there, of the picture and of the full sum, W/m^2.
-    mean : float
-        Mean irradiance of the picture over covered pixels and channels, W/m^2.
+    missed : (3, n) ndarray
+        What it differs by from the full sum there, W/m^2.
+    mean : tuple of 2 floats
+        Of `mean_of`.
 
     Returns
     -------
     Estimate
-        0 where all is dark.
+        0 where nothing differs.
 
     Notes
     -----
-    The full sum's mean is the picture's plus that of the difference at the samples, which varies far less than light.
-    Strata are taken for independent draws, which overestimates the standard errors. Errors are rare and large along
+    Strata are taken for independent draws, which overestimates the standard error. Errors are rare and large along
     edges, so the upper bound also takes as much of what was not drawn as three more of the worst sample.
     """
-    difference = exact.astype(np.float64) - light
-    square, offset = (difference**2).mean(axis=0), difference.mean(axis=0)
-    (mse, mse_error), (shift, shift_error) = (_weighted(samples.share, values) for values in (square, offset))
+    square = samples.share * (missed.astype(np.float64) ** 2).mean(axis=0)
+    mse = float(square.sum())
     if mse == 0:
         return Estimate(0.0, 0.0, 0.0)
-    brightest, darkest = mean + shift + shift_error, mean + shift - shift_error
-    unseen = UNSEEN * float((samples.share * square).max())
-    high = math.sqrt(mse + mse_error + unseen) / darkest if darkest > 0 else math.inf
-    return Estimate(math.sqrt(mse) / max(mean + shift, 1e-300), math.sqrt(max(mse - mse_error, 0.0)) / brightest, high)
-
-
-def _weighted(share: Array, values: Array) -> tuple[float, float]:
-    """Return a weighted mean and `DEVIATIONS` of its standard errors."""
-    mean = float(share @ values)
-    return mean, DEVIATIONS * math.sqrt(float(share**2 @ (values - mean) ** 2))
+    spread = DEVIATIONS * math.sqrt(float(((square - samples.share * mse) ** 2).sum()))
+    light, doubt = mean
+    high = math.sqrt(mse + spread + UNSEEN * float(square.max())) / (light - doubt) if light > doubt else math.inf
+    return Estimate(math.sqrt(mse) / max(light, 1e-300), math.sqrt(max(mse - spread, 0.0)) / (light + doubt), high)
 
 
 @kernel(parallel=True)

@@ -12,14 +12,17 @@ from refgi.jit import threads
 from refgi.rsm import PixelLights
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
+from refgi.splat.irradiance import checked
 from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.multires import MultiresSettings
 from refgi.splat.refinement import error_driven as module
+from refgi.splat.refinement import trial as trial_module
+from refgi.splat.refinement.descent import assemble, begin, descend
 from refgi.splat.refinement.error_driven import error_driven
-from refgi.splat.refinement.grid import representatives
-from refgi.splat.refinement.interpolate import blends, descend, residuals
+from refgi.splat.refinement.interpolate import blends
+from refgi.splat.refinement.levels import levels_of
 from refgi.splat.refinement.near import near_light
-from refgi.splat.refinement.samples import estimate, stratified
+from refgi.splat.refinement.samples import estimate, mean_of, stratified
 
 ROUNDING = 1e-5  # float32 sums of 64 terms, the largest many times the rest
 LINEAR = 1e-5  # of values up to 10: float32 means of four
@@ -80,14 +83,14 @@ def test_pairs_are_saved_and_all_counted(monkeypatch):
     frame = seen("cornell_box", 300, 300)
     settings = MultiresSettings(lights=64, target_error=0.05)
     lights, area, full = full_sum(frame, settings)
-    lit, near, evaluate, near_light = [], [], module.evaluate, module.near_light
-    monkeypatch.setattr(module, "evaluate", lambda p, *how: lit.append(p.T) or evaluate(p, *how))
+    lit, near, add_lights, near_light = [], [], trial_module.add_lights, module.near_light
+    monkeypatch.setattr(trial_module, "add_lights", lambda p, *how: lit.append(p.T) or add_lights(p, *how))
     monkeypatch.setattr(module, "near_light", lambda *how: near.append(near_light(*how)) or near[-1])
     found = error_driven(frame.gbuffer, lights, settings, area)
     points = np.concatenate(lit)
     assert len(np.unique(points, axis=0)) == len(points)  # no pixel twice
     count = lights.flux.shape[1]
-    assert found.pairs == count * len(points) + near[0][1]
+    assert found.pairs == count * len(points) + near[0].pairs
     assert found.full_pairs == count * np.count_nonzero(frame.gbuffer.covered)
     assert found.pairs < 0.25 * found.full_pairs
     assert relative_error(found.irradiance, full, frame.gbuffer.covered) <= 0.05
@@ -124,7 +127,7 @@ def test_threads_change_no_bit(box):
     with threads(1):
         alone = error_driven(box.gbuffer, lights, settings, area)
     np.testing.assert_array_equal(found.irradiance, alone.irradiance)
-    assert found[2:] == alone[2:]
+    assert found[4:] == alone[4:]
 
 
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 40), (33, 1), (17, 40)])
@@ -168,15 +171,21 @@ def plane(height, width, turn=None):
     return flat, normal
 
 
-def from_level(level, image, position, normal, covered):
+def from_level(top, image, position, normal, covered):
     """Interpolate a picture's values at the pixels of one level down to all."""
-    places = representatives(covered, level)
-    made, values = blends(position, normal, places), np.stack([image.reshape(-1)] * 3)
-    light = np.where(places[level] >= 0, values[:, places[level]], np.float32(0))
-    for k in range(level - 1, -1, -1):
-        shape = places[k].shape
-        fine = np.zeros((3, *shape), np.float32)
-        descend(light, made[k].weight, np.zeros(shape, bool), places[k], values, fine, np.zeros(shape, np.float32))
+    levels, exact = levels_of(position, normal, covered, top), np.stack([image] * 3)
+    made, squares = blends(levels), [-(-side // 16) for side in image.shape]
+    none = np.zeros((3, 0, 0), np.float32), np.zeros(squares, bool)
+    light = np.zeros((3, *levels[top].covered.shape), np.float32)
+    begin(levels[top].place, exact, *none, light)
+    for k in range(top - 1, -1, -1):
+        shape, unsplit = levels[k].covered.shape, np.zeros(levels[k + 1].covered.shape, bool)
+        fine, blend = np.full((3, *shape), np.nan, np.float32), made[k]
+        if k:
+            descend(light, blend.weight, blend.across, unsplit, levels[k].place, exact, *none, fine,
+                    np.zeros(shape, bool), np.zeros(shape, np.float32))
+        else:
+            assemble(light, blend.weight, blend.across, unsplit, covered, exact, *none, fine)
         light = fine
     return light[0]
 
@@ -216,14 +225,13 @@ def test_light_stays_on_its_facet_and_on_its_step():
 def test_residuals_are_those_of_the_interpolated_normals():
     """Analytic: none on a plane; a pixel turned by 90 degrees against all around is off by sqrt 2."""
     position, normal = plane(16, 16)
-    places = representatives(np.ones((16, 16), bool), 2)
-    flat = residuals(blends(position, normal, places), places[2].shape)
-    assert max(part.max() for part in flat) < 1e-12
+    covered = np.ones((16, 16), bool)
+    assert max(blend.rest.max() for blend in blends(levels_of(position, normal, covered, 2))) < 1e-12
     normal[:, 4, 6] = 1, 0, 0  # an even row and column: it stands for no coarser cell
-    sums = residuals(blends(position, normal, places), places[2].shape)
-    assert sums[1][2, 3] == pytest.approx(2, rel=1e-5)
-    assert sums[2][1, 1] == pytest.approx(2, rel=1e-5)
-    assert sums[2].sum() == pytest.approx(2, rel=1e-5)
+    one, two = (blend.rest for blend in blends(levels_of(position, normal, covered, 2)))
+    assert one[2, 3] == pytest.approx(2, rel=1e-5)
+    assert two[1, 1] == pytest.approx(2, rel=1e-5)
+    assert two.sum() == pytest.approx(2, rel=1e-5)
 
 
 @pytest.mark.parametrize("clamp", [{}, {"clamp": "distance", "clamp_value": 0.05}])
@@ -235,7 +243,9 @@ def test_near_light_is_what_exceeds_the_bound(clamp):
     lights = PixelLights(at, np.tile([[0.0], [-1.0], [0.0]], 64), rng.uniform(0.1, 1, (3, 64)), *(None,) * 3, 64)
     covered = rng.random((23, 37)) < 0.9
     most, settings = 2.0, MultiresSettings(**clamp)
-    got, pairs = near_light(Receivers(position, normal, covered), lights, settings, None, most)
+    receivers = Receivers(position, normal, covered)
+    near = near_light(receivers, checked(receivers, lights, settings, None), most)
+    got = np.where(np.kron(near.touched, np.ones((16, 16), bool))[:23, :37], near.light, np.float32(0))
     away = at.astype(np.float32).astype(float)[:, None, None] - position[..., None]
     square = (away**2).sum(axis=0)
     kept = np.maximum(square, 0.05**2) if clamp else square
@@ -244,7 +254,7 @@ def test_near_light_is_what_exceeds_the_bound(clamp):
     excess = (lights.flux[:, None, None] / math.pi * np.maximum(0, term - bound)).sum(axis=-1) * covered
     assert excess.max() > 10 * most
     np.testing.assert_allclose(got, excess, rtol=ROUNDING, atol=ROUNDING * most)
-    assert 0 < pairs < 64 * covered.sum()
+    assert 0 < near.pairs < 64 * covered.sum()
 
 
 def test_samples_stand_for_all_covered_pixels_and_bound_the_error():
@@ -259,6 +269,8 @@ def test_samples_stand_for_all_covered_pixels_and_bound_the_error():
         assert covered.reshape(-1)[samples.pixel].all()
         assert samples.share.sum() == pytest.approx(1)
         assert len(np.unique(samples.pixel)) == len(samples.pixel) < covered.sum() / 8
-        mean = picture[:, covered].mean(dtype=float)
-        found = estimate(samples, *(part.reshape(3, -1)[:, samples.pixel] for part in (picture, full)), mean)
+        light, exact = (part.reshape(3, -1)[:, samples.pixel] for part in (picture, full))
+        mean, doubt = mean_of(samples, exact)
+        assert abs(mean - full[:, covered].mean(dtype=float)) < doubt
+        found = estimate(samples, exact - light, (mean, doubt))
         assert found.low < error < found.high < 1.4 * error

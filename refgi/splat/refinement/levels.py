@@ -48,7 +48,7 @@ def levels_of(position: Array, normal: Array, covered: Array, top: int) -> tuple
     position, normal, covered = (np.ascontiguousarray(part) for part in (position, normal, covered))
     levels = [Level(position, normal, covered, np.empty((0, 0), np.int32))]
     for level in range(1, top + 1):
-        shape = level_shape(*covered.shape, level)
+        shape = level_shape(covered.shape[0], covered.shape[1], level)
         one = Level(plane((3, *shape), position.dtype), plane((3, *shape), position.dtype), plane(shape, np.bool_),
                     plane(shape, np.int32))
         with threads(one.crew):

@@ -77,7 +77,7 @@ def near_light(receivers: Receivers, packed: Packed, most: float) -> NearLight:
     """
     position, normal, covered = receivers
     light, pairs = plane(position.shape, position.dtype), 0
-    touched = np.zeros(level_shape(*covered.shape, SIDE.bit_length() - 1), np.bool_)
+    touched = np.zeros(level_shape(covered.shape[0], covered.shape[1], SIDE.bit_length() - 1), np.bool_)
     if packed.lobes is not None:
         places = block_by_block(covered)
         sums = np.zeros((3, len(places)), position.dtype)
@@ -103,9 +103,10 @@ def _add_excess(
         i, j = k // columns, k % columns
         near, low, high = np.empty(len(bound), np.bool_), np.empty(3, position.dtype), np.empty(3, position.dtype)
         tile = np.zeros((ROWS, SIDE * SIDE), position.dtype)
-        there = _load(position, normal, covered, i * SIDE, j * SIDE, tile)
+        there = _load(position, covered, i * SIDE, j * SIDE, tile)
         _bound(tile, low, high)
         if there and _mark_near(lights, bound, low, high, near):
+            _face(normal, covered, i * SIDE, j * SIDE, tile)
             _sum_near(tile, lights, clamp, bound, near)
             pairs[i, j] = there * np.count_nonzero(near)
             _put(tile, touched[i, j], i * SIDE, j * SIDE, light)
@@ -113,23 +114,31 @@ def _add_excess(
 
 
 @kernel
-def _load(position: Array, normal: Array, covered: Array, top: int, left: int, tile: Array) -> int:
-    """Load a square of pixels; return how many show a surface. In place of others is one that does, turned away."""
+def _load(position: Array, covered: Array, top: int, left: int, tile: Array) -> int:
+    """Load the positions of a square of pixels, a copy of one for others without surface; return how many have one."""
     count, kept = 0, 0
     for y in range(top, min(top + SIDE, covered.shape[0])):
         there, first = covered[y, left : left + SIDE], (y - top) * SIDE
         for c in range(3):
             _copy(position[c, y, left:], tile[X + c, first : first + len(there)])
-            _copy(normal[c, y, left:], tile[NX + c, first : first + len(there)])
         for x in range(len(there)):
             if there[x]:
                 count, kept = count + 1, first + x
-    for k in range(SIDE * SIDE if count < SIDE * SIDE else 0):
+    for k in range(SIDE * SIDE if 0 < count < SIDE * SIDE else 0):
         y, x = top + k // SIDE, left + k % SIDE
         if y >= covered.shape[0] or x >= covered.shape[1] or not covered[y, x]:
             for c in range(3):
-                tile[X + c, k], tile[NX + c, k] = tile[X + c, kept], 0
+                tile[X + c, k] = tile[X + c, kept]
     return count
+
+
+@kernel
+def _face(normal: Array, covered: Array, top: int, left: int, tile: Array) -> None:
+    """Load the normals of a square of pixels; those without a surface face nothing and stay dark."""
+    for y in range(top, min(top + SIDE, covered.shape[0])):
+        for x in range(left, min(left + SIDE, covered.shape[1])):
+            for c in range(3):
+                tile[NX + c, (y - top) * SIDE + x - left] = normal[c, y, x] if covered[y, x] else 0
 
 
 @kernel

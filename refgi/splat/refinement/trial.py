@@ -108,7 +108,7 @@ class Trials:
     def share_lit(self) -> float:
         """Return how many of the pixels the picture would have lit, of 1."""
         lit = np.count_nonzero(self._known.has) + len(self._known.missing(self.split[1], self._levels[0]))
-        return lit / max(1, np.count_nonzero(self._levels[0].covered))
+        return float(lit) / max(1, int(np.count_nonzero(self._levels[0].covered)))
 
     def split_all(self) -> None:
         """Split every cell, for a picture without error."""

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.scene.values import is_count
+from refgi.scene.values import BRIGHTEST, is_count
 from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.lights.settings import LightSettings, Pattern, expect_choices
 from refgi.splat.lights.solid_angle import demo_footprints
@@ -106,7 +106,8 @@ class MultiresSettings(LightSettings):
         expect(is_count(self.finest) and 0 <= self.finest <= 16, "finest", "a level, 0 to 16", self.finest)
         expect(self.rim in (0, 1) and is_count(self.rim), "rim", "0 or 1 pixels", self.rim)
         for key in THRESHOLDS:
-            expect(getattr(self, key) >= 0, key, "0 or more", getattr(self, key))
+            expect(0 <= getattr(self, key) <= BRIGHTEST or getattr(self, key) == math.inf, key,
+                   f"0 to {BRIGHTEST:g}, or inf", getattr(self, key))
         expect_choices(self, CHOICES)
         expect(0 <= self.detail <= 1, "detail", "a share from 0 to 1", self.detail)
         expect(self.target_error is None or (math.isfinite(self.target_error) and self.target_error > 0),

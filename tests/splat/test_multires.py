@@ -153,7 +153,8 @@ def test_the_table_of_methods_knows_it():
 
 def test_settings_are_checked():
     for change in ({"coarsest": 0}, {"coarsest": 1.5}, {"finest": -1}, {"finest": 17}, {"criteria": {"colour"}},
-                   {"depth_threshold": -1}, {"normal_threshold": math.nan}, {"normal_components": "z"},
+                   {"depth_threshold": -1}, {"normal_threshold": math.nan}, {"curvature_threshold": 1e39},
+                   {"normal_components": "z"},
                    {"curvature": "arc"}, {"rim": 2}, {"diagonal": "on"}, {"refinement": "twice"},
                    {"per_light": "both"}, {"light_threshold": -0.1}, {"threshold_form": "half"},
                    {"representative": "corner"}, {"visibility": "map"}, {"upsampling": "cubic"}, {"detail": 1.5},

@@ -12,10 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.rsm.batch import Part, draw
 from refgi.rsm.memory import plane
 from refgi.rsm.paraboloid import draw_paraboloids
 from refgi.rsm.projection import PARABOLOID, Projection
-from refgi.rsm.triangle import LANES, Part, bound_triangles, draw, project_vertices
+from refgi.rsm.triangle import LANES, bound_triangles, project_vertices
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
@@ -37,7 +38,7 @@ class Bands(NamedTuple):
 
     boxes: Array  # (m, 4) uint16: first and last column, first and last row; first > last: covers nothing
     starts: Array  # (bands + 1,) where each band's triangles start in `members`
-    members: Array  # (...) int32: triangles of band 0, of band 1, ..., each in mesh order
+    members: Array  # (...) int32: triangles of band 0, of band 1, ..., each in mesh order; then CHUNKS of no meaning
     rows: int  # height of a band
 
 
@@ -138,11 +139,12 @@ def bands(corners: Array, cells: Array, faces: Array, width: int, height: int, r
         The lists, in mesh order.
     """
     boxes = plane((len(faces), 4), np.uint16)
-    counts = np.zeros((CHUNKS, -(-height // rows)), np.int64)
-    _count(corners, cells, faces, np.array([width, height, rows]), boxes, counts)
+    band_of = np.arange(height, dtype=np.int32) // np.int32(rows)
+    counts = np.zeros((CHUNKS, band_of[-1] + 1), np.int64)
+    _count(corners, cells, faces, (width, height), band_of, boxes, counts)
     ends = np.cumsum(counts.T).reshape(counts.T.shape)  # band by band, chunk by chunk
-    members = plane((int(ends[-1, -1]),), np.int32)
-    _list(boxes, rows, np.ascontiguousarray((ends - counts.T).T), members)
+    members = plane((int(ends[-1, -1]) + CHUNKS,), np.int32)
+    _list(boxes, band_of, np.ascontiguousarray((ends - counts.T).T), members)
     return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)
 
 
@@ -162,26 +164,33 @@ def _project(projection: Projection, vertices: Array, corners: Array, cells: Arr
 
 
 @kernel(parallel=True)
-def _count(corners: Array, cells: Array, faces: Array, size: Array, boxes: Array, counts: Array) -> None:
+def _count(
+    corners: Array, cells: Array, faces: Array, size: tuple[int, int], band_of: Array, boxes: Array, counts: Array
+) -> None:
     step = -(-len(faces) // CHUNKS)
     for chunk in prange(CHUNKS):
         first, last = min(chunk * step, len(faces)), min((chunk + 1) * step, len(faces))
-        bound_triangles(corners, cells, faces, first, last, (size[0], size[1]), boxes[first:last])
+        bound_triangles(corners, cells, faces, first, last, size, boxes[first:last])
         for face in range(first, last):
-            if boxes[face, 0] <= boxes[face, 1]:
-                for band in range(boxes[face, 2] // size[2], boxes[face, 3] // size[2] + 1):
-                    counts[chunk, band] += 1
+            upper, lower = band_of[boxes[face, 2]], band_of[boxes[face, 3]]
+            counts[chunk, upper] += boxes[face, 0] <= boxes[face, 1]
+            for band in range(upper + 1, lower + 1):
+                counts[chunk, band] += 1
 
 
 @kernel(parallel=True)
-def _list(boxes: Array, rows: int, cursors: Array, members: Array) -> None:
+def _list(boxes: Array, band_of: Array, cursors: Array, members: Array) -> None:
     step = -(-len(boxes) // CHUNKS)
     for chunk in prange(CHUNKS):
+        spare = len(members) - 1 - chunk  # takes what covers nothing: no branch for it
         for face in range(chunk * step, min((chunk + 1) * step, len(boxes))):
-            if boxes[face, 0] <= boxes[face, 1]:
-                for band in range(boxes[face, 2] // rows, boxes[face, 3] // rows + 1):
-                    members[cursors[chunk, band]] = face
-                    cursors[chunk, band] += 1
+            upper, lower = band_of[boxes[face, 2]], band_of[boxes[face, 3]]
+            there, cursor = boxes[face, 0] <= boxes[face, 1], cursors[chunk, upper]
+            members[cursor if there else spare] = face
+            cursors[chunk, upper] = cursor + there
+            for band in range(upper + 1, lower + 1):
+                members[cursors[chunk, band]] = face
+                cursors[chunk, band] += 1
 
 
 @kernel(parallel=True)
@@ -208,8 +217,7 @@ def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: S
                 count, last = 0, min(base + BATCH, len(faces))
                 bound_triangles(corners, cells, faces, base, last, (projection.width, height), boxes)
                 for face in range(base, last):
-                    if boxes[face - base, 0] <= boxes[face - base, 1]:
-                        members[count] = face
-                        count += 1
+                    members[count] = face
+                    count += boxes[face - base, 0] <= boxes[face - base, 1]
                 part = Part(members, 0, count, boxes, base, 0, height - 1)
                 draw(corners, faces, part, seen.inverse_depth[rows], seen.triangle_id[rows])

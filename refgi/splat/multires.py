@@ -39,6 +39,7 @@ CHOICES: dict[str, Any] = {
     "normal_components": Literal["xyz", "xy"], "curvature": Literal["chord", "rate"], "diagonal": Diagonal,
     "refinement": Refinement, "per_light": PerLight, "threshold_form": Threshold, "upsampling": Upsampling,
     "representative": Literal["pixel", "mean"], "visibility": Literal["none", "rays"]}
+LEAST_TARGET = 1e-6  # about what rounding to float32 leaves of the full sum
 THRESHOLDS = ("depth_threshold", "derivative_threshold", "normal_threshold", "curvature_threshold", "light_threshold")
 # settings and printed forms that a mode would not heed: pairs with rays are those of `vpl`, an error sets its own cells
 UNHEEDED = {
@@ -110,8 +111,8 @@ class MultiresSettings(LightSettings):
                    f"0 to {BRIGHTEST:g}, or inf", getattr(self, key))
         expect_choices(self, CHOICES)
         expect(0 <= self.detail <= 1, "detail", "a share from 0 to 1", self.detail)
-        expect(self.target_error is None or (math.isfinite(self.target_error) and self.target_error > 0),
-               "target_error", "none or a share of the mean above 0", self.target_error)
+        expect(self.target_error is None or LEAST_TARGET <= self.target_error < math.inf, "target_error",
+               f"none or a share of the mean from {LEAST_TARGET:g} on", self.target_error)
         self._expect_heeded()
 
     def _expect_heeded(self) -> None:
@@ -125,6 +126,8 @@ class MultiresSettings(LightSettings):
                        getattr(self, key))
             expect(self.as_published.isdisjoint(switches), "as_published",
                    f"none of {sorted(switches)} with {mode} {chosen!r}", sorted(self.as_published))
+        expect(self.clamp != "sphere" or self.target_error is None, "clamp",
+               "another one with target_error, which takes peaks of points alone apart", self.clamp)
         expect(self.clamp == "disc" or "ams_disc" not in self.as_published, "as_published",
                "'ams_disc' with the clamp 'disc' alone", sorted(self.as_published))
 
@@ -233,4 +236,9 @@ def _halved(light: Array, fine: Array, covered: Array) -> Array:
     shown = fine.reshape(four[1:]).sum(axis=(1, 3))
     mean = light.reshape(four).sum(axis=(2, 4)) / np.maximum(shown, 1).astype(light.dtype)
     halved: Array = np.where(covered, mean, light.dtype.type(0))
+    for i, j in zip(*np.nonzero(covered & (shown == 0)), strict=True):  # slivers: as the pixels around them
+        around = np.s_[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
+        lit = shown[around] > 0
+        if lit.any():
+            halved[:, i, j] = mean[:, *around][:, lit].mean(axis=1)
     return halved

@@ -13,6 +13,7 @@ from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, load_scene
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
 from refgi.splat.lights.selection import choose_lights, footprints
+from refgi.splat.multires import _halved
 from refgi.splat.refinement.grid import representatives
 from refgi.stages import observe
 
@@ -131,6 +132,26 @@ def test_nothing_to_see_is_black():
         assert not multires(at, MultiresSettings(lights=16, **how)).any()
 
 
+@pytest.mark.parametrize(("scene", "size", "change"), [
+    ("parallel_plates", (161, 97), {"lights": 16, "pattern": "random", "seed": 630, "target_error": 0.1}),
+    ("ring", (200, 200), {"lights": 4, "target_error": 0.01})])
+def test_cells_that_look_dark_do_not_hold_an_error_up(scene, size, change):
+    """Limit: where light is seen by samples but by no cell that could be split, every pixel is lit in the end."""
+    at = frame(scene, *size, rsm_resolution=16)
+    settings = MultiresSettings(coarsest=1, **change)
+    full, covered = full_sum(at, settings).astype(float), at.gbuffer.covered
+    off = np.sqrt(((multires(at, settings) - full)[:, covered] ** 2).mean())
+    assert off <= settings.target_error * full[:, covered].mean()
+
+
+def test_slivers_between_doubled_pixels_take_the_light_around():
+    """By hand: a pixel with a surface whose four finer ones show none is the mean of its lit neighbours."""
+    covered, fine = np.ones((1, 3), bool), np.ones((2, 6), bool)
+    fine[:, 2:4] = False
+    light = np.where(fine, np.array([1.0, 1, 9, 9, 3, 3]), 0)[None].repeat(3, axis=0)
+    np.testing.assert_array_equal(_halved(light, fine, covered), [[[1, 2, 3]]] * 3)
+
+
 def test_cells_of_background_are_no_subsplats(box):
     covered = np.zeros((40, 50), bool)
     covered[7, 11] = True  # a silhouette of one pixel
@@ -158,7 +179,8 @@ def test_settings_are_checked():
                    {"curvature": "arc"}, {"rim": 2}, {"diagonal": "on"}, {"refinement": "twice"},
                    {"per_light": "both"}, {"light_threshold": -0.1}, {"threshold_form": "half"},
                    {"representative": "corner"}, {"visibility": "map"}, {"upsampling": "cubic"}, {"detail": 1.5},
-                   {"target_error": 0}, {"target_error": math.inf}, {"lights": 0}, {"pattern": "spiral"},
+                   {"target_error": 0}, {"clamp": "sphere", "target_error": 0.1},
+                   {"target_error": math.inf}, {"lights": 0}, {"pattern": "spiral"},
                    {"visibility": "rays", "clamp": "disc"}, {"visibility": "rays", "target_error": 0.1},
                    {"visibility": "rays", "offset": 0.1}, {"visibility": "rays", "representative": "mean"},
                    {"visibility": "rays", "as_published": {"sii_no_pi"}}, {"target_error": 0.1, "rim": 1},

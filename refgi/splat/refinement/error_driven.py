@@ -43,6 +43,7 @@ SLOPES = 0.5, 1.2  # what they may tell
 AIM = 0.95  # of the target, where the next trial is to end
 STEPS = 0.3, 0.9  # of a threshold, where the next may lie
 ENOUGH = 0.75  # of the pixels lit: then the rest are lit as well
+LAST = 16  # trial, after which every pixel is lit: cells of which nothing bright is known may never be split
 
 
 class ErrorDriven(NamedTuple):
@@ -129,11 +130,12 @@ def _typical(light: Array) -> float:
 def _search(
     trials: Trials, samples: Samples, mean: tuple[float, float], typical: float, target: float
 ) -> tuple[Estimate, float, int]:
-    """Return the estimate, threshold and number of the first trial that meets the target."""
+    """Return the estimate, threshold and number of the first trial that meets the target, or light every pixel."""
     threshold, count, before = FIRST * target, 1, (0.0, 0.0)
     while True:
         trials.run(threshold * typical)
-        if trials.share_lit() > ENOUGH:
+        dark = mean[0] <= 0  # no sample saw light: what little there may be is not known from them
+        if dark or count == LAST or trials.share_lit() > ENOUGH:
             trials.split_all()
             return Estimate(0.0, 0.0, 0.0), threshold, count
         found = estimate(samples, trials.missed(samples.pixel), mean)

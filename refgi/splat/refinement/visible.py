@@ -44,8 +44,8 @@ def evaluate_visible(
     Returns
     -------
     (3, n) ndarray
-        Irradiance, W/m^2, linear RGB, in the buffer's dtype: that of `vpl` at the same pixels, to the bit. Excludes the
-        receiver's albedo/pi.
+        Irradiance, W/m^2, linear RGB, in the buffer's dtype: that of `vpl` for the same lights, to the bit.
+        Excludes the receiver's albedo/pi.
 
     Notes
     -----

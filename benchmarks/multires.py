@@ -18,10 +18,10 @@ from refgi.scene import Scene
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
 from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.refinement.criteria import needs
-from refgi.splat.refinement.evaluate import at_subsplats, evaluate
 from refgi.splat.refinement.grid import top_level
 from refgi.splat.refinement.refine import refine
-from refgi.splat.refinement.upsample import upsample
+from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.subsplats.upsample import upsample
 
 DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 STAND_INS = {"dragon_bunny": "atrium:faces=405000", "flying_bunnies": "atrium:faces=417000,seed=2",

@@ -11,10 +11,10 @@ from refgi.papers.multires.subjects import DRAGON, frame_of, full_sum, settings_
 from refgi.papers.records import Cell, Figure, Picture, Table
 from refgi.splat.lights.selection import choose_lights
 from refgi.splat.multires import MultiresSettings, multires
-from refgi.splat.refinement.evaluate import at_subsplats, evaluate
 from refgi.splat.refinement.grid import Subsplats
 from refgi.splat.refinement.picture import level_picture
-from refgi.splat.refinement.upsample import upsample
+from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.subsplats.upsample import upsample
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

@@ -11,8 +11,8 @@ from refgi.papers.records import Figure, Table
 from refgi.papers.timing import interleaved
 from refgi.splat.lights.selection import choose_lights
 from refgi.splat.multires import MultiresSettings, Upsampling, multires
-from refgi.splat.refinement.evaluate import at_subsplats, evaluate
-from refgi.splat.refinement.upsample import upsample
+from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.subsplats.upsample import upsample
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

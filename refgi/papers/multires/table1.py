@@ -20,9 +20,9 @@ from refgi.papers.multires.subjects import (
     subsplats_of,
 )
 from refgi.papers.records import Cell, Figure, Picture, Table
+from refgi.splat.light_lists.per_light import per_light_counts
 from refgi.splat.lights.selection import choose_lights
 from refgi.splat.multires import MultiresSettings, multires
-from refgi.splat.refinement.per_light import per_light_counts
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

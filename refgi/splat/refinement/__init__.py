@@ -1,6 +1,6 @@
-"""Adaptive subsplats (Nichols and Wyman 2009): where light may change, it is evaluated finely; elsewhere it is not.
+"""Which cells of the picture are subsplats (Nichols and Wyman 2009, Sec. 3.2 and 3.3).
 
-`grid` names the cells, `ranges` and `criteria` find discontinuities, `refine` lists the subsplats, `evaluate` and
-`visible` light them, `upsample` makes a picture of them, `detail` darkens it by Eq. 3. `per_light` refines for each
-light by itself, `error_driven` until the picture is as near to the full sum as asked for.
+`grid` names the cells, `ranges` and `changes` find discontinuities in mips of any size (`pyramid`), `criteria` says
+which cells hold one, `cells` what neighbours across a corner do to that, `refine` lists the subsplats in one visit and
+`published_list` pass by pass, `picture` draws them (Fig. 5).
 """

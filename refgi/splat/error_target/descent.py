@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.refinement.interpolate import tent_of
-from refgi.splat.refinement.near import SIDE, near_at
+from refgi.splat.error_target.interpolate import tent_of
+from refgi.splat.error_target.near import SIDE, near_at
 
 Array = npt.NDArray[Any]
 

@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange, threads
 from refgi.splat.irradiance import Receivers, checked
-from refgi.splat.refinement.evaluate import at_subsplats, evaluate
+from refgi.splat.light_lists.lists import Cells, Lists, leaves, refine_for_lights, room_for
+from refgi.splat.light_lists.one_light import separate
+from refgi.splat.light_lists.tree import Tree, above_leaves, cell_tree, cut
 from refgi.splat.refinement.grid import Subsplats, top_level
-from refgi.splat.refinement.light_lists import Cells, Lists, leaves, refine_for_lights, room_for
-from refgi.splat.refinement.one_light import separate
-from refgi.splat.refinement.tree import Tree, above_leaves, cell_tree, cut
-from refgi.splat.refinement.upsample import upsample
+from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.subsplats.upsample import upsample
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.multires import MultiresSettings
-from refgi.splat.refinement.evaluate import at_subsplats, evaluate
 from refgi.splat.refinement.grid import Subsplats, level_shape, representatives
+from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
 
 MEAN_ERROR = 1e-6  # a float32 mean over at most 64 positions below 1 m and unit normals
 

@@ -8,7 +8,7 @@ from refgi.scene import load_scene
 from refgi.splat.lights.selection import choose_lights
 from refgi.splat.multires import MultiresSettings
 from refgi.splat.refinement.grid import Subsplats, level_shape, representatives
-from refgi.splat.refinement.visible import evaluate_visible
+from refgi.splat.subsplats.visible import evaluate_visible
 from refgi.truth import VplSettings, vpl
 
 

@@ -8,7 +8,7 @@ from refgi.jit import threads
 from refgi.splat.multires import MultiresSettings
 from refgi.splat.refinement.grid import level_shape, top_level
 from refgi.splat.refinement.refine import refine
-from refgi.splat.refinement.upsample import upsample
+from refgi.splat.subsplats.upsample import upsample
 from tests.naive import upsample as naive
 
 ROUNDING = 1e-15  # values up to 1: up to five passes, each the mean of 9, or the sum of as many levels

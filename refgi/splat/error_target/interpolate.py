@@ -27,7 +27,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange, threads
 from refgi.rsm.memory import plane
-from refgi.splat.refinement.levels import Level
+from refgi.splat.error_target.levels import Level
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]

@@ -11,14 +11,14 @@ from refgi.jit import threads
 from refgi.rsm import choose_pixel_lights
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
+from refgi.splat.light_lists import per_light as module
+from refgi.splat.light_lists.per_light import per_light, per_light_counts
 from refgi.splat.multires import MultiresSettings
-from refgi.splat.refinement import per_light as module
 from refgi.splat.refinement.criteria import needs
-from refgi.splat.refinement.evaluate import at_subsplats, evaluate
 from refgi.splat.refinement.grid import level_shape, top_level
-from refgi.splat.refinement.per_light import per_light, per_light_counts
 from refgi.splat.refinement.refine import refine
-from refgi.splat.refinement.upsample import upsample
+from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.subsplats.upsample import upsample
 from tests.naive import eq2
 from tests.naive import per_light as naive
 from tests.naive import upsample as naive_upsample

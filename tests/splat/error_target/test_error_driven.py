@@ -12,17 +12,17 @@ from refgi.jit import threads
 from refgi.rsm import PixelLights
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
+from refgi.splat.error_target import error_driven as module
+from refgi.splat.error_target import trial as trial_module
+from refgi.splat.error_target.descent import assemble, begin, descend
+from refgi.splat.error_target.error_driven import error_driven
+from refgi.splat.error_target.interpolate import blends
+from refgi.splat.error_target.levels import levels_of
+from refgi.splat.error_target.near import near_light
+from refgi.splat.error_target.samples import estimate, mean_of, stratified
 from refgi.splat.irradiance import checked
 from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.multires import MultiresSettings
-from refgi.splat.refinement import error_driven as module
-from refgi.splat.refinement import trial as trial_module
-from refgi.splat.refinement.descent import assemble, begin, descend
-from refgi.splat.refinement.error_driven import error_driven
-from refgi.splat.refinement.interpolate import blends
-from refgi.splat.refinement.levels import levels_of
-from refgi.splat.refinement.near import near_light
-from refgi.splat.refinement.samples import estimate, mean_of, stratified
 
 ROUNDING = 1e-5  # float32 sums of 64 terms, the largest many times the rest
 LINEAR = 1e-5  # of values up to 10: float32 means of four

@@ -7,7 +7,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
-from refgi.splat.refinement.detail import surface_detail
+from refgi.splat.subsplats.detail import surface_detail
 
 EYE = (0.3, 1.2, 4.0)
 ROUNDING = {np.float32: 2e-6, np.float64: 4e-15}  # values up to 4 times a factor of a few roundings

@@ -20,13 +20,13 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.splat.error_target.levels import levels_of
+from refgi.splat.error_target.near import near_light
+from refgi.splat.error_target.samples import Estimate, Samples, estimate, mean_of, stratified
+from refgi.splat.error_target.trial import Known, Trials
 from refgi.splat.irradiance import Receivers, checked
 from refgi.splat.refinement.grid import Subsplats, top_level
-from refgi.splat.refinement.levels import levels_of
-from refgi.splat.refinement.near import near_light
 from refgi.splat.refinement.refine import refine
-from refgi.splat.refinement.samples import Estimate, Samples, estimate, mean_of, stratified
-from refgi.splat.refinement.trial import Known, Trials
 from refgi.stages import stage
 
 if TYPE_CHECKING:

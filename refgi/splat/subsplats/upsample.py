@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange, threads
-from refgi.splat.refinement.demo import demo_pass
 from refgi.splat.refinement.grid import Subsplats
-from refgi.splat.refinement.layers import filled_cells, layer, sorted_by_row
-from refgi.splat.refinement.tent import tent_pass
+from refgi.splat.subsplats.demo import demo_pass
+from refgi.splat.subsplats.layers import filled_cells, layer, sorted_by_row
+from refgi.splat.subsplats.tent import tent_pass
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]

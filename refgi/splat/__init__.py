@@ -8,8 +8,8 @@ exact solid angles and T / N, intensities 1 / pi, Phong lobes conserve their flu
 `sii` is that of the threshold alone, whatever bound found the pixels, and subsplats keep what was evaluated for them.
 
 `lights` chooses the lights, `pairs` sums over pairs, `reach` says how far lights count, `account` where the power goes.
-`refinement` lists subsplats, `subsplats` lights them and makes a picture of them, `light_lists` refines for each light by
-itself and `error_target` until an error is met. `gathering` holds the older method.
+`refinement` lists subsplats, `subsplats` lights them and makes a picture of them, `light_lists` refines for each light
+by itself and `error_target` until an error is met. `gathering` holds the older method.
 """
 
 from refgi.splat.gathering.gather import GatherSettings, gather

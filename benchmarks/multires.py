@@ -95,7 +95,7 @@ def _errors(name: str, frame: Frame, settings: MultiresSettings, repeats: int) -
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
 
     def everywhere() -> Any:
-        return irradiance(receivers, choose_lights(frame, settings), settings, area)
+        return irradiance(receivers, choose_lights(frame, settings), settings, footprints(frame, settings))
 
     full = irradiance(receivers, lights, settings, area).astype(np.float64)
     for threshold in (0.1, 0.25, 0.5, 1.4):

@@ -27,7 +27,7 @@ from refgi.splat.error_target.trial import Known, Trials
 from refgi.splat.irradiance import Receivers, checked
 from refgi.splat.refinement.grid import Subsplats, top_level
 from refgi.splat.refinement.refine import refine
-from refgi.stages import stage
+from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
     from refgi.rsm import GBuffer, PixelLights
@@ -115,9 +115,12 @@ def error_driven(
     picture = trials.picture()
     as_split = dataclasses.replace(settings, target_error=None, diagonal="off", refinement="single_pass")
     number = lights.flux.shape[1]
-    return ErrorDriven(picture, tuple(trials.split), receivers.covered, as_split, *found, threshold, count,
-                       np.count_nonzero(known.has) * number + near.pairs,
-                       np.count_nonzero(receivers.covered) * number)
+    pairs = np.count_nonzero(known.has) * number + near.pairs
+    full_pairs = np.count_nonzero(receivers.covered) * number
+    skip("splat.full_sum", f"{pairs / max(1, full_pairs):.1%} of its pairs, {count} trials: the error is at most "
+                           f"{found.high:.2%} of the mean")
+    return ErrorDriven(picture, tuple(trials.split), receivers.covered, as_split, *found, threshold, count, pairs,
+                       full_pairs)
 
 
 def _typical(light: Array) -> float:

@@ -23,6 +23,7 @@ from refgi.splat.error_target.samples import estimate, mean_of, stratified
 from refgi.splat.irradiance import checked
 from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.multires import MultiresSettings
+from refgi.stages import observe
 
 ROUNDING = 1e-5  # float32 sums of 64 terms, the largest many times the rest
 LINEAR = 1e-5  # of values up to 10: float32 means of four
@@ -86,7 +87,10 @@ def test_pairs_are_saved_and_all_counted(monkeypatch):
     lit, near, add_lights, near_light = [], [], trial_module.add_lights, module.near_light
     monkeypatch.setattr(trial_module, "add_lights", lambda p, *how: lit.append(p.T) or add_lights(p, *how))
     monkeypatch.setattr(module, "near_light", lambda *how: near.append(near_light(*how)) or near[-1])
-    found = error_driven(frame.gbuffer, lights, settings, area)
+    with observe() as log:
+        found = error_driven(frame.gbuffer, lights, settings, area)
+    said = next(run.reason for run in log.runs if run.name == "splat.full_sum")
+    assert said.startswith(f"{found.pairs / found.full_pairs:.1%} of its pairs")
     points = np.concatenate(lit)
     assert len(np.unique(points, axis=0)) == len(points)  # no pixel twice
     count = lights.flux.shape[1]

@@ -1,13 +1,17 @@
-"""A paper made by hand: pictures, ratios, tables and notes without rendering."""
+"""Papers made tiny, once for all tests, and one made by hand: pictures, ratios, tables and notes without rendering."""
+
+from functools import cache
 
 import numpy as np
 import pytest
 
 from refgi.papers.catalogue import Entry, Paper
 from refgi.papers.records import Bar, Figure, Picture, Plot, Ratios, Table
+from refgi.papers.runner import reproduce
 from refgi.papers.workbench import Scale
 
 TINY = Scale("tiny", 16, 16, 1, 2, 64)
+SMALL = Scale("small", 32, 32, 1, 2, 256)
 
 
 def gradient(_bench):
@@ -39,3 +43,16 @@ def paper(monkeypatch):
     made = Paper("handmade", "A <paper>", "Nobody & others, 1906", "handmade")
     monkeypatch.setattr(Paper, "load", lambda _: ENTRIES)
     return made
+
+
+@pytest.fixture(scope="session")
+def reproduced():
+    """Return a function that makes a paper again and gives the outcome and its figures by key."""
+
+    @cache
+    def once(name):
+        made = reproduce(name, scale=SMALL)
+        assert made.failures == {}
+        return made, {outcome.entry.key: outcome.figure for outcome in made.outcomes}
+
+    return once

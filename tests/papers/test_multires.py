@@ -1,33 +1,17 @@
 """Every figure of the 2009 paper, made tiny: what it holds, and that the printed numbers are the paper's."""
 
-import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from refgi.papers.catalogue import find_paper
 from refgi.papers.curves import Axes, Curve, drawn
-from refgi.papers.files import as_json
 from refgi.papers.multires.scenes import BUILDERS
-from refgi.papers.report import page
-from refgi.papers.runner import reproduce
-from refgi.papers.workbench import Scale
-from tests.compare.test_report import Outline
-
-TINY = Scale("tiny", 32, 32, 1, 2, 256)
-KEYS = ["fig5", "fig7", "fig9", "fig10", "fig11", "fig13", "fig14", "fig15", "table1", "table2", "error"]
 
 
-@pytest.fixture(scope="module")
-def made():
-    return reproduce("multires", scale=TINY)
-
-
-@pytest.fixture(scope="module")
-def figures(made):
-    assert made.failures == {}
-    return {outcome.entry.key: outcome.figure for outcome in made.outcomes}
+@pytest.fixture
+def figures(reproduced):
+    return reproduced("multires")[1]
 
 
 def table(figure, number=0):
@@ -37,39 +21,6 @@ def table(figure, number=0):
 
 def printed(figure, number=0):
     return {bar.label: bar.paper for bar in figure.ratios[number].bars}
-
-
-def test_every_figure_is_made_and_has_a_place_on_the_page(made, figures):
-    assert [entry.key for entry in find_paper("multires").load()] == KEYS == list(figures)
-    assert made.is_sound
-    html = page(made)
-    outline = Outline(html)
-    identifiers = [attributes["id"] for _, attributes in outline.tags if "id" in attributes]
-    assert len(identifiers) == len(set(identifiers))  # those inside of several plots too
-    for outcome in made.outcomes:
-        assert f'<section id="{outcome.entry.key}"' in html
-        assert outcome.figure.notes, f"{outcome.entry.key} does not say how its shape compares"
-    assert html.count("<img width") == sum(len(figure.pictures) for figure in figures.values())
-    assert as_json(made)["sound"] is True
-
-
-def test_pictures_are_whole_and_finite(figures):
-    for key, figure in figures.items():
-        for picture in figure.pictures:
-            assert picture.pixels.dtype == np.uint8
-            for name, plane in picture.planes.items():
-                assert np.isfinite(plane).all(), (key, picture.name, name)
-                assert plane.shape == picture.pixels.shape[:2]
-        assert len({picture.name for picture in figure.pictures}) == len(figure.pictures)
-
-
-def test_every_number_is_finite(figures):
-    for key, figure in figures.items():
-        values = [value for one in figure.ratios for bar in one.bars for value in bar[1:]]
-        values += [cell for one in figure.tables for row in one.rows for cell in row]
-        assert all(math.isfinite(value) for value in values if isinstance(value, float)), key
-        assert all(len(row) == len(one.columns) for one in figure.tables for row in one.rows)
-        assert not any("nan" in note or "inf " in note for note in figure.notes), key
 
 
 def test_the_papers_frame_rates_are_the_printed_ones(figures):

@@ -5,59 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from refgi.papers.catalogue import find_paper
-from refgi.papers.files import as_json
 from refgi.papers.judging import errors_of
-from refgi.papers.report import page
-from refgi.papers.runner import reproduce
-from refgi.papers.workbench import Scale
-
-TINY = Scale("tiny", 32, 32, 1, 2, 256)
-KEYS = ["fig4", "fig6", "fig7", "fig8", "fig11", "fig12", "table1", "table2", "table3", "full"]
 
 
-@pytest.fixture(scope="module")
-def made():
-    return reproduce("sii", scale=TINY)
-
-
-@pytest.fixture(scope="module")
-def figures(made):
-    assert made.failures == {}
-    return {outcome.entry.key: outcome.figure for outcome in made.outcomes}
+@pytest.fixture
+def figures(reproduced):
+    return reproduced("sii")[1]
 
 
 def ratios(figure):
     return {bar.label: bar.paper for one in figure.ratios for bar in one.bars}
-
-
-def test_every_figure_is_made_and_has_a_place_on_the_page(made, figures):
-    assert [entry.key for entry in find_paper("sii").load()] == KEYS == list(figures)
-    assert made.is_sound
-    html = page(made)
-    for outcome in made.outcomes:
-        assert f'<section id="{outcome.entry.key}"' in html
-        assert outcome.figure.notes, f"{outcome.entry.key} does not say how its shape compares"
-    assert html.count("<img width") == sum(len(figure.pictures) for figure in figures.values())
-    assert as_json(made)["sound"] is True
-
-
-def test_pictures_are_of_the_runs_size_and_finite(figures):
-    for key, figure in figures.items():
-        for picture in figure.pictures:
-            assert picture.pixels.dtype == np.uint8
-            for name, plane in picture.planes.items():
-                assert np.isfinite(plane).all(), (key, picture.name, name)
-                assert plane.shape == picture.pixels.shape[:2]
-        assert len({picture.name for picture in figure.pictures}) == len(figure.pictures)
-
-
-def test_every_number_is_finite(figures):
-    for key, figure in figures.items():
-        values = [value for one in figure.ratios for bar in one.bars for value in bar[1:]]
-        values += [cell for table in figure.tables for row in table.rows for cell in row]
-        assert all(math.isfinite(value) for value in values if isinstance(value, float)), key
-        assert all(len(row) == len(table.columns) for table in figure.tables for row in table.rows)
 
 
 # as printed: frames per second of Figures 4, 11 and 12 and Table 3, milliseconds of Tables 1 and 2

@@ -159,7 +159,7 @@ def _indirect(
     frame: "Frame", buffer: "GBuffer", lights: "PixelLights", footprint: Array | None, settings: MultiresSettings
 ) -> Array:
     """Light the pixels of one buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
-    buffer.resolve("depth", "position", "normal")  # in one pass
+    _resolve(buffer, settings)
     if settings.target_error is not None:
         light = error_driven(buffer, lights, settings, footprint).irradiance
     elif settings.per_light == "light":
@@ -174,6 +174,13 @@ def _indirect(
         return light
     eye = frame.scene.camera.eye
     return surface_detail(light, buffer.position, buffer.normal, buffer.covered, eye, settings.detail)  # Eq. (3)
+
+
+def _resolve(buffer: "GBuffer", settings: MultiresSettings) -> None:
+    """Compute in one pass what the steps will ask for one by one; depth only where a criterion looks at it."""
+    by_geometry = settings.target_error is None and settings.per_light != "light"
+    looks_at_depth = by_geometry and not settings.criteria.isdisjoint({"depth", "derivative"})
+    buffer.resolve("position", "normal", *(("depth",) if looks_at_depth else ()))
 
 
 def shared_subsplats(buffer: "GBuffer", settings: MultiresSettings) -> Subsplats:

@@ -172,6 +172,18 @@ def test_the_table_of_methods_knows_it():
     assert log.status("splat.refine") == ["ran"]
 
 
+@pytest.mark.parametrize(("change", "asked"), [
+    ({}, True), ({"criteria": {"normal"}}, False), ({"target_error": 0.1}, False), ({"per_light": "light"}, False)])
+def test_depth_is_computed_only_where_a_criterion_looks_at_it(change, asked):
+    """Skip: the light is the same to the bit with the depth resolved beforehand."""
+    at, other = frame(width=33, height=20), frame(width=33, height=20)
+    settings = MultiresSettings(lights=16, **change)
+    light = multires(at, settings)
+    assert ("depth" in at.gbuffer._channels) == asked
+    other.gbuffer.resolve("depth")
+    np.testing.assert_array_equal(multires(other, settings), light)
+
+
 def test_settings_are_checked():
     for change in ({"coarsest": 0}, {"coarsest": 1.5}, {"finest": -1}, {"finest": 17}, {"criteria": {"colour"}},
                    {"depth_threshold": -1}, {"normal_threshold": math.nan}, {"curvature_threshold": 1e39},

@@ -14,7 +14,7 @@ from numba import njit, prange
 
 from benchmarks.harness import Row, ratio
 from refgi.jit import threads
-from refgi.splat.pairs.pair_sum import Clamp, sum_pairs
+from refgi.pairs.pair_sum import Clamp, sum_pairs
 
 
 @njit(parallel=True, fastmath=True, error_model="numpy")

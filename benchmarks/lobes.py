@@ -16,8 +16,8 @@ from numba import njit, prange
 from benchmarks.eq2 import on_threads, room
 from benchmarks.harness import Row, ratio, seconds
 from refgi.elementary import exp2, log2p1
-from refgi.splat.pairs.lobe_sum import add_lobes
-from refgi.splat.pairs.pair_sum import Clamp
+from refgi.pairs.lobe_sum import add_lobes
+from refgi.pairs.pair_sum import Clamp
 
 EXPONENTS = (20.0, 1000.0)
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from benchmarks.harness import Row, ratio, seconds
 from refgi import Frame, load_scene
+from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import Scene
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
-from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.refinement.criteria import needs
 from refgi.splat.refinement.grid import top_level
 from refgi.splat.refinement.refine import refine

@@ -8,16 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import LightSettings, Pattern, expect_choices
+from refgi.lights.solid_angle import demo_footprints
+from refgi.pairs.settings import PairSettings
 from refgi.scene.values import BRIGHTEST, is_count
 from refgi.splat.error_target.error_driven import error_driven
 from refgi.splat.light_lists.per_light import per_light
-from refgi.splat.lights.selection import choose_lights, footprints
-from refgi.splat.lights.settings import LightSettings, Pattern, expect_choices
-from refgi.splat.lights.solid_angle import demo_footprints
 from refgi.splat.refinement.criteria import needs
 from refgi.splat.refinement.grid import Subsplats, top_level
 from refgi.splat.refinement.refine import refine
-from refgi.splat.settings import PairSettings
 from refgi.splat.subsplats.detail import surface_detail
 from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
 from refgi.splat.subsplats.upsample import upsample

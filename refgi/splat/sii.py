@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import LightSettings
+from refgi.pairs.irradiance import Receivers
 from refgi.splat.half_resolution import half_resolution
-from refgi.splat.irradiance import Receivers
-from refgi.splat.lights.selection import choose_lights, footprints
-from refgi.splat.lights.settings import LightSettings
 from refgi.splat.settings import SplatSettings
 from refgi.splat.splat import splat
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.splat.irradiance import Receivers, checked, irradiance, over_receivers
-from refgi.splat.pairs.lobe_sum import add_lobes
-from refgi.splat.pairs.ranged_sum import sum_pairs_in_range, sum_weighed_pairs
-from refgi.splat.pairs.sphere_sum import sum_spheres
+from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
+from refgi.pairs.lobe_sum import add_lobes
+from refgi.pairs.ranged_sum import sum_pairs_in_range, sum_weighed_pairs
+from refgi.pairs.sphere_sum import sum_spheres
 from refgi.splat.reach.lists import Lists
 from refgi.splat.settings import SplatSettings
 from refgi.stages import skip, stage

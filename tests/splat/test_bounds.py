@@ -9,10 +9,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from refgi.errors import InputError
+from refgi.pairs.blocks import block_by_block
+from refgi.pairs.ranged_sum import LANES, reached
 from refgi.rsm.projection import camera_projection, cube_projection
 from refgi.scene import Camera
-from refgi.splat.pairs.blocks import block_by_block
-from refgi.splat.pairs.ranged_sum import LANES, reached
 from refgi.splat.reach.bins import list_lights, pack_solids
 from refgi.splat.reach.bounds import (
     Ellipsoid,
@@ -27,7 +27,7 @@ from refgi.splat.reach.bounds import (
 from refgi.splat.reach.mesh_bounds import covered_pixels, inflation, sphere_mesh
 from refgi.splat.reach.screen_bounds import screen_quads, tiles_of_quads
 from tests.naive import bounds as naive
-from tests.splat import sets
+from tests.pairs import sets
 
 TOUCH = 1e-12  # curves touch: F^2 and e^2 are equal there but for rounding
 PRINTED = 0.5e-3  # tables give three digits

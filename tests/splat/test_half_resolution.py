@@ -5,11 +5,11 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights.selection import choose_lights, footprints
+from refgi.pairs.irradiance import irradiance
 from refgi.scene import load_scene
 from refgi.splat import Receivers, SiiSettings
 from refgi.splat.half_resolution import half_resolution
-from refgi.splat.irradiance import irradiance
-from refgi.splat.lights.selection import choose_lights, footprints
 
 QUARTER = 0.26  # of the pixels: blocks on the edge of the picture and of surfaces are not whole
 

@@ -8,12 +8,12 @@ import pytest
 
 from refgi.form_factors import polygon_form_factor
 from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
 from refgi.rsm.projection import CUBE_FORWARD, CUBE_UP
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from refgi.splat import SiiSettings, sii
 from refgi.splat.account.ledger import energy_ledger
 from refgi.splat.account.pixel_area import pixel_areas
-from refgi.splat.lights.selection import choose_lights
 from refgi.stages import observe
 from tests.naive import ledger as naive
 from tests.naive.radiometry import lobe_fraction

@@ -9,10 +9,10 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights.selection import choose_lights, footprints
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, load_scene
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
-from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.multires import _halved
 from refgi.splat.refinement.grid import representatives
 from refgi.stages import observe

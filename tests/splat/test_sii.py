@@ -8,9 +8,9 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.frame import Frame
+from refgi.lights.selection import light_footprints, pixel_lights
 from refgi.scene import SpotLight, load_scene
 from refgi.splat import SiiSettings, sii
-from refgi.splat.lights.selection import light_footprints, pixel_lights
 from refgi.stages import observe
 
 ALL = SiiSettings(pattern="all", i_low=0)  # the sum without a cut

@@ -10,10 +10,10 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.pairs.ranged_sum import LANES, range_factor
 from refgi.rsm import choose_pixel_lights
 from refgi.scene import load_scene
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.pairs.ranged_sum import LANES, range_factor
 from refgi.splat.reach.bounds import light_solids
 from refgi.splat.reach.fragments import fragments, gather_bits
 from refgi.splat.reach.mesh_bounds import covered_pixels
@@ -22,7 +22,7 @@ from refgi.splat.reach.threshold import low_irradiance
 from refgi.splat.settings import SplatSettings
 from refgi.splat.splat import cut_irradiance, splat
 from tests.naive import bounds as naive
-from tests.splat import sets
+from tests.pairs import sets
 
 CUT = SplatSettings(irradiance_low=0.05)
 BOUNDS = ("full", "quad", "ellipsoid", "tangent", "mesh")

@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.compare.maps import Scale
+from refgi.lights.selection import choose_lights
 from refgi.papers import pictures
 from refgi.papers.multires.subjects import DRAGON, frame_of, full_sum, settings_of, share_lit, subsplats_of
 from refgi.papers.records import Cell, Figure, Picture, Table
-from refgi.splat.lights.selection import choose_lights
 from refgi.splat.multires import MultiresSettings, multires
 from refgi.splat.refinement.grid import Subsplats
 from refgi.splat.refinement.picture import level_picture

@@ -4,12 +4,12 @@ import dataclasses
 from functools import partial
 from typing import TYPE_CHECKING, Any, get_args
 
+from refgi.lights.selection import choose_lights
 from refgi.papers import pictures
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.multires.subjects import DRAGON, LARGE, frame_of, full_sum, settings_of, subsplats_of, unclamped
 from refgi.papers.records import Figure, Table
 from refgi.papers.timing import interleaved
-from refgi.splat.lights.selection import choose_lights
 from refgi.splat.multires import MultiresSettings, Upsampling, multires
 from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
 from refgi.splat.subsplats.upsample import upsample

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.lights.selection import choose_lights, footprints
 from refgi.papers import pictures
 from refgi.papers.curves import Axes, Curve, drawn
 from refgi.papers.judging import errors_of
@@ -14,7 +15,6 @@ from refgi.papers.multires.subjects import LARGE, frame_of, full_sum, settings_o
 from refgi.papers.records import Cell, Figure, Picture, Plot, Table
 from refgi.papers.timing import interleaved
 from refgi.splat.error_target.error_driven import error_driven
-from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.multires import MultiresSettings, multires
 
 if TYPE_CHECKING:

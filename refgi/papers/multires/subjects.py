@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.frame import Frame
+from refgi.lights.selection import choose_lights, footprints
+from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.papers.multires.scenes import BUILDERS
-from refgi.splat.irradiance import Receivers, irradiance
-from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.multires import MultiresSettings, multires, shared_subsplats
 from refgi.splat.refinement.grid import Subsplats
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from refgi.lights.selection import choose_lights
 from refgi.papers import pictures
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.multires.subjects import (
@@ -21,7 +22,6 @@ from refgi.papers.multires.subjects import (
 )
 from refgi.papers.records import Cell, Figure, Picture, Table
 from refgi.splat.light_lists.per_light import per_light_counts
-from refgi.splat.lights.selection import choose_lights
 from refgi.splat.multires import MultiresSettings, multires
 
 if TYPE_CHECKING:

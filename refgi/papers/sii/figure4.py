@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
 from refgi.papers import pictures
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.records import Bar, Cell, Figure, Picture, Ratios, Table
 from refgi.papers.sii.subjects import CAUSTIC
 from refgi.papers.timing import interleaved
 from refgi.splat import SiiSettings, sii
-from refgi.splat.lights.selection import choose_lights
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

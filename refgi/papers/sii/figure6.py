@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.lights.selection import choose_lights
 from refgi.papers import pictures
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.records import Figure, Table
 from refgi.splat import SiiSettings, sii
-from refgi.splat.lights.selection import choose_lights
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.lights.selection import importance_maps
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Table
 from refgi.papers.sii.subjects import full_sum
@@ -13,7 +14,6 @@ from refgi.rsm.pyramid import importance_pyramid
 from refgi.rsm.warp import warp_samples
 from refgi.sampling import halton
 from refgi.splat import SiiSettings, sii
-from refgi.splat.lights.selection import importance_maps
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

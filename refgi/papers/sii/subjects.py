@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
+from refgi.lights.selection import choose_lights
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.lights.selection import choose_lights
 from refgi.splat.reach.fragments import Fragments, fragments
 
 if TYPE_CHECKING:

@@ -39,10 +39,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.lights.selection import choose_lights, light_maps
 from refgi.radiometry import lobe_fraction
 from refgi.splat.account.light_side import LightSide, light_side
 from refgi.splat.account.screen_side import screen_side
-from refgi.splat.lights.selection import choose_lights, light_maps
 from refgi.stages import stage
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.lights.selection import footprints
+from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.splat.account.pixel_area import pixel_areas
-from refgi.splat.irradiance import Receivers, irradiance
-from refgi.splat.lights.selection import footprints
 from refgi.splat.sii import sii
 from refgi.splat.splat import cut_irradiance
 

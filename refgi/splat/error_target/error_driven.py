@@ -20,11 +20,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.pairs.irradiance import Receivers, checked
 from refgi.splat.error_target.levels import levels_of
 from refgi.splat.error_target.near import near_light
 from refgi.splat.error_target.samples import Estimate, Samples, estimate, mean_of, stratified
 from refgi.splat.error_target.trial import Known, Trials
-from refgi.splat.irradiance import Receivers, checked
 from refgi.splat.refinement.grid import Subsplats, top_level
 from refgi.splat.refinement.refine import refine
 from refgi.stages import skip, stage

@@ -13,14 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange, threads
+from refgi.pairs.blocks import put, taken
+from refgi.pairs.irradiance import Receivers, add_lights
+from refgi.pairs.packing import Packed
 from refgi.rsm.memory import plane
 from refgi.splat.error_target.descent import assemble, begin, descend, misses
 from refgi.splat.error_target.interpolate import blends
 from refgi.splat.error_target.levels import Level
 from refgi.splat.error_target.near import NearLight
-from refgi.splat.irradiance import Receivers, add_lights
-from refgi.splat.pairs.blocks import put, taken
-from refgi.splat.pairs.packing import Packed
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]

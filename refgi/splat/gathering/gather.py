@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.pairs.irradiance import Receivers
 from refgi.scene.values import LARGEST
 from refgi.splat.gathering.gather_sum import GatherMap, disc_pattern, gather_discs
 from refgi.splat.gathering.interpolation import Agreement, coarse_pixels, interpolate
-from refgi.splat.irradiance import Receivers
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.pairs.pair_sum import geometry_term
 from refgi.sampling import halton
-from refgi.splat.pairs.pair_sum import geometry_term
 
 Array = npt.NDArray[Any]
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.irradiance import Receivers
+from refgi.pairs.irradiance import Receivers
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]

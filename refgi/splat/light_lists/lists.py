@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.pairs.lobe_shape import Widening
+from refgi.pairs.pair_sum import SUM, TILE, Clamp
 from refgi.splat.light_lists.one_light import TILE_ROWS, Separate, light_tile, load_cells
-from refgi.splat.pairs.lobe_shape import Widening
-from refgi.splat.pairs.pair_sum import SUM, TILE, Clamp
 
 Array = npt.NDArray[Any]
 

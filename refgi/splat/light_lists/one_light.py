@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.splat.pairs.lobe_culling import LIMIT, bound_lobes
-from refgi.splat.pairs.lobe_shape import Widening
-from refgi.splat.pairs.lobe_sum import add_lobe
-from refgi.splat.pairs.packing import Packed
-from refgi.splat.pairs.pair_sum import NX, ROWS, SUM, Clamp, X, clamped_term, geometry_term
-from refgi.splat.pairs.sphere_sum import TERM, cut_cones, whole_cones
+from refgi.pairs.lobe_culling import LIMIT, bound_lobes
+from refgi.pairs.lobe_shape import Widening
+from refgi.pairs.lobe_sum import add_lobe
+from refgi.pairs.packing import Packed
+from refgi.pairs.pair_sum import NX, ROWS, SUM, Clamp, X, clamped_term, geometry_term
+from refgi.pairs.sphere_sum import TERM, cut_cones, whole_cones
 
 Array = npt.NDArray[Any]
 

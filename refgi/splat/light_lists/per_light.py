@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange, threads
-from refgi.splat.irradiance import Receivers, checked
+from refgi.pairs.irradiance import Receivers, checked
 from refgi.splat.light_lists.lists import Cells, Lists, leaves, refine_for_lights, room_for
 from refgi.splat.light_lists.one_light import separate
 from refgi.splat.light_lists.tree import Tree, above_leaves, cell_tree, cut

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.pairs.pair_sum import TILE
-from refgi.splat.pairs.ranged_sum import LANES
+from refgi.pairs.pair_sum import TILE
+from refgi.pairs.ranged_sum import LANES
 from refgi.splat.reach.bounds import Solids
 from refgi.stages import stage
 

@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.irradiance import Receivers, checked, over_receivers
-from refgi.splat.pairs.lobe_shape import CORRECTED, Widening, lobe_norm_factor
-from refgi.splat.pairs.pair_sum import TILE
-from refgi.splat.pairs.range import Range
-from refgi.splat.pairs.ranged_sum import LANES, reached
+from refgi.pairs.irradiance import Receivers, checked, over_receivers
+from refgi.pairs.lobe_shape import CORRECTED, Widening, lobe_norm_factor
+from refgi.pairs.pair_sum import TILE
+from refgi.pairs.range import Range
+from refgi.pairs.ranged_sum import LANES, reached
 from refgi.splat.reach.lists import Lists
 from refgi.splat.settings import SplatSettings
 

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.splat.pairs.packing import Packed
-from refgi.splat.pairs.range import Range
-from refgi.splat.pairs.ranged_sum import LANES
+from refgi.pairs.packing import Packed
+from refgi.pairs.range import Range
+from refgi.pairs.ranged_sum import LANES
 from refgi.splat.reach.bins import list_lights, of_whole_tiles, pack_solids
 from refgi.splat.reach.bounds import Solids, light_solids
 from refgi.splat.reach.mesh_bounds import covered_pixels

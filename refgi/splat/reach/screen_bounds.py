@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.splat.pairs.ranged_sum import LANES
+from refgi.pairs.ranged_sum import LANES
 
 if TYPE_CHECKING:
     from refgi.rsm import Projection

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.splat.pairs.packing import Packed, pack
-from refgi.splat.pairs.range import Range
+from refgi.pairs.packing import Packed, pack
+from refgi.pairs.range import Range
 from refgi.splat.settings import SplatSettings
 
 if TYPE_CHECKING:

@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
-from refgi.splat.pairs.blocks import taken
-from refgi.splat.pairs.pair_sum import TILE
+from refgi.pairs.blocks import taken
+from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
+from refgi.pairs.pair_sum import TILE
+from refgi.pairs.settings import PairSettings
 from refgi.splat.refinement.grid import Subsplats
-from refgi.splat.settings import PairSettings
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:

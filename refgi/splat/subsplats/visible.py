@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.pairs.blocks import taken
 from refgi.scene import Geometry
 from refgi.shadowed import receivers, shadowed_sum
-from refgi.splat.pairs.blocks import taken
 from refgi.splat.refinement.grid import Subsplats
 from refgi.stages import stage
 

@@ -9,6 +9,8 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights.selection import choose_lights, footprints
+from refgi.pairs.irradiance import checked
 from refgi.rsm import PixelLights
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
@@ -20,8 +22,6 @@ from refgi.splat.error_target.interpolate import blends
 from refgi.splat.error_target.levels import levels_of
 from refgi.splat.error_target.near import near_light
 from refgi.splat.error_target.samples import estimate, mean_of, stratified
-from refgi.splat.irradiance import checked
-from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.multires import MultiresSettings
 from refgi.stages import observe
 

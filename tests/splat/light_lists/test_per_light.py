@@ -22,7 +22,7 @@ from refgi.splat.subsplats.upsample import upsample
 from tests.naive import eq2
 from tests.naive import per_light as naive
 from tests.naive import upsample as naive_upsample
-from tests.splat import sets
+from tests.pairs import sets
 
 TWIN = 1e-12  # float64 against unit vectors and printed terms; a lobe of exponent 20 takes 20 roundings to its power
 ROUNDING = 2.0**-24  # float32; a compensated sum of terms >= 0 is off by 2 of these, lobes are added to it at last

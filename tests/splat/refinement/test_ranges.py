@@ -14,7 +14,7 @@ from refgi.splat.refinement.criteria import needs
 from refgi.splat.refinement.grid import level_shape, top_level
 from refgi.splat.refinement.ranges import curvatures, depth_ranges, depth_slopes, normal_ranges
 from tests.naive import refinement as naive
-from tests.splat.sets import random_directions, unit
+from tests.pairs.sets import random_directions, unit
 
 SIZES = ((1, 1), (1, 9), (7, 1), (16, 16), (37, 53))
 TOP = 3

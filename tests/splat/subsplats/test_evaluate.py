@@ -5,9 +5,9 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
-from refgi.splat.lights.selection import choose_lights, footprints
 from refgi.splat.multires import MultiresSettings
 from refgi.splat.refinement.grid import Subsplats, level_shape, representatives
 from refgi.splat.subsplats.evaluate import at_subsplats, evaluate

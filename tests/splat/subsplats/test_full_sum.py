@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.gathering.gather import GatherSettings, gather
-from refgi.splat.lights.selection import choose_lights
 from refgi.splat.multires import MultiresSettings, multires
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 

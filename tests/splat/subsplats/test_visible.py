@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
-from refgi.splat.lights.selection import choose_lights
 from refgi.splat.multires import MultiresSettings
 from refgi.splat.refinement.grid import Subsplats, level_shape, representatives
 from refgi.splat.subsplats.visible import evaluate_visible

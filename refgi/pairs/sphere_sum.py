@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.pairs.pair_sum import GROUP, LEAST_SQUARE, NX, ROWS, SUM, TILE, TOTAL, X, close_group, load_tile
-from refgi.splat.pairs.range import Range
-from refgi.splat.pairs.ranged_sum import range_factor
-from refgi.splat.pairs.sphere_pair import LEAST_RATIO, cone_term, cut_cone_term
+from refgi.pairs.pair_sum import GROUP, LEAST_SQUARE, NX, ROWS, SUM, TILE, TOTAL, X, close_group, load_tile
+from refgi.pairs.range import Range
+from refgi.pairs.ranged_sum import range_factor
+from refgi.pairs.sphere_pair import LEAST_RATIO, cone_term, cut_cone_term
 
 Array = npt.NDArray[Any]
 

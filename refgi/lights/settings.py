@@ -4,10 +4,10 @@ import dataclasses
 from typing import Any, ClassVar, Literal, get_args
 
 from refgi.errors import expect
+from refgi.lights.walk import MOST_BOUNCES
+from refgi.pairs.settings import FOOTPRINT_CLAMPS, LAST_SEED, PairSettings
 from refgi.scene.material import SHARPEST
 from refgi.scene.values import LARGEST, is_count
-from refgi.splat.lights.walk import MOST_BOUNCES
-from refgi.splat.settings import FOOTPRINT_CLAMPS, LAST_SEED, PairSettings
 
 Pattern = Literal["grid", "halton", "all", "random"]
 Source = Literal["rsm", "walk"]

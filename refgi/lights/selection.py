@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.splat.lights.solid_angle import with_equal_solid_angles
-from refgi.splat.settings import FOOTPRINT_CLAMPS
+from refgi.lights.solid_angle import with_equal_solid_angles
+from refgi.pairs.settings import FOOTPRINT_CLAMPS
 from refgi.stages import skip
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
+    from refgi.lights.settings import LightSettings
     from refgi.rsm import PixelLights, Rsm
-    from refgi.splat.lights.settings import LightSettings
 
 Array = npt.NDArray[Any]
 
@@ -118,7 +118,7 @@ def thinned(frame: "Frame", lights: "PixelLights", settings: "LightSettings") ->
     PixelLights
         What is left of them.
     """
-    from refgi.splat.lights.openness_flux import roulette, scale_flux
+    from refgi.lights.openness_flux import roulette, scale_flux
 
     if settings.openness_flux == "none":
         return lights
@@ -139,8 +139,8 @@ def _openness(
 
 
 def _walked(frame: "Frame", settings: "LightSettings") -> "PixelLights":
+    from refgi.lights.walk import walk_lights
     from refgi.scene import light_table, material_table
-    from refgi.splat.lights.walk import walk_lights
 
     scene = frame.scene
     return walk_lights(frame.tracer, scene.geometry, material_table(scene.materials), light_table(scene.lights),

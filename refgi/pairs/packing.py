@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
-from refgi.splat.pairs.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
-from refgi.splat.pairs.pair_sum import Clamp
-from refgi.splat.settings import PairSettings
+from refgi.pairs.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
+from refgi.pairs.pair_sum import Clamp
+from refgi.pairs.settings import PairSettings
 
 if TYPE_CHECKING:
     from refgi.rsm import PixelLights

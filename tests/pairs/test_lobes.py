@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from refgi.jit import threads
+from refgi.pairs.lobe_shape import CLAMPED, FULL_LOBE, NO_NORM, lobe_norm_factor
+from refgi.pairs.lobe_sum import add_lobes
+from refgi.pairs.packing import pack_clamp, pack_lobes, pack_widening
+from refgi.pairs.range import Range
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.pairs.lobe_shape import CLAMPED, FULL_LOBE, NO_NORM, lobe_norm_factor
-from refgi.splat.pairs.lobe_sum import add_lobes
-from refgi.splat.pairs.packing import pack_clamp, pack_lobes, pack_widening
-from refgi.splat.pairs.range import Range
 from tests.naive import eq2
 from tests.naive.radiometry import lobe_fraction
-from tests.splat import sets
+from tests.pairs import sets
 
 EXPONENTS = (0.0, 0.37, 1.0, 2.0, 10.0, 100.0, 1e4, 1e6)
 TILTS = (0.0, 30.0, 60.0, 75.0, 85.0, 90.0)

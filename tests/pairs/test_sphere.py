@@ -8,11 +8,11 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
+from refgi.pairs.sphere_pair import cone_term, cut_cone_term
 from refgi.splat import PairSettings, irradiance
-from refgi.splat.pairs.sphere_pair import cone_term, cut_cone_term
 from tests.naive import eq2
 from tests.naive.sphere import cone_integral, spherical_pair
-from tests.splat import sets
+from tests.pairs import sets
 
 UP = np.array([[0.0], [0.0], [1.0]])
 ON_AXIS = {1: 0.667, 2: 0.935, 5: 0.990, 10: 0.9975}  # E / E of the pixel light at so many radii

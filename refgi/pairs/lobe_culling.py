@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel
-from refgi.splat.pairs.pair_sum import TILE, X
+from refgi.pairs.pair_sum import TILE, X
 
 Array = npt.NDArray[Any]
 

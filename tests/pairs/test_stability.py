@@ -14,7 +14,7 @@ from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight
 from refgi.splat import PairSettings, SplatSettings, irradiance
 from refgi.splat.splat import splat
-from tests.splat import sets
+from tests.pairs import sets
 
 U = 2.0**-24  # unit of rounding of float32
 SMALLEST = 2.0**-126  # a lobe below this share of its peak is 0

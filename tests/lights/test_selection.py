@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
+from refgi.lights.openness_flux import roulette, scale_flux
 from refgi.rays import Tracer, openness
 from refgi.rsm import Warp, choose_pixel_lights, importance, reflective_shadow_map
 from refgi.scene import Material, SpotLight, load_scene, material_table
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.lights.openness_flux import roulette, scale_flux
 from tests.rsm.shapes import geometry
 
 ROUNDING = 1e-12

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from refgi.errors import InputError
 from refgi.jit import threads
+from refgi.pairs.culling import bound_tile, lights_in_reach
+from refgi.pairs.packing import pack_diffuse
+from refgi.pairs.pair_sum import GROUP, TILE, geometry_term, sum_pairs
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.pairs.culling import bound_tile, lights_in_reach
-from refgi.splat.pairs.packing import pack_diffuse
-from refgi.splat.pairs.pair_sum import GROUP, TILE, geometry_term, sum_pairs
 from tests.naive import eq2
-from tests.splat import sets
+from tests.pairs import sets
 
 PLAIN = PairSettings()
 # one term: about 15 roundings, each of half a unit; a group of 64 and its partial sums add a few more

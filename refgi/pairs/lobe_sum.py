@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
-from refgi.splat.pairs.lobe_culling import (
+from refgi.pairs.lobe_culling import (
     LIMIT,
     MEASURES,
     PARTS,
@@ -27,14 +27,14 @@ from refgi.splat.pairs.lobe_culling import (
     lobes_in_reach,
     parts_in_reach,
 )
-from refgi.splat.pairs.lobe_shape import (
+from refgi.pairs.lobe_shape import (
     CORRECTED,
     Widening,
     lobe_norm_factor,
     widened,
 )
-from refgi.splat.pairs.pair_sum import GROUP, LEAST_SQUARE, LOST, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, load_tile
-from refgi.splat.pairs.range import Range
+from refgi.pairs.pair_sum import GROUP, LEAST_SQUARE, LOST, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, load_tile
+from refgi.pairs.range import Range
 
 Array = npt.NDArray[Any]
 

@@ -8,7 +8,7 @@ import pytest
 from refgi.form_factors import disc_form_factor, parallel_rectangles_form_factor, polygon_form_factor
 from refgi.splat import PairSettings, irradiance
 from tests.naive import eq2
-from tests.splat import sets
+from tests.pairs import sets
 
 UP = np.array([[0.0], [0.0], [1.0]])
 FLOOR = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.pairs.pair_sum import (
+from refgi.pairs.pair_sum import (
     GROUP,
     LEAST_SQUARE,
     NX,
@@ -27,7 +27,7 @@ from refgi.splat.pairs.pair_sum import (
     geometry_term,
     load_tile,
 )
-from refgi.splat.pairs.range import Range
+from refgi.pairs.range import Range
 
 Array = npt.NDArray[Any]
 

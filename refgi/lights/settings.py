@@ -18,8 +18,9 @@ Refraction = Literal["none", "back_face", "two_interface"]
 
 CHOICES: dict[str, Any] = {"pattern": Pattern, "source": Source, "warp": WarpMethod, "importance": Importance,
                            "openness_flux": OpennessFlux, "refraction": Refraction}
-# least and most; lights: every texel of a map of 4096 x 4096
-COUNTS = (("lights", 1, 1 << 24), ("bounces", 1, MOST_BOUNCES), ("warp_levels", 0, 32), ("openness_rays", 1, 1 << 16),
+MOST_LIGHTS = 1 << 24  # every texel of a map of 4096 x 4096
+# least and most of each number
+COUNTS = (("lights", 1, MOST_LIGHTS), ("bounces", 1, MOST_BOUNCES), ("warp_levels", 0, 32), ("openness_rays", 1, 1 << 16),
           ("seed", 0, LAST_SEED))
 FOR_MAPS = ("pattern", "filtered", "warp", "renormalise_weights")  # no effect on paths: must be left as they are
 FOR_MAPS_AS_PUBLISHED = frozenset({"sii_no_tn", "equal_solid_angle"})

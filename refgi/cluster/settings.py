@@ -1,0 +1,110 @@
+"""What clustered visibility can be set to."""
+
+import dataclasses
+from typing import Any, ClassVar, Literal
+
+from refgi.errors import expect
+from refgi.lights.settings import MOST_LIGHTS, LightSettings, expect_choices
+from refgi.scene.values import is_count
+
+Distance = Literal["raw", "normalised", "squared"]
+Axes = Literal["fixed", "pca", "min_area"]
+Extent = Literal["root", "longer", "shorter"]
+Visibility = Literal["series", "step", "hard", "back_projection", "rectangle", "members", "none"]
+Prefilter = Literal["mip", "sat", "brute"]
+Rescale = Literal["none", "scale2", "plateau"]
+Behind = Literal["visible", "dual_paraboloid", "raytrace"]
+NearGeometry = Literal["keep", "planes", "ball"]
+Blur = Literal["none", "box", "geometry"]
+
+CHOICES: dict[str, Any] = {
+    "distance": Distance, "axes": Axes, "extent": Extent, "visibility": Visibility, "prefilter": Prefilter,
+    "rescale": Rescale, "behind": Behind, "near_geometry": NearGeometry, "blur": Blur,
+    "single_light": Literal["point", "footprint"], "maps": Literal["raster", "rays"],
+    "quantisation": Literal["none", "published"]}
+MOST_TERMS = 64
+LARGEST_MAP = 4096  # texels
+# least and most of each number
+COUNTS = (("area_lights", 1, MOST_LIGHTS), ("rounds", 1, 1000), ("map_resolution", 1, LARGEST_MAP),
+          ("terms", 1, MOST_TERMS))
+LEAST_TARGET = 1e-4  # about what rays for a thousand pixels can tell
+
+
+@dataclasses.dataclass(frozen=True)
+class ValSettings(LightSettings):
+    """What `val` can be set to; the defaults are the paper's, those of docs/methods/val where it is silent.
+
+    Clustering: `area_lights` clusters by a `distance` ("raw" as printed, "normalised" by the scene's diagonal and pi,
+    or "squared") of weights `position_weight` and `normal_weight`, for at most `rounds` rounds. `target_error` (share
+    of the mean, RMSE) adds area lights until the error of visibility is estimated to be below it.
+
+    Area lights: rectangles along `axes`; one `extent` of it is the paper's Delta. `unbiased_area` enlarges it by what
+    a sample of n lights misses, `foreshortened` narrows it towards the receiver, `single_light` is what a cluster of
+    one light is. Maps of `map_resolution` texels a side from `maps` ("raster" or "rays"); `near_geometry` says what
+    is left out of them around the centre ("planes" that pass within the cluster's radius, all within that "ball"),
+    `occluders_alone` leaves out what nothing lies behind. `behind` says what receivers behind an area light see of it.
+
+    Visibility: "series" of `terms` terms with the filter `prefilter`, the exact "step", one "hard" test towards the
+    centre, or by reference: the map projected back ("back_projection"), rays to the "rectangle", rays to the
+    "members"; or "none". A receiver is moved by `bias` (share of the depth range; none: where the series is 1 for
+    the first time); `attenuation` is that of the series' terms and `rescale` what becomes of it; `quantisation` is
+    that of the published textures. The step counts what lies before the `receiver_plane` and within the `cone`.
+
+    `interleaving` n sums one light of n^2 at each pixel of n x n (8 as published; 1: all; none: all where that is no
+    more than 2^30 pairs, else 8), and `blur` joins them, within `blur_extent` of the scene's diagonal and above
+    `blur_cosine` between normals.
+    """
+
+    lights: int = 1024
+    area_lights: int = 30
+    target_error: float | None = None
+    distance: Distance = "normalised"
+    position_weight: float = 0.7
+    normal_weight: float = 0.3
+    rounds: int = 50
+    axes: Axes = "fixed"
+    extent: Extent = "root"
+    unbiased_area: bool = False
+    foreshortened: bool = False
+    single_light: Literal["point", "footprint"] = "point"
+    map_resolution: int = 256
+    maps: Literal["raster", "rays"] = "raster"
+    near_geometry: NearGeometry = "planes"
+    occluders_alone: bool = True
+    behind: Behind = "visible"
+    visibility: Visibility = "series"
+    terms: int = 4
+    prefilter: Prefilter = "mip"
+    bias: float | None = None
+    attenuation: float = 0.0
+    rescale: Rescale = "none"
+    quantisation: Literal["none", "published"] = "none"
+    receiver_plane: bool = True
+    cone: bool = True
+    interleaving: int | None = None
+    blur: Blur = "geometry"
+    blur_extent: float = 0.1
+    blur_cosine: float = 0.8
+
+    SWITCHES: ClassVar[frozenset[str]] = LightSettings.SWITCHES | {
+        "val_alpha", "val_alpha_over_pi", "val_search_solid_angle"}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for key, least, most in COUNTS:
+            count = getattr(self, key)
+            expect(is_count(count) and least <= count <= most, key, f"a whole number, {least} to {most:,}", count)
+        expect_choices(self, CHOICES)
+        for key in ("position_weight", "normal_weight"):
+            expect(0 <= getattr(self, key) <= 1e6, key, "a weight of 0 to 1e6", getattr(self, key))
+        expect(self.position_weight + self.normal_weight > 0, "position_weight",
+               "more than 0 beside a normal_weight of 0", self.position_weight)
+        expect(self.target_error is None or LEAST_TARGET <= self.target_error < float("inf"), "target_error",
+               f"none or a share of the mean from {LEAST_TARGET:g} on", self.target_error)
+        expect(self.bias is None or 0 <= self.bias <= 0.25, "bias", "none or a share of the depth range, 0 to 0.25",
+               self.bias)
+        expect(0 <= self.attenuation <= 100, "attenuation", "0 to 100", self.attenuation)
+        expect(self.interleaving is None or (is_count(self.interleaving) and 1 <= self.interleaving <= 64),
+               "interleaving", "none or 1 to 64 pixels", self.interleaving)
+        expect(0 <= self.blur_extent <= 10, "blur_extent", "a share of the diagonal, 0 to 10", self.blur_extent)
+        expect(-1 <= self.blur_cosine <= 1, "blur_cosine", "a cosine, -1 to 1", self.blur_cosine)

@@ -8,7 +8,7 @@ Array = npt.NDArray[Any]
 
 
 class AreaLights(NamedTuple):
-    """M rectangles; those of empty clusters have `count` 0 and are of no use."""
+    """M rectangles; those of empty clusters have no `members` and are of no use."""
 
     center: Array  # (3, M) float64, m
     normal: Array  # (3, M) float64, unit vectors
@@ -18,5 +18,5 @@ class AreaLights(NamedTuple):
     offset: Array  # (2, M) float64, m: the rectangle's middle, along the axes from `center`
     delta: Array  # (M,) float64, m: Delta, the size of the light as a filter sees it; 0: a point
     radius: Array  # (M,) float64, m: from the centre to the farthest light of the cluster
-    count: Array  # (M,) int64: lights of the cluster
+    members: Array  # (M,) int64: lights of the cluster
     of: Array  # (N,) int32: C(i), the area light of each pixel light

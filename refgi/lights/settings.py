@@ -20,8 +20,8 @@ CHOICES: dict[str, Any] = {"pattern": Pattern, "source": Source, "warp": WarpMet
                            "openness_flux": OpennessFlux, "refraction": Refraction}
 MOST_LIGHTS = 1 << 24  # every texel of a map of 4096 x 4096
 # least and most of each number
-COUNTS = (("lights", 1, MOST_LIGHTS), ("bounces", 1, MOST_BOUNCES), ("warp_levels", 0, 32), ("openness_rays", 1, 1 << 16),
-          ("seed", 0, LAST_SEED))
+COUNTS = (("lights", 1, MOST_LIGHTS), ("bounces", 1, MOST_BOUNCES), ("warp_levels", 0, 32),
+          ("openness_rays", 1, 1 << 16), ("seed", 0, LAST_SEED))
 FOR_MAPS = ("pattern", "filtered", "warp", "renormalise_weights")  # no effect on paths: must be left as they are
 FOR_MAPS_AS_PUBLISHED = frozenset({"sii_no_tn", "equal_solid_angle"})
 

@@ -1,1 +1,1 @@
-"""What clustered visibility converges to: rays to the lights of a cluster or to its rectangle, the map projected back."""
+"""What clustered visibility converges to: rays to the lights of a cluster or its rectangle, the map projected back."""

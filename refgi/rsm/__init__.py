@@ -8,6 +8,7 @@ second pass, only those that are asked for.
 
 from refgi.rsm.depth_maps import paraboloid_depth_maps
 from refgi.rsm.direct import direct_irradiance, shadow_map_visibility
+from refgi.rsm.facing import facing_normals
 from refgi.rsm.gbuffer import GBuffer, gbuffer
 from refgi.rsm.importance import importance
 from refgi.rsm.leaving import leaving_radiance
@@ -29,6 +30,7 @@ __all__ = [
     "camera_projection",
     "choose_pixel_lights",
     "direct_irradiance",
+    "facing_normals",
     "gbuffer",
     "importance",
     "importance_pyramid",

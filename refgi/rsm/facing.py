@@ -1,0 +1,69 @@
+"""Normals of the triangles themselves, where the shading normal may be another: what lies before a surface's plane."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.rsm.memory import plane
+from refgi.scene.model import Geometry
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+
+@stage("rsm.facing")
+def facing_normals(geometry: Geometry, triangle_id: Array, normal: Array) -> Array:
+    """Return the normal of each pixel's triangle on the side of its shading normal.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    triangle_id : (h, w) ndarray of int32
+        Which triangle a pixel sees; -1 for none.
+    normal : (3, h, w) ndarray
+        Shading normals; their dtype is that of the result.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Unit vectors; 0 where there is no surface. The very array `normal` where nothing is interpolated.
+    """
+    if geometry.vertex_normals is None:
+        return normal
+    facing = plane(normal.shape, normal.dtype)
+    _fill(geometry.vertices, geometry.faces, triangle_id, normal, facing)
+    return facing
+
+
+@kernel(parallel=True)
+def _fill(vertices: Array, faces: Array, triangle_id: Array, normal: Array, facing: Array) -> None:
+    for row in prange(triangle_id.shape[0]):
+        last, nx, ny, nz = -1, 0.0, 0.0, 0.0
+        for column in range(triangle_id.shape[1]):
+            face = triangle_id[row, column]
+            if face != last:  # neighbours mostly share their triangle
+                nx, ny, nz = _unit_normal(vertices, faces, face)
+                last = face
+            along = nx * normal[0, row, column] + ny * normal[1, row, column] + nz * normal[2, row, column]
+            sign = -1.0 if along < 0.0 else 1.0
+            facing[0, row, column] = sign * nx
+            facing[1, row, column] = sign * ny
+            facing[2, row, column] = sign * nz
+
+
+@kernel
+def _unit_normal(vertices: Array, faces: Array, face: int) -> Any:
+    if face < 0:
+        return 0.0, 0.0, 0.0
+    i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+    ax, ay, az = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1], vertices[j, 2] - vertices[i, 2]
+    bx, by, bz = vertices[k, 0] - vertices[i, 0], vertices[k, 1] - vertices[i, 1], vertices[k, 2] - vertices[i, 2]
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length == 0.0:
+        return 0.0, 0.0, 0.0
+    return nx / length, ny / length, nz / length

@@ -10,8 +10,8 @@ ROUNDING = {np.float32: 1e-7, np.float64: 4e-16}  # of a unit vector's component
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_the_face_s_normal_on_the_shading_normal_s_side(rng, dtype):
-    ball = sphere(6)
+def test_the_normal_of_the_face_on_the_side_of_the_shading_normal(dtype):
+    rng, ball = np.random.default_rng(5), sphere(6)
     face = rng.integers(-1, len(ball.faces), (7, 9)).astype(np.int32)
     shading = rng.normal(size=(3, 7, 9)).astype(dtype)
     expected = np.zeros((3, 7, 9))

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.attributes import Planes, Wanted, resolve
-from refgi.rsm.paraboloid import draw_paraboloids
+from refgi.rsm.paraboloid import Ignored, draw_paraboloids
 from refgi.rsm.projection import Projection, paraboloid_projection
 from refgi.rsm.runs import Surface
 from refgi.rsm.triangle import LANES
@@ -53,23 +53,51 @@ def paraboloid_depth_maps(
     expect(len(centers) == len(axes), "axes", f"{len(centers)} as many as centres", len(axes))
     expect(bool(np.isfinite(centers).all()), "centers", "finite coordinates", centers)
     expect(bool(np.isfinite(axes).all() and axes.any(axis=1).all()), "axes", "finite vectors, not zero", axes)
-    projection = paraboloid_projection(centers, axes, size)
+    return distance_maps(paraboloid_projection(centers, axes, size), geometry.vertices, geometry.faces, dtype)[0]
+
+
+def distance_maps(
+    projection: Projection, vertices: Array, faces: Array, dtype: npt.DTypeLike, ignored: Ignored | None = None
+) -> tuple[Array, Array]:
+    """Measure the distance to the nearest of some triangles on paraboloid maps.
+
+    Parameters
+    ----------
+    projection : Projection
+        k paraboloid maps of n x n texels.
+    vertices : (v, 3) float64 ndarray
+        World space, m.
+    faces : (m, 3) int32 ndarray
+        Vertices of each triangle.
+    dtype : dtype
+        Float32 or float64.
+    ignored : Ignored, optional
+        What lies too near the centres to count; nothing where absent.
+
+    Returns
+    -------
+    distance : (k, n, n) ndarray
+        Distance, m; inf where nothing is seen and outside the disc.
+    left_out : (k,) ndarray
+        Int64: triangles of each map's hemisphere that were ignored for their planes.
+    """
     height, width = projection.shape
     nearness = np.full((height, max(width, LANES)), 0.0, np.float32)
     ids = np.full(nearness.shape, -1, np.int32)
-    if len(geometry.faces):
-        draw_paraboloids(projection, geometry.vertices, geometry.faces, numba.get_num_threads(), nearness, ids)
+    left_out = np.zeros(projection.maps, np.int64)
+    if len(faces):
+        left_out = draw_paraboloids(projection, vertices, faces, numba.get_num_threads(), nearness, ids, ignored)
     if np.dtype(dtype) == np.float64:
-        return _exact_distances(geometry, projection, ids[:, :width]).reshape(-1, size, size)
-    distance = np.empty((len(centers), size, size), np.float32)
+        return _exact_distances(vertices, faces, projection, ids[:, :width]).reshape(-1, width, width), left_out
+    distance = np.empty((projection.maps, width, width), np.float32)
     _distances(projection, nearness, distance)
-    return distance
+    return distance, left_out
 
 
-def _exact_distances(geometry: Geometry, projection: Projection, ids: Array) -> Array:
+def _exact_distances(vertices: Array, faces: Array, projection: Projection, ids: Array) -> Array:
     """Return the distance to the plane of each texel's triangle, float64."""
     distance, none, no_vectors = np.zeros(ids.shape), np.zeros((0, 0)), np.zeros((3, 0, 0))
-    surface = Surface(geometry.vertices, geometry.faces, np.zeros((0, 3)), geometry.material_of_face, np.zeros((1, 3)))
+    surface = Surface(vertices, faces, np.zeros((0, 3)), np.zeros(len(faces), np.int32), np.zeros((1, 3)))
     planes = Planes(distance, none, no_vectors, no_vectors, no_vectors, np.zeros((0, 0), np.int32))
     wanted = Wanted(True, False, False, False, False, False)
     resolve(surface, projection, np.ascontiguousarray(ids), wanted, planes, numba.get_num_threads())

@@ -32,9 +32,17 @@ class Scratch(NamedTuple):
     faces: Array  # (m, 3) int32
 
 
+class Ignored(NamedTuple):
+    """What each map does not see of the geometry near its centre."""
+
+    planes: Array  # (k,) float64, m: triangles whose plane passes nearer than this
+    ball: Array  # (k,) float64, m: surfaces nearer than this, as if cut away
+
+
 def draw_paraboloids(
-    projection: Projection, vertices: Array, faces: Array, workers: int, nearness: Array, ids: Array
-) -> None:
+    projection: Projection, vertices: Array, faces: Array, workers: int, nearness: Array, ids: Array,
+    ignored: Ignored | None = None,
+) -> Array:
     """Draw triangles on every paraboloid map, inside the hemisphere's disc.
 
     Parameters
@@ -51,13 +59,26 @@ def draw_paraboloids(
         Float32, receives 1/tau; 0 where nothing is.
     ids : (H, max(W, LANES)) ndarray
         Int32, receives the triangle's id.
+    ignored : Ignored, optional
+        What lies too near the centres to count; nothing where absent.
+
+    Returns
+    -------
+    (k,) ndarray
+        Int64: triangles of each map's hemisphere that were ignored for their planes.
     """
     scratch = Scratch(np.empty((workers, len(vertices), 5)), faces)
-    _draw_maps(projection, vertices, scratch, nearness, ids)
+    none = np.zeros(projection.maps)
+    left_out = np.zeros(projection.maps, np.int64)
+    _draw_maps(projection, vertices, scratch, ignored or Ignored(none, none), nearness, ids, left_out)
+    return left_out
 
 
 @kernel(parallel=True)
-def _draw_maps(projection: Projection, vertices: Array, scratch: Scratch, nearness: Array, ids: Array) -> None:
+def _draw_maps(
+    projection: Projection, vertices: Array, scratch: Scratch, ignored: Ignored, nearness: Array, ids: Array,
+    left_out: Array,
+) -> None:
     workers, height = len(scratch.corners), projection.height
     for worker in prange(workers):
         corners = scratch.corners[worker]
@@ -68,7 +89,8 @@ def _draw_maps(projection: Projection, vertices: Array, scratch: Scratch, nearne
                 scale = 1.0 / max(math.sqrt(x * x + y * y + z * z) + z, SMALLEST)
                 corners[i, 3], corners[i, 4] = x * scale, y * scale
             rows = slice(m * height, (m + 1) * height)
-            _draw(projection, corners, scratch.faces, nearness[rows], ids[rows])
+            near = 1.0 / (ignored.planes[m] * ignored.planes[m]), 1.0 / ignored.ball[m]
+            left_out[m] = _draw(projection, corners, scratch.faces, near, nearness[rows], ids[rows])
             _clear_outside_disc(projection, nearness[rows], ids[rows])
 
 
@@ -96,9 +118,13 @@ def _plane(
 
 
 @kernel
-def _draw(projection: Projection, corners: Array, faces: Array, nearness: Array, ids: Array) -> None:
+def _draw(
+    projection: Projection, corners: Array, faces: Array, near_limits: tuple[float, float], nearness: Array, ids: Array
+) -> int:
     """Draw every triangle on one map; the loop is inside because calls with arrays cost atomic reference counts."""
     n, width, half = projection.width, nearness.shape[1], projection.half[0]
+    steepest, nearest = near_limits  # 1 / distance^2 of planes, 1 / distance of hits that are ignored
+    left_out = 0
     step, texels = 2.0 * half / n, 0.5 * n / half
     for face in range(len(faces)):
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
@@ -126,6 +152,9 @@ def _draw(projection: Projection, corners: Array, faces: Array, nearness: Array,
         x2, y2, z2, t2 = _plane(xi, yi, zi, xj, yj, zj, sign)
         scale = sign / det
         xn, yn, zn = (x0 + x1 + x2) * scale, (y0 + y1 + y2) * scale, (z0 + z1 + z2) * scale
+        if xn * xn + yn * yn + zn * zn > steepest:  # its plane lies 1/|n| from the centre
+            left_out += 1
+            continue
         size = max(_longest(xi, yi, zi), max(_longest(xj, yj, zj), _longest(xk, yk, zk)))
         limit = np.float32(1.0 / (NEAREST * size))
         for row in range(top, bottom + 1):
@@ -133,7 +162,7 @@ def _draw(projection: Projection, corners: Array, faces: Array, nearness: Array,
             rest = 1.0 - t * t
             r0, r1, r2 = 2.0 * t * y0 + rest * z0, 2.0 * t * y1 + rest * z1, 2.0 * t * y2 + rest * z2
             rn = 2.0 * t * yn + rest * zn
-            line, left, right = np.uint64(row), first, last
+            line, left, right, length = np.uint64(row), first, last, 1.0 + t * t
             if last - first > SPAN_CUT:
                 left, right = _cut(left, right, x0, z0, r0, step, 0.5 * (n - 1))
                 left, right = _cut(left, right, x1, z1, r1, step, 0.5 * (n - 1))
@@ -150,9 +179,11 @@ def _draw(projection: Projection, corners: Array, faces: Array, nearness: Array,
                         & ((2.0 * x1 - z1 * s) * s + r1 >= t1)
                         & ((2.0 * x2 - z2 * s) * s + r2 >= t2)
                     )
-                    if inside & (near > nearness[line, column]) & (near <= limit):
+                    far_enough = (near <= limit) & (near <= (length + s * s) * nearest)
+                    if inside & (near > nearness[line, column]) & far_enough:
                         nearness[line, column] = near
                         ids[line, column] = face
+    return left_out
 
 
 @kernel

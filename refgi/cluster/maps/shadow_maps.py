@@ -1,0 +1,121 @@
+"""What each area light sees: paraboloid maps of the distance to the nearest occluder (Sec. 4, 6).
+
+A map looks along the area light's normal from its centre, lifted a little off the surface. Where the paper ignores
+geometry "near the cluster's centre" without saying how near, `near_geometry` says what is left out, within the
+distance of the cluster's farthest light.
+"""
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.maps.occluders import Blockers, blockers
+from refgi.cluster.maps.traced import traced_maps
+from refgi.cluster.settings import ValSettings
+from refgi.errors import expect
+from refgi.rsm.depth_maps import distance_maps
+from refgi.rsm.paraboloid import Ignored
+from refgi.rsm.projection import paraboloid_projection
+from refgi.scene.model import Geometry
+from refgi.stages import skip, stage
+
+if TYPE_CHECKING:
+    from refgi.rays import Tracer
+
+Array = npt.NDArray[Any]
+
+LIFT = 4e-6  # share of the largest coordinate: twice what ends of rays are lifted, above the rounding of float32
+BACKWARD = np.diag([-1.0, 1.0, -1.0])  # the frame of the hemisphere behind: right and forward turned round
+
+
+class ShadowMaps(NamedTuple):
+    """K maps of M area lights; all that concerns a map is measured from its centre."""
+
+    depth: Array  # (K, n, n) float32 or float64, m: distance to the nearest occluder; inf where there is none
+    map_of: Array  # (M,) int32: the map of each area light; -1 where nothing can occlude it
+    center: Array  # (K, 3) float64, m
+    frame: Array  # (K, 3, 3) float64: rows right, down, forward, unit vectors
+    near: Array  # (K,) float64, m: smallest distance in `depth`, inf if there is none
+    far: Array  # (K,) float64, m: to the farthest corner of the scene's bounding box
+    behind: Array | None = None  # (K, n, n): the hemisphere behind, its frame with right and forward turned round
+    near_behind: Array | None = None  # (K,) float64, m: smallest distance in `behind`
+    left_out: int = 0  # triangles left out because they are near a centre, summed over all maps
+
+
+@stage("cluster.shadow_maps")
+def shadow_maps(
+    geometry: Geometry, areas: AreaLights, settings: ValSettings, dtype: npt.DTypeLike, tracer: "Tracer | None" = None
+) -> ShadowMaps:
+    """Draw a paraboloid map of distances for every area light that something may occlude.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    areas : AreaLights
+        M area lights.
+    settings : ValSettings
+        Size and kind of the maps, and what is left out of them.
+    dtype : dtype
+        Float32 or float64.
+    tracer : Tracer, optional
+        Rays against `geometry`, for ``maps == "rays"``; made where it is needed and absent.
+
+    Returns
+    -------
+    ShadowMaps
+        At most M maps. An area light without lights, or with nothing in the hemispheres that its maps show, has none.
+
+    Raises
+    ------
+    InputError
+        If the type is not float32 or float64.
+    """
+    expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
+    drawn, both = blockers(geometry, settings.occluders_alone), settings.behind == "dual_paraboloid"
+    lit = np.flatnonzero(areas.members > 0)
+    if len(drawn.faces) == 0:
+        skip("cluster.depth_maps", "no triangle lies between others")
+        lit = lit[:0]
+    scale = max(float(np.abs(corner).max()) for corner in geometry.bounds)
+    center = np.ascontiguousarray((areas.center + LIFT * scale * areas.normal)[:, lit].T)
+    if len(drawn.faces) < len(geometry.faces):
+        tracer = None  # it sees more than the maps do
+    depth, left_out = _draw(drawn, center, areas.frame[lit], areas.radius[lit], settings, dtype, tracer)
+    near = _nearest(depth)
+    behind = near_behind = None
+    needed = np.isfinite(near)
+    if both:
+        behind, more = _draw(drawn, center, BACKWARD @ areas.frame[lit], areas.radius[lit], settings, dtype, tracer)
+        near_behind, left_out = _nearest(behind), left_out + more
+        needed |= np.isfinite(near_behind)
+    if not needed.all():
+        skip("cluster.depth_maps", f"nothing occludes {len(needed) - needed.sum()} of {len(needed)} area lights")
+    map_of = np.full(len(areas.members), -1, np.int32)
+    map_of[lit[needed]] = np.arange(needed.sum())
+    corners = np.array(np.meshgrid(*np.stack(geometry.bounds, axis=1))).reshape(3, -1).T
+    far = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
+    kept = [None if array is None else array[needed] for array in (behind, near_behind)]
+    return ShadowMaps(depth[needed], map_of, center[needed], areas.frame[lit][needed], near[needed], far[needed],
+                      *kept, int(left_out.sum()))  # fmt: skip
+
+
+def _draw(
+    drawn: Blockers, center: Array, frame: Array, radius: Array, settings: ValSettings, dtype: npt.DTypeLike,
+    tracer: "Tracer | None",
+) -> tuple[Array, Array]:
+    """Return maps and how many triangles each leaves out."""
+    projection = paraboloid_projection(center, frame[:, 2], settings.map_resolution)._replace(
+        frame=np.ascontiguousarray(frame))  # fmt: skip
+    none = np.zeros_like(radius)
+    rule = settings.near_geometry
+    ignored = Ignored(radius if rule == "planes" else none, radius if rule == "ball" else none)
+    if settings.maps == "rays":
+        return traced_maps(projection, drawn, ignored, dtype, tracer)
+    return distance_maps(projection, drawn.vertices, drawn.faces, dtype, ignored)
+
+
+def _nearest(depth: Array) -> Array:
+    return depth.min(axis=(1, 2), initial=np.inf).astype(np.float64)

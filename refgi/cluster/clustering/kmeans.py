@@ -1,0 +1,138 @@
+"""Clusters of lights by k-means over position and normal (Sec. 5): the mapping C(i) from light to area light."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.clustering.rounds import LINES, TILE, iterate
+from refgi.cluster.settings import Distance
+from refgi.errors import expect
+from refgi.jit import threads
+from refgi.stages import skip, stage
+
+Array = npt.NDArray[Any]
+
+SMALL = 1 << 17  # pairs of lights and area lights up to which waking other threads costs more than it brings
+SLACK = 1e-12  # share of the largest distance: thousands of roundings
+
+
+class Clusters(NamedTuple):
+    """M clusters of N lights; those without members stand where they last had some."""
+
+    center: Array  # (3, M) float64, m
+    normal: Array  # (3, M) float64, unit vectors
+    members: Array  # (M,) int64
+    of: Array  # (N,) int32: C(i)
+    rounds: int  # of means
+    objective: Array  # (rounds + 1,) float64: sum of all distances, at the start and after each round
+
+
+@stage("cluster.kmeans")
+def cluster(
+    position: Array, normal: Array, count: int, *, distance: Distance = "normalised",
+    weights: tuple[float, float] = (0.7, 0.3), diagonal: float, rounds: int = 50, start: Clusters | None = None,
+) -> Clusters:
+    """Group lights by k-means with d = w_x |x - c| + w_a angle(n, n_c).
+
+    Parameters
+    ----------
+    position : (3, N) ndarray
+        Lights, m.
+    normal : (3, N) ndarray
+        Their normals, any length but 0.
+    count : int
+        M; no more than N are made.
+    distance : {"normalised", "raw", "squared"}
+        The distance in shares of `diagonal` and of pi; in metres and radians, as printed; or
+        w_x |x - c|^2 / diagonal^2 + w_a |n - n_c|^2.
+    weights : tuple of 2 floats
+        w_x and w_a.
+    diagonal : float
+        Of the scene, m; not used when raw.
+    rounds : int
+        Most rounds; fewer when no light changes its cluster any more.
+    start : Clusters, optional
+        Where the clusters begin, M of them; light floor(k N / M) for cluster k where absent.
+
+    Returns
+    -------
+    Clusters
+        C(i) is the cluster at least distance, the lowest on ties.
+
+    Raises
+    ------
+    InputError
+        If shapes do not fit or numbers are not finite.
+
+    Notes
+    -----
+    The paper weighs metres against radians, which depends on the unit of length; "normalised" does not. Means minimise
+    the "squared" distances alone: there the objective never rises, with the others it may. The number of rounds is not
+    published. A cluster without lights keeps its values, and one whose normals cancel keeps its normal. A `start` from
+    the frame before loses clusters for good (Sec. 5.2). With M = N each light is a cluster, coincident ones too.
+
+    Examples
+    --------
+    >>> walls = np.array([[0.0, 0.1, 1.0, 1.1], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
+    >>> up = np.repeat([[0.0], [1.0], [0.0]], 4, axis=1)
+    >>> cluster(walls, up, 2, diagonal=1.0).of.tolist()
+    [0, 0, 1, 1]
+    """
+    lights = np.vstack([_finite(position, "position"), _finite(normal, "normal")])
+    total = lights.shape[1]
+    expect(count >= 1, "count", "1 or more clusters", count)
+    expect(rounds >= 1, "rounds", "1 or more", rounds)
+    expect(0 < diagonal < math.inf or total == 0, "diagonal", "a length above 0 m", diagonal)
+    length = np.sqrt((lights[3:] ** 2).sum(axis=0))
+    lights[3:] /= np.where(length > 0, length, 1)
+    if start is not None:
+        expect(start.center.shape[1] == count, "start", f"{count} clusters", start.center.shape[1])
+        areas = np.vstack([start.center, start.normal]).astype(np.float64)
+    else:
+        if count > total:
+            skip("cluster.kmeans", f"{count - total} of {count} area lights: there are {total} pixel lights")
+        count = min(count, total)
+        areas = np.ascontiguousarray(lights[:, np.arange(count) * total // max(count, 1)])
+        if count == total:
+            return _each_its_own(areas)
+    return _run(lights, areas, distance, weights, diagonal, rounds)
+
+
+def _finite(values: Array, name: str) -> Array:
+    array = np.asarray(values, np.float64)
+    expect(array.ndim == 2 and len(array) == 3, name, "shape (3, N)", array.shape)
+    expect(bool(np.isfinite(array).all()), name, "finite numbers", "NaN or infinity")
+    return array
+
+
+def _each_its_own(lights: Array) -> Clusters:
+    count = lights.shape[1]
+    return Clusters(lights[:3].copy(), lights[3:].copy(), np.ones(count, np.int64), np.arange(count, dtype=np.int32), 0,
+                    np.zeros(1))
+
+
+def _run(
+    lights: Array, areas: Array, distance: Distance, weights: tuple[float, float], diagonal: float, rounds: int
+) -> Clusters:
+    total, count = lights.shape[1], areas.shape[1]
+    of, members, objective = np.full(total, -1, np.int32), np.zeros(count, np.int64), np.zeros(rounds + 1)
+    scaled = _weights(distance, weights, diagonal)
+    tiles = -(-total // TILE)
+    span = sum(np.ptp(np.hstack([lights[c], areas[c]])) for c in range(3)) if total else 0.0
+    slack = SLACK * float(scaled[0] * span + scaled[1] * math.pi)
+    with threads(1 if total * count <= SMALL else None):
+        done = iterate(lights, areas, scaled, distance == "squared", slack, rounds, of, members, objective,
+                       np.zeros((2, total)), np.empty((tiles, LINES, TILE)), np.empty((tiles, 2, TILE), np.int64))
+    return Clusters(areas[:3].copy(), areas[3:].copy(), members, of, done, objective[: done + 1])
+
+
+def _weights(distance: Distance, weights: tuple[float, float], diagonal: float) -> tuple[float, float]:
+    """Return the weights of metres and radians, or of their squares."""
+    # Sec. 5.1: d = w_x dx + w_a da
+    if distance == "raw":
+        return float(weights[0]), float(weights[1])
+    if distance == "normalised":
+        return weights[0] / diagonal, weights[1] / math.pi
+    return weights[0] / diagonal**2, float(weights[1])

@@ -1,0 +1,122 @@
+"""The area light of each cluster (Sec. 6): the bounding rectangle of its lights, projected onto its plane."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.axes import turn_of
+from refgi.cluster.clustering.kmeans import Clusters
+from refgi.cluster.settings import Extent, ValSettings
+from refgi.errors import expect
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.rsm import PixelLights
+
+Array = npt.NDArray[Any]
+
+UPRIGHT = 0.999  # |y| of a normal from which a map's up is -z, as for all maps
+
+
+@stage("cluster.area_lights")
+def area_lights(
+    lights: "PixelLights", clusters: Clusters, settings: ValSettings, footprint: Array | None = None
+) -> AreaLights:
+    """Return the rectangle that stands for each cluster.
+
+    Parameters
+    ----------
+    lights : PixelLights
+        N lights.
+    clusters : Clusters
+        Their clusters.
+    settings : ValSettings
+        Axes, extent, correction for sampling, and what a single light is.
+    footprint : (N,) ndarray, optional
+        Surface area of each light, m^2; for single lights that are their footprint.
+
+    Returns
+    -------
+    AreaLights
+        M rectangles around the projections of their lights. A cluster of no lights, of one that is a point, or of
+        lights in one place has sides of 0.
+
+    Raises
+    ------
+    InputError
+        If lights, clusters and footprints do not fit, or footprints are missing.
+
+    Notes
+    -----
+    The paper says neither along which axes the rectangle lies nor what single size Delta the filter takes from its
+    sides s and t: here the fixed frame of the map and (s t)^(1/2), or as the settings say. A rectangle around n lights
+    drawn evenly from a rectangle of area A has a mean area of ((n - 1) / (n + 1))^2 A; `unbiased_area` divides that
+    out, (n + 1) / (n - 1) a side.
+    """
+    position = np.asarray(lights.position, np.float64)
+    total, count = position.shape[1], clusters.center.shape[1]
+    expect(clusters.of.shape == (total,), "clusters.of", f"shape ({total},)", clusters.of.shape)
+    if settings.single_light == "footprint":
+        expect(footprint is not None and footprint.shape == (total,), "footprint",
+               f"the area of each of {total} lights", None if footprint is None else footprint.shape)
+    frames = map_frames(clusters.normal)
+    side, offset, radius = np.zeros((2, count)), np.zeros((2, count)), np.zeros(count)
+    axes = frames[:, :2].copy()
+    order = np.argsort(clusters.of, kind="stable")
+    ends = np.cumsum(clusters.members)
+    for m in np.flatnonzero(clusters.members):
+        mine = order[ends[m] - clusters.members[m] : ends[m]]
+        away = position[:, mine] - clusters.center[:, m, None]
+        axes[m], side[:, m], offset[:, m] = _bound(away, frames[m], settings)
+        radius[m] = math.sqrt((away**2).sum(axis=0).max())
+        if len(mine) == 1 and settings.single_light == "footprint" and footprint is not None:
+            side[:, m] = math.sqrt(footprint[mine[0]])
+    delta = _size(side, settings.extent)
+    return AreaLights(clusters.center, clusters.normal, frames, side, axes, offset, delta, radius, clusters.members,
+                      clusters.of)
+
+
+def map_frames(normal: Array) -> Array:
+    """Return the frames of paraboloid maps along normals, those of `paraboloid_projection`.
+
+    Parameters
+    ----------
+    normal : (3, M) ndarray
+        Unit vectors.
+
+    Returns
+    -------
+    (M, 3, 3) ndarray
+        Rows right, down, forward.
+    """
+    forward = np.ascontiguousarray(normal.T)
+    up = np.where(np.abs(forward[:, 1:2]) < UPRIGHT, (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
+    right = np.cross(forward, up)
+    right /= np.sqrt((right**2).sum(axis=1, keepdims=True))
+    return np.stack([right, np.cross(forward, right), forward], axis=1)
+
+
+def _bound(away: Array, frame: Array, settings: ValSettings) -> tuple[Array, Array, Array]:
+    """Return axes (2, 3), sides (2,) and middle (2,) of the rectangle around points given from the centre, (3, n)."""
+    flat = frame[:2] @ away
+    turn = turn_of(flat, settings.axes)
+    if turn:
+        c, s = math.cos(turn), math.sin(turn)
+        rotation = np.array([[c, s], [-s, c]])
+        flat = rotation @ flat
+    low, high = flat.min(axis=1), flat.max(axis=1)
+    side, n = high - low, away.shape[1]
+    if settings.unbiased_area and n > 1:
+        side *= (n + 1) / (n - 1)
+    return rotation @ frame[:2] if turn else frame[:2], side, (low + high) / 2
+
+
+def _size(side: Array, extent: Extent) -> Array:
+    """Return Delta, the one size of each rectangle."""
+    if extent == "root":
+        root: Array = np.sqrt(side[0] * side[1])
+        return root
+    return np.asarray(side.max(axis=0) if extent == "longer" else side.min(axis=0))

@@ -1,0 +1,277 @@
+"""Geometry-aware blur: the mean over n x n pixels of the same surface (Sec. 6, Laine et al. 2007).
+
+A pixel q counts for p where |x_q - x_p| <= extent and <n_p . n_q> >= cosine. All weights are 1: a window of n x n
+pixels sees each subset of lights once wherever it lies, and any other kernel would leave the pattern of the subsets in
+the picture. At the rim of the picture the window is moved inwards, for the same reason.
+
+Threads take tiles of TALL x WIDE pixels with their surroundings; the pixels of a row are the SIMD lanes. Where bounds
+say that all pixels around a tile count for each other, nothing is compared.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.jit import kernel, prange
+from refgi.pairs.irradiance import Receivers
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+TALL, WIDE = 16, 64  # pixels of a tile
+MOST = 64  # pixels along a side of the window
+COLUMNS = WIDE + MOST  # of each plane in a row of a tile; fixed, which lets loops run in lanes
+E, X, N, END = 0, 3 * COLUMNS, 6 * COLUMNS, 9 * COLUMNS  # irradiance, position, normal: three planes each
+FAR = 1e18  # m; where pixels without surface are put. Its square is within float32
+MARGIN = 1e-5  # by which bounds must hold: distances and cosines are off by less
+
+
+@stage("cluster.blur")
+def blur(irradiance: Array, receivers: Receivers, size: int, extent: float, cosine: float) -> Array:
+    """Average irradiance over n x n pixels of the same surface.
+
+    Parameters
+    ----------
+    irradiance : (3, h, w) ndarray
+        W/m^2, in the dtype of the receivers.
+    receivers : Receivers
+        The points that are lit.
+    size : int
+        n, 1 to 64: pixels along a side of the window.
+    extent : float
+        Farthest that two points of one surface may be apart, m; inf: anywhere.
+    cosine : float
+        Least cosine between their normals, -1 to 1.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        W/m^2; 0 where there is no surface. Equal irradiance stays as it is, to the bit.
+
+    Raises
+    ------
+    InputError
+        If shapes do not fit or a number is out of range.
+
+    Notes
+    -----
+    [Dong09] Sec. 6 takes a tenth of the scene's extent and a cosine of 0.8, and blurs what leaves the surface; here it
+    is the irradiance, so that textures stay sharp. The window of pixel x starts at x - n // 2, or at the rim. The mean
+    is taken of differences to the pixel itself.
+    """
+    position, covered = np.ascontiguousarray(receivers.position), np.ascontiguousarray(receivers.covered, np.bool_)
+    normal = np.ascontiguousarray(receivers.normal, position.dtype)
+    values = np.ascontiguousarray(irradiance, position.dtype)
+    expect(values.shape == position.shape, "irradiance", f"shape {position.shape}", values.shape)
+    expect(1 <= size <= MOST, "size", f"1 to {MOST} pixels", size)
+    expect(extent >= 0, "extent", "a length of at least 0 m", extent)
+    expect(-1 <= cosine <= 1, "cosine", "-1 to 1", cosine)
+    real = position.dtype.type
+    result = np.empty_like(values)
+    square = real(min(extent, FAR / 4)) ** 2
+    least = real(cosine if cosine > -1 else -np.inf)
+    _blur(values, position, normal, covered, np.int64(size), square, least, result)
+    return result
+
+
+@kernel(parallel=True)
+def _blur(
+    irradiance: Array, position: Array, normal: Array, covered: Array, size: int, square_extent: Any, cosine: Any,
+    result: Array,
+) -> None:
+    height, width = covered.shape
+    across = (width + WIDE - 1) // WIDE
+    for block in prange(across * ((height + TALL - 1) // TALL)):
+        top, left = np.int64(block) // across * TALL, np.int64(block) % across * WIDE
+        tall, wide = min(TALL, height - top), min(WIDE, width - left)
+        tile = np.empty((tall + size - 1, END), position.dtype)
+        sums = np.empty((4, WIDE), position.dtype)
+        _load(tile, irradiance, position, normal, covered, top - size // 2, left - size // 2, size)
+        alike = _alike(tile, wide + size - 1, square_extent, cosine)
+        for row in range(tall):
+            for i in range(WIDE):
+                sums[0, i] = sums[1, i] = sums[2, i] = sums[3, i] = 0
+            if alike:
+                _add_all(tile, row, size, sums)
+            else:
+                _add_accepted(tile, row, size, square_extent, cosine, sums)
+            _store(tile, row + size // 2, size // 2, sums, covered, top + row, left, wide, result)
+
+
+@kernel
+def _load(
+    tile: Array, irradiance: Array, position: Array, normal: Array, covered: Array, top: int, left: int, size: int
+) -> None:
+    """Copy a tile with its surroundings; what lies outside the picture is taken from n pixels further inside."""
+    height, width = covered.shape
+    last = WIDE + size - 1
+    inside = left >= 0 and left + last <= width
+    for row in range(len(tile)):
+        y = _within(top + row, height, size)
+        for c in range(3):
+            if inside and y >= 0:
+                _copy(tile, row, c, irradiance, position, normal, covered, y, np.uint64(left), np.uint64(last))
+            else:
+                for i in range(last):
+                    x = _within(left + i, width, size)
+                    _copy_one(tile, row, c, i, irradiance, position, normal, covered, y, x)
+
+
+@kernel
+def _copy(
+    tile: Array, row: int, c: int, irradiance: Array, position: Array, normal: Array, covered: Array, y: int,
+    left: Any, last: Any,
+) -> None:
+    far = tile.dtype.type(FAR)
+    e, x, n = np.uint64(E + c * COLUMNS), np.uint64(X + c * COLUMNS), np.uint64(N + c * COLUMNS)
+    for i in range(last):
+        tile[row, e + i] = irradiance[c, y, left + i]
+    for i in range(last):
+        tile[row, x + i] = position[c, y, left + i] if covered[y, left + i] else far
+    for i in range(last):
+        tile[row, n + i] = normal[c, y, left + i]
+
+
+@kernel
+def _copy_one(
+    tile: Array, row: int, c: int, i: int, irradiance: Array, position: Array, normal: Array, covered: Array, y: int,
+    x: int,
+) -> None:
+    known = y >= 0 and x >= 0 and covered[max(y, 0), max(x, 0)]
+    tile[row, E + c * COLUMNS + i] = irradiance[c, y, x] if known else 0
+    tile[row, X + c * COLUMNS + i] = position[c, y, x] if known else FAR
+    tile[row, N + c * COLUMNS + i] = normal[c, y, x] if known else 0
+
+
+@kernel
+def _within(place: int, count: int, size: int) -> int:
+    """Return the place, moved by n into the picture; -1 where that does not help."""
+    if place < 0:
+        place += size
+    elif place >= count:
+        place -= size
+    return place if 0 <= place < count else -1
+
+
+@kernel
+def _alike(tile: Array, wide: int, square_extent: Any, cosine: Any) -> bool:
+    """Tell whether all pixels around a tile are sure to count for each other."""
+    real = tile.dtype.type
+    one = real(1.0)
+    bounds = np.empty((7, COLUMNS), tile.dtype)  # least and most of x, y, z; least cosine
+    middle = np.uint64(wide // 2)
+    ux, uy, uz = (tile[len(tile) // 2, np.uint64(N) + middle], tile[len(tile) // 2, np.uint64(N + COLUMNS) + middle],
+                  tile[len(tile) // 2, np.uint64(N + 2 * COLUMNS) + middle])
+    for i in range(np.uint64(wide)):
+        bounds[0, i] = bounds[3, i] = tile[0, np.uint64(X) + i]
+        bounds[1, i] = bounds[4, i] = tile[0, np.uint64(X + COLUMNS) + i]
+        bounds[2, i] = bounds[5, i] = tile[0, np.uint64(X + 2 * COLUMNS) + i]
+        bounds[6, i] = 1
+    for row in range(len(tile)):
+        for i in range(np.uint64(wide)):
+            x, y, z = (tile[row, np.uint64(X) + i], tile[row, np.uint64(X + COLUMNS) + i],
+                       tile[row, np.uint64(X + 2 * COLUMNS) + i])
+            dot = (ux * tile[row, np.uint64(N) + i] + uy * tile[row, np.uint64(N + COLUMNS) + i]
+                   + uz * tile[row, np.uint64(N + 2 * COLUMNS) + i])
+            bounds[0, i] = x if x < bounds[0, i] else bounds[0, i]
+            bounds[1, i] = y if y < bounds[1, i] else bounds[1, i]
+            bounds[2, i] = z if z < bounds[2, i] else bounds[2, i]
+            bounds[3, i] = x if x > bounds[3, i] else bounds[3, i]
+            bounds[4, i] = y if y > bounds[4, i] else bounds[4, i]
+            bounds[5, i] = z if z > bounds[5, i] else bounds[5, i]
+            bounds[6, i] = dot if dot < bounds[6, i] else bounds[6, i]
+    square = real(0.0)
+    for c in range(3):
+        side = bounds[3 + c, :wide].max() - bounds[c, :wide].min()
+        square += side * side
+    near = bounds[6, :wide].min()
+    # two normals that are within an angle of a third are within twice that angle of each other
+    facing = (near > real(0.0)) & (near * near + near * near - real(1.0 + MARGIN) >= cosine)
+    return bool((square * real(1.0 + MARGIN) <= square_extent) & (facing | (cosine < -one)))
+
+
+@kernel
+def _add_all(tile: Array, row: int, size: int, sums: Array) -> None:
+    """Add up differences to the pixels of a row where all pixels count."""
+    one, four = tile.dtype.type(1.0), np.uint64(4)
+    middle, line = row + size // 2, np.uint64(size // 2)
+    quads = np.uint64(size // 4)
+    for y in range(row, row + size):
+        for quad in range(quads):
+            first = four * quad
+            for i in range(np.uint64(WIDE)):
+                sums[0, i] = _four(tile, middle, np.uint64(E) + line + i, y, np.uint64(E) + first + i, sums[0, i])
+                sums[1, i] = _four(tile, middle, np.uint64(E + COLUMNS) + line + i, y,
+                                   np.uint64(E + COLUMNS) + first + i, sums[1, i])
+                sums[2, i] = _four(tile, middle, np.uint64(E + 2 * COLUMNS) + line + i, y,
+                                   np.uint64(E + 2 * COLUMNS) + first + i, sums[2, i])
+        for q in range(four * quads, np.uint64(size)):
+            for i in range(np.uint64(WIDE)):
+                p = line + i
+                for c in range(3):
+                    plane = np.uint64(E + c * COLUMNS)
+                    sums[c, i] += tile[y, plane + q + i] - tile[middle, plane + p]
+    for i in range(WIDE):
+        sums[3, i] = one * (size * size)
+
+
+@kernel
+def _four(tile: Array, middle: int, p: Any, y: int, q: Any, total: Any) -> Any:
+    here = tile[middle, p]
+    total = total + (tile[y, q] - here)
+    total = total + (tile[y, q + np.uint64(1)] - here)
+    total = total + (tile[y, q + np.uint64(2)] - here)
+    return total + (tile[y, q + np.uint64(3)] - here)
+
+
+@kernel
+def _add_accepted(tile: Array, row: int, size: int, square_extent: Any, cosine: Any, sums: Array) -> None:
+    """Add up differences to the pixels of a row where pixels count for each other, and how many do."""
+    real = tile.dtype.type
+    one, zero = real(1.0), real(0.0)
+    middle, line = row + size // 2, np.uint64(size // 2)
+    e0, e1, e2 = np.uint64(E), np.uint64(E + COLUMNS), np.uint64(E + 2 * COLUMNS)
+    for y in range(row, row + size):
+        for first in range(np.uint64(0), np.uint64(size), np.uint64(2)):
+            pair = first + np.uint64(1) < np.uint64(size)
+            for i in range(np.uint64(WIDE)):
+                p, q, r = line + i, first + i, first + i + np.uint64(1)
+                with_q = _near(tile, middle, p, y, q, square_extent) & _faces(tile, middle, p, y, q, cosine)
+                with_r = _near(tile, middle, p, y, r, square_extent) & _faces(tile, middle, p, y, r, cosine) & pair
+                # read whether they count or not, so that nothing branches
+                red, green, blue = tile[middle, e0 + p], tile[middle, e1 + p], tile[middle, e2 + p]
+                dr, dg, db = tile[y, e0 + q] - red, tile[y, e1 + q] - green, tile[y, e2 + q] - blue
+                er, eg, eb = tile[y, e0 + r] - red, tile[y, e1 + r] - green, tile[y, e2 + r] - blue
+                sums[0, i] = sums[0, i] + (dr if with_q else zero) + (er if with_r else zero)
+                sums[1, i] = sums[1, i] + (dg if with_q else zero) + (eg if with_r else zero)
+                sums[2, i] = sums[2, i] + (db if with_q else zero) + (eb if with_r else zero)
+                sums[3, i] = sums[3, i] + (one if with_q else zero) + (one if with_r else zero)
+
+
+@kernel
+def _near(tile: Array, middle: int, p: Any, y: int, q: Any, square_extent: Any) -> bool:
+    x0, x1, x2 = np.uint64(X), np.uint64(X + COLUMNS), np.uint64(X + 2 * COLUMNS)
+    dx, dy, dz = (tile[y, x0 + q] - tile[middle, x0 + p], tile[y, x1 + q] - tile[middle, x1 + p],
+                  tile[y, x2 + q] - tile[middle, x2 + p])
+    return bool(dx * dx + dy * dy + dz * dz <= square_extent)
+
+
+@kernel
+def _faces(tile: Array, middle: int, p: Any, y: int, q: Any, cosine: Any) -> bool:
+    n0, n1, n2 = np.uint64(N), np.uint64(N + COLUMNS), np.uint64(N + 2 * COLUMNS)
+    return bool(tile[y, n0 + q] * tile[middle, n0 + p] + tile[y, n1 + q] * tile[middle, n1 + p]
+                + tile[y, n2 + q] * tile[middle, n2 + p] >= cosine)
+
+
+@kernel
+def _store(
+    tile: Array, middle: int, line: int, sums: Array, covered: Array, row: int, left: int, wide: int, result: Array
+) -> None:
+    one, zero = tile.dtype.type(1.0), tile.dtype.type(0.0)
+    for c in range(3):
+        for i in range(wide):
+            count = sums[3, i] if sums[3, i] > one else one
+            mean = tile[middle, E + c * COLUMNS + line + i] + sums[c, i] / count
+            result[c, row, left + i] = mean if covered[row, left + i] else zero

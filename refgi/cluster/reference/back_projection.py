@@ -1,0 +1,182 @@
+"""Visibility of an area light's rectangle by projecting its map back onto it (Guennebaud, Barthe and Paulin 2006).
+
+Each texel nearer than the receiver's surface is a small patch at its depth. Seen from the receiver, the patch hides
+a quadrilateral of the light's plane; V is the share of the rectangle that none of them hides. Patches that overlap
+count once: a grid over the rectangle keeps their union.
+
+Coordinates: those of the rectangle, along its two sides and its normal, from the centre of the map.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
+from refgi.cluster.reference.unobstructed import Given
+from refgi.cluster.settings import ValSettings
+from refgi.errors import expect
+from refgi.jit import kernel, prange
+
+Array = npt.NDArray[Any]
+
+CELLS = 32  # of the grid along each side of the rectangle
+AT_ONCE = 32  # receivers that share scratch
+CLEARANCE = 1e-4  # share of the map's far distance by which a blocker lies before the receiver's surface
+LEAST_SIDE = 1e-9  # of a rectangle, as a share of the far distance: a point light has none
+
+
+class Patches(NamedTuple):
+    """Texels of one map that hold something."""
+
+    corner: Array  # (k, 4, 3) float64, m
+    direction: Array  # (k, 3) unit vectors through texel centres
+    depth: Array  # (k,) float64, m
+
+
+def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, settings: ValSettings) -> Given:
+    """Return V of an area light from its map, projected back onto its rectangle.
+
+    Parameters
+    ----------
+    areas : AreaLights
+        The area lights.
+    maps : ShadowMaps
+        What each sees.
+    settings : ValSettings
+        What is seen from behind; `behind` "raytrace" is not this function's.
+
+    Returns
+    -------
+    callable
+        ``(m, points (3, n), facing (3, n)) -> (n,)``, in the dtype of the points.
+
+    Notes
+    -----
+    Patches of neighbouring texels at unlike depths leave gaps or overlap, as published: V is too large behind slanted
+    surfaces by up to their share. What a map does not see from its centre cannot hide anything. An area light without
+    a map has V = 1, and so has a receiver behind it ("visible") or without any of the rectangle above its surface.
+    """
+    kept: dict[tuple[int, bool], Patches] = {}
+
+    def given(m: int, points: Array, facing: Array) -> Array:
+        k = maps.map_of[m]
+        visible = np.ones(points.shape[1])
+        if k >= 0:
+            axes = np.vstack([areas.axes[m], areas.normal[:, m]])
+            x, up = axes @ (points.astype(np.float64) - maps.center[k][:, None]), axes @ facing.astype(np.float64)
+            for depth, sign in ((maps.depth, 1.0), (maps.behind, -1.0)):
+                on = x[2] * sign > 0
+                if depth is None or not on.any():
+                    continue
+                turned = np.array([1.0, 1.0, sign])[:, None]  # behind: mirrored, so that it lies ahead
+                if (m, sign < 0) not in kept:
+                    kept.clear()
+                    frame = maps.frame[k] if sign > 0 else BACKWARD @ maps.frame[k]
+                    kept[m, sign < 0] = _patches(depth[k], frame, axes * turned)
+                low, cell = _grid(areas, maps, m, k)
+                visible[on] = _visible(kept[m, sign < 0], turned * x[:, on], turned * up[:, on], low, cell,
+                                       CLEARANCE * maps.far[k])
+        return visible.astype(points.dtype)
+
+    expect(settings.behind != "raytrace", "behind", "'visible' or 'dual_paraboloid' with back-projection", "raytrace")
+    return given
+
+
+def _patches(depth: Array, frame: Array, axes: Array) -> Patches:
+    """Return the patches of a map (n, n) with its frame, in the coordinates of `axes`."""
+    n = len(depth)
+    row, column = np.nonzero(np.isfinite(depth))
+    turn = frame @ axes.T
+    z = depth[row, column].astype(np.float64)
+    corners = [_direction(row + i, column + j, n) @ turn * z[:, None] for i, j in ((0, 0), (0, 1), (1, 1), (1, 0))]
+    return Patches(np.ascontiguousarray(np.stack(corners, axis=1)), _direction(row + 0.5, column + 0.5, n) @ turn, z)
+
+
+def _direction(row: Array, column: Array, n: int) -> Array:
+    """Return the unit vectors of places on a map of n texels, (k, 3), in its frame."""
+    s, t = column * 2.0 / n - 1.0, row * 2.0 / n - 1.0
+    square = s * s + t * t
+    return np.stack([2.0 * s, 2.0 * t, 1.0 - square], axis=1) / (1.0 + square)[:, None]
+
+
+def _grid(areas: AreaLights, maps: ShadowMaps, m: int, k: int) -> tuple[Array, Array]:
+    """Return where the rectangle begins and how large its cells are, (3,) and (2,), m."""
+    side = np.maximum(areas.side[:, m], LEAST_SIDE * maps.far[k])
+    lift = float(areas.normal[:, m] @ (areas.center[:, m] - maps.center[k]))
+    return np.array([*(areas.offset[:, m] - side / 2), lift]), side / CELLS
+
+
+def _visible(patches: Patches, x: Array, up: Array, low: Array, cell: Array, eps: float) -> Array:
+    visible = np.ones(x.shape[1])
+    _project(patches.corner, patches.direction, patches.depth, np.ascontiguousarray(x), np.ascontiguousarray(up), low,
+             cell, eps, visible)
+    return visible
+
+
+@kernel(parallel=True)
+def _project(corner: Array, direction: Array, depth: Array, x: Array, up: Array, low: Array, cell: Array, eps: float,
+             visible: Array) -> None:
+    """Fill V of receivers (3, n) ahead of the rectangle."""
+    blocks = (x.shape[1] + AT_ONCE - 1) // AT_ONCE
+    for block in prange(blocks):
+        hidden, quad = np.zeros((CELLS, CELLS), np.bool_), np.empty((4, 2))
+        for i in range(np.int64(block) * AT_ONCE, min(np.int64(block) * AT_ONCE + AT_ONCE, x.shape[1])):
+            for cells in range(CELLS * CELLS):
+                hidden[cells // CELLS, cells % CELLS] = False
+            height = x[0, i] * up[0, i] + x[1, i] * up[1, i] + x[2, i] * up[2, i]
+            for k in range(len(depth)):
+                approach = direction[k, 0] * up[0, i] + direction[k, 1] * up[1, i] + direction[k, 2] * up[2, i]
+                limit = height / approach if approach * height > 0.0 else np.inf
+                if depth[k] < limit - eps and _project_patch(corner, k, x, i, low, cell, quad):
+                    _hide(quad, hidden)
+            visible[i] = _share(hidden, x, up, i, low, cell)
+
+
+@kernel
+def _project_patch(corner: Array, k: int, x: Array, i: int, low: Array, cell: Array, quad: Array) -> bool:
+    """Project a patch from a receiver onto the grid; False where it misses it or is not before the receiver."""
+    least_u, most_u, least_v, most_v = np.inf, -np.inf, np.inf, -np.inf
+    for c in range(4):
+        fall = x[2, i] - corner[k, c, 2]
+        if fall <= 0.0:
+            return False
+        way = (x[2, i] - low[2]) / fall
+        u = (x[0, i] + way * (corner[k, c, 0] - x[0, i]) - low[0]) / cell[0]
+        v = (x[1, i] + way * (corner[k, c, 1] - x[1, i]) - low[1]) / cell[1]
+        quad[c, 0], quad[c, 1] = u, v
+        least_u, most_u, least_v, most_v = min(least_u, u), max(most_u, u), min(least_v, v), max(most_v, v)
+    return bool(most_u > 0.5 and least_u < CELLS - 0.5 and most_v > 0.5 and least_v < CELLS - 0.5)
+
+
+@kernel
+def _hide(quad: Array, hidden: Array) -> None:
+    """Mark the cells whose centres lie in a convex quadrilateral."""
+    least, most = min(min(quad[0, 1], quad[1, 1]), min(quad[2, 1], quad[3, 1])), max(
+        max(quad[0, 1], quad[1, 1]), max(quad[2, 1], quad[3, 1]))
+    for row in range(math.ceil(max(least - 0.5, 0.0)), int(min(most + 0.5, float(CELLS)))):
+        v, left, right = row + 0.5, np.inf, -np.inf
+        for c in range(4):
+            u0, v0, u1, v1 = quad[c - 1, 0], quad[c - 1, 1], quad[c, 0], quad[c, 1]
+            if (v0 <= v) != (v1 <= v):
+                u = u0 + (v - v0) * (u1 - u0) / (v1 - v0)
+                left, right = min(left, u), max(right, u)
+        if left <= right:
+            for column in range(math.ceil(max(left - 0.5, 0.0)), int(min(right + 0.5, float(CELLS)))):
+                hidden[row, column] = True
+
+
+@kernel
+def _share(hidden: Array, x: Array, up: Array, i: int, low: Array, cell: Array) -> float:
+    """Return the share of the cells above the receiver's surface that nothing hides."""
+    free, whole = 0, 0
+    for row in range(CELLS):
+        v = low[1] + (row + 0.5) * cell[1] - x[1, i]
+        for column in range(CELLS):
+            u = low[0] + (column + 0.5) * cell[0] - x[0, i]
+            if u * up[0, i] + v * up[1, i] + (low[2] - x[2, i]) * up[2, i] > 0.0:
+                whole += 1
+                free += 0 if hidden[row, column] else 1
+    return free / whole if whole > 0 else 1.0

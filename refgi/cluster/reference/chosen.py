@@ -1,0 +1,47 @@
+"""The reference that settings ask for."""
+
+from typing import TYPE_CHECKING
+
+from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.reference.back_projection import back_projected_visibility
+from refgi.cluster.reference.members import member_visibility
+from refgi.cluster.reference.rectangle import rectangle_visibility
+from refgi.cluster.reference.unobstructed import Given
+from refgi.cluster.settings import ValSettings
+
+if TYPE_CHECKING:
+    from refgi.cluster.maps.shadow_maps import ShadowMaps
+    from refgi.frame import Frame
+    from refgi.rsm import PixelLights
+
+
+def reference_visibility(
+    frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps", settings: ValSettings
+) -> Given | None:
+    """Return the reference visibility of `settings.visibility`.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene.
+    lights : PixelLights
+        The pixel lights.
+    areas : AreaLights
+        Their area lights.
+    maps : ShadowMaps
+        What each area light sees.
+    settings : ValSettings
+        Says which.
+
+    Returns
+    -------
+    callable or None
+        ``(m, points (3, n), facing (3, n)) -> (n,)``; None where it is not by reference.
+    """
+    if settings.visibility == "members":
+        return member_visibility(frame, lights, areas)
+    if settings.visibility == "rectangle":
+        return rectangle_visibility(frame, areas, settings)
+    if settings.visibility == "back_projection":
+        return back_projected_visibility(areas, maps, settings)
+    return None

@@ -1,6 +1,6 @@
 """Slow literal twins: the series' basis of a depth map, its means over discs and boxes, mip maps and 8 bits.
 
-A map holds t = depth as a share of the range, row by row; its texel centres lie at ((j + 1/2) 2/n - 1, (i + 1/2) 2/n - 1).
+A map holds t = depth as a share of the range, row by row; texel centres lie at ((j + 1/2) 2/n - 1, (i + 1/2) 2/n - 1).
 """
 
 import math
@@ -67,17 +67,14 @@ def disc_mean(values, s, t, radius):
     """Mean over texels with their centre in the disc and in the unit disc, or the nearest texel of the map."""
     n = len(values)
     total, count = np.zeros(values.shape[2]), 0
-    nearest, least = (0, 0), math.inf
+    own = tuple(min(range(n), key=lambda i: abs(centre(i, n) - at)) for at in (t, s))
     for i in range(n):
         for j in range(n):
             x, y = centre(j, n), centre(i, n)
             if x * x + y * y <= 1 and (x - s) ** 2 + (y - t) ** 2 <= radius**2:
                 total += values[i, j]
                 count += 1
-            distance = max(abs(x - s), abs(y - t))
-            if distance < least:
-                nearest, least = (i, j), distance
-    return total / count if count else values[nearest]
+    return total / count if count else values[own]
 
 
 def box_mean(values, s, t, radius):

@@ -1,0 +1,184 @@
+"""The nearest and the farthest depth within any box of a map, for decisions before anything is filtered.
+
+Each level keeps the least and the largest depth of 2 x 2 texels of the level before; a box reads the level of which
+it touches no more than 2 x 2. What comes back bounds the depths of all texels that the box touches: the nearest is
+never farther, and the farthest never nearer, than theirs. Depths are the map's own, m, inf where nothing is seen, as
+outside the unit disc: nothing is shadowed throughout there.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+
+Array = npt.NDArray[Any]
+
+
+class RangeMip(NamedTuple):
+    """One map's pyramid, or with a leading axis those of several."""
+
+    depth: Array  # (n, n), m: level 0
+    nearest: Array  # (texels,): levels 1 and up
+    farthest: Array  # (texels,)
+    first: Array  # (levels,) int64: first texel of each level; of no use for level 0
+
+
+def level_offsets(size: int) -> tuple[Array, int]:
+    """Return where each level of a pyramid starts, levels 1 and up laid end to end.
+
+    Parameters
+    ----------
+    size : int
+        Texels along a side of level 0; each level has half of the one before, rounded up.
+
+    Returns
+    -------
+    first : (levels,) ndarray
+        Int64; negative for level 0, which is not among them.
+    total : int
+        Texels of levels 1 and up, 1 at least.
+    """
+    sides = [size]
+    while sides[-1] > 1:
+        sides.append((sides[-1] + 1) // 2)
+    texels = np.array([side * side for side in sides], np.int64)
+    return np.cumsum(texels) - texels - texels[0], max(int(texels[1:].sum()), 1)
+
+
+def range_mips(depth: Array) -> RangeMip:
+    """Build the pyramids of several maps.
+
+    Parameters
+    ----------
+    depth : (K, n, n) ndarray
+        Radial distances, m; inf where nothing is seen.
+
+    Returns
+    -------
+    RangeMip
+        Arrays with a leading axis of K.
+    """
+    first, total = level_offsets(depth.shape[1])
+    shape = (len(depth), total)
+    several = RangeMip(depth, np.empty(shape, depth.dtype), np.empty(shape, depth.dtype), first)
+    _build(several)
+    return several
+
+
+@kernel
+def range_mip_of(several: RangeMip, k: int) -> RangeMip:
+    """Return one of several pyramids.
+
+    Parameters
+    ----------
+    several : RangeMip
+        With a leading axis.
+    k : int
+        Which.
+
+    Returns
+    -------
+    RangeMip
+        Views of that pyramid.
+    """
+    return RangeMip(several.depth[k], several.nearest[k], several.farthest[k], several.first)
+
+
+@kernel(parallel=True)
+def _build(several: RangeMip) -> None:
+    for k in prange(len(several.depth)):
+        _build_one(several.depth[k], several.nearest[k], several.farthest[k], several.first)
+
+
+@kernel
+def _build_one(depth: Array, nearest: Array, farthest: Array, first: Array) -> None:
+    side = len(depth)
+    for level in range(1, len(first)):
+        half = (side + 1) // 2
+        end = first[level] + half * half
+        low, high = nearest[first[level] : end].reshape(half, half), farthest[first[level] : end].reshape(half, half)
+        if level == 1:
+            _halve(depth, depth, low, high)
+        else:
+            finer = slice(first[level - 1], first[level])
+            _halve(nearest[finer].reshape(side, side), farthest[finer].reshape(side, side), low, high)
+        side = half
+
+
+@kernel
+def _halve(fine_low: Array, fine_high: Array, low: Array, high: Array) -> None:
+    last = len(fine_low) - 1
+    for i in range(len(low)):
+        i0, i1 = 2 * i, min(2 * i + 1, last)
+        for j in range(len(low)):
+            j0, j1 = 2 * j, min(2 * j + 1, last)
+            low[i, j] = min(min(fine_low[i0, j0], fine_low[i0, j1]), min(fine_low[i1, j0], fine_low[i1, j1]))
+            high[i, j] = max(max(fine_high[i0, j0], fine_high[i0, j1]), max(fine_high[i1, j0], fine_high[i1, j1]))
+
+
+@kernel
+def range_in_box(mip: RangeMip, s_low: float, s_high: float, t_low: float, t_high: float) -> tuple[Any, Any]:
+    """Return bounds of the depths of all texels that a box touches.
+
+    Parameters
+    ----------
+    mip : RangeMip
+        One map's pyramid.
+    s_low, s_high, t_low, t_high : float
+        The box, in units of the map's half side; beyond the map its edge is read.
+
+    Returns
+    -------
+    nearest, farthest : float
+        No farther and no nearer than every texel, m.
+    """
+    n = len(mip.depth)
+    scale = 0.5 * n
+    left, right = _texel(s_low, scale, n), _texel(s_high, scale, n)
+    top, bottom = _texel(t_low, scale, n), _texel(t_high, scale, n)
+    span, level = max(right - left, bottom - top), 0
+    while (1 << level) < span:
+        level += 1
+    left, right, top, bottom = left >> level, right >> level, top >> level, bottom >> level
+    if level == 0:
+        a, b, c, d = mip.depth[top, left], mip.depth[top, right], mip.depth[bottom, left], mip.depth[bottom, right]
+        return min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
+    side, first = (n + (1 << level) - 1) >> level, mip.first[level]
+    above, below = first + top * side, first + bottom * side
+    near, far = mip.nearest, mip.farthest
+    return (min(min(near[above + left], near[above + right]), min(near[below + left], near[below + right])),
+            max(max(far[above + left], far[above + right]), max(far[below + left], far[below + right])))  # fmt: skip
+
+
+@kernel
+def _texel(position: float, scale: float, n: int) -> int:
+    """Return the texel that a coordinate lies in, the outermost for one beyond the map or NaN."""
+    place = (position + 1.0) * scale
+    return int(min(max(place, 0.0), n - 1.0)) if place == place else 0
+
+
+@kernel
+def nearest_in_discs(
+    mip: RangeMip, s: Array, t: Array, radius: Array, wanted: Array, count: int, out: Array
+) -> None:
+    """Bound from below the depths in the box around a disc for each lane of a tile.
+
+    Parameters
+    ----------
+    mip : RangeMip
+        One map's pyramid.
+    s, t, radius : (lanes,) ndarray
+        Centre and radius of the discs, in units of the map's half side.
+    wanted : (lanes,) ndarray
+        Lanes to read.
+    count : int
+        Lanes in use.
+    out : (lanes,) ndarray
+        Filled where wanted: no texel that the box touches is nearer, m.
+    """
+    for i in range(count):
+        if wanted[i]:
+            near, _ = range_in_box(mip, s[i] - radius[i], s[i] + radius[i], t[i] - radius[i], t[i] + radius[i])
+            out[i] = near

@@ -8,7 +8,7 @@ Threads take tiles of TALL x WIDE pixels with their surroundings; the pixels of 
 say that all pixels around a tile count for each other, nothing is compared.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,9 @@ from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
 from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.cluster.settings import ValSettings
 
 Array = npt.NDArray[Any]
 
@@ -29,21 +32,21 @@ MARGIN = 1e-5  # by which bounds must hold: distances and cosines are off by les
 
 
 @stage("cluster.blur")
-def blur(irradiance: Array, receivers: Receivers, size: int, extent: float, cosine: float) -> Array:
+def blur(irradiance: Array, receivers: Receivers, size: int, settings: "ValSettings", diagonal: float) -> Array:
     """Average irradiance over n x n pixels of the same surface.
 
     Parameters
     ----------
     irradiance : (3, h, w) ndarray
-        W/m^2, in the dtype of the receivers.
+        W/m^2.
     receivers : Receivers
-        The points that are lit.
+        The points that are lit; their dtype is that of the result.
     size : int
         n, 1 to 64: pixels along a side of the window.
-    extent : float
-        Farthest that two points of one surface may be apart, m; inf: anywhere.
-    cosine : float
-        Least cosine between their normals, -1 to 1.
+    settings : ValSettings
+        Says how far apart points of one surface may be and how their normals may differ; "box" does not ask.
+    diagonal : float
+        Of the scene, m.
 
     Returns
     -------
@@ -53,26 +56,25 @@ def blur(irradiance: Array, receivers: Receivers, size: int, extent: float, cosi
     Raises
     ------
     InputError
-        If shapes do not fit or a number is out of range.
+        If shapes do not fit or the size is out of range.
 
     Notes
     -----
     [Dong09] Sec. 6 takes a tenth of the scene's extent and a cosine of 0.8, and blurs what leaves the surface; here it
-    is the irradiance, so that textures stay sharp. The window of pixel x starts at x - n // 2, or at the rim. The mean
-    is taken of differences to the pixel itself.
+    is the irradiance, so that textures stay sharp. The window of pixel x starts at x - n // 2. The mean is taken of
+    differences to the pixel itself.
     """
     position, covered = np.ascontiguousarray(receivers.position), np.ascontiguousarray(receivers.covered, np.bool_)
     normal = np.ascontiguousarray(receivers.normal, position.dtype)
     values = np.ascontiguousarray(irradiance, position.dtype)
     expect(values.shape == position.shape, "irradiance", f"shape {position.shape}", values.shape)
     expect(1 <= size <= MOST, "size", f"1 to {MOST} pixels", size)
-    expect(extent >= 0, "extent", "a length of at least 0 m", extent)
-    expect(-1 <= cosine <= 1, "cosine", "-1 to 1", cosine)
     real = position.dtype.type
+    everywhere = settings.blur == "box"
+    extent = FAR / 4 if everywhere else min(settings.blur_extent * diagonal, FAR / 4)
+    cosine = settings.blur_cosine if settings.blur_cosine > -1 and not everywhere else -np.inf
     result = np.empty_like(values)
-    square = real(min(extent, FAR / 4)) ** 2
-    least = real(cosine if cosine > -1 else -np.inf)
-    _blur(values, position, normal, covered, np.int64(size), square, least, result)
+    _blur(values, position, normal, covered, size, real(extent) ** 2, real(cosine), result)
     return result
 
 

@@ -1,0 +1,85 @@
+"""One name for the three filters of a map, told apart by the type of what they read when kernels are compiled."""
+
+from typing import Any
+
+import numpy.typing as npt
+from numba.extending import overload
+
+from refgi.cluster.filters.brute import Brute, brute_means, brutes, build_brute
+from refgi.cluster.filters.mip import Mip, build_mip, mip_means, mip_of, mips
+from refgi.cluster.filters.sat import Sat, build_sat, sat_means, sats
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.series import series
+
+Array = npt.NDArray[Any]
+
+MEANS: dict[Any, Any] = {Mip: mip_means, Sat: sat_means, Brute: brute_means}
+
+
+def filtered(
+    filters: Any, s: Array, t: Array, radius: Array, wanted: Array, count: int, with_z: bool, out: Array
+) -> None:
+    """Read the means of the channels over a disc for each lane of a tile.
+
+    Parameters
+    ----------
+    filters : Mip, Sat or Brute
+        The filtered map.
+    s, t, radius : (lanes,) ndarray
+        Centre and radius of the discs, in units of the map's half side.
+    wanted : (lanes,) ndarray of bool
+        Lanes to read.
+    count : int
+        Lanes in use.
+    with_z : bool
+        All 4 M + 1 channels instead of the first 2 M.
+    out : (channels, lanes) ndarray
+        Filled where wanted.
+    """
+    MEANS[type(filters)](filters, s, t, radius, wanted, count, with_z, out)
+
+
+@overload(filtered)
+def _by_type(
+    filters: Any, s: Any, t: Any, radius: Any, wanted: Any, count: Any, with_z: Any, out: Any  # noqa: ARG001
+) -> Any:
+    means = MEANS[filters.instance_class]
+
+    def call(
+        filters: Any, s: Any, t: Any, radius: Any, wanted: Any, count: Any, with_z: Any, out: Any
+    ) -> None:
+        means(filters, s, t, radius, wanted, count, with_z, out)
+
+    return call
+
+
+def build(depth: Array, far: float, settings: ValSettings) -> Any:
+    """Filter one map as settings ask for.
+
+    Parameters
+    ----------
+    depth : (n, n) ndarray
+        Radial distance, m; inf where nothing is seen.
+    far : float
+        Depth at the far end, m.
+    settings : ValSettings
+        `prefilter`, `terms` and `quantisation` count.
+
+    Returns
+    -------
+    Mip, Sat or Brute
+        In the dtype of `depth`.
+    """
+    most, n, quantised = series(settings).range, len(depth), settings.quantisation == "published"
+    if settings.prefilter == "mip":
+        mip = mip_of(mips(1, n, settings.terms, depth.dtype, quantised=quantised), 0)
+        build_mip(depth, most / far, most, mip)
+        return mip
+    if settings.prefilter == "sat":
+        sat = sats(n, settings.terms, depth.dtype, quantised=quantised)
+        build_sat(depth, most / far, most, sat)
+        return sat
+    box = "val_alpha_over_pi" in settings.as_published
+    brute = brutes(n, settings.terms, depth.dtype, box=box, quantised=quantised)
+    build_brute(depth, most / far, most, brute)
+    return brute

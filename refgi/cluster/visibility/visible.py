@@ -1,0 +1,134 @@
+"""How much of an area light points see, by its map: any points, any mode (Sec. 4.1, 5.1)."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.maps.hard import hard_visibility
+from refgi.cluster.maps.shadow_maps import ShadowMaps
+from refgi.cluster.reference.unobstructed import Given
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.filtered import build
+from refgi.cluster.visibility.series import series
+from refgi.cluster.visibility.soft import ROOM_ROWS, Choices, choices, look, numbers_of, soft_tile
+from refgi.cluster.visibility.step import Rules, rules, step_lanes
+from refgi.errors import InputError, expect
+from refgi.jit import kernel, prange
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+TILE = 256  # receivers a thread works on at once
+
+
+@stage("cluster.visibility", kept=False)
+def visibility(
+    maps: ShadowMaps, areas: AreaLights, m: int, points: Array, facing: Array, settings: ValSettings,
+    rays: Given | None = None,
+) -> Array:
+    """Return how much of one area light each point sees.
+
+    Parameters
+    ----------
+    maps : ShadowMaps
+        The maps.
+    areas : AreaLights
+        The area lights that the maps were drawn for.
+    m : int
+        Which area light.
+    points : (3, n) ndarray
+        World space, m.
+    facing : (3, n) ndarray
+        Normals of their surfaces, on either side.
+    settings : ValSettings
+        `visibility` is "series", "step", "hard" or "none"; `behind` says what points behind the area light see.
+    rays : callable, optional
+        ``(m, points (3, n), facing (3, n)) -> (n,)``: V by rays, as from `rectangle_visibility`; for points behind the
+        area light and ``behind == "raytrace"``.
+
+    Returns
+    -------
+    (n,) ndarray
+        V, 0 to 1, in the dtype of the maps.
+
+    Raises
+    ------
+    InputError
+        If there is no such area light, a mode is asked for that works without maps, or rays that are not given.
+
+    Notes
+    -----
+    An area light without extent casts a hard shadow. Points behind its plane see it whole (Sec. 5.1), unless a second
+    map or rays say otherwise.
+    """
+    expect(0 <= m < len(areas.members), "m", f"an area light, 0 to {len(areas.members) - 1}", m)
+    mode = settings.visibility
+    expect(mode in ("series", "step", "hard", "none"), "visibility", "'series', 'step', 'hard' or 'none'", mode)
+    points = np.ascontiguousarray(points, maps.depth.dtype)
+    facing = np.ascontiguousarray(facing, maps.depth.dtype)
+    k = int(maps.map_of[m])
+    if mode == "none" or k < 0:
+        visible = np.ones(points.shape[1], points.dtype)
+    elif mode == "hard" or areas.delta[m] == 0.0:
+        visible = hard_visibility(maps, areas, m, points, facing)
+    else:
+        visible = _soft(maps, k, float(areas.delta[m]), points, facing, settings)
+    if settings.behind == "raytrace" and mode != "none":
+        if rays is None:
+            raise InputError("rays: expected V by rays where behind is 'raytrace', got None")
+        back = areas.normal[:, m] @ (points - areas.center[:, m, None]) <= 0
+        visible[back] = rays(m, points[:, back], facing[:, back])
+    return visible
+
+
+def _soft(
+    maps: ShadowMaps, k: int, delta: float, points: Array, facing: Array, settings: ValSettings
+) -> Array:
+    """Return V by the map ahead and, where there is one, the map behind: each sees its own hemisphere alone."""
+    visible = np.ones(points.shape[1], points.dtype)
+    chain, chosen, far = series(settings), choices(settings), float(maps.far[k])
+    for depth, behind in ((maps.depth, False), (maps.behind, True)):
+        if depth is None:
+            continue
+        numbers = numbers_of(maps, k, delta, settings, behind)
+        if settings.visibility == "step":
+            rule = rules(settings, chain.search_bias / chain.range * far)
+            _step_tiles(numbers, chosen, rule, depth[k], points, facing, visible)
+        else:
+            weight = chain.weight.astype(points.dtype)
+            _series_tiles(numbers, chosen, weight, build(depth[k], far, settings), points, visible)
+    return visible
+
+
+@kernel(parallel=True)
+def _series_tiles(
+    numbers: Array, chosen: Choices, weight: Array, filters: Any, points: Array, visible: Array
+) -> None:
+    count, terms, real = points.shape[1], len(weight), points.dtype
+    for tile in prange((count + TILE - 1) // TILE):
+        first = np.int64(tile) * TILE
+        size = min(TILE, count - first)
+        wanted, todo = np.ones(TILE, np.bool_), np.empty(TILE, np.bool_)
+        room, means = np.empty((ROOM_ROWS, TILE), real), np.empty((4 * terms + 1, TILE), real)
+        part, here = points[:, first : first + size], np.empty(TILE, real)
+        soft_tile(numbers, chosen, weight, filters, part, size, wanted, todo, here, room, means)
+        for i in range(size):
+            visible[first + i] = min(visible[first + i], here[i])
+
+
+@kernel(parallel=True)
+def _step_tiles(
+    numbers: Array, chosen: Choices, rule: Rules, depth: Array, points: Array, facing: Array, visible: Array
+) -> None:
+    count, real = points.shape[1], points.dtype
+    for tile in prange((count + TILE - 1) // TILE):
+        first = np.int64(tile) * TILE
+        size = min(TILE, count - first)
+        wanted, todo = np.ones(TILE, np.bool_), np.empty(TILE, np.bool_)
+        room, here = np.empty((ROOM_ROWS, TILE), real), np.empty(TILE, real)
+        if look(numbers, chosen, points[:, first : first + size], size, wanted, todo, here, room) > 0:
+            step_lanes(numbers, chosen, rule, depth, facing[:, first : first + size], size, todo, here, room)
+        for i in range(size):
+            visible[first + i] = min(visible[first + i], here[i])

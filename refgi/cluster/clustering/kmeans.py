@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import get_num_threads
 
-from refgi.cluster.clustering.rounds import LINES, TILE, iterate
+from refgi.cluster.clustering.rounds import LINES, TILE, Metric, Rounds, iterate
 from refgi.cluster.settings import Distance
 from refgi.errors import expect
 from refgi.jit import threads
@@ -117,22 +118,24 @@ def _run(
     lights: Array, areas: Array, distance: Distance, weights: tuple[float, float], diagonal: float, rounds: int
 ) -> Clusters:
     total, count = lights.shape[1], areas.shape[1]
-    of, members, objective = np.full(total, -1, np.int32), np.zeros(count, np.int64), np.zeros(rounds + 1)
-    scaled = _weights(distance, weights, diagonal)
-    tiles = -(-total // TILE)
-    span = sum(np.ptp(np.hstack([lights[c], areas[c]])) for c in range(3)) if total else 0.0
-    slack = SLACK * float(scaled[0] * span + scaled[1] * math.pi)
+    metric = _metric(distance, weights, diagonal, np.ptp(np.hstack([lights, areas])[:3], axis=1).sum())
     with threads(1 if total * count <= SMALL else None):
-        done = iterate(lights, areas, scaled, distance == "squared", slack, rounds, of, members, objective,
-                       np.zeros((2, total)), np.empty((tiles, LINES, TILE)), np.empty((tiles, 2, TILE), np.int64))
-    return Clusters(areas[:3].copy(), areas[3:].copy(), members, of, done, objective[: done + 1])
+        workers, most = get_num_threads(), count + total // TILE
+        state = Rounds(
+            lights, areas, np.zeros(total, np.int32), np.zeros(count, np.int64), np.zeros(total),
+            np.empty(total, np.int64), np.empty((3, most), np.int64), np.empty(most, np.int64),
+            np.empty((workers, LINES, TILE)), np.empty((workers, count)), np.empty((workers, 2, TILE), np.int64))
+        objective = np.zeros(rounds + 1)
+        done = iterate(state, metric, rounds, objective)
+    return Clusters(areas[:3].copy(), areas[3:].copy(), state.members, state.of, done, objective[: done + 1])
 
 
-def _weights(distance: Distance, weights: tuple[float, float], diagonal: float) -> tuple[float, float]:
-    """Return the weights of metres and radians, or of their squares."""
+def _metric(distance: Distance, weights: tuple[float, float], diagonal: float, span: float) -> Metric:
+    """Return the distance with its units taken in; no two lights are farther apart than `span`, m."""
     # Sec. 5.1: d = w_x dx + w_a da
-    if distance == "raw":
-        return float(weights[0]), float(weights[1])
+    position, angle = float(weights[0]), float(weights[1])
     if distance == "normalised":
-        return weights[0] / diagonal, weights[1] / math.pi
-    return weights[0] / diagonal**2, float(weights[1])
+        position, angle = position / diagonal, angle / math.pi
+    elif distance == "squared":
+        position, span = position / diagonal**2, span * span
+    return Metric(position, angle, distance == "squared", SLACK * float(position * span + angle * math.pi))

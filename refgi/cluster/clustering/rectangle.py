@@ -9,7 +9,7 @@ import numpy.typing as npt
 from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.axes import turn_of
 from refgi.cluster.clustering.kmeans import Clusters
-from refgi.cluster.settings import Extent, ValSettings
+from refgi.cluster.settings import Axes, Extent, ValSettings
 from refgi.errors import expect
 from refgi.stages import stage
 
@@ -63,17 +63,18 @@ def area_lights(
         expect(footprint is not None and footprint.shape == (total,), "footprint",
                f"the area of each of {total} lights", None if footprint is None else footprint.shape)
     frames = map_frames(clusters.normal)
+    used, away, starts = _grouped(position, clusters)
+    axes = _axes(away, frames, clusters, settings.axes)
     side, offset, radius = np.zeros((2, count)), np.zeros((2, count)), np.zeros(count)
-    axes = frames[:, :2].copy()
-    order = np.argsort(clusters.of, kind="stable")
-    ends = np.cumsum(clusters.members)
-    for m in np.flatnonzero(clusters.members):
-        mine = order[ends[m] - clusters.members[m] : ends[m]]
-        away = position[:, mine] - clusters.center[:, m, None]
-        axes[m], side[:, m], offset[:, m] = _bound(away, frames[m], settings)
-        radius[m] = math.sqrt((away**2).sum(axis=0).max())
-        if len(mine) == 1 and settings.single_light == "footprint" and footprint is not None:
-            side[:, m] = math.sqrt(footprint[mine[0]])
+    if total:
+        flat = np.einsum("nac,cn->an", np.repeat(axes[used], clusters.members[used], axis=0), away)
+        low, high = np.minimum.reduceat(flat, starts, axis=1), np.maximum.reduceat(flat, starts, axis=1)
+        side[:, used], offset[:, used] = high - low, (low + high) / 2
+        radius[used] = np.sqrt(np.maximum.reduceat((away**2).sum(axis=0), starts))
+    side *= _correction(clusters.members) if settings.unbiased_area else 1.0
+    if settings.single_light == "footprint" and footprint is not None:
+        single = np.flatnonzero(clusters.members[clusters.of] == 1)
+        side[:, clusters.of[single]] = np.sqrt(footprint[single])
     delta = _size(side, settings.extent)
     return AreaLights(clusters.center, clusters.normal, frames, side, axes, offset, delta, radius, clusters.members,
                       clusters.of)
@@ -99,19 +100,31 @@ def map_frames(normal: Array) -> Array:
     return np.stack([right, np.cross(forward, right), forward], axis=1)
 
 
-def _bound(away: Array, frame: Array, settings: ValSettings) -> tuple[Array, Array, Array]:
-    """Return axes (2, 3), sides (2,) and middle (2,) of the rectangle around points given from the centre, (3, n)."""
-    flat = frame[:2] @ away
-    turn = turn_of(flat, settings.axes)
-    if turn:
+def _grouped(position: Array, clusters: Clusters) -> tuple[Array, Array, Array]:
+    """Return the clusters in use, the lights of each in turn from its centre, and where each begins."""
+    order = np.argsort(clusters.of, kind="stable")
+    used = np.flatnonzero(clusters.members)
+    starts = np.cumsum(clusters.members[used]) - clusters.members[used]
+    return used, position[:, order] - clusters.center[:, clusters.of[order]], starts
+
+
+def _axes(away: Array, frames: Array, clusters: Clusters, axes: Axes) -> Array:
+    """Return the axes of every rectangle, (M, 2, 3)."""
+    turned = np.ascontiguousarray(frames[:, :2])
+    if axes == "fixed":
+        return turned
+    first = 0
+    for m, members in enumerate(clusters.members):
+        turn = turn_of(frames[m, :2] @ away[:, first : first + members], axes)
         c, s = math.cos(turn), math.sin(turn)
-        rotation = np.array([[c, s], [-s, c]])
-        flat = rotation @ flat
-    low, high = flat.min(axis=1), flat.max(axis=1)
-    side, n = high - low, away.shape[1]
-    if settings.unbiased_area and n > 1:
-        side *= (n + 1) / (n - 1)
-    return rotation @ frame[:2] if turn else frame[:2], side, (low + high) / 2
+        turned[m] = np.array([[c, s], [-s, c]]) @ turned[m]
+        first += members
+    return turned
+
+
+def _correction(members: Array) -> Array:
+    """Return by how much the sides of a rectangle around n lights fall short."""
+    return np.where(members > 1, (members + 1) / np.maximum(members - 1, 1), 1.0)
 
 
 def _size(side: Array, extent: Extent) -> Array:

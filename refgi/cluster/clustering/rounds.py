@@ -1,191 +1,219 @@
 """The rounds of k-means (Sec. 5.1, 6): each light to the nearest area light, each area light to the mean of its lights.
 
-The printed distance obeys the triangle inequality, so a light that is nearer to its area light than any other can have
-come since needs no search: `own` is its distance, `lower` a bound on that to every other (Hamerly 2010). The search
-that is left is exact, so the result is that of searching always, to the bit.
+Distances (their roots, where squared) obey the triangle inequality: an area light more than twice as far from a
+light's own one as the light itself is cannot be nearer to it (Elkan 2003). Lights that share an area light are looked
+at together, against those few that may be nearer to one of them. What is left out could not have been chosen, so the
+result is that of comparing all, to the bit.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.clustering.metric import fill_linear, fill_squares, linear
+from refgi.cluster.clustering.metric import fill_linear, fill_squares
 from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
 
-TILE = 256  # lights
-LINES = 9  # of scratch: six of lights, then distance, least and second least
+TILE = 256  # lights looked at together
+LINES = 9  # of scratch: six of lights, then distances to an area light, to the own one, to the nearest
 ZERO_MEAN = 1e-9  # a mean normal shorter than this has no direction
 
 
+class Metric(NamedTuple):
+    """How distances are measured."""
+
+    position: float  # weight of distance or its square
+    angle: float  # weight of the angle or the square of the normals' difference
+    squared: bool  # whether squares are summed
+    slack: float  # more than distances are off by rounding
+
+
+class Rounds(NamedTuple):
+    """What the rounds work on."""
+
+    lights: Array  # (6, N) float64: positions, m, and unit normals
+    areas: Array  # (6, M) float64: the start, then the result
+    of: Array  # (N,) int32: area light of each light; any at the start
+    members: Array  # (M,) int64: how many lights each has
+    own: Array  # (N,) float64: distance of each light to its area light
+    order: Array  # (N,) int64: lights, those of an area light together, in their order
+    tiles: Array  # (3, most) int64: first place in `order`, lights, area light
+    changed: Array  # (most,) int64: by tile, how many lights went elsewhere
+    scratch: Array  # (workers, LINES, TILE) float64
+    rows: Array  # (workers, M) float64: from one area light to all
+    picks: Array  # (workers, 2, TILE) int64: places in `order`, nearest area lights
+
+
 @kernel(parallel=True)
-def iterate(
-    lights: Array, areas: Array, weights: tuple[float, float], squared: bool, slack: float, rounds: int,
-    of: Array, members: Array, objective: Array, bounds: Array, scratch: Array, picks: Array,
-) -> int:
+def iterate(state: Rounds, metric: Metric, rounds: int, objective: Array) -> int:
     """Run k-means until no light changes its area light, or for a number of rounds.
 
     Parameters
     ----------
-    lights : (6, N) ndarray
-        Positions, m, and unit normals, float64.
-    areas : (6, M) ndarray
+    state : Rounds
         The start; becomes the result.
-    weights : tuple of 2 floats
-        Of distance and angle, or of their squares.
-    squared : bool
-        Whether squares are summed.
-    slack : float
-        More than distances are off by rounding.
+    metric : Metric
+        The distance.
     rounds : int
         Most rounds of means.
-    of : (N,) int32 ndarray
-        -1; filled with the area light of each light.
-    members : (M,) int64 ndarray
-        Filled with the lights of each.
     objective : (rounds + 1,) ndarray
         Filled with the sum of all distances at the start and after each round.
-    bounds : (2, N) ndarray
-        Room for the distance to the own area light and a bound on that to any other.
-    scratch : (tiles, LINES, TILE) ndarray
-        Room for tiles of lights.
-    picks : (tiles, 2, TILE) int64 ndarray
-        Room for indices.
 
     Returns
     -------
     int
         Rounds of means made.
     """
-    tiles = len(scratch)
-    changes = np.zeros(tiles, np.int64)
-    moved = (0.0, 0.0, -1)
+    workers = len(state.scratch)
     done = 0
     while True:
-        for tile in prange(tiles):
-            changes[tile] = _assign(
-                int(tile) * TILE, lights, areas, weights, squared, slack, moved, of, bounds, scratch[tile],
-                picks[tile],
-            )
-        objective[done] = _total(bounds[0])
-        if changes.sum() == 0 or done == rounds:
+        tiles = _sort(state)
+        if done > 0:
+            _move_to_means(state)
+        for worker in prange(workers):
+            _assign(state, metric, int(worker), tiles)
+        objective[done] = _total(state.own)
+        if done == rounds or (done > 0 and _total(state.changed[:tiles]) == 0):
             break
-        moved = _move_to_means(lights, of, weights, areas, members)
         done += 1
-    _count_members(of, members)
+    _sort(state)
     return done
 
 
 @kernel
-def _assign(
-    first: int, lights: Array, areas: Array, weights: tuple[float, float], squared: bool, slack: float,
-    moved: tuple[float, float, int], of: Array, bounds: Array, scratch: Array, picks: Array,
-) -> int:
-    """Find the nearest area light of each light of a tile, the lowest index on ties; return how many changed."""
-    size = min(TILE, lights.shape[1] - first)
-    pending = _doubtful(first, size, lights, areas, weights, squared, slack, moved, of, bounds, picks[0])
-    for j in range(pending):
-        for c in range(6):
-            scratch[c, j] = lights[c, picks[0, j]]
-    _search(scratch, pending, areas, weights, squared, picks[1])
-    changed = 0
-    for j in range(pending):
-        i = picks[0, j]
-        changed += of[i] != picks[1, j]
-        of[i] = picks[1, j]
-        bounds[0, i], bounds[1, i] = scratch[7, j], scratch[8, j]
-    return changed
+def _sort(state: Rounds) -> int:
+    """Bring the lights of each area light together and split them into tiles; return how many tiles there are."""
+    members, tiles = state.members, state.tiles
+    members[:] = 0
+    for i in range(len(state.of)):
+        members[state.of[i]] += 1
+    place = np.empty(len(members), np.int64)
+    first, count = 0, 0
+    for k in range(len(members)):
+        place[k] = first
+        for start in range(0, members[k], TILE):
+            tiles[0, count], tiles[1, count], tiles[2, count] = first + start, min(TILE, members[k] - start), k
+            count += 1
+        first += members[k]
+    for i in range(len(state.of)):
+        k = state.of[i]
+        state.order[place[k]] = i
+        place[k] += 1
+    return count
+
+
+@kernel
+def _move_to_means(state: Rounds) -> None:
+    """Move each area light to the mean of its lights, summed in their order; without lights it stays.
+
+    Sums are taken from the first light, so that what all have in common, a wall's coordinate, is the mean's too.
+    """
+    lights, areas, first = state.lights, state.areas, 0
+    for k in range(len(state.members)):
+        members = state.members[k]
+        if members == 0:
+            continue
+        o = state.order[first]
+        ox, oy, oz, onx, ony, onz = lights[0, o], lights[1, o], lights[2, o], lights[3, o], lights[4, o], lights[5, o]
+        x, y, z, nx, ny, nz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for j in range(members):
+            i = state.order[first + j]
+            x, y, z = x + (lights[0, i] - ox), y + (lights[1, i] - oy), z + (lights[2, i] - oz)
+            nx, ny, nz = nx + (lights[3, i] - onx), ny + (lights[4, i] - ony), nz + (lights[5, i] - onz)
+        first += members
+        areas[0, k], areas[1, k], areas[2, k] = ox + x / members, oy + y / members, oz + z / members
+        nx, ny, nz = onx + nx / members, ony + ny / members, onz + nz / members
+        length = math.sqrt(nx * nx + ny * ny + nz * nz)
+        if length > ZERO_MEAN:
+            areas[3, k], areas[4, k], areas[5, k] = nx / length, ny / length, nz / length
+
+
+@kernel
+def _assign(state: Rounds, metric: Metric, worker: int, tiles: int) -> None:
+    """Find the nearest area light, the lowest index on ties, of each light of a worker's tiles."""
+    scratch, pick, nearest = state.scratch[worker], state.picks[worker, 0], state.picks[worker, 1]
+    for tile in range(worker, tiles, len(state.scratch)):
+        first, count, k = state.tiles[0, tile], state.tiles[1, tile], state.tiles[2, tile]
+        _distances(state.areas, len(state.members), state.areas, k, metric, state.rows[worker])
+        pending, farthest = _doubtful(state, metric, first, count, k, scratch, state.rows[worker], pick)
+        changed = 0
+        if pending > 0:
+            _search(scratch, pending, state.areas, metric, k, farthest, state.rows[worker], nearest)
+            for j in range(pending):
+                i = state.order[pick[j]]
+                changed += nearest[j] != k
+                state.of[i], state.own[i] = nearest[j], scratch[8, j]
+        state.changed[tile] = changed
+
+
+@kernel
+def _distances(lights: Array, count: int, areas: Array, k: int, metric: Metric, out: Array) -> None:
+    if metric.squared:
+        fill_squares(lights, count, areas, k, metric.position, metric.angle, out)
+    else:
+        fill_linear(lights, count, areas, k, metric.position, metric.angle, out)
 
 
 @kernel
 def _doubtful(
-    first: int, size: int, lights: Array, areas: Array, weights: tuple[float, float], squared: bool, slack: float,
-    moved: tuple[float, float, int], of: Array, bounds: Array, pick: Array,
-) -> int:
-    """List the lights of a tile that may have a new nearest area light; the others get their new distance."""
-    pending = 0
-    for i in range(first, first + size):
-        k = of[i]
-        if not squared and k >= 0:
-            bounds[0, i] = linear(
-                lights[0, i], lights[1, i], lights[2, i], lights[3, i], lights[4, i], lights[5, i], areas[0, k],
-                areas[1, k], areas[2, k], areas[3, k], areas[4, k], areas[5, k], weights[0], weights[1],
-            )
-            bounds[1, i] -= moved[1] if k == moved[2] else moved[0]
-            if bounds[0, i] + slack < bounds[1, i]:
-                continue
-        pick[pending] = i
-        pending += 1
-    return pending
+    state: Rounds, metric: Metric, first: int, count: int, k: int, scratch: Array, row: Array, pick: Array
+) -> tuple[int, float]:
+    """Gather the lights of a tile that may be nearer to another area light; return how many and the farthest.
+
+    All of them are lights of area light k, and `row` holds its distances to the others.
+    """
+    for j in range(count):
+        i = state.order[first + j]
+        for c in range(6):
+            scratch[c, j] = state.lights[c, i]
+    _distances(scratch, count, state.areas, k, metric, scratch[7])
+    gap = np.inf
+    for m in range(len(row)):
+        gap = min(gap, row[m]) if m != k else gap
+    pending, farthest = 0, 0.0
+    for j in range(count):
+        own = scratch[7, j]
+        state.own[state.order[first + j]] = own
+        if gap <= _twice(own, metric):
+            for c in range(6):
+                scratch[c, pending] = scratch[c, j]
+            scratch[7, pending], pick[pending] = own, first + j
+            farthest = max(farthest, own)
+            pending += 1
+    return pending, farthest
+
+
+@kernel
+def _twice(distance: float, metric: Metric) -> float:
+    """Return twice a distance, four times where squared, and some more than rounding takes from it."""
+    return (4.0 if metric.squared else 2.0) * distance * (1.0 + 1e-9) + metric.slack
 
 
 @kernel
 def _search(
-    scratch: Array, count: int, areas: Array, weights: tuple[float, float], squared: bool, nearest: Array
+    scratch: Array, count: int, areas: Array, metric: Metric, own: int, farthest: float, row: Array, nearest: Array
 ) -> None:
-    """Find the nearest area light of gathered lights, the lowest index on ties."""
-    distance, least, second = scratch[6], scratch[7], scratch[8]
+    """Find the nearest area light of gathered lights of the area light `own`, the lowest index on ties."""
+    within, distance, least = _twice(farthest, metric), scratch[6], scratch[8]
     for j in range(count):
-        least[j], second[j], nearest[j] = np.inf, np.inf, 0
-    for k in range(areas.shape[1]):
-        if squared:
-            fill_squares(scratch, count, areas, k, weights[0], weights[1], distance)
-        else:
-            fill_linear(scratch, count, areas, k, weights[0], weights[1], distance)
+        least[j], nearest[j] = np.inf, own
+    for k in range(len(row)):
+        if k != own and row[k] > within:
+            continue
+        _distances(scratch, count, areas, k, metric, distance)
         for j in range(count):
-            d, best = distance[j], least[j]
-            second[j] = min(second[j], max(d, best))
-            nearest[j] = k if d < best else nearest[j]
-            least[j] = min(d, best)
+            nearer = distance[j] < least[j]
+            nearest[j] = k if nearer else nearest[j]
+            least[j] = distance[j] if nearer else least[j]
 
 
 @kernel
-def _move_to_means(
-    lights: Array, of: Array, weights: tuple[float, float], areas: Array, members: Array
-) -> tuple[float, float, int]:
-    """Move each area light to the mean of its lights and return the two farthest moves and whose the first is."""
-    _count_members(of, members)
-    sums = np.zeros(areas.shape)
-    for i in range(lights.shape[1]):
-        for c in range(6):
-            sums[c, of[i]] += lights[c, i]
-    farthest, second, which = 0.0, 0.0, -1
-    for k in range(areas.shape[1]):
-        if members[k] == 0:
-            continue  # keeps its values
-        cx, cy, cz = sums[0, k] / members[k], sums[1, k] / members[k], sums[2, k] / members[k]
-        nx, ny, nz = sums[3, k], sums[4, k], sums[5, k]
-        length = math.sqrt(nx * nx + ny * ny + nz * nz)
-        if length > ZERO_MEAN * members[k]:
-            nx, ny, nz = nx / length, ny / length, nz / length
-        else:
-            nx, ny, nz = areas[3, k], areas[4, k], areas[5, k]
-        move = linear(areas[0, k], areas[1, k], areas[2, k], areas[3, k], areas[4, k], areas[5, k], cx, cy, cz,
-                      nx, ny, nz, weights[0], weights[1])  # fmt: skip
-        if move > farthest:
-            farthest, second, which = move, farthest, k
-        else:
-            second = max(second, move)
-        areas[0, k], areas[1, k], areas[2, k] = cx, cy, cz
-        areas[3, k], areas[4, k], areas[5, k] = nx, ny, nz
-    return farthest, second, which
-
-
-@kernel
-def _count_members(of: Array, members: Array) -> None:
-    """Count the lights of each area light."""
-    members[:] = 0
-    for i in range(len(of)):
-        members[of[i]] += 1
-
-
-@kernel
-def _total(values: Array) -> float:
+def _total(values: Any) -> Any:
     """Return the sum of values in their order."""
-    result = 0.0
+    result = values.dtype.type(0)
     for i in range(len(values)):
         result += values[i]
     return result

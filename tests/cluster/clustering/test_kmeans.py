@@ -1,0 +1,261 @@
+"""Clusters of lights: against the literal twin, and what must hold whatever the lights (Dong et al. 2009, Sec. 5)."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.cluster.clustering.kmeans import Clusters, cluster
+from refgi.cluster.clustering.measures import in_use, mean_angle
+from refgi.cluster.clustering.metric import angle
+from refgi.errors import InputError
+from refgi.stages import observe
+from tests.naive import kmeans as naive
+
+MODES = ("raw", "normalised", "squared")
+WEIGHTS = (0.7, 0.3)
+ROUNDING = 1e-13  # relative; sums of some hundred terms in another order
+ANGLE_ERROR = 1e-15  # rad: two roundings of pi/2
+RISE = 1e-12  # relative, of a sum of 400 roundings
+RUNS = 300
+
+
+def random_lights(seed, axes=False):
+    rng = np.random.default_rng(seed)
+    total, count = int(rng.integers(50, 400)), int(rng.integers(2, 31))
+    position, normal = rng.random((3, total)), rng.normal(size=(3, total))
+    if axes:
+        normal = np.eye(3)[:, rng.integers(0, 3, total)] * rng.choice([-1, 1], total)
+    return position, normal, count
+
+
+def distances(position, normal, clusters, mode, diagonal):
+    """Every distance of every light to every cluster, (N, M), by plain NumPy."""
+    n = normal / np.linalg.norm(normal, axis=0)
+    dx = np.linalg.norm(position[:, :, None] - clusters.center[:, None, :], axis=0)
+    across = np.linalg.norm(np.cross(n[:, :, None], clusters.normal[:, None, :], axis=0), axis=0)
+    turn = np.arctan2(across, n.T @ clusters.normal)
+    if mode == "raw":
+        return WEIGHTS[0] * dx + WEIGHTS[1] * turn
+    if mode == "normalised":
+        return WEIGHTS[0] * dx / diagonal + WEIGHTS[1] * turn / math.pi
+    chord = np.linalg.norm(n[:, :, None] - clusters.normal[:, None, :], axis=0)
+    return WEIGHTS[0] * (dx / diagonal) ** 2 + WEIGHTS[1] * chord**2
+
+
+@pytest.mark.feature("VAL-05")
+@pytest.mark.parametrize("mode", MODES)
+def test_the_rounds_are_those_of_the_literal_twin(mode, evidence):
+    lights = 0
+    for seed in range(25):
+        rng = np.random.default_rng(seed)
+        total, count = int(rng.integers(1, 90)), int(rng.integers(1, 12))
+        position, normal = rng.random((3, total)), rng.normal(size=(3, total))
+        ours = cluster(position, normal, count, distance=mode, weights=WEIGHTS, diagonal=1.7)
+        if count >= total:
+            continue
+        centers, axes, of, members, objective = naive.cluster(position.T.tolist(), normal.T.tolist(), count, mode,
+                                                              WEIGHTS, 1.7)
+        np.testing.assert_array_equal(ours.of, of)
+        np.testing.assert_array_equal(ours.members, members)
+        np.testing.assert_allclose(ours.center.T, centers, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(ours.normal.T, axes, rtol=0, atol=ROUNDING)
+        assert ours.rounds == len(objective) - 1
+        np.testing.assert_allclose(ours.objective, objective, rtol=ROUNDING)
+        lights += total
+    evidence(f"{mode}: C(i) and rounds of {lights} lights are the twin's, means to 1e-13")
+
+
+@pytest.mark.feature("VAL-05")
+@pytest.mark.parametrize(("mode", "rises"), [("raw", True), ("normalised", True), ("squared", False)])
+def test_only_the_sum_of_squares_never_rises(mode, rises, evidence):
+    risen, rounds = 0, []
+    for seed in range(RUNS):
+        position, normal, count = random_lights(seed, axes=seed % 2 == 1)
+        found = cluster(position, normal, count, distance=mode, diagonal=3**0.5)
+        assert len(found.objective) == found.rounds + 1
+        risen += bool((np.diff(found.objective) > RISE * found.objective[:-1]).any())
+        rounds.append(found.rounds)
+    evidence(f"{mode}: objective rose in {risen} of {RUNS} runs; {np.mean(rounds):.1f} rounds, {max(rounds)} at most")
+    assert (risen > 0) == rises
+    assert max(rounds) < 50
+
+
+@pytest.mark.feature("VAL-10")
+@pytest.mark.parametrize("mode", MODES)
+def test_every_light_belongs_to_the_cluster_at_least_distance(mode, evidence):
+    lights, worst = 0, 0.0
+    for seed in range(20):
+        position, normal, count = random_lights(seed, axes=seed % 2 == 1)
+        found = cluster(position, normal, count, distance=mode, diagonal=1.3, rounds=1 + seed % 4)
+        table = distances(position, normal, found, mode, 1.3)
+        mine = table[np.arange(len(found.of)), found.of]
+        worst = max(worst, float((mine - table.min(axis=1)).max()))
+        np.testing.assert_array_equal(found.members, np.bincount(found.of, minlength=count))
+        np.testing.assert_allclose(mine.sum(), found.objective[-1], rtol=ROUNDING)
+        lights += len(found.of)
+    assert worst <= ROUNDING
+    evidence(f"{mode}: {lights} lights, none nearer to another cluster by more than {worst:.1e}")
+
+
+@pytest.mark.feature("VAL-10")
+def test_the_lowest_cluster_wins_a_tie():
+    position = np.zeros((3, 5))
+    position[0] = [-1, -1, 0, 1, 1]  # the middle one is as far from both
+    normal = np.repeat([[0.0], [0.0], [1.0]], 5, axis=1)
+    for first, expected in (((-1.0, 1.0), 0), ((1.0, -1.0), 0)):
+        start = Clusters(np.array([first, (0, 0), (0, 0)], float), normal[:, :2], np.zeros(2, np.int64),
+                         np.zeros(5, np.int32), 0, np.zeros(1))
+        for mode in MODES:
+            found = cluster(position, normal, 2, distance=mode, diagonal=1.0, rounds=1, start=start)
+            # the middle light joined cluster 0, whose mean moved towards it
+            assert found.of[2] == expected
+            assert abs(found.center[0, 0]) == pytest.approx(2 / 3)
+
+
+@pytest.mark.feature("VAL-06")
+def test_clusters_start_at_light_k_n_over_m():
+    position, normal, _ = random_lights(3)
+    for count in (1, 2, 7, 30, position.shape[1] - 1):
+        at = [k * position.shape[1] // count for k in range(count)]
+        unit = normal / np.linalg.norm(normal, axis=0)
+        start = Clusters(position[:, at], unit[:, at], np.zeros(count, np.int64), np.zeros(1, np.int32), 0, np.zeros(1))
+        one = cluster(position, normal, count, diagonal=1.0)
+        two = cluster(position, normal, count, diagonal=1.0, start=start)
+        assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
+
+
+@pytest.mark.feature("VAL-06")
+def test_reruns_and_other_numbers_of_threads_give_the_same_bits(evidence):
+    import numba
+
+    from refgi.jit import threads
+
+    rng = np.random.default_rng(7)
+    position, normal = rng.random((3, 5000)), rng.normal(size=(3, 5000))
+    runs = []
+    for workers in (1, numba.config.NUMBA_NUM_THREADS, 1):
+        with threads(workers):
+            runs.append(cluster(position, normal, 60, diagonal=1.7, rounds=8))
+    for other in runs[1:]:
+        assert all(np.array_equal(a, b) for a, b in zip(runs[0], other, strict=True))
+    evidence(f"5000 lights, 60 clusters, {runs[0].rounds} rounds: bits equal on 1 and "
+             f"{numba.config.NUMBA_NUM_THREADS} threads and again")
+
+
+@pytest.mark.feature("VAL-08")
+def test_normals_keep_clusters_planar(evidence):
+    rng = np.random.default_rng(5)
+    wall = rng.integers(0, 3, 1024)  # three walls of a corner, each of unit size
+    position, normal = rng.random((3, 1024)), np.zeros((3, 1024))
+    position[wall, np.arange(1024)] = 0
+    normal[wall, np.arange(1024)] = 1
+    alone = cluster(position, normal, 30, weights=(1.0, 0.0), diagonal=3**0.5)
+    both = cluster(position, normal, 30, diagonal=3**0.5)
+    before, after = (math.degrees(mean_angle(normal, found)) for found in (alone, both))
+    mixed = [sum(len(set(wall[found.of == k])) > 1 for k in range(30)) for found in (alone, both)]
+    evidence(f"mean angle inside clusters at a corner {before:.2f} deg by position alone, {after:.2f} deg with the "
+             f"normal; clusters of several walls {mixed[0]}, {mixed[1]}")
+    assert after < 0.1 * before
+    assert mixed[1] < mixed[0]
+    twin = naive.mean_angle(normal.T.tolist(), both.of, both.normal.T.tolist())
+    assert mean_angle(normal, both) == pytest.approx(twin, abs=ANGLE_ERROR)
+
+
+def test_angles_are_exact_near_zero_and_near_a_half_turn():
+    rng = np.random.default_rng(2)
+    worst = 0.0
+    for size in (1e-12, 1e-8, 1e-4, 0.01, 0.5, 1.0, 10.0):
+        for sign in (1.0, -1.0):
+            for _ in range(50):
+                a = naive.unit(rng.normal(size=3))
+                b = naive.unit(sign * np.array(a) + size * rng.normal(size=3))
+                dot = naive.dot(a, b)
+                apart = np.array(a) - math.copysign(1.0, dot) * np.array(b)
+                worst = max(worst, abs(angle(dot, float(apart @ apart)) - naive.angle(a, b)))
+    assert worst <= ANGLE_ERROR
+    assert angle(0.0, 2.0) == math.pi / 2
+    assert angle(1.0, 0.0) == 0.0
+    assert angle(-1.0, 0.0) == math.pi
+
+
+def test_the_normalised_clusters_do_not_depend_on_the_unit_of_length():
+    position, normal, count = random_lights(11)
+    metres = cluster(position, normal, count, diagonal=1.5)
+    inches = cluster(64 * position, normal, count, diagonal=96.0)
+    np.testing.assert_array_equal(metres.of, inches.of)
+    np.testing.assert_array_equal(64 * metres.center, inches.center)
+    raw = [cluster(scale * position, normal, count, distance="raw", diagonal=1.0).of for scale in (1, 64)]
+    assert (raw[0] != raw[1]).any()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_all_lights_in_one_point(mode):
+    position = np.full((3, 40), 0.3)
+    normal = np.repeat([[0.0], [0.6], [0.8]], 40, axis=1)
+    found = cluster(position, normal, 6, distance=mode, diagonal=1.0)
+    assert in_use(found) == 1
+    assert found.members[0] == 40
+    assert found.objective[-1] < 40 * ROUNDING
+    assert (found.center == 0.3).all()  # the mean has what all have in common; empty clusters stay where they were
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_one_cluster_is_the_mean(mode):
+    position, normal, _ = random_lights(1)
+    unit = normal / np.linalg.norm(normal, axis=0)
+    found = cluster(position, normal, 1, distance=mode, diagonal=1.0)
+    np.testing.assert_allclose(found.center[:, 0], position.mean(axis=1), rtol=ROUNDING)
+    mean = unit.sum(axis=1)
+    np.testing.assert_allclose(found.normal[:, 0], mean / np.linalg.norm(mean), atol=ROUNDING)
+    assert found.rounds == 1
+    assert not found.of.any()
+
+
+def test_as_many_clusters_as_lights_are_the_lights_themselves():
+    position, normal, _ = random_lights(4)
+    position[:, 5], normal[:, 5] = position[:, 2], normal[:, 2]  # two of them in one place
+    total = position.shape[1]
+    for count in (total, total + 20):
+        with observe() as log:
+            found = cluster(position, normal, count, diagonal=1.0)
+        np.testing.assert_array_equal(found.of, np.arange(total))
+        np.testing.assert_array_equal(found.center, position)
+        assert (found.members == 1).all()
+        said = [run.reason for run in log.runs if run.status == "skipped"]
+        assert said == ([] if count == total else [f"20 of {count} area lights: there are {total} pixel lights"])
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_cluster_whose_normals_cancel_keeps_its_normal(mode):
+    position = np.array([[0.0, 0.1, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    normal = np.array([[0.0, 0.0, 1.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0]])
+    start = Clusters(np.array([[0.05, 9.0], [0.0, 0.0], [0.0, 0.0]]), np.array([[0.0, 1.0], [0.6, 0.0], [0.8, 0.0]]),
+                     np.zeros(2, np.int64), np.zeros(3, np.int32), 0, np.zeros(1))
+    found = cluster(position, normal, 2, distance=mode, weights=(0.9, 0.1), diagonal=1.0, start=start)
+    assert found.of.tolist() == [0, 0, 1]
+    np.testing.assert_array_equal(found.normal[:, 0], [0.0, 0.6, 0.8])
+
+
+def test_no_light_and_one_light():
+    none = np.zeros((3, 0))
+    found = cluster(none, none, 30, diagonal=1.0)
+    assert found.center.shape == (3, 0)
+    assert found.of.shape == (0,)
+    one = cluster(np.ones((3, 1), np.float32), np.eye(3, 1, dtype=np.float32), 30, diagonal=1.0)
+    assert one.center.shape == (3, 1)
+    assert one.center.dtype == np.float64
+    before = cluster(*random_lights(1)[:2], 5, diagonal=1.0)
+    dark = cluster(none, none, 5, diagonal=1.0, start=before)  # the light went out
+    np.testing.assert_array_equal(dark.center, before.center)
+    assert in_use(dark) == 0
+
+
+@pytest.mark.parametrize(("given", "name"), [
+    ({"position": np.zeros((2, 4))}, "position"), ({"normal": np.full((3, 4), np.nan)}, "normal"),
+    ({"count": 0}, "count"), ({"diagonal": 0.0}, "diagonal"), ({"rounds": 0}, "rounds"),
+    ({"start": cluster(np.eye(3), np.eye(3), 2, diagonal=1.0)}, "start")])  # fmt: skip
+def test_what_cannot_be_clustered_is_said(given, name):
+    usual = {"position": np.ones((3, 4)), "normal": np.ones((3, 4)), "count": 3, "diagonal": 1.0}
+    with pytest.raises(InputError, match=f"^{name}"):
+        cluster(**{**usual, **given})

@@ -13,6 +13,8 @@ from refgi.cluster.visibility.series import series
 
 Array = npt.NDArray[Any]
 
+# a read between texels is a tent twice as wide as a texel of its level: half the level makes it the filter's width
+LEVEL_SHIFT = -1.0
 MEANS: dict[Any, Any] = {Mip: mip_means, Sat: sat_means, Brute: brute_means}
 
 
@@ -72,7 +74,7 @@ def build(depth: Array, far: float, settings: ValSettings) -> Any:
     """
     most, n, quantised = series(settings).range, len(depth), settings.quantisation == "published"
     if settings.prefilter == "mip":
-        mip = mip_of(mips(1, n, settings.terms, depth.dtype, quantised=quantised), 0)
+        mip = mip_of(mips(1, n, settings.terms, depth.dtype, shift=LEVEL_SHIFT, quantised=quantised), 0)
         build_mip(depth, most / far, most, mip)
         return mip
     if settings.prefilter == "sat":

@@ -31,22 +31,22 @@ class Rules(NamedTuple):
     bias: Any  # m; without `receiver_plane` alone
 
 
-def rules(settings: ValSettings, bias: float) -> Rules:
+def rules(settings: ValSettings, unit: float) -> Rules:
     """Return what counts as a blocker by settings.
 
     Parameters
     ----------
     settings : ValSettings
-        `receiver_plane` and `cone` count.
-    bias : float
-        Least distance of a blocker from the receiver where its tangent plane does not count, m.
+        `receiver_plane`, `cone` and, where the receiver's plane does not count, `bias` do.
+    unit : float
+        Metres per unit of the series' scale, on which a bias is given.
 
     Returns
     -------
     Rules
-        Two flags and the bias.
+        Two flags and the bias; 0 where none is given, as the step needs none.
     """
-    return Rules(settings.receiver_plane, settings.cone, bias)
+    return Rules(settings.receiver_plane, settings.cone, (settings.bias or 0.0) * unit)
 
 
 @kernel
@@ -228,11 +228,11 @@ def hides(z: Any, w: Any, rule: Rules, receiver: Any, normal: Any) -> Any:
         z < d_plane(w) (1 - slack); where the plane is not met, the receiver's own distance stands in.
     """
     x, y, depth, d = receiver
-    if not rule.receiver_plane:
-        return z < d - type(d)(rule.bias)
-    a, b, c = normal
-    height, slope = a * x + b * y + c * depth, a * w[0] + b * w[1] + c * w[2]
-    limit = height / slope if height * slope > type(d)(0.0) else d
+    limit = d - type(d)(rule.bias)
+    if rule.receiver_plane:
+        a, b, c = normal
+        height, slope = a * x + b * y + c * depth, a * w[0] + b * w[1] + c * w[2]
+        limit = height / slope if height * slope > type(d)(0.0) else d
     return z < limit * type(d)(1.0 - SLACK)
 
 

@@ -1,6 +1,6 @@
 """How much of an area light points see, by its map: any points, any mode (Sec. 4.1, 5.1)."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -8,7 +8,8 @@ import numpy.typing as npt
 from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.maps.hard import hard_visibility
 from refgi.cluster.maps.shadow_maps import ShadowMaps
-from refgi.cluster.reference.unobstructed import Given
+from refgi.cluster.reference.rectangle import rectangle_points
+from refgi.cluster.reference.unobstructed import Ball, free_share
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.filtered import build
 from refgi.cluster.visibility.series import series
@@ -18,15 +19,19 @@ from refgi.errors import InputError, expect
 from refgi.jit import kernel, prange
 from refgi.stages import stage
 
+if TYPE_CHECKING:
+    from refgi.rays import Tracer
+
 Array = npt.NDArray[Any]
 
 TILE = 256  # receivers a thread works on at once
+BESIDE = (np.arange(4) + 0.5) / 4  # points along a side of the rectangle that rays from behind end at
 
 
 @stage("cluster.visibility", kept=False)
 def visibility(
     maps: ShadowMaps, areas: AreaLights, m: int, points: Array, facing: Array, settings: ValSettings,
-    rays: Given | None = None,
+    tracer: "Tracer | None" = None,
 ) -> Array:
     """Return how much of one area light each point sees.
 
@@ -44,9 +49,8 @@ def visibility(
         Normals of their surfaces, on either side.
     settings : ValSettings
         `visibility` is "series", "step", "hard" or "none"; `behind` says what points behind the area light see.
-    rays : callable, optional
-        ``(m, points (3, n), facing (3, n)) -> (n,)``: V by rays, as from `rectangle_visibility`; for points behind the
-        area light and ``behind == "raytrace"``.
+    tracer : Tracer, optional
+        Rays against the scene, for points behind the area light and ``behind == "raytrace"``.
 
     Returns
     -------
@@ -56,12 +60,12 @@ def visibility(
     Raises
     ------
     InputError
-        If there is no such area light, a mode is asked for that works without maps, or rays that are not given.
+        If there is no such area light, a mode is asked for that works without maps, or rays without a tracer.
 
     Notes
     -----
     An area light without extent casts a hard shadow. Points behind its plane see it whole (Sec. 5.1), unless a second
-    map or rays say otherwise.
+    map or rays to its rectangle say otherwise; nothing within the cluster's radius of the centre blocks such rays.
     """
     expect(0 <= m < len(areas.members), "m", f"an area light, 0 to {len(areas.members) - 1}", m)
     mode = settings.visibility
@@ -76,10 +80,10 @@ def visibility(
     else:
         visible = _soft(maps, k, float(areas.delta[m]), points, facing, settings)
     if settings.behind == "raytrace" and mode != "none":
-        if rays is None:
-            raise InputError("rays: expected V by rays where behind is 'raytrace', got None")
+        if tracer is None:
+            raise InputError("tracer: expected rays where behind is 'raytrace', got None")
         back = areas.normal[:, m] @ (points - areas.center[:, m, None]) <= 0
-        visible[back] = rays(m, points[:, back], facing[:, back])
+        visible[back] = _traced(tracer, areas, m, points[:, back], facing[:, back])
     return visible
 
 
@@ -94,12 +98,19 @@ def _soft(
             continue
         numbers = numbers_of(maps, k, delta, settings, behind)
         if settings.visibility == "step":
-            rule = rules(settings, chain.search_bias / chain.range * far)
+            rule = rules(settings, far / chain.range)
             _step_tiles(numbers, chosen, rule, depth[k], points, facing, visible)
         else:
             weight = chain.weight.astype(points.dtype)
             _series_tiles(numbers, chosen, weight, build(depth[k], far, settings), points, visible)
     return visible
+
+
+def _traced(tracer: "Tracer", areas: AreaLights, m: int, points: Array, facing: Array) -> Array:
+    targets = rectangle_points(areas, m, np.array(np.meshgrid(BESIDE, BESIDE)).reshape(2, -1))
+    targets -= tracer.offset * areas.normal[:, m, None]
+    ball = Ball(areas.center[:, m], float(areas.radius[m]))
+    return free_share(tracer, points, facing, targets, lambda toward, _: np.ones(toward.shape[:2]), tracer.offset, ball)
 
 
 @kernel(parallel=True)

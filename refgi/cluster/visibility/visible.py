@@ -46,7 +46,7 @@ def visibility(
     points : (3, n) ndarray
         World space, m.
     facing : (3, n) ndarray
-        Normals of their surfaces, on either side.
+        Normals of their surfaces; on the lit side for rays, else on either.
     settings : ValSettings
         `visibility` is "series", "step", "hard" or "none"; `behind` says what points behind the area light see.
     tracer : Tracer, optional
@@ -108,9 +108,12 @@ def _soft(
 
 def _traced(tracer: "Tracer", areas: AreaLights, m: int, points: Array, facing: Array) -> Array:
     targets = rectangle_points(areas, m, np.array(np.meshgrid(BESIDE, BESIDE)).reshape(2, -1))
-    targets -= tracer.offset * areas.normal[:, m, None]
     ball = Ball(areas.center[:, m], float(areas.radius[m]))
-    return free_share(tracer, points, facing, targets, lambda toward, _: np.ones(toward.shape[:2]), tracer.offset, ball)
+    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], _alike, tracer.offset, ball)
+
+
+def _alike(toward: Array, _: Array) -> Array:
+    return np.ones(toward.shape[:2])
 
 
 @kernel(parallel=True)

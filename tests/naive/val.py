@@ -9,6 +9,8 @@ import math
 from typing import NamedTuple
 
 STEEPEST = math.radians(80)  # half-angle of the widest cone in which blockers are searched
+LIFT = 4e-6  # of map centres off their lights, as a share of the largest coordinate
+SLACK = 1e-3  # share of its distance by which a blocker lies before a receiver
 NO_BLOCKER = 0.02  # share of the search disc below which the series has found none
 
 
@@ -173,12 +175,17 @@ def hit_distance(triangle, origin, direction):
     return tau if u >= 0 and v >= 0 and u + v <= 1 and tau > 0 else math.inf
 
 
-def depth_map(area, triangles, n, tolerance, *, near_planes=True, between_alone=True):
-    """Cast a ray for each texel inside the unit disc."""
+def lifted(area, triangles):
+    """Return the area light with its centre where its map looks from."""
+    largest = max(abs(x) for triangle in triangles for v in triangle for x in v)
+    return area._replace(center=plus(area.center, area.normal, LIFT * largest))
+
+
+def depth_map(area, triangles, n, tolerance):
+    """Cast a ray for each texel inside the unit disc, past what cannot block or passes within the cluster's radius."""
     vertices = [v for triangle in triangles for v in triangle]
-    kept = [t for t in triangles if not between_alone or is_between(t, vertices, tolerance)]
-    if near_planes:
-        kept = [t for t in kept if plane_distance(area.center, t) > area.radius + tolerance]
+    kept = [t for t in triangles if is_between(t, vertices, tolerance)]
+    kept = [t for t in kept if plane_distance(area.center, t) >= area.radius]
     depth = [[math.inf] * n for _ in range(n)]
     for row in range(n):
         for column in range(n):
@@ -223,15 +230,15 @@ def texels_in_disc(n, s, t, radius):
 
 
 def distance_to_plane(area, x, facing, direction):
-    """Return how far from the centre a direction meets the receiver's plane; infinity where it does not."""
+    """Return how far from the centre a direction meets the receiver's plane; that of x itself where it does not."""
     approach, height = dot(direction, facing), dot(minus(x, area.center), facing)
-    return height / approach if approach * height > 0 else math.inf
+    return height / approach if approach * height > 0 else length(minus(x, area.center))
 
 
-def is_blocked(area, seen, x, facing, row, column, eps):
+def is_blocked(area, seen, x, facing, row, column):
     """True step: what is stored is nearer than the receiver's plane in the texel's own direction."""
     w = place_to_direction(area, *texel_place(len(seen.depth), row, column))
-    return seen.depth[row][column] < distance_to_plane(area, x, facing, w) - eps
+    return seen.depth[row][column] < distance_to_plane(area, x, facing, w) * (1 - SLACK)
 
 
 def in_cone(area, seen, x, row, column):
@@ -251,29 +258,31 @@ def is_behind(area, x):
     return dot(minus(x, area.center), area.normal) <= 0
 
 
-def hard(area, seen, x, facing, eps):
-    """Return 0 or 1 from the one texel that x falls into."""
+def hard(area, seen, x, facing):
+    """Return 0 or 1 from the one texel that x falls into; its surface must be nearer than x itself as well."""
     if is_behind(area, x):
         return 1.0
     s, t, _ = disc_of_cone(area, x, 0.0)
-    return 0.0 if is_blocked(area, seen, x, facing, *nearest_texel(len(seen.depth), s, t), eps) else 1.0
+    row, column = nearest_texel(len(seen.depth), s, t)
+    before = seen.depth[row][column] < length(minus(x, area.center)) * (1 - SLACK)
+    return 0.0 if before and is_blocked(area, seen, x, facing, row, column) else 1.0
 
 
-def step(area, seen, x, facing, eps, cone=True):
+def step(area, seen, x, facing, cone=True):
     """Return V by the true step: search, mean depth of blockers, share of the final disc that is free."""
     d = length(minus(x, area.center))
     if is_behind(area, x) or seen.near >= d:
         return 1.0
     n = len(seen.depth)
     search = texels_in_disc(n, *disc_of_cone(area, x, min(half_angle(area.delta, d, seen.near), STEEPEST)))
-    blockers = [(row, column) for row, column in search if is_blocked(area, seen, x, facing, row, column, eps)
+    blockers = [(row, column) for row, column in search if is_blocked(area, seen, x, facing, row, column)
                 and (not cone or in_cone(area, seen, x, row, column))]
     if not blockers:
         return 1.0
     z_avg = sum(seen.depth[row][column] for row, column in blockers) / len(blockers)
     z_avg = min(max(z_avg, seen.near), d)
     final = texels_in_disc(n, *disc_of_cone(area, x, half_angle(area.delta, d, z_avg)))
-    return 1 - sum(is_blocked(area, seen, x, facing, row, column, eps) for row, column in final) / len(final)
+    return 1 - sum(is_blocked(area, seen, x, facing, row, column) for row, column in final) / len(final)
 
 
 def series_value(gap, terms, attenuation=0.0):
@@ -361,13 +370,19 @@ def irradiance(pixels, lights, areas, visible, block=1):
 # Sec. 6, geometry-aware blur
 
 
-def blurred(light, pixels, block, extent, cosine):
-    """Return means over windows of block x block pixels, of those near in space and alike in normal."""
+def window(middle, block, size):
+    """Return block places around one, moved inwards at the ends."""
+    first = max(0, min(middle - block // 2, size - block))
+    return range(first, min(first + block, size))
+
+
+def blurred(light, pixels, block, size, extent, cosine):
+    """Return means over windows of block x block of size pixels each way, of those near and alike in normal."""
     result = {}
     for (row, column), (x, normal, _) in pixels.items():
         total, count = [0.0, 0.0, 0.0], 0
-        for i in range(row - block // 2, row - block // 2 + block):
-            for j in range(column - block // 2, column - block // 2 + block):
+        for i in window(row, block, size):
+            for j in window(column, block, size):
                 if (i, j) in pixels:
                     other, other_normal, _ = pixels[i, j]
                     if length(minus(other, x)) <= extent and dot(normal, other_normal) >= cosine:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.maps.hard import SLACK
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
 from refgi.cluster.reference.unobstructed import Given
 from refgi.cluster.settings import ValSettings
@@ -24,7 +25,6 @@ Array = npt.NDArray[Any]
 
 CELLS = 32  # of the grid along each side of the rectangle
 AT_ONCE = 32  # receivers that share scratch
-CLEARANCE = 1e-4  # share of the map's far distance by which a blocker lies before the receiver's surface
 LEAST_SIDE = 1e-9  # of a rectangle, as a share of the far distance: a point light has none
 
 
@@ -77,8 +77,7 @@ def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, settings: Val
                     frame = maps.frame[k] if sign > 0 else BACKWARD @ maps.frame[k]
                     kept[m, sign < 0] = _patches(depth[k], frame, axes * turned)
                 low, cell = _grid(areas, maps, m, k)
-                visible[on] = _visible(kept[m, sign < 0], turned * x[:, on], turned * up[:, on], low, cell,
-                                       CLEARANCE * maps.far[k])
+                visible[on] = _visible(kept[m, sign < 0], turned * x[:, on], turned * up[:, on], low, cell)
         return visible.astype(points.dtype)
 
     expect(settings.behind != "raytrace", "behind", "'visible' or 'dual_paraboloid' with back-projection", "raytrace")
@@ -109,15 +108,15 @@ def _grid(areas: AreaLights, maps: ShadowMaps, m: int, k: int) -> tuple[Array, A
     return np.array([*(areas.offset[:, m] - side / 2), lift]), side / CELLS
 
 
-def _visible(patches: Patches, x: Array, up: Array, low: Array, cell: Array, eps: float) -> Array:
+def _visible(patches: Patches, x: Array, up: Array, low: Array, cell: Array) -> Array:
     visible = np.ones(x.shape[1])
     _project(patches.corner, patches.direction, patches.depth, np.ascontiguousarray(x), np.ascontiguousarray(up), low,
-             cell, eps, visible)
+             cell, visible)
     return visible
 
 
 @kernel(parallel=True)
-def _project(corner: Array, direction: Array, depth: Array, x: Array, up: Array, low: Array, cell: Array, eps: float,
+def _project(corner: Array, direction: Array, depth: Array, x: Array, up: Array, low: Array, cell: Array,
              visible: Array) -> None:
     """Fill V of receivers (3, n) ahead of the rectangle."""
     blocks = (x.shape[1] + AT_ONCE - 1) // AT_ONCE
@@ -130,7 +129,7 @@ def _project(corner: Array, direction: Array, depth: Array, x: Array, up: Array,
             for k in range(len(depth)):
                 approach = direction[k, 0] * up[0, i] + direction[k, 1] * up[1, i] + direction[k, 2] * up[2, i]
                 limit = height / approach if approach * height > 0.0 else np.inf
-                if depth[k] < limit - eps and _project_patch(corner, k, x, i, low, cell, quad):
+                if depth[k] < limit * (1.0 - SLACK) and _project_patch(corner, k, x, i, low, cell, quad):
                     _hide(quad, hidden)
             visible[i] = _share(hidden, x, up, i, low, cell)
 

@@ -54,7 +54,6 @@ def member_visibility(
         flux = flux + np.asarray(lights.lobe_flux, np.float64).sum(axis=0)
     order = np.argsort(areas.of, kind="stable")
     first = np.searchsorted(areas.of[order], np.arange(len(areas.members) + 1))
-    ends = position + frame.tracer.offset * normal
 
     def given(m: int, points: Array, facing: Array) -> Array:
         of = order[first[m] : first[m + 1]]
@@ -70,6 +69,6 @@ def member_visibility(
             given_light: Array = np.divide(flux[of] * away * above, square**2, out=np.zeros_like(square), where=faced)
             return given_light
 
-        return free_share(frame.tracer, points, facing, ends[:, of], worth, frame.tracer.offset)
+        return free_share(frame.tracer, points, facing, position[:, of], normal[:, of], worth, frame.tracer.offset)
 
     return given

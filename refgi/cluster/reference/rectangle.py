@@ -56,14 +56,14 @@ def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSetting
         return tracer_without_near(frame, drawn, areas, m, settings)
 
     def given(m: int, points: Array, facing: Array) -> Array:
-        tracer, visible, offset = tracer_of(m), np.ones(points.shape[1], points.dtype), frame.tracer.offset
+        tracer, visible = tracer_of(m), np.ones(points.shape[1], points.dtype)
         ball = Ball(areas.center[:, m], float(areas.radius[m])) if settings.near_geometry == "ball" else None
         height = areas.normal[:, m] @ (points - areas.center[:, m, None])
         within = np.where(height > 0, True, settings.behind != "visible")
         for side in (1.0, -1.0):
             on = within & (height * side > 0)
-            targets = rectangle_points(areas, m, on_square) + side * offset * areas.normal[:, m, None]
-            visible[on] = free_share(tracer, points[:, on], facing[:, on], targets, _alike, offset, ball)
+            visible[on] = free_share(tracer, points[:, on], facing[:, on], rectangle_points(areas, m, on_square),
+                                     side * areas.normal[:, m, None], _alike, frame.tracer.offset, ball)
         return visible
 
     return given

@@ -24,8 +24,8 @@ class Ball(NamedTuple):
 
 
 def free_share(
-    tracer: "Tracer", points: Array, facing: Array, targets: Array, worth: Callable[[Array, Array], Array],
-    offset: float, ball: Ball | None = None,
+    tracer: "Tracer", points: Array, facing: Array, targets: Array, upward: Array,
+    worth: Callable[[Array, Array], Array], offset: float, ball: Ball | None = None,
 ) -> Array:
     """Return the share of each receiver's rays that arrives, each ray after its worth.
 
@@ -36,12 +36,14 @@ def free_share(
     points, facing : (3, n) ndarray
         Receivers (m) and the unit normals of their surfaces, off which rays start.
     targets : (3, k) ndarray
-        Where rays end, m.
+        Points on lights, m.
+    upward : (3, k) or (3, 1) ndarray
+        Unit normals at the targets, on the side that rays come from.
     worth : callable
         Given vectors (n, k, 3) from some receivers to the targets and their normals (n, 3), the weight (n, k) of each
         ray, 0 or more. Rays of no worth, and those to targets below a receiver's surface, are not traced.
     offset : float
-        How far above their surfaces rays start, m.
+        How far above their surfaces rays start and end, m.
     ball : Ball, optional
         Rays end where they enter it.
 
@@ -51,11 +53,11 @@ def free_share(
         In the dtype of the points, 0 to 1; 1 where no ray is of any worth.
     """
     visible = np.ones(points.shape[1], points.dtype)
-    ends, step = targets.T, max(1, RAYS_AT_ONCE // max(1, targets.shape[1]))
+    ends, step = (targets + offset * upward).T, max(1, RAYS_AT_ONCE // max(1, targets.shape[1]))
     for first in range(0, len(visible), step):
         part = slice(first, first + step)
         at, up = points[:, part].T.astype(np.float64), facing[:, part].T.astype(np.float64)
-        toward = ends[None] - at[:, None]
+        toward = targets.T[None] - at[:, None]
         above = np.einsum("nkc,nc->nk", toward, up) > 0
         weight = np.where(above, worth(toward, up), 0.0)
         reach = np.where(weight > 0, _way_to(ball, at, toward), 0.0)

@@ -1,0 +1,113 @@
+"""A square light behind a straight edge: the penumbra is Delta (d - z) / z wide, and V across it is a ramp."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.rectangle import map_frames
+from refgi.cluster.maps.shadow_maps import shadow_maps
+from refgi.cluster.reference import back_projected_visibility, rectangle_visibility
+from refgi.cluster.settings import ValSettings
+from refgi.frame import Frame
+from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
+
+EDGE, RECEIVER = 1.0, 3.0  # distances of the edge and the receivers from the light, m
+SETTINGS = ValSettings(map_resolution=256)
+# 256 points hide behind an edge along a side one by one
+RAYS = 1.01 / 256
+# half a texel of 256 by which patches reach over the edge, as a share of the penumbra on the map, and half a cell of 32
+PROJECTED = {0.2: 0.05, 0.5: 0.05}
+# from the ramp of a disc: the disc ends in whole texels, 17 and 40 to a penumbra, and is a little too small, since
+# blockers off the axis lie deeper than the edge
+STEP = {0.2: 0.045, 0.5: 0.035}
+# from the ramp of the square: 0.050 is the disc's share; the rest is bias and ripple, within what papers report (an rms
+# of 0.03 for M = 4), and levels of the mip map
+SERIES = {(16, "brute"): 0.15, (4, "brute"): 0.10, (4, "mip"): 0.11}
+
+
+def square(x, y, z, half_x, half_y):
+    """Return corners of a rectangle at height z."""
+    return [(x - half_x, y - half_y, z), (x + half_x, y - half_y, z), (x + half_x, y + half_y, z),
+            (x - half_x, y + half_y, z)]
+
+
+def scene():
+    """A plate with the light, one with an edge at x = 0 above it, and a ceiling of receivers."""
+    vertices = [*square(0, 0, 0, 2, 2), *square(-1.5, 0, EDGE, 1.5, 2.5), *square(0, 0, RECEIVER, 3, 3)]
+    faces = [f for k in range(3) for f in ((4 * k, 4 * k + 1, 4 * k + 2), (4 * k, 4 * k + 2, 4 * k + 3))]
+    geometry = Geometry(np.array(vertices, np.float64), np.array(faces, np.int32), np.zeros(6, np.int32))
+    return Scene("edge", geometry, (Material("grey", (0.5, 0.5, 0.5)),), Camera((0, -9, 1), (0, 0, 1), up=(0, 0, 1)),
+                 (SpotLight((0, 0, 2), (0, 0, -1), 0.3, 0.4, (1, 1, 1)),))
+
+
+def square_light(delta):
+    """Return one area light around the origin."""
+    normal = np.array([[0.0], [0.0], [1.0]])
+    frame = map_frames(normal)
+    return AreaLights(np.zeros((3, 1)), normal, frame, np.full((2, 1), delta), frame[:, :2], np.zeros((2, 1)),
+                      np.array([delta]), np.array([delta / math.sqrt(2)]), np.array([4]), np.zeros(4, np.int32))
+
+
+def receivers(delta, count=201):
+    """Return points along x over twice the penumbra, which way they face, and V in closed form."""
+    width = delta * (RECEIVER - EDGE) / EDGE
+    x = np.linspace(-width, width, count)
+    points = np.stack([x, np.zeros(count), np.full(count, RECEIVER)])
+    facing = np.repeat([[0.0], [0.0], [-1.0]], count, axis=1)
+    return points, facing, np.clip(0.5 + x / width, 0, 1), width
+
+
+def width_of(x, v):
+    """Return the width of a penumbra from where V is 0.1 and 0.9; of a ramp, all of it."""
+    rising = np.maximum.accumulate(v)
+    return (np.interp(0.9, rising, x) - np.interp(0.1, rising, x)) / 0.8
+
+
+def disc_ramp(u):
+    """Return the share of a unit disc that an edge at u leaves free."""
+    u = np.clip(u, -1, 1)
+    return 0.5 + (np.arcsin(u) + u * np.sqrt(1 - u * u)) / math.pi
+
+
+@pytest.mark.feature("VAL-19", "REF-15")
+@pytest.mark.parametrize("delta", [0.2, 0.5])
+def test_rays_and_the_map_projected_back_give_the_ramp(delta, evidence):
+    frame, areas = Frame(scene(), dtype=np.float64), square_light(delta)
+    points, facing, exact, width = receivers(delta)
+    traced = rectangle_visibility(frame, areas, SETTINGS)(0, points, facing)
+    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
+    projected = back_projected_visibility(areas, maps, SETTINGS)(0, points, facing)
+    off = np.abs(traced - exact).max(), np.abs(projected - exact).max()
+    evidence(f"Delta {delta}: penumbra {width:.2f} m, rays {width_of(points[0], traced):.3f}, map projected back "
+             f"{width_of(points[0], projected):.3f}; V at most {off[0]:.4f} and {off[1]:.3f} off the ramp")
+    assert off[0] < RAYS
+    assert off[1] < PROJECTED[delta]
+    assert width_of(points[0], traced) == pytest.approx(width, rel=0.02)
+
+
+@pytest.mark.feature("VAL-19")
+@pytest.mark.parametrize("delta", [0.2, 0.5])
+def test_the_chain_follows_the_ramp(delta, evidence):
+    from refgi.cluster.visibility.visible import visibility
+
+    geometry, areas = scene().geometry, square_light(delta)
+    points, facing, exact, width = receivers(delta)
+    maps = shadow_maps(geometry, areas, SETTINGS, np.float64)
+    disc = disc_ramp(2 * points[0] / width)
+    figures = []
+    for mode, terms, prefilter in (("step", 4, "brute"), *(("series", *kind) for kind in SERIES)):
+        settings = dataclasses.replace(SETTINGS, visibility=mode, terms=terms, prefilter=prefilter)
+        v = visibility(maps, areas, 0, points, facing, settings)
+        figures.append((mode, terms, prefilter, width_of(points[0], v) / width, np.abs(v - exact).max()))
+        if mode == "step":
+            assert np.abs(v - disc).max() < STEP[delta]
+            assert figures[0][3] == pytest.approx(width_of(points[0], disc) / width, rel=0.02)
+        else:
+            assert figures[-1][4] < SERIES[terms, prefilter]
+            assert 0.75 < figures[-1][3] < 1.15
+    evidence(f"Delta {delta}, penumbra {width:.2f} m, {width_of(points[0], disc) / width:.3f} of it for a disc: "
+             + "; ".join(f"{mode}{'' if mode == 'step' else f' M={terms} {prefilter}'} {ratio:.3f} of it, V at most "
+                         f"{off:.3f} off" for mode, terms, prefilter, ratio, off in figures))

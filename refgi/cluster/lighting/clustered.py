@@ -1,7 +1,8 @@
 """All pixel lights under the visibility of their area lights (Sec. 4): E(x) = sum_i E_i(x) V_C(i)(x).
 
 Area light by area light, so that what is read of one shadow map stays near the processor: the light of its members,
-then V where there is any.
+then V where there is any. Diffuse lights under the map of the hemisphere ahead, the published case, go tile by tile;
+everything else takes the longer way, by lists of receivers, to the same bits.
 """
 
 from collections.abc import Callable
@@ -11,18 +12,20 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.area_lights import AreaLights
-from refgi.cluster.lighting.area_sum import add_share, bound_tiles, sum_members
-from refgi.cluster.lighting.interleave import Subsets, subsets
+from refgi.cluster.lighting.area_sum import Tiles, add_hard, add_soft, add_unshadowed, bound_tiles
+from refgi.cluster.lighting.interleave import Subsets, put, subsets, take
 from refgi.cluster.lighting.member_lights import MemberLights, add_members, member_lights
+from refgi.cluster.visibility.filtered import build
+from refgi.cluster.visibility.series import series
+from refgi.cluster.visibility.soft import choices, numbers_of
+from refgi.cluster.visibility.visible import visibility
 from refgi.errors import expect
-from refgi.pairs.blocks import put, taken
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
     from refgi.cluster.settings import ValSettings
-    from refgi.rays import Tracer
     from refgi.rsm import PixelLights
 
 Array = npt.NDArray[Any]
@@ -33,7 +36,7 @@ Given = Callable[[int, Array, Array], Array]  # V of an area light at points (3,
 def clustered_irradiance(
     receivers: Receivers, facing: Array, lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",
     settings: "ValSettings", footprint: Array | None = None, given: Given | None = None, interleaving: int = 1,
-    tracer: "Tracer | None" = None,
+    rays: Given | None = None,
 ) -> Array:
     """Sum the irradiance of every pixel light under the visibility of its area light.
 
@@ -57,8 +60,8 @@ def clustered_irradiance(
         V from elsewhere: (m, points (3, n), facing (3, n)) -> (n,).
     interleaving : int
         n: each pixel of n x n sums its own lights, n^2 times; 1: all.
-    tracer : Tracer, optional
-        Rays against the scene; needed for ``behind == "raytrace"`` alone.
+    rays : callable, optional
+        V by rays, as `given`, for points behind an area light; needed for ``behind == "raytrace"`` alone.
 
     Returns
     -------
@@ -80,52 +83,88 @@ def clustered_irradiance(
     expect(np.shape(facing) == np.shape(receivers.position), "facing", f"shape {np.shape(receivers.position)}",
            np.shape(facing))
     packed = checked(receivers, lights, settings, footprint)
-    position = np.asarray(receivers.position)
-    parts = subsets(np.asarray(receivers.covered, np.bool_), interleaving)
     members = member_lights(packed, areas.of, len(areas.members), interleaving)
-    points, normals, faces = (taken(np.asarray(plane, position.dtype), parts.places)
-                              for plane in (position, receivers.normal, facing))
-    seen = _visibility(points, faces, areas, maps, settings, given, tracer)
-    result = np.zeros(position.shape, position.dtype)
-    put(result, parts.places, _sum(points, normals, parts, members, seen) * position.dtype.type(interleaving**2))
+    parts = subsets(np.asarray(receivers.covered, np.bool_), interleaving)
+    tiles = _tiles(receivers, facing, parts)
+    sums = np.zeros_like(tiles.position)
+    if _published(members, settings, given):
+        _add_by_tiles(tiles, members, areas, maps, settings, sums)
+    else:
+        _add_by_lists(tiles, parts, members, _visibility(areas, maps, settings, given, rays), sums)
+    result = np.zeros(np.shape(receivers.position), sums.dtype)
+    put(sums, parts, sums.dtype.type(interleaving**2), result.reshape(3, -1))
     return result
 
 
-def _sum(
-    points: Array, normals: Array, parts: Subsets, members: MemberLights, seen: Callable[[int, Array], Array]
-) -> Array:
-    """Return E of receivers, (3, n)."""
-    total, lost = np.zeros_like(points), np.zeros_like(points)
-    packed, tiles = members.packed, np.stack([parts.first, parts.size, parts.subset])
-    low, high = np.empty((2, len(parts.first), 6), points.dtype)
-    bound_tiles(points, normals, tiles, low, high)
-    diffuse_alone = packed.spheres is None and packed.lobes is None
-    count = len(members.start)
-    for m in range(count):
-        part = np.zeros_like(points)
-        if diffuse_alone:
-            sum_members(points, normals, tiles, low, high, packed.diffuse, packed.clamp, members.start[m], part)
+def _tiles(receivers: Receivers, facing: Array, parts: Subsets) -> Tiles:
+    real = np.asarray(receivers.position).dtype
+    planes = []
+    for plane in (receivers.position, receivers.normal, facing):
+        planes.append(np.empty((3, len(parts.places)), real))
+        take(np.ascontiguousarray(plane, real).reshape(3, -1), parts, planes[-1])
+    position, normal, faces = planes
+    low, high = np.empty((2, parts.tiles.shape[1], 6), real)
+    tiles = Tiles(position, normal, faces, parts.tiles, low, high)
+    bound_tiles(tiles)
+    return tiles
+
+
+def _published(members: MemberLights, settings: "ValSettings", given: Given | None) -> bool:
+    """Tell whether tiles can be lit and shadowed at once."""
+    return (members.packed.spheres is None and members.packed.lobes is None and given is None
+            and settings.visibility in ("series", "hard", "none") and settings.behind == "visible")
+
+
+def _add_by_tiles(
+    tiles: Tiles, members: MemberLights, areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings",
+    sums: Array,
+) -> None:
+    """Add every area light to receivers, tile by tile."""
+    lights, clamp, chain, chosen = members.packed.diffuse, members.packed.clamp, series(settings), choices(settings)
+    weight = chain.weight.astype(sums.dtype)
+    for m, start in enumerate(members.start):
+        k = -1 if maps is None or settings.visibility == "none" else int(maps.map_of[m])
+        if start[0] == start[-1]:
+            continue
+        if k < 0 or maps is None:
+            add_unshadowed(tiles, lights, clamp, start, sums)
+        elif settings.visibility == "hard" or areas.delta[m] == 0:
+            add_hard(tiles, lights, clamp, start, maps.depth[k], maps.center[k], maps.frame[k], sums)
         else:
-            add_members(points, normals, parts, members, m, part)
+            numbers = numbers_of(maps, k, float(areas.delta[m]), settings)
+            filters = build(maps.depth[k], float(maps.far[k]), settings)
+            add_soft(tiles, lights, clamp, start, numbers, chosen, weight, filters, sums)
+        report_progress((m + 1) / len(members.start))
+
+
+def _add_by_lists(
+    tiles: Tiles, parts: Subsets, members: MemberLights, seen: Given, sums: Array
+) -> None:
+    """Add every area light to receivers: the light of its members first, then V where there is any."""
+    packed = members.packed
+    diffuse_alone = packed.spheres is None and packed.lobes is None
+    for m, start in enumerate(members.start):
+        part = np.zeros_like(sums)
+        if diffuse_alone:
+            add_unshadowed(tiles, packed.diffuse, packed.clamp, start, part)
+        else:
+            add_members(tiles.position, tiles.normal, parts, members, m, part)
         lit = np.flatnonzero(part.any(axis=0))
         if len(lit):
-            add_share(part, lit, seen(m, lit), total, lost)
-        report_progress((m + 1) / count)
-    return total
+            sums[:, lit] += part[:, lit] * np.asarray(seen(m, tiles.position[:, lit], tiles.facing[:, lit]), sums.dtype)
+        report_progress((m + 1) / len(members.start))
 
 
 def _visibility(
-    points: Array, faces: Array, areas: AreaLights, maps: "ShadowMaps | None",
-    settings: "ValSettings", given: Given | None, tracer: "Tracer | None",
-) -> Callable[[int, Array], Array]:
-    """Return what tells V of area light m at some receivers."""
-    def seen(m: int, lit: Array) -> Array:
-        if given is not None:
-            return np.asarray(given(m, points[:, lit], faces[:, lit]), points.dtype)
-        if settings.visibility == "none" or maps is None or maps.map_of[m] < 0:
-            return np.ones(len(lit), points.dtype)
-        from refgi.cluster.visibility.visible import visibility
+    areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings", given: Given | None, rays: Given | None
+) -> Given:
+    """Return what tells V of an area light at some points."""
+    if given is not None:
+        return given
 
-        return np.asarray(visibility(maps, areas, m, points[:, lit], faces[:, lit], settings, tracer))
+    def seen(m: int, points: Array, facing: Array) -> Array:
+        if maps is None or settings.visibility == "none":
+            return np.ones(points.shape[1], points.dtype)
+        return visibility(maps, areas, m, points, facing, settings, rays)
 
     return seen

@@ -10,10 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.pairs.blocks import block_by_block
+from refgi.jit import kernel, prange
+from refgi.pairs.blocks import BLOCK
 from refgi.pairs.pair_sum import TILE
 
 Array = npt.NDArray[Any]
+
+MOST = 64  # pixels along a side of a block
+FIRST, SIZE, SUBSET = 0, 1, 2  # rows of tiles
 
 
 class Subsets(NamedTuple):
@@ -21,9 +25,7 @@ class Subsets(NamedTuple):
 
     places: Array  # (n,) int64: flat indices of the pixels
     start: Array  # (subsets + 1,) int64: first pixel of each subset, and how many there are
-    first: Array  # (T,) int64: first pixel of each tile
-    size: Array  # (T,) int64: how many it has, 1 to TILE
-    subset: Array  # (T,) int64: which lights it sums
+    tiles: Array  # (3, T) int64: first pixel of each tile, how many it has (1 to TILE), and its subset
 
 
 def subsets(covered: Array, side: int) -> Subsets:
@@ -34,25 +36,94 @@ def subsets(covered: Array, side: int) -> Subsets:
     covered : (h, w) ndarray of bool
         Whether there is a surface.
     side : int
-        n, pixels along a side of a block.
+        n, pixels along a side of a block; 1 to 64.
 
     Returns
     -------
     Subsets
-        Every covered pixel once; within a subset block by block (`block_by_block`).
+        Every covered pixel once; those of a subset by blocks of `BLOCK` x `BLOCK` of them.
+
+    Raises
+    ------
+    InputError
+        If the side is out of range.
     """
-    expect(side >= 1, "interleaving", "1 or more pixels", side)
-    width = covered.shape[1]
-    parts = []
-    for row in range(side):
-        for column in range(side):
-            some = np.ascontiguousarray(covered[row::side, column::side])
-            y, x = np.divmod(block_by_block(some), max(1, some.shape[1]))
-            parts.append((y * side + row) * width + (x * side + column))
-    counts = np.array([len(part) for part in parts])
+    expect(1 <= side <= MOST, "interleaving", f"1 to {MOST} pixels", side)
+    covered = np.ascontiguousarray(covered)
+    counts = np.empty(side * side, np.int64)
+    _count(covered, side, counts)
     start = np.append(0, np.cumsum(counts))
+    places = np.empty(start[-1], np.int64)
+    _fill(covered, side, start, places)
     tiles = -(-counts // TILE)
     subset = np.repeat(np.arange(len(counts)), tiles)
     first = start[subset] + (np.arange(len(subset)) - np.repeat(np.cumsum(tiles) - tiles, tiles)) * TILE
-    size = np.minimum(TILE, start[subset + 1] - first)
-    return Subsets(np.concatenate(parts), start, first, size, subset)
+    return Subsets(places, start, np.stack([first, np.minimum(TILE, start[subset + 1] - first), subset]))
+
+
+@kernel(parallel=True)
+def _count(covered: Array, side: int, counts: Array) -> None:
+    height, width = covered.shape
+    for subset in prange(side * side):
+        count = 0
+        for row in range(np.int64(subset) // side, height, side):
+            for column in range(np.int64(subset) % side, width, side):
+                count += covered[row, column]
+        counts[subset] = count
+
+
+@kernel(parallel=True)
+def _fill(covered: Array, side: int, start: Array, places: Array) -> None:
+    height, width = covered.shape
+    step = side * BLOCK
+    for subset in prange(side * side):
+        place = start[subset]
+        for top in range(np.int64(subset) // side, height, step):
+            for left in range(np.int64(subset) % side, width, step):
+                for row in range(top, min(top + step, height), side):
+                    for column in range(left, min(left + step, width), side):
+                        if covered[row, column]:
+                            places[place] = row * width + column
+                            place += 1
+
+
+@kernel(parallel=True)
+def take(plane: Array, parts: Subsets, values: Array) -> None:
+    """Copy three channels into the order of subsets.
+
+    Parameters
+    ----------
+    plane : (3, h w) ndarray
+        Of a picture.
+    parts : Subsets
+        The order.
+    values : (3, n) ndarray
+        Filled.
+    """
+    tiles, places = parts.tiles, parts.places
+    for t in prange(tiles.shape[1]):
+        for c in range(3):
+            for i in range(tiles[FIRST, t], tiles[FIRST, t] + tiles[SIZE, t]):
+                values[c, i] = plane[c, places[i]]
+
+
+@kernel(parallel=True)
+def put(values: Array, parts: Subsets, factor: Any, plane: Array) -> None:
+    """Copy three channels, times a factor, back into the order of a picture.
+
+    Parameters
+    ----------
+    values : (3, n) ndarray
+        In the order of subsets.
+    parts : Subsets
+        That order.
+    factor : float
+        n^2: how many subsets each stands for.
+    plane : (3, h w) ndarray
+        Of a picture; changed where there is a surface.
+    """
+    tiles, places = parts.tiles, parts.places
+    for t in prange(tiles.shape[1]):
+        for c in range(3):
+            for i in range(tiles[FIRST, t], tiles[FIRST, t] + tiles[SIZE, t]):
+                plane[c, places[i]] = values[c, i] * factor

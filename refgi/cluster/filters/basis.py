@@ -79,6 +79,25 @@ def sine_cosine(t: Any) -> tuple[Any, Any]:
 
 
 @kernel
+def turned(sine: Any, cosine: Any, by_sine: Any, by_cosine: Any) -> tuple[Any, Any]:
+    """Return sine and cosine of the sum of two angles.
+
+    Parameters
+    ----------
+    sine, cosine : float
+        Of the one angle.
+    by_sine, by_cosine : float
+        Of the other.
+
+    Returns
+    -------
+    tuple of 2 floats
+        From S_k, C_k and the sine and cosine of 2 pi t, S_k+1 and C_k+1.
+    """
+    return sine * by_cosine + cosine * by_sine, cosine * by_cosine - sine * by_sine
+
+
+@kernel
 def fill_basis(depth: Array, terms: int, quantised: bool, basis: Array, basis_z: Array) -> None:
     """Write the basis and the basis-z of every texel of a map.
 
@@ -99,11 +118,11 @@ def fill_basis(depth: Array, terms: int, quantised: bool, basis: Array, basis_z:
         for j in range(depth.shape[1]):
             t = depth[i, j]
             sine, cosine = sine_cosine(t)
-            turn_sine, turn_cosine = (sine + sine) * cosine, (cosine - sine) * (cosine + sine)
+            by_sine, by_cosine = turned(sine, cosine, sine, cosine)
             for k in range(terms):
                 basis[i, j, k], basis[i, j, terms + k] = sine, cosine
                 basis_z[i, j, k], basis_z[i, j, terms + k] = t * sine, t * cosine
-                sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
+                sine, cosine = turned(sine, cosine, by_sine, by_cosine)
             basis_z[i, j, 2 * terms] = t
             if quantised:
                 for c in range(2 * terms):

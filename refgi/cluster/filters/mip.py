@@ -1,164 +1,35 @@
-"""A mip map of the basis, read between its texels and levels (Sec. 6): the filter of the paper.
+"""Read a mip map for the receivers of a tile: the filter of the paper (Sec. 6).
 
-Level l halves level l - 1 by the mean of 2 x 2 texels; where the side is odd, the last row and column count twice.
-Texel i of level l covers the texels i 2^l .. (i + 1) 2^l - 1 of the map, so no size drifts. A disc is read at level
-log2 of its diameter in texels, between the two next levels and the 2 x 2 nearest texels of each. Beyond the edge of
-the map the edge goes on; the square beyond the unit disc holds the far end.
+A disc is read at level log2 of its diameter in texels, at least 0, between the two levels around it and the 2 x 2
+nearest texels of each: 8 texels with 8 weights. Beyond the edge of the map the edge goes on.
 
-Level 0 is not stored: its texels are the largest part of a pyramid and are computed from the depth where they are
-read, to the same bits.
+Where levels, texels and weights are worked out, receivers are the SIMD lanes; where texels are summed up, their
+channels are; then sums of 8 receivers and 8 channels are transposed in registers.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numba import types
 
-from refgi.cluster.filters.basis import fill_basis, normalise, sine_cosine
+from refgi.cluster.filters.basis import sine_cosine, turned
+from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store, transpose
+from refgi.cluster.filters.mip_build import build_mip, build_mips
+from refgi.cluster.filters.pyramid import Mip, mip_of, mips
 from refgi.cluster.filters.quantise import eight_bits, half_precision
 from refgi.elementary import log2
-from refgi.jit import kernel, prange
+from refgi.jit import kernel
+
+__all__ = ["Mip", "build_mip", "build_mips", "mip_means", "mip_of", "mips"]
 
 Array = npt.NDArray[Any]
 
-LANES = 8  # channels of a texel are padded to a multiple of it, with zeros
-
-
-class Mip(NamedTuple):
-    """One map's pyramid, or with a leading axis those of several."""
-
-    depth: Array  # (n, n): t
-    basis: Array  # (texels, 2 M padded): S_k, C_k of levels 1 and up
-    basis_z: Array  # (texels, 2 M padded): t S_k, t C_k
-    mean_depth: Array  # (texels,): means of t
-    first: Array  # (levels,) int64: first texel of each level; of no use for level 0
-    terms: int  # M
-    shift: float  # added to every level that is read
-    quantised: bool  # 8 bits for the basis, 16 for basis-z
-
-
-def mips(count: int, size: int, terms: int, dtype: npt.DTypeLike, *, shift: float = 0.0, quantised: bool = False) -> Mip:
-    """Make room for the pyramids of several maps.
-
-    Parameters
-    ----------
-    count : int
-        Maps.
-    size : int
-        Texels along a side of a map, n.
-    terms : int
-        M.
-    dtype : dtype
-        Float32 or float64.
-    shift : float
-        Added to the level of every read; 0 as published, negative for a narrower filter.
-    quantised : bool
-        Keep 8 bits of the basis and 16 of the basis-z on every level.
-
-    Returns
-    -------
-    Mip
-        Arrays with a leading axis of `count`, not yet filled; padding is 0.
-    """
-    sides = [size]
-    while sides[-1] > 1:
-        sides.append((sides[-1] + 1) // 2)
-    texels = np.array([side * side for side in sides])
-    first = np.cumsum(texels) - texels - texels[0]
-    total, width = max(int(texels[1:].sum()), 1), -(-2 * terms // LANES) * LANES
-    return Mip(np.zeros((count, size, size), dtype), np.zeros((count, total, width), dtype),
-               np.zeros((count, total, width), dtype), np.zeros((count, total), dtype), first, terms, shift, quantised)
-
-
-@kernel
-def mip_of(several: Mip, k: int) -> Mip:
-    """Return one of several pyramids.
-
-    Parameters
-    ----------
-    several : Mip
-        With a leading axis.
-    k : int
-        Which.
-
-    Returns
-    -------
-    Mip
-        Views of that pyramid.
-    """
-    return Mip(several.depth[k], several.basis[k], several.basis_z[k], several.mean_depth[k], several.first,
-               several.terms, several.shift, several.quantised)
-
-
-@kernel
-def build_mip(depth: Array, scale: float, most: float, mip: Mip) -> None:
-    """Fill one pyramid.
-
-    Parameters
-    ----------
-    depth : (n, n) ndarray
-        Radial distance, m; inf where nothing is seen.
-    scale, most : float
-        As in `basis.normalise`.
-    mip : Mip
-        Filled.
-    """
-    normalise(depth, scale, most, mip.depth)
-    n = len(mip.depth)
-    terms = mip.terms
-    basis, basis_z = np.empty((n, n, 2 * terms), depth.dtype), np.empty((n, n, 2 * terms + 1), depth.dtype)
-    fill_basis(mip.depth, terms, mip.quantised, basis, basis_z)
-    quarter = depth.dtype.type(0.25)
-    side = n
-    for level in range(1, len(mip.first)):
-        half = (side + 1) // 2
-        source, target = mip.first[level - 1], mip.first[level]
-        for i in range(half):
-            for j in range(half):
-                i1, j1 = min(2 * i + 1, side - 1), min(2 * j + 1, side - 1)
-                texel = target + i * half + j
-                for c in range(2 * terms + 1):
-                    if level == 1:
-                        z = (basis_z[2 * i, 2 * j, c] + basis_z[2 * i, j1, c]) + (basis_z[i1, 2 * j, c] + basis_z[i1, j1, c])
-                        v = z
-                        if c < 2 * terms:
-                            v = (basis[2 * i, 2 * j, c] + basis[2 * i, j1, c]) + (basis[i1, 2 * j, c] + basis[i1, j1, c])
-                    else:
-                        a, b = source + 2 * i * side + 2 * j, source + 2 * i * side + j1
-                        e, f = source + i1 * side + 2 * j, source + i1 * side + j1
-                        v = z = depth.dtype.type(0.0)
-                        if c == 2 * terms:
-                            z = (mip.mean_depth[a] + mip.mean_depth[b]) + (mip.mean_depth[e] + mip.mean_depth[f])
-                        else:
-                            z = (mip.basis_z[a, c] + mip.basis_z[b, c]) + (mip.basis_z[e, c] + mip.basis_z[f, c])
-                            v = (mip.basis[a, c] + mip.basis[b, c]) + (mip.basis[e, c] + mip.basis[f, c])
-                    v, z = quarter * v, quarter * z
-                    if mip.quantised:
-                        v, z = eight_bits(v), half_precision(z)
-                    if c == 2 * terms:
-                        mip.mean_depth[texel] = z
-                    else:
-                        mip.basis[texel, c], mip.basis_z[texel, c] = v, z
-        side = half
-
-
-@kernel(parallel=True)
-def build_mips(depth: Array, scale: Array, most: float, several: Mip) -> None:
-    """Fill the pyramids of several maps.
-
-    Parameters
-    ----------
-    depth : (K, n, n) ndarray
-        Radial distances, m; inf where nothing is seen.
-    scale : (K,) ndarray
-        As in `basis.normalise`.
-    most : float
-        The same.
-    several : Mip
-        Filled; with a leading axis of K at least.
-    """
-    for k in prange(len(depth)):
-        build_mip(depth[k], scale[k], most, mip_of(several, np.int64(k)))
+CHUNK = 64  # receivers whose texels and weights are kept at once
+FINE, COARSE, FINE_SIDE, COARSE_SIDE, LEVEL, DIRECT = range(6)  # rows of whole numbers
+MAP = 8  # first of the 4 weights of texels of the map itself; before: 4 of the finer level, 4 of the coarser
+WHOLE, WEIGHTS, SUMS = room_of(6, CHUNK, types.int32), room_of(12, CHUNK), room_of(EIGHT, CHUNK)
+DEPTHS, SINES, COSINES, BY_SINES, BY_COSINES = (room_of(1, CHUNK) for _ in range(5))
 
 
 @kernel
@@ -172,7 +43,7 @@ def mip_means(
     mip : Mip
         One map's pyramid.
     s, t, radius : (lanes,) ndarray
-        Centre and radius of the discs, in units of the map's half side; beyond the map its edge is read.
+        Centre and radius of the discs, in units of the map's half side.
     wanted : (lanes,) ndarray
         Lanes to read.
     count : int
@@ -180,60 +51,216 @@ def mip_means(
     with_z : bool
         All 4 M + 1 channels instead of the first 2 M.
     out : (channels, lanes) ndarray
-        Filled where wanted; what it held is lost in row 0 of all lanes.
+        Filled where wanted; what the first `count` lanes held elsewhere is lost.
     """
-    n, terms, top = len(mip.depth), mip.terms, len(mip.first) - 1
-    real = s.dtype.type
-    for i in range(count):
-        level = log2(max(radius[i] * real(n), real(1.0))) + real(mip.shift)
-        out[0, i] = min(max(level, real(0.0)), real(top))
-    for i in range(count):
-        if not wanted[i]:
+    whole, weights, sums = WHOLE(s), WEIGHTS(s), SUMS(s)
+    channels = 2 * mip.terms
+    for start in range(0, count, CHUNK):
+        lanes = min(CHUNK, count - start)
+        place = slice(start, start + lanes)
+        _find_texels(mip.shift, len(mip.depth), len(mip.first) - 1, s[place], t[place], radius[place], wanted[place],
+                     whole, weights)
+        some, direct = _find_levels(mip.first, wanted[place], whole)
+        if not some:
             continue
-        level = out[0, i]
-        fine = min(int(level), max(top - 1, 0))
-        share = level - real(fine)
-        for c in range(4 * terms + 1 if with_z else 2 * terms):
-            out[c, i] = real(0.0)
-        _add(mip, fine, s[i], t[i], real(1.0) - share, with_z, i, out)
-        if share > real(0.0):
-            _add(mip, fine + 1, s[i], t[i], share, with_z, i, out)
+        for first in range(0, channels, EIGHT):
+            here = min(EIGHT, channels - first)
+            _sum_up(mip.basis, first, lanes, whole, weights, sums)
+            _take(sums, here, lanes, out, first, start)
+            if with_z:
+                _sum_up(mip.basis_z, first, lanes, whole, weights, sums)
+                _take(sums, here, lanes, out, channels + first, start)
+        if with_z:
+            _sum_depths(mip.mean_depth, lanes, whole, weights, out, 2 * channels, start)
+        if direct and mip.quantised:
+            _add_rounded(mip.depth, mip.terms, with_z, lanes, whole, weights, out, start)
+        elif direct:
+            _add_map(mip.depth, mip.terms, with_z, lanes, whole, weights, out, start)
 
 
 @kernel
-def _add(mip: Mip, level: int, s: Any, t: Any, weight: Any, with_z: bool, i: int, out: Array) -> None:
-    n, terms = len(mip.depth), mip.terms
-    real = type(s)
-    side = (n + (1 << level) - 1) >> level
-    scale = real(0.5) * real(n) / real(1 << level)
-    x = min(max((s + real(1.0)) * scale - real(0.5), real(0.0)), real(side - 1))
-    y = min(max((t + real(1.0)) * scale - real(0.5), real(0.0)), real(side - 1))
-    j, r = int(x), int(y)
-    fx, fy = x - real(j), y - real(r)
+def _find_texels(
+    shift: float, size: int, coarsest: int, s: Array, t: Array, radius: Array, wanted: Array, whole: Array,
+    weights: Array,
+) -> None:
+    """Find levels, texels within them and weights; a lane that is not wanted reads the coarsest level."""
+    real = s.dtype.type
+    n, top, one = np.int32(size), np.int32(coarsest), np.int32(1)
+    none, half, full = real(0.0), real(0.5), real(1.0)
+    for lane in range(len(s)):
+        used = wanted[lane] != 0
+        level = log2(max(radius[lane] * real(n), full)) + real(shift)
+        level = min(max(level, none), real(top)) if used else real(top)
+        x = (s[lane] + full) * half * real(n) if used else none
+        y = (t[lane] + full) * half * real(n) if used else none
+        fine = np.int32(level)
+        share = level - real(fine)
+        texel, side, a, b, c, d = _four(x, y, fine, n, full - share)
+        mapped = fine == 0
+        whole[LEVEL, lane] = fine
+        whole[DIRECT, lane] = texel if mapped else np.int32(0)
+        whole[FINE, lane] = np.int32(0) if mapped else texel
+        whole[FINE_SIDE, lane] = np.int32(0) if mapped else side
+        weights[0, lane], weights[1, lane] = (none if mapped else a), (none if mapped else b)
+        weights[2, lane], weights[3, lane] = (none if mapped else c), (none if mapped else d)
+        weights[MAP, lane], weights[MAP + 1, lane] = (a if mapped else none), (b if mapped else none)
+        weights[MAP + 2, lane], weights[MAP + 3, lane] = (c if mapped else none), (d if mapped else none)
+        texel, side, a, b, c, d = _four(x, y, min(fine + one, top), n, share)
+        whole[COARSE, lane], whole[COARSE_SIDE, lane] = texel, side
+        weights[4, lane], weights[5, lane], weights[6, lane], weights[7, lane] = a, b, c, d
+
+
+@kernel
+def _four(x: Any, y: Any, level: Any, n: Any, share: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
+    """Return the first of 2 x 2 texels of a level, the level's side, and their weights, which add up to `share`.
+
+    Beyond the last centres the weights of what is not there are 0.
+    """
+    real, one = type(x), np.int32(1)
+    none, half, full = real(0.0), real(0.5), real(1.0)
+    side = np.int32((n + (one << level) - one) >> level)
+    shrink, last = full / real(one << level), real(side - one)
+    u, v = min(max(x * shrink - half, none), last), min(max(y * shrink - half, none), last)
+    column, row = np.int32(u), np.int32(v)
+    fx, fy = u - real(column), v - real(row)
+    above, below = share * (full - fy), share * fy
+    return np.int32(row * side + column), side, above * (full - fx), above * fx, below * (full - fx), below * fx
+
+
+@kernel
+def _find_levels(first: Array, wanted: Array, whole: Array) -> tuple[bool, bool]:
+    """Add where levels start; return whether any lane is wanted, and whether any reads the map itself."""
+    some, direct, top = False, False, len(first) - 1
+    for lane in range(len(wanted)):
+        level = whole[LEVEL, lane]
+        some |= wanted[lane] != 0
+        direct |= level == 0
+        if level > 0:
+            whole[FINE, lane] += np.int32(first[level])
+        if top > 0:
+            whole[COARSE, lane] += np.int32(first[min(level + 1, top)])
+    for lane in range(len(wanted), -(-len(wanted) // EIGHT) * EIGHT):  # to a multiple of 8
+        for row in range(6):
+            whole[row, lane] = 0
+    return some, direct
+
+
+@kernel
+def _sum_up(levels: Array, first: int, lanes: int, whole: Array, weights: Array, sums: Array) -> None:
+    """Sum 8 channels from `first` on over the 8 texels of each lane."""
+    for lane in range(0, lanes, EIGHT):
+        lines = transpose((
+            _eight(levels, first, lane, whole, weights), _eight(levels, first, lane + 1, whole, weights),
+            _eight(levels, first, lane + 2, whole, weights), _eight(levels, first, lane + 3, whole, weights),
+            _eight(levels, first, lane + 4, whole, weights), _eight(levels, first, lane + 5, whole, weights),
+            _eight(levels, first, lane + 6, whole, weights), _eight(levels, first, lane + 7, whole, weights),
+        ))  # fmt: skip
+        for c in range(EIGHT):
+            store(sums, c * CHUNK + lane, lines[c])
+
+
+@kernel
+def _eight(levels: Array, first: int, lane: int, whole: Array, weights: Array) -> Any:
+    width = levels.shape[1]
+    a = np.int64(whole[FINE, lane]) * width + first
+    b = a + np.int64(whole[FINE_SIDE, lane]) * width
+    c = np.int64(whole[COARSE, lane]) * width + first
+    d = c + np.int64(whole[COARSE_SIDE, lane]) * width
+    above = add(scale(load(levels, a), weights[0, lane]), scale(load(levels, a + width), weights[1, lane]))
+    below = add(scale(load(levels, b), weights[2, lane]), scale(load(levels, b + width), weights[3, lane]))
+    fine = add(above, below)
+    above = add(scale(load(levels, c), weights[4, lane]), scale(load(levels, c + width), weights[5, lane]))
+    below = add(scale(load(levels, d), weights[6, lane]), scale(load(levels, d + width), weights[7, lane]))
+    return add(fine, add(above, below))
+
+
+@kernel
+def _take(sums: Array, here: int, lanes: int, out: Array, row: int, start: int) -> None:
+    for c in range(here):
+        for lane in range(lanes):
+            out[row + c, start + lane] = sums[c, lane]
+
+
+@kernel
+def _sum_depths(
+    levels: Array, lanes: int, whole: Array, weights: Array, out: Array, row: int, start: int
+) -> None:
+    for lane in range(lanes):
+        a, c = np.int64(whole[FINE, lane]), np.int64(whole[COARSE, lane])
+        b, d = a + np.int64(whole[FINE_SIDE, lane]), c + np.int64(whole[COARSE_SIDE, lane])
+        fine = (levels[a] * weights[0, lane] + levels[a + 1] * weights[1, lane]) + (
+            levels[b] * weights[2, lane] + levels[b + 1] * weights[3, lane])
+        coarse = (levels[c] * weights[4, lane] + levels[c + 1] * weights[5, lane]) + (
+            levels[d] * weights[6, lane] + levels[d + 1] * weights[7, lane])
+        out[row, start + lane] = fine + coarse
+
+
+@kernel
+def _add_map(
+    depth: Array, terms: int, with_z: bool, lanes: int, whole: Array, weights: Array, out: Array, start: int
+) -> None:
+    """Add what lanes read of the map itself; the others add 0."""
+    depths, sines, cosines = DEPTHS(depth)[0], SINES(depth)[0], COSINES(depth)[0]
+    by_sines, by_cosines = BY_SINES(depth)[0], BY_COSINES(depth)[0]
     for tap in range(4):
-        row, column = min(r + tap // 2, side - 1), min(j + tap % 2, side - 1)
-        w = weight * (fy if tap // 2 else real(1.0) - fy) * (fx if tap % 2 else real(1.0) - fx)
-        if level == 0:
-            z = mip.depth[row, column]
+        _fetch(depth, tap, lanes, whole, depths)
+        for lane in range(lanes):
+            sine, cosine = sine_cosine(depths[lane])
+            by_sines[lane], by_cosines[lane] = turned(sine, cosine, sine, cosine)
+            sines[lane], cosines[lane] = weights[MAP + tap, lane] * sine, weights[MAP + tap, lane] * cosine
+        for k in range(terms):
+            _accumulate(sines, lanes, out[k], start)
+            _accumulate(cosines, lanes, out[terms + k], start)
+            if with_z:
+                _accumulate_z(sines, depths, lanes, out[2 * terms + k], start)
+                _accumulate_z(cosines, depths, lanes, out[3 * terms + k], start)
+            for lane in range(lanes):
+                sines[lane], cosines[lane] = turned(sines[lane], cosines[lane], by_sines[lane], by_cosines[lane])
+        if with_z:
+            _accumulate_z(weights[MAP + tap], depths, lanes, out[4 * terms], start)
+
+
+@kernel
+def _fetch(depth: Array, tap: int, lanes: int, whole: Array, depths: Array) -> None:
+    n = len(depth)
+    flat = depth.reshape(-1)
+    step = tap // 2 * n + tap % 2
+    for lane in range(lanes):
+        depths[lane] = flat[min(whole[DIRECT, lane] + step, n * n - 1)]
+
+
+@kernel
+def _accumulate(values: Array, lanes: int, row: Array, start: int) -> None:
+    for lane in range(lanes):
+        row[start + lane] += values[lane]
+
+
+@kernel
+def _accumulate_z(values: Array, depths: Array, lanes: int, row: Array, start: int) -> None:
+    for lane in range(lanes):
+        row[start + lane] += values[lane] * depths[lane]
+
+
+@kernel
+def _add_rounded(
+    depth: Array, terms: int, with_z: bool, lanes: int, whole: Array, weights: Array, out: Array, start: int
+) -> None:
+    """Add what lanes read of the map itself, of 8 and 16 bits."""
+    flat, n = depth.reshape(-1), len(depth)
+    for lane in range(lanes):
+        if whole[LEVEL, lane] > 0:
+            continue
+        for tap in range(4):
+            weight = weights[MAP + tap, lane]
+            z = flat[min(whole[DIRECT, lane] + tap // 2 * n + tap % 2, n * n - 1)]
             sine, cosine = sine_cosine(z)
-            turn_sine, turn_cosine = (sine + sine) * cosine, (cosine - sine) * (cosine + sine)
+            by_sine, by_cosine = turned(sine, cosine, sine, cosine)
             for k in range(terms):
-                a, b, az, bz = sine, cosine, z * sine, z * cosine
-                if mip.quantised:
-                    a, b, az, bz = eight_bits(a), eight_bits(b), half_precision(az), half_precision(bz)
-                out[k, i] += w * a
-                out[terms + k, i] += w * b
+                out[k, start + lane] += weight * eight_bits(sine)
+                out[terms + k, start + lane] += weight * eight_bits(cosine)
                 if with_z:
-                    out[2 * terms + k, i] += w * az
-                    out[3 * terms + k, i] += w * bz
-                sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
+                    out[2 * terms + k, start + lane] += weight * half_precision(z * sine)
+                    out[3 * terms + k, start + lane] += weight * half_precision(z * cosine)
+                sine, cosine = turned(sine, cosine, by_sine, by_cosine)
             if with_z:
-                out[4 * terms, i] += w * (half_precision(z) if mip.quantised else z)
-        else:
-            texel = mip.first[level] + row * side + column
-            for c in range(2 * terms):
-                out[c, i] += w * mip.basis[texel, c]
-                if with_z:
-                    out[2 * terms + c, i] += w * mip.basis_z[texel, c]
-            if with_z:
-                out[4 * terms, i] += w * mip.mean_depth[texel]
+                out[4 * terms, start + lane] += weight * half_precision(z)

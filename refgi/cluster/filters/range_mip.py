@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.filters.pyramid import level_offsets
 from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
@@ -23,28 +24,6 @@ class RangeMip(NamedTuple):
     nearest: Array  # (texels,): levels 1 and up
     farthest: Array  # (texels,)
     first: Array  # (levels,) int64: first texel of each level; of no use for level 0
-
-
-def level_offsets(size: int) -> tuple[Array, int]:
-    """Return where each level of a pyramid starts, levels 1 and up laid end to end.
-
-    Parameters
-    ----------
-    size : int
-        Texels along a side of level 0; each level has half of the one before, rounded up.
-
-    Returns
-    -------
-    first : (levels,) ndarray
-        Int64; negative for level 0, which is not among them.
-    total : int
-        Texels of levels 1 and up, 1 at least.
-    """
-    sides = [size]
-    while sides[-1] > 1:
-        sides.append((sides[-1] + 1) // 2)
-    texels = np.array([side * side for side in sides], np.int64)
-    return np.cumsum(texels) - texels - texels[0], max(int(texels[1:].sum()), 1)
 
 
 def range_mips(depth: Array) -> RangeMip:
@@ -61,7 +40,7 @@ def range_mips(depth: Array) -> RangeMip:
         Arrays with a leading axis of K.
     """
     first, total = level_offsets(depth.shape[1])
-    shape = (len(depth), total)
+    shape = (len(depth), max(total, 1))
     several = RangeMip(depth, np.empty(shape, depth.dtype), np.empty(shape, depth.dtype), first)
     _build(several)
     return several

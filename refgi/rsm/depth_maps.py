@@ -7,12 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.jit import kernel, prange
-from refgi.rsm.attributes import Planes, Wanted, resolve
-from refgi.rsm.paraboloid import Ignored, draw_paraboloids
+from refgi.rsm.chunks import Chunks, chunks
+from refgi.rsm.memory import plane
+from refgi.rsm.paraboloid import BLOCK, Ignored, draw_distances
 from refgi.rsm.projection import Projection, paraboloid_projection
-from refgi.rsm.runs import Surface
-from refgi.rsm.triangle import LANES
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
@@ -53,22 +51,21 @@ def paraboloid_depth_maps(
     expect(len(centers) == len(axes), "axes", f"{len(centers)} as many as centres", len(axes))
     expect(bool(np.isfinite(centers).all()), "centers", "finite coordinates", centers)
     expect(bool(np.isfinite(axes).all() and axes.any(axis=1).all()), "axes", "finite vectors, not zero", axes)
-    return distance_maps(paraboloid_projection(centers, axes, size), geometry.vertices, geometry.faces, dtype)[0]
+    laid = chunks(geometry.vertices, geometry.faces)
+    return distance_maps(paraboloid_projection(centers, axes, size), laid, dtype)[0]
 
 
 def distance_maps(
-    projection: Projection, vertices: Array, faces: Array, dtype: npt.DTypeLike, ignored: Ignored | None = None
-) -> tuple[Array, Array]:
+    projection: Projection, laid: Chunks, dtype: npt.DTypeLike, ignored: Ignored | None = None
+) -> tuple[Array, Array, Array]:
     """Measure the distance to the nearest of some triangles on paraboloid maps.
 
     Parameters
     ----------
     projection : Projection
         k paraboloid maps of n x n texels.
-    vertices : (v, 3) float64 ndarray
-        World space, m.
-    faces : (m, 3) int32 ndarray
-        Vertices of each triangle.
+    laid : Chunks
+        The triangles.
     dtype : dtype
         Float32 or float64.
     ignored : Ignored, optional
@@ -78,40 +75,12 @@ def distance_maps(
     -------
     distance : (k, n, n) ndarray
         Distance, m; inf where nothing is seen and outside the disc.
+    nearest : (k,) ndarray
+        Float64: smallest distance on each map, m; inf where nothing is.
     left_out : (k,) ndarray
-        Int64: triangles of each map's hemisphere that were ignored for their planes.
+        Int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in its ball.
     """
-    height, width = projection.shape
-    nearness = np.full((height, max(width, LANES)), 0.0, np.float32)
-    ids = np.full(nearness.shape, -1, np.int32)
-    left_out = np.zeros(projection.maps, np.int64)
-    if len(faces):
-        left_out = draw_paraboloids(projection, vertices, faces, numba.get_num_threads(), nearness, ids, ignored)
-    if np.dtype(dtype) == np.float64:
-        return _exact_distances(vertices, faces, projection, ids[:, :width]).reshape(-1, width, width), left_out
-    distance = np.empty((projection.maps, width, width), np.float32)
-    _distances(projection, nearness, distance)
-    return distance, left_out
-
-
-def _exact_distances(vertices: Array, faces: Array, projection: Projection, ids: Array) -> Array:
-    """Return the distance to the plane of each texel's triangle, float64."""
-    distance, none, no_vectors = np.zeros(ids.shape), np.zeros((0, 0)), np.zeros((3, 0, 0))
-    surface = Surface(vertices, faces, np.zeros((0, 3)), np.zeros(len(faces), np.int32), np.zeros((1, 3)))
-    planes = Planes(distance, none, no_vectors, no_vectors, no_vectors, np.zeros((0, 0), np.int32))
-    wanted = Wanted(True, False, False, False, False, False)
-    resolve(surface, projection, np.ascontiguousarray(ids), wanted, planes, numba.get_num_threads())
-    return distance
-
-
-@kernel(parallel=True)
-def _distances(projection: Projection, nearness: Array, distance: Array) -> None:
-    n, half = projection.width, projection.half[0]
-    step = 2.0 * half / n
-    for m in prange(len(distance)):
-        for row in range(n):
-            t = (row + 0.5) * step - half
-            for column in range(n):
-                s = (column + 0.5) * step - half
-                # nothing seen: nearness 0, distance inf
-                distance[m, row, column] = (1.0 + s * s + t * t) / nearness[m * n + row, column]
+    n, none = projection.width, np.zeros(projection.maps)
+    distance = plane((projection.maps * n, max(n, BLOCK)), dtype)
+    found = draw_distances(projection, laid, ignored or Ignored(none, none), numba.get_num_threads(), distance)
+    return np.ascontiguousarray(distance[:, :n]).reshape(-1, n, n), *found

@@ -71,7 +71,7 @@ def _hard_tiles(depth: Array, center: Array, frame: Array, points: Array, facing
 
 @kernel
 def hard_tile(
-    depth: Array, center: Array, frame: Array, points: Array, facing: Array, first: int, last: int, visible: Array
+    depth: Array, center: Array, frame: Array, points: Array, facing: Array, first: Any, last: Any, visible: Array
 ) -> None:
     """Set V of the receivers that one map hides to 0, and leave the others as they are.
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.rsm.chunks import Chunks, chunks
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
@@ -18,6 +19,7 @@ Array = npt.NDArray[Any]
 # Share of the scene's diagonal by which points may lie beyond a plane that still counts as the scene's border; below
 # what ends of rays are kept from surfaces.
 TOLERANCE = 1e-6
+FEW_PAIRS = 1 << 27  # triangles times points that are tried at once rather than from the hull: 0.1 s
 DIRECTIONS = 64  # along which extreme points are found before the hull: enough to tell most triangles from it
 
 
@@ -26,7 +28,7 @@ class Blockers(NamedTuple):
 
     vertices: Array  # (n, 3) float64, m
     faces: Array  # (m, 3) int32
-    triangle_id: Array  # (m,) int64: index in the geometry
+    laid: Chunks  # the same, as maps are drawn from
 
 
 @stage("cluster.occluders")
@@ -45,19 +47,15 @@ def occluders(geometry: Geometry) -> Array:
         an end, or within 1e-6 of the scene's diagonal of one. Triangles without area are False too.
     """
     faces = np.ascontiguousarray(geometry.faces)
-    outside = np.zeros(len(faces), np.bool_)
-    if len(faces) == 0:
-        return outside
-    tolerance = TOLERANCE * geometry.diagonal
-    vertices = np.ascontiguousarray(geometry.vertices, np.float64)
-    used = vertices[np.unique(faces)]
-    _on_border(vertices, faces, _extreme(used), tolerance, outside)
-    doubtful = np.flatnonzero(outside)
-    if len(doubtful):
-        certain = np.zeros(len(doubtful), np.bool_)
-        _on_border(vertices, np.ascontiguousarray(faces[doubtful]), _hull(used), tolerance, certain)
-        outside[doubtful] = certain
-    return np.logical_not(outside)
+    border = np.zeros(len(faces), np.bool_)
+    if len(faces):
+        tolerance = TOLERANCE * geometry.diagonal
+        vertices = np.ascontiguousarray(geometry.vertices, np.float64)
+        used = vertices[_used(len(vertices), faces)]
+        _on_border(vertices, faces, _extreme(used), tolerance, border)
+        doubtful = np.flatnonzero(border)
+        _confirm(vertices, np.ascontiguousarray(faces[doubtful]), used, tolerance, doubtful, border)
+    return np.logical_not(border)
 
 
 @stage("cluster.blockers")
@@ -77,12 +75,29 @@ def blockers(geometry: Geometry, alone: bool) -> Blockers:
         The triangles, in mesh order.
     """
     if not alone:
-        return Blockers(np.ascontiguousarray(geometry.vertices, np.float64), geometry.faces,
-                        np.arange(len(geometry.faces)))  # fmt: skip
-    triangle_id = np.flatnonzero(occluders(geometry))
-    used, place = np.unique(geometry.faces[triangle_id], return_inverse=True)
-    faces = np.ascontiguousarray(place.reshape(-1, 3), np.int32)
-    return Blockers(np.ascontiguousarray(geometry.vertices[used], np.float64), faces, triangle_id)
+        vertices = np.ascontiguousarray(geometry.vertices, np.float64)
+        return Blockers(vertices, geometry.faces, chunks(vertices, geometry.faces))
+    kept = geometry.faces[occluders(geometry)]
+    used = _used(len(geometry.vertices), kept)
+    vertices = np.ascontiguousarray(geometry.vertices[used], np.float64)
+    faces = np.ascontiguousarray((np.cumsum(used) - 1)[kept], np.int32)
+    return Blockers(vertices, faces, chunks(vertices, faces))
+
+
+def _used(count: int, faces: Array) -> Array:
+    """Tell which of `count` vertices triangles use."""
+    used = np.zeros(count, np.bool_)
+    used[faces] = True
+    return used
+
+
+def _confirm(vertices: Array, faces: Array, points: Array, tolerance: float, doubtful: Array, border: Array) -> None:
+    """Decide the triangles that extreme points alone do not tell from the border."""
+    if len(doubtful) * len(points) > FEW_PAIRS:
+        points = _hull(points)
+    certain = np.zeros(len(doubtful), np.bool_)
+    _on_border(vertices, faces, points, tolerance, certain)
+    border[doubtful] = certain
 
 
 def _extreme(points: Array) -> Array:
@@ -105,7 +120,7 @@ def _hull(points: Array) -> Array:
 
 
 @kernel(parallel=True)
-def _on_border(vertices: Array, faces: Array, points: Array, tolerance: float, outside: Array) -> None:
+def _on_border(vertices: Array, faces: Array, points: Array, tolerance: float, border: Array) -> None:
     """Tell which planes have all points on one side, up to a tolerance."""
     for face in prange(len(faces)):
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
@@ -119,4 +134,4 @@ def _on_border(vertices: Array, faces: Array, points: Array, tolerance: float, o
             height = nx * (points[p, 0] - ax) + ny * (points[p, 1] - ay) + nz * (points[p, 2] - az)
             above, below = above or height > limit, below or height < -limit
             p += 1
-        outside[face] = not (above and below)
+        border[face] = not (above and below)

@@ -75,38 +75,50 @@ def shadow_maps(
     """
     expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
     drawn, both = blockers(geometry, settings.occluders_alone), settings.behind == "dual_paraboloid"
-    lit = np.flatnonzero(areas.members > 0)
-    if len(drawn.faces) == 0:
-        skip("cluster.depth_maps", "no triangle lies between others")
-        lit = lit[:0]
-    scale = max(float(np.abs(corner).max()) for corner in geometry.bounds)
-    center = np.ascontiguousarray((areas.center + LIFT * scale * areas.normal)[:, lit].T)
-    if len(drawn.faces) < len(geometry.faces):
-        tracer = None  # it sees more than the maps do
-    depth, left_out = _draw(drawn, center, areas.frame[lit], areas.radius[lit], settings, dtype, tracer)
-    near = _nearest(depth)
+    lit = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
+    center = np.ascontiguousarray((areas.center + _lift(geometry) * areas.normal)[:, lit].T)
+    frame, radius = areas.frame[lit], areas.radius[lit]
+    rays = tracer if len(drawn.faces) == len(geometry.faces) else None
+    depth, near, left_out = _draw(drawn, center, frame, radius, settings, dtype, rays)
     behind = near_behind = None
     needed = np.isfinite(near)
     if both:
-        behind, more = _draw(drawn, center, BACKWARD @ areas.frame[lit], areas.radius[lit], settings, dtype, tracer)
-        near_behind, left_out = _nearest(behind), left_out + more
-        needed |= np.isfinite(near_behind)
-    if not needed.all():
-        skip("cluster.depth_maps", f"nothing occludes {len(needed) - needed.sum()} of {len(needed)} area lights")
+        behind, near_behind, more = _draw(drawn, center, BACKWARD @ frame, radius, settings, dtype, rays)
+        needed, left_out = needed | np.isfinite(near_behind), left_out + more
     map_of = np.full(len(areas.members), -1, np.int32)
     map_of[lit[needed]] = np.arange(needed.sum())
-    corners = np.array(np.meshgrid(*np.stack(geometry.bounds, axis=1))).reshape(3, -1).T
-    far = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
-    kept = [None if array is None else array[needed] for array in (behind, near_behind)]
-    return ShadowMaps(depth[needed], map_of, center[needed], areas.frame[lit][needed], near[needed], far[needed],
-                      *kept, int(left_out.sum()))  # fmt: skip
+    if (map_of < 0).any():
+        skip("cluster.depth_maps", f"nothing occludes {(map_of < 0).sum()} of {len(map_of)} area lights")
+    maps = ShadowMaps(depth, map_of, center, frame, near, _farthest(geometry, center), behind, near_behind,
+                      int(left_out.sum()))  # fmt: skip
+    return maps if needed.all() else _without(maps, needed)
+
+
+def _lift(geometry: Geometry) -> float:
+    """Return how far centres are moved off the surface, m."""
+    return LIFT * max(float(np.abs(corner).max()) for corner in geometry.bounds)
+
+
+def _farthest(geometry: Geometry, center: Array) -> Array:
+    """Return distances to the farthest corner of the scene's bounding box, m."""
+    low, high = geometry.bounds
+    return np.asarray(np.linalg.norm(np.maximum(np.abs(low - center), np.abs(high - center)), axis=1))
+
+
+def _without(maps: ShadowMaps, needed: Array) -> ShadowMaps:
+    """Drop the maps on which there is nothing."""
+    behind, near_behind = maps.behind, maps.near_behind
+    return maps._replace(
+        depth=maps.depth[needed], center=maps.center[needed], frame=maps.frame[needed], near=maps.near[needed],
+        far=maps.far[needed], behind=None if behind is None else behind[needed],
+        near_behind=None if near_behind is None else near_behind[needed])  # fmt: skip
 
 
 def _draw(
     drawn: Blockers, center: Array, frame: Array, radius: Array, settings: ValSettings, dtype: npt.DTypeLike,
     tracer: "Tracer | None",
-) -> tuple[Array, Array]:
-    """Return maps and how many triangles each leaves out."""
+) -> tuple[Array, Array, Array]:
+    """Return maps, the smallest distance on each, and how many triangles each leaves out."""
     projection = paraboloid_projection(center, frame[:, 2], settings.map_resolution)._replace(
         frame=np.ascontiguousarray(frame))  # fmt: skip
     none = np.zeros_like(radius)
@@ -114,8 +126,4 @@ def _draw(
     ignored = Ignored(radius if rule == "planes" else none, radius if rule == "ball" else none)
     if settings.maps == "rays":
         return traced_maps(projection, drawn, ignored, dtype, tracer)
-    return distance_maps(projection, drawn.vertices, drawn.faces, dtype, ignored)
-
-
-def _nearest(depth: Array) -> Array:
-    return depth.min(axis=(1, 2), initial=np.inf).astype(np.float64)
+    return distance_maps(projection, drawn.laid, dtype, ignored)

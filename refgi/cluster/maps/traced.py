@@ -17,7 +17,7 @@ Array = npt.NDArray[Any]
 
 def traced_maps(
     projection: Projection, drawn: Blockers, ignored: Ignored, dtype: npt.DTypeLike, tracer: "Tracer | None" = None
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Measure distances on paraboloid maps by rays.
 
     Parameters
@@ -37,21 +37,23 @@ def traced_maps(
     -------
     distance : (k, n, n) ndarray
         Distance, m; inf where nothing is seen and outside the disc.
+    nearest : (k,) ndarray
+        Float64: smallest distance on each map, m; inf where nothing is.
     left_out : (k,) ndarray
-        Int64: triangles of each map's hemisphere that were ignored for their planes.
+        Int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in its ball.
     """
     n = projection.width
     distance, left_out = np.full((projection.maps, n, n), np.inf, dtype), np.zeros(projection.maps, np.int64)
     directions, inside = _texel_directions(n)
     for m in range(projection.maps):
-        kept, left_out[m] = _kept(drawn, projection, m, ignored.planes[m])
+        kept, left_out[m] = _kept(drawn, projection, m, ignored)
         if kept.all():
             tracer = tracer or _tracer(drawn, kept)
         rays = tracer if kept.all() and tracer else _tracer(drawn, kept)
         toward, start = directions @ projection.frame[m], ignored.ball[m]
         hits = rays.closest(projection.origin[m] + start * toward, toward)
         distance[m][inside] = hits.distance + start
-    return distance, left_out
+    return distance, distance.min(axis=(1, 2), initial=np.inf).astype(np.float64), left_out
 
 
 def _texel_directions(n: int) -> tuple[Array, Array]:
@@ -63,14 +65,15 @@ def _texel_directions(n: int) -> tuple[Array, Array]:
     return local[inside], inside
 
 
-def _kept(drawn: Blockers, projection: Projection, m: int, distance: float) -> tuple[Array, int]:
-    """Tell which planes do not pass nearer the centre than `distance`; count those that do and reach ahead."""
+def _kept(drawn: Blockers, projection: Projection, m: int, ignored: Ignored) -> tuple[Array, int]:
+    """Tell which planes do not pass too near the centre; count what reaches ahead and is ignored."""
     corners = drawn.vertices[drawn.faces] - projection.origin[m]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     height = np.abs((normal * corners[:, 0]).sum(axis=1))
-    kept = height >= distance * np.linalg.norm(normal, axis=1)
+    near_plane = (height < ignored.planes[m] * np.linalg.norm(normal, axis=1)) & (height > 0.0)
+    inside = ((corners * corners).sum(axis=2) < ignored.ball[m] ** 2).all(axis=1)
     ahead = (corners @ projection.frame[m, 2] >= 0.0).any(axis=1)
-    return kept, int((ahead & ~kept & (height > 0)).sum())
+    return ~near_plane, int((ahead & (near_plane | inside)).sum())
 
 
 def _tracer(drawn: Blockers, kept: Array) -> "Tracer":

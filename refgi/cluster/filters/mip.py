@@ -27,8 +27,9 @@ Array = npt.NDArray[Any]
 
 CHUNK = 64  # receivers whose texels and weights are kept at once
 FINE, COARSE, FINE_SIDE, COARSE_SIDE, LEVEL, DIRECT = range(6)  # rows of whole numbers
-MAP = 8  # first of the 4 weights of texels of the map itself; before: 4 of the finer level, 4 of the coarser
-WHOLE, WEIGHTS, SUMS = room_of(6, CHUNK, types.int32), room_of(12, CHUNK), room_of(EIGHT, CHUNK)
+# rows of weights: 4 of the finer level, 4 of the coarser, 4 of texels of the map itself; then what they are made of
+MAP, X, Y, SHARE = 8, 12, 13, 14
+WHOLE, WEIGHTS, SUMS = room_of(6, CHUNK, types.int32), room_of(15, CHUNK), room_of(EIGHT, CHUNK)
 DEPTHS, SINES, COSINES, BY_SINES, BY_COSINES = (room_of(1, CHUNK) for _ in range(5))
 
 
@@ -54,15 +55,18 @@ def mip_means(
         Filled where wanted; what the first `count` lanes held elsewhere is lost.
     """
     whole, weights, sums = WHOLE(s), WEIGHTS(s), SUMS(s)
-    channels = 2 * mip.terms
+    n, top, channels = len(mip.depth), len(mip.first) - 1, 2 * mip.terms
     for start in range(0, count, CHUNK):
         lanes = min(CHUNK, count - start)
         place = slice(start, start + lanes)
-        _find_texels(mip.shift, len(mip.depth), len(mip.first) - 1, s[place], t[place], radius[place], wanted[place],
-                     whole, weights)
-        some, direct = _find_levels(mip.first, wanted[place], whole)
+        _find_levels(mip.shift, n, top, s[place], t[place], radius[place], wanted[place], whole, weights)
+        _find_texels(n, top, lanes, 0, whole, weights)
+        _find_texels(n, top, lanes, 1, whole, weights)
+        some, direct = _find_starts(mip.first, wanted[place], whole)
         if not some:
             continue
+        if direct:
+            _part_map(lanes, whole, weights)
         for first in range(0, channels, EIGHT):
             here = min(EIGHT, channels - first)
             _sum_up(mip.basis, first, lanes, whole, weights, sums)
@@ -79,70 +83,77 @@ def mip_means(
 
 
 @kernel
-def _find_texels(
+def _find_levels(
     shift: float, size: int, coarsest: int, s: Array, t: Array, radius: Array, wanted: Array, whole: Array,
     weights: Array,
 ) -> None:
-    """Find levels, texels within them and weights; a lane that is not wanted reads the coarsest level."""
+    """Find each lane's finer level and the coarser one's share, and its place in texels of the map.
+
+    A lane that is not wanted reads the coarsest level.
+    """
     real = s.dtype.type
-    n, top, one = np.int32(size), np.int32(coarsest), np.int32(1)
-    none, half, full = real(0.0), real(0.5), real(1.0)
+    n, top, none, half, one = real(size), real(coarsest), real(0.0), real(0.5), real(1.0)
     for lane in range(len(s)):
         used = wanted[lane] != 0
-        level = log2(max(radius[lane] * real(n), full)) + real(shift)
-        level = min(max(level, none), real(top)) if used else real(top)
-        x = (s[lane] + full) * half * real(n) if used else none
-        y = (t[lane] + full) * half * real(n) if used else none
+        level = log2(max(radius[lane] * n, one)) + real(shift)
+        level = min(max(level, none), top) if used else top
         fine = np.int32(level)
-        share = level - real(fine)
-        texel, side, a, b, c, d = _four(x, y, fine, n, full - share)
-        mapped = fine == 0
         whole[LEVEL, lane] = fine
-        whole[DIRECT, lane] = texel if mapped else np.int32(0)
-        whole[FINE, lane] = np.int32(0) if mapped else texel
-        whole[FINE_SIDE, lane] = np.int32(0) if mapped else side
-        weights[0, lane], weights[1, lane] = (none if mapped else a), (none if mapped else b)
-        weights[2, lane], weights[3, lane] = (none if mapped else c), (none if mapped else d)
-        weights[MAP, lane], weights[MAP + 1, lane] = (a if mapped else none), (b if mapped else none)
-        weights[MAP + 2, lane], weights[MAP + 3, lane] = (c if mapped else none), (d if mapped else none)
-        texel, side, a, b, c, d = _four(x, y, min(fine + one, top), n, share)
-        whole[COARSE, lane], whole[COARSE_SIDE, lane] = texel, side
-        weights[4, lane], weights[5, lane], weights[6, lane], weights[7, lane] = a, b, c, d
+        weights[SHARE, lane] = level - real(fine)
+        weights[X, lane] = (s[lane] + one) * half * n if used else none
+        weights[Y, lane] = (t[lane] + one) * half * n if used else none
 
 
 @kernel
-def _four(x: Any, y: Any, level: Any, n: Any, share: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
-    """Return the first of 2 x 2 texels of a level, the level's side, and their weights, which add up to `share`.
+def _find_texels(size: int, coarsest: int, lanes: int, which: int, whole: Array, weights: Array) -> None:
+    """Find the first of 2 x 2 texels on the finer (`which` 0) or coarser (1) level, and weights that sum to its share.
 
     Beyond the last centres the weights of what is not there are 0.
     """
-    real, one = type(x), np.int32(1)
+    real = weights.dtype.type
+    n, top, one = np.int32(size), np.int32(coarsest), np.int32(1)
     none, half, full = real(0.0), real(0.5), real(1.0)
-    side = np.int32((n + (one << level) - one) >> level)
-    shrink, last = full / real(one << level), real(side - one)
-    u, v = min(max(x * shrink - half, none), last), min(max(y * shrink - half, none), last)
-    column, row = np.int32(u), np.int32(v)
-    fx, fy = u - real(column), v - real(row)
-    above, below = share * (full - fy), share * fy
-    return np.int32(row * side + column), side, above * (full - fx), above * fx, below * (full - fx), below * fx
+    texel, sides, row_1 = whole[FINE + which], whole[FINE_SIDE + which], 4 * which
+    a, b, c, d = weights[row_1], weights[row_1 + 1], weights[row_1 + 2], weights[row_1 + 3]
+    for lane in range(lanes):
+        level = min(np.int32(whole[LEVEL, lane] + np.int32(which)), top)
+        side = np.int32((n + (one << level) - one) >> level)
+        shrink, last = full / real(np.int32(one << level)), real(np.int32(side - one))
+        u = min(max(weights[X, lane] * shrink - half, none), last)
+        v = min(max(weights[Y, lane] * shrink - half, none), last)
+        column, row = np.int32(u), np.int32(v)
+        fx, fy = u - real(column), v - real(row)
+        share = weights[SHARE, lane] if which else full - weights[SHARE, lane]
+        above, below = share * (full - fy), share * fy
+        a[lane], b[lane], c[lane], d[lane] = above * (full - fx), above * fx, below * (full - fx), below * fx
+        texel[lane], sides[lane] = np.int32(row * side + column), side
 
 
 @kernel
-def _find_levels(first: Array, wanted: Array, whole: Array) -> tuple[bool, bool]:
+def _find_starts(first: Array, wanted: Array, whole: Array) -> tuple[bool, bool]:
     """Add where levels start; return whether any lane is wanted, and whether any reads the map itself."""
     some, direct, top = False, False, len(first) - 1
     for lane in range(len(wanted)):
         level = whole[LEVEL, lane]
         some |= wanted[lane] != 0
         direct |= level == 0
-        if level > 0:
-            whole[FINE, lane] += np.int32(first[level])
-        if top > 0:
-            whole[COARSE, lane] += np.int32(first[min(level + 1, top)])
+        whole[DIRECT, lane] = whole[FINE, lane]
+        whole[FINE, lane] += np.int32(max(first[level], -whole[FINE, lane]))  # of the map itself: texel 0
+        whole[COARSE, lane] += np.int32(first[min(level + 1, top)])
     for lane in range(len(wanted), -(-len(wanted) // EIGHT) * EIGHT):  # to a multiple of 8
         for row in range(6):
             whole[row, lane] = 0
     return some, direct
+
+
+@kernel
+def _part_map(lanes: int, whole: Array, weights: Array) -> None:
+    """Move the finer weights of lanes that read the map itself."""
+    none = weights.dtype.type(0.0)
+    for k in range(4):
+        for lane in range(lanes):
+            weight, mapped = weights[k, lane], whole[LEVEL, lane] == 0
+            weights[MAP + k, lane], weights[k, lane] = (weight if mapped else none), (none if mapped else weight)
 
 
 @kernel

@@ -41,6 +41,8 @@ METHODS = {
                "refgi.splat.account.ledger:energy_ledger"),
         Method("multires", "refgi.splat.multires:multires", "MultiresSettings", False,
                "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes"),
+        Method("val", "refgi.cluster.val:val", "ValSettings", True,
+               "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights"),
         Method("gather", "refgi.splat.gathering.gather:gather", "GatherSettings", False,
                "Reflective Shadow Maps (2005): gathering around the projected point"),
         Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,

@@ -1,0 +1,149 @@
+"""Real-time Indirect Illumination with Clustered Visibility (Dong, Grosch, Ritschel, Kautz and Seidel 2009)."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy.typing as npt
+
+from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.kmeans import cluster
+from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.lighting.blur import blur
+from refgi.cluster.lighting.clustered import clustered_irradiance
+from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
+from refgi.cluster.reference import rectangle_visibility, reference_visibility
+from refgi.cluster.settings import ValSettings
+from refgi.lights.selection import choose_lights, footprints, light_footprints, light_maps
+from refgi.pairs.irradiance import Receivers
+from refgi.rsm import facing_normals
+from refgi.stages import skip
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+    from refgi.rsm import PixelLights
+
+Array = npt.NDArray[Any]
+
+PAIRS_IN_FULL = 1 << 30  # about a quarter of a second on two cores
+PUBLISHED_BLOCK = 8  # pixels
+
+
+def val(frame: "Frame", settings: ValSettings) -> Array:
+    """Light every pixel by pixel lights whose visibility is that of the area light they belong to.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen and lit.
+    settings : ValSettings
+        Which lights, how they are clustered and how an area light's visibility is found.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Indirect irradiance, W/m^2, linear RGB.
+    """
+    lights = choose_lights(frame, settings)  # Sec. 6, VPL generation
+    areas, maps = clustered(frame, lights, settings)
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    block = block_side(frame, lights, settings)
+    light = clustered_irradiance(  # Sec. 4 and 6
+        receivers, facing(frame), lights, areas, maps, settings, footprint=footprints(frame, settings),
+        given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
+        rays=rectangle_visibility(frame, areas, settings) if settings.behind == "raytrace" else None)
+    if block == 1 or settings.blur == "none":
+        skip("cluster.blur", "every pixel sums all lights" if block == 1 else "left out by the settings")
+        return light
+    return blur(light, receivers, block, settings, frame.scene.geometry.diagonal)  # Sec. 6, geometry-aware blur
+
+
+def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> tuple[AreaLights, ShadowMaps]:
+    """Group pixel lights into area lights and draw what occludes them.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene.
+    lights : PixelLights
+        The pixel lights.
+    settings : ValSettings
+        Number and kind of clusters, and of their maps.
+
+    Returns
+    -------
+    AreaLights
+        One for each cluster.
+    ShadowMaps
+        What each sees.
+    """
+    if settings.target_error is not None:
+        from refgi.cluster.adaptive import enough_area_lights
+
+        chosen = enough_area_lights(frame, lights, settings, areas_of_lights(frame, settings))
+        return chosen.areas, chosen.maps
+    skip("cluster.adaptive", "the number of area lights is given")
+    geometry = frame.scene.geometry
+    clusters = cluster(lights.position, lights.normal, settings.area_lights, distance=settings.distance,
+                       weights=(settings.position_weight, settings.normal_weight), diagonal=geometry.diagonal,
+                       rounds=settings.rounds)  # Sec. 5
+    areas = area_lights(lights, clusters, settings, areas_of_lights(frame, settings))
+    tracer = frame.tracer if settings.maps == "rays" else None
+    return areas, shadow_maps(geometry, areas, settings, frame.dtype, tracer)
+
+
+def areas_of_lights(frame: "Frame", settings: ValSettings) -> Array | None:
+    """Return the surface that each pixel light stands for, where a cluster of one light has its light's size.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, lit.
+    settings : ValSettings
+        What the lights were chosen by.
+
+    Returns
+    -------
+    (N,) ndarray or None
+        Area, m^2.
+    """
+    if settings.single_light == "point":
+        return None
+    return light_footprints(light_maps(frame, settings), settings)
+
+
+def block_side(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> int:
+    """Return the side of the blocks of pixels that share the lights out among themselves; 1: each sums all.
+
+    Parameters
+    ----------
+    frame : Frame
+        Says how many pixels there are.
+    lights : PixelLights
+        Says how many lights.
+    settings : ValSettings
+        May say the side.
+
+    Returns
+    -------
+    int
+        Pixels.
+    """
+    if settings.interleaving is not None:
+        return settings.interleaving
+    return 1 if frame.width * frame.height * lights.flux.shape[1] <= PAIRS_IN_FULL else PUBLISHED_BLOCK
+
+
+def facing(frame: "Frame") -> Array:
+    """Return the normals of the triangles that a frame's pixels see.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Unit vectors on the side of the shading normals.
+    """
+    buffer = frame.gbuffer
+    return facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)

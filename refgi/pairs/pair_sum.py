@@ -118,51 +118,44 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
         low, high = np.empty(6, position.dtype), np.empty(6, position.dtype)
         bound_tile(tile, size, low, high)
         reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
-        sum_tile(tile, low, high, lights, clamp, 0, lights.shape[1] - 1, reach, chosen)
+        black = lights.shape[1] - 1
+        for group in range(0, black, GROUP):
+            listed = lights_in_reach(lights, group, min(group + GROUP, black), low, high, reach, chosen)
+            add_listed(tile, lights, clamp, chosen, listed)
         for c in range(3):
             for i in range(size):
                 irradiance[c, first + i] = tile[TOTAL + c, i]
 
 
 @kernel
-def sum_tile(
-    tile: Array, low: Array, high: Array, lights: Array, clamp: Clamp | None, first: int, last: int, reach: Array,
-    chosen: Array,
-) -> None:
-    """Add some lights to the totals of a tile, in their order.
+def add_listed(tile: Array, lights: Array, clamp: Clamp | None, chosen: Array, listed: int) -> None:
+    """Add the listed lights of a group to the totals of a tile.
 
     Parameters
     ----------
     tile : (>= ROWS, TILE) ndarray
         Receivers; rows SUM hold 0, rows TOTAL and LOST what was added before.
-    low, high : (6,) ndarray
-        Bounds of the tile, of `bound_tile`.
     lights : (9, N) ndarray
         Packed lights; the last one is black.
     clamp : Clamp or None
         How near pairs are kept finite.
-    first, last : int
-        The lights: first to last - 1, without the black one.
-    reach : (>= GROUP,) ndarray of bool
-        Room to work in.
-    chosen : (>= GROUP + 1,) ndarray of int64
-        The same.
+    chosen : (> listed,) ndarray of int64
+        Indices of lights, rising; the entry after them is overwritten.
+    listed : int
+        How many there are.
     """
-    black = lights.shape[1] - 1
-    for group in range(first, last, GROUP):
-        listed = lights_in_reach(lights, group, min(group + GROUP, last), low, high, reach, chosen)
-        chosen[listed] = black
-        for pair in range(0, listed, 2):
-            a, b = chosen[pair], chosen[pair + 1]
-            one, two = _light(lights, a), _light(lights, b)
-            for i in range(TILE):
-                receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-                g1, g2 = _term(one, receiver, clamp, a), _term(two, receiver, clamp, b)  # Eq. (2)
-                # written out: a loop over the channels would cost the compiler its even split into lanes
-                tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
-                tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
-                tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8]
-        close_group(tile)
+    chosen[listed] = lights.shape[1] - 1
+    for pair in range(0, listed, 2):
+        a, b = chosen[pair], chosen[pair + 1]
+        one, two = _light(lights, a), _light(lights, b)
+        for i in range(TILE):
+            receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
+            g1, g2 = _term(one, receiver, clamp, a), _term(two, receiver, clamp, b)  # Eq. (2)
+            # written out: a loop over the channels would cost the compiler its even split into lanes
+            tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
+            tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
+            tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8]
+    close_group(tile)
 
 
 @kernel

@@ -14,7 +14,7 @@ from refgi.cluster.maps.hard import hard_tile
 from refgi.cluster.visibility.soft import ROOM_ROWS, Choices, soft_tile
 from refgi.jit import kernel, prange
 from refgi.pairs.culling import bound_tile, lights_in_reach
-from refgi.pairs.pair_sum import GROUP, ROWS, TILE, TOTAL, Clamp, X, load_tile, sum_tile
+from refgi.pairs.pair_sum import GROUP, ROWS, TILE, TOTAL, Clamp, X, add_listed, load_tile
 
 Array = npt.NDArray[Any]
 
@@ -69,12 +69,11 @@ def add_unshadowed(receivers: Tiles, lights: Array, clamp: Clamp | None, start: 
     """
     for task in prange(TASKS):
         real = receivers.position.dtype
-        tile, points, places = np.zeros((ROWS, TILE), real), np.empty((6, TILE), real), np.empty(TILE, np.int64)
-        visible = np.ones(TILE, real)
+        tile, visible = np.zeros((ROWS, TILE), real), np.ones(TILE, real)
+        reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
         for t in range(np.int64(task), receivers.tiles.shape[1], TASKS):
-            count = _light_tile(receivers, t, lights, clamp, start, tile, points, places)
-            if count > 0:
-                _add(tile, receivers.tiles[FIRST, t], places, count, visible, irradiance)
+            if _light_tile(receivers, t, lights, clamp, start, tile, reach, chosen):
+                _add(tile, receivers.tiles, t, visible, irradiance)
 
 
 @kernel(parallel=True)
@@ -105,20 +104,22 @@ def add_hard(
     """
     for task in prange(TASKS):
         real = receivers.position.dtype
-        tile, points, places = np.zeros((ROWS, TILE), real), np.empty((6, TILE), real), np.empty(TILE, np.int64)
-        visible = np.empty(TILE, real)
+        tile, visible, facing = np.zeros((ROWS, TILE), real), np.empty(TILE, real), np.empty((3, TILE), real)
+        reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
         for t in range(np.int64(task), receivers.tiles.shape[1], TASKS):
-            count = _light_tile(receivers, t, lights, clamp, start, tile, points, places)
-            if count > 0:
-                for i in range(count):
+            if _light_tile(receivers, t, lights, clamp, start, tile, reach, chosen):
+                first, size = receivers.tiles[FIRST, t], receivers.tiles[SIZE, t]
+                for i in range(size):
                     visible[i] = 1
-                hard_tile(depth, center, frame, points[:3], points[3:], 0, count, visible)
-                _add(tile, receivers.tiles[FIRST, t], places, count, visible, irradiance)
+                    for c in range(3):
+                        facing[c, i] = receivers.facing[c, first + i]
+                hard_tile(depth, center, frame, tile, facing, 0, size, visible)
+                _add(tile, receivers.tiles, t, visible, irradiance)
 
 
 @kernel(parallel=True)
 def add_soft(
-    receivers: Tiles, lights: Array, clamp: Clamp | None, start: Array, numbers: Array, chosen: Choices,
+    receivers: Tiles, lights: Array, clamp: Clamp | None, start: Array, numbers: Array, sizes: Choices,
     weight: Array, filters: Any, irradiance: Array,
 ) -> None:
     """Add the diffuse lights of one area light under its soft shadow (`visibility.soft`).
@@ -135,7 +136,7 @@ def add_soft(
         The same.
     numbers : (NUMBERS,) ndarray
         The area light, of `numbers_of`.
-    chosen : Choices
+    sizes : Choices
         How filters are sized.
     weight : (M,) ndarray
         Of the series' terms.
@@ -146,53 +147,79 @@ def add_soft(
     """
     for task in prange(TASKS):
         real = receivers.position.dtype
-        tile, points, places = np.zeros((ROWS, TILE), real), np.empty((6, TILE), real), np.empty(TILE, np.int64)
-        wanted, todo, visible = np.ones(TILE, np.bool_), np.empty(TILE, np.bool_), np.empty(TILE, real)
-        room, means = np.empty((ROOM_ROWS, TILE), real), np.empty((4 * len(weight) + 1, TILE), real)
+        tile, visible, room = np.zeros((ROWS, TILE), real), np.empty(TILE, real), np.empty((ROOM_ROWS, TILE), real)
+        reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
+        lit, all_lit, todo = np.empty(TILE, np.bool_), np.ones(TILE, np.bool_), np.empty(TILE, np.bool_)
+        points, places, some = np.empty((3, TILE), real), np.empty(TILE, np.int64), np.empty(TILE, real)
+        means = np.empty((4 * len(weight) + 1, TILE), real)
         for t in range(np.int64(task), receivers.tiles.shape[1], TASKS):
-            count = _light_tile(receivers, t, lights, clamp, start, tile, points, places)
-            if count > 0:
-                soft_tile(numbers, chosen, weight, filters, points, count, wanted, todo, visible, room, means)
-                _add(tile, receivers.tiles[FIRST, t], places, count, visible, irradiance)
+            if not _light_tile(receivers, t, lights, clamp, start, tile, reach, chosen):
+                continue
+            size = receivers.tiles[SIZE, t]
+            count = _lit(tile, size, lit, places)
+            if 4 * count >= 3 * size:
+                soft_tile(numbers, sizes, weight, filters, tile, size, lit, todo, visible, room, means)
+            elif count > 0:
+                _gather(tile, places, count, points)
+                soft_tile(numbers, sizes, weight, filters, points, count, all_lit, todo, some, room, means)
+                _scatter(some, places, count, visible)
+            _add(tile, receivers.tiles, t, visible, irradiance)
 
 
 @kernel
 def _light_tile(
-    receivers: Tiles, t: int, lights: Array, clamp: Clamp | None, start: Array, tile: Array, points: Array,
-    places: Array,
-) -> int:
-    """Sum the light on a tile into its rows TOTAL, and move the receivers that have any together.
+    receivers: Tiles, t: int, lights: Array, clamp: Clamp | None, start: Array, tile: Array, reach: Array,
+    chosen: Array,
+) -> bool:
+    """Sum the light on a tile into its rows TOTAL; return False, and do nothing, where no light can reach it."""
+    low, high, subset = receivers.low[t], receivers.high[t], receivers.tiles[SUBSET, t]
+    last, loaded = start[subset + 1], False
+    for group in range(start[subset], last, GROUP):
+        listed = lights_in_reach(lights, group, min(group + GROUP, last), low, high, reach, chosen)
+        if listed > 0:
+            if not loaded:
+                load_tile(tile, receivers.position, receivers.normal, receivers.tiles[FIRST, t],
+                          receivers.tiles[SIZE, t])
+                for row in range(TOTAL, ROWS):
+                    for i in range(TILE):
+                        tile[row, i] = 0
+                loaded = True
+            add_listed(tile, lights, clamp, chosen, listed)
+    return loaded
 
-    Return how many there are; `points` receives their positions and the normals of their triangles, `places` their
-    lanes.
-    """
-    first, size, subset = receivers.tiles[FIRST, t], receivers.tiles[SIZE, t], receivers.tiles[SUBSET, t]
-    low, high = receivers.low[t], receivers.high[t]
-    reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
-    found = 0
-    for group in range(start[subset], start[subset + 1], GROUP):
-        found += lights_in_reach(lights, group, min(group + GROUP, start[subset + 1]), low, high, reach, chosen)
-    if found == 0:
-        return 0
-    load_tile(tile, receivers.position, receivers.normal, first, size)
-    for row in range(TOTAL, ROWS):
-        for i in range(TILE):
-            tile[row, i] = 0
-    sum_tile(tile, low, high, lights, clamp, start[subset], start[subset + 1], reach, chosen)
+
+@kernel
+def _lit(tile: Array, size: int, lit: Array, places: Array) -> int:
+    """List the receivers that have any light, and count them."""
+    zero = tile.dtype.type(0.0)
+    for i in range(TILE):
+        lit[i] = (tile[TOTAL, i] > zero) | (tile[TOTAL + 1, i] > zero) | (tile[TOTAL + 2, i] > zero)
     count = 0
     for i in range(size):
         places[count] = i
-        count += (tile[TOTAL, i] != 0) | (tile[TOTAL + 1, i] != 0) | (tile[TOTAL + 2, i] != 0)
-    for c in range(3):
-        for j in range(count):
-            points[c, j] = tile[X + c, places[j]]
-            points[3 + c, j] = receivers.facing[c, first + places[j]]
+        count += lit[i]
     return count
 
 
 @kernel
-def _add(tile: Array, first: int, places: Array, count: int, visible: Array, irradiance: Array) -> None:
-    """E += V_m E_m."""
+def _gather(tile: Array, places: Array, count: int, points: Array) -> None:
     for c in range(3):
         for j in range(count):
-            irradiance[c, first + places[j]] += visible[j] * tile[TOTAL + c, places[j]]
+            points[c, j] = tile[X + c, places[j]]
+
+
+@kernel
+def _scatter(some: Array, places: Array, count: int, visible: Array) -> None:
+    for i in range(TILE):
+        visible[i] = 0
+    for j in range(count):
+        visible[places[j]] = some[j]
+
+
+@kernel
+def _add(tile: Array, tiles: Array, t: int, visible: Array, irradiance: Array) -> None:
+    """E += V_m E_m."""
+    first, size = tiles[FIRST, t], tiles[SIZE, t]
+    for c in range(3):
+        for i in range(size):
+            irradiance[c, first + i] += visible[i] * tile[TOTAL + c, i]

@@ -34,7 +34,7 @@ NOTHING = 0.02  # of the search disc blocked: less is the series' ripple, not a 
 X, Y, Z, D, EXTENT = 0, 1, 2, 3, 4  # receiver in the map's frame, its distance, the light's size towards it; m
 S, T, RADIUS = 5, 6, 7  # where it looks, in [-1, 1] units
 SINE, COSINE, STEP_SINE, STEP_COSINE = 8, 9, 10, 11  # of c_k d' for the current k, of 2 pi d'
-SHADE, DEPTH = 12, 13  # sums over k
+SHADE, DEPTH = 12, 13  # sums over k; the latter becomes z_avg, m
 ROOM_ROWS = 14
 # places in the numbers of an area light
 CENTER, FRAME, DELTA, NEAREST, SCALE, SEARCH_BIAS, BIAS, GAIN = 0, 3, 12, 13, 14, 15, 16, 17
@@ -178,7 +178,7 @@ def find_penumbra(
     todo : (>= size,) ndarray of bool
         Which of them; those without a blocker are taken out.
     room : (ROOM_ROWS, >= size) ndarray
-        Filled in rows S to RADIUS.
+        Filled in rows S to RADIUS and DEPTH, the latter with z_avg, m: d where there is no blocker.
 
     Returns
     -------
@@ -210,6 +210,7 @@ def find_penumbra(
         d = room[D, i]
         depth = (half * means[4 * terms, i] - room[DEPTH, i]) / (blocked * scale) if found else d
         depth = min(max(depth, near), d) if found else d
+        room[DEPTH, i] = depth
         extent = room[EXTENT, i]
         # Sec. 4.2: alpha = arctan(p cos(beta) / d)
         tangent = published_tangent(extent, d, depth) if choices.alpha else cone_tangent(extent, d, depth)

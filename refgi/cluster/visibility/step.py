@@ -17,7 +17,7 @@ import numpy.typing as npt
 from refgi.cluster.maps.hard import SLACK
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.kernel_size import cone_tangent, disc, published_square, published_tangent
-from refgi.cluster.visibility.soft import EXTENT, FRAME, NEAREST, RADIUS, Choices, D, S, T, X, Y, Z
+from refgi.cluster.visibility.soft import DEPTH, EXTENT, FRAME, NEAREST, RADIUS, Choices, D, S, T, X, Y, Z
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
@@ -75,7 +75,7 @@ def step_lanes(
     visible : (>= size,) ndarray
         Filled where `todo`: V = 1 - share of the penumbra's disc that is blocked.
     room : (ROOM_ROWS, >= size) ndarray
-        Receivers and search discs; S to RADIUS become those of the penumbra.
+        Receivers and search discs; S to RADIUS become those of the penumbra, DEPTH z_avg, m.
     """
     real = room.dtype.type
     one, near = real(1.0), numbers[NEAREST]
@@ -89,6 +89,7 @@ def step_lanes(
         if blocked == 0:
             continue
         mean = min(max(total / real(blocked), near), d)
+        room[DEPTH, i] = mean
         tangent = published_tangent(extent, d, mean) if choices.alpha else cone_tangent(extent, d, mean)
         where = published_square(x, y, z, d, tangent) if choices.alpha_over_pi else disc(x, y, z, d, tangent)
         room[S, i], room[T, i], room[RADIUS, i] = where
@@ -185,9 +186,13 @@ def _scan(
             z = depth[row, column]
             scale = one / (one + inside)
             w = (two * s * scale, two * t * scale, (one - inside) * scale)
-            if hides(z, w, rule, receiver, normal) and not (search and rule.cone and outside(z, w, receiver, extent)):
-                blocked += 1
-                total += z
+            width = step * scale  # half of what the texel is wide, as an angle
+            if not hides(z, w, rule, receiver, normal) or (
+                search and rule.cone and outside(z, w, width, receiver, extent)
+            ):
+                continue
+            blocked += 1
+            total += z
     return count, blocked, total
 
 
@@ -237,15 +242,17 @@ def hides(z: Any, w: Any, rule: Rules, receiver: Any, normal: Any) -> Any:
 
 
 @kernel
-def outside(z: Any, w: Any, receiver: Any, extent: Any) -> Any:
-    """Tell whether a point lies outside the cone from the receiver to the light.
+def outside(z: Any, w: Any, width: Any, receiver: Any, extent: Any) -> Any:
+    """Tell whether all that a texel stands for lies outside the cone from the receiver to the light.
 
     Parameters
     ----------
     z : float
-        Its distance, m.
+        Its depth, m.
     w : tuple of 3 floats
         Its direction, in the map's frame.
+    width : float
+        Half of its width, as an angle.
     receiver : tuple of 4 floats
         In the map's frame, and its distance, m.
     extent : float
@@ -254,10 +261,11 @@ def outside(z: Any, w: Any, receiver: Any, extent: Any) -> Any:
     Returns
     -------
     bool
-        Whether its offset from the axis exceeds (Delta / 2)(1 - s / d).
+        Whether it lies beyond the receiver, or its offset from the axis exceeds (Delta / 2)(1 - s / d) by more than
+        half its diagonal: near the receiver the cone is narrower than a texel, and would miss what touches it.
     """
     x, y, depth, d = receiver
-    along = x * w[0] + y * w[1] + depth * w[2]
+    along = (x * w[0] + y * w[1] + depth * w[2]) * z / d
     a, b, c = y * w[2] - depth * w[1], depth * w[0] - x * w[2], x * w[1] - y * w[0]
-    offset = math.sqrt(a * a + b * b + c * c)
-    return z * offset > extent * type(d)(0.5) * (d - z * along / d)
+    offset = math.sqrt(a * a + b * b + c * c) / d - type(d)(math.sqrt(2.0)) * width
+    return along >= d or z * offset > extent * type(d)(0.5) * (type(d)(1.0) - along / d)

@@ -1,0 +1,117 @@
+"""The depth comparison as a series: its shape, its bias and what becomes of it (VAL-12, VAL-18)."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.series import above_half, first_lit, plateau, series, weights
+from tests.naive import soft_shadow as naive
+
+EXACT = 1e-13  # sums of up to 64 sines in another order
+PRINTED = 5.1e-5  # half of the last digit of the known crossings, and rounding
+DIGITS = 5e-4  # half of the last digit of the known plateaus
+LEAST = 0.84  # of the way to the top: the undershoot of two terms, the deepest, is 0.849
+
+
+@pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("terms", [1, 4, 16, 64])
+def test_series_is_the_sum_of_sines(terms):
+    differences = np.linspace(-1.2, 1.2, 49)
+    for attenuation in (0.0, 1.0):
+        expected = [naive.step_series(0.0, u, terms, attenuation) - 0.5 for u in differences]
+        assert np.abs(above_half(differences, weights(terms, attenuation)) - expected).max() < EXACT
+
+
+@pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("terms", [1, 2, 4, 8, 64])
+def test_slope_is_twice_the_number_of_terms(terms, evidence):
+    h = 1e-6
+    slope = float(above_half(h, weights(terms)) - above_half(-h, weights(terms))) / (2 * h)
+    assert slope == pytest.approx(2 * terms, rel=1e-7)
+    if terms == 4:
+        evidence(f"slope at 0 for M = 4: {slope:.6f}")
+
+
+@pytest.mark.feature("VAL-12")
+def test_overshoot_of_the_plain_series(evidence):
+    overshoot = float(above_half(np.linspace(0, 1, 4001), weights(4)).max()) - 0.5
+    assert overshoot == pytest.approx(0.092, abs=DIGITS)  # E-VAL-03: 9.2 % for M = 4
+    gibbs = float(above_half(np.linspace(0, 0.02, 4001), weights(64)).max()) - 0.5
+    assert gibbs == pytest.approx(0.0895, abs=DIGITS)  # Gibbs: Si(pi)/pi - 1/2 = 0.08949
+    evidence(f"overshoot {overshoot:.4f} (M = 4), {gibbs:.4f} (M = 64)")
+
+
+@pytest.mark.feature("VAL-12")
+def test_bias_is_the_first_crossing_of_one(evidence):
+    found = {terms: first_lit(weights(terms)) for terms in (4, 8, 16)}
+    for terms, known in ((4, 0.0763), (8, 0.0383), (16, 0.0192)):
+        assert found[terms] == pytest.approx(known, abs=PRINTED)
+        assert found[terms] == pytest.approx(naive.first_one(terms), abs=1e-12)
+        assert series(ValSettings(terms=terms)).bias == found[terms]
+    evidence("b* = " + ", ".join(f"{b:.4f} (M = {m})" for m, b in found.items()))
+
+
+@pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("terms", [1, 2, 3, 4, 7, 16, 64])
+@pytest.mark.parametrize("attenuation", [0.0, 0.5, 1.0, 2.0, 100.0])
+@pytest.mark.parametrize("rescale", ["none", "plateau"])
+def test_no_difference_of_depths_wraps_around(terms, attenuation, rescale):
+    chain = series(ValSettings(terms=terms, attenuation=attenuation, rescale=rescale))
+    assert chain.range == pytest.approx(1 - 2 * chain.first) and 0.17 < chain.range < 1
+    lit = np.linspace(chain.first, 1 - chain.first, 101)
+    top = float(above_half(lit, chain.weight)[0])
+    assert (above_half(lit, chain.weight) > LEAST * top).all()  # farther than b* is lit, as far as the range goes
+    assert (above_half(-lit, chain.weight) < -LEAST * top).all()
+
+
+def test_depths_that_wrap_around_without_a_narrower_range():
+    w = weights(4)
+    assert float(above_half(1.0, w)) == pytest.approx(0.0, abs=1e-12)  # E-VAL-05: 1/2 again
+    assert np.allclose(above_half(1 - np.linspace(0, 1, 33), w), above_half(np.linspace(0, 1, 33), w), atol=1e-14)
+    assert series(ValSettings()).range == pytest.approx(0.847, abs=DIGITS)
+
+
+@pytest.mark.feature("VAL-18")
+def test_attenuation_lowers_the_plateau(evidence):
+    for attenuation, low, high in ((1.0, 0.965, 0.993), (2.0, 0.941, 0.966)):
+        w = weights(4, attenuation)
+        values = 0.5 + above_half(np.linspace(0.2, 0.5, 20001), w)
+        assert (values.min(), values.max()) == pytest.approx((low, high), abs=DIGITS)
+        assert values.min() < 0.5 + plateau(w) < values.max()
+        evidence(f"A = {attenuation:.0f}: {values.min():.4f} .. {values.max():.4f}")
+
+
+@pytest.mark.feature("VAL-18")
+def test_plateau_is_stretched_to_one():
+    for attenuation in (1.0, 2.0, 5.0):
+        chain = series(ValSettings(attenuation=attenuation, rescale="plateau"))
+        lit = above_half(np.linspace(chain.first, 1 - chain.first, 2001), chain.weight)
+        assert 0.47 < lit.mean() < 0.51
+        assert np.array_equal(chain.weight, weights(4, attenuation) / (2 * plateau(weights(4, attenuation))))
+    assert np.array_equal(series(ValSettings(rescale="plateau")).weight, weights(4))  # nothing to stretch
+
+
+@pytest.mark.feature("VAL-18")
+def test_doubled_series_needs_no_bias(evidence):
+    chain = series(ValSettings(rescale="scale2"))
+    assert (chain.bias, chain.gain) == (0.0, 2.0) and chain.search_bias == chain.first
+    seen = {gap: float(np.clip(2 * (0.5 + above_half(-gap, chain.weight)), 0, 1)) for gap in (0.0, 0.01, 0.05, 0.1)}
+    for gap, known in ((0.0, 1.0), (0.01, 0.84), (0.05, 0.27), (0.1, 0.0)):  # E-VAL-03
+        assert seen[gap] == pytest.approx(known, abs=5e-3)
+    evidence("clamp(2 f): " + ", ".join(f"{v:.3f} at a gap of {gap}" for gap, v in seen.items()))
+
+
+def test_series_gap_of_twice_the_bias_is_needed_for_full_shadow():
+    w, b = weights(4), first_lit(weights(4))
+    assert float(above_half(-b + b, w)) == 0.0  # a blocker at a gap of b* halves the light
+    assert float(above_half(-2 * b + b, w)) == pytest.approx(-0.5, abs=EXACT)
+
+
+def test_bias_of_the_settings_counts():
+    chain = series(ValSettings(bias=0.2))
+    assert chain.bias == chain.search_bias == 0.2
+    assert chain.range == pytest.approx(1 - chain.first - 0.2)
+    assert series(ValSettings(bias=0.0)).range == series(ValSettings()).range
+    assert math.isclose(series(ValSettings(bias=0.0)).first, series(ValSettings()).first)

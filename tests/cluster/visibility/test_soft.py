@@ -1,0 +1,228 @@
+"""Soft shadows by filtered series: the chain against its literal twin, its limits and its failures."""
+
+import numpy as np
+import pytest
+
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.series import above_half, first_lit, frequencies, weights
+from refgi.cluster.visibility.soft import (
+    BIAS,
+    DEPTH,
+    GAIN,
+    NEAREST,
+    SCALE,
+    SEARCH_BIAS,
+    Choices,
+    D,
+    Z,
+    compare,
+    find_penumbra,
+)
+from refgi.cluster.visibility.visible import visibility
+from tests.cluster.visibility.plates import lit_by, map_of_plates, on_plane, rooms, square_share
+from tests.naive import soft_shadow as naive
+
+ROUNDING = 1e-10  # float64 sums over discs of some hundred texels, in another order
+PLATES = [(-0.6, -0.1, -0.3, 0.3, 1.0), (0.1, 0.6, -0.3, 0.3, 1.0)]
+FAR = 6.4
+AS_WRITTEN = Choices(False, False, False, False)
+
+
+def rmse(a, b):
+    return float(np.sqrt(((a - b) ** 2).mean()))
+
+
+def shadow(areas, maps, points, normals, **settings):
+    return visibility(maps, areas, 0, points, normals, ValSettings(**settings))
+
+
+@pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("terms", [1, 4, 9])
+def test_chain_is_its_literal_twin(terms):
+    depth = map_of_plates(24, PLATES, 3.0)
+    points, normals = on_plane(3.0, 2.2, 7)
+    for delta in (0.2, 1.0):
+        areas, maps = lit_by(depth, delta, FAR)
+        got = shadow(areas, maps, points, normals, prefilter="brute", terms=terms)
+        expected = [naive.series_shadow(depth.tolist(), p, delta, FAR, terms)[0] for p in points.T]
+        assert np.abs(got - expected).max() < ROUNDING
+    got = shadow(areas, maps, points, normals, prefilter="brute", terms=terms, bias=0.2)
+    expected = [naive.series_shadow(depth.tolist(), p, 1.0, FAR, terms, 0.2)[0] for p in points.T]
+    assert np.abs(got - expected).max() < ROUNDING
+
+
+def mixture(terms, *parts):
+    """Means over a filter that holds shares of depths."""
+    c = frequencies(terms)
+    return sum(share * np.concatenate([np.sin(c * z), np.cos(c * z), z * np.sin(c * z), z * np.cos(c * z), [z]])
+               for share, z in parts)[:, None]
+
+
+def mean_depth(bias, d=0.7, parts=((0.1, 0.3), (0.9, 0.7))):
+    """z_avg of the search kernel of E-VAL-04; the receiver's own distance is d."""
+    numbers, room, means, todo, _ = rooms(1, 4)
+    numbers[[NEAREST, SCALE, SEARCH_BIAS]] = 1e-9, 1.0, bias
+    room[D], room[Z], means[:] = d, d, mixture(4, *parts)
+    count = find_penumbra(numbers, AS_WRITTEN, weights(4), means, 1, todo, room)
+    return float(room[DEPTH, 0]), count
+
+
+@pytest.mark.feature("VAL-13")
+def test_mean_depth_of_blockers_before_a_receiver(evidence):
+    b = first_lit(weights(4))
+    plain, rounded, right = mean_depth(0.0)[0], mean_depth(0.075)[0], mean_depth(b)[0]
+    assert plain == pytest.approx(0.625, abs=5e-4)  # the receiver counts as half a blocker
+    assert rounded == pytest.approx(0.318, abs=5e-4)  # with b* rounded to 0.3 / M
+    assert right == pytest.approx(0.3, abs=1e-12)  # at b* itself the receiver does not count at all
+    means = mixture(4, (0.1, 0.3), (0.9, 0.7))[:, 0]
+    c, d = frequencies(4), 0.7 - 0.125
+    w, cosine, sine = weights(4), np.cos(c * d), np.sin(c * d)
+    blocked = 0.5 - w @ (cosine * means[:4] - sine * means[4:8])
+    wild = (0.5 * means[16] - w @ (cosine * means[8:12] - sine * means[12:16])) / blocked
+    assert wild == pytest.approx(-2.3, abs=0.05)
+    assert mean_depth(0.125) == (0.7, 0)  # so little blocked that nothing is
+    evidence(f"z_avg {plain:.3f} (b = 0), {rounded:.3f} (b = 0.075), {right:.3f} (b*), {wild:.2f} (b = 0.125, refused); truth 0.3")
+
+
+@pytest.mark.feature("VAL-13")
+def test_mean_depth_stays_between_the_nearest_and_the_receiver():
+    for bias in (0.0, 0.05, 0.0763, 0.2):
+        for share in (0.0, 0.03, 0.1, 0.5, 1.0):
+            for blocker in (0.05, 0.3, 0.69):
+                depth, count = mean_depth(bias, parts=((share, blocker), (1 - share, 0.7)))
+                assert 1e-9 <= depth <= 0.7 and (count == 1 or depth == 0.7)
+
+
+@pytest.mark.feature("VAL-18")
+@pytest.mark.parametrize("rescale", ["none", "scale2", "plateau"])
+def test_comparison_is_the_series(rescale):
+    settings = ValSettings(attenuation=1.0, rescale=rescale)
+    from refgi.cluster.visibility.series import series
+
+    chain = series(settings)
+    for blocker in (0.1, 0.45, 0.5, 0.55, 0.7):
+        numbers, room, means, todo, visible = rooms(1, 4)
+        numbers[[SCALE, BIAS, GAIN]] = 1.0, chain.bias, chain.gain
+        room[D], means[:] = 0.6, mixture(4, (1.0, blocker))
+        compare(numbers, chain.weight, means, 1, todo, visible, room)
+        value = chain.gain * (0.5 + above_half(blocker - 0.6 + chain.bias, chain.weight))
+        assert visible[0] == pytest.approx(np.clip(value, 0, 1), abs=1e-13)
+
+
+@pytest.mark.feature("VAL-12")
+def test_more_terms_tend_to_comparing_every_texel(evidence):
+    depth = map_of_plates(48, PLATES)  # no plane: nothing shadows itself
+    points, normals = on_plane(3.0, 1.8, 12)
+    areas, maps = lit_by(depth, 0.5, FAR)
+    every = shadow(areas, maps, points, normals, visibility="step", receiver_plane=False, cone=False)
+    off = [rmse(shadow(areas, maps, points, normals, prefilter="brute", terms=m), every) for m in (1, 2, 4, 8, 16, 64)]
+    assert off[0] > off[1] > off[2] > off[4] > off[5] and off[5] < 0.01
+    evidence("RMSE to PCF for M = 1, 2, 4, 8, 16, 64: " + ", ".join(f"{e:.4f}" for e in off))
+
+
+@pytest.mark.feature("VAL-20")
+def test_light_leaks_at_contacts(evidence):
+    """A plate just above the plane: its shadow's middle gets no light at all."""
+    seen = {}
+    for gap in (0.05, 0.2, 0.5, 1.0):
+        plates = [(-1.5, 1.5, -1.5, 1.5, 3.0 - gap)]
+        areas, maps = lit_by(map_of_plates(64, plates, 3.0), 0.3, FAR)
+        points, normals = on_plane(3.0, 1e-3, 2)
+        seen[gap] = [float(shadow(areas, maps, points, normals, **kw)[0])
+                     for kw in ({"prefilter": "brute"}, {"prefilter": "brute", "terms": 16}, {"visibility": "step"})]
+    assert seen[0.05][0] > 0.9 and seen[0.2][0] > 0.6 and seen[1.0][0] < 0.1  # b* is 0.58 m here
+    assert all(values[0] >= values[1] >= values[2] for values in seen.values())
+    assert all(values[2] == 0 for values in seen.values())  # the step leaks nothing
+    evidence("V below a plate (truth 0), M = 4 / 16 / step: " + ", ".join(
+        f"{v[0]:.2f} / {v[1]:.2f} / {v[2]:.2f} at {gap} m" for gap, v in seen.items()))
+
+
+@pytest.mark.feature("VAL-20")
+def test_huge_senders_ring(evidence):
+    """A lone plane is lit everywhere; the larger the light, the wider the search meets nearer parts of the plane."""
+    points, normals = on_plane(3.0, 3.0, 9)
+    depth = map_of_plates(64, [(4.0, 4.2, -0.1, 0.1, 0.4)], 3.0)  # something near, aside, that shadows nothing here
+    least = {}
+    for delta in (0.2, 1.0, 4.0):
+        areas, maps = lit_by(depth, delta, FAR)
+        least[delta] = float(shadow(areas, maps, points, normals, prefilter="brute").min())
+    assert least[0.2] > 0.97 and least[4.0] < 0.8
+    evidence("least V of a lit plane, M = 4: " + ", ".join(f"{v:.3f} for Delta {d}" for d, v in least.items()))
+
+
+@pytest.mark.feature("VAL-20")
+def test_penumbrae_of_straight_edges_are_curved(evidence):
+    """The line V = 1/2 of a half plane's edge, under a large sender: straight in truth."""
+    plates = [(-9.0, 9.0, 0.5, 9.0, 1.0)]
+    areas, maps = lit_by(map_of_plates(96, plates, 3.0), 1.5, 9.0)
+    x, y = np.meshgrid(np.linspace(0, 4, 5), np.linspace(0, 4, 81))
+    points = np.stack([x.ravel(), y.ravel(), np.full(x.size, 3.0)])
+    normals = np.tile([[0.0], [0.0], [-1.0]], (1, x.size))
+
+    def half_line(v):
+        v = v.reshape(x.shape)
+        return np.array([y[np.argmax(v[:, k] < 0.5), k] for k in range(v.shape[1])])
+
+    truth = half_line(square_share(points, 1.5, plates, 32))
+    found = half_line(shadow(areas, maps, points, normals, prefilter="brute"))
+    assert np.ptp(truth) <= 0.051 and np.ptp(found) > 0.2  # a step of the grid; many
+    evidence(f"V = 1/2 along a straight edge moves by {np.ptp(found):.2f} m over 4 m (truth {np.ptp(truth):.2f})")
+
+
+@pytest.mark.feature("VAL-20")
+def test_mip_levels_show_as_steps(evidence):
+    """The same shadow on a map turned by half a texel of a coarse level: a mip map answers differently."""
+    off = {}
+    points, normals = on_plane(3.0, 1.5, 15)
+    for name in ("mip", "sat"):
+        seen = []
+        for shift in (0.0, 0.125):  # 8 texels of 128: the grid of coarse levels moves against the plates
+            plates = [(a + shift, b + shift, *rest) for a, b, *rest in PLATES]
+            areas, maps = lit_by(map_of_plates(128, plates, 3.0, dtype=np.float32), 1.0, FAR)
+            moved = points + np.array([[3 * shift], [0.0], [0.0]])
+            truth = square_share(moved, 1.0, plates, 16)
+            seen.append(shadow(areas, maps, moved, normals, prefilter=name) - truth)
+        off[name] = rmse(*seen)
+    assert off["mip"] > 1.5 * off["sat"]
+    evidence(f"change of the error as the plates move against the map: mip {off['mip']:.4f}, SAT {off['sat']:.4f}")
+
+
+@pytest.mark.parametrize(("dtype", "prefilter"), [(np.float32, "mip"), (np.float64, "brute"), (np.float32, "sat")])
+@pytest.mark.parametrize("terms", [1, 4, 64])
+def test_any_receiver_sees_a_share(dtype, prefilter, terms):
+    rng = np.random.default_rng(5)
+    extreme = np.array([[0, 0, 0], [0, 0, 1e-20], [1, 0, 0], [1, 1, -1e-9], [0, 0, -2], [0, 0, 100], [4, 5, 1e-12],
+                        [1e-8, 0, 1e-8], [0, 0, 3], [3, 0, 1e-6]]).T
+    points = np.concatenate([extreme, rng.uniform(-3, 3, (3, 30))], axis=1).astype(dtype)
+    normals = rng.normal(size=points.shape).astype(dtype)
+    for plates, plane in ((PLATES, 3.0), ([], None), ([(-50, 50, -50, 50, 1e-3)], None), ([], 3.0)):
+        depth = map_of_plates(17, plates, plane, dtype=dtype)
+        for delta in (1e-9, 0.5, 1e6):
+            areas, maps = lit_by(depth, delta, FAR)
+            for extra in ({}, {"attenuation": 100.0, "rescale": "plateau"}, {"rescale": "scale2", "foreshortened": True},
+                          {"bias": 0.25, "as_published": frozenset({"val_alpha", "val_alpha_over_pi"})},
+                          {"bias": 0.0, "as_published": frozenset({"val_search_solid_angle"})}):
+                got = shadow(areas, maps, points, normals, prefilter=prefilter, terms=terms, **extra)
+                assert got.dtype == dtype and np.isfinite(got).all() and (got >= 0).all() and (got <= 1).all()
+                assert (got[points[2] <= 0] == 1).all()
+
+
+def test_each_receiver_is_on_its_own():
+    areas, maps = lit_by(map_of_plates(32, PLATES, 3.0, dtype=np.float32), 0.7, FAR)
+    points, normals = on_plane(3.0, 2.0, 23)
+    points, normals = points.astype(np.float32), normals.astype(np.float32)
+    whole = shadow(areas, maps, points, normals)
+    order = np.random.default_rng(1).permutation(points.shape[1])[:300]
+    assert np.array_equal(shadow(areas, maps, points[:, order], normals[:, order]), whole[order])
+    assert len(shadow(areas, maps, points[:, :0], normals[:, :0])) == 0
+    assert shadow(areas, maps, points[:, 7:8], normals[:, 7:8])[0] == whole[7]
+
+
+def test_a_smaller_light_seen_aslant_has_a_narrower_penumbra():
+    plates = [(1.0, 9.0, -9.0, 9.0, 1.0)]
+    areas, maps = lit_by(map_of_plates(64, plates, 3.0), 1.0, 9.0)
+    x = np.linspace(1.5, 5.0, 40)
+    points, normals = np.stack([x, 0 * x, 0 * x + 3]), np.tile([[0.0], [0.0], [-1.0]], (1, 40))
+    width = [int(((v > 0.1) & (v < 0.9)).sum()) for v in (
+        shadow(areas, maps, points, normals, visibility="step", foreshortened=f) for f in (False, True))]
+    assert 0 < width[1] < width[0]

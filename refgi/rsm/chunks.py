@@ -18,7 +18,6 @@ class Chunks(NamedTuple):
 
     corners: Array  # (c, 9, CHUNK) float64, m: x, y, z of the first corner, of the second, of the third
     box: Array  # (c, 6) float64, m: least x, y, z, then greatest
-    count: int  # triangles
 
 
 def chunks(vertices: Array, faces: Array) -> Chunks:
@@ -37,7 +36,7 @@ def chunks(vertices: Array, faces: Array) -> Chunks:
         A copy of their corners.
     """
     number = (len(faces) + CHUNK - 1) // CHUNK
-    laid = Chunks(plane((number, 9, CHUNK), np.float64), np.empty((number, 6)), len(faces))
+    laid = Chunks(plane((number, 9, CHUNK), np.float64), np.empty((number, 6)))
     _lay_out(vertices, faces, laid.corners, laid.box)
     return laid
 

@@ -1,4 +1,4 @@
-"""Which triangles can block anything: those on the hull of the scene cannot (Sec. 6, maps).
+"""Which triangles can block anything: those on the hull of the scene cannot.
 
 A triangle whose plane has the whole scene on one side meets a segment between two points of the scene at an end of it
 at most. Floors, walls and ceilings of a closed room are of this kind, and often make up most of what a map shows.
@@ -43,8 +43,8 @@ def occluders(geometry: Geometry) -> Array:
     Returns
     -------
     (m,) bool ndarray
-        False for triangles on the scene's convex hull: no segment between two points of the scene meets them but at
-        an end, or within 1e-6 of the scene's diagonal of one. Triangles without area are False too.
+        False for triangles on the scene's convex hull: a segment between two points of the scene meets them only
+        where one of its ends lies in their plane, to 1e-6 of the scene's diagonal. Triangles without area are False.
     """
     faces = np.ascontiguousarray(geometry.faces)
     border = np.zeros(len(faces), np.bool_)

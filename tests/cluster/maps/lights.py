@@ -1,0 +1,31 @@
+"""Area lights by hand, and points on surfaces for them to light."""
+
+import numpy as np
+
+from refgi.cluster.area_lights import AreaLights
+from refgi.rsm.projection import paraboloid_projection
+
+
+def area_lights(center, normal, radius=0.0, members=None):
+    """Area lights of no extent around given centres; `radius` says how far their lights are."""
+    center, normal = np.atleast_2d(np.asarray(center, float)), np.atleast_2d(np.asarray(normal, float))
+    count = len(center)
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    frame = paraboloid_projection(center, normal, 1).frame
+    none = np.zeros((2, count))
+    members = np.ones(count, np.int64) if members is None else np.asarray(members, np.int64)
+    return AreaLights(np.ascontiguousarray(center.T), np.ascontiguousarray(normal.T), frame, none,
+                      np.ascontiguousarray(frame[:, :2]), none, np.zeros(count), np.full(count, float(radius)), members,
+                      np.arange(count, dtype=np.int32))
+
+
+def surface_points(geometry, count, rng):
+    """Points spread over the triangles by area, and the triangles' normals, (3, n) each."""
+    corners = geometry.vertices[geometry.faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    face = rng.choice(len(area), count, p=area / area.sum())
+    u, v = rng.uniform(size=(2, count, 1))
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    points = corners[face, 0] * (1 - u - v) + corners[face, 1] * u + corners[face, 2] * v
+    return np.ascontiguousarray(points.T), np.ascontiguousarray((cross[face] / area[face, None]).T)

@@ -171,10 +171,11 @@ def load_tile(tile: Array, position: Array, normal: Array, first: int, size: int
     first, size : int
         Which receivers.
     """
+    start = np.uint64(first)  # unsigned, which needs no check for places counted from the end
     for axis in range(3):
-        for i in range(size):
-            tile[X + axis, i] = position[axis, first + i]
-            tile[NX + axis, i] = normal[axis, first + i]
+        for i in range(np.uint64(size)):
+            tile[X + axis, i] = position[axis, start + i]
+            tile[NX + axis, i] = normal[axis, start + i]
 
 
 @kernel

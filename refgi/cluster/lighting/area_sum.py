@@ -219,7 +219,9 @@ def _scatter(some: Array, places: Array, count: int, visible: Array) -> None:
 @kernel
 def _add(tile: Array, tiles: Array, t: int, visible: Array, irradiance: Array) -> None:
     """E += V_m E_m."""
-    first, size = tiles[FIRST, t], tiles[SIZE, t]
-    for c in range(3):
-        for i in range(size):
-            irradiance[c, first + i] += visible[i] * tile[TOTAL + c, i]
+    first, size = np.uint64(tiles[FIRST, t]), np.uint64(tiles[SIZE, t])
+    for i in range(size):
+        v = visible[i]
+        irradiance[0, first + i] += v * tile[TOTAL, i]
+        irradiance[1, first + i] += v * tile[TOTAL + 1, i]
+        irradiance[2, first + i] += v * tile[TOTAL + 2, i]

@@ -65,6 +65,22 @@ def _store(_: Any, array: Any, index: Any, value: Any) -> Emitted:  # noqa: ARG0
     return types.void(array, types.intp, value), emit
 
 
+def _store_at(_: Any, array: Any, row: Any, column: Any, value: Any) -> Emitted:  # noqa: ARG001
+    """Emit array[row, column : column + 8] = value; rows are contiguous, the array need not be."""
+
+    def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, row, column, value = arguments
+        kind = signature.args[0]
+        lines = context.make_array(kind)(context, builder, array)
+        stride = builder.extract_value(lines.strides, 0)
+        line = cgutils.pointer_add(builder, lines.data, builder.mul(row, stride), lines.data.type)
+        place = builder.bitcast(builder.gep(line, [column]), value.type.as_pointer())
+        builder.store(value, place, align=kind.dtype.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp, value), emit
+
+
 def _add(_: Any, one: Any, other: Any) -> Emitted:
     """Emit the sum of two eights."""
     return one(one, other), lambda _context, builder, _signature, arguments: builder.fadd(*arguments)
@@ -140,6 +156,7 @@ def room_of(rows: int, lanes: int, kind: Any = None) -> Any:
 
 load: Any = intrinsic(_load)
 store: Any = intrinsic(_store)
+store_at: Any = intrinsic(_store_at)
 add: Any = intrinsic(_add)
 scale: Any = intrinsic(_scale)
 transpose: Any = intrinsic(_transpose)

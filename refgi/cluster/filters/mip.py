@@ -14,22 +14,22 @@ import numpy.typing as npt
 from numba import types
 
 from refgi.cluster.filters.basis import sine_cosine, turned
-from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store, transpose
+from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store_at, transpose
 from refgi.cluster.filters.mip_build import build_mip, build_mips
 from refgi.cluster.filters.pyramid import Mip, mip_of, mips
 from refgi.cluster.filters.quantise import eight_bits, half_precision
-from refgi.elementary import log2
+from refgi.elementary import log2p1
 from refgi.jit import kernel
 
 __all__ = ["Mip", "build_mip", "build_mips", "mip_means", "mip_of", "mips"]
 
 Array = npt.NDArray[Any]
 
-CHUNK = 64  # receivers whose texels and weights are kept at once
+CHUNK = 128  # receivers whose texels and weights are kept at once
 FINE, COARSE, FINE_SIDE, COARSE_SIDE, LEVEL, DIRECT = range(6)  # rows of whole numbers
 # rows of weights: 4 of the finer level, 4 of the coarser, 4 of texels of the map itself; then what they are made of
 MAP, X, Y, SHARE = 8, 12, 13, 14
-WHOLE, WEIGHTS, SUMS = room_of(6, CHUNK, types.int32), room_of(15, CHUNK), room_of(EIGHT, CHUNK)
+WHOLE, WEIGHTS, SUMS = room_of(6, CHUNK, types.int32), room_of(15, CHUNK), room_of(EIGHT, EIGHT)
 DEPTHS, SINES, COSINES, BY_SINES, BY_COSINES = (room_of(1, CHUNK) for _ in range(5))
 
 
@@ -69,11 +69,9 @@ def mip_means(
             _part_map(lanes, whole, weights)
         for first in range(0, channels, EIGHT):
             here = min(EIGHT, channels - first)
-            _sum_up(mip.basis, first, lanes, whole, weights, sums)
-            _take(sums, here, lanes, out, first, start)
+            _sum_up(mip.basis, first, here, lanes, whole, weights, sums, out, first, start)
             if with_z:
-                _sum_up(mip.basis_z, first, lanes, whole, weights, sums)
-                _take(sums, here, lanes, out, channels + first, start)
+                _sum_up(mip.basis_z, first, here, lanes, whole, weights, sums, out, channels + first, start)
         if with_z:
             _sum_depths(mip.mean_depth, lanes, whole, weights, out, 2 * channels, start)
         if direct and mip.quantised:
@@ -93,15 +91,16 @@ def _find_levels(
     """
     real = s.dtype.type
     n, top, none, half, one = real(size), real(coarsest), real(0.0), real(0.5), real(1.0)
+    for lane in range(len(s)):  # three loops: one would be too long for the compiler to join into SIMD lanes
+        weights[SHARE, lane] = log2p1(max(radius[lane] * n - one, none)) + real(shift)
     for lane in range(len(s)):
-        used = wanted[lane] != 0
-        level = log2(max(radius[lane] * n, one)) + real(shift)
-        level = min(max(level, none), top) if used else top
+        level = min(max(weights[SHARE, lane], none), top)
+        level = level if wanted[lane] else top
         fine = np.int32(level)
-        whole[LEVEL, lane] = fine
-        weights[SHARE, lane] = level - real(fine)
-        weights[X, lane] = (s[lane] + one) * half * n if used else none
-        weights[Y, lane] = (t[lane] + one) * half * n if used else none
+        whole[LEVEL, lane], weights[SHARE, lane] = fine, level - real(fine)
+    for lane in range(len(s)):
+        x, y = (s[lane] + one) * half * n, (t[lane] + one) * half * n
+        weights[X, lane], weights[Y, lane] = (x if wanted[lane] else none), (y if wanted[lane] else none)
 
 
 @kernel
@@ -138,7 +137,7 @@ def _find_starts(first: Array, wanted: Array, whole: Array) -> tuple[bool, bool]
         some |= wanted[lane] != 0
         direct |= level == 0
         whole[DIRECT, lane] = whole[FINE, lane]
-        whole[FINE, lane] += np.int32(max(first[level], -whole[FINE, lane]))  # of the map itself: texel 0
+        whole[FINE, lane] = whole[FINE, lane] + np.int32(first[level]) if level > 0 else np.int32(0)
         whole[COARSE, lane] += np.int32(first[min(level + 1, top)])
     for lane in range(len(wanted), -(-len(wanted) // EIGHT) * EIGHT):  # to a multiple of 8
         for row in range(6):
@@ -157,9 +156,26 @@ def _part_map(lanes: int, whole: Array, weights: Array) -> None:
 
 
 @kernel
-def _sum_up(levels: Array, first: int, lanes: int, whole: Array, weights: Array, sums: Array) -> None:
-    """Sum 8 channels from `first` on over the 8 texels of each lane."""
-    for lane in range(0, lanes, EIGHT):
+def _sum_up(
+    levels: Array, first: int, here: int, lanes: int, whole: Array, weights: Array, sums: Array, out: Array,
+    row: int, start: int,
+) -> None:
+    """Sum channels from `first` on over the 8 texels of each lane: `here` of them, at most 8."""
+    full = lanes // EIGHT * EIGHT
+    _sum_eights(levels, first, here, 0, full, whole, weights, out, row, start)
+    if full < lanes:
+        _sum_eights(levels, first, here, full, lanes, whole, weights, sums, 0, -full)
+        for c in range(here):
+            for lane in range(full, lanes):
+                out[row + c, start + lane] = sums[c, lane - full]
+
+
+@kernel
+def _sum_eights(
+    levels: Array, first: int, here: int, begin: int, end: int, whole: Array, weights: Array, out: Array, row: int,
+    start: int,
+) -> None:
+    for lane in range(begin, end, EIGHT):
         lines = transpose((
             _eight(levels, first, lane, whole, weights), _eight(levels, first, lane + 1, whole, weights),
             _eight(levels, first, lane + 2, whole, weights), _eight(levels, first, lane + 3, whole, weights),
@@ -167,7 +183,8 @@ def _sum_up(levels: Array, first: int, lanes: int, whole: Array, weights: Array,
             _eight(levels, first, lane + 6, whole, weights), _eight(levels, first, lane + 7, whole, weights),
         ))  # fmt: skip
         for c in range(EIGHT):
-            store(sums, c * CHUNK + lane, lines[c])
+            if c < here:
+                store_at(out, row + c, start + lane, lines[c])
 
 
 @kernel
@@ -183,13 +200,6 @@ def _eight(levels: Array, first: int, lane: int, whole: Array, weights: Array) -
     above = add(scale(load(levels, c), weights[4, lane]), scale(load(levels, c + width), weights[5, lane]))
     below = add(scale(load(levels, d), weights[6, lane]), scale(load(levels, d + width), weights[7, lane]))
     return add(fine, add(above, below))
-
-
-@kernel
-def _take(sums: Array, here: int, lanes: int, out: Array, row: int, start: int) -> None:
-    for c in range(here):
-        for lane in range(lanes):
-            out[row + c, start + lane] = sums[c, lane]
 
 
 @kernel

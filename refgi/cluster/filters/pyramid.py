@@ -45,7 +45,7 @@ def level_offsets(size: int) -> tuple[Array, int]:
     Returns
     -------
     first : (levels,) ndarray
-        Int64; negative for level 0, which is not among them.
+        Int64; 0 for level 0, which is not among them, as for level 1.
     total : int
         Texels of levels 1 and up.
     """
@@ -53,7 +53,7 @@ def level_offsets(size: int) -> tuple[Array, int]:
     while sides[-1] > 1:
         sides.append((sides[-1] + 1) // 2)
     texels = np.array([side * side for side in sides], np.int64)
-    return np.cumsum(texels) - texels - texels[0], int(texels[1:].sum())
+    return np.maximum(np.cumsum(texels) - texels - texels[0], 0), int(texels[1:].sum())
 
 
 def mips(

@@ -4,13 +4,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
+from refgi.cluster.adaptive import enough_area_lights
 from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
-from refgi.cluster.reference import rectangle_visibility, reference_visibility
+from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.lights.selection import choose_lights, footprints, light_footprints, light_maps
 from refgi.pairs.irradiance import Receivers
@@ -25,6 +26,7 @@ Array = npt.NDArray[Any]
 
 PAIRS_IN_FULL = 1 << 30  # about a quarter of a second on two cores
 PUBLISHED_BLOCK = 8  # pixels
+WITHOUT_MAPS = ("none", "members", "rectangle")  # kinds of visibility
 
 
 def val(frame: "Frame", settings: ValSettings) -> Array:
@@ -49,14 +51,14 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     light = clustered_irradiance(  # Sec. 4 and 6
         receivers, facing(frame), lights, areas, maps, settings, footprint=footprints(frame, settings),
         given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
-        rays=rectangle_visibility(frame, areas, settings) if settings.behind == "raytrace" else None)
+        rays=frame.tracer if settings.behind == "raytrace" else None)
     if block == 1 or settings.blur == "none":
         skip("cluster.blur", "every pixel sums all lights" if block == 1 else "left out by the settings")
         return light
     return blur(light, receivers, block, settings, frame.scene.geometry.diagonal)  # Sec. 6, geometry-aware blur
 
 
-def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> tuple[AreaLights, ShadowMaps]:
+def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> tuple[AreaLights, ShadowMaps | None]:
     """Group pixel lights into area lights and draw what occludes them.
 
     Parameters
@@ -72,12 +74,10 @@ def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> t
     -------
     AreaLights
         One for each cluster.
-    ShadowMaps
-        What each sees.
+    ShadowMaps or None
+        What each sees; None where nothing asks for it.
     """
     if settings.target_error is not None:
-        from refgi.cluster.adaptive import enough_area_lights
-
         chosen = enough_area_lights(frame, lights, settings, areas_of_lights(frame, settings))
         return chosen.areas, chosen.maps
     skip("cluster.adaptive", "the number of area lights is given")
@@ -86,6 +86,9 @@ def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> t
                        weights=(settings.position_weight, settings.normal_weight), diagonal=geometry.diagonal,
                        rounds=settings.rounds)  # Sec. 5
     areas = area_lights(lights, clusters, settings, areas_of_lights(frame, settings))
+    if settings.visibility in WITHOUT_MAPS:
+        skip("cluster.shadow_maps", f"visibility {settings.visibility!r} looks at none")
+        return areas, None
     tracer = frame.tracer if settings.maps == "rays" else None
     return areas, shadow_maps(geometry, areas, settings, frame.dtype, tracer)
 

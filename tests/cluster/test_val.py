@@ -1,0 +1,141 @@
+"""The method as a whole: its limits, odd pictures and scenes, sameness, bad settings."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from refgi.cluster import ValSettings, val
+from refgi.errors import InputError
+from refgi.frame import Frame
+from refgi.jit import threads
+from refgi.methods import find_method, render
+from refgi.scene import load_scene
+from refgi.splat import SiiSettings, sii
+from refgi.stages import observe
+
+SMALL = {"lights": 64, "area_lights": 6, "map_resolution": 32}
+SUM = {np.float32: 2e-6, np.float64: 1e-12}  # another order of summation, relative to the brightest pixel
+# a moved or scaled scene: lights beside a texel's border may take its neighbour's depth; away from those it is rounding
+SCALED = 1e-5
+
+
+def frame(name="cornell_sphere:faces=400", width=33, height=27, **options):
+    return Frame(load_scene(name), width=width, height=height, **{"rsm_resolution": 64} | options)
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return frame()
+
+
+def test_it_is_in_the_table_of_methods(ball):
+    function, settings = find_method("val").load()
+    assert (function, settings) == (val, ValSettings)
+    picture = render(ball.scene, "val", ValSettings(**SMALL), width=33, height=27, rsm_resolution=64)
+    np.testing.assert_array_equal(picture.irradiance, val(ball, ValSettings(**SMALL)))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.feature("VAL-01")
+def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
+    """Oracle: `sii` without a cut, at equal lights."""
+    at = frame(dtype=dtype)
+    plain = val(at, ValSettings(visibility="none", **SMALL))
+    full = sii(at, SiiSettings(lights=64, i_low=0))
+    off = np.abs(plain - full).max() / full.max()
+    assert off <= SUM[dtype]
+    evidence(f"{np.dtype(dtype).name}: against sii {off:.1e} of the brightest pixel")
+
+
+@pytest.mark.parametrize("how", [
+    {}, {"visibility": "step"}, {"visibility": "hard"}, {"visibility": "members"}, {"visibility": "rectangle"},
+    {"visibility": "back_projection"}, {"prefilter": "sat"}, {"prefilter": "brute"}, {"interleaving": 4},
+    {"quantisation": "published"}, {"behind": "dual_paraboloid"}, {"behind": "raytrace"}, {"clamp": "disc"},
+    {"single_light": "footprint"}, {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"maps": "rays"},
+    {"target_error": 0.3}, {"distance": "raw"}, {"distance": "squared"}, {"axes": "pca"}, {"axes": "min_area"},
+    {"as_published": {"val_alpha", "val_search_solid_angle"}}, {"as_published": {"val_alpha_over_pi"}},
+], ids=str)
+def test_every_setting_gives_a_picture_between_darkness_and_the_unshadowed(ball, how):
+    settings = ValSettings(**SMALL | how)
+    light = val(ball, settings)
+    most = val(ball, dataclasses.replace(settings, visibility="none", behind="visible", target_error=None,
+                                         interleaving=settings.interleaving))
+    covered = ball.gbuffer.covered
+    assert light.shape == (3, 27, 33)
+    assert light.dtype == np.float32
+    assert np.isfinite(light).all()
+    assert (light >= 0).all()
+    assert not light[:, ~covered].any()
+    assert light[:, covered].mean() <= most[:, covered].mean() * (1 + SUM[np.float32])
+    assert light[:, covered].mean() > 0.3 * most[:, covered].mean()
+
+
+@pytest.mark.feature("REF-19")
+def test_threads_change_no_bit(evidence):
+    settings = ValSettings(interleaving=4, **SMALL)
+    pictures = []
+    for count in (1, 2):
+        with threads(count):
+            pictures.append(val(frame(), settings))
+    np.testing.assert_array_equal(*pictures)
+    evidence("val, one thread and two: the same bits")
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (5, 1), (17, 9)])
+def test_pictures_of_any_size(size):
+    light = val(frame(width=size[0], height=size[1]), ValSettings(interleaving=8, **SMALL))
+    assert light.shape == (3, size[1], size[0])
+    assert np.isfinite(light).all()
+
+
+@pytest.mark.parametrize("scale", [2.0**-20, 2.0**20])
+def test_the_unit_of_length_does_not_matter(ball, scale):
+    """Law: E of a scene twice as large under the same light is a quarter; powers of two move no rounding."""
+    scene = ball.scene
+    shape = dataclasses.replace(scene.geometry, vertices=scene.geometry.vertices * scale)
+    camera = dataclasses.replace(scene.camera, eye=tuple(scale * np.array(scene.camera.eye)),
+                                 target=tuple(scale * np.array(scene.camera.target)))
+    light = dataclasses.replace(scene.lights[0], position=tuple(scale * np.array(scene.lights[0].position)))
+    large = Frame(dataclasses.replace(scene, geometry=shape, camera=camera, lights=(light,)), width=33, height=27,
+                  rsm_resolution=64)
+    expected = val(ball, ValSettings(**SMALL)).astype(float)
+    got = val(large, ValSettings(**SMALL)).astype(float) * scale**2
+    off = np.abs(got - expected).max(axis=0)
+    assert np.median(off) <= SCALED * expected.max()
+    assert (off > SCALED * expected.max()).mean() < 0.01
+
+
+def test_a_light_that_hits_nothing_gives_darkness(ball):
+    light = dataclasses.replace(ball.scene.lights[0], position=(0.0, 1e4, 0.0), direction=(0.0, 1.0, 0.0))
+    dark = Frame(ball.scene.with_lights(light), width=9, height=9, rsm_resolution=16)
+    for how in ({}, {"interleaving": 8}, {"target_error": 0.1}):
+        assert not val(dark, ValSettings(**SMALL | how)).any()
+
+
+def test_more_area_lights_than_lights_are_hard_shadows_of_each(ball):
+    each = val(ball, ValSettings(**SMALL | {"area_lights": 1000}))
+    hard = val(ball, ValSettings(**SMALL | {"area_lights": 64, "visibility": "hard"}))
+    np.testing.assert_array_equal(each, hard)
+
+
+def test_what_is_not_needed_does_not_run(ball):
+    """Full sums are not blurred, visibility by rays draws no maps, an empty convex room neither."""
+    with observe() as log:
+        val(ball, ValSettings(**SMALL))
+    assert log.status("cluster.blur") == ["skipped"]
+    assert log.status("cluster.adaptive") == ["skipped"]
+    with observe() as log:
+        val(ball, ValSettings(visibility="none", **SMALL))
+    assert log.status("cluster.shadow_maps") == ["skipped"]
+
+
+@pytest.mark.parametrize(("key", "value"), [
+    ("area_lights", 0), ("area_lights", 1.5), ("terms", 0), ("terms", 65), ("map_resolution", 0), ("rounds", 0),
+    ("distance", "euclid"), ("visibility", "soft"), ("prefilter", "gauss"), ("bias", -0.1), ("bias", float("nan")),
+    ("position_weight", -1), ("normal_weight", float("inf")), ("attenuation", -1), ("interleaving", 0),
+    ("interleaving", 65), ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0), ("target_error", float("nan")),
+    ("as_published", {"val_beta"}), ("behind", "mirror"), ("near_geometry", "some"), ("axes", "x"), ("extent", "area")])
+def test_a_setting_that_cannot_be_is_named(key, value):
+    with pytest.raises(InputError, match=key):
+        ValSettings(**{key: value})

@@ -21,7 +21,13 @@ Emitted = tuple[Any, Callable[..., Any]]
 
 
 class EightType(types.Type):
-    """Eight float32 or eight float64."""
+    """Eight float32 or eight float64.
+
+    Parameters
+    ----------
+    real : numba type
+        Which.
+    """
 
     def __init__(self, real: Any) -> None:
         self.real = real
@@ -30,7 +36,15 @@ class EightType(types.Type):
 
 @register_model(EightType)
 class EightModel(models.PrimitiveModel):  # type: ignore[misc]
-    """In registers, an LLVM vector."""
+    """Held as an LLVM vector.
+
+    Parameters
+    ----------
+    manager : DataModelManager
+        Of Numba.
+    kind : EightType
+        What is held.
+    """
 
     def __init__(self, manager: Any, kind: EightType) -> None:
         element = ir.FloatType() if kind.real == types.float32 else ir.DoubleType()
@@ -136,7 +150,7 @@ def room_of(rows: int, lanes: int, kind: Any = None) -> Any:
     def room(_: Any, like: Any) -> Emitted:
         array_type = types.Array(kind or like.dtype, 2, "C")
 
-        def emit(context: Any, builder: Any, signature: Any, _arguments: Any) -> Any:
+        def emit(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
             element = context.get_data_type(array_type.dtype)
             data = cgutils.alloca_once(builder, element, size=rows * lanes)
             data.align = 64

@@ -88,7 +88,7 @@ def mips(
 
 
 @kernel
-def mip_of(several: Mip, k: int) -> Mip:
+def mip_of(several: Mip, k: Any) -> Mip:
     """Return one of several pyramids.
 
     Parameters

@@ -11,10 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.filters.eight import room_of
 from refgi.cluster.filters.pyramid import level_offsets
 from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
+
+CHUNK = 64  # texels made at once
+LINES = room_of(2, 2 * CHUNK)
 
 
 class RangeMip(NamedTuple):
@@ -47,7 +51,7 @@ def range_mips(depth: Array) -> RangeMip:
 
 
 @kernel
-def range_mip_of(several: RangeMip, k: int) -> RangeMip:
+def range_mip_of(several: RangeMip, k: Any) -> RangeMip:
     """Return one of several pyramids.
 
     Parameters
@@ -89,12 +93,20 @@ def _build_one(depth: Array, nearest: Array, farthest: Array, first: Array) -> N
 @kernel
 def _halve(fine_low: Array, fine_high: Array, low: Array, high: Array) -> None:
     last = len(fine_low) - 1
+    both = LINES(fine_low)
+    nearer, farther = both[0], both[1]
     for i in range(len(low)):
-        i0, i1 = 2 * i, min(2 * i + 1, last)
-        for j in range(len(low)):
-            j0, j1 = 2 * j, min(2 * j + 1, last)
-            low[i, j] = min(min(fine_low[i0, j0], fine_low[i0, j1]), min(fine_low[i1, j0], fine_low[i1, j1]))
-            high[i, j] = max(max(fine_high[i0, j0], fine_high[i0, j1]), max(fine_high[i1, j0], fine_high[i1, j1]))
+        above, below = 2 * i, min(2 * i + 1, last)
+        for start in range(0, len(low), CHUNK):
+            count, texels = min(CHUNK, len(low) - start), min(2 * CHUNK, last + 1 - 2 * start)
+            for j in range(texels):
+                nearer[j] = min(fine_low[above, 2 * start + j], fine_low[below, 2 * start + j])
+                farther[j] = max(fine_high[above, 2 * start + j], fine_high[below, 2 * start + j])
+            if texels < 2 * count:  # an odd side: the last column counts twice
+                nearer[texels], farther[texels] = nearer[texels - 1], farther[texels - 1]
+            for j in range(count):
+                low[i, start + j] = min(nearer[2 * j], nearer[2 * j + 1])
+                high[i, start + j] = max(farther[2 * j], farther[2 * j + 1])
 
 
 @kernel

@@ -1,0 +1,100 @@
+"""The basis of the series against sines and cosines one by one (VAL-12), in 8 and 16 bits (VAL-17)."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.cluster.filters.basis import fill_basis, normalise
+from refgi.cluster.filters.quantise import eight_bits, half_precision
+from tests.naive import filters as naive
+
+EXACT = 1e-12  # 64 turns of rounded sines and cosines
+# float32: turn k of an angle is off by 2.4e-7 (2k - 1) at most, and a term's weight is 2 sqrt(2) / ((2k - 1) pi)
+PER_TERM = 2.4e-7 * 2 * math.sqrt(2) / math.pi
+WORST = 0.0059  # sum_k 2 sqrt(2) / (255 c_k) for four terms
+MEASURED = 0.0042  # the largest error of V found over all depths of receiver and texel
+DIGIT = 5.1e-5  # half of the last digit of both
+
+
+def basis_of(t, terms, dtype, quantised=False):
+    """All channels of depths, (4 M + 1, count)."""
+    t = np.asarray(t, dtype).reshape(1, -1)
+    basis, basis_z = np.empty((*t.shape, 2 * terms), dtype), np.empty((*t.shape, 2 * terms + 1), dtype)
+    fill_basis(t, terms, quantised, basis, basis_z)
+    return np.concatenate([basis, basis_z], axis=2)[0].T
+
+
+@pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("terms", [1, 4, 64])
+def test_channels_add_up_to_the_series(terms, evidence):
+    depths = np.linspace(0, 0.99, 34)
+    errors = {}
+    for dtype in (np.float64, np.float32):
+        given = depths.astype(dtype)
+        found, error = basis_of(given, terms, dtype).astype(np.float64), 0.0
+        for i, z in enumerate(given):
+            for d in depths[::3]:
+                error = max(error, abs(naive.seen_share(found[:, i], d, terms) - naive.step_series(d, float(z), terms)))
+                by_z = 0.5 * float(z) - float(z) * (naive.step_series(d, float(z), terms) - 0.5)
+                error = max(error, abs(naive.blocker_sum(found[:, i], d, terms) - by_z))
+        errors[dtype] = error
+    assert errors[np.float64] < EXACT
+    assert errors[np.float32] < PER_TERM * terms
+    evidence(f"M = {terms}: sum of channels less series {errors[np.float64]:.1e} (float64), "
+             f"{errors[np.float32]:.1e} (float32, bound {PER_TERM * terms:.1e})")
+
+
+@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-13), (np.float32, 2e-6)])  # 7 turns
+def test_channels_are_sines_and_cosines(dtype, tolerance):
+    t = np.linspace(0, 1, 41, dtype=dtype)
+    expected = np.array([naive.channels(float(z), 4) for z in t]).T
+    assert np.abs(basis_of(t, 4, dtype) - expected).max() < tolerance
+
+
+def test_nothing_seen_lies_at_the_far_end():
+    depth = np.array([[0.0, 1.0], [4.0, 7.0], [np.inf, 3.999999]], np.float32)
+    out = np.empty_like(depth)
+    normalise(depth, 0.2, 0.8, out)
+    assert np.abs(out - naive.normalised(depth, 0.2, 0.8)).max() < 1e-7
+    assert out[1, 1] == out[2, 0] == np.float32(0.8)
+
+
+@pytest.mark.feature("VAL-17")
+def test_eight_bits_move_visibility_by_less_than_the_bound(evidence):
+    terms = 4
+    depths = np.linspace(0, 1, 4001)
+    plain, rounded = basis_of(depths, terms, np.float64), basis_of(depths, terms, np.float64, quantised=True)
+    bound = sum(2 * math.sqrt(2) / (255 * naive.frequency(k)) for k in range(1, terms + 1))
+    worst = 0.0
+    for d in np.linspace(0, 1, 101):
+        c = np.array([naive.frequency(k) for k in range(1, terms + 1)])
+        factors = np.concatenate([2 / c * np.cos(c * d), -2 / c * np.sin(c * d)])
+        worst = max(worst, float(np.abs(factors @ (rounded - plain)[: 2 * terms]).max()))
+    assert bound == pytest.approx(WORST, abs=DIGIT)
+    assert worst == pytest.approx(MEASURED, abs=DIGIT)
+    evidence(f"8 bits: V off by {worst:.4f} at most, bound {bound:.4f} (M = 4)")
+
+
+@pytest.mark.feature("VAL-17")
+def test_sixteen_bits_move_the_blocker_depth_little(evidence):
+    terms, depths = 4, np.linspace(0, 0.85, 2001)
+    plain, rounded = basis_of(depths, terms, np.float64), basis_of(depths, terms, np.float64, quantised=True)
+    worst = 0.0
+    for d in np.linspace(0, 0.85, 51):
+        worst = max(worst, *(abs(naive.blocker_sum(rounded[:, i] - plain[:, i], d, terms)) for i in range(0, 2001, 40)))
+    # a half is off by 2^-12 of numbers below 1: Z/2 and 2 sqrt(2)/c_k for each term
+    bound = 2.0**-12 * (0.5 + sum(2 * math.sqrt(2) / naive.frequency(k) for k in range(1, terms + 1)))
+    assert 0 < worst < bound
+    evidence(f"16 bits: sum of blockers' depths off by {worst:.1e} of the range at most, bound {bound:.1e}")
+
+
+@pytest.mark.feature("VAL-17")
+def test_rounding_is_that_of_the_formats():
+    rng = np.random.default_rng(3)
+    values = np.concatenate([rng.uniform(-1, 1, 300), 10 ** rng.uniform(-9, 4, 200), [0, 1, -1, 2**-24, 2**-25, 1.5 * 2**-24,
+                             1 + 2**-11, 1 + 3 * 2**-11, 65504, 1 / 3]])  # fmt: skip
+    assert [half_precision(float(v)) for v in values] == [naive.half_precision(float(v)) for v in values]
+    inside = values[np.abs(values) <= 1]
+    assert max(abs(eight_bits(float(v)) - naive.eight_bits(float(v))) for v in inside) < 1e-15
+    assert [eight_bits(v) for v in (-1.0, 1.0)] == [-1.0, 1.0]

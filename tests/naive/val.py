@@ -242,11 +242,13 @@ def is_blocked(area, seen, x, facing, row, column):
 
 
 def in_cone(area, seen, x, row, column):
-    """Tell whether a texel's surface lies inside the cone from x to a disc of diameter Delta."""
-    w = place_to_direction(area, *texel_place(len(seen.depth), row, column))
-    p, axis = [seen.depth[row][column] * k for k in w], unit(minus(x, area.center))
-    s = dot(p, axis)
-    return length(plus(p, axis, -s)) <= area.delta / 2 * (1 - s / length(minus(x, area.center)))
+    """Tell whether a texel, half its diagonal around its centre, touches the cone from x to a disc of width Delta."""
+    n = len(seen.depth)
+    place, z = texel_place(n, row, column), seen.depth[row][column]
+    p, axis = [z * k for k in place_to_direction(area, *place)], unit(minus(x, area.center))
+    s, d = dot(p, axis), length(minus(x, area.center))
+    half_diagonal = z * math.sqrt(2) * 2 / n / (1 + place[0] ** 2 + place[1] ** 2)
+    return s < d and length(plus(p, axis, -s)) - half_diagonal <= area.delta / 2 * (1 - s / d)
 
 
 def half_angle(delta, d, z):

@@ -17,8 +17,6 @@ from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.maps.hard import SLACK
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
 from refgi.cluster.reference.unobstructed import Given
-from refgi.cluster.settings import ValSettings
-from refgi.errors import expect
 from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
@@ -36,7 +34,7 @@ class Patches(NamedTuple):
     depth: Array  # (k,) float64, m
 
 
-def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, settings: ValSettings) -> Given:
+def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, rays: Given | None = None) -> Given:
     """Return V of an area light from its map, projected back onto its rectangle.
 
     Parameters
@@ -45,8 +43,8 @@ def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, settings: Val
         The area lights.
     maps : ShadowMaps
         What each sees.
-    settings : ValSettings
-        What is seen from behind; `behind` "raytrace" is not this function's.
+    rays : callable, optional
+        V of receivers behind an area light. Without, that of the maps of the hemispheres behind, or 1.
 
     Returns
     -------
@@ -57,16 +55,17 @@ def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, settings: Val
     -----
     Patches of neighbouring texels at unlike depths leave gaps or overlap, as published: V is too large behind slanted
     surfaces by up to their share. What a map does not see from its centre cannot hide anything. An area light without
-    a map has V = 1, and so has a receiver behind it ("visible") or without any of the rectangle above its surface.
+    a map has V = 1, and so has a receiver with no part of the rectangle above its surface.
     """
     kept: dict[tuple[int, bool], Patches] = {}
 
     def given(m: int, points: Array, facing: Array) -> Array:
         k = maps.map_of[m]
         visible = np.ones(points.shape[1])
+        axes = np.vstack([areas.axes[m], areas.normal[:, m]])
+        center = maps.center[k] if k >= 0 else areas.center[:, m]
+        x, up = axes @ (points.astype(np.float64) - center[:, None]), axes @ facing.astype(np.float64)
         if k >= 0:
-            axes = np.vstack([areas.axes[m], areas.normal[:, m]])
-            x, up = axes @ (points.astype(np.float64) - maps.center[k][:, None]), axes @ facing.astype(np.float64)
             for depth, sign in ((maps.depth, 1.0), (maps.behind, -1.0)):
                 on = x[2] * sign > 0
                 if depth is None or not on.any():
@@ -78,9 +77,10 @@ def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, settings: Val
                     kept[m, sign < 0] = _patches(depth[k], frame, axes * turned)
                 low, cell = _grid(areas, maps, m, k)
                 visible[on] = _visible(kept[m, sign < 0], turned * x[:, on], turned * up[:, on], low, cell)
+        if rays is not None:
+            visible[x[2] <= 0] = rays(m, points[:, x[2] <= 0], facing[:, x[2] <= 0])
         return visible.astype(points.dtype)
 
-    expect(settings.behind != "raytrace", "behind", "'visible' or 'dual_paraboloid' with back-projection", "raytrace")
     return given
 
 

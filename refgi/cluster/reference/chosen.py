@@ -43,5 +43,6 @@ def reference_visibility(
     if settings.visibility == "rectangle":
         return rectangle_visibility(frame, areas, settings)
     if settings.visibility == "back_projection":
-        return back_projected_visibility(areas, maps, settings)
+        behind = rectangle_visibility(frame, areas, settings) if settings.behind == "raytrace" else None
+        return back_projected_visibility(areas, maps, behind)
     return None

@@ -79,7 +79,7 @@ def test_rays_and_the_map_projected_back_give_the_ramp(delta, evidence):
     points, facing, exact, width = receivers(delta)
     traced = rectangle_visibility(frame, areas, SETTINGS)(0, points, facing)
     maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
-    projected = back_projected_visibility(areas, maps, SETTINGS)(0, points, facing)
+    projected = back_projected_visibility(areas, maps)(0, points, facing)
     off = np.abs(traced - exact).max(), np.abs(projected - exact).max()
     evidence(f"Delta {delta}: penumbra {width:.2f} m, rays {width_of(points[0], traced):.3f}, map projected back "
              f"{width_of(points[0], projected):.3f}; V at most {off[0]:.4f} and {off[1]:.3f} off the ramp")

@@ -1,0 +1,190 @@
+"""What each approximation costs: pictures from exact shadows to the published method, one step apart (Sec. 7, Fig. 10).
+
+Each picture takes one approximation more than the one before it, all with the same pixel lights and clusters:
+
+- lights: as many pixel lights as asked for, a ray each, for all the light there is; what sampling costs,
+- members: V of an area light is the share of its lights that rays reach; clustering,
+- rectangle: rays to the bounding rectangle instead, past what lies too near; the shape of the light,
+- back_projection: one paraboloid map from the centre instead of rays; what one view and its texels miss,
+- step: one mean depth of blockers and one disc of the map around the receiver; single blocker and kernel,
+- series: M terms for the step, over the same discs; the series,
+- sat: squares for the discs, by summed areas; box filter,
+- mip: levels of a pyramid for squares; prefilter,
+- interleaved: one light of n^2 at each pixel, and the blur.
+
+The whole error is the sum of the steps. Were they independent, its root mean square would be the root of the sum of
+their squares.
+"""
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.rectangle import map_frames
+from refgi.cluster.lighting.blur import blur
+from refgi.cluster.lighting.clustered import clustered_irradiance
+from refgi.cluster.reference.chosen import reference_visibility
+from refgi.cluster.reference.members import member_visibility
+from refgi.cluster.reference.rectangle import rectangle_visibility
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.val import PUBLISHED_BLOCK, clustered, facing
+from refgi.errors import expect
+from refgi.lights.selection import choose_lights, footprints
+from refgi.pairs.irradiance import Receivers
+
+if TYPE_CHECKING:
+    from refgi.cluster.maps.shadow_maps import ShadowMaps
+    from refgi.frame import Frame
+    from refgi.rsm import PixelLights
+
+Array = npt.NDArray[Any]
+
+STEPS: dict[str, dict[str, Any]] = {
+    "members": {"visibility": "members"},
+    "rectangle": {"visibility": "rectangle"},
+    "back_projection": {"visibility": "back_projection"},
+    "step": {"visibility": "step"},
+    "series": {"visibility": "series", "prefilter": "brute"},
+    "sat": {"visibility": "series", "prefilter": "sat"},
+    "mip": {"visibility": "series", "prefilter": "mip"},
+}
+
+
+class Step(NamedTuple):
+    """What one approximation changes, as shares of the mean of the first picture."""
+
+    name: str
+    rmse: float  # against the picture before
+    shift: float  # of the mean
+    so_far: float  # rmse against the first picture
+
+
+class ErrorSplit(NamedTuple):
+    """The steps of one scene, and the pictures between them."""
+
+    steps: tuple[Step, ...]
+    pictures: dict[str, Array]  # (3, h, w) W/m^2; those of the steps, after the one that they start from
+
+    @property
+    def whole(self) -> float:
+        """Rmse of the last picture against the first."""
+        return self.steps[-1].so_far
+
+    @property
+    def root_of_squares(self) -> float:
+        """What `whole` would be if the steps were independent."""
+        return math.sqrt(sum(step.rmse**2 for step in self.steps))
+
+
+def split_error(
+    frame: "Frame", settings: ValSettings, truth: Array | None = None, block: int = PUBLISHED_BLOCK
+) -> ErrorSplit:
+    """Render a scene with one approximation after the other and measure each.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen and lit.
+    settings : ValSettings
+        The method's; `visibility`, `prefilter` and `interleaving` are the steps'.
+    truth : (3, h, w) ndarray, optional
+        One-bounce irradiance, W/m^2, from which the first step starts; without, steps start from exact shadows.
+    block : int
+        Side of the blocks of the interleaved picture, pixels.
+
+    Returns
+    -------
+    ErrorSplit
+        At pixels with a surface, over the three channels.
+
+    Raises
+    ------
+    InputError
+        If the first picture has no light to be a share of.
+    """
+    lights = choose_lights(frame, settings)
+    base = dataclasses.replace(settings, visibility="series", prefilter="mip")
+    areas, maps = clustered(frame, lights, base)
+    pictures = {} if truth is None else {"truth": truth}
+    pictures["lights"] = exact_shadows(frame, lights, base)
+    for name, changes in STEPS.items():
+        pictures[name] = _picture(frame, lights, areas, maps, dataclasses.replace(base, **changes))
+    interleaved, surface = _picture(frame, lights, areas, maps, base, block), _surface(frame)
+    pictures["interleaved"] = blur(interleaved, surface, block, base, frame.scene.geometry.diagonal)
+    return ErrorSplit(steps_between(pictures, np.asarray(surface.covered, np.bool_)), pictures)
+
+
+def steps_between(pictures: dict[str, Array], covered: Array) -> tuple[Step, ...]:
+    """Measure a sequence of pictures.
+
+    Parameters
+    ----------
+    pictures : dict of str to (3, h, w) ndarray
+        Names of the steps after the first and what they lead to.
+    covered : (h, w) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    tuple of Step
+        One for each picture but the first.
+
+    Raises
+    ------
+    InputError
+        If the first picture is black.
+    """
+    names = list(pictures)
+    values = [pictures[name][:, covered].astype(np.float64) for name in names]
+    mean = float(values[0].mean()) if values[0].size else 0.0
+    expect(mean > 0, names[0], "a picture with light", "black")
+    return tuple(
+        Step(name, _rms(value - before) / mean, float((value - before).mean()) / mean, _rms(value - values[0]) / mean)
+        for name, before, value in zip(names[1:], values[:-1], values[1:], strict=True))
+
+
+def exact_shadows(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> Array:
+    """Light every pixel by all lights with a shadow ray each: an area light for each of them, of one member.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen.
+    lights : PixelLights
+        N lights.
+    settings : ValSettings
+        How one light lights one receiver.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2: that of the method `vpl` for the same lights, where nothing is clamped.
+    """
+    count = lights.flux.shape[1]
+    position, normal = (np.asarray(part, np.float64) for part in (lights.position, lights.normal))
+    frames, none = map_frames(normal), np.zeros((2, count))
+    single = AreaLights(position, normal, frames, none, frames[:, :2], none, none[0], none[0], np.ones(count, np.int64),
+                        np.arange(count, dtype=np.int32))
+    return clustered_irradiance(_surface(frame), facing(frame), lights, single, None, settings,
+                                footprint=footprints(frame, settings), given=member_visibility(frame, lights, single))
+
+
+def _picture(
+    frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps", settings: ValSettings, block: int = 1
+) -> Array:
+    return clustered_irradiance(
+        _surface(frame), facing(frame), lights, areas, maps, settings, footprint=footprints(frame, settings),
+        given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
+        rays=rectangle_visibility(frame, areas, settings) if settings.behind == "raytrace" else None)
+
+
+def _surface(frame: "Frame") -> Receivers:
+    return Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+
+
+def _rms(values: Array) -> float:
+    return math.sqrt(float((values**2).mean()))

@@ -1,0 +1,83 @@
+"""The whole method against plain loops, from the pixel lights to the blurred picture, on a picture of a few pixels."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.val import val
+from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
+from refgi.rsm import facing_normals
+from refgi.scene import load_scene
+from tests.naive import val as naive
+
+SIDE, MAP = 8, 16
+SETTINGS = ValSettings(lights=40, area_lights=5, map_resolution=MAP, interleaving=1, prefilter="brute")
+HULL = 1e-6  # of the diagonal: what lies beyond a plane by less is not beyond it
+# Sums of some dozen positive terms round by a few 1e-16. Whether a texel belongs to a disc could turn on the last bit
+# and change V by a texel's share: no such tie occurs here.
+ROUNDING = 1e-14
+SINGLE = 2e-6  # the same with the unit of float32, 6e-8
+
+
+@pytest.fixture(scope="module", params=[np.float64, np.float32])
+def box(request):
+    return Frame(load_scene("cornell_box"), width=SIDE, height=SIDE, rsm_resolution=32, dtype=request.param)
+
+
+def pixels_of(frame):
+    """Return (row, column) -> position, normal, normal of the triangle; of pixels that see one."""
+    buffer = frame.gbuffer
+    facing = facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)
+    return {(i, j): [a[:, i, j].astype(float).tolist() for a in (buffer.position, buffer.normal, facing)]
+            for i, j in np.argwhere(buffer.covered).tolist()}
+
+
+def twin(frame, settings, block=1):
+    """Return the picture by loops, (3, h, w)."""
+    lights, geometry = choose_lights(frame, settings), frame.scene.geometry
+    positions, normals, fluxes = (a.T.astype(float).tolist() for a in (lights.position, lights.normal, lights.flux))
+    triangles = geometry.vertices[geometry.faces].tolist()
+    areas = naive.area_lights(positions, *naive.k_means(positions, normals, settings.area_lights, geometry.diagonal))
+    above = [naive.lifted(area, triangles) for area in areas]
+    maps = [naive.depth_map(area, triangles, MAP, HULL * geometry.diagonal) for area in above]
+
+    def visible(m, x, facing):
+        if settings.visibility == "hard" or areas[m].delta == 0:
+            return naive.hard(above[m], maps[m], x, facing)
+        if settings.visibility == "step":
+            return naive.step(above[m], maps[m], x, facing)
+        return naive.series(above[m], maps[m], x, settings.terms) if settings.visibility == "series" else 1.0
+
+    pixels = pixels_of(frame)
+    light = naive.irradiance(pixels, (positions, normals, fluxes), areas, visible, block)
+    if block > 1:
+        extent = settings.blur_extent * geometry.diagonal
+        light = naive.blurred(light, pixels, block, SIDE, extent, settings.blur_cosine)
+    picture = np.zeros((3, SIDE, SIDE))
+    for (row, column), value in light.items():
+        picture[:, row, column] = value
+    return picture
+
+
+@pytest.mark.feature("REF-15", "VAL-01", "VAL-12")
+@pytest.mark.parametrize("mode", ["series", "step", "hard", "none"])
+def test_every_pixel_is_that_of_the_loops(box, mode, evidence):
+    settings = dataclasses.replace(SETTINGS, visibility=mode)
+    expected, got = twin(box, settings), val(box, settings)
+    off = np.abs(got - expected).max() / expected.max()
+    shadows = 1 - expected.sum() / twin(box, dataclasses.replace(settings, visibility="none")).sum()
+    evidence(f"{mode}, {box.dtype}: {off:.1e} of the maximum off a picture by plain loops; shadows take {shadows:.0%}")
+    assert (shadows > 0.03) == (mode != "none")
+    assert off < (ROUNDING if box.dtype == np.float64 else SINGLE)
+
+
+@pytest.mark.feature("VAL-23", "VAL-24")
+def test_interleaved_and_blurred_as_well(box, evidence):
+    settings = dataclasses.replace(SETTINGS, interleaving=4)
+    expected, got = twin(box, settings, 4), val(box, settings)
+    off = np.abs(got - expected).max() / expected.max()
+    evidence(f"4 x 4 interleaved, blurred, {box.dtype}: {off:.1e} of the maximum off a picture by plain loops")
+    assert off < (ROUNDING if box.dtype == np.float64 else SINGLE)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 TALL, WIDE = 16, 64  # pixels of a tile
+TASKS = 64  # parts that tiles are dealt to, whatever the number of threads
 MOST = 64  # pixels along a side of the window
 COLUMNS = WIDE + MOST  # of each plane in a row of a tile; fixed, which lets loops run in lanes
 E, X, N, END = 0, 3 * COLUMNS, 6 * COLUMNS, 9 * COLUMNS  # irradiance, position, normal: three planes each
@@ -85,55 +86,60 @@ def _blur(
 ) -> None:
     height, width = covered.shape
     across = (width + WIDE - 1) // WIDE
-    for block in prange(across * ((height + TALL - 1) // TALL)):
-        top, left = np.int64(block) // across * TALL, np.int64(block) % across * WIDE
-        tall, wide = min(TALL, height - top), min(WIDE, width - left)
-        tile = np.empty((tall + size - 1, END), position.dtype)
+    tiles = across * ((height + TALL - 1) // TALL)
+    for task in prange(TASKS):
+        room = np.empty((TALL + size - 1, END), position.dtype)  # once: pages of memory cost more than their use
         sums = np.empty((4, WIDE), position.dtype)
-        _load(tile, irradiance, position, normal, covered, top - size // 2, left - size // 2, size)
-        alike = _alike(tile, wide + size - 1, square_extent, cosine)
-        for row in range(tall):
-            for i in range(WIDE):
-                sums[0, i] = sums[1, i] = sums[2, i] = sums[3, i] = 0
-            if alike:
-                _add_all(tile, row, size, sums)
-            else:
-                _add_accepted(tile, row, size, square_extent, cosine, sums)
-            _store(tile, row + size // 2, size // 2, sums, covered, top + row, left, wide, result)
+        for t in range(np.int64(task), tiles, TASKS):
+            top, left = t // across * TALL, t % across * WIDE
+            tall, wide = min(TALL, height - top), min(WIDE, width - left)
+            tile = room[: tall + size - 1]
+            _load(tile, irradiance, position, normal, covered, top - size // 2, left - size // 2, wide, size)
+            alike = _alike(tile, wide + size - 1, square_extent, cosine)
+            for row in range(tall):
+                if alike:
+                    _add_all(tile, row, size, sums)
+                else:
+                    _add_accepted(tile, row, size, square_extent, cosine, sums)
+                _store(tile, row + size // 2, size // 2, sums, covered, top + row, left, wide, result)
 
 
 @kernel
 def _load(
-    tile: Array, irradiance: Array, position: Array, normal: Array, covered: Array, top: int, left: int, size: int
+    tile: Array, irradiance: Array, position: Array, normal: Array, covered: Array, top: int, left: int, wide: int,
+    size: int,
 ) -> None:
     """Copy a tile with its surroundings; what lies outside the picture is taken from n pixels further inside."""
     height, width = covered.shape
-    last = WIDE + size - 1
-    inside = left >= 0 and left + last <= width
+    last = wide + size - 1
+    low, high = min(max(-left, 0), last), max(min(width - left, last), 0)  # what lies in the picture
     for row in range(len(tile)):
         y = _within(top + row, height, size)
         for c in range(3):
-            if inside and y >= 0:
-                _copy(tile, row, c, irradiance, position, normal, covered, y, np.uint64(left), np.uint64(last))
-            else:
-                for i in range(last):
-                    x = _within(left + i, width, size)
-                    _copy_one(tile, row, c, i, irradiance, position, normal, covered, y, x)
+            inside = low
+            if y >= 0:
+                _copy(tile, row, c, irradiance, position, normal, covered, y, left, np.uint64(low), np.uint64(high))
+                inside = max(low, high)
+            for i in range(low):
+                _copy_one(tile, row, c, i, irradiance, position, normal, covered, y, _within(left + i, width, size))
+            for i in range(inside, last):
+                _copy_one(tile, row, c, i, irradiance, position, normal, covered, y, _within(left + i, width, size))
 
 
 @kernel
 def _copy(
     tile: Array, row: int, c: int, irradiance: Array, position: Array, normal: Array, covered: Array, y: int,
-    left: Any, last: Any,
+    left: int, low: Any, high: Any,
 ) -> None:
     far = tile.dtype.type(FAR)
     e, x, n = np.uint64(E + c * COLUMNS), np.uint64(X + c * COLUMNS), np.uint64(N + c * COLUMNS)
-    for i in range(last):
-        tile[row, e + i] = irradiance[c, y, left + i]
-    for i in range(last):
-        tile[row, x + i] = position[c, y, left + i] if covered[y, left + i] else far
-    for i in range(last):
-        tile[row, n + i] = normal[c, y, left + i]
+    shift = np.uint64(left)  # may stand for a number below 0: places wrap round to the right ones
+    for i in range(low, high):
+        tile[row, e + i] = irradiance[c, y, shift + i]
+    for i in range(low, high):
+        tile[row, x + i] = position[c, y, shift + i] if covered[y, shift + i] else far
+    for i in range(low, high):
+        tile[row, n + i] = normal[c, y, shift + i]
 
 
 @kernel
@@ -198,6 +204,9 @@ def _alike(tile: Array, wide: int, square_extent: Any, cosine: Any) -> bool:
 def _add_all(tile: Array, row: int, size: int, sums: Array) -> None:
     """Add up differences to the pixels of a row where all pixels count."""
     one, four = tile.dtype.type(1.0), np.uint64(4)
+    for c in range(3):
+        for i in range(WIDE):
+            sums[c, i] = 0
     middle, line = row + size // 2, np.uint64(size // 2)
     quads = np.uint64(size // 4)
     for y in range(row, row + size):
@@ -233,6 +242,9 @@ def _add_accepted(tile: Array, row: int, size: int, square_extent: Any, cosine: 
     """Add up differences to the pixels of a row where pixels count for each other, and how many do."""
     real = tile.dtype.type
     one, zero = real(1.0), real(0.0)
+    for k in range(4):
+        for i in range(WIDE):
+            sums[k, i] = zero
     middle, line = row + size // 2, np.uint64(size // 2)
     e0, e1, e2 = np.uint64(E), np.uint64(E + COLUMNS), np.uint64(E + 2 * COLUMNS)
     for y in range(row, row + size):

@@ -120,7 +120,8 @@ def test_real_scenes_by_rays(name, data_dir, evidence):
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     height = np.abs([((p[met] - a) * normal).sum(axis=1) for p in (starts, ends)]).min(axis=0)
     assert height.max(initial=0.0) < IN_THE_PLANE_OF_FLOAT32 * shape.diagonal
-    evidence(f"{name}: {len(left_out.faces)} of {len(shape.faces)} triangles left out; 20000 segments meet none but with an end in its plane")
+    evidence(f"{name}: {len(left_out.faces)} of {len(shape.faces)} triangles left out; 20000 segments meet none but "
+             "with an end in its plane")
 
 
 def test_an_animation_finds_them_once():

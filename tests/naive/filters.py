@@ -139,8 +139,11 @@ def trilinear(levels, s, t, radius, shift=0.0):
 
 
 def eight_bits(value):
-    """What is left of a number of [-1, 1] that is stored as a whole number of 0 to 255."""
-    return math.floor((value + 1) / 2 * 255 + 0.5) / 255 * 2 - 1
+    """What is left of a number of [-1, 1] that is stored as a whole number of 0 to 255; halves are rounded up.
+
+    Whether a number lies half way is known to 1e-4 of a step, so that its last bit decides nothing.
+    """
+    return math.floor((value + 1) / 2 * 255 + 0.5001) / 255 * 2 - 1
 
 
 def half_precision(value):

@@ -2,18 +2,24 @@
 
 The disc takes the texels whose centres it holds, within the unit disc, or the one it lies in. The box is the square
 around the disc, at least a texel wide; texels count by the area of them that it holds, those beyond the unit disc
-too, and what of it lies beyond the map is cut off. A box with its middle beyond the map is moved to its edge.
+too, and what of it lies beyond the map is cut off. A box with its middle beyond the map is moved to its edge. Sums
+are float64 for any map.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import types
 
 from refgi.cluster.filters.basis import fill_basis, normalise
+from refgi.cluster.filters.eight import room_of
+from refgi.cluster.settings import MOST_TERMS
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
+
+SUMS = room_of(1, 4 * MOST_TERMS + 1, types.float64)
 
 
 class Brute(NamedTuple):
@@ -90,60 +96,56 @@ def brute_means(
         Filled where wanted.
     """
     n, channels = len(brute.depth), brute.basis.shape[2]
-    real = s.dtype.type
+    real, sums = s.dtype.type, SUMS(s)[0]
+    used = 2 * channels + 1 if with_z else channels
     for i in range(count):
         if not wanted[i]:
             continue
-        for c in range(2 * channels + 1 if with_z else channels):
-            out[c, i] = real(0.0)
+        for c in range(used):
+            sums[c] = 0.0
         x, y, half = _box(s[i], t[i], radius[i], n, brute.box)
-        total = real(0.0)
+        total = 0.0
         for row in range(max(int(np.floor(y - half)), 0), min(int(np.ceil(y + half)), n)):
             for column in range(max(int(np.floor(x - half)), 0), min(int(np.ceil(x + half)), n)):
                 weight = _weight(column, row, x, y, half, n, brute.box)
-                if weight > real(0.0):
+                if weight > 0.0:
                     total += weight
-                    _add(brute, row, column, weight, with_z, i, out)
-        if total == real(0.0):
-            total = real(1.0)
+                    _add(brute, row, column, weight, with_z, sums)
+        if total == 0.0:
+            total = 1.0
             column, row = min(max(int(x), 0), n - 1), min(max(int(y), 0), n - 1)
-            _add(brute, row, column, total, with_z, i, out)
-        for c in range(2 * channels + 1 if with_z else channels):
-            out[c, i] /= total
+            _add(brute, row, column, total, with_z, sums)
+        for c in range(used):
+            out[c, i] = real(sums[c] / total)
 
 
 @kernel
-def _box(s: Any, t: Any, radius: Any, n: int, box: bool) -> tuple[Any, Any, Any]:
+def _box(s: float, t: float, radius: float, n: int, box: bool) -> tuple[float, float, float]:
     """Return middle and half side in texels."""
-    real = type(s)
-    scale = real(0.5) * real(n)
-    x, y, half = (s + real(1.0)) * scale, (t + real(1.0)) * scale, radius * scale
+    x, y, half = 0.5 * n * (s + 1.0), 0.5 * n * (t + 1.0), 0.5 * n * radius
     if box:
-        x, y = min(max(x, real(0.0)), real(n)), min(max(y, real(0.0)), real(n))
-        half = max(half, real(0.5))
+        x, y, half = min(max(x, 0.0), 1.0 * n), min(max(y, 0.0), 1.0 * n), max(half, 0.5)
     return x, y, half
 
 
 @kernel
-def _weight(column: int, row: int, x: Any, y: Any, half: Any, n: int, box: bool) -> Any:
+def _weight(column: int, row: int, x: float, y: float, half: float, n: int, box: bool) -> float:
     """Return how much a texel counts: the area in the box, or 1 with its centre in the disc and the unit disc."""
-    real = type(x)
     if box:
-        wide = min(real(column + 1), x + half) - max(real(column), x - half)
-        high = min(real(row + 1), y + half) - max(real(row), y - half)
-        return max(wide, real(0.0)) * max(high, real(0.0))
-    middle = real(0.5) * real(n)
-    u, v = real(column) + real(0.5), real(row) + real(0.5)
+        wide = min(column + 1.0, x + half) - max(1.0 * column, x - half)
+        high = min(row + 1.0, y + half) - max(1.0 * row, y - half)
+        return max(wide, 0.0) * max(high, 0.0)
+    middle, u, v = 0.5 * n, column + 0.5, row + 0.5
     inside = (u - x) * (u - x) + (v - y) * (v - y) <= half * half
     within = (u - middle) * (u - middle) + (v - middle) * (v - middle) <= middle * middle
-    return real(1.0) if inside & within else real(0.0)
+    return 1.0 if inside & within else 0.0
 
 
 @kernel
-def _add(brute: Brute, row: int, column: int, weight: Any, with_z: bool, i: int, out: Array) -> None:
+def _add(brute: Brute, row: int, column: int, weight: float, with_z: bool, sums: Array) -> None:
     channels = brute.basis.shape[2]
     for c in range(channels):
-        out[c, i] += weight * brute.basis[row, column, c]
+        sums[c] += weight * brute.basis[row, column, c]
     if with_z:
         for c in range(channels + 1):
-            out[channels + c, i] += weight * brute.basis_z[row, column, c]
+            sums[channels + c] += weight * brute.basis_z[row, column, c]

@@ -11,9 +11,12 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils as untyped_cgutils
 from numba.extending import intrinsic, models, register_model
-from numba.np import arrayobj
+from numba.np import arrayobj as untyped_arrayobj
+
+cgutils: Any = untyped_cgutils
+arrayobj: Any = untyped_arrayobj
 
 EIGHT = 8
 INDEX = ir.IntType(32)
@@ -35,7 +38,7 @@ class EightType(types.Type):
 
 
 @register_model(EightType)
-class EightModel(models.PrimitiveModel):  # type: ignore[misc]
+class EightModel(models.PrimitiveModel):
     """Held as an LLVM vector.
 
     Parameters
@@ -48,7 +51,7 @@ class EightModel(models.PrimitiveModel):  # type: ignore[misc]
 
     def __init__(self, manager: Any, kind: EightType) -> None:
         element = ir.FloatType() if kind.real == types.float32 else ir.DoubleType()
-        super().__init__(manager, kind, ir.VectorType(element, EIGHT))
+        super().__init__(manager, kind, ir.VectorType(element, EIGHT))  # type: ignore[no-untyped-call]
 
 
 def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> tuple[Any, int]:

@@ -13,6 +13,7 @@ import numpy as np
 from refgi.jit import kernel
 
 STEPS = 255.0
+HALF_STEP = 0.5001  # what lies half way, as means of four often do, is rounded up however it was rounded before
 LEAST_EXPONENT = -14  # of a half with all its 11 bits; below it the spacing stays 2^-24
 
 
@@ -31,7 +32,7 @@ def eight_bits(value: Any) -> Any:
         The nearest of 256 evenly spaced numbers from -1 to 1.
     """
     real = type(value)
-    step = math.floor((value + real(1.0)) * real(0.5 * STEPS) + real(0.5))
+    step = math.floor((value + real(1.0)) * real(0.5 * STEPS) + real(HALF_STEP))
     return real(step) * real(2.0 / STEPS) - real(1.0)
 
 

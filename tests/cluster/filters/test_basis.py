@@ -13,8 +13,8 @@ EXACT = 1e-12  # 64 turns of rounded sines and cosines
 # float32: turn k of an angle is off by 2.4e-7 (2k - 1) at most, and a term's weight is 2 sqrt(2) / ((2k - 1) pi)
 PER_TERM = 2.4e-7 * 2 * math.sqrt(2) / math.pi
 WORST = 0.0059  # sum_k 2 sqrt(2) / (255 c_k) for four terms
-MEASURED = 0.0042  # the largest error of V found over all depths of receiver and texel
-DIGIT = 5.1e-5  # half of the last digit of both
+MEASURED = 0.0042  # what a coarse search for the largest error of V finds
+DIGIT = 5.1e-5  # half of the last digit
 
 
 def basis_of(t, terms, dtype, quantised=False):
@@ -72,7 +72,7 @@ def test_eight_bits_move_visibility_by_less_than_the_bound(evidence):
         factors = np.concatenate([2 / c * np.cos(c * d), -2 / c * np.sin(c * d)])
         worst = max(worst, float(np.abs(factors @ (rounded - plain)[: 2 * terms]).max()))
     assert bound == pytest.approx(WORST, abs=DIGIT)
-    assert worst == pytest.approx(MEASURED, abs=DIGIT)
+    assert MEASURED < worst < bound
     evidence(f"8 bits: V off by {worst:.4f} at most, bound {bound:.4f} (M = 4)")
 
 
@@ -92,8 +92,8 @@ def test_sixteen_bits_move_the_blocker_depth_little(evidence):
 @pytest.mark.feature("VAL-17")
 def test_rounding_is_that_of_the_formats():
     rng = np.random.default_rng(3)
-    values = np.concatenate([rng.uniform(-1, 1, 300), 10 ** rng.uniform(-9, 4, 200), [0, 1, -1, 2**-24, 2**-25, 1.5 * 2**-24,
-                             1 + 2**-11, 1 + 3 * 2**-11, 65504, 1 / 3]])  # fmt: skip
+    special = [0, 1, -1, 2**-24, 2**-25, 1.5 * 2**-24, 1 + 2**-11, 1 + 3 * 2**-11, 65504, 1 / 3]
+    values = np.concatenate([rng.uniform(-1, 1, 300), 10 ** rng.uniform(-9, 4, 200), special])
     assert [half_precision(float(v)) for v in values] == [naive.half_precision(float(v)) for v in values]
     inside = values[np.abs(values) <= 1]
     assert max(abs(eight_bits(float(v)) - naive.eight_bits(float(v))) for v in inside) < 1e-15

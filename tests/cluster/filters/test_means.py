@@ -46,7 +46,7 @@ def test_boxes_texel_by_texel_equal_summed_areas(evidence):
             assert error < tolerance
             assert np.abs(boxes - reference(depth, 4, discs, naive.box_mean)).max() < tolerance
             worst[dtype] = max(error, worst.get(dtype, 0.0))
-    evidence(f"summed areas less box texel by texel: {worst[np.float64]:.1e} (float64), {worst[np.float32]:.1e} (float32)")
+    evidence(f"summed areas less box: {worst[np.float64]:.1e} (float64), {worst[np.float32]:.1e} (float32)")
 
 
 @pytest.mark.feature("VAL-16")

@@ -23,7 +23,7 @@ def test_no_texel_of_a_disc_is_nearer(n, evidence):
     assert (found <= exact).all()
     assert (found == exact).mean() > 0.3
     if n == 33:
-        evidence(f"nearest depth of a disc: never beyond it, equal to it for {(found == exact).mean():.0%} of 200 discs")
+        evidence(f"nearest depth of 200 discs: never beyond it, equal to it for {(found == exact).mean():.0%}")
 
 
 @pytest.mark.parametrize("n", [1, 7, 16])

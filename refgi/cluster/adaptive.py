@@ -6,6 +6,7 @@ their area lights. Area lights are doubled until the two are near enough to each
 
 import dataclasses
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.reference import member_visibility, rectangle_visibility, reference_visibility
 from refgi.errors import expect
+from refgi.jit import threads
 from refgi.lights.selection import footprints
 from refgi.pairs.irradiance import Receivers
 from refgi.rsm import facing_normals
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-SAMPLES = 1024  # pixels: the error of one share in a thousand of a picture is seen
+SAMPLES = 2048  # pixels: what one in a thousand adds is seen
 DEVIATIONS = 1.645  # standard errors from the estimate to its bound: 95 %
 MOST_TEXELS = 1 << 28  # of all maps together: 1 GB in float32
 BACK = 0.75  # of the area lights that were enough: the one step back
@@ -51,6 +53,14 @@ class Adaptive(NamedTuple):
     maps: ShadowMaps
     error: float  # RMSE over the mean, estimated
     trail: tuple[Trial, ...]  # all that were tried, in their order
+
+
+class Attempt(NamedTuple):
+    """Area lights and what they came to."""
+
+    trial: Trial
+    areas: AreaLights
+    maps: ShadowMaps
 
 
 class Samples(NamedTuple):
@@ -93,39 +103,42 @@ def enough_area_lights(
     Notes
     -----
     The error is the RMSE over all channels between the irradiance under the visibility of area lights and that with a
-    ray for each pixel light, over the mean of the latter, at up to 1024 pixels drawn with `settings.seed`; that of
+    ray for each pixel light, over the mean of the latter, at up to 2048 pixels drawn with `settings.seed`; that of
     interleaving is no part of it. M is doubled from 1 to N, or as far as maps fit into 2^28 texels; then 3/4 of the
     M that was enough is tried. The error need not fall with every step, and at M = N that of the maps is left.
     """
-    target = settings.target_error
-    expect(target is not None, "target_error", "a share of the mean", target)
-    assert target is not None
-    total = lights.position.shape[1]
-    most = max(1, min(total, MOST_TEXELS // settings.map_resolution**2))
+    expect(settings.target_error is not None, "target_error", "a share of the mean", settings.target_error)
+    assert settings.target_error is not None
     samples = _samples(frame, lights, settings)
-    trail: list[Trial] = []
-    best: tuple[Trial, AreaLights, ShadowMaps] | None = None
-    count = 1
-    while True:
+    total = lights.position.shape[1]
+
+    def attempt(count: int) -> Attempt:
         areas, maps, made = _make(frame, lights, settings, footprint, samples, count)
-        trial = _judge(made, samples, count)
-        trail.append(trial)
-        enough = trial.bound <= target
-        if best is None or enough or trial.error < best[0].error:
-            best = trial, areas, maps
-        back = math.ceil(BACK * count)
-        if enough or count == most:
-            break
+        return Attempt(_judge(made, samples, count), areas, maps)
+
+    most = max(1, min(total, MOST_TEXELS // settings.map_resolution**2))
+    best, trail = _seek(attempt, most, settings.target_error)
+    if best.trial.bound > settings.target_error:
+        skip("cluster.adaptive", f"no number of area lights tried has an error below {settings.target_error:g}: "
+             f"{best.trial.area_lights} of {total} come nearest, with {best.trial.error:.3g}")
+    return Adaptive(best.areas, best.maps, best.trial.error, tuple(trail))
+
+
+def _seek(attempt: Callable[[int], Attempt], most: int, target: float) -> tuple[Attempt, list[Trial]]:
+    """Double the area lights until they are enough, then try one step back; return the best and all trials."""
+    best = attempt(1)
+    trail, count = [best.trial], 1
+    while trail[-1].bound > target and count < most:
         count = min(2 * count, most)
-    if enough and count // 2 < back < count:
-        areas, maps, made = _make(frame, lights, settings, footprint, samples, back)
-        trail.append(_judge(made, samples, back))
-        if trail[-1].bound <= target:
-            best = trail[-1], areas, maps
-    if not enough:
-        skip("cluster.adaptive", f"an error of {target:g}: {best[0].area_lights} of {total} came nearest, with "
-             f"{best[0].error:.3g}")
-    return Adaptive(best[1], best[2], best[0].error, tuple(trail))
+        latest = attempt(count)
+        trail.append(latest.trial)
+        best = latest if latest.trial.bound <= target or latest.trial.error < best.trial.error else best
+    back = math.ceil(BACK * count)
+    if trail[-1].bound <= target and (count + 1) // 2 < back < count:
+        latest = attempt(back)
+        trail.append(latest.trial)
+        best = latest if latest.trial.bound <= target else best
+    return best, trail
 
 
 def _make(
@@ -171,8 +184,9 @@ def _by_rays(
     alone = cluster(lights.position, lights.normal, max(1, lights.position.shape[1]),
                     diagonal=frame.scene.geometry.diagonal)
     areas = area_lights(lights, alone, dataclasses.replace(settings, single_light="point"))
-    light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,
-                                 given=member_visibility(frame, lights, areas, "even"))
+    with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
+        light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,
+                                     given=member_visibility(frame, lights, areas, "even"))
     return light[:, 0]
 
 

@@ -63,3 +63,8 @@ def rooms(size, terms, dtype=np.float64):
     """What a tile needs: numbers, room, means, todo, visible."""
     return (np.zeros(NUMBERS, dtype), np.zeros((ROOM_ROWS, size), dtype), np.zeros((4 * terms + 1, size), dtype),
             np.ones(size, np.bool_), np.ones(size, dtype))
+
+
+def are_shares(values, dtype):
+    """Whether values are numbers from 0 to 1 of a type."""
+    return values.dtype == dtype and bool(((values >= 0) & (values <= 1)).all())

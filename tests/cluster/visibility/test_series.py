@@ -59,7 +59,8 @@ def test_bias_is_the_first_crossing_of_one(evidence):
 @pytest.mark.parametrize("rescale", ["none", "plateau"])
 def test_no_difference_of_depths_wraps_around(terms, attenuation, rescale):
     chain = series(ValSettings(terms=terms, attenuation=attenuation, rescale=rescale))
-    assert chain.range == pytest.approx(1 - 2 * chain.first) and 0.17 < chain.range < 1
+    assert chain.range == pytest.approx(1 - 2 * chain.first)
+    assert 0.17 < chain.range < 1
     lit = np.linspace(chain.first, 1 - chain.first, 101)
     top = float(above_half(lit, chain.weight)[0])
     assert (above_half(lit, chain.weight) > LEAST * top).all()  # farther than b* is lit, as far as the range goes
@@ -96,7 +97,8 @@ def test_plateau_is_stretched_to_one():
 @pytest.mark.feature("VAL-18")
 def test_doubled_series_needs_no_bias(evidence):
     chain = series(ValSettings(rescale="scale2"))
-    assert (chain.bias, chain.gain) == (0.0, 2.0) and chain.search_bias == chain.first
+    assert (chain.bias, chain.gain) == (0.0, 2.0)
+    assert chain.search_bias == chain.first
     seen = {gap: float(np.clip(2 * (0.5 + above_half(-gap, chain.weight)), 0, 1)) for gap in (0.0, 0.01, 0.05, 0.1)}
     for gap, known in ((0.0, 1.0), (0.01, 0.84), (0.05, 0.27), (0.1, 0.0)):  # E-VAL-03
         assert seen[gap] == pytest.approx(known, abs=5e-3)

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.series import above_half, first_lit, frequencies, weights
+from refgi.cluster.visibility.series import above_half, first_lit, frequencies, series, weights
 from refgi.cluster.visibility.soft import (
     BIAS,
+    DELTA,
     DEPTH,
+    EXTENT,
+    FRAME,
     GAIN,
     NEAREST,
     SCALE,
@@ -17,9 +20,10 @@ from refgi.cluster.visibility.soft import (
     Z,
     compare,
     find_penumbra,
+    look,
 )
 from refgi.cluster.visibility.visible import visibility
-from tests.cluster.visibility.plates import lit_by, map_of_plates, on_plane, rooms, square_share
+from tests.cluster.visibility.plates import are_shares, lit_by, map_of_plates, on_plane, rooms, square_share
 from tests.naive import soft_shadow as naive
 
 ROUNDING = 1e-10  # float64 sums over discs of some hundred texels, in another order
@@ -81,7 +85,8 @@ def test_mean_depth_of_blockers_before_a_receiver(evidence):
     wild = (0.5 * means[16] - w @ (cosine * means[8:12] - sine * means[12:16])) / blocked
     assert wild == pytest.approx(-2.3, abs=0.05)
     assert mean_depth(0.125) == (0.7, 0)  # so little blocked that nothing is
-    evidence(f"z_avg {plain:.3f} (b = 0), {rounded:.3f} (b = 0.075), {right:.3f} (b*), {wild:.2f} (b = 0.125, refused); truth 0.3")
+    evidence(f"z_avg {plain:.3f} (b = 0), {rounded:.3f} (b = 0.075), {right:.3f} (b*), {wild:.2f} (b = 0.125, refused); "
+             "truth 0.3")
 
 
 @pytest.mark.feature("VAL-13")
@@ -90,16 +95,14 @@ def test_mean_depth_stays_between_the_nearest_and_the_receiver():
         for share in (0.0, 0.03, 0.1, 0.5, 1.0):
             for blocker in (0.05, 0.3, 0.69):
                 depth, count = mean_depth(bias, parts=((share, blocker), (1 - share, 0.7)))
-                assert 1e-9 <= depth <= 0.7 and (count == 1 or depth == 0.7)
+                assert 1e-9 <= depth <= 0.7
+                assert (count == 1 or depth == 0.7)
 
 
 @pytest.mark.feature("VAL-18")
 @pytest.mark.parametrize("rescale", ["none", "scale2", "plateau"])
 def test_comparison_is_the_series(rescale):
-    settings = ValSettings(attenuation=1.0, rescale=rescale)
-    from refgi.cluster.visibility.series import series
-
-    chain = series(settings)
+    chain = series(ValSettings(attenuation=1.0, rescale=rescale))
     for blocker in (0.1, 0.45, 0.5, 0.55, 0.7):
         numbers, room, means, todo, visible = rooms(1, 4)
         numbers[[SCALE, BIAS, GAIN]] = 1.0, chain.bias, chain.gain
@@ -116,7 +119,8 @@ def test_more_terms_tend_to_comparing_every_texel(evidence):
     areas, maps = lit_by(depth, 0.5, FAR)
     every = shadow(areas, maps, points, normals, visibility="step", receiver_plane=False, cone=False)
     off = [rmse(shadow(areas, maps, points, normals, prefilter="brute", terms=m), every) for m in (1, 2, 4, 8, 16, 64)]
-    assert off[0] > off[1] > off[2] > off[4] > off[5] and off[5] < 0.01
+    assert off[0] > off[1] > off[2] > off[3] > off[4] > off[5]
+    assert off[5] < 0.03
     evidence("RMSE to PCF for M = 1, 2, 4, 8, 16, 64: " + ", ".join(f"{e:.4f}" for e in off))
 
 
@@ -130,7 +134,9 @@ def test_light_leaks_at_contacts(evidence):
         points, normals = on_plane(3.0, 1e-3, 2)
         seen[gap] = [float(shadow(areas, maps, points, normals, **kw)[0])
                      for kw in ({"prefilter": "brute"}, {"prefilter": "brute", "terms": 16}, {"visibility": "step"})]
-    assert seen[0.05][0] > 0.9 and seen[0.2][0] > 0.6 and seen[1.0][0] < 0.1  # b* is 0.58 m here
+    assert seen[0.05][0] > 0.9
+    assert seen[0.2][0] > 0.6
+    assert seen[1.0][0] < 0.1
     assert all(values[0] >= values[1] >= values[2] for values in seen.values())
     assert all(values[2] == 0 for values in seen.values())  # the step leaks nothing
     evidence("V below a plate (truth 0), M = 4 / 16 / step: " + ", ".join(
@@ -139,34 +145,40 @@ def test_light_leaks_at_contacts(evidence):
 
 @pytest.mark.feature("VAL-20")
 def test_huge_senders_ring(evidence):
-    """A lone plane is lit everywhere; the larger the light, the wider the search meets nearer parts of the plane."""
-    points, normals = on_plane(3.0, 3.0, 9)
-    depth = map_of_plates(64, [(4.0, 4.2, -0.1, 0.1, 0.4)], 3.0)  # something near, aside, that shadows nothing here
-    least = {}
-    for delta in (0.2, 1.0, 4.0):
+    """The larger the light, the less of the overshoot and undershoot of the series does the filter hide."""
+    points, normals = on_plane(3.0, 3.0, 13)
+    plates = [(-0.4, 0.4, -0.4, 0.4, 1.5)]
+    depth, off = map_of_plates(64, plates, 3.0), {}
+    for delta in (0.5, 2.0, 6.0):
         areas, maps = lit_by(depth, delta, FAR)
-        least[delta] = float(shadow(areas, maps, points, normals, prefilter="brute").min())
-    assert least[0.2] > 0.97 and least[4.0] < 0.8
-    evidence("least V of a lit plane, M = 4: " + ", ".join(f"{v:.3f} for Delta {d}" for d, v in least.items()))
+        truth = square_share(points, delta, plates, 16)
+        lit = truth == 1
+        seen = shadow(areas, maps, points, normals, prefilter="brute")
+        off[delta] = rmse(seen, truth), 1 - float(seen[lit].min()) if lit.any() else 0.0
+    assert off[6.0][0] > 2 * off[0.5][0]
+    evidence("RMSE of V, M = 4: " + ", ".join(f"{e:.3f} for Delta {d}" for d, (e, _) in off.items()))
 
 
 @pytest.mark.feature("VAL-20")
 def test_penumbrae_of_straight_edges_are_curved(evidence):
-    """The line V = 1/2 of a half plane's edge, under a large sender: straight in truth."""
+    """The line V = 0.8 of a half plane's edge, under a large sender: straight in truth."""
     plates = [(-9.0, 9.0, 0.5, 9.0, 1.0)]
     areas, maps = lit_by(map_of_plates(96, plates, 3.0), 1.5, 9.0)
     x, y = np.meshgrid(np.linspace(0, 4, 5), np.linspace(0, 4, 81))
     points = np.stack([x.ravel(), y.ravel(), np.full(x.size, 3.0)])
     normals = np.tile([[0.0], [0.0], [-1.0]], (1, x.size))
 
-    def half_line(v):
+    def line(v):
         v = v.reshape(x.shape)
-        return np.array([y[np.argmax(v[:, k] < 0.5), k] for k in range(v.shape[1])])
+        return np.array([y[np.argmax(v[:, k] < 0.8), k] for k in range(v.shape[1])])
 
-    truth = half_line(square_share(points, 1.5, plates, 32))
-    found = half_line(shadow(areas, maps, points, normals, prefilter="brute"))
-    assert np.ptp(truth) <= 0.051 and np.ptp(found) > 0.2  # a step of the grid; many
-    evidence(f"V = 1/2 along a straight edge moves by {np.ptp(found):.2f} m over 4 m (truth {np.ptp(truth):.2f})")
+    truth = line(square_share(points, 1.5, plates, 32))
+    found = line(shadow(areas, maps, points, normals, prefilter="brute"))
+    exact = line(shadow(areas, maps, points, normals, visibility="step"))
+    assert np.ptp(truth) == 0
+    assert np.ptp(found) > 0.3
+    evidence(f"the line V = 0.8 along a straight edge moves by {np.ptp(found):.2f} m over 4 m, {np.ptp(exact):.2f} m with "
+             "the step")
 
 
 @pytest.mark.feature("VAL-20")
@@ -199,11 +211,12 @@ def test_any_receiver_sees_a_share(dtype, prefilter, terms):
         depth = map_of_plates(17, plates, plane, dtype=dtype)
         for delta in (1e-9, 0.5, 1e6):
             areas, maps = lit_by(depth, delta, FAR)
-            for extra in ({}, {"attenuation": 100.0, "rescale": "plateau"}, {"rescale": "scale2", "foreshortened": True},
+            for extra in ({}, {"attenuation": 100.0, "rescale": "plateau"},
+                          {"rescale": "scale2", "foreshortened": True},
                           {"bias": 0.25, "as_published": frozenset({"val_alpha", "val_alpha_over_pi"})},
                           {"bias": 0.0, "as_published": frozenset({"val_search_solid_angle"})}):
                 got = shadow(areas, maps, points, normals, prefilter=prefilter, terms=terms, **extra)
-                assert got.dtype == dtype and np.isfinite(got).all() and (got >= 0).all() and (got <= 1).all()
+                assert are_shares(got, dtype)
                 assert (got[points[2] <= 0] == 1).all()
 
 
@@ -218,11 +231,11 @@ def test_each_receiver_is_on_its_own():
     assert shadow(areas, maps, points[:, 7:8], normals[:, 7:8])[0] == whole[7]
 
 
-def test_a_smaller_light_seen_aslant_has_a_narrower_penumbra():
-    plates = [(1.0, 9.0, -9.0, 9.0, 1.0)]
-    areas, maps = lit_by(map_of_plates(64, plates, 3.0), 1.0, 9.0)
-    x = np.linspace(1.5, 5.0, 40)
-    points, normals = np.stack([x, 0 * x, 0 * x + 3]), np.tile([[0.0], [0.0], [-1.0]], (1, 40))
-    width = [int(((v > 0.1) & (v < 0.9)).sum()) for v in (
-        shadow(areas, maps, points, normals, visibility="step", foreshortened=f) for f in (False, True))]
-    assert 0 < width[1] < width[0]
+def test_a_light_seen_aslant_is_smaller():
+    for foreshortened, share in ((False, 1.0), (True, np.sqrt(0.6))):
+        numbers, room, _, todo, visible = rooms(1, 4)
+        numbers[[DELTA, NEAREST, SCALE]] = 0.7, 0.5, 0.1
+        numbers[FRAME : FRAME + 9] = np.eye(3).ravel()
+        chosen = AS_WRITTEN._replace(foreshortened=foreshortened)
+        assert look(numbers, chosen, np.array([[4.0], [0.0], [3.0]]), 1, todo, todo.copy(), visible, room) == 1
+        assert room[EXTENT, 0] == pytest.approx(0.7 * share, rel=1e-15)

@@ -1,0 +1,178 @@
+"""Soft shadows by the step itself: against plain loops, against area sampling, and the rules it needs."""
+
+import numpy as np
+import pytest
+
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.soft import DEPTH, NEAREST, RADIUS, choices, look, numbers_of
+from refgi.cluster.visibility.step import rules, step_lanes
+from refgi.cluster.visibility.visible import visibility
+from tests.cluster.visibility.plates import are_shares, lit_by, map_of_plates, on_plane, rooms, square_share
+from tests.naive import soft_shadow as naive
+
+ROUNDING = 1e-13  # a count over a count
+PLATES = [(-0.6, -0.1, -0.3, 0.3, 1.0), (0.1, 0.6, -0.3, 0.3, 1.0)]
+FAR = 6.4
+SEARCH = frozenset({"val_search_solid_angle"})
+PUBLISHED = SEARCH | {"val_alpha_over_pi"}
+
+
+def shadow(areas, maps, points, normals, **settings):
+    return visibility(maps, areas, 0, points, normals, ValSettings(**settings))
+
+
+@pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("plane", [True, False])
+@pytest.mark.parametrize("cone", [True, False])
+def test_step_is_its_literal_twin(plane, cone):
+    slope = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
+    depth = map_of_plates(24, PLATES, 2.8, slope)
+    points, normals = on_plane(3.0, 2.2, 7)
+    points[2] = (2.8 - slope[0] * points[0] - slope[1] * points[1]) / slope[2]
+    normals[:] = -slope[:, None]
+    for delta in (0.3, 1.2):
+        areas, maps = lit_by(depth, delta, FAR)
+        got = shadow(areas, maps, points, normals, visibility="step", receiver_plane=plane, cone=cone)
+        expected = [naive.step_shadow(depth.tolist(), p, -slope, delta, cone, plane)[0] for p in points.T]
+        assert np.abs(got - expected).max() < ROUNDING
+        assert np.array_equal(
+            got, shadow(areas, maps, points, -normals, visibility="step", receiver_plane=plane, cone=cone))
+
+
+@pytest.mark.feature("VAL-13")
+def test_mean_depth_is_that_of_the_blockers(evidence):
+    """Ten per cent of a search disc at 0.3, the rest the receiver's own plane: the step knows them apart."""
+    depth = map_of_plates(48, [(-0.3, -0.06, -0.5, 0.5, 0.3)], 0.7)
+    points, normals = on_plane(0.7, 0.15, 5)
+    _, maps = lit_by(depth, 0.3, 2.0)
+    settings = ValSettings(visibility="step", cone=False)
+    numbers, (_, room, _, todo, visible) = numbers_of(maps, 0, 0.3, settings), rooms(25, 1)
+    chosen, rule = choices(settings), rules(settings, 1.0)
+    count = look(numbers, chosen, points, 25, np.ones(25, np.bool_), todo, visible, room)
+    step_lanes(numbers, chosen, rule, depth, normals, 25, todo, visible, room)
+    expected = [naive.step_shadow(depth.tolist(), p, (0, 0, -1), 0.3, cone=False) for p in points.T]
+    found = [k for k in range(25) if expected[k][1] is not None]
+    assert count == 25
+    assert len(found) > 5
+    assert np.allclose(room[DEPTH, found], [expected[k][1] for k in found], rtol=1e-14)
+    assert np.allclose(visible, [v for v, _ in expected], atol=ROUNDING)
+    means = room[DEPTH, found]
+    evidence(f"z_avg of blockers at 0.3 before 0.7: {means.min():.3f} .. {means.max():.3f}, as the plain loop's")
+
+
+def table(delta):
+    """RMSE of V against area sampling, two plates at z = 1 before a plane at z = 3."""
+    points, normals = on_plane(3.0, 2.0, 20)
+    areas, maps = lit_by(map_of_plates(256, PLATES, 3.0, dtype=np.float32), delta, FAR)
+    truth = square_share(points, delta, PLATES, 24)
+    rows = {
+        "constant bias": {"visibility": "step", "receiver_plane": False, "cone": False},
+        "plane": {"visibility": "step", "cone": False},
+        "plane, cone": {"visibility": "step"},
+        "plane, published kernels": {"visibility": "step", "cone": False, "as_published": PUBLISHED},
+        "M = 4": {"prefilter": "sat"},
+        "M = 4, published kernels": {"prefilter": "sat", "as_published": PUBLISHED},
+        "M = 16": {"prefilter": "sat", "terms": 16},
+        "M = 4, mip": {"prefilter": "mip"},
+    }
+    return {name: float(np.sqrt(((shadow(areas, maps, points, normals, **row) - truth) ** 2).mean()))
+            for name, row in rows.items()}
+
+
+@pytest.mark.feature("VAL-14")
+def test_step_needs_the_receivers_plane(evidence):
+    off = {delta: table(delta) for delta in (0.2, 0.5, 1.0)}
+    for delta, bound in ((0.2, 0.04), (0.5, 0.04), (1.0, 0.05)):  # E-VAL-14: 0.036, 0.033, 0.050
+        assert off[delta]["plane, cone"] < bound
+        assert off[delta]["constant bias"] > 0.28  # it shadows itself
+        assert off[delta]["plane"] >= off[delta]["plane, cone"] - 0.002
+        assert off[delta]["M = 4"] < 0.075
+        assert off[delta]["M = 4, mip"] < 0.09
+        assert off[delta]["M = 4, published kernels"] > off[delta]["M = 4"]
+    assert off[1.0]["M = 16"] > off[1.0]["M = 4"]  # a smaller bias lets more of the plane shadow itself
+    for name in off[0.2]:
+        evidence(f"{name}: " + " / ".join(f"{off[delta][name]:.3f}" for delta in off))
+
+
+@pytest.mark.feature("VAL-14")
+def test_blockers_near_the_light_escape_the_published_search(evidence):
+    """Delta = 1, d = 4, a half plane at z = 0.2 that starts 0.3 off the axis hides 18.4 % of the light."""
+    plates = [(0.3, 60.0, -60.0, 60.0, 0.2)]
+    point, normal = np.array([[0.0], [0.0], [4.0]]), np.array([[0.0], [0.0], [-1.0]])
+    _, maps = lit_by(map_of_plates(64, plates, 4.0), 1.0, 8.0)
+    truth = float(square_share(point, 1.0, plates, 512)[0])
+    assert 1 - truth == pytest.approx(0.184, abs=2e-3)
+    covers, found = {}, {}
+    for name, switches, near in (("published", SEARCH, maps.near[0]), ("radial", frozenset(), maps.near[0]),
+                                 ("axial", frozenset(), 0.2)):
+        settings = ValSettings(visibility="step", cone=False, as_published=switches)
+        numbers, (_, room, _, todo, visible) = numbers_of(maps, 0, 1.0, settings), rooms(1, 1)
+        numbers[NEAREST] = near
+        look(numbers, choices(settings), point, 1, np.ones(1, np.bool_), todo, visible, room)
+        covers[name] = 0.2 * np.tan(2 * np.arctan(room[RADIUS, 0]))
+        step_lanes(numbers, choices(settings), rules(settings, 1.0), maps.depth[0], normal, 1, todo, visible, room)
+        found[name] = bool(room[DEPTH, 0] > 0)
+    assert covers["published"] == pytest.approx(0.025, abs=1e-6)
+    assert not found["published"]
+    assert covers["axial"] == pytest.approx(0.475, abs=1e-6)
+    assert found["axial"]
+    assert 0.2 < covers["radial"] < 0.3
+    assert not found["radial"]
+    evidence(f"hidden {1 - truth:.3f}; at z = 0.2 the searches cover " + ", ".join(
+        f"{covers[name]:.3f} ({name}: {'found' if found[name] else 'missed'})" for name in covers))
+
+
+@pytest.mark.feature("VAL-14")
+def test_cone_leaves_out_blockers_beside_the_light(evidence):
+    """Something near the light makes the search wide, so that it meets low plates aside that shadow nothing here."""
+    plates = [(-0.2, 0.2, -0.2, 0.2, 1.0), (1.2, 3.0, -3.0, 3.0, 2.5), (-3.0, -1.2, -3.0, 3.0, 2.5)]
+    points, normals = on_plane(3.0, 0.7, 15)
+    areas, maps = lit_by(map_of_plates(96, plates, 3.0), 1.0, FAR)
+    maps = maps._replace(near=np.array([0.3]))
+    truth = square_share(points, 1.0, plates, 24)
+    off = {name: float(np.sqrt(((shadow(areas, maps, points, normals, **row) - truth) ** 2).mean()))
+           for name, row in {"cone": {"visibility": "step"}, "no cone": {"visibility": "step", "cone": False},
+                             "M = 4": {"prefilter": "brute"}}.items()}
+    assert off["cone"] < 0.15
+    assert off["no cone"] > 0.4
+    assert off["M = 4"] > 0.2
+    evidence("blockers at two depths: " + ", ".join(f"{name} {value:.3f}" for name, value in off.items()))
+
+
+@pytest.mark.feature("VAL-22")
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_lone_plane_sees_the_whole_light(dtype, evidence):
+    for normal in ((0, 0, 1), (0.5, 0.2, 0.8), (0.9, 0, 0.1)):
+        up = np.array(normal) / np.linalg.norm(normal)
+        depth = map_of_plates(64, [], 2.0, up, dtype)
+        rng = np.random.default_rng(3)
+        along = np.linalg.svd(up[None])[2][1:]
+        points = 2.0 * up[:, None] + along.T @ rng.uniform(-4, 4, (2, 60))
+        normals = np.repeat(-up[:, None], 60, axis=1)
+        for delta in (0.1, 2.0, 50.0):
+            areas, maps = lit_by(depth, delta, 12.0)
+            assert (shadow(areas, maps, points, normals, visibility="step") == 1).all()
+            assert (shadow(areas, maps, points, normals, visibility="step", cone=False) == 1).all()
+    flat = map_of_plates(64, [], 2.0, dtype=dtype)
+    areas, maps = lit_by(flat, 2.0, 12.0)
+    points, normals = on_plane(2.0, 4.0, 9)
+    without = shadow(areas, maps, points, normals, visibility="step", receiver_plane=False, cone=False)
+    assert without.min() < 0.6
+    evidence(f"V = 1 exactly, {np.dtype(dtype).name}; without the plane's rule down to {without.min():.2f}")
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_any_receiver_sees_a_share(dtype):
+    rng = np.random.default_rng(5)
+    extreme = np.array([[0, 0, 0], [0, 0, 1e-20], [1, 0, 0], [1, 1, -1e-9], [0, 0, -2], [0, 0, 100], [4, 5, 1e-12],
+                        [1e-8, 0, 1e-8], [0, 0, 3], [3, 0, 1e-6]]).T
+    points = np.concatenate([extreme, rng.uniform(-3, 3, (3, 30))], axis=1).astype(dtype)
+    normals = rng.normal(size=points.shape).astype(dtype)
+    normals[:, 3] = 0
+    for plates, plane in ((PLATES, 3.0), ([], None), ([(-50, 50, -50, 50, 1e-3)], None), ([], 3.0)):
+        depth = map_of_plates(17, plates, plane, dtype=dtype)
+        for delta in (0.0, 1e-9, 0.5, 1e6):
+            areas, maps = lit_by(depth, delta, FAR)
+            for extra in ({}, {"cone": False, "as_published": PUBLISHED}, {"receiver_plane": False, "bias": 0.25}):
+                got = shadow(areas, maps, points, normals, visibility="step", **extra)
+                assert are_shares(got, dtype)

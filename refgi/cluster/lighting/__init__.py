@@ -1,1 +1,10 @@
-"""Light of every pixel light under the visibility of its area light (Sec. 4, 6), interleaved and blurred or not."""
+"""From area lights to the picture: all pixel lights under their visibility, interleaved and blurred (Sec. 4, 6).
+
+`clustered_irradiance` is the sum, `interleave` deals the lights out to blocks of pixels, `blur` joins these. Unlike
+the paper, each light counts n^2 times in the pixels that sum it, and irradiance is blurred instead of radiance.
+"""
+
+from refgi.cluster.lighting.blur import blur
+from refgi.cluster.lighting.clustered import clustered_irradiance
+
+__all__ = ["blur", "clustered_irradiance"]

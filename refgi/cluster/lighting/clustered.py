@@ -26,6 +26,7 @@ from refgi.stages import report_progress, stage
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
     from refgi.cluster.settings import ValSettings
+    from refgi.rays import Tracer
     from refgi.rsm import PixelLights
 
 Array = npt.NDArray[Any]
@@ -36,7 +37,7 @@ Given = Callable[[int, Array, Array], Array]  # V of an area light at points (3,
 def clustered_irradiance(
     receivers: Receivers, facing: Array, lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",
     settings: "ValSettings", footprint: Array | None = None, given: Given | None = None, interleaving: int = 1,
-    rays: Given | None = None,
+    rays: "Tracer | None" = None,
 ) -> Array:
     """Sum the irradiance of every pixel light under the visibility of its area light.
 
@@ -60,8 +61,8 @@ def clustered_irradiance(
         V from elsewhere: (m, points (3, n), facing (3, n)) -> (n,).
     interleaving : int
         n: each pixel of n x n sums its own lights, n^2 times; 1: all.
-    rays : callable, optional
-        V by rays, as `given`, for points behind an area light; needed for ``behind == "raytrace"`` alone.
+    rays : Tracer, optional
+        The scene's triangles, for points behind an area light; needed for ``behind == "raytrace"`` alone.
 
     Returns
     -------
@@ -156,7 +157,8 @@ def _add_by_lists(
 
 
 def _visibility(
-    areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings", given: Given | None, rays: Given | None
+    areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings", given: Given | None,
+    rays: "Tracer | None",
 ) -> Given:
     """Return what tells V of an area light at some points."""
     if given is not None:

@@ -1,0 +1,103 @@
+"""The geometry-aware blur against its literal twin, and what it must not do."""
+
+import numpy as np
+import pytest
+
+from refgi.cluster.lighting.blur import blur
+from refgi.cluster.settings import ValSettings
+from refgi.jit import threads
+from refgi.pairs.irradiance import Receivers
+from tests.naive.interleaving import blurred, window
+
+ROUNDING = 1e-12  # of means of some dozen float64 values, relative to the largest
+ROUNDING_SINGLE = 2e-6  # the same of float32: 64 differences, half a unit of rounding each
+DIAGONAL = 10.0  # m: an extent of 1 m as published
+
+
+def plane(height, width, real=np.float64):
+    """Return a plane that faces the camera, a pixel every tenth of a metre."""
+    y, x = np.mgrid[:height, :width].astype(real)
+    position = np.stack([x / 10, -y / 10, np.zeros_like(x)])
+    normal = np.zeros_like(position)
+    normal[2] = 1
+    return Receivers(position, normal, np.ones((height, width), bool))
+
+
+def rough(rng, height, width, real=np.float64):
+    """Return pixels on two depths, turned at random, some of them without surface."""
+    flat = plane(height, width, real)
+    position = flat.position + np.array([0, 0, 1]).reshape(3, 1, 1) * rng.choice([0.0, 0.9, 2.0], (height, width))
+    normal = flat.normal + rng.normal(size=flat.normal.shape) * 0.4
+    normal /= np.linalg.norm(normal, axis=0)
+    covered = rng.random((height, width)) > 0.1
+    return Receivers(position.astype(real), (normal * covered).astype(real), covered)
+
+
+@pytest.mark.feature("VAL-24")
+@pytest.mark.parametrize(("height", "width", "side"), [(19, 77, 8), (7, 5, 8), (1, 1, 3), (21, 67, 5), (18, 130, 1)])
+def test_equals_the_twin(height, width, side, evidence):
+    rng = np.random.default_rng(height)
+    to, light = rough(rng, height, width), rng.random((3, height, width))
+    expected = blurred(light, *to, side, 1.0, 0.8)
+    result = blur(light, to, side, ValSettings(), DIAGONAL)
+    error = np.abs(result - expected).max()
+    evidence(f"{width} x {height}, n = {side}: {error:.1e} off the loops")
+    assert error < ROUNDING
+    box = blur(light, to, side, ValSettings(blur="box"), DIAGONAL)
+    assert np.abs(box - blurred(light, *to, side, np.inf, -2.0)).max() < ROUNDING
+
+
+@pytest.mark.feature("VAL-24")
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_a_constant_stays_to_the_bit(real, evidence):
+    rng = np.random.default_rng(3)
+    for to in (plane(33, 70, real), rough(rng, 33, 70, real)):
+        light = np.broadcast_to(np.array([0.1, 1 / 3, 7e5], real).reshape(3, 1, 1), to.position.shape)
+        result = blur(light, to, 8, ValSettings(), DIAGONAL)
+        assert np.array_equal(result, np.where(to.covered, light, 0))
+    evidence("constant field: 0 bits of difference")
+
+
+@pytest.mark.feature("VAL-24")
+def test_nothing_leaks_across_an_edge(evidence):
+    flat = plane(40, 90, np.float32)
+    right = np.arange(90) >= 45
+    light = np.where(right, np.float32(1e6), np.float32(0.1)) * np.ones((3, 40, 90), np.float32)
+    deep = flat._replace(position=flat.position - 1.5 * np.array([0, 0, 1], np.float32).reshape(3, 1, 1) * right)
+    turned = flat._replace(normal=np.where(right, np.array([1, 0, 0], np.float32).reshape(3, 1, 1), flat.normal))
+    for to in (deep, turned):
+        assert np.array_equal(blur(light, to, 8, ValSettings(), DIAGONAL), light)
+    assert not np.array_equal(blur(light, flat, 8, ValSettings(), DIAGONAL), light)
+    evidence("a step of 1e7 across an edge in depth, in normal: 0 bits leak")
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_without_comparisons_where_bounds_decide(real):
+    """A tile whose pixels all count has the bits of one that compares them: an edge far below changes none above."""
+    rng = np.random.default_rng(4)
+    to, light = plane(64, 128, real), rng.random((3, 64, 128)).astype(real)
+    below = to._replace(normal=to.normal.copy())
+    below.normal[:, 60:] = np.array([1, 0, 0]).reshape(3, 1, 1)
+    for side in (8, 5):
+        alike, compared = (blur(light, some, side, ValSettings(), 100.0) for some in (to, below))
+        assert np.array_equal(alike[:, :56], compared[:, :56])
+        assert not np.array_equal(alike[:, 57:], compared[:, 57:])
+
+
+def test_single_precision_and_threads():
+    rng = np.random.default_rng(5)
+    to, light = rough(rng, 50, 150), rng.random((3, 50, 150)).astype(np.float32)
+    near = Receivers(to.position.astype(np.float32), to.normal.astype(np.float32), to.covered)
+    with threads(1):
+        one = blur(light, near, 8, ValSettings(), DIAGONAL)
+    assert np.array_equal(one, blur(light, near, 8, ValSettings(), DIAGONAL))
+    exact = blurred(light, near.position.astype(np.float64), near.normal, near.covered, 8, 1.0, 0.8)
+    off = np.abs(one - exact).max(axis=0)
+    # where a comparison is decided by rounding, another set of pixels counts
+    assert (off > ROUNDING_SINGLE).mean() < 1e-3
+
+
+def test_a_window_sees_every_subset_once():
+    for count in (8, 9, 31):
+        for place in range(count):
+            assert sorted(i % 8 for i in window(place, count, 8)) == list(range(8))

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from numba import types
 
 from refgi.cluster.filters.basis import fill_basis, normalise
+from refgi.cluster.filters.beyond import beyond_disc, fill_beyond
 from refgi.cluster.filters.eight import room_of
 from refgi.cluster.settings import MOST_TERMS
 from refgi.jit import kernel
@@ -30,9 +31,12 @@ class Brute(NamedTuple):
     basis_z: Array  # (n, n, 2 M + 1)
     box: bool  # the square around the disc instead of the disc
     quantised: bool  # 8 bits for the basis, 16 for basis-z
+    beyond: Array  # (count, 2) int32: texels beyond the unit disc and what they copy
 
 
-def brutes(size: int, terms: int, dtype: npt.DTypeLike, *, box: bool = False, quantised: bool = False) -> Brute:
+def brutes(
+    size: int, terms: int, dtype: npt.DTypeLike, *, box: bool = False, quantised: bool = False, mirrored: bool = False
+) -> Brute:
     """Make room for one map.
 
     Parameters
@@ -47,6 +51,8 @@ def brutes(size: int, terms: int, dtype: npt.DTypeLike, *, box: bool = False, qu
         Filter over the square around the disc instead of the disc.
     quantised : bool
         Keep 8 bits of the basis and 16 of the basis-z.
+    mirrored : bool
+        Mirror the disc in the square beyond it, which otherwise holds the far end; boxes alone look there.
 
     Returns
     -------
@@ -54,7 +60,7 @@ def brutes(size: int, terms: int, dtype: npt.DTypeLike, *, box: bool = False, qu
         Arrays not yet filled.
     """
     return Brute(np.zeros((size, size), dtype), np.zeros((size, size, 2 * terms), dtype),
-                 np.zeros((size, size, 2 * terms + 1), dtype), box, quantised)
+                 np.zeros((size, size, 2 * terms + 1), dtype), box, quantised, beyond_disc(size, mirrored))
 
 
 @kernel
@@ -71,6 +77,7 @@ def build_brute(depth: Array, scale: float, most: float, brute: Brute) -> None:
         Filled.
     """
     normalise(depth, scale, most, brute.depth)
+    fill_beyond(brute.beyond, brute.depth)
     fill_basis(brute.depth, brute.basis.shape[2] // 2, brute.quantised, brute.basis, brute.basis_z)
 
 

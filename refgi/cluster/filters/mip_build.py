@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.filters.basis import fill_basis, normalise, sine_cosine, turned
+from refgi.cluster.filters.beyond import fill_beyond
 from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store
 from refgi.cluster.filters.pyramid import Mip, mip_of
 from refgi.cluster.filters.quantise import eight_bits, half_precision
@@ -55,6 +56,7 @@ def build_mip(depth: Array, per_metre: float, most: float, mip: Mip) -> None:
         Filled.
     """
     normalise(depth, per_metre, most, mip.depth)
+    fill_beyond(mip.beyond, mip.depth)
     if len(depth) == 1:
         return
     if mip.quantised:

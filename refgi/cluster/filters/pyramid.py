@@ -2,7 +2,7 @@
 
 Level l halves level l - 1 by the mean of 2 x 2 texels; where the side is odd, the last row and column count twice.
 Texel i of level l covers the texels i 2^l .. (i + 1) 2^l - 1 of the map, so no size drifts. The square beyond the
-unit disc holds the far end.
+unit disc holds the far end, or mirrors the disc (`beyond`).
 
 Level 0 is not stored. It would be three quarters of a pyramid and more than a core's cache, small discs alone read
 it, and four depths give what four of its texels hold, to the same bits.
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.filters.beyond import beyond_disc
 from refgi.cluster.filters.eight import EIGHT
 from refgi.jit import kernel
 
@@ -32,6 +33,7 @@ class Mip(NamedTuple):
     terms: int  # M
     shift: float  # added to every level that is read
     quantised: bool  # 8 bits for the basis, 16 for basis-z
+    beyond: Array  # (count, 2) int32: texels beyond the unit disc and what they copy
 
 
 def level_offsets(size: int) -> tuple[Array, int]:
@@ -57,7 +59,8 @@ def level_offsets(size: int) -> tuple[Array, int]:
 
 
 def mips(
-    count: int, size: int, terms: int, dtype: npt.DTypeLike, *, shift: float = 0.0, quantised: bool = False
+    count: int, size: int, terms: int, dtype: npt.DTypeLike, *, shift: float = 0.0, quantised: bool = False,
+    mirrored: bool = False,
 ) -> Mip:
     """Make room for the pyramids of several maps.
 
@@ -75,6 +78,8 @@ def mips(
         Added to the level of every read; 0 as published, negative for a narrower filter.
     quantised : bool
         Keep 8 bits of the basis and 16 of the basis-z on every level.
+    mirrored : bool
+        Mirror the disc in the square beyond it, which otherwise holds the far end.
 
     Returns
     -------
@@ -84,7 +89,7 @@ def mips(
     first, total = level_offsets(size)
     shape, width = (count, total + SLACK), -(-2 * terms // EIGHT) * EIGHT
     return Mip(np.zeros((count, size, size), dtype), np.zeros((*shape, width), dtype), np.zeros((*shape, width), dtype),
-               np.zeros(shape, dtype), first, terms, shift, quantised)
+               np.zeros(shape, dtype), first, terms, shift, quantised, beyond_disc(size, mirrored))
 
 
 @kernel
@@ -104,4 +109,4 @@ def mip_of(several: Mip, k: Any) -> Mip:
         Views of that pyramid.
     """
     return Mip(several.depth[k], several.basis[k], several.basis_z[k], several.mean_depth[k], several.first,
-               several.terms, several.shift, several.quantised)
+               several.terms, several.shift, several.quantised, several.beyond)

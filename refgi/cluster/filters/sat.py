@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.filters.basis import fill_basis, normalise
+from refgi.cluster.filters.beyond import beyond_disc, fill_beyond
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
@@ -23,9 +24,10 @@ class Sat(NamedTuple):
     depth: Array  # (n, n): t
     sums: Array  # (n + 1, n + 1, 4 M + 1) float64
     quantised: bool  # 8 bits for the basis, 16 for basis-z
+    beyond: Array  # (count, 2) int32: texels beyond the unit disc and what they copy
 
 
-def sats(size: int, terms: int, dtype: npt.DTypeLike, *, quantised: bool = False) -> Sat:
+def sats(size: int, terms: int, dtype: npt.DTypeLike, *, quantised: bool = False, mirrored: bool = False) -> Sat:
     """Make room for one map.
 
     Parameters
@@ -38,13 +40,16 @@ def sats(size: int, terms: int, dtype: npt.DTypeLike, *, quantised: bool = False
         Float32 or float64, of the map.
     quantised : bool
         Keep 8 bits of the basis and 16 of the basis-z of each texel.
+    mirrored : bool
+        Mirror the disc in the square beyond it, which otherwise holds the far end.
 
     Returns
     -------
     Sat
         Arrays not yet filled.
     """
-    return Sat(np.zeros((size, size), dtype), np.zeros((size + 1, size + 1, 4 * terms + 1)), quantised)
+    return Sat(np.zeros((size, size), dtype), np.zeros((size + 1, size + 1, 4 * terms + 1)), quantised,
+               beyond_disc(size, mirrored))
 
 
 @kernel
@@ -61,6 +66,7 @@ def build_sat(depth: Array, scale: float, most: float, sat: Sat) -> None:
         Filled.
     """
     normalise(depth, scale, most, sat.depth)
+    fill_beyond(sat.beyond, sat.depth)
     n, terms = len(depth), sat.sums.shape[2] // 4
     basis, basis_z = np.empty((1, n, 2 * terms), depth.dtype), np.empty((1, n, 2 * terms + 1), depth.dtype)
     along = np.empty(4 * terms + 1)

@@ -162,3 +162,20 @@ def nearest_in_disc(depth, s, t, radius):
             if x * x + y * y <= radius**2:
                 least = min(least, depth[i, j])
     return least
+
+
+def mirrored(depth):
+    """Give texels beyond the unit disc the depth in the direction (x, y, -z): (s, t) over its squared length.
+
+    What would fall within a texel and a half of the rim comes from there.
+    """
+    n = len(depth)
+    out = np.array(depth, float)
+    for i in range(n):
+        for j in range(n):
+            x, y = centre(j, n), centre(i, n)
+            length = math.sqrt(x * x + y * y)
+            if length > 1:
+                scale = min(1 / length, 1 - 1.5 / n) / length
+                out[i, j] = depth[int((y * scale + 1) * n / 2), int((x * scale + 1) * n / 2)]
+    return out

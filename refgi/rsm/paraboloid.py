@@ -31,7 +31,8 @@ from refgi.rsm.paraboloid_batch import (
     UNSEEN,
     bound_across,
     is_behind,
-    set_up,
+    orient,
+    place,
 )
 from refgi.rsm.projection import Projection
 from refgi.rsm.triangle import SPAN_CUT
@@ -172,7 +173,8 @@ def _draw(
     for chunk in range(len(box)):
         if is_behind(box, chunk, view):
             continue
-        set_up(corners, chunk, view, half, n, ball, setup)
+        place(corners, chunk, view, half, n, ball, setup)
+        orient(setup)
         for b in range(CHUNK):
             state = setup[STATE + b]
             if state == BEHIND:

@@ -70,8 +70,8 @@ def _longest(x: float, y: float, z: float) -> Any:
 
 
 @kernel
-def set_up(corners: Array, chunk: int, view: Any, half: float, size: int, ball: float, setup: Array) -> None:
-    """Write what drawing needs to know of every triangle of a chunk.
+def place(corners: Array, chunk: int, view: Any, half: float, size: int, ball: float, setup: Array) -> None:
+    """Write where every triangle of a chunk lies on a map.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def set_up(corners: Array, chunk: int, view: Any, half: float, size: int, ball: 
     ball : float
         Triangles all nearer than this to the centre are `NEAR`, m.
     setup : (ROWS * CHUNK,) ndarray
-        Receives it.
+        Receives corners, state and box of each.
     """
     ox, oy, oz, rx, ry, rz, dx, dy, dz, fx, fy, fz = view
     texels, within = 0.5 * size / half, ball * ball
@@ -125,6 +125,17 @@ def set_up(corners: Array, chunk: int, view: Any, half: float, size: int, ball: 
         at = BOX + b
         setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK], setup[at + 3 * CHUNK] = (
             first_column, last_column, first_row, last_row)  # fmt: skip
+
+
+@kernel
+def orient(setup: Array) -> None:
+    """Write the planes through the centre and the edges of every triangle of a chunk, and its own plane.
+
+    Parameters
+    ----------
+    setup : (ROWS * CHUNK,) ndarray
+        Corners are read, the rest is written.
+    """
     for b in range(CHUNK):
         at = CORNERS + b
         xi, yi, zi = setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK]

@@ -16,6 +16,7 @@ from refgi.papers.val.figure11 import figure11
 from refgi.papers.val.figure12 import figure12
 from refgi.papers.val.figure13 import figure13
 from refgi.papers.val.headline import headline
+from refgi.papers.val.splitting import splitting
 from refgi.papers.val.table1 import table1
 from refgi.papers.val.table2 import table2
 
@@ -32,4 +33,5 @@ FIGURES = (
     Entry("fig13", "Figure 13", "Soft and crisp", figure13),
     Entry("table1", "Table 1", "Four scenes", table1),
     Entry("table2", "Table 2", "Where the time goes", table2),
+    Entry("error", "Error, split", "Beyond the paper", splitting),
 )

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 SHOWN = (2, 4, 8, 16, AREA_LIGHTS)
-FURTHER = (64, 128, 256, 512, 1024)
+FURTHER = (128, 512, 1024)
 KINDS = {"series": "series of 4 terms", "step": "exact step", "hard": "one hard shadow"}
-STEPS_TO = 64  # area lights up to which the exact step, which reads every texel, is looked at
+STEPS_TO = AREA_LIGHTS  # up to which the exact step, which reads every texel, is looked at
 
 
 class Sweep(NamedTuple):
@@ -98,7 +98,7 @@ def swept(bench: "Workbench", frame: "Frame", right: Array, traced: Array) -> Sw
     """
     covered, most = frame.gbuffer.covered, settings_of(bench).lights
     found = Sweep({}, {}, {}, {})
-    for m in (*SHOWN, *(n for n in FURTHER if n <= most)):
+    for m in (*SHOWN, *(n for n in FURTHER if SHOWN[-1] < n < most), most):
         for kind in KINDS if m <= STEPS_TO else ("series", "hard"):
             started = time.perf_counter()
             light = val(frame, settings_of(bench, area_lights=m, visibility=kind))

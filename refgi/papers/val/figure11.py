@@ -8,7 +8,7 @@ from refgi.papers.records import Bar, Figure, Ratios
 from refgi.papers.timing import interleaved
 from refgi.papers.val.scenes import march
 from refgi.papers.val.sequence import note, sequence, table
-from refgi.papers.val.subjects import ATRIUM, MARCH, drawing, published, scene_of, seen_by
+from refgi.papers.val.subjects import ATRIUM, MARCH, drawing, published, rounds, scene_of, seen_by
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench
@@ -40,7 +40,7 @@ def figure11(bench: "Workbench") -> Figure:
     shown.append(pictures.indirect("indirect", "indirect light at the end", "8 x 8 pixels interleaved, blurred", light,
                                    pictures.exposure_of(light, last.gbuffer.covered)))
     seconds = interleaved({"moving bodies": drawing(bench, scene_of(bench, MARCH), settings),
-                           "still": drawing(bench, scene_of(bench, ATRIUM), settings)}, bench.scale.repeats)
+                           "still": drawing(bench, scene_of(bench, ATRIUM), settings)}, rounds(bench))
     moving = sequence(bench, march, STEP * (max(4, bench.scale.repeats) - 1))
     return Figure(
         shows="Several animated dragons in Sponza, 100 thousand faces in all, at 14 frames per second; light that "

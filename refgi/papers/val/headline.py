@@ -12,14 +12,15 @@ from refgi.papers.timing import interleaved
 from refgi.papers.val.subjects import (
     HORSE,
     JUDGED,
-    TIMED,
     clamped,
     drawing,
     frame_of,
     published,
+    rounds,
     scene_of,
     settings_of,
     shadowed,
+    timed_size,
 )
 
 if TYPE_CHECKING:
@@ -41,9 +42,10 @@ def headline(bench: "Workbench") -> Figure:
     Figure
         The picture, its parts, its time and its error.
     """
-    frame, scene = frame_of(bench, HORSE, TIMED), scene_of(bench, HORSE)
+    scene = scene_of(bench, HORSE)
+    frame = frame_of(bench, HORSE, timed_size(bench) / bench.scale.size)
     ways = {"interleaved and blurred": published(bench, scene), "all lights at every pixel": clamped(bench, scene)}
-    seconds = interleaved({title: drawing(bench, scene, one) for title, one in ways.items()}, bench.scale.repeats)
+    seconds = interleaved({title: drawing(bench, scene, one) for title, one in ways.items()}, rounds(bench))
     light = {title: val(frame, one) for title, one in ways.items()}
     block, full = ways
     small = frame_of(bench, HORSE, JUDGED)

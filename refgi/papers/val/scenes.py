@@ -7,6 +7,7 @@ that throw thin shadows beside a trunk that throws a broad one.
 import dataclasses
 import math
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -29,12 +30,13 @@ LEGS = ((-0.42, 0.16), (-0.4, -0.16), (0.38, 0.15), (0.36, -0.15))  # where they
 BALLS_A_LIMB = 9
 BODY_CELLS = 50  # along the grid of its field: 17 thousand faces with the box
 ATRIUM_FACES = 98_000
-MOVING_CELLS, MOVING_ATRIUM_FACES = 40, 83_000  # 100 thousand faces in all
+MOVING_CELLS, MOVING_ATRIUM_FACES = 26, 93_500  # 100 thousand faces in all
 BLOB_CELLS = 22  # 5.1 thousand faces
 
 WIDE, NARROW = math.radians(62), math.radians(12)  # half-angles of Figure 13's spots
 
 
+@cache
 def body(cells: int = BODY_CELLS, stride: float = 0.0) -> Mesh:
     """Build the body, 1.6 units high, standing on y = 0 above the origin and looking along x.
 

@@ -34,8 +34,9 @@ Array = npt.NDArray[Any]
 
 HORSE, CORNER, BOX, ATRIUM, BLOB, MARCH = "horse", "corner", "plain box", "atrium", "blob", "march"
 MOST_LIGHTS, AREA_LIGHTS, BLOCK = 1024, 30, 8  # the paper's
+FEWEST_LIGHTS = 128  # however small a run is
 CLAMP = 0.04  # least distance between light and receiver, share of the diagonal
-TIMED = 25 / 16  # of the run's size: 800 pixels in a full run, as the paper's
+PAPER_SIZE = 800  # pixels along a side, of what is timed
 JUDGED, SMALL, MOVING = 1 / 2, 1 / 4, 1 / 8  # where each pixel has a ray to each light: one picture, several, many
 
 
@@ -122,8 +123,9 @@ def settings_of(bench: "Workbench", **changes: Any) -> ValSettings:
     ValSettings
         The settings.
     """
-    usual: dict[str, Any] = {"lights": min(MOST_LIGHTS, 4 * bench.scale.size), "area_lights": AREA_LIGHTS,
-                             "map_resolution": bench.scale.rsm_resolution, "interleaving": 1}
+    lights = min(MOST_LIGHTS, max(FEWEST_LIGHTS, 2 * bench.scale.size))
+    usual: dict[str, Any] = {"lights": lights, "area_lights": AREA_LIGHTS, "map_resolution": bench.scale.rsm_resolution,
+                             "interleaving": 1}
     return ValSettings(**(usual | changes))
 
 
@@ -231,11 +233,45 @@ def drawing(bench: "Workbench", scene: "Scene", settings: ValSettings) -> Callab
     callable
         Gives radiance; nothing is kept from one call to the next.
     """
+    factor = timed_size(bench) / bench.scale.size
+
     def draw() -> Array:
-        frame = seen_by(bench, scene, TIMED)
+        frame = seen_by(bench, scene, factor)
         return frame.radiance(val(frame, settings))
 
     return draw
+
+
+def timed_size(bench: "Workbench") -> int:
+    """Return how large the pictures are that are timed.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Says how large a run is.
+
+    Returns
+    -------
+    int
+        Pixels along a side: the paper's in a full run, those of the run in a smaller one.
+    """
+    return PAPER_SIZE if bench.scale.size >= PAPER_SIZE / 2 else bench.scale.size
+
+
+def rounds(bench: "Workbench") -> int:
+    """Return how often a whole frame is timed.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Says how often shorter work is.
+
+    Returns
+    -------
+    int
+        1 or more.
+    """
+    return max(1, bench.scale.repeats // 2)
 
 
 def rays_to(frame: Frame, lights: "PixelLights") -> Array:

@@ -24,7 +24,7 @@ ROUNDING = 1e-4  # of the error: float32 sums, and rays that graze an edge from 
 
 @pytest.fixture(scope="module")
 def frame():
-    return Frame(load_scene("cornell_sphere"), width=40, height=40)
+    return Frame(load_scene("cornell_sphere"), width=32, height=32)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_a_lower_target_takes_more_area_lights_and_is_met(frame, lights, evidenc
         settings = dataclasses.replace(SETTINGS, target_error=target)
         found = enough_area_lights(frame, lights, settings)
         error = error_of_picture(frame, lights, found.areas, found.maps, settings)
-        # 40 x 40 pixels are all looked at: the estimate is the picture's error
+        # 32 x 32 pixels are all looked at: the estimate is the picture's error
         assert error == pytest.approx(found.error, rel=ROUNDING)
         assert error <= target
         assert found.error in [trial.error for trial in found.trail if trial.area_lights == len(found.areas.members)]
@@ -70,7 +70,7 @@ def test_a_sample_of_the_pixels_bounds_the_error_of_all(frame, lights, monkeypat
         met += error <= trial.bound
         figures.append(round(float(trial.error / error), 3))
         assert trial.bound > trial.error
-    evidence(f"200 of 1600 pixels: estimate over true error {figures}; the bound held {met} times of 4")
+    evidence(f"200 of 1024 pixels: estimate over true error {figures}; the bound held {met} times of 4")
     assert met >= 3  # 95 % each
 
 

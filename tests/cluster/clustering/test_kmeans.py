@@ -227,13 +227,16 @@ def test_as_many_clusters_as_lights_are_the_lights_themselves():
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_cluster_whose_normals_cancel_keeps_its_normal(mode):
-    position = np.array([[0.0, 0.1, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    normal = np.array([[0.0, 0.0, 1.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0]])
+@pytest.mark.parametrize("turns", [(0, 180), (10, 130, 250)])
+def test_a_cluster_whose_normals_cancel_keeps_its_normal(mode, turns):
+    """Cancel exactly, or but for rounding, which is no direction."""
+    position, normal = np.zeros((3, len(turns) + 1)), np.zeros((3, len(turns) + 1))
+    position[0] = [*(0.1 * i for i in range(len(turns))), 9.0]
+    normal[:2] = np.cos(np.radians([*turns, 0])), np.sin(np.radians([*turns, 0]))
     start = Clusters(np.array([[0.05, 9.0], [0.0, 0.0], [0.0, 0.0]]), np.array([[0.0, 1.0], [0.6, 0.0], [0.8, 0.0]]),
                      np.zeros(2, np.int64), np.zeros(3, np.int32), 0, np.zeros(1))
     found = cluster(position, normal, 2, distance=mode, weights=(0.9, 0.1), diagonal=1.0, start=start)
-    assert found.of.tolist() == [0, 0, 1]
+    assert found.of.tolist() == [0] * len(turns) + [1]
     np.testing.assert_array_equal(found.normal[:, 0], [0.0, 0.6, 0.8])
 
 

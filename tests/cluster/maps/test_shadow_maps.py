@@ -51,6 +51,13 @@ def test_drawn_maps_are_those_of_rays(rule, alone, evidence):
     evidence(f"{rule}, occluders alone {alone}: {off:.1e} of texels differ from rays, {drawn.left_out} left out")
 
 
+@pytest.mark.parametrize("alone", [True, False])
+def test_rays_of_the_frame_serve_where_nothing_is_left_out(alone):
+    settings = dataclasses.replace(SMALL, maps="rays", occluders_alone=alone, near_geometry="keep")
+    given = shadow_maps(SCENE, LIGHTS, settings, np.float32, Tracer(SCENE))
+    np.testing.assert_array_equal(given.depth, shadow_maps(SCENE, LIGHTS, settings, np.float32).depth)
+
+
 def test_what_a_map_says_of_itself():
     maps = maps_of(SCENE, LIGHTS, np.float64, occluders_alone=False, near_geometry="keep", behind="dual_paraboloid")
     assert maps.depth.dtype == maps.behind.dtype == np.float64

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 
 def reference_visibility(
-    frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps", settings: ValSettings
+    frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",
+    settings: ValSettings,
 ) -> Given | None:
     """Return the reference visibility of `settings.visibility`.
 
@@ -28,8 +29,8 @@ def reference_visibility(
         The pixel lights.
     areas : AreaLights
         Their area lights.
-    maps : ShadowMaps
-        What each area light sees.
+    maps : ShadowMaps or None
+        What each area light sees; for "back_projection" alone.
     settings : ValSettings
         Says which.
 
@@ -42,7 +43,7 @@ def reference_visibility(
         return member_visibility(frame, lights, areas)
     if settings.visibility == "rectangle":
         return rectangle_visibility(frame, areas, settings)
-    if settings.visibility == "back_projection":
+    if settings.visibility == "back_projection" and maps is not None:
         behind = rectangle_visibility(frame, areas, settings) if settings.behind == "raytrace" else None
         return back_projected_visibility(areas, maps, behind)
     return None

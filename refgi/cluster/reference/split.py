@@ -13,7 +13,7 @@ Each picture takes one approximation more than the one before it, all with the s
 - interleaved: one light of n^2 at each pixel, and the blur.
 
 The whole error is the sum of the steps. Were they independent, its root mean square would be the root of the sum of
-their squares.
+their squares. The last step is not: the blur removes much of what the first one adds, peaks beside pixel lights.
 """
 
 import dataclasses
@@ -29,7 +29,6 @@ from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.reference.chosen import reference_visibility
 from refgi.cluster.reference.members import member_visibility
-from refgi.cluster.reference.rectangle import rectangle_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import PUBLISHED_BLOCK, clustered, facing
 from refgi.errors import expect
@@ -68,6 +67,27 @@ class ErrorSplit(NamedTuple):
 
     steps: tuple[Step, ...]
     pictures: dict[str, Array]  # (3, h, w) W/m^2; those of the steps, after the one that they start from
+    covered: Array  # (h, w) bool: pixels that count
+
+    def together(self, first: str, last: str) -> tuple[float, float]:
+        """Return the error of several steps, and what it would be if they were independent.
+
+        Parameters
+        ----------
+        first, last : str
+            Names of the first and the last of them.
+
+        Returns
+        -------
+        rmse, root_of_squares : float
+            As shares of the mean of the first picture of all.
+        """
+        names = list(self.pictures)
+        begin, end = names.index(first) - 1, names.index(last)
+        covered = self.covered
+        change = (self.pictures[last] - self.pictures[names[begin]])[:, covered].astype(np.float64)
+        mean = float(self.pictures[names[0]][:, covered].astype(np.float64).mean())
+        return _rms(change) / mean, math.sqrt(sum(step.rmse**2 for step in self.steps[begin:end]))
 
     @property
     def whole(self) -> float:
@@ -115,7 +135,8 @@ def split_error(
         pictures[name] = _picture(frame, lights, areas, maps, dataclasses.replace(base, **changes))
     interleaved, surface = _picture(frame, lights, areas, maps, base, block), _surface(frame)
     pictures["interleaved"] = blur(interleaved, surface, block, base, frame.scene.geometry.diagonal)
-    return ErrorSplit(steps_between(pictures, np.asarray(surface.covered, np.bool_)), pictures)
+    covered = np.asarray(surface.covered, np.bool_)
+    return ErrorSplit(steps_between(pictures, covered), pictures, covered)
 
 
 def steps_between(pictures: dict[str, Array], covered: Array) -> tuple[Step, ...]:
@@ -174,12 +195,13 @@ def exact_shadows(frame: "Frame", lights: "PixelLights", settings: ValSettings) 
 
 
 def _picture(
-    frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps", settings: ValSettings, block: int = 1
+    frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None", settings: ValSettings,
+    block: int = 1,
 ) -> Array:
     return clustered_irradiance(
         _surface(frame), facing(frame), lights, areas, maps, settings, footprint=footprints(frame, settings),
         given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
-        rays=rectangle_visibility(frame, areas, settings) if settings.behind == "raytrace" else None)
+        rays=frame.tracer if settings.behind == "raytrace" else None)
 
 
 def _surface(frame: "Frame") -> Receivers:

@@ -1,0 +1,71 @@
+"""What each approximation costs: steps that add up, from exact shadows to the published picture."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from refgi.cluster.reference.split import STEPS, exact_shadows, split_error, steps_between
+from refgi.cluster.settings import ValSettings
+from refgi.errors import InputError
+from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
+from refgi.scene import load_scene
+from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
+
+# near pairs clamped at a twentieth of the scene's metre: else the error of sampling is that of a pixel beside a light
+SETTINGS = ValSettings(lights=128, area_lights=12, map_resolution=64, clamp="distance", clamp_value=0.1)
+ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
+# the root of summed squares over the error of all seven steps of visibility: 1 for independent ones, 0.4 where all are
+# alike, without bound where they cancel
+PLAUSIBLE = (0.5, 2.0)
+
+
+@pytest.mark.feature("VAL-02", "VAL-27")
+def test_the_picture_of_exact_shadows_is_that_of_vpl(evidence):
+    frame, settings = Frame(load_scene("cornell_box"), width=20, height=20, rsm_resolution=64), ValSettings(lights=100)
+    exact = exact_shadows(frame, choose_lights(frame, settings), settings)
+    reference = vpl(frame, VplSettings(lights=100))
+    off = np.abs(exact - reference).max() / reference.max()
+    evidence(f"100 area lights of one light each, V by rays: {off:.1e} of the maximum off the method vpl")
+    assert off < ROUNDING
+
+
+@pytest.mark.feature("VAL-27", "REF-15")
+@pytest.mark.parametrize("name", ["cornell_box", "cornell_sphere:faces=600"])
+def test_errors_of_the_steps_add_up_plausibly(name, evidence):
+    frame = Frame(load_scene(name), width=32, height=32, rsm_resolution=64)
+    reference = trace_truth(frame, TruthSettings(samples=384)).mean
+    found = split_error(frame, SETTINGS, reference, block=4)
+    whole, root = found.together("members", "mip")
+    evidence(f"{name.partition(':')[0]}, rmse / mean of truth: "
+             + ", ".join(f"{step.name} {step.rmse:.3f}" for step in found.steps)
+             + f"; steps of visibility together {whole:.3f}, root of their squares {root:.3f} ({root / whole:.2f}); "
+             f"all {found.whole:.3f}, root {found.root_of_squares:.3f}")
+    assert [step.name for step in found.steps] == ["lights", *STEPS, "interleaved"]
+    assert all(0 < step.rmse < 1 for step in found.steps)
+    assert PLAUSIBLE[0] < root / whole < PLAUSIBLE[1]
+    changes = sum(step.shift for step in found.steps)
+    mean = found.pictures["truth"][:, found.covered].mean()
+    assert changes == pytest.approx(found.pictures["interleaved"][:, found.covered].mean() / mean - 1, abs=1e-6)
+
+
+def test_steps_of_known_pictures():
+    first = np.full((3, 2, 2), 2.0)
+    second, third = first + np.array([[1.0, -1.0], [9.0, 9.0]]), first + np.array([[1.0, 1.0], [9.0, 9.0]])
+    covered = np.array([[True, True], [False, False]])
+    one, two = steps_between({"a": first, "b": second, "c": third}, covered)
+    assert (one.name, one.rmse, one.shift, one.so_far) == ("b", 0.5, 0.0, 0.5)
+    assert (two.name, two.shift, two.so_far) == ("c", 0.5, 0.5)
+    assert two.rmse == pytest.approx(math.sqrt(0.5))
+    with pytest.raises(InputError, match="black"):
+        steps_between({"a": 0 * first, "b": second}, covered)
+
+
+def test_without_truth_and_with_rays_behind():
+    frame = Frame(load_scene("cornell_box"), width=8, height=8, rsm_resolution=32)
+    settings = dataclasses.replace(SETTINGS, lights=32, area_lights=3, map_resolution=16, behind="raytrace")
+    found = split_error(frame, settings, block=2)
+    assert next(iter(found.pictures)) == "lights"
+    assert all(np.isfinite(picture).all() and (picture >= 0).all() for picture in found.pictures.values())

@@ -25,6 +25,7 @@ __all__ = ["Mip", "build_mip", "build_mips", "mip_means", "mip_of", "mips"]
 
 Array = npt.NDArray[Any]
 
+WIDEST = 4.0  # radius from which on a disc holds the whole map
 CHUNK = 128  # receivers whose texels and weights are kept at once
 FINE, COARSE, FINE_SIDE, COARSE_SIDE, LEVEL, DIRECT = range(6)  # rows of whole numbers
 # rows of weights: 4 of the finer level, 4 of the coarser, 4 of texels of the map itself; then what they are made of
@@ -92,9 +93,9 @@ def _find_levels(
     real = s.dtype.type
     n, top, none, half, one = real(size), real(coarsest), real(0.0), real(0.5), real(1.0)
     for lane in range(len(s)):  # three loops: one would be too long for the compiler to join into SIMD lanes
-        weights[SHARE, lane] = log2p1(max(radius[lane] * n - one, none)) + real(shift)
+        weights[SHARE, lane] = log2p1(max(none, min(real(WIDEST), radius[lane]) * n - one)) + real(shift)
     for lane in range(len(s)):
-        level = min(max(weights[SHARE, lane], none), top)
+        level = min(max(none, weights[SHARE, lane]), top)
         level = level if wanted[lane] else top
         fine = np.int32(level)
         whole[LEVEL, lane], weights[SHARE, lane] = fine, level - real(fine)
@@ -118,8 +119,8 @@ def _find_texels(size: int, coarsest: int, lanes: int, which: int, whole: Array,
         level = min(np.int32(whole[LEVEL, lane] + np.int32(which)), top)
         side = np.int32((n + (one << level) - one) >> level)
         shrink, last = full / real(np.int32(one << level)), real(np.int32(side - one))
-        u = min(max(weights[X, lane] * shrink - half, none), last)
-        v = min(max(weights[Y, lane] * shrink - half, none), last)
+        u = min(max(none, weights[X, lane] * shrink - half), last)  # 0 for NaN, whose lane reads something
+        v = min(max(none, weights[Y, lane] * shrink - half), last)
         column, row = np.int32(u), np.int32(v)
         fx, fy = u - real(column), v - real(row)
         share = weights[SHARE, lane] if which else full - weights[SHARE, lane]

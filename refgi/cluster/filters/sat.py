@@ -109,8 +109,8 @@ def sat_means(
     for i in range(count):
         if not wanted[i]:
             continue
-        half = max(0.5 * radius[i] * n, 0.5)
-        x, y = min(max(0.5 * n * (s[i] + 1.0), 0.0), 1.0 * n), min(max(0.5 * n * (t[i] + 1.0), 0.0), 1.0 * n)
+        half = max(0.5, 0.5 * radius[i] * n)
+        x, y = min(max(0.0, 0.5 * n * (s[i] + 1.0)), 1.0 * n), min(max(0.0, 0.5 * n * (t[i] + 1.0)), 1.0 * n)
         left, right = max(x - half, 0.0), min(x + half, 1.0 * n)
         top, bottom = max(y - half, 0.0), min(y + half, 1.0 * n)
         area = (right - left) * (bottom - top)

@@ -80,6 +80,17 @@ def test_one_depth_everywhere_is_its_own_mean(kind):
     assert np.abs(found - expected[:, None]).max() < SUMS
 
 
+@pytest.mark.parametrize("kind", ["mip", "sat", "brute"])
+def test_discs_without_end_or_number_read_within_the_map(kind):
+    depth, none = reads.random_map(16, np.float32), np.zeros(4, np.float32)
+    bad = np.array([np.nan, np.inf, -np.inf, 1e30], np.float32)
+    filters = getattr(reads, kind)(depth, 4)
+    for discs in ((bad, none, none + 0.1), (none, bad, none + 0.1), (none, none, np.abs(bad))):
+        means = reads.means(filters, discs, 4)
+        assert (np.abs(means[np.isfinite(means)]) <= 1).all()
+        assert np.isfinite(means[:, 1:]).all() or kind != "mip"
+
+
 def test_several_maps_at_once_are_those_of_each():
     depth = np.stack([reads.random_map(17, np.float32, seed) for seed in range(3)])
     several = mips(3, 17, 4, np.float32)

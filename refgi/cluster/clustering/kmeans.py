@@ -15,7 +15,7 @@ from refgi.stages import skip, stage
 
 Array = npt.NDArray[Any]
 
-SMALL = 1 << 17  # pairs of lights and area lights up to which waking other threads costs more than it brings
+SMALL = 1 << 20  # pairs of lights and area lights up to which waking other threads costs more than it brings
 SLACK = 1e-12  # share of the largest distance: thousands of roundings
 
 

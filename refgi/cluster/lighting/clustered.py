@@ -5,9 +5,11 @@ then V where there is any. Diffuse lights under the map of the hemisphere ahead,
 everything else takes the longer way, by lists of receivers, to the same bits.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -121,21 +123,36 @@ def _add_by_tiles(
     sums: Array,
 ) -> None:
     """Add every area light to receivers, tile by tile."""
-    lights, clamp, chain, chosen = members.packed.diffuse, members.packed.clamp, series(settings), choices(settings)
-    weight = chain.weight.astype(sums.dtype)
-    for m, start in enumerate(members.start):
-        k = -1 if maps is None or settings.visibility == "none" else int(maps.map_of[m])
-        if start[0] == start[-1]:
-            continue
+    lights, clamp, sizes = members.packed.diffuse, members.packed.clamp, choices(settings)
+    weight = series(settings).weight.astype(sums.dtype)
+    shining = np.flatnonzero(members.start[:, 0] < members.start[:, -1])
+    map_of = np.full(len(members.start), -1) if maps is None or settings.visibility == "none" else maps.map_of
+    hard = (areas.delta == 0) | (settings.visibility == "hard")
+    filters = _filtered(maps, map_of[shining[(map_of[shining] >= 0) & ~hard[shining]]], settings)
+    for done, m in enumerate(shining):
+        start, k = members.start[m], int(map_of[m])
         if k < 0 or maps is None:
             add_unshadowed(tiles, lights, clamp, start, sums)
-        elif settings.visibility == "hard" or areas.delta[m] == 0:
+        elif hard[m]:
             add_hard(tiles, lights, clamp, start, maps.depth[k], maps.center[k], maps.frame[k], sums)
         else:
             numbers = numbers_of(maps, k, float(areas.delta[m]), settings)
-            filters = build(maps.depth[k], float(maps.far[k]), settings)
-            add_soft(tiles, lights, clamp, start, numbers, chosen, weight, filters, sums)
-        report_progress((m + 1) / len(members.start))
+            add_soft(tiles, lights, clamp, start, numbers, sizes, weight, next(filters), sums)
+        report_progress((done + 1) / len(shining))
+
+
+def _filtered(maps: "ShadowMaps | None", wanted: Array, settings: "ValSettings") -> Iterator[Any]:
+    """Filter some maps in their order, a few ahead: one map is too little for more than one thread."""
+    if maps is None or len(wanted) == 0:
+        return
+    known, workers = maps, numba.get_num_threads()
+
+    def filtered(k: int) -> Any:
+        return build(known.depth[k], float(known.far[k]), settings)
+
+    with ThreadPoolExecutor(workers) as pool:
+        for first in range(0, len(wanted), workers):
+            yield from pool.map(filtered, wanted[first : first + workers])
 
 
 def _add_by_lists(

@@ -8,6 +8,7 @@ Coordinates: those of the rectangle, along its two sides and its normal, from th
 """
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,31 +58,33 @@ def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, rays: Given |
     surfaces by up to their share. What a map does not see from its centre cannot hide anything. An area light without
     a map has V = 1, and so has a receiver with no part of the rectangle above its surface.
     """
-    kept: dict[tuple[int, bool], Patches] = {}
+    @lru_cache(maxsize=2)
+    def patches_of(m: int, sign: float) -> Patches:
+        k, turned = maps.map_of[m], np.array([1.0, 1.0, sign])[:, None]
+        depth, frame = (maps.depth, maps.frame[k]) if sign > 0 else (maps.behind, BACKWARD @ maps.frame[k])
+        return _patches(np.asarray(depth)[k], frame, _axes(areas, m) * turned)
 
     def given(m: int, points: Array, facing: Array) -> Array:
-        k = maps.map_of[m]
-        visible = np.ones(points.shape[1])
-        axes = np.vstack([areas.axes[m], areas.normal[:, m]])
+        k, visible = maps.map_of[m], np.ones(points.shape[1])
         center = maps.center[k] if k >= 0 else areas.center[:, m]
-        x, up = axes @ (points.astype(np.float64) - center[:, None]), axes @ facing.astype(np.float64)
-        if k >= 0:
-            for depth, sign in ((maps.depth, 1.0), (maps.behind, -1.0)):
-                on = x[2] * sign > 0
-                if depth is None or not on.any():
-                    continue
-                turned = np.array([1.0, 1.0, sign])[:, None]  # behind: mirrored, so that it lies ahead
-                if (m, sign < 0) not in kept:
-                    kept.clear()
-                    frame = maps.frame[k] if sign > 0 else BACKWARD @ maps.frame[k]
-                    kept[m, sign < 0] = _patches(depth[k], frame, axes * turned)
-                low, cell = _grid(areas, maps, m, k)
-                visible[on] = _visible(kept[m, sign < 0], turned * x[:, on], turned * up[:, on], low, cell)
+        x = _axes(areas, m) @ (points.astype(np.float64) - center[:, None])
+        up = _axes(areas, m) @ facing.astype(np.float64)
+        for sign in () if k < 0 else (1.0,) if maps.behind is None else (1.0, -1.0):
+            turned = np.array([1.0, 1.0, sign])[:, None]  # behind: mirrored, so that it lies ahead
+            low, cell = _grid(areas, maps, m, k)
+            low[2] *= sign
+            on = x[2] * sign > 0
+            visible[on] = _visible(patches_of(m, sign), turned * x[:, on], turned * up[:, on], low, cell)
         if rays is not None:
             visible[x[2] <= 0] = rays(m, points[:, x[2] <= 0], facing[:, x[2] <= 0])
         return visible.astype(points.dtype)
 
     return given
+
+
+def _axes(areas: AreaLights, m: int) -> Array:
+    """Return the rectangle's sides and its normal, (3, 3)."""
+    return np.vstack([areas.axes[m], areas.normal[:, m]])
 
 
 def _patches(depth: Array, frame: Array, axes: Array) -> Patches:

@@ -1,0 +1,137 @@
+"""Rays to a rectangle and its map projected back: what counts, what does not, and how the two agree."""
+
+import dataclasses
+
+import numba
+import numpy as np
+import pytest
+
+from refgi.cluster.clustering.kmeans import cluster
+from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.maps.shadow_maps import shadow_maps
+from refgi.cluster.reference import back_projected_visibility, rectangle_visibility, reference_visibility
+from refgi.cluster.reference.rectangle import rectangle_points
+from refgi.cluster.settings import ValSettings
+from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
+from refgi.rsm import facing_normals
+from refgi.scene import load_scene
+from tests.naive import truth
+
+SETTINGS = ValSettings(lights=200, area_lights=6, map_resolution=128)
+PAIRS = 150
+# rms over area lights and pixels: one view from the centre misses what hides behind the nearest surface, and patches
+# are a texel of 128 wide
+ONE_VIEW = 0.12
+
+
+@pytest.fixture(scope="module")
+def box():
+    """Return frame, lights, area lights, and the surface points with the normals of their triangles."""
+    frame = Frame(load_scene("cornell_box"), width=24, height=24, rsm_resolution=64, dtype=np.float64)
+    lights = choose_lights(frame, SETTINGS)
+    clusters = cluster(lights.position, lights.normal, 6, diagonal=frame.scene.geometry.diagonal)
+    buffer = frame.gbuffer
+    facing = facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)
+    return frame, lights, area_lights(lights, clusters, SETTINGS), buffer.position[:, buffer.covered], facing[
+        :, buffer.covered]  # fmt: skip
+
+
+def height_above(areas, m, points):
+    return areas.normal[:, m] @ (points - areas.center[:, m, None])
+
+
+@pytest.mark.feature("REF-15")
+def test_one_point_of_the_rectangle_is_a_ray_against_every_triangle(box, evidence):
+    frame, _, areas, points, facing = box
+    settings = dataclasses.replace(SETTINGS, near_geometry="keep", behind="raytrace")
+    given, geometry = rectangle_visibility(frame, areas, settings, points=1), frame.scene.geometry
+    rng = np.random.default_rng(2)
+    wrong, blocked = 0, 0
+    for _ in range(PAIRS):
+        m, i = rng.integers(0, 6), rng.integers(0, points.shape[1])
+        q = rectangle_points(areas, m, np.full((2, 1), 0.5))[:, 0]
+        side = np.sign(height_above(areas, m, points[:, i : i + 1])[0])
+        if (q - points[:, i]) @ facing[:, i] <= 0:
+            free = True  # below the receiver's surface: does not count
+        else:
+            start, end = points[:, i] + 1e-6 * facing[:, i], q + 1e-6 * side * areas.normal[:, m]
+            free = truth.nearest_hit(geometry.vertices, geometry.faces, start, end - start)[1] > 1
+        wrong += given(m, points[:, i : i + 1], facing[:, i : i + 1])[0] != free
+        blocked += not free
+    evidence(f"{wrong} of {PAIRS} random rays to rectangles differ from a ray against every triangle; {blocked} are "
+             "blocked")
+    assert wrong == 0
+    assert 10 < blocked < PAIRS - 10
+
+
+@pytest.mark.feature("REF-15")
+def test_the_map_projected_back_agrees_with_rays(box, evidence):
+    frame, _, areas, points, facing = box
+    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
+    traced, projected = rectangle_visibility(frame, areas, SETTINGS), back_projected_visibility(areas, maps)
+    off = []
+    for m in range(6):
+        a, b = traced(m, points, facing), projected(m, points, facing)
+        assert ((a >= 0) & (a <= 1) & (b >= 0) & (b <= 1)).all()
+        off.append(a - b)
+    rms = np.sqrt(np.mean(np.square(off)))
+    evidence(f"6 area lights, {points.shape[1]} receivers: V from a map projected back is {rms:.3f} (rms) off rays to "
+             f"the rectangle, {np.mean(off):+.3f} in the mean")
+    assert rms < ONE_VIEW
+
+
+@pytest.mark.feature("VAL-21")
+def test_behind_the_area_light(box):
+    frame, _, areas, points, facing = box
+    for m in range(6):
+        back = height_above(areas, m, points) <= 0
+        published = rectangle_visibility(frame, areas, SETTINGS)(m, points, facing)
+        traced = rectangle_visibility(frame, areas, dataclasses.replace(SETTINGS, behind="raytrace"))(m, points, facing)
+        assert (published[back] == 1).all()
+        assert np.array_equal(published[~back], traced[~back])
+    both = dataclasses.replace(SETTINGS, behind="dual_paraboloid")
+    rays = rectangle_visibility(frame, areas, dataclasses.replace(both, behind="raytrace"))
+    maps = shadow_maps(frame.scene.geometry, areas, both, np.float64)
+    off, wide = [], 0
+    for m in range(6):
+        back = height_above(areas, m, points) < -1e-3
+        seen = back_projected_visibility(areas, maps)(m, points[:, back], facing[:, back])
+        off += list(seen - rays(m, points[:, back], facing[:, back]))
+        wide += (seen < 1).sum()
+        by_rays = back_projected_visibility(areas, maps, rays)(m, points[:, back], facing[:, back])
+        assert np.array_equal(by_rays, rays(m, points[:, back], facing[:, back]))
+    assert wide > 0  # the map of the hemisphere behind hides something
+    assert np.sqrt(np.mean(np.square(off))) < ONE_VIEW
+
+
+@pytest.mark.feature("VAL-22")
+def test_near_geometry_is_left_out_or_kept(box, evidence):
+    frame, _, areas, points, facing = box
+    mean = {}
+    for rule in ("keep", "ball", "planes"):
+        given = rectangle_visibility(frame, areas, dataclasses.replace(SETTINGS, near_geometry=rule))
+        mean[rule] = [given(m, points, facing).mean() for m in range(6)]
+    evidence("mean V of a rectangle, near geometry kept, cut by a ball, left out by planes: "
+             + ", ".join(f"{np.mean(mean[rule]):.3f}" for rule in ("keep", "ball", "planes")))
+    for kept, ball, planes in zip(mean["keep"], mean["ball"], mean["planes"], strict=True):
+        assert kept <= ball + 1e-12
+        assert kept <= planes + 1e-12
+    assert np.mean(mean["planes"]) > np.mean(mean["keep"]) + 0.01
+
+
+def test_same_bits_for_any_threads_and_any_split(box):
+    frame, lights, areas, points, facing = box
+    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
+    before = numba.get_num_threads()
+    for mode in ("members", "rectangle", "back_projection"):
+        given = reference_visibility(frame, lights, areas, maps, dataclasses.replace(SETTINGS, visibility=mode))
+        whole = given(2, points, facing)
+        numba.set_num_threads(1)
+        parts = [given(2, points[:, part], facing[:, part]) for part in (slice(0, 7), slice(7, 7), slice(7, None))]
+        numba.set_num_threads(before)
+        assert np.array_equal(np.concatenate(parts), whole)
+        single = given(2, points.astype(np.float32), facing.astype(np.float32))
+        assert single.dtype == np.float32
+        assert np.isfinite(single).all()
+    assert reference_visibility(frame, lights, areas, maps, SETTINGS) is None

@@ -20,7 +20,7 @@ from refgi.scene.model import merge
 Array = npt.NDArray[np.float64]
 
 HIDE = Material("hide", (0.6, 0.55, 0.48))
-FIELD_CUBE = 2.0  # units of the skeleton along a side of the grid
+FIELD_CUBE = 2.2  # units of the skeleton along a side of the grid
 # joints of the skeleton, x ahead, y up, z aside, and radii there; each row is a limb from joint to joint
 TRUNK = ((-0.42, 0.86, 0.0, 0.2), (0.36, 0.9, 0.0, 0.2))
 NECK = ((0.42, 1.0, 0.0, 0.14), (0.72, 1.42, 0.0, 0.085))
@@ -28,9 +28,9 @@ HEAD = ((0.72, 1.45, 0.0, 0.09), (0.95, 1.28, 0.0, 0.06))
 TAIL = ((-0.58, 0.92, 0.0, 0.06), (-0.78, 0.45, 0.0, 0.04))
 LEGS = ((-0.42, 0.16), (-0.4, -0.16), (0.38, 0.15), (0.36, -0.15))  # where they leave the trunk: x, z
 BALLS_A_LIMB = 9
-BODY_CELLS = 50  # along the grid of its field: 17 thousand faces with the box
+BODY_CELLS = 55  # along the grid of its field: 17 thousand faces with the box
 ATRIUM_FACES = 98_000
-MOVING_CELLS, MOVING_ATRIUM_FACES = 26, 93_500  # 100 thousand faces in all
+MOVING_CELLS, MOVING_ATRIUM_FACES = 28, 90_500  # 100 thousand faces in all
 BLOB_CELLS = 22  # 5.1 thousand faces
 
 WIDE, NARROW = math.radians(62), math.radians(12)  # half-angles of Figure 13's spots

@@ -24,6 +24,7 @@ from refgi.papers.val.subjects import (
     seen_by,
     settings_of,
 )
+from refgi.stages import Memory, observe
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -78,10 +79,14 @@ def sequence(bench: "Workbench", scene_at: "Callable[[float], Scene]", span: flo
     restarted, warm = _along(frames, settings, warm=False), _along(frames, settings, warm=True)
     few = dataclasses.replace(settings, area_lights=FEW)
     fewer = _along(frames, few, warm=False)
-    made = {EXACT: [rays_to(frame, one.lights) for frame, one in zip(frames, restarted, strict=True)],
-            RESTARTED: _lit(frames, restarted, settings), WARM: _lit(frames, warm, settings),
-            FEWER: _lit(frames, fewer, few),
-            INTERLEAVED: [val(frame, published(bench, frame.scene)) for frame in frames]}
+    made: dict[str, list[Array]] = {way: [] for way in (EXACT, RESTARTED, WARM, FEWER, INTERLEAVED)}
+    for frame, one, other, third in zip(frames, restarted, warm, fewer, strict=True):
+        with observe(memory=Memory()):  # what may occlude is found once a frame
+            made[EXACT].append(rays_to(frame, one.lights))
+            made[RESTARTED].append(lit(frame, one, settings))
+            made[WARM].append(lit(frame, other, settings))
+            made[FEWER].append(lit(frame, third, few))
+            made[INTERLEAVED].append(val(frame, published(bench, frame.scene)))
     of = {RESTARTED: restarted, WARM: warm, FEWER: fewer, INTERLEAVED: restarted}
     return Sequence(frames, restarted, {way: _steadiness(frames, pictures, made[EXACT], of.get(way))
                                         for way, pictures in made.items()})
@@ -135,10 +140,6 @@ def _along(frames: "list[Frame]", settings: ValSettings, *, warm: bool) -> list[
     for frame in frames:
         found.append(clustered(frame, settings, found[-1].clusters if warm and found else None))
     return found
-
-
-def _lit(frames: "list[Frame]", found: list[Clustered], settings: ValSettings) -> list[Array]:
-    return [lit(frame, one, settings) for frame, one in zip(frames, found, strict=True)]
 
 
 def _steadiness(frames: "list[Frame]", made: list[Array], exact: list[Array],

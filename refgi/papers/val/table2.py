@@ -155,5 +155,5 @@ def _notes(spent: dict[tuple[str, str], dict[str, float]]) -> tuple[str, ...]:
         f"In the scene of 98 thousand faces shadow maps take {share(cssm, ATRIUM):.0f} % and indirect illumination "
         f"{share(light, ATRIUM):.0f} %. Without interleaving and blur the frame of the Cornell Horse takes "
         f"{spent[HORSE, 'all lights']['frame'] / spent[HORSE, 'interleaved']['frame']:.1f} times as long: an area "
-        "light's visibility is looked up once for all of its lights at a pixel, so a 64th of the lights is not a 64th of "
-        "the work.")
+        "light's visibility is looked up once for all of its lights at a pixel, so a 64th of the lights is not a 64th "
+        "of the work.")

@@ -1,4 +1,4 @@
-"""Hard visibility: one test of one texel, as an area light without extent casts its shadow (Sec. 4, Fig. 3).
+"""Hard visibility: one test of one texel, as an area light without extent casts its shadow (Sec. 4.2, 5.1).
 
 The texel that a receiver is seen through knows the distance along its own centre's direction, not along the
 receiver's. So the receiver is moved there as well, on its tangent plane: of a surface that the map itself holds, no
@@ -48,6 +48,11 @@ def hard_visibility(maps: ShadowMaps, areas: AreaLights, m: int, points: Array, 
     ------
     InputError
         If there is no such area light.
+
+    Notes
+    -----
+    What hides a receiver is nearer by a thousandth than both the receiver and its tangent plane along the texel's
+    direction: where that plane recedes, what stands behind the receiver must not count. The paper uses a bias.
     """
     expect(0 <= m < len(areas.members), "m", f"an area light, 0 to {len(areas.members) - 1}", m)
     visible = np.ones(points.shape[1], points.dtype)

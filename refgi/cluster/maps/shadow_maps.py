@@ -1,8 +1,8 @@
-"""What each area light sees: paraboloid maps of the distance to the nearest occluder (Sec. 4, 6).
+"""What each area light sees: paraboloid maps of the distance to the nearest occluder (Sec. 4.2, 6).
 
-A map looks along the area light's normal from its centre, lifted a little off the surface. Where the paper ignores
-geometry "near the cluster's centre" without saying how near, `near_geometry` says what is left out, within the
-distance of the cluster's farthest light.
+A map looks along the area light's normal from its centre, lifted a little off the surface. The centre of a cluster
+may lie inside geometry, so what is near it must be ignored (Sec. 5.1, Fig. 7); the paper does not say how near.
+Here it is the distance of the cluster's farthest light, and `near_geometry` says what within it is left out.
 """
 
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,7 +17,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.errors import expect
 from refgi.rsm.depth_maps import distance_maps
 from refgi.rsm.paraboloid import Ignored
-from refgi.rsm.projection import paraboloid_projection
+from refgi.rsm.projection import PARABOLOID, Projection
 from refgi.scene.model import Geometry
 from refgi.stages import skip, stage
 
@@ -119,8 +119,8 @@ def _draw(
     tracer: "Tracer | None",
 ) -> tuple[Array, Array, Array]:
     """Return maps, the smallest distance on each, and how many triangles each leaves out."""
-    projection = paraboloid_projection(center, frame[:, 2], settings.map_resolution)._replace(
-        frame=np.ascontiguousarray(frame))  # fmt: skip
+    n = settings.map_resolution
+    projection = Projection(PARABOLOID, n, n, center, np.ascontiguousarray(frame), np.ones(2), np.inf)
     none = np.zeros_like(radius)
     rule = settings.near_geometry
     ignored = Ignored(radius if rule == "planes" else none, radius if rule == "ball" else none)

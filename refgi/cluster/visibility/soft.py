@@ -138,22 +138,64 @@ def look(
     rx, ry, rz = numbers[FRAME], numbers[FRAME + 1], numbers[FRAME + 2]
     dx, dy, dz = numbers[FRAME + 3], numbers[FRAME + 4], numbers[FRAME + 5]
     fx, fy, fz = numbers[FRAME + 6], numbers[FRAME + 7], numbers[FRAME + 8]
-    count = 0
     for i in range(size):
         px, py, pz = points[0, i] - cx, points[1, i] - cy, points[2, i] - cz
         d = math.sqrt(px * px + py * py + pz * pz)
         x, y, z = px * rx + py * ry + pz * rz, px * dx + py * dy + pz * dz, px * fx + py * fy + pz * fz
         ahead = wanted[i] & (z > zero) & (d > near)
         todo[i] = ahead
-        count += ahead
         visible[i] = one
         d = d if ahead else one
         z = z if ahead else one
         extent = delta * math.sqrt(z / d) if choices.foreshortened else delta
         room[X, i], room[Y, i], room[Z, i], room[D, i], room[EXTENT, i] = x, y, z, d, extent
-        tangent = solid_angle_tangent(extent, d) if choices.solid_angle else cone_tangent(extent, d, near)
-        where = published_square(x, y, z, d, tangent) if choices.alpha_over_pi else disc(x, y, z, d, tangent)
-        room[S, i], room[T, i], room[RADIUS, i] = where
+        room[RADIUS, i] = solid_angle_tangent(extent, d) if choices.solid_angle else cone_tangent(extent, d, near)
+    place_filters(choices.alpha_over_pi, size, room)
+    return count_of(todo, size)
+
+
+@kernel
+def place_filters(squares: bool, size: int, room: Array) -> None:
+    """Turn the tangents of cones into places and radii on the map.
+
+    Parameters
+    ----------
+    squares : bool
+        Squares of side alpha / pi instead of discs.
+    size : int
+        How many receivers.
+    room : (ROOM_ROWS, >= size) ndarray
+        Receivers, and tangents in row RADIUS; filled in rows S to RADIUS.
+    """
+    if squares:
+        for i in range(size):
+            where = published_square(room[X, i], room[Y, i], room[Z, i], room[D, i], room[RADIUS, i])
+            room[S, i], room[T, i], room[RADIUS, i] = where
+    else:
+        for i in range(size):  # without a call of the library of C, these are SIMD lanes
+            where = disc(room[X, i], room[Y, i], room[Z, i], room[D, i], room[RADIUS, i])
+            room[S, i], room[T, i], room[RADIUS, i] = where
+
+
+@kernel
+def count_of(flags: Array, size: int) -> int:
+    """Count what is true.
+
+    Parameters
+    ----------
+    flags : (>= size,) ndarray of bool
+        What to count.
+    size : int
+        Of the first this many.
+
+    Returns
+    -------
+    int
+        How many.
+    """
+    count = 0
+    for i in range(size):
+        count += 1 if flags[i] else 0
     return count
 
 
@@ -201,23 +243,19 @@ def find_penumbra(
             room[DEPTH, i] += w * (cosine * means[2 * terms + k, i] - sine * means[3 * terms + k, i])
             room[SINE, i] = sine * room[STEP_COSINE, i] + cosine * room[STEP_SINE, i]
             room[COSINE, i] = cosine * room[STEP_COSINE, i] - sine * room[STEP_SINE, i]
-    count = 0
     for i in range(size):
         blocked = half - room[SHADE, i]
         found = todo[i] & (blocked >= real(NOTHING))
         todo[i] = found
-        count += found
         d = room[D, i]
         depth = (half * means[4 * terms, i] - room[DEPTH, i]) / (blocked * scale) if found else d
         depth = min(max(depth, near), d) if found else d
         room[DEPTH, i] = depth
         extent = room[EXTENT, i]
         # Sec. 4.2: alpha = arctan(p cos(beta) / d)
-        tangent = published_tangent(extent, d, depth) if choices.alpha else cone_tangent(extent, d, depth)
-        x, y, z = room[X, i], room[Y, i], room[Z, i]
-        where = published_square(x, y, z, d, tangent) if choices.alpha_over_pi else disc(x, y, z, d, tangent)
-        room[S, i], room[T, i], room[RADIUS, i] = where
-    return count
+        room[RADIUS, i] = published_tangent(extent, d, depth) if choices.alpha else cone_tangent(extent, d, depth)
+    place_filters(choices.alpha_over_pi, size, room)
+    return count_of(todo, size)
 
 
 @kernel

@@ -15,7 +15,7 @@ from refgi.cluster.visibility.filtered import build
 from refgi.cluster.visibility.series import series
 from refgi.cluster.visibility.soft import ROOM_ROWS, Choices, choices, look, numbers_of, soft_tile
 from refgi.cluster.visibility.step import Rules, rules, step_lanes
-from refgi.errors import InputError, expect
+from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.stages import stage
 
@@ -70,6 +70,8 @@ def visibility(
     expect(0 <= m < len(areas.members), "m", f"an area light, 0 to {len(areas.members) - 1}", m)
     mode = settings.visibility
     expect(mode in ("series", "step", "hard", "none"), "visibility", "'series', 'step', 'hard' or 'none'", mode)
+    traced = settings.behind == "raytrace" and mode != "none"
+    expect(not traced or tracer is not None, "tracer", "rays where behind is 'raytrace'", tracer)
     points = np.ascontiguousarray(points, maps.depth.dtype)
     facing = np.ascontiguousarray(facing, maps.depth.dtype)
     k = int(maps.map_of[m])
@@ -79,9 +81,7 @@ def visibility(
         visible = hard_visibility(maps, areas, m, points, facing)
     else:
         visible = _soft(maps, k, float(areas.delta[m]), points, facing, settings)
-    if settings.behind == "raytrace" and mode != "none":
-        if tracer is None:
-            raise InputError("tracer: expected rays where behind is 'raytrace', got None")
+    if traced and tracer is not None:
         back = areas.normal[:, m] @ (points - areas.center[:, m, None]) <= 0
         visible[back] = _traced(tracer, areas, m, points[:, back], facing[:, back])
     return visible

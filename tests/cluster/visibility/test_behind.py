@@ -54,9 +54,10 @@ def test_filtered_reads_lose_what_lies_beyond_the_rim(evidence):
     half = np.sqrt(0.5)  # the map's corners, not its edges, lie that way
     areas = areas._replace(frame=np.array([[[half, half, 0.0], [-half, half, 0.0], [0.0, 0.0, 1.0]]]))
     seen = {}
-    for prefilter in ("brute", "sat", "mip"):
+    for prefilter, dtype in (("brute", np.float64), ("sat", np.float32), ("mip", np.float32)):
         settings = ValSettings(behind="dual_paraboloid", prefilter=prefilter, map_resolution=128)
-        maps = shadow_maps(scene, areas, settings, np.float64 if prefilter == "brute" else np.float32)
+        maps = shadow_maps(scene, areas, settings, np.float64)
+        maps = maps._replace(depth=maps.depth.astype(dtype), behind=maps.behind.astype(dtype))
         seen[prefilter] = float(visibility(maps, areas, 0, points, -points, settings)[0])
     assert seen["brute"] < 0.1 < seen["sat"]
     evidence("V just before the plane, in full shadow: " + ", ".join(f"{name} {v:.2f}" for name, v in seen.items()))

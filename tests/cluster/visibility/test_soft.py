@@ -85,7 +85,7 @@ def test_mean_depth_of_blockers_before_a_receiver(evidence):
     wild = (0.5 * means[16] - w @ (cosine * means[8:12] - sine * means[12:16])) / blocked
     assert wild == pytest.approx(-2.3, abs=0.05)
     assert mean_depth(0.125) == (0.7, 0)  # so little blocked that nothing is
-    evidence(f"z_avg {plain:.3f} (b = 0), {rounded:.3f} (b = 0.075), {right:.3f} (b*), {wild:.2f} (b = 0.125, refused); "
+    evidence(f"z_avg {plain:.3f} (b = 0), {rounded:.3f} (b = 0.075), {right:.3f} (b*), {wild:.2f} (0.125, refused); "
              "truth 0.3")
 
 
@@ -177,8 +177,8 @@ def test_penumbrae_of_straight_edges_are_curved(evidence):
     exact = line(shadow(areas, maps, points, normals, visibility="step"))
     assert np.ptp(truth) == 0
     assert np.ptp(found) > 0.3
-    evidence(f"the line V = 0.8 along a straight edge moves by {np.ptp(found):.2f} m over 4 m, {np.ptp(exact):.2f} m with "
-             "the step")
+    evidence(f"the line V = 0.8 along a straight edge moves by {np.ptp(found):.2f} m over 4 m, {np.ptp(exact):.2f} m "
+             "with the step")
 
 
 @pytest.mark.feature("VAL-20")

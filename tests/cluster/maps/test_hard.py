@@ -30,12 +30,12 @@ def test_every_receiver_as_its_literal_twin(dtype, close):
     lights = area_lights(rng.normal(size=(3, 3)) * 0.3, rng.normal(size=(3, 3)))
     settings = ValSettings(map_resolution=24, near_geometry="keep")
     maps = shadow_maps(shape, lights, settings, dtype)
-    points, normals = (array.astype(dtype) for array in surface_points(shape, 150, rng))
+    points, normals = (array.astype(dtype) for array in surface_points(shape, 90, rng))
     checked = hidden = 0
     for m in range(3):
         seen = hard_visibility(maps, lights, m, points, normals)
         assert seen.dtype == dtype
-        for i in range(150):
+        for i in range(90):
             at = points[:, i].astype(float)
             cell = (maps.frame[m] @ (at - maps.center[m]))
             scale = (np.linalg.norm(cell) + cell[2]) / 24
@@ -47,8 +47,8 @@ def test_every_receiver_as_its_literal_twin(dtype, close):
                 assert seen[i] == expected
                 checked += 1
                 hidden += expected == 0
-    assert checked > 400
-    assert hidden > 100
+    assert checked > 240
+    assert hidden > 60
 
 
 @pytest.mark.feature("VAL-03", "REF-15")

@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from refgi.cluster.maps import blockers, occluders
@@ -91,6 +91,7 @@ def test_the_hull_decides_as_all_points_do(monkeypatch):
     assert not occluders(flat).any()
 
 
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), solids=st.integers(1, 4), loose=st.integers(0, 12), turned=st.booleans())
 def test_no_segment_between_two_points_of_a_scene_meets_what_was_left_out(seed, solids, loose, turned):
     rng = np.random.default_rng(seed)

@@ -61,8 +61,8 @@ def mip_means(
         lanes = min(CHUNK, count - start)
         place = slice(start, start + lanes)
         _find_levels(mip.shift, n, top, s[place], t[place], radius[place], wanted[place], whole, weights)
-        _find_texels(n, top, lanes, 0, whole, weights)
-        _find_texels(n, top, lanes, 1, whole, weights)
+        for which in range(2):
+            _find_texels(n, top, lanes, which, whole, weights)
         some, direct = _find_starts(mip.first, wanted[place], whole)
         if not some:
             continue
@@ -162,10 +162,10 @@ def _sum_up(
     row: int, start: int,
 ) -> None:
     """Sum channels from `first` on over the 8 texels of each lane: `here` of them, at most 8."""
-    full = lanes // EIGHT * EIGHT
-    _sum_eights(levels, first, here, 0, full, whole, weights, out, row, start)
+    full, none = lanes // EIGHT * EIGHT, np.int64(0)  # a bare 0 would compile a variant of its own
+    _sum_eights(levels, first, here, none, full, whole, weights, out, row, start)
     if full < lanes:
-        _sum_eights(levels, first, here, full, lanes, whole, weights, sums, 0, -full)
+        _sum_eights(levels, first, here, full, lanes, whole, weights, sums, none, -full)
         for c in range(here):
             for lane in range(full, lanes):
                 out[row + c, start + lane] = sums[c, lane - full]
@@ -173,7 +173,7 @@ def _sum_up(
 
 @kernel
 def _sum_eights(
-    levels: Array, first: int, here: int, begin: int, end: int, whole: Array, weights: Array, out: Array, row: int,
+    levels: Array, first: int, here: int, begin: Any, end: int, whole: Array, weights: Array, out: Array, row: Any,
     start: int,
 ) -> None:
     for lane in range(begin, end, EIGHT):

@@ -41,6 +41,9 @@ PAPERS = {
               "refgi.papers.sii"),
         Paper("multires", "Interactive Indirect Illumination Using Adaptive Multiresolution Splatting",
               "Greg Nichols and Chris Wyman, IEEE TVCG 2010", "refgi.papers.multires"),
+        Paper("val", "Real-time Indirect Illumination with Clustered Visibility",
+              "Zhao Dong, Thorsten Grosch, Tobias Ritschel, Jan Kautz and Hans-Peter Seidel, VMV 2009",
+              "refgi.papers.val"),
     )
 }
 

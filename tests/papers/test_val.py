@@ -63,8 +63,9 @@ def test_stand_ins_have_the_papers_face_counts():
 def test_the_body_is_closed_and_in_one_piece():
     """Each edge belongs to two faces, once in each direction: no hole through which light leaks."""
     mesh = body(20)
-    edges = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
-    there, back = (np.sort(part[:, 0].astype(np.int64) * len(mesh.vertices) + part[:, 1]) for part in (edges, edges[:, ::-1]))
+    faces = mesh.faces.astype(np.int64)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    there, back = (np.sort(part[:, 0] * len(mesh.vertices) + part[:, 1]) for part in (edges, edges[:, ::-1]))
     assert (there == back).all()
     assert mesh.vertices[:, 1].min() == 0.0
     assert 1.4 < mesh.vertices[:, 1].max() < 1.8

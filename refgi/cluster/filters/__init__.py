@@ -10,4 +10,8 @@ Three filters answer the same question, the mean of the first 2 M or of all chan
 receivers: `mip_means(mip, s, t, radius, wanted, count, with_z, out)`, `sat_means(...)`, `brute_means(...)`. Each takes
 what its `build_*` kernel filled, the centre (s, t) and the radius of each lane's disc in units of the map's half
 side, and fills `out[channel, lane]` where `wanted[lane]`. `range_mip` bounds the depths a disc can meet.
+
+Against the sum over the texels of the disc, on maps of real scenes, V is off by (RMSE) 0.09 with a mip map read at
+log2 of the disc's diameter, as published, 0.046 one level finer (`shift` -1: a read between texels is twice as wide
+as they are), and 0.019 with the square beyond the disc `mirrored` as well; summed areas give 0.046 and 0.015.
 """

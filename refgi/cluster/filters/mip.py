@@ -13,11 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import types
 
-from refgi.cluster.filters.basis import sine_cosine, turned
 from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store_at, transpose
+from refgi.cluster.filters.level_0 import CHUNK, DIRECT, LEVEL, MAP, add_level_0
 from refgi.cluster.filters.mip_build import build_mip, build_mips
 from refgi.cluster.filters.pyramid import Mip, mip_of, mips
-from refgi.cluster.filters.quantise import eight_bits, half_precision
 from refgi.elementary import log2p1
 from refgi.jit import kernel
 
@@ -26,12 +25,10 @@ __all__ = ["Mip", "build_mip", "build_mips", "mip_means", "mip_of", "mips"]
 Array = npt.NDArray[Any]
 
 WIDEST = 4.0  # radius from which on a disc holds the whole map
-CHUNK = 128  # receivers whose texels and weights are kept at once
-FINE, COARSE, FINE_SIDE, COARSE_SIDE, LEVEL, DIRECT = range(6)  # rows of whole numbers
+FINE, COARSE, FINE_SIDE, COARSE_SIDE = range(4)  # rows of whole numbers, before LEVEL and DIRECT
 # rows of weights: 4 of the finer level, 4 of the coarser, 4 of texels of the map itself; then what they are made of
-MAP, X, Y, SHARE = 8, 12, 13, 14
+X, Y, SHARE = MAP + 4, MAP + 5, MAP + 6
 WHOLE, WEIGHTS, SUMS = room_of(6, CHUNK, types.int32), room_of(15, CHUNK), room_of(EIGHT, EIGHT)
-DEPTHS, SINES, COSINES, BY_SINES, BY_COSINES = (room_of(1, CHUNK) for _ in range(5))
 
 
 @kernel
@@ -75,10 +72,8 @@ def mip_means(
                 _sum_up(mip.basis_z, first, here, lanes, whole, weights, sums, out, channels + first, start)
         if with_z:
             _sum_depths(mip.mean_depth, lanes, whole, weights, out, 2 * channels, start)
-        if direct and mip.quantised:
-            _add_rounded(mip.depth, mip.terms, with_z, lanes, whole, weights, out, start)
-        elif direct:
-            _add_map(mip.depth, mip.terms, with_z, lanes, whole, weights, out, start)
+        if direct:
+            add_level_0(mip, with_z, lanes, whole, weights, out, start)
 
 
 @kernel
@@ -215,74 +210,3 @@ def _sum_depths(
         coarse = (levels[c] * weights[4, lane] + levels[c + 1] * weights[5, lane]) + (
             levels[d] * weights[6, lane] + levels[d + 1] * weights[7, lane])
         out[row, start + lane] = fine + coarse
-
-
-@kernel
-def _add_map(
-    depth: Array, terms: int, with_z: bool, lanes: int, whole: Array, weights: Array, out: Array, start: int
-) -> None:
-    """Add what lanes read of the map itself; the others add 0."""
-    depths, sines, cosines = DEPTHS(depth)[0], SINES(depth)[0], COSINES(depth)[0]
-    by_sines, by_cosines = BY_SINES(depth)[0], BY_COSINES(depth)[0]
-    for tap in range(4):
-        _fetch(depth, tap, lanes, whole, depths)
-        for lane in range(lanes):
-            sine, cosine = sine_cosine(depths[lane])
-            by_sines[lane], by_cosines[lane] = turned(sine, cosine, sine, cosine)
-            sines[lane], cosines[lane] = weights[MAP + tap, lane] * sine, weights[MAP + tap, lane] * cosine
-        for k in range(terms):
-            _accumulate(sines, lanes, out[k], start)
-            _accumulate(cosines, lanes, out[terms + k], start)
-            if with_z:
-                _accumulate_z(sines, depths, lanes, out[2 * terms + k], start)
-                _accumulate_z(cosines, depths, lanes, out[3 * terms + k], start)
-            for lane in range(lanes):
-                sines[lane], cosines[lane] = turned(sines[lane], cosines[lane], by_sines[lane], by_cosines[lane])
-        if with_z:
-            _accumulate_z(weights[MAP + tap], depths, lanes, out[4 * terms], start)
-
-
-@kernel
-def _fetch(depth: Array, tap: int, lanes: int, whole: Array, depths: Array) -> None:
-    n = len(depth)
-    flat = depth.reshape(-1)
-    step = tap // 2 * n + tap % 2
-    for lane in range(lanes):
-        depths[lane] = flat[min(whole[DIRECT, lane] + step, n * n - 1)]
-
-
-@kernel
-def _accumulate(values: Array, lanes: int, row: Array, start: int) -> None:
-    for lane in range(lanes):
-        row[start + lane] += values[lane]
-
-
-@kernel
-def _accumulate_z(values: Array, depths: Array, lanes: int, row: Array, start: int) -> None:
-    for lane in range(lanes):
-        row[start + lane] += values[lane] * depths[lane]
-
-
-@kernel
-def _add_rounded(
-    depth: Array, terms: int, with_z: bool, lanes: int, whole: Array, weights: Array, out: Array, start: int
-) -> None:
-    """Add what lanes read of the map itself, of 8 and 16 bits."""
-    flat, n = depth.reshape(-1), len(depth)
-    for lane in range(lanes):
-        if whole[LEVEL, lane] > 0:
-            continue
-        for tap in range(4):
-            weight = weights[MAP + tap, lane]
-            z = flat[min(whole[DIRECT, lane] + tap // 2 * n + tap % 2, n * n - 1)]
-            sine, cosine = sine_cosine(z)
-            by_sine, by_cosine = turned(sine, cosine, sine, cosine)
-            for k in range(terms):
-                out[k, start + lane] += weight * eight_bits(sine)
-                out[terms + k, start + lane] += weight * eight_bits(cosine)
-                if with_z:
-                    out[2 * terms + k, start + lane] += weight * half_precision(z * sine)
-                    out[3 * terms + k, start + lane] += weight * half_precision(z * cosine)
-                sine, cosine = turned(sine, cosine, by_sine, by_cosine)
-            if with_z:
-                out[4 * terms, start + lane] += weight * half_precision(z)

@@ -71,14 +71,19 @@ def build(depth: Array, far: float, settings: ValSettings) -> Any:
     -------
     Mip, Sat or Brute
         In the dtype of `depth`.
+
+    Notes
+    -----
+    Sec. 6 filters square maps. The square beyond the unit disc, which the hemisphere does not reach, mirrors what lies
+    within: holding nothing, it would let light leak in over the rim. Texel by texel, it is left out.
     """
     most, n, quantised = series(settings).range, len(depth), settings.quantisation == "published"
     if settings.prefilter == "mip":
-        mip = mip_of(mips(1, n, settings.terms, depth.dtype, shift=LEVEL_SHIFT, quantised=quantised), 0)
+        mip = mip_of(mips(1, n, settings.terms, depth.dtype, shift=LEVEL_SHIFT, quantised=quantised, mirrored=True), 0)
         build_mip(depth, most / far, most, mip)
         return mip
     if settings.prefilter == "sat":
-        sat = sats(n, settings.terms, depth.dtype, quantised=quantised)
+        sat = sats(n, settings.terms, depth.dtype, quantised=quantised, mirrored=True)
         build_sat(depth, most / far, most, sat)
         return sat
     box = "val_alpha_over_pi" in settings.as_published

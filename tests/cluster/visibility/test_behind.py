@@ -47,8 +47,8 @@ def test_shadow_breaks_off_at_the_light_s_plane(evidence):
 
 
 @pytest.mark.feature("VAL-21")
-def test_filtered_reads_lose_what_lies_beyond_the_rim(evidence):
-    """Near the plane half of a filter lies beyond the hemisphere, where the square of the map holds nothing."""
+def test_no_light_leaks_in_over_the_rim(evidence):
+    """Near the plane half of a filter lies beyond the hemisphere, where the square of the map mirrors it."""
     scene, points = room_with_blocker(), np.array([[3.0], [0.0], [0.02]])
     areas, _ = lit_by(map_of_plates(4, []), 0.3, 1.0)
     half = np.sqrt(0.5)  # the map's corners, not its edges, lie that way
@@ -59,7 +59,7 @@ def test_filtered_reads_lose_what_lies_beyond_the_rim(evidence):
         maps = shadow_maps(scene, areas, settings, np.float64)
         maps = maps._replace(depth=maps.depth.astype(dtype), behind=maps.behind.astype(dtype))
         seen[prefilter] = float(visibility(maps, areas, 0, points, -points, settings)[0])
-    assert seen["brute"] < 0.1 < seen["sat"]
+    assert max(seen.values()) < 0.02
     evidence("V just before the plane, in full shadow: " + ", ".join(f"{name} {v:.2f}" for name, v in seen.items()))
 
 

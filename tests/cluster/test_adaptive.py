@@ -90,6 +90,16 @@ def test_reruns_are_the_same_bits(frame, lights):
     np.testing.assert_array_equal(runs[0].maps.depth, runs[1].maps.depth)
 
 
+def test_the_settings_of_the_picture_are_those_of_the_trials(frame, lights):
+    trails = {}
+    for key, value in (("behind", "visible"), ("behind", "raytrace"), ("visibility", "members"), ("clamp", "disc")):
+        settings = dataclasses.replace(SETTINGS, **{key: value})
+        trails[value] = [trial.error for trial in enough_area_lights(frame, lights, settings).trail]
+    usual = trails.pop("visible")
+    assert all(trail != usual for trail in trails.values())
+    assert trails["members"][0] < usual[0]  # the share of the lights seen, weighed by flux, is nearer than any map
+
+
 def test_a_target_is_needed(frame, lights):
     with pytest.raises(InputError, match="target_error: expected"):
         enough_area_lights(frame, lights, dataclasses.replace(SETTINGS, target_error=None))

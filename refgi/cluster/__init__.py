@@ -16,7 +16,6 @@ from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
-from refgi.cluster.visibility.visible import visibility
 
 __all__ = [
     "AreaLights",
@@ -29,5 +28,4 @@ __all__ = [
     "clustered_irradiance",
     "shadow_maps",
     "val",
-    "visibility",
 ]

@@ -41,8 +41,8 @@ class ValSettings(LightSettings):
     Area lights: rectangles along `axes`; one `extent` of it is the paper's Delta. `unbiased_area` enlarges it by what
     a sample of n lights misses, `foreshortened` narrows it towards the receiver, `single_light` is what a cluster of
     one light is. Maps of `map_resolution` texels a side from `maps` ("raster" or "rays"); `near_geometry` says what
-    is left out of them around the centre ("planes" that pass within the cluster's radius, all within that "ball"),
-    `occluders_alone` leaves out what nothing lies behind. `behind` says what receivers behind an area light see of it.
+    is left out of them around the centre (a "ball", or "planes" that pass nearer), within a share `near_distance` of the
+    cluster's radius; `occluders_alone` leaves out what nothing lies behind. `behind` says what receivers behind an area light see of it.
 
     Visibility: "series" of `terms` terms with the filter `prefilter`, the exact "step", one "hard" test towards the
     centre, or by reference: the map projected back ("back_projection"), rays to the "rectangle", rays to the
@@ -69,7 +69,8 @@ class ValSettings(LightSettings):
     single_light: Literal["point", "footprint"] = "point"
     map_resolution: int = 256
     maps: Literal["raster", "rays"] = "raster"
-    near_geometry: NearGeometry = "planes"
+    near_geometry: NearGeometry = "ball"
+    near_distance: float = 0.5
     occluders_alone: bool = True
     behind: Behind = "visible"
     visibility: Visibility = "series"
@@ -103,6 +104,8 @@ class ValSettings(LightSettings):
                f"none or a share of the mean from {LEAST_TARGET:g} on", self.target_error)
         expect(self.bias is None or 0 <= self.bias <= 0.25, "bias", "none or a share of the depth range, 0 to 0.25",
                self.bias)
+        expect(0 <= self.near_distance <= 100, "near_distance", "a share of the cluster's radius, 0 to 100",
+               self.near_distance)
         expect(0 <= self.attenuation <= 100, "attenuation", "0 to 100", self.attenuation)
         expect(self.interleaving is None or (is_count(self.interleaving) and 1 <= self.interleaving <= 64),
                "interleaving", "none or 1 to 64 pixels", self.interleaving)

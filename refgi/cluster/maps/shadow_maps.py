@@ -77,7 +77,7 @@ def shadow_maps(
     drawn, both = blockers(geometry, settings.occluders_alone), settings.behind == "dual_paraboloid"
     lit = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
     center = np.ascontiguousarray((areas.center + _lift(geometry) * areas.normal)[:, lit].T)
-    frame, radius = areas.frame[lit], areas.radius[lit]
+    frame, radius = areas.frame[lit], settings.near_distance * areas.radius[lit]
     rays = tracer if len(drawn.faces) == len(geometry.faces) else None
     depth, near, left_out = _draw(drawn, center, frame, radius, settings, dtype, rays)
     behind = near_behind = None

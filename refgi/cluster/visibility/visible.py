@@ -65,7 +65,7 @@ def visibility(
     Notes
     -----
     An area light without extent casts a hard shadow. Points behind its plane see it whole (Sec. 5.1), unless a second
-    map or rays to its rectangle say otherwise; nothing within the cluster's radius of the centre blocks such rays.
+    map or rays to its rectangle say otherwise; nothing within `near_distance` of the centre blocks such rays.
     """
     expect(0 <= m < len(areas.members), "m", f"an area light, 0 to {len(areas.members) - 1}", m)
     mode = settings.visibility
@@ -83,7 +83,8 @@ def visibility(
         visible = _soft(maps, k, float(areas.delta[m]), points, facing, settings)
     if traced and tracer is not None:
         back = areas.normal[:, m] @ (points - areas.center[:, m, None]) <= 0
-        visible[back] = _traced(tracer, areas, m, points[:, back], facing[:, back])
+        near = settings.near_distance * float(areas.radius[m])
+        visible[back] = _traced(tracer, areas, m, near, points[:, back], facing[:, back])
     return visible
 
 
@@ -106,9 +107,9 @@ def _soft(
     return visible
 
 
-def _traced(tracer: "Tracer", areas: AreaLights, m: int, points: Array, facing: Array) -> Array:
+def _traced(tracer: "Tracer", areas: AreaLights, m: int, near: float, points: Array, facing: Array) -> Array:
     targets = rectangle_points(areas, m, np.array(np.meshgrid(BESIDE, BESIDE)).reshape(2, -1))
-    ball = Ball(areas.center[:, m], float(areas.radius[m]))
+    ball = Ball(areas.center[:, m], near)
     return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], _alike, tracer.offset, ball)
 
 

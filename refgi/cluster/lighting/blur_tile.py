@@ -1,0 +1,146 @@
+"""Tiles of a picture with their surroundings, as the blur reads them."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+
+Array = npt.NDArray[Any]
+
+TALL, WIDE = 16, 64  # pixels of a tile
+MOST = 64  # pixels along a side of the window
+COLUMNS = WIDE + MOST  # of each plane in a row of a tile; fixed, which lets loops run in lanes
+E, X, N, END = 0, 3 * COLUMNS, 6 * COLUMNS, 9 * COLUMNS  # irradiance, position, normal: three planes each
+FAR = 1e18  # m; where pixels without surface are put. Its square is within float32
+MARGIN = 1e-5  # by which bounds must hold: distances and cosines are off by less
+
+
+@kernel
+def load_pixels(
+    tile: Array, irradiance: Array, position: Array, normal: Array, covered: Array, top: int, left: int, wide: int,
+    size: int,
+) -> None:
+    """Copy a tile with its surroundings; what lies outside the picture is taken from n pixels further inside.
+
+    Parameters
+    ----------
+    tile : (rows, END) ndarray
+        Filled; planes of irradiance, position and normal next to each other in each row.
+    irradiance, position, normal : (3, h, w) ndarray
+        The picture.
+    covered : (h, w) ndarray of bool
+        Whether there is a surface; positions without one are put far away.
+    top, left : int
+        Pixel of the tile's first row and column; may lie outside.
+    wide : int
+        Pixels along a row, without the surroundings.
+    size : int
+        n, of the window.
+    """
+    height, width = covered.shape
+    last = wide + size - 1
+    low, high = min(max(-left, 0), last), max(min(width - left, last), 0)  # what lies in the picture
+    for row in range(len(tile)):
+        y = _within(top + row, height, size)
+        for c in range(3):
+            inside = low
+            if y >= 0:
+                _copy(tile, row, c, irradiance, position, normal, covered, y, left, np.uint64(low), np.uint64(high))
+                inside = max(low, high)
+            for i in range(low):
+                _copy_one(tile, row, c, i, irradiance, position, normal, covered, y, _within(left + i, width, size))
+            for i in range(inside, last):
+                _copy_one(tile, row, c, i, irradiance, position, normal, covered, y, _within(left + i, width, size))
+
+
+@kernel
+def _copy(
+    tile: Array, row: int, c: int, irradiance: Array, position: Array, normal: Array, covered: Array, y: int,
+    left: int, low: Any, high: Any,
+) -> None:
+    far = tile.dtype.type(FAR)
+    e, x, n = np.uint64(E + c * COLUMNS), np.uint64(X + c * COLUMNS), np.uint64(N + c * COLUMNS)
+    shift = np.uint64(left)  # may stand for a number below 0: places wrap round to the right ones
+    for i in range(low, high):
+        tile[row, e + i] = irradiance[c, y, shift + i]
+    for i in range(low, high):
+        tile[row, x + i] = position[c, y, shift + i] if covered[y, shift + i] else far
+    for i in range(low, high):
+        tile[row, n + i] = normal[c, y, shift + i]
+
+
+@kernel
+def _copy_one(
+    tile: Array, row: int, c: int, i: int, irradiance: Array, position: Array, normal: Array, covered: Array, y: int,
+    x: int,
+) -> None:
+    known = y >= 0 and x >= 0 and covered[max(y, 0), max(x, 0)]
+    tile[row, E + c * COLUMNS + i] = irradiance[c, y, x] if known else 0
+    tile[row, X + c * COLUMNS + i] = position[c, y, x] if known else FAR
+    tile[row, N + c * COLUMNS + i] = normal[c, y, x] if known else 0
+
+
+@kernel
+def _within(place: int, count: int, size: int) -> int:
+    """Return the place, moved by n into the picture; -1 where that does not help."""
+    if place < 0:
+        place += size
+    elif place >= count:
+        place -= size
+    return place if 0 <= place < count else -1
+
+
+@kernel
+def alike(tile: Array, wide: int, square_extent: Any, cosine: Any) -> bool:
+    """Tell whether all pixels around a tile are sure to count for each other.
+
+    Parameters
+    ----------
+    tile : (rows, END) ndarray
+        Of `load_pixels`.
+    wide : int
+        Pixels along a row, with the surroundings.
+    square_extent : float
+        Square of the farthest distance, m^2.
+    cosine : float
+        Least cosine between normals; -inf: any.
+
+    Returns
+    -------
+    bool
+        By bounds: where it is False they may count all the same.
+    """
+    real = tile.dtype.type
+    one = real(1.0)
+    bounds = np.empty((7, COLUMNS), tile.dtype)  # least and most of x, y, z; least cosine
+    middle = np.uint64(wide // 2)
+    ux, uy, uz = (tile[len(tile) // 2, np.uint64(N) + middle], tile[len(tile) // 2, np.uint64(N + COLUMNS) + middle],
+                  tile[len(tile) // 2, np.uint64(N + 2 * COLUMNS) + middle])
+    for i in range(np.uint64(wide)):
+        bounds[0, i] = bounds[3, i] = tile[0, np.uint64(X) + i]
+        bounds[1, i] = bounds[4, i] = tile[0, np.uint64(X + COLUMNS) + i]
+        bounds[2, i] = bounds[5, i] = tile[0, np.uint64(X + 2 * COLUMNS) + i]
+        bounds[6, i] = 1
+    for row in range(len(tile)):
+        for i in range(np.uint64(wide)):
+            x, y, z = (tile[row, np.uint64(X) + i], tile[row, np.uint64(X + COLUMNS) + i],
+                       tile[row, np.uint64(X + 2 * COLUMNS) + i])
+            dot = (ux * tile[row, np.uint64(N) + i] + uy * tile[row, np.uint64(N + COLUMNS) + i]
+                   + uz * tile[row, np.uint64(N + 2 * COLUMNS) + i])
+            bounds[0, i] = x if x < bounds[0, i] else bounds[0, i]
+            bounds[1, i] = y if y < bounds[1, i] else bounds[1, i]
+            bounds[2, i] = z if z < bounds[2, i] else bounds[2, i]
+            bounds[3, i] = x if x > bounds[3, i] else bounds[3, i]
+            bounds[4, i] = y if y > bounds[4, i] else bounds[4, i]
+            bounds[5, i] = z if z > bounds[5, i] else bounds[5, i]
+            bounds[6, i] = dot if dot < bounds[6, i] else bounds[6, i]
+    square = real(0.0)
+    for c in range(3):
+        side = bounds[3 + c, :wide].max() - bounds[c, :wide].min()
+        square += side * side
+    near = bounds[6, :wide].min()
+    # two normals that are within an angle of a third are within twice that angle of each other
+    facing = (near > real(0.0)) & (near * near + near * near - real(1.0 + MARGIN) >= cosine)
+    return bool((square * real(1.0 + MARGIN) <= square_extent) & (facing | (cosine < -one)))

@@ -40,9 +40,10 @@ class ValSettings(LightSettings):
 
     Area lights: rectangles along `axes`; one `extent` of it is the paper's Delta. `unbiased_area` enlarges it by what
     a sample of n lights misses, `foreshortened` narrows it towards the receiver, `single_light` is what a cluster of
-    one light is. Maps of `map_resolution` texels a side from `maps` ("raster" or "rays"); `near_geometry` says what
-    is left out of them around the centre (a "ball", or "planes" that pass nearer), within a share `near_distance` of the
-    cluster's radius; `occluders_alone` leaves out what nothing lies behind. `behind` says what receivers behind an area light see of it.
+    one light is. Maps of `map_resolution` texels a side from `maps` ("raster" or "rays") leave out what is near the
+    centre, `near_geometry` (a "ball", or "planes" that pass there) within a share `near_distance` of the cluster's
+    radius, and with `occluders_alone` what nothing lies behind. `behind` says what receivers behind an area light see
+    of it.
 
     Visibility: "series" of `terms` terms with the filter `prefilter`, the exact "step", one "hard" test towards the
     centre, or by reference: the map projected back ("back_projection"), rays to the "rectangle", rays to the

@@ -2,7 +2,7 @@
 
 A map looks along the area light's normal from its centre, lifted a little off the surface. The centre of a cluster
 may lie inside geometry, so what is near it must be ignored (Sec. 5.1, Fig. 7); the paper does not say how near.
-Here it is the distance of the cluster's farthest light, and `near_geometry` says what within it is left out.
+Here it is a share `near_distance` of the cluster's radius, and `near_geometry` says what within it is left out.
 """
 
 from typing import TYPE_CHECKING, Any, NamedTuple

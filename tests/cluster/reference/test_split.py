@@ -32,23 +32,38 @@ def test_the_picture_of_exact_shadows_is_that_of_vpl(evidence):
     assert off < ROUNDING
 
 
-@pytest.mark.feature("VAL-27", "REF-15")
-@pytest.mark.parametrize("name", ["cornell_box", "cornell_sphere:faces=600"])
-def test_errors_of_the_steps_add_up_plausibly(name, evidence):
-    frame = Frame(load_scene(name), width=32, height=32, rsm_resolution=64)
-    reference = trace_truth(frame, TruthSettings(samples=384)).mean
-    found = split_error(frame, SETTINGS, reference, block=4)
+def judge(name, frame, settings, samples, evidence):
+    """Split a frame's error, record it and check how the steps add up."""
+    reference = trace_truth(frame, TruthSettings(samples=samples)).mean
+    found = split_error(frame, settings, reference, block=4)
     whole, root = found.together("members", "mip")
-    evidence(f"{name.partition(':')[0]}, rmse / mean of truth: "
-             + ", ".join(f"{step.name} {step.rmse:.3f}" for step in found.steps)
+    evidence(f"{name}, rmse / mean of truth: " + ", ".join(f"{step.name} {step.rmse:.3f}" for step in found.steps)
              + f"; steps of visibility together {whole:.3f}, root of their squares {root:.3f} ({root / whole:.2f}); "
              f"all {found.whole:.3f}, root {found.root_of_squares:.3f}")
     assert [step.name for step in found.steps] == ["lights", *STEPS, "interleaved"]
     assert all(0 < step.rmse < 1 for step in found.steps)
     assert PLAUSIBLE[0] < root / whole < PLAUSIBLE[1]
-    changes = sum(step.shift for step in found.steps)
+    return found
+
+
+@pytest.mark.feature("VAL-27", "REF-15")
+@pytest.mark.parametrize("name", ["cornell_box", "cornell_sphere:faces=600"])
+def test_errors_of_the_steps_add_up_plausibly(name, evidence):
+    frame = Frame(load_scene(name), width=32, height=32, rsm_resolution=64)
+    found = judge(name.partition(":")[0], frame, SETTINGS, 384, evidence)
     mean = found.pictures["truth"][:, found.covered].mean()
+    changes = sum(step.shift for step in found.steps)
     assert changes == pytest.approx(found.pictures["interleaved"][:, found.covered].mean() / mean - 1, abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.feature("VAL-27", "REF-15")
+@pytest.mark.parametrize("name", ["cornell_horse", "sponza", "kitchen"])
+def test_errors_of_real_scenes(name, data_dir, evidence):
+    found = load_scene(data_dir / f"{name}.json")
+    frame = Frame(found, width=24, height=24, rsm_resolution=128)
+    settings = ValSettings(lights=256, clamp="distance", clamp_value=0.05 * found.geometry.diagonal)
+    judge(name, frame, settings, 384, evidence)
 
 
 def test_steps_of_known_pictures():

@@ -99,7 +99,7 @@ def swept(bench: "Workbench", frame: "Frame", right: Array, traced: Array) -> Sw
     covered, most = frame.gbuffer.covered, settings_of(bench).lights
     found = Sweep({}, {}, {}, {})
     for m in (*SHOWN, *(n for n in FURTHER if SHOWN[-1] < n < most), most):
-        for kind in KINDS if m <= STEPS_TO else ("series", "hard"):
+        for kind in KINDS if m <= STEPS_TO else ("series", "hard") if m == most else ("series",):
             started = time.perf_counter()
             light = val(frame, settings_of(bench, area_lights=m, visibility=kind))
             taken = time.perf_counter() - started

@@ -11,7 +11,7 @@ from refgi.papers import pictures
 from refgi.papers.records import Figure, Table
 from refgi.papers.timing import interleaved
 from refgi.papers.val.scenes import blob_at
-from refgi.papers.val.sequence import note, sequence, table
+from refgi.papers.val.sequence import frame_count, note, sequence, table
 from refgi.papers.val.subjects import drawing, published, rounds, seen_by
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def figure12(bench: "Workbench") -> Figure:
                                 frame, val(frame, settings), settings)
                   for t, frame, count in zip(TIMES, views, counts, strict=True))
     seconds = interleaved({str(t): drawing(bench, blob_at(t), settings) for t in TIMES}, max(1, rounds(bench) - 1))
-    moving = sequence(bench, blob_at, STEP * (max(4, bench.scale.repeats) - 1))
+    moving = sequence(bench, blob_at, STEP * (frame_count(bench) - 1))
     rates = [1 / seconds[str(t)] for t in TIMES]
     rows = tuple((f"t = {t:g}", count, frame.scene.face_count, 1e3 * seconds[str(t)], 1 / seconds[str(t)], PAPER_FPS)
                  for t, frame, count in zip(TIMES, views, counts, strict=True))

@@ -73,7 +73,7 @@ def sequence(bench: "Workbench", scene_at: "Callable[[float], Scene]", span: flo
     Sequence
         Frames, clusters, and how steady pictures are.
     """
-    count = max(4, bench.scale.repeats)
+    count = frame_count(bench)
     frames = [seen_by(bench, scene_at(span * k / (count - 1)), MOVING) for k in range(count)]
     settings = settings_of(bench)
     restarted, warm = _along(frames, settings, warm=False), _along(frames, settings, warm=True)
@@ -90,6 +90,22 @@ def sequence(bench: "Workbench", scene_at: "Callable[[float], Scene]", span: flo
     of = {RESTARTED: restarted, WARM: warm, FEWER: fewer, INTERLEAVED: restarted}
     return Sequence(frames, restarted, {way: _steadiness(frames, pictures, made[EXACT], of.get(way))
                                         for way, pictures in made.items()})
+
+
+def frame_count(bench: "Workbench") -> int:
+    """Return how many frames a sequence has.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Says how often things are done.
+
+    Returns
+    -------
+    int
+        3 or more.
+    """
+    return max(3, bench.scale.repeats)
 
 
 def table(found: Sequence) -> Table:

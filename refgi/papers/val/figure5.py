@@ -77,8 +77,8 @@ def _notes(rmse: dict[str, list[float]]) -> tuple[str, ...]:
         return ", ".join(f"{value:.1f}" for value in rmse[way]) + " %"
 
     return (
-        f"The three pictures are {said(PUBLISHED)} off as published. With summed areas in place of mip levels it is "
-        f"{said('4 terms, summed areas')}: what the steps between levels cost. Every texel of the disc comes to "
+        f"The three pictures are {said(PUBLISHED)} off as published. With summed areas, which know no steps between "
+        f"mip levels, it is {said('4 terms, summed areas')}. Every texel of the disc comes to "
         f"{said('4 terms, every texel')}.",
         f"Sixteen terms, whose bias is a quarter, come to {said('16 terms, summed areas')}; the exact step, with the "
         f"receiver's plane and the cone towards the light, to {said(STEP)}. One hard shadow comes to "

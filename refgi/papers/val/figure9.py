@@ -98,5 +98,4 @@ def _notes(rows: list[tuple[Cell, ...]], off_sum: float, lost: float) -> tuple[s
         f"{off_sum:.1f} %: errors of many overlapping soft shadows do hide each other, as the paper says.",
         f"Pictures of all single area lights add up to the whole one to {lost:.1g} of its largest value; float32 sums "
         "in another order.",
-        "Area lights near an edge of the box give most of their light to the wall next to them; clusters that nothing "
-        "stands before have no map.")
+        "Area lights near an edge of the box give most of their light to the wall next to them.")

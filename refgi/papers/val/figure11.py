@@ -57,6 +57,6 @@ def figure11(bench: "Workbench") -> Figure:
                "that rest do, there and here.",
                note(moving),
                f"The MAE against rays is {moving.ways[RESTARTED].mae:.0f} % of the mean here: with {AREA_LIGHTS} area "
-               "lights in a hall of 30 m each is metres wide, and its rectangle reaches over edges where it has no lights.",
+               "lights in a hall of 30 m each is metres wide, and its rectangle reaches where it has no lights.",
                "Two four-legged bodies stand in for the dragons and the built-in atrium for Sponza, so only ratios "
                "and the look can be compared, not the pictures themselves."))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 STEEPEST = math.radians(80)  # half-angle of the widest cone in which blockers are searched
 LIFT = 4e-6  # of map centres off their lights, as a share of the largest coordinate
+NEAR = 0.5  # share of a cluster's radius within which nothing blocks
 SLACK = 1e-3  # share of its distance by which a blocker lies before a receiver
 NO_BLOCKER = 0.02  # share of the search disc below which the series has found none
 
@@ -157,13 +158,8 @@ def is_between(triangle, vertices, tolerance):
     return max(heights) > tolerance and min(heights) < -tolerance
 
 
-def plane_distance(point, triangle):
-    normal = unit(cross(minus(triangle[1], triangle[0]), minus(triangle[2], triangle[0])))
-    return abs(dot(normal, minus(point, triangle[0])))
-
-
-def hit_distance(triangle, origin, direction):
-    """Return the distance to a triangle along a unit direction, infinity for a miss."""
+def hit_distance(triangle, origin, direction, least):
+    """Return the distance to a triangle along a unit direction, infinity for a miss or a hit nearer than `least`."""
     e1, e2, s = minus(triangle[1], triangle[0]), minus(triangle[2], triangle[0]), minus(origin, triangle[0])
     p = cross(direction, e2)
     volume = dot(e1, p)
@@ -172,7 +168,7 @@ def hit_distance(triangle, origin, direction):
     u, q = dot(s, p) / volume, cross(s, e1)
     v = dot(direction, q) / volume
     tau = dot(e2, q) / volume
-    return tau if u >= 0 and v >= 0 and u + v <= 1 and tau > 0 else math.inf
+    return tau if u >= 0 and v >= 0 and u + v <= 1 and tau > 0 and tau >= least else math.inf
 
 
 def lifted(area, triangles):
@@ -182,17 +178,17 @@ def lifted(area, triangles):
 
 
 def depth_map(area, triangles, n, tolerance):
-    """Cast a ray for each texel inside the unit disc, past what cannot block or passes within the cluster's radius."""
+    """Cast a ray for each texel inside the unit disc, past what cannot block or is too near."""
     vertices = [v for triangle in triangles for v in triangle]
     kept = [t for t in triangles if is_between(t, vertices, tolerance)]
-    kept = [t for t in kept if plane_distance(area.center, t) >= area.radius]
     depth = [[math.inf] * n for _ in range(n)]
     for row in range(n):
         for column in range(n):
             s, t = texel_place(n, row, column)
             if s * s + t * t <= 1:
                 w = place_to_direction(area, s, t)
-                depth[row][column] = min((hit_distance(k, area.center, w) for k in kept), default=math.inf)
+                hits = [hit_distance(k, area.center, w, NEAR * area.radius) for k in kept]
+                depth[row][column] = min(hits, default=math.inf)
     low = [min(v[axis] for v in vertices) for axis in range(3)]
     high = [max(v[axis] for v in vertices) for axis in range(3)]
     far = math.sqrt(sum(max(abs(low[a] - area.center[a]), abs(high[a] - area.center[a])) ** 2 for a in range(3)))

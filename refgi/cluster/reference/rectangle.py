@@ -43,10 +43,10 @@ def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSetting
 
     Notes
     -----
-    The rectangle is the bounding one with its own sides, not a disc or square of size Delta. As in the maps, planes
-    that pass within the cluster's radius of the centre block nothing, or nothing in a ball of that radius does
-    (`near_geometry`). Points below the receiver's surface do not count; where none is left V is 1. Behind the area
-    light V is 1 ("visible"), or what rays say in all other modes of `behind`.
+    The rectangle is the bounding one with its own sides, not a disc or square of size Delta. As in the maps,
+    nothing within a share `near_distance` of the cluster's radius around the centre blocks, or no plane that passes
+    there (`near_geometry`). Points below the receiver's surface do not count; where none is left V is 1. Behind the
+    area light V is 1 ("visible"), or what rays say in all other modes of `behind`.
     """
     drawn = blockers(frame.scene.geometry, settings.occluders_alone)
     on_square = _even(points)
@@ -57,7 +57,8 @@ def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSetting
 
     def given(m: int, points: Array, facing: Array) -> Array:
         tracer, visible = tracer_of(m), np.ones(points.shape[1], points.dtype)
-        ball = Ball(areas.center[:, m], float(areas.radius[m])) if settings.near_geometry == "ball" else None
+        radius = settings.near_distance * float(areas.radius[m])
+        ball = Ball(areas.center[:, m], radius) if settings.near_geometry == "ball" else None
         height = areas.normal[:, m] @ (points - areas.center[:, m, None])
         within = np.where(height > 0, True, settings.behind != "visible")
         for side in (1.0, -1.0):
@@ -114,12 +115,13 @@ def tracer_without_near(
     Tracer
         That of the frame where nothing is left out.
     """
-    if settings.near_geometry != "planes" or areas.radius[m] == 0:
+    distance = settings.near_distance * areas.radius[m]
+    if settings.near_geometry != "planes" or distance == 0:
         return frame.tracer
     corner = drawn.vertices[drawn.faces] - areas.center[:, m]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     height = np.abs((normal * corner[:, 0]).sum(axis=1))
-    faces = drawn.faces[height >= areas.radius[m] * np.linalg.norm(normal, axis=1)]
+    faces = drawn.faces[height >= distance * np.linalg.norm(normal, axis=1)]
     return Tracer(Geometry(drawn.vertices, faces, np.zeros(len(faces), np.int32)))
 
 

@@ -56,8 +56,8 @@ def test_errors_of_the_steps_add_up_plausibly(name, evidence):
     assert changes == pytest.approx(found.pictures["interleaved"][:, found.covered].mean() / mean - 1, abs=1e-6)
 
 
-# 3.1 instead of at most 2: the light's own curved surface darkens rays to the rectangle beyond the ball in which nothing
-# blocks, and one view from the centre does not see that; the two steps cancel (correlation -0.85 to -0.95)
+# 3.1 instead of at most 2: rays to the rectangle darken the picture, one view from its centre brightens it again
+# (correlation of the two steps -0.85 to -0.95), probably by what blocks at the rectangle's rim beyond the ball
 CANCELS = pytest.mark.xfail(raises=AssertionError, reason="rectangle and back-projection cancel here")
 
 

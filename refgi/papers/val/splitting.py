@@ -16,7 +16,7 @@ STEPS = {"lights": "pixel lights for all light, near ones clamped", "members": "
          "rectangle": "their bounding rectangle", "back_projection": "one map from its centre, projected back",
          "step": "one mean blocker, one disc", "series": "series of 4 terms", "sat": "squares for discs",
          "mip": "mip levels for squares", "interleaved": "interleaving and blur"}
-LARGE = 512  # pixels along a side, of a full run
+SIZE = MOVING / 2  # pixels a side in units of the run's: references are slow
 METHOD = tuple(STEPS)[1:-1]  # what stands between exact shadows and the full sum
 SHOWN = ("lights", "members", "step", "mip")
 
@@ -43,7 +43,7 @@ def splitting(bench: "Workbench") -> Figure:
          *(100 * sum(step.shift for step in one.steps) for one in found.values())),
         ("if they were independent", *(100 * one.root_of_squares for one in found.values()), *(None for _ in found))]
     scene = scene_of(bench, HORSE)
-    size = frame_of(bench, HORSE, _factor(bench)).width
+    size = frame_of(bench, HORSE, SIZE).width
     return Figure(
         shows="The paper has no such table: it shows the difference to a hard shadow for every light, in one picture.",
         facts=(f"{size}² pixels", f"path tracing with {bench.scale.truth_samples} samples a pixel",
@@ -57,14 +57,9 @@ def splitting(bench: "Workbench") -> Figure:
 
 
 def _split(bench: "Workbench", name: str) -> ErrorSplit:
-    frame = frame_of(bench, name, _factor(bench))
+    frame = frame_of(bench, name, SIZE)
     traced = trace_truth(frame, TruthSettings(samples=bench.scale.truth_samples)).mean
     return split_error(frame, clamped(bench, scene_of(bench, name)), traced)
-
-
-def _factor(bench: "Workbench") -> float:
-    """Return pixels a side in units of the run's: references are slow, and a small run is to be quick."""
-    return MOVING if bench.scale.size >= LARGE else MOVING / 2
 
 
 def _step(found: ErrorSplit, name: str) -> Step:
@@ -72,7 +67,7 @@ def _step(found: ErrorSplit, name: str) -> Step:
 
 
 def _pictures(bench: "Workbench", found: ErrorSplit) -> tuple[Picture, ...]:
-    covered = frame_of(bench, HORSE, _factor(bench)).gbuffer.covered
+    covered = frame_of(bench, HORSE, SIZE).gbuffer.covered
     made = {name: (STEPS[name], found.pictures[name]) for name in SHOWN[1:]}
     exposure = pictures.exposure_of(found.pictures["lights"], covered)
     shown = [pictures.indirect("lights", "a ray to each light", "Cornell Horse", found.pictures["lights"], exposure)]

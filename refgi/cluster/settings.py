@@ -15,11 +15,12 @@ Prefilter = Literal["mip", "sat", "brute"]
 Rescale = Literal["none", "scale2", "plateau"]
 Behind = Literal["visible", "dual_paraboloid", "raytrace"]
 NearGeometry = Literal["keep", "planes", "ball"]
+Dealing = Literal["index", "cluster"]
 Blur = Literal["none", "box", "geometry"]
 
 CHOICES: dict[str, Any] = {
     "distance": Distance, "axes": Axes, "extent": Extent, "visibility": Visibility, "prefilter": Prefilter,
-    "rescale": Rescale, "behind": Behind, "near_geometry": NearGeometry, "blur": Blur,
+    "rescale": Rescale, "behind": Behind, "near_geometry": NearGeometry, "dealing": Dealing, "blur": Blur,
     "single_light": Literal["point", "footprint"], "maps": Literal["raster", "rays"],
     "quantisation": Literal["none", "published"]}
 MOST_TERMS = 64
@@ -84,6 +85,7 @@ class ValSettings(LightSettings):
     receiver_plane: bool = True
     cone: bool = True
     interleaving: int | None = None
+    dealing: Dealing = "cluster"
     blur: Blur = "geometry"
     blur_extent: float = 0.1
     blur_cosine: float = 0.8

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.lighting.area_sum import Tiles, add_hard, add_soft, add_unshadowed, bound_tiles
-from refgi.cluster.lighting.interleave import Subsets, put, subsets, take
+from refgi.cluster.lighting.interleave import Subsets, dealt, put, subsets, take
 from refgi.cluster.lighting.member_lights import MemberLights, add_members, member_lights
 from refgi.cluster.visibility.filtered import build
 from refgi.cluster.visibility.series import series
@@ -86,8 +86,9 @@ def clustered_irradiance(
     expect(np.shape(facing) == np.shape(receivers.position), "facing", f"shape {np.shape(receivers.position)}",
            np.shape(facing))
     packed = checked(receivers, lights, settings, footprint)
-    members = member_lights(packed, areas.of, len(areas.members), interleaving)
     parts = subsets(np.asarray(receivers.covered, np.bool_), interleaving)
+    subset = dealt(areas.of, interleaving, settings.dealing)
+    members = member_lights(packed, areas.of, len(areas.members), subset, interleaving**2)
     tiles = _tiles(receivers, facing, parts)
     sums = np.zeros_like(tiles.position)
     if _published(members, settings, given):

@@ -1,10 +1,10 @@
 """Interleaved sampling: each pixel of a block of n x n sums one light of n^2 (Sec. 6; Segovia et al. 2006).
 
-Pixel (x, y) takes the lights i with i mod n^2 = (y mod n) n + x mod n, and each of them n^2 times. Pixels of one subset
-are kept together, so that the pixels of a tile share their lights.
+Pixel (x, y) takes the lights of subset (y mod n) n + x mod n, and each of them n^2 times. Pixels of one subset are kept
+together, so that the pixels of a tile share their lights.
 """
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,9 +14,13 @@ from refgi.jit import kernel, prange
 from refgi.pairs.blocks import BLOCK
 from refgi.pairs.pair_sum import TILE
 
+if TYPE_CHECKING:
+    from refgi.cluster.settings import Dealing
+
 Array = npt.NDArray[Any]
 
 MOST = 64  # pixels along a side of a block
+RUNS = 3  # of lights next to each other that a pixel takes where they are dealt out by cluster
 FIRST, SIZE, SUBSET = 0, 1, 2  # rows of tiles
 
 
@@ -59,6 +63,49 @@ def subsets(covered: Array, side: int) -> Subsets:
     subset = np.repeat(np.arange(len(counts)), tiles)
     first = start[subset] + (np.arange(len(subset)) - np.repeat(np.cumsum(tiles) - tiles, tiles)) * TILE
     return Subsets(places, start, np.stack([first, np.minimum(TILE, start[subset + 1] - first), subset]))
+
+
+def dealt(area_of: Array, side: int, dealing: "Dealing") -> Array:
+    """Say which subset each light belongs to.
+
+    Parameters
+    ----------
+    area_of : (N,) ndarray of int
+        C(i), the area light of each.
+    side : int
+        n, pixels along a side of a block.
+    dealing : {"index", "cluster"}
+        Light i to the subset i mod n^2; or lights sorted by area light, cut into equal runs and these dealt out in
+        turn, `RUNS` to each subset, fewer where lights are few.
+
+    Returns
+    -------
+    (N,) ndarray of int64
+        Subsets, 0 to n^2 - 1.
+
+    Notes
+    -----
+    [Dong09] Sec. 6 does not say which lights a pixel takes. By index it meets a part of nearly every area light, and
+    the visibility of each costs as much as for all its lights; by cluster it meets two to four of 30. Runs that
+    follow each other lie far apart in the block, as the lights of a cluster should in any part of a window.
+    """
+    count, subset_count = len(area_of), side * side
+    lights = np.arange(count)
+    if dealing == "index":
+        return lights % subset_count
+    runs = min(RUNS, max(count // subset_count, 1)) * subset_count
+    subset = np.empty(count, np.int64)
+    subset[np.argsort(area_of, kind="stable")] = _far_apart(side)[lights * runs // max(count, 1) % subset_count]
+    return subset
+
+
+def _far_apart(side: int) -> Array:
+    """Return the places of a block in the order of Bayer's dither: halves, quarters and so on cover it evenly."""
+    y, x = np.mgrid[:side, :side]
+    rank = np.zeros_like(x)
+    for bit in range(MOST.bit_length() - 1):
+        rank = rank << 2 | (x ^ y) >> bit << 1 & 2 | y >> bit & 1
+    return np.argsort(rank, axis=None)
 
 
 @kernel(parallel=True)

@@ -22,7 +22,7 @@ class MemberLights(NamedTuple):
     lobe_start: Array  # (M, n^2 + 1) int64: the same of the lobes
 
 
-def member_lights(packed: Packed, area_of: Array, count: int, side: int) -> MemberLights:
+def member_lights(packed: Packed, area_of: Array, count: int, subset: Array, subsets: int) -> MemberLights:
     """Sort packed lights by what they belong to.
 
     Parameters
@@ -33,16 +33,17 @@ def member_lights(packed: Packed, area_of: Array, count: int, side: int) -> Memb
         C(i), the area light of each.
     count : int
         M, how many area lights there are.
-    side : int
-        n of interleaved sampling: light i belongs to the subset i mod n^2.
+    subset : (N,) ndarray of int
+        Of interleaved sampling, the subset that each light belongs to.
+    subsets : int
+        n^2, how many subsets there are.
 
     Returns
     -------
     MemberLights
         The same lights, sorted.
     """
-    subsets = side * side
-    key = np.asarray(area_of, np.int64) * subsets + np.arange(len(area_of)) % subsets
+    key = np.asarray(area_of, np.int64) * subsets + subset
     order, start = _sorted(key[packed.shines], count, subsets)
     lobe_order, lobe_start = _sorted(key[packed.glossy], count, subsets)
     with_black = np.append(order, packed.diffuse.shape[1] - 1)

@@ -7,6 +7,7 @@ from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
 from refgi.cluster.lighting import clustered_irradiance
+from refgi.cluster.lighting.interleave import RUNS, dealt
 from refgi.cluster.maps.hard import hard_visibility
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.settings import ValSettings
@@ -68,8 +69,9 @@ def test_unshadowed_it_is_the_sum_over_all_lights(kind, real, evidence):
 
 
 @pytest.mark.feature("VAL-04", "VAL-23")
+@pytest.mark.parametrize("dealing", ["index", "cluster"])
 @pytest.mark.parametrize(("side", "count"), [(1, 60), (3, 60), (8, 200), (8, 5)])
-def test_every_pixel_sums_its_lights_under_their_visibility(side, count, evidence):
+def test_every_pixel_sums_its_lights_under_their_visibility(side, count, dealing, evidence):
     """Oracle: E = n^2 sum over the pixel's lights of E_i V_C(i), pair by pair."""
     rng = np.random.default_rng(side)
     to, lights = sets.room(rng, 17 * 19)
@@ -77,35 +79,54 @@ def test_every_pixel_sums_its_lights_under_their_visibility(side, count, evidenc
     to.covered[rng.random((17, 19)) < 0.2] = False
     lights = PixelLights(*(None if part is None else part[:, :count] for part in lights[:3]), None, None, None, count)
     of = rng.integers(0, 6, count)
-    result = clustered_irradiance(to, to.normal, lights, grouped(of, 6), None, NOT_SHADOWED, given=striped,
+    settings = ValSettings(visibility="none", dealing=dealing)
+    result = clustered_irradiance(to, to.normal, lights, grouped(of, 6), None, settings, given=striped,
                                   interleaving=side)
     expected = np.zeros_like(result)
     for y, x in np.argwhere(to.covered):
         at, up = to.position[:, y, x], to.normal[:, y, x]
-        for i in lights_of(x, y, side, count):
+        for i in lights_of(x, y, side, count, of if dealing == "cluster" else None):
             pair = eq2.pair(at, up, lights.position[:, i], lights.normal[:, i], lights.flux[:, i])
             expected[:, y, x] += side**2 * pair * striped(of[i], at, up)
     error = np.abs(result - expected).max() / expected.max()
     assert error < ROUNDING
-    evidence(f"n = {side}, {count} lights: {error:.1e} off the literal sum")
+    evidence(f"n = {side}, {count} lights by {dealing}: {error:.1e} off the literal sum")
 
 
 @pytest.mark.feature("VAL-23")
-@pytest.mark.parametrize("real", [np.float32, np.float64])
-def test_a_block_of_equal_pixels_has_the_full_sum_as_its_mean(real, evidence):
+@pytest.mark.parametrize("dealing", ["index", "cluster"])
+@pytest.mark.parametrize(("side", "count"), [(1, 9), (3, 60), (8, 1000), (8, 5), (64, 1024), (5, 0)])
+def test_every_light_is_dealt_out_once(side, count, dealing, evidence):
+    of = np.random.default_rng(count).integers(0, 30, count)
+    subset = dealt(of, side, dealing)
+    share = np.bincount(subset, minlength=side**2)
+    assert len(share) == side**2
+    assert share.sum() == count
+    assert np.ptp(share) <= (1 if dealing == "index" else RUNS)
+    if side == 8 and count == 1000:
+        met = len(np.unique(subset * 30 + of)) / side**2
+        assert (met > 10) if dealing == "index" else (met < 4)
+        evidence(f"{count} lights by {dealing}: a pixel meets {met:.1f} of 30 area lights")
+
+
+@pytest.mark.feature("VAL-23")
+@pytest.mark.parametrize(("real", "dealing"), [(np.float32, "index"), (np.float32, "cluster"),
+                                              (np.float64, "cluster")])
+def test_a_block_of_equal_pixels_has_the_full_sum_as_its_mean(real, dealing, evidence):
     rng = np.random.default_rng(2)
     to, lights = sets.room(rng, 1024, real)
     at = Receivers(*(np.ascontiguousarray(np.broadcast_to(part[:, :, :1], (3, 24, 16))) for part in to[:2]),
                    np.ones((24, 16), bool))
     areas = grouped(rng.integers(0, 30, 1024), 30)
-    full, eighth = (clustered_irradiance(at, at.normal, lights, areas, None, NOT_SHADOWED, given=striped,
+    settings = ValSettings(visibility="none", dealing=dealing)
+    full, eighth = (clustered_irradiance(at, at.normal, lights, areas, None, settings, given=striped,
                                          interleaving=side) for side in (1, 8))
     means = np.stack([eighth[:, y : y + 8, x : x + 8].mean(axis=(1, 2), dtype=np.float64)
                       for y in range(0, 17, 3) for x in range(0, 9, 4)])
     error = np.abs(means / full[:, 0, 0] - 1).max()
     assert error < (ROUNDING_SINGLE if real is np.float32 else ROUNDING)
     assert eighth.std() > 0.1 * eighth.mean()
-    evidence(f"{np.dtype(real).name}: means of 8 x 8 pixels at any place {error:.1e} off the full sum")
+    evidence(f"{dealing}, {np.dtype(real).name}: means of 8 x 8 pixels at any place {error:.1e} off the full sum")
 
 
 @pytest.fixture(scope="module", params=[np.float32, np.float64])

@@ -15,8 +15,9 @@ import numpy.typing as npt
 from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.grouping import grouped
 from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
+from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import member_visibility, reference_visibility
 from refgi.errors import expect
 from refgi.jit import threads
@@ -50,7 +51,7 @@ class Adaptive(NamedTuple):
     """The area lights that were enough."""
 
     areas: AreaLights
-    maps: ShadowMaps
+    maps: ShadowMaps | None
     error: float  # RMSE over the mean, estimated
     trail: tuple[Trial, ...]  # all that were tried, in their order
 
@@ -60,7 +61,7 @@ class Attempt(NamedTuple):
 
     trial: Trial
     areas: AreaLights
-    maps: ShadowMaps
+    maps: ShadowMaps | None
 
 
 class Samples(NamedTuple):
@@ -145,14 +146,9 @@ def _seek(attempt: Callable[[int], Attempt], most: int, target: float) -> tuple[
 def _make(
     frame: "Frame", lights: "PixelLights", settings: "ValSettings", footprint: Array | None, samples: Samples,
     count: int,
-) -> tuple[AreaLights, ShadowMaps, Array]:
+) -> tuple[AreaLights, ShadowMaps | None, Array]:
     """Return area lights, their maps and the light at the samples."""
-    geometry = frame.scene.geometry
-    clusters = cluster(lights.position, lights.normal, count, distance=settings.distance,
-                       weights=(settings.position_weight, settings.normal_weight), diagonal=geometry.diagonal,
-                       rounds=settings.rounds)
-    areas = area_lights(lights, clusters, settings, footprint)
-    maps = shadow_maps(geometry, areas, settings, frame.dtype, frame.tracer if settings.maps == "rays" else None)
+    areas, maps = grouped(frame, lights, settings, count, footprint)
     given = reference_visibility(frame, lights, areas, maps, settings)
     rays = frame.tracer if settings.behind == "raytrace" else None
     light = clustered_irradiance(samples.receivers, samples.facing, lights, areas, maps, settings,

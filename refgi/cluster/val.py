@@ -6,11 +6,10 @@ import numpy.typing as npt
 
 from refgi.cluster.adaptive import enough_area_lights
 from refgi.cluster.area_lights import AreaLights
-from refgi.cluster.clustering.kmeans import cluster
-from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.grouping import grouped
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
+from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.lights.selection import choose_lights, footprints, light_footprints, light_maps
@@ -26,7 +25,6 @@ Array = npt.NDArray[Any]
 
 PAIRS_IN_FULL = 1 << 30  # about a quarter of a second on two cores
 PUBLISHED_BLOCK = 8  # pixels
-WITHOUT_MAPS = ("none", "members", "rectangle")  # kinds of visibility
 
 
 def val(frame: "Frame", settings: ValSettings) -> Array:
@@ -59,7 +57,7 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
 
 
 def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> tuple[AreaLights, ShadowMaps | None]:
-    """Group pixel lights into area lights and draw what occludes them.
+    """Group pixel lights into as many area lights as asked for, or as an error asks for, and draw their maps.
 
     Parameters
     ----------
@@ -81,16 +79,7 @@ def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> t
         chosen = enough_area_lights(frame, lights, settings, areas_of_lights(frame, settings))
         return chosen.areas, chosen.maps
     skip("cluster.adaptive", "the number of area lights is given")
-    geometry = frame.scene.geometry
-    clusters = cluster(lights.position, lights.normal, settings.area_lights, distance=settings.distance,
-                       weights=(settings.position_weight, settings.normal_weight), diagonal=geometry.diagonal,
-                       rounds=settings.rounds)  # Sec. 5
-    areas = area_lights(lights, clusters, settings, areas_of_lights(frame, settings))
-    if settings.visibility in WITHOUT_MAPS:
-        skip("cluster.shadow_maps", f"visibility {settings.visibility!r} looks at none")
-        return areas, None
-    tracer = frame.tracer if settings.maps == "rays" else None
-    return areas, shadow_maps(geometry, areas, settings, frame.dtype, tracer)
+    return grouped(frame, lights, settings, settings.area_lights, areas_of_lights(frame, settings))  # Sec. 5
 
 
 def areas_of_lights(frame: "Frame", settings: ValSettings) -> Array | None:

@@ -25,12 +25,19 @@ class Method(NamedTuple):
     visibility: bool  # whether it knows what blocks indirect light
     summary: str
     ledger: str = ""  # module and function that accounts for the power of the lights; empty: the method keeps none
+    memory: str = ""  # module and function that says what settings add to a picture's memory; empty: next to nothing
 
     def load(self) -> tuple[Callable[["Frame", Any], Array], type]:
         """Return the method's function and its settings class."""
         module, _, function = self.home.partition(":")
         loaded = import_module(module)
         return getattr(loaded, function), getattr(loaded, self.settings)
+
+    def extra_bytes(self, settings: Any, pixels: int, float_bytes: int) -> int:
+        """Return what settings add to the memory of a picture whose floats have 4 or 8 bytes."""
+        module, _, function = self.memory.partition(":")
+        added: int = getattr(import_module(module), function)(settings, pixels, float_bytes) if module else 0
+        return added
 
 
 METHODS = {
@@ -42,7 +49,8 @@ METHODS = {
         Method("multires", "refgi.splat.multires:multires", "MultiresSettings", False,
                "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes"),
         Method("val", "refgi.cluster.val:val", "ValSettings", True,
-               "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights"),
+               "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights",
+               memory="refgi.cluster.memory:extra_bytes"),
         Method("gather", "refgi.splat.gathering.gather:gather", "GatherSettings", False,
                "Reflective Shadow Maps (2005): gathering around the projected point"),
         Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,

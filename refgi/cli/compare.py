@@ -42,7 +42,7 @@ def _compare(session: Session, /, methods: str | None, pairs: tuple[str, ...], d
     if out is not None:
         folder(out)
     scene = View(**options).load()
-    require_memory(scene, dtype, rsm_resolution, traced=True, compared=len(names) + 2)
+    require_memory(scene, dtype, rsm_resolution, traced=True, compared=len(names) + 2, settings=settings)
     with on_threads(threads), progress() as tell:
         comparison = compare(scene, names, truth_settings=settings.pop("truth"), method_settings=settings, out=out,
                              progress=tell, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)

@@ -1,9 +1,12 @@
 """A picture that will not fit in memory is refused before it is begun."""
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from refgi.errors import InputError
+from refgi.methods import find_method
 from refgi.scene import PointLight, Scene
 
 # From peaks measured at 1024^2 and 2048^2, rounded up by a third; the truth keeps moments in float64.
@@ -56,7 +59,8 @@ def available_bytes() -> int | None:
     return min(found) if found else None
 
 
-def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: bool = False, compared: int = 0) -> None:
+def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: bool = False, compared: int = 0,
+                   settings: Mapping[str, Any] | None = None) -> None:
     """Refuse a picture of the camera's size that will not fit.
 
     Parameters
@@ -71,6 +75,8 @@ def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: boo
         Whether the truth is among the methods.
     compared : int
         How many methods and references are compared.
+    settings : mapping of str to object, optional
+        Those of each method, which run one after the other.
 
     Raises
     ------
@@ -78,11 +84,17 @@ def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: boo
         If more is needed than available; names both.
     """
     width, height = scene.camera.width, scene.camera.height
-    needed = needed_bytes(scene, width, height, float_bytes=8 if dtype == "float64" else 4,
-                          rsm_resolution=rsm_resolution, traced=traced, compared=compared)
-    available = available_bytes()
-    if available is not None and needed > available:
-        raise InputError(f"size: {width}x{height} needs about {needed:,} bytes of memory, {available:,} are available")
+    float_bytes = 8 if dtype == "float64" else 4
+    needed = needed_bytes(scene, width, height, float_bytes=float_bytes, rsm_resolution=rsm_resolution, traced=traced,
+                          compared=compared)
+    extra = {name: find_method(name).extra_bytes(own, width * height, float_bytes)
+             for name, own in (settings or {}).items()}
+    most = max(extra, key=extra.__getitem__, default="")
+    added, available = extra.get(most, 0), available_bytes()
+    if available is not None and needed + added > available:
+        of = f", {added:,} of them for the settings of {most}" if added else ""
+        raise InputError(f"size: {width}x{height} needs about {needed + added:,} bytes of memory{of}, {available:,} "
+                         "are available")
 
 
 def _machine_bytes() -> int | None:

@@ -45,7 +45,7 @@ def _render(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str
     settings = read_settings(find_method(method).load()[1], pairs, seed, method)
     files = picture_files(out, f"{_stem(options['scene'])}_{method}")
     scene = View(**options).load()
-    require_memory(scene, dtype, rsm_resolution, traced=method == "truth")
+    require_memory(scene, dtype, rsm_resolution, traced=method == "truth", settings={method: settings})
     started = time.perf_counter()
     with on_threads(threads), progress() as tell, stages.observe(progress=tell) as log:
         picture = render(scene, method, settings, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from refgi.cli import memory
 from refgi.cli.group import VerbGroup
 from refgi.cli.lights import read_lights
+from refgi.cluster import ValSettings
 from refgi.image import read_exr
 from refgi.methods import Picture, render
 from refgi.scene import Camera, PointLight, SpotLight, load_scene
@@ -150,6 +151,26 @@ def test_a_size_that_does_not_fit_is_refused_with_both_figures(tmp_path, monkeyp
     monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
     assert refused(run("cornell_box", "--size", "8000x8000", "--out", tmp_path / "a.exr"), "size: 8000x8000",
                    "1,000,000,000 are available")
+
+
+@pytest.mark.usefixtures("never_computes")
+@pytest.mark.parametrize("how", [
+    ("map_resolution=4096", "area_lights=30"), ("map_resolution=4096", "area_lights=1", "terms=64"),
+    ("map_resolution=2048", "area_lights=40", "behind=dual_paraboloid"), ("pattern=all", "area_lights=5000"),
+    ("map_resolution=4096", "area_lights=2", "prefilter=sat"), ("target_error=0.1", "map_resolution=1024"),
+], ids=str)
+def test_maps_of_area_lights_that_do_not_fit_are_refused(how, tmp_path, monkeypatch):
+    monkeypatch.setattr(memory, "available_bytes", lambda: 2 * 10**9)
+    pairs = [text for pair in how for text in ("--set", pair)]
+    assert refused(run("cornell_box", "--method", "val", *pairs, "--size", "24x24", "--out", tmp_path / "a.exr"),
+                   "for the settings of val", "2,000,000,000 are available")
+
+
+@pytest.mark.parametrize("how", [{}, {"map_resolution": 4096, "visibility": "members"}, {"target_error": 0.1}], ids=str)
+def test_what_fits_is_not_refused_for_its_maps(how, monkeypatch):
+    monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
+    scene = load_scene("cornell_box").with_camera(width=24, height=24)
+    memory.require_memory(scene, "float32", 512, settings={"val": ValSettings(**how)})
 
 
 def test_where_memory_cannot_be_told_nothing_is_refused(monkeypatch):

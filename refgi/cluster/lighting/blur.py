@@ -180,11 +180,16 @@ def _faces(tile: Array, middle: int, p: Any, y: int, q: Any, cosine: Any) -> boo
 
 @kernel
 def _store(
-    tile: Array, middle: int, line: int, sums: Array, covered: Array, row: int, left: int, wide: int, result: Array
+    tile: Array, middle: int, middle_column: int, sums: Array, covered: Array, row: int, left: int, wide: int,
+    result: Array,
 ) -> None:
     one, zero = tile.dtype.type(1.0), tile.dtype.type(0.0)
+    line, start = np.uint64(middle_column), np.uint64(left)  # unsigned: no check for places counted from the end
+    for i in range(np.uint64(WIDE)):
+        sums[3, i] = sums[3, i] if sums[3, i] > one else one
     for c in range(3):
-        for i in range(wide):
-            count = sums[3, i] if sums[3, i] > one else one
-            mean = tile[middle, E + c * COLUMNS + line + i] + sums[c, i] / count
-            result[c, row, left + i] = mean if covered[row, left + i] else zero
+        plane = np.uint64(E + c * COLUMNS) + line
+        for i in range(np.uint64(WIDE)):
+            sums[c, i] = tile[middle, plane + i] + sums[c, i] / sums[3, i]
+        for i in range(np.uint64(wide)):
+            result[c, row, start + i] = sums[c, i] if covered[row, start + i] else zero

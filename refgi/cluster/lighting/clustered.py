@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.lighting.area_sum import Tiles, add_hard, add_soft, add_unshadowed, bound_tiles
-from refgi.cluster.lighting.interleave import Subsets, dealt, put, subsets, take
+from refgi.cluster.lighting.interleave import SUBSET, Subsets, dealt, put, subsets, take
 from refgi.cluster.lighting.member_lights import MemberLights, add_members, member_lights
 from refgi.cluster.visibility.filtered import build
 from refgi.cluster.visibility.series import series
@@ -89,9 +89,10 @@ def clustered_irradiance(
     parts = subsets(np.asarray(receivers.covered, np.bool_), interleaving)
     subset = dealt(areas.of, interleaving, settings.dealing)
     members = member_lights(packed, areas.of, len(areas.members), subset, interleaving**2)
-    tiles = _tiles(receivers, facing, parts)
+    published = _published(members, settings, given)
+    tiles = _tiles(receivers, None if published and not _any_hard(areas, settings) else facing, parts)
     sums = np.zeros_like(tiles.position)
-    if _published(members, settings, given):
+    if published:
         _add_by_tiles(tiles, members, areas, maps, settings, sums)
     else:
         _add_by_lists(tiles, parts, members, _visibility(areas, maps, settings, given, rays), sums)
@@ -100,12 +101,14 @@ def clustered_irradiance(
     return result
 
 
-def _tiles(receivers: Receivers, facing: Array, parts: Subsets) -> Tiles:
+def _tiles(receivers: Receivers, facing: Array | None, parts: Subsets) -> Tiles:
+    """Sort receivers into tiles; their triangles' normals, which hard tests alone ask for, only where given."""
     real = np.asarray(receivers.position).dtype
-    planes = []
-    for plane in (receivers.position, receivers.normal, facing):
-        planes.append(np.empty((3, len(parts.places)), real))
-        take(np.ascontiguousarray(plane, real).reshape(3, -1), parts, planes[-1])
+    planes = [np.empty((3, len(parts.places) if plane is not None else 0), real)
+              for plane in (receivers.position, receivers.normal, facing)]
+    for plane, values in zip((receivers.position, receivers.normal, facing), planes, strict=True):
+        if plane is not None:
+            take(np.ascontiguousarray(plane, real).reshape(3, -1), parts, values)
     position, normal, faces = planes
     low, high = np.empty((2, parts.tiles.shape[1], 6), real)
     tiles = Tiles(position, normal, faces, parts.tiles, low, high)
@@ -117,6 +120,19 @@ def _published(members: MemberLights, settings: "ValSettings", given: Given | No
     """Tell whether tiles can be lit and shadowed at once."""
     return (members.packed.spheres is None and members.packed.lobes is None and given is None
             and settings.visibility in ("series", "hard", "none") and settings.behind == "visible")
+
+
+def _any_hard(areas: AreaLights, settings: "ValSettings") -> bool:
+    """Tell whether any area light casts a hard shadow."""
+    return settings.visibility == "hard" or (settings.visibility == "series" and bool((areas.delta == 0).any()))
+
+
+def _lit_tiles(tiles: Tiles, start: Array) -> Tiles:
+    """Leave out tiles whose subset holds none of an area light's members."""
+    lit = np.diff(start)[tiles.tiles[SUBSET]] > 0
+    if lit.all():
+        return tiles
+    return tiles._replace(tiles=np.compress(lit, tiles.tiles, axis=1), low=tiles.low[lit], high=tiles.high[lit])
 
 
 def _add_by_tiles(
@@ -132,13 +148,14 @@ def _add_by_tiles(
     filters = _filtered(maps, map_of[shining[(map_of[shining] >= 0) & ~hard[shining]]], settings)
     for done, m in enumerate(shining):
         start, k = members.start[m], int(map_of[m])
+        lit = _lit_tiles(tiles, start)
         if k < 0 or maps is None:
-            add_unshadowed(tiles, lights, clamp, start, sums)
+            add_unshadowed(lit, lights, clamp, start, sums)
         elif hard[m]:
-            add_hard(tiles, lights, clamp, start, maps.depth[k], maps.center[k], maps.frame[k], sums)
+            add_hard(lit, lights, clamp, start, maps.depth[k], maps.center[k], maps.frame[k], sums)
         else:
             numbers = numbers_of(maps, k, float(areas.delta[m]), settings)
-            add_soft(tiles, lights, clamp, start, numbers, sizes, weight, next(filters), sums)
+            add_soft(lit, lights, clamp, start, numbers, sizes, weight, next(filters), sums)
         report_progress((done + 1) / len(shining))
 
 

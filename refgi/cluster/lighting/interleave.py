@@ -29,7 +29,7 @@ class Subsets(NamedTuple):
 
     places: Array  # (n,) int64: flat indices of the pixels
     start: Array  # (subsets + 1,) int64: first pixel of each subset, and how many there are
-    tiles: Array  # (3, T) int64: first pixel of each tile, how many it has (1 to TILE), and its subset
+    tiles: Array  # (3, T) int64: first pixel of each tile, how many it has (1 to TILE), and its subset; by place
 
 
 def subsets(covered: Array, side: int) -> Subsets:
@@ -62,7 +62,10 @@ def subsets(covered: Array, side: int) -> Subsets:
     tiles = -(-counts // TILE)
     subset = np.repeat(np.arange(len(counts)), tiles)
     first = start[subset] + (np.arange(len(subset)) - np.repeat(np.cumsum(tiles) - tiles, tiles)) * TILE
-    return Subsets(places, start, np.stack([first, np.minimum(TILE, start[subset + 1] - first), subset]))
+    every = np.stack([first, np.minimum(TILE, start[subset + 1] - first), subset])
+    row, column = np.divmod(places[first], covered.shape[1])
+    by_place = np.lexsort((column // (side * BLOCK), row // (side * BLOCK)))  # pixels are loaded once for all subsets
+    return Subsets(places, start, np.take(every, by_place, axis=1))
 
 
 def dealt(area_of: Array, side: int, dealing: "Dealing") -> Array:

@@ -95,4 +95,4 @@ def _errors(name: str, size: int) -> Iterator[Row]:
 def _relative(found: Any, truth: Any, frame: Frame) -> tuple[float, str]:
     from refgi.compare.metrics import relmse
 
-    return relmse(np.moveaxis(found, 0, -1), np.moveaxis(truth, 0, -1), frame.gbuffer.covered), "relMSE"
+    return relmse(found, truth, frame.gbuffer.covered), "relMSE"

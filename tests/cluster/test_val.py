@@ -54,7 +54,7 @@ def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
     {"quantisation": "published"}, {"behind": "dual_paraboloid"}, {"behind": "raytrace"}, {"clamp": "disc"},
     {"single_light": "footprint"}, {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"maps": "rays"},
     {"target_error": 0.3}, {"distance": "raw"}, {"distance": "squared"}, {"axes": "pca"}, {"axes": "min_area"},
-    {"as_published": {"val_alpha", "val_search_solid_angle"}}, {"as_published": {"val_alpha_over_pi"}},
+    {"as_published": ("val_alpha", "val_search_solid_angle")}, {"as_published": ("val_alpha_over_pi",)},
 ], ids=str)
 def test_every_setting_gives_a_picture_between_darkness_and_the_unshadowed(ball, how):
     settings = ValSettings(**SMALL | how)

@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.lighting.interleave import FIRST, SIZE, SUBSET
-from refgi.cluster.lighting.soft_lanes import FULL, listed, soft_lanes
 from refgi.cluster.maps.hard import hard_tile
-from refgi.cluster.visibility.soft import ROOM_ROWS, Choices
+from refgi.cluster.visibility.soft import FULL, ROOM_ROWS, Choices, soft_tile
 from refgi.jit import kernel, prange
 from refgi.pairs.culling import bound_tile, lights_in_reach
 from refgi.pairs.pair_sum import GROUP, ROWS, TILE, TOTAL, Clamp, X, add_listed, load_tile
@@ -148,22 +147,21 @@ def add_soft(
     """
     for task in prange(TASKS):
         real = receivers.position.dtype
-        tile, visible, room = np.zeros((ROWS, TILE), real), np.empty(TILE, real), np.empty((2, ROOM_ROWS, TILE), real)
+        tile, visible, room = np.zeros((ROWS, TILE), real), np.empty(TILE, real), np.empty((ROOM_ROWS, TILE), real)
         reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
         lit, all_lit, todo = np.empty(TILE, np.bool_), np.ones(TILE, np.bool_), np.empty(TILE, np.bool_)
-        places, found = np.empty(TILE, np.int64), np.empty(TILE, np.int64)
-        points, some = np.empty((3, TILE), real), np.empty(TILE, real)
-        means = np.empty((4 * len(weight) + 2, TILE), real)
+        places, points, some = np.empty(TILE, np.int64), np.empty((3, TILE), real), np.empty(TILE, real)
+        means = np.empty((4 * len(weight) + 1, TILE), real)
         for t in range(np.int64(task), receivers.tiles.shape[1], TASKS):
             if not _light_tile(receivers, t, lights, clamp, start, tile, reach, chosen):
                 continue
             size = receivers.tiles[SIZE, t]
             count = _lit(tile, size, lit, places)
             if count >= FULL * size:
-                soft_lanes(numbers, sizes, weight, filters, tile, size, lit, todo, visible, room, means, found)
+                soft_tile(numbers, sizes, weight, filters, tile, size, lit, todo, visible, room, means)
             else:
                 _gather(tile, places, count, points)
-                soft_lanes(numbers, sizes, weight, filters, points, count, all_lit, todo, some, room, means, found)
+                soft_tile(numbers, sizes, weight, filters, points, count, all_lit, todo, some, room, means)
                 _scatter(some, places, count, visible)
             _add(tile, receivers.tiles, t, visible, irradiance)
 
@@ -196,7 +194,11 @@ def _lit(tile: Array, size: int, lit: Array, places: Array) -> int:
     zero = tile.dtype.type(0.0)
     for i in range(TILE):
         lit[i] = (tile[TOTAL, i] > zero) | (tile[TOTAL + 1, i] > zero) | (tile[TOTAL + 2, i] > zero)
-    return listed(lit, size, places)
+    count = 0
+    for i in range(size):
+        places[count] = i
+        count += lit[i]
+    return count
 
 
 @kernel

@@ -17,7 +17,7 @@ from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.lighting.area_sum import Tiles, add_hard, add_soft, add_unshadowed, bound_tiles
 from refgi.cluster.lighting.interleave import SUBSET, Subsets, dealt, put, subsets, take
 from refgi.cluster.lighting.member_lights import MemberLights, add_members, member_lights
-from refgi.cluster.visibility.filtered import build
+from refgi.cluster.visibility.filtered import build, room_for
 from refgi.cluster.visibility.series import series
 from refgi.cluster.visibility.soft import choices, numbers_of
 from refgi.cluster.visibility.visible import visibility
@@ -165,12 +165,15 @@ def _filtered(maps: "ShadowMaps | None", wanted: Array, settings: "ValSettings")
         return
     known, workers = maps, numba.get_num_threads()
 
-    def filtered(k: int) -> Any:
-        return build(known.depth[k], float(known.far[k]), settings)
+    rooms = [room_for(known.depth.shape[1], known.depth.dtype, settings) for _ in range(min(workers, len(wanted)))]
+
+    def filtered(k: int, room: Any) -> Any:
+        return build(known.depth[k], float(known.far[k]), settings, room)
 
     with ThreadPoolExecutor(workers) as pool:
-        for first in range(0, len(wanted), workers):
-            yield from pool.map(filtered, wanted[first : first + workers])
+        for first in range(0, len(wanted), workers):  # what is filtered before is in use no more
+            some = wanted[first : first + workers]
+            yield from pool.map(filtered, some, rooms[: len(some)])
 
 
 def _add_by_lists(

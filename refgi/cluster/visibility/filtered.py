@@ -16,6 +16,7 @@ Array = npt.NDArray[Any]
 # a read between texels is a tent twice as wide as a texel of its level: half the level makes it the filter's width
 LEVEL_SHIFT = -1.0
 MEANS: dict[Any, Any] = {Mip: mip_means, Sat: sat_means, Brute: brute_means}
+FILL: dict[Any, Any] = {Mip: build_mip, Sat: build_sat, Brute: build_brute}
 
 
 def filtered(
@@ -55,7 +56,7 @@ def _by_type(
     return call
 
 
-def build(depth: Array, far: float, settings: ValSettings) -> Any:
+def build(depth: Array, far: float, settings: ValSettings, room: Any = None) -> Any:
     """Filter one map as settings ask for.
 
     Parameters
@@ -66,27 +67,45 @@ def build(depth: Array, far: float, settings: ValSettings) -> Any:
         Depth at the far end, m.
     settings : ValSettings
         `prefilter`, `terms` and `quantisation` count.
+    room : Mip, Sat or Brute, optional
+        Of `room_for` with the same settings; overwritten and returned.
 
     Returns
     -------
     Mip, Sat or Brute
         In the dtype of `depth`.
+    """
+    room = room_for(len(depth), depth.dtype, settings) if room is None else room
+    most = series(settings).range
+    FILL[type(room)](depth, most / far, most, room)
+    return room
+
+
+def room_for(n: int, dtype: npt.DTypeLike, settings: ValSettings) -> Any:
+    """Make room for one filtered map.
+
+    Parameters
+    ----------
+    n : int
+        Texels along a side of the map.
+    dtype : dtype
+        Of the map.
+    settings : ValSettings
+        As in `build`.
+
+    Returns
+    -------
+    Mip, Sat or Brute
+        Not yet filled.
 
     Notes
     -----
     Sec. 6 filters square maps. The square beyond the unit disc, which the hemisphere does not reach, mirrors what lies
     within: holding nothing, it would let light leak in over the rim. Texel by texel, it is left out.
     """
-    most, n, quantised = series(settings).range, len(depth), settings.quantisation == "published"
+    quantised = settings.quantisation == "published"
     if settings.prefilter == "mip":
-        mip = mip_of(mips(1, n, settings.terms, depth.dtype, shift=LEVEL_SHIFT, quantised=quantised, mirrored=True), 0)
-        build_mip(depth, most / far, most, mip)
-        return mip
+        return mip_of(mips(1, n, settings.terms, dtype, shift=LEVEL_SHIFT, quantised=quantised, mirrored=True), 0)
     if settings.prefilter == "sat":
-        sat = sats(n, settings.terms, depth.dtype, quantised=quantised, mirrored=True)
-        build_sat(depth, most / far, most, sat)
-        return sat
-    box = "val_alpha_over_pi" in settings.as_published
-    brute = brutes(n, settings.terms, depth.dtype, box=box, quantised=quantised)
-    build_brute(depth, most / far, most, brute)
-    return brute
+        return sats(n, settings.terms, dtype, quantised=quantised, mirrored=True)
+    return brutes(n, settings.terms, dtype, box="val_alpha_over_pi" in settings.as_published, quantised=quantised)

@@ -29,6 +29,7 @@ from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
 
+FULL = 0.75  # share of the lanes from which on moving them together costs more than it saves
 NOTHING = 0.02  # of the search disc blocked: less is the series' ripple, not a blocker
 # rows of the room
 X, Y, Z, D, EXTENT = 0, 1, 2, 3, 4  # receiver in the map's frame, its distance, the light's size towards it; m
@@ -343,7 +344,7 @@ def soft_tile(
     size : int
         How many.
     wanted : (>= size,) ndarray of bool
-        Which of them.
+        Which of them; overwritten, with nothing but True.
     todo : (>= size,) ndarray of bool
         Filled: whose filtered comparison was needed.
     visible : (>= size,) ndarray
@@ -355,10 +356,37 @@ def soft_tile(
 
     Notes
     -----
-    Each receiver's V depends on nothing but its own position, whatever tile it is in.
+    Each receiver's V depends on nothing but its own position, whatever tile it is in. The second read is half of the
+    cost; where few have blockers, these move together for it.
     """
-    if look(numbers, choices, points, size, wanted, todo, visible, room) > 0:
-        filtered(filters, room[S], room[T], room[RADIUS], todo, size, True, means)
-        if find_penumbra(numbers, choices, weight, means, size, todo, room) > 0:
-            filtered(filters, room[S], room[T], room[RADIUS], todo, size, False, means)
-            compare(numbers, weight, means, size, todo, visible, room)
+    if look(numbers, choices, points, size, wanted, todo, visible, room) == 0:
+        return
+    filtered(filters, room[S], room[T], room[RADIUS], todo, size, True, means)
+    count = find_penumbra(numbers, choices, weight, means, size, todo, room)
+    if count >= FULL * size:
+        filtered(filters, room[S], room[T], room[RADIUS], todo, size, False, means)
+        compare(numbers, weight, means, size, todo, visible, room)
+    elif count > 0:
+        _move_together(size, todo, wanted, room)
+        filtered(filters, room[S], room[T], room[RADIUS], wanted, count, False, means)
+        compare(numbers, weight, means, count, wanted, room[X], room)
+        _move_back(room[X], size, todo, visible)
+
+
+@kernel
+def _move_together(size: int, todo: Array, first: Array, room: Array) -> None:
+    """Move the receivers left to do to the first lanes, in place, and flag these."""
+    count = 0
+    for i in range(size):
+        room[D, count], room[RADIUS, count] = room[D, i], room[RADIUS, i]
+        room[S, count], room[T, count] = room[S, i], room[T, i]
+        first[count] = True
+        count += todo[i]
+
+
+@kernel
+def _move_back(some: Array, size: int, todo: Array, visible: Array) -> None:
+    count = 0
+    for i in range(size):
+        visible[i] = some[count] if todo[i] else visible[i]
+        count += todo[i]

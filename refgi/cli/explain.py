@@ -37,6 +37,7 @@ def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: st
 
     The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving.
     """
+    from refgi.cli.memory import require_memory
     from refgi.cli.progress import progress
     from refgi.cli.settings import read_settings
     from refgi.cli.threads import on_threads
@@ -46,6 +47,7 @@ def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: st
 
     settings = read_settings(find_method(method).load()[1], pairs, seed, method)
     scene = _small(View(**options).load())
+    require_memory(scene, dtype, rsm_resolution, traced=method == "truth", settings={method: settings})
     frame_options = {"dtype": dtype, "rsm_resolution": rsm_resolution, "shadows": shadows}
     with on_threads(threads), progress() as tell:
         first = _watch(scene, method, settings, frame_options, None)

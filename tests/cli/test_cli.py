@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 import refgi
+from refgi.cli import memory
 from refgi.cli.group import VERBS, VerbGroup
 from refgi.image import read_exr
 
@@ -201,6 +202,13 @@ def test_explain_says_what_is_skipped_and_why():
     text = run("explain", "cornell_box", *TINY, "--set", "lights=16").stdout
     assert skipped[0]["reason"] in text
     assert "SII Table 1" in text
+
+
+def test_explain_refuses_maps_that_do_not_fit(monkeypatch):
+    monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
+    told = run("explain", "cornell_box", *TINY, "--method", "val", "--set", "map_resolution=4096")
+    assert told.exit_code == 2
+    assert "for the settings of val" in told.stderr
 
 
 @pytest.mark.feature("REF-04")

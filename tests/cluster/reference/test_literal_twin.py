@@ -76,7 +76,7 @@ def test_every_pixel_is_that_of_the_loops(box, mode, evidence):
 
 @pytest.mark.feature("VAL-23", "VAL-24")
 def test_interleaved_and_blurred_as_well(box, evidence):
-    settings = dataclasses.replace(SETTINGS, interleaving=4)
+    settings = dataclasses.replace(SETTINGS, interleaving=4, dealing="index")
     expected, got = twin(box, settings, 4), val(box, settings)
     off = np.abs(got - expected).max() / expected.max()
     evidence(f"4 x 4 interleaved, blurred, {box.dtype}: {off:.1e} of the maximum off a picture by plain loops")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 UPRIGHT = 0.999  # |y| of a normal from which a map's up is -z, as for all maps
+FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line, of no width but the rounding of its lights
 
 
 @stage("cluster.area_lights")
@@ -42,7 +43,7 @@ def area_lights(
     -------
     AreaLights
         M rectangles around the projections of their lights. A cluster of no lights, of one that is a point, or of
-        lights in one place has sides of 0.
+        lights in one place has sides of 0; one of lights in a row along an axis has one side of 0.
 
     Raises
     ------
@@ -71,6 +72,7 @@ def area_lights(
         low, high = np.minimum.reduceat(flat, starts, axis=1), np.maximum.reduceat(flat, starts, axis=1)
         side[:, used], offset[:, used] = high - low, (low + high) / 2
         radius[used] = np.sqrt(np.maximum.reduceat((away**2).sum(axis=0), starts))
+    side[side < FLAT * radius] = 0.0
     side *= _correction(clusters.members) if settings.unbiased_area else 1.0
     if settings.single_light == "footprint" and footprint is not None:
         single = np.flatnonzero(clusters.members[clusters.of] == 1)

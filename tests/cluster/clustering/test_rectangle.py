@@ -184,3 +184,18 @@ def test_degenerate_clusters_are_finite(axes, unbiased):
                        cluster(position[:, :0], normals[:, :0], 5, diagonal=1.0), settings)
     assert none.delta.shape == (0,)
     assert none.frame.shape == (0, 3, 3)
+
+
+@pytest.mark.parametrize("axes", ["pca", "min_area"])
+def test_lights_in_a_row_have_no_width_whatever_their_rounding(axes):
+    """Else rounding would decide whether the area light casts a hard shadow."""
+    rng = np.random.default_rng(4)
+    along, start = rng.normal(size=(3, 40, 1)), rng.normal(size=(3, 40, 1))
+    across = rng.normal(size=(3, 40))
+    normals = np.cross(along[..., 0], across, axis=0)
+    normals = np.repeat(normals / np.linalg.norm(normals, axis=0), 3, axis=1)
+    position = (start + along * np.array([0.0, 0.3, 1.0])).reshape(3, -1).astype(np.float32).astype(np.float64)
+    given = grouped(position, normals, np.arange(120) // 3, 40)
+    found = area_lights(lights_at(position, normals), given, dataclasses.replace(PUBLISHED, axes=axes))
+    assert not found.delta.any()
+    assert (found.side.max(axis=0) > 0.1).all()

@@ -9,7 +9,7 @@ unit disc among them, hold the far end of the range. What is filtered of it are 
 Three filters answer the same question, the mean of the first 2 M or of all channels over the discs of a tile's
 receivers: `mip_means(mip, s, t, radius, wanted, count, with_z, out)`, `sat_means(...)`, `brute_means(...)`. Each takes
 what its `build_*` kernel filled, the centre (s, t) and the radius of each lane's disc in units of the map's half
-side, and fills `out[channel, lane]` where `wanted[lane]`. `range_mip` bounds the depths a disc can meet.
+side, and fills `out[channel, lane]` where `wanted[lane]`.
 
 Against the sum over the texels of the disc, on maps of real scenes, V is off by (RMSE) 0.09 with a mip map read at
 log2 of the disc's diameter, as published, 0.046 one level finer (`shift` -1: a read between texels is twice as wide

@@ -56,11 +56,14 @@ def _frames(name: str, size: int, repeats: int, paper: float) -> Iterator[Row]:
         moved = Frame(_moved(scene, 1e-4 * next(moves)), width=size, height=size)
         moved.radiance(val(moved, settings))
 
-    published, full = ValSettings(interleaving=8), ValSettings(interleaving=1)
-    yield Row(f"{name}: 8 x 8 interleaved and blurred", 1 / seconds(lambda: frame(published), repeats), "frames/s",
-              f"> {paper}", f"paper {paper}; {_breakdown(lambda: frame(published), repeats)}")
-    yield Row(f"{name}: every light at every pixel", 1 / seconds(lambda: frame(full), repeats), "frames/s", "",
-              _breakdown(lambda: frame(full), repeats))
+    for label, aim, settings in (
+            ("8 x 8 interleaved and blurred", f"> {paper}", ValSettings(interleaving=8)),
+            ("the same, lights dealt out by cluster", f"> {paper}", ValSettings(interleaving=8, dealing="cluster")),
+            ("every light at every pixel", "", ValSettings(interleaving=1))):
+        def draw(how: ValSettings = settings) -> None:
+            frame(how)
+
+        yield Row(f"{name}: {label}", 1 / seconds(draw, repeats), "frames/s", aim, _breakdown(draw, repeats))
 
 
 def _moved(scene: Scene, step: float) -> Scene:

@@ -85,7 +85,7 @@ class ValSettings(LightSettings):
     receiver_plane: bool = True
     cone: bool = True
     interleaving: int | None = None
-    dealing: Dealing = "cluster"
+    dealing: Dealing = "index"
     blur: Blur = "geometry"
     blur_extent: float = 0.1
     blur_cosine: float = 0.8

@@ -6,6 +6,7 @@ their area lights. Area lights are doubled until the two are near enough to each
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,12 +20,12 @@ from refgi.cluster.grouping import grouped
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import member_visibility, reference_visibility
-from refgi.errors import expect
+from refgi.errors import RefgiWarning, expect
 from refgi.jit import threads
 from refgi.lights.selection import footprints
 from refgi.pairs.irradiance import Receivers
 from refgi.rsm import facing_normals
-from refgi.stages import skip, stage
+from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.cluster.settings import ValSettings
@@ -121,8 +122,9 @@ def enough_area_lights(
     most = max(1, min(total, MOST_TEXELS // settings.map_resolution**2))
     best, trail = _seek(attempt, most, settings.target_error)
     if best.trial.bound > settings.target_error:
-        skip("cluster.adaptive", f"no number of area lights tried has an error below {settings.target_error:g}: "
-             f"{best.trial.area_lights} of {total} come nearest, with {best.trial.error:.3g}")
+        said = (f"no number of area lights tried has an error below {settings.target_error:g}: "
+                f"{best.trial.area_lights} of {total} come nearest, with {best.trial.error:.3g}")
+        warnings.warn(RefgiWarning(said), stacklevel=2)
     return Adaptive(best.areas, best.maps, best.trial.error, tuple(trail))
 
 

@@ -1,10 +1,12 @@
 """A virtual area light stands for the visibility of the lights of one cluster (Sec. 4, 5)."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
 Array = npt.NDArray[Any]
+Given = Callable[[int, Array, Array], Array]  # (area light, points (3, n), facing (3, n)) -> V (n,)
 
 
 class AreaLights(NamedTuple):

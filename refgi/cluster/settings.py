@@ -3,9 +3,11 @@
 import dataclasses
 from typing import Any, ClassVar, Literal
 
+import numpy as np
+
 from refgi.errors import expect
 from refgi.lights.settings import MOST_LIGHTS, LightSettings, expect_choices
-from refgi.scene.values import is_count
+from refgi.scene.values import is_count, is_number
 
 Distance = Literal["raw", "normalised", "squared"]
 Axes = Literal["fixed", "pca", "min_area"]
@@ -23,12 +25,23 @@ CHOICES: dict[str, Any] = {
     "rescale": Rescale, "behind": Behind, "near_geometry": NearGeometry, "dealing": Dealing, "blur": Blur,
     "single_light": Literal["point", "footprint"], "maps": Literal["raster", "rays"],
     "quantisation": Literal["none", "published"]}
+PUBLISHED_AREA_LIGHTS = 30
 MOST_TERMS = 64
+MOST_BLOCK = 64  # pixels
 LARGEST_MAP = 4096  # texels
 # least and most of each number
 COUNTS = (("area_lights", 1, MOST_LIGHTS), ("rounds", 1, 1000), ("map_resolution", 1, LARGEST_MAP),
           ("terms", 1, MOST_TERMS))
-LEAST_TARGET = 1e-4  # about what rays for a thousand pixels can tell
+FLAGS = ("unbiased_area", "foreshortened", "occluders_alone", "receiver_plane", "cone")
+# least and most of each number that may have a fraction, and what it is; the least target is about what rays for a
+# thousand pixels can tell
+NUMBERS = {
+    "position_weight": (0.0, 1e6, "a weight"), "normal_weight": (0.0, 1e6, "a weight"),
+    "target_error": (1e-4, 1e6, "a share of the mean"),
+    "near_distance": (0.0, 100.0, "a share of the cluster's radius"), "bias": (0.0, 0.25, "a share of the depth range"),
+    "attenuation": (0.0, 100.0, "a factor"),
+    "blur_extent": (0.0, 10.0, "a share of the diagonal"), "blur_cosine": (-1.0, 1.0, "a cosine")}
+MAY_BE_NONE = frozenset({"target_error", "bias"})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,7 +71,7 @@ class ValSettings(LightSettings):
     """
 
     lights: int = 1024
-    area_lights: int = 30
+    area_lights: int = PUBLISHED_AREA_LIGHTS
     target_error: float | None = None
     distance: Distance = "normalised"
     position_weight: float = 0.7
@@ -99,18 +112,23 @@ class ValSettings(LightSettings):
             count = getattr(self, key)
             expect(is_count(count) and least <= count <= most, key, f"a whole number, {least} to {most:,}", count)
         expect_choices(self, CHOICES)
-        for key in ("position_weight", "normal_weight"):
-            expect(0 <= getattr(self, key) <= 1e6, key, "a weight of 0 to 1e6", getattr(self, key))
+        for key in FLAGS:
+            expect(isinstance(getattr(self, key), bool | np.bool_), key, "true or false", getattr(self, key))
+        for key, (low, high, what) in NUMBERS.items():
+            value = getattr(self, key)
+            expect((value is None and key in MAY_BE_NONE) or (is_number(value) and low <= value <= high), key,
+                   f"{'none or ' if key in MAY_BE_NONE else ''}{what}, {low:g} to {high:g}", value)
         expect(self.position_weight + self.normal_weight > 0, "position_weight",
                "more than 0 beside a normal_weight of 0", self.position_weight)
-        expect(self.target_error is None or LEAST_TARGET <= self.target_error < float("inf"), "target_error",
-               f"none or a share of the mean from {LEAST_TARGET:g} on", self.target_error)
-        expect(self.bias is None or 0 <= self.bias <= 0.25, "bias", "none or a share of the depth range, 0 to 0.25",
-               self.bias)
-        expect(0 <= self.near_distance <= 100, "near_distance", "a share of the cluster's radius, 0 to 100",
-               self.near_distance)
-        expect(0 <= self.attenuation <= 100, "attenuation", "0 to 100", self.attenuation)
-        expect(self.interleaving is None or (is_count(self.interleaving) and 1 <= self.interleaving <= 64),
-               "interleaving", "none or 1 to 64 pixels", self.interleaving)
-        expect(0 <= self.blur_extent <= 10, "blur_extent", "a share of the diagonal, 0 to 10", self.blur_extent)
-        expect(-1 <= self.blur_cosine <= 1, "blur_cosine", "a cosine, -1 to 1", self.blur_cosine)
+        expect(self.interleaving is None or (is_count(self.interleaving) and 1 <= self.interleaving <= MOST_BLOCK),
+               "interleaving", f"none or 1 to {MOST_BLOCK} pixels", self.interleaving)
+        expect(self.single_light == "point" or self.source == "rsm", "single_light", "'point' with the source 'walk'",
+               self.single_light)
+        self._expect_heeded()
+
+    def _expect_heeded(self) -> None:
+        """Refuse what a target for the error would not heed."""
+        if self.target_error is not None:
+            expect(self.area_lights == PUBLISHED_AREA_LIGHTS, "area_lights",
+                   "no number beside target_error, which finds it", self.area_lights)
+            expect(self.visibility != "none", "visibility", "another one with target_error", self.visibility)

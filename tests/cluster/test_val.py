@@ -15,6 +15,7 @@ from refgi.splat import SiiSettings, sii
 from refgi.stages import observe
 
 SMALL = {"lights": 64, "area_lights": 6, "map_resolution": 32}
+TO_AN_ERROR = {"area_lights": 30, "target_error": 0.3}  # the number is left as it is where an error finds it
 SUM = {np.float32: 2e-6, np.float64: 1e-12}  # another order of summation, relative to the brightest pixel
 # a moved or scaled scene: lights beside a texel's border may take its neighbour's depth; away from those it is rounding
 SCALED = 1e-5
@@ -53,7 +54,7 @@ def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
     {"visibility": "back_projection"}, {"prefilter": "sat"}, {"prefilter": "brute"}, {"interleaving": 4},
     {"quantisation": "published"}, {"behind": "dual_paraboloid"}, {"behind": "raytrace"}, {"clamp": "disc"},
     {"single_light": "footprint"}, {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"maps": "rays"},
-    {"target_error": 0.3}, {"distance": "raw"}, {"distance": "squared"}, {"axes": "pca"}, {"axes": "min_area"},
+    TO_AN_ERROR, {"distance": "raw"}, {"distance": "squared"}, {"axes": "pca"}, {"axes": "min_area"},
     {"as_published": ("val_alpha", "val_search_solid_angle")}, {"as_published": ("val_alpha_over_pi",)},
 ], ids=str)
 def test_every_setting_gives_a_picture_between_darkness_and_the_unshadowed(ball, how):
@@ -109,7 +110,7 @@ def test_the_unit_of_length_does_not_matter(ball, scale):
 def test_a_light_that_hits_nothing_gives_darkness(ball):
     light = dataclasses.replace(ball.scene.lights[0], position=(0.0, 1e4, 0.0), direction=(0.0, 1.0, 0.0))
     dark = Frame(ball.scene.with_lights(light), width=9, height=9, rsm_resolution=16)
-    for how in ({}, {"interleaving": 8}, {"target_error": 0.1}):
+    for how in ({}, {"interleaving": 8}, TO_AN_ERROR):
         assert not val(dark, ValSettings(**SMALL | how)).any()
 
 
@@ -135,7 +136,18 @@ def test_what_is_not_needed_does_not_run(ball):
     ("distance", "euclid"), ("visibility", "soft"), ("prefilter", "gauss"), ("bias", -0.1), ("bias", float("nan")),
     ("position_weight", -1), ("normal_weight", float("inf")), ("attenuation", -1), ("interleaving", 0),
     ("interleaving", 65), ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0), ("target_error", float("nan")),
-    ("as_published", {"val_beta"}), ("behind", "mirror"), ("near_geometry", "some"), ("axes", "x"), ("extent", "area")])
+    ("position_weight", "much"), ("bias", "some"), ("cone", None), ("occluders_alone", "no"), ("near_distance", -1),
+    ("as_published", {"val_beta"}), ("dealing", "cards"), ("behind", "mirror"), ("near_geometry", "some"),
+    ("axes", "x"), ("extent", "area")])
 def test_a_setting_that_cannot_be_is_named(key, value):
     with pytest.raises(InputError, match=key):
         ValSettings(**{key: value})
+
+
+@pytest.mark.parametrize(("key", "how"), [
+    ("single_light", {"single_light": "footprint", "source": "walk"}),
+    ("area_lights", {"area_lights": 12, "target_error": 0.1}),
+    ("visibility", {"visibility": "none", "target_error": 0.1})])
+def test_settings_that_do_not_go_together_are_refused(key, how):
+    with pytest.raises(InputError, match=key):
+        ValSettings(**how)

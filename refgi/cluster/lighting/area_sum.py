@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from refgi.cluster.lighting.interleave import FIRST, SIZE, SUBSET
 from refgi.cluster.maps.hard import hard_tile
-from refgi.cluster.visibility.soft import FULL, ROOM_ROWS, Choices, soft_tile
+from refgi.cluster.visibility.look import ROOM_ROWS, Choices
+from refgi.cluster.visibility.soft import FULL, soft_tile
 from refgi.jit import kernel, prange
 from refgi.pairs.culling import bound_tile, lights_in_reach
 from refgi.pairs.pair_sum import GROUP, ROWS, TILE, TOTAL, Clamp, X, add_listed, load_tile

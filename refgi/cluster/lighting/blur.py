@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.lighting.blur_tile import COLUMNS, END, FAR, MOST, TALL, WIDE, E, N, X, alike, load_pixels
+from refgi.cluster.lighting.blur_tile import COLUMNS, END, FAR, TALL, WIDE, E, N, X, alike, load_pixels
+from refgi.cluster.settings import MOST_BLOCK
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
@@ -64,7 +65,7 @@ def blur(irradiance: Array, receivers: Receivers, size: int, settings: "ValSetti
     normal = np.ascontiguousarray(receivers.normal, position.dtype)
     values = np.ascontiguousarray(irradiance, position.dtype)
     expect(values.shape == position.shape, "irradiance", f"shape {position.shape}", values.shape)
-    expect(1 <= size <= MOST, "size", f"1 to {MOST} pixels", size)
+    expect(1 <= size <= MOST_BLOCK, "size", f"1 to {MOST_BLOCK} pixels", size)
     real = position.dtype.type
     everywhere = settings.blur == "box"
     extent = FAR / 4 if everywhere else min(settings.blur_extent * diagonal, FAR / 4)

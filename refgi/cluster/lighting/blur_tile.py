@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.settings import MOST_BLOCK
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
 
 TALL, WIDE = 16, 64  # pixels of a tile
-MOST = 64  # pixels along a side of the window
-COLUMNS = WIDE + MOST  # of each plane in a row of a tile; fixed, which lets loops run in lanes
+COLUMNS = WIDE + MOST_BLOCK  # of each plane in a row of a tile; fixed, which lets loops run in lanes
 E, X, N, END = 0, 3 * COLUMNS, 6 * COLUMNS, 9 * COLUMNS  # irradiance, position, normal: three planes each
 FAR = 1e18  # m; where pixels without surface are put. Its square is within float32
 MARGIN = 1e-5  # by which bounds must hold: distances and cosines are off by less

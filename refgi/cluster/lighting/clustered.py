@@ -5,7 +5,7 @@ then V where there is any. Diffuse lights under the map of the hemisphere ahead,
 everything else takes the longer way, by lists of receivers, to the same bits.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +13,13 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.area_lights import AreaLights, Given
 from refgi.cluster.lighting.area_sum import Tiles, add_hard, add_soft, add_unshadowed, bound_tiles
 from refgi.cluster.lighting.interleave import SUBSET, Subsets, dealt, put, subsets, take
 from refgi.cluster.lighting.member_lights import MemberLights, add_members, member_lights
 from refgi.cluster.visibility.filtered import build, room_for
+from refgi.cluster.visibility.look import choices, numbers_of
 from refgi.cluster.visibility.series import series
-from refgi.cluster.visibility.soft import choices, numbers_of
 from refgi.cluster.visibility.visible import visibility
 from refgi.errors import expect
 from refgi.pairs.irradiance import Receivers, checked
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from refgi.rsm import PixelLights
 
 Array = npt.NDArray[Any]
-Given = Callable[[int, Array, Array], Array]  # V of an area light at points (3, n) of surfaces that face (3, n)
 
 
 @stage("cluster.irradiance")
@@ -89,10 +88,10 @@ def clustered_irradiance(
     parts = subsets(np.asarray(receivers.covered, np.bool_), interleaving)
     subset = dealt(areas.of, interleaving, settings.dealing)
     members = member_lights(packed, areas.of, len(areas.members), subset, interleaving**2)
-    published = _published(members, settings, given)
-    tiles = _tiles(receivers, None if published and not _any_hard(areas, settings) else facing, parts)
+    by_tiles = _goes_by_tiles(members, settings, given)
+    tiles = _tiles(receivers, None if by_tiles and not _any_hard(areas, settings) else facing, parts)
     sums = np.zeros_like(tiles.position)
-    if published:
+    if by_tiles:
         _add_by_tiles(tiles, members, areas, maps, settings, sums)
     else:
         _add_by_lists(tiles, parts, members, _visibility(areas, maps, settings, given, rays), sums)
@@ -116,7 +115,7 @@ def _tiles(receivers: Receivers, facing: Array | None, parts: Subsets) -> Tiles:
     return tiles
 
 
-def _published(members: MemberLights, settings: "ValSettings", given: Given | None) -> bool:
+def _goes_by_tiles(members: MemberLights, settings: "ValSettings", given: Given | None) -> bool:
     """Tell whether tiles can be lit and shadowed at once."""
     return (members.packed.spheres is None and members.packed.lobes is None and given is None
             and settings.visibility in ("series", "hard", "none") and settings.behind == "visible")
@@ -124,7 +123,8 @@ def _published(members: MemberLights, settings: "ValSettings", given: Given | No
 
 def _any_hard(areas: AreaLights, settings: "ValSettings") -> bool:
     """Tell whether any area light casts a hard shadow."""
-    return settings.visibility == "hard" or (settings.visibility == "series" and bool((areas.delta == 0).any()))
+    points = (areas.delta == 0) & (areas.members > 0)
+    return settings.visibility == "hard" or (settings.visibility == "series" and bool(points.any()))
 
 
 def _lit_tiles(tiles: Tiles, start: Array) -> Tiles:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.settings import MOST_BLOCK
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.blocks import BLOCK
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-MOST = 64  # pixels along a side of a block
 RUNS = 3  # of lights next to each other that a pixel takes where they are dealt out by cluster
 FIRST, SIZE, SUBSET = 0, 1, 2  # rows of tiles
 
@@ -52,7 +52,7 @@ def subsets(covered: Array, side: int) -> Subsets:
     InputError
         If the side is out of range.
     """
-    expect(1 <= side <= MOST, "interleaving", f"1 to {MOST} pixels", side)
+    expect(1 <= side <= MOST_BLOCK, "interleaving", f"1 to {MOST_BLOCK} pixels", side)
     covered = np.ascontiguousarray(covered)
     counts = np.empty(side * side, np.int64)
     _count(covered, side, counts)
@@ -106,7 +106,7 @@ def _far_apart(side: int) -> Array:
     """Return the places of a block in the order of Bayer's dither: halves, quarters and so on cover it evenly."""
     y, x = np.mgrid[:side, :side]
     rank = np.zeros_like(x)
-    for bit in range(MOST.bit_length() - 1):
+    for bit in range(MOST_BLOCK.bit_length() - 1):
         rank = rank << 2 | (x ^ y) >> bit << 1 & 2 | y >> bit & 1
     return np.argsort(rank, axis=None)
 

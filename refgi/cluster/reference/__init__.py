@@ -8,6 +8,5 @@ from refgi.cluster.reference.back_projection import back_projected_visibility
 from refgi.cluster.reference.chosen import reference_visibility
 from refgi.cluster.reference.members import member_visibility
 from refgi.cluster.reference.rectangle import rectangle_visibility
-from refgi.cluster.reference.unobstructed import Given
 
-__all__ = ["Given", "back_projected_visibility", "member_visibility", "rectangle_visibility", "reference_visibility"]
+__all__ = ["back_projected_visibility", "member_visibility", "rectangle_visibility", "reference_visibility"]

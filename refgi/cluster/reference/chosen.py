@@ -2,11 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.area_lights import AreaLights, Given
 from refgi.cluster.reference.back_projection import back_projected_visibility
 from refgi.cluster.reference.members import member_visibility
 from refgi.cluster.reference.rectangle import rectangle_visibility
-from refgi.cluster.reference.unobstructed import Given
 from refgi.cluster.settings import ValSettings
 
 if TYPE_CHECKING:

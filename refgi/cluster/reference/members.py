@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights
-from refgi.cluster.reference.unobstructed import Given, free_share
+from refgi.cluster.area_lights import AreaLights, Given
+from refgi.cluster.reference.unobstructed import free_share
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

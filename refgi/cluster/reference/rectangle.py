@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.area_lights import AreaLights, Given
 from refgi.cluster.maps.occluders import Blockers, blockers
-from refgi.cluster.reference.unobstructed import Ball, Given, free_share
+from refgi.cluster.reference.unobstructed import Ball, alike, free_share
 from refgi.cluster.settings import ValSettings
 from refgi.rays import Tracer
 from refgi.sampling import halton
@@ -64,7 +64,7 @@ def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSetting
         for side in (1.0, -1.0):
             on = within & (height * side > 0)
             visible[on] = free_share(tracer, points[:, on], facing[:, on], rectangle_points(areas, m, on_square),
-                                     side * areas.normal[:, m, None], _alike, frame.tracer.offset, ball)
+                                     side * areas.normal[:, m, None], alike, frame.tracer.offset, ball)
         return visible
 
     return given
@@ -123,10 +123,6 @@ def tracer_without_near(
     height = np.abs((normal * corner[:, 0]).sum(axis=1))
     faces = drawn.faces[height >= distance * np.linalg.norm(normal, axis=1)]
     return Tracer(Geometry(drawn.vertices, faces, np.zeros(len(faces), np.int32)))
-
-
-def _alike(toward: Array, _: Array) -> Array:
-    return np.ones(toward.shape[:2])
 
 
 def _even(count: int) -> Array:

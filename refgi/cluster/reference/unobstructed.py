@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from refgi.rays import Tracer
 
 Array = npt.NDArray[Any]
-Given = Callable[[int, Array, Array], Array]  # (area light, points (3, n), facing (3, n)) -> V (n,)
 
 RAYS_AT_ONCE = 1 << 18
 SHORTEST = 1e-6  # of a ray: a reach of 0 would count as blocked
@@ -88,3 +87,19 @@ def _way_to(ball: Ball | None, at: Array, toward: Array) -> Any:
     root = half**2 - square * (np.einsum("nc,nc->n", start, start) - ball.radius**2)[:, None]
     share = np.divide(-half - np.sqrt(np.maximum(root, 0)), square, out=np.ones_like(square), where=square > 0)
     return np.where(root > 0, np.clip(share, SHORTEST, 1.0), 1.0)
+
+
+def alike(toward: Array, _: Array) -> Array:
+    """Weigh all rays the same.
+
+    Parameters
+    ----------
+    toward : (n, k, 3) ndarray
+        Vectors to the targets.
+
+    Returns
+    -------
+    (n, k) ndarray
+        Ones.
+    """
+    return np.ones(toward.shape[:2])

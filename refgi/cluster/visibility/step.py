@@ -17,7 +17,7 @@ import numpy.typing as npt
 from refgi.cluster.maps.hard import SLACK
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.kernel_size import cone_tangent, disc, published_square, published_tangent
-from refgi.cluster.visibility.soft import DEPTH, EXTENT, FRAME, NEAREST, RADIUS, Choices, D, S, T, X, Y, Z
+from refgi.cluster.visibility.look import DEPTH, EXTENT, FRAME, NEAREST, RADIUS, Choices, D, S, T, X, Y, Z
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]

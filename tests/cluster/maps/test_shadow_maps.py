@@ -142,7 +142,8 @@ def test_a_ball_cuts_surfaces_and_shows_what_lies_beyond():
     sheets = geometry([[-5, 1, -5], [5, 1, -5], [0, 1, 9], [-5, 1.5, -5], [5, 1.5, -5], [0, 1.5, 9]],
                       [[0, 1, 2], [3, 4, 5]])
     light = area_lights([[0, 0, 0]], [[0, 1, 0]], radius=1.2)
-    maps = maps_of(sheets, light, near_geometry="ball", occluders_alone=False, map_resolution=65, dtype=np.float64)
+    maps = maps_of(sheets, light, np.float64, near_geometry="ball", near_distance=1.0, occluders_alone=False,
+                   map_resolution=65)
     middle, frame = maps.depth[0][32], maps.frame[0]
     s = (2 * np.arange(65) + 1) / 65 - 1
     cosine = (1 - s * s) / (1 + s * s)
@@ -155,7 +156,7 @@ def test_a_ball_cuts_surfaces_and_shows_what_lies_beyond():
 @pytest.mark.parametrize("size", [1, 3, 17])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_any_size_and_any_number_of_threads_give_the_same_bits(size, dtype):
-    shape, areas = soup(np.random.default_rng(1), 70), area_lights(np.eye(3) * 0.3, np.ones((3, 3)), radius=0.2)
+    shape, areas = soup(np.random.default_rng(1), 70), area_lights(np.eye(3) * 0.3, np.ones((3, 3)), radius=0.4)  # the ball: half of it
     first = None
     before = numba.get_num_threads()
     for count in (1, before):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.series import above_half, first_lit, frequencies, series, weights
-from refgi.cluster.visibility.soft import (
+from refgi.cluster.visibility.look import (
     BIAS,
     DELTA,
     DEPTH,
@@ -18,10 +17,10 @@ from refgi.cluster.visibility.soft import (
     Choices,
     D,
     Z,
-    compare,
-    find_penumbra,
     look,
 )
+from refgi.cluster.visibility.series import above_half, first_lit, frequencies, series, weights
+from refgi.cluster.visibility.soft import compare, find_penumbra
 from refgi.cluster.visibility.visible import visibility
 from tests.cluster.visibility.plates import are_shares, lit_by, map_of_plates, on_plane, rooms, square_share
 from tests.naive import soft_shadow as naive

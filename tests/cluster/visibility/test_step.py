@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.soft import DEPTH, NEAREST, RADIUS, choices, look, numbers_of
+from refgi.cluster.visibility.look import DEPTH, NEAREST, RADIUS, choices, look, numbers_of
 from refgi.cluster.visibility.step import rules, step_lanes
 from refgi.cluster.visibility.visible import visibility
 from tests.cluster.visibility.plates import are_shares, lit_by, map_of_plates, on_plane, rooms, square_share

@@ -156,7 +156,7 @@ def test_a_ball_cuts_surfaces_and_shows_what_lies_beyond():
 @pytest.mark.parametrize("size", [1, 3, 17])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_any_size_and_any_number_of_threads_give_the_same_bits(size, dtype):
-    shape, areas = soup(np.random.default_rng(1), 70), area_lights(np.eye(3) * 0.3, np.ones((3, 3)), radius=0.4)  # the ball: half of it
+    shape, areas = soup(np.random.default_rng(1), 70), area_lights(np.eye(3) * 0.3, np.ones((3, 3)), radius=0.4)
     first = None
     before = numba.get_num_threads()
     for count in (1, before):
@@ -168,7 +168,7 @@ def test_any_size_and_any_number_of_threads_give_the_same_bits(size, dtype):
         assert maps.depth.shape[1:] == (size, size)
         assert len(maps.depth) > 0
         assert not np.isnan(maps.depth).any()
-        assert (maps.depth >= 0.2 * (1 - 1e-6)).all()
+        assert (maps.depth >= 0.2 * (1 - 1e-6)).all()  # the ball is half the radius
         first = first or maps
         np.testing.assert_array_equal(maps.depth, first.depth)
 

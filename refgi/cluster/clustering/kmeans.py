@@ -35,7 +35,7 @@ def cluster(
     position: Array, normal: Array, count: int, *, distance: Distance = "normalised",
     weights: tuple[float, float] = (0.7, 0.3), diagonal: float, rounds: int = 50, start: Clusters | None = None,
 ) -> Clusters:
-    """Group lights by k-means with d = w_x |x - c| + w_a angle(n, n_c).
+    """Group lights by k-means with ``d = w_x |x - c| + w_a angle(n, n_c)``.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def cluster(
         M; no more than N are made.
     distance : {"normalised", "raw", "squared"}
         The distance in shares of `diagonal` and of pi; in metres and radians, as printed; or
-        w_x |x - c|^2 / diagonal^2 + w_a |n - n_c|^2.
+        ``w_x |x - c|^2 / diagonal^2 + w_a |n - n_c|^2``.
     weights : tuple of 2 floats
         w_x and w_a.
     diagonal : float

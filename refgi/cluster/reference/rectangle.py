@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from refgi.cluster.area_lights import AreaLights, Given
 from refgi.cluster.maps.occluders import Blockers, blockers
-from refgi.cluster.reference.unobstructed import Ball, alike, free_share
+from refgi.cluster.reference.unobstructed import Ball, free_share
 from refgi.cluster.settings import ValSettings
 from refgi.rays import Tracer
 from refgi.sampling import halton
@@ -64,7 +64,7 @@ def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSetting
         for side in (1.0, -1.0):
             on = within & (height * side > 0)
             visible[on] = free_share(tracer, points[:, on], facing[:, on], rectangle_points(areas, m, on_square),
-                                     side * areas.normal[:, m, None], alike, frame.tracer.offset, ball)
+                                     side * areas.normal[:, m, None], None, frame.tracer.offset, ball)
         return visible
 
     return given

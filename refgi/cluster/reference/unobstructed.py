@@ -24,7 +24,7 @@ class Ball(NamedTuple):
 
 def free_share(
     tracer: "Tracer", points: Array, facing: Array, targets: Array, upward: Array,
-    worth: Callable[[Array, Array], Array], offset: float, ball: Ball | None = None,
+    worth: Callable[[Array, Array], Array] | None, offset: float, ball: Ball | None = None,
 ) -> Array:
     """Return the share of each receiver's rays that arrives, each ray after its worth.
 
@@ -38,9 +38,10 @@ def free_share(
         Points on lights, m.
     upward : (3, k) or (3, 1) ndarray
         Unit normals at the targets, on the side that rays come from.
-    worth : callable
+    worth : callable or None
         Given vectors (n, k, 3) from some receivers to the targets and their normals (n, 3), the weight (n, k) of each
-        ray, 0 or more. Rays of no worth, and those to targets below a receiver's surface, are not traced.
+        ray, 0 or more; None: all the same. Rays of no worth, and those to targets below a receiver's surface, are
+        not traced.
     offset : float
         How far above their surfaces rays start and end, m.
     ball : Ball, optional
@@ -58,7 +59,7 @@ def free_share(
         at, up = points[:, part].T.astype(np.float64), facing[:, part].T.astype(np.float64)
         toward = targets.T[None] - at[:, None]
         above = np.einsum("nkc,nc->nk", toward, up) > 0
-        weight = np.where(above, worth(toward, up), 0.0)
+        weight = np.where(above, 1.0 if worth is None else worth(toward, up), 0.0)
         reach = np.where(weight > 0, _way_to(ball, at, toward), 0.0)
         arrives = ~_blocked(tracer, at + offset * up, ends, reach)
         whole = weight.sum(axis=1)
@@ -87,19 +88,3 @@ def _way_to(ball: Ball | None, at: Array, toward: Array) -> Any:
     root = half**2 - square * (np.einsum("nc,nc->n", start, start) - ball.radius**2)[:, None]
     share = np.divide(-half - np.sqrt(np.maximum(root, 0)), square, out=np.ones_like(square), where=square > 0)
     return np.where(root > 0, np.clip(share, SHORTEST, 1.0), 1.0)
-
-
-def alike(toward: Array, _: Array) -> Array:
-    """Weigh all rays the same.
-
-    Parameters
-    ----------
-    toward : (n, k, 3) ndarray
-        Vectors to the targets.
-
-    Returns
-    -------
-    (n, k) ndarray
-        Ones.
-    """
-    return np.ones(toward.shape[:2])

@@ -9,7 +9,7 @@ from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.maps.hard import hard_visibility
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference.rectangle import rectangle_points
-from refgi.cluster.reference.unobstructed import Ball, alike, free_share
+from refgi.cluster.reference.unobstructed import Ball, free_share
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.filtered import build
 from refgi.cluster.visibility.look import ROOM_ROWS, Choices, choices, look, numbers_of
@@ -111,7 +111,7 @@ def _soft(
 def _traced(tracer: "Tracer", areas: AreaLights, m: int, near: float, points: Array, facing: Array) -> Array:
     targets = rectangle_points(areas, m, np.array(np.meshgrid(BESIDE, BESIDE)).reshape(2, -1))
     ball = Ball(areas.center[:, m], near)
-    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], alike, tracer.offset, ball)
+    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], None, tracer.offset, ball)
 
 
 

@@ -19,7 +19,7 @@ Array = npt.NDArray[Any]
 # Share of the scene's diagonal by which points may lie beyond a plane that still counts as the scene's border; below
 # what ends of rays are kept from surfaces.
 TOLERANCE = 1e-6
-FEW_PAIRS = 1 << 28  # triangles times points that are tried without asking for the hull: 0.2 s
+FEW_PAIRS = 1 << 24  # triangles times points that are tried without asking for the hull, which takes about as long
 DIRECTIONS = 128  # along which extreme points are found before the hull: enough to tell most triangles from it
 TURN = 47  # odd: steps through the directions in an order that is spread from the start
 SKETCHED = 1 << 14  # points that are enough for that

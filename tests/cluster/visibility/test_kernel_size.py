@@ -48,7 +48,7 @@ def test_published_filter_is_too_wide_in_the_middle_and_too_narrow_at_the_rim(ev
 @pytest.mark.feature("VAL-15")
 def test_penumbra_angle_as_printed_starts_at_the_axis():
     d, z, delta = 2.0, 1.0, 2.0  # p cos(beta) = 2 = d
-    assert 2 * math.degrees(math.atan(published_tangent(delta, d, z))) == pytest.approx(45, abs=1e-9)  # E-VAL-07
+    assert 2 * math.degrees(math.atan(published_tangent(delta, d, z))) == pytest.approx(45, abs=1e-9)
     assert 2 * math.degrees(math.atan(cone_tangent(delta, d, z))) == pytest.approx(53.13, abs=5e-3)
     assert published_tangent(1e-4, d, z) == pytest.approx(cone_tangent(1e-4, d, z), rel=1e-6)
 

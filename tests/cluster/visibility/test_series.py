@@ -37,7 +37,7 @@ def test_slope_is_twice_the_number_of_terms(terms, evidence):
 @pytest.mark.feature("VAL-12")
 def test_overshoot_of_the_plain_series(evidence):
     overshoot = float(above_half(np.linspace(0, 1, 4001), weights(4)).max()) - 0.5
-    assert overshoot == pytest.approx(0.092, abs=DIGITS)  # E-VAL-03: 9.2 % for M = 4
+    assert overshoot == pytest.approx(0.092, abs=DIGITS)  # of four terms
     gibbs = float(above_half(np.linspace(0, 0.02, 4001), weights(64)).max()) - 0.5
     assert gibbs == pytest.approx(0.0895, abs=DIGITS)  # Gibbs: Si(pi)/pi - 1/2 = 0.08949
     evidence(f"overshoot {overshoot:.4f} (M = 4), {gibbs:.4f} (M = 64)")
@@ -69,7 +69,7 @@ def test_no_difference_of_depths_wraps_around(terms, attenuation, rescale):
 
 def test_depths_that_wrap_around_without_a_narrower_range():
     w = weights(4)
-    assert float(above_half(1.0, w)) == pytest.approx(0.0, abs=1e-12)  # E-VAL-05: 1/2 again
+    assert float(above_half(1.0, w)) == pytest.approx(0.0, abs=1e-12)  # 1/2 again
     assert np.allclose(above_half(1 - np.linspace(0, 1, 33), w), above_half(np.linspace(0, 1, 33), w), atol=1e-14)
     assert series(ValSettings()).range == pytest.approx(0.847, abs=DIGITS)
 
@@ -100,7 +100,7 @@ def test_doubled_series_needs_no_bias(evidence):
     assert (chain.bias, chain.gain) == (0.0, 2.0)
     assert chain.search_bias == chain.first
     seen = {gap: float(np.clip(2 * (0.5 + above_half(-gap, chain.weight)), 0, 1)) for gap in (0.0, 0.01, 0.05, 0.1)}
-    for gap, known in ((0.0, 1.0), (0.01, 0.84), (0.05, 0.27), (0.1, 0.0)):  # E-VAL-03
+    for gap, known in ((0.0, 1.0), (0.01, 0.84), (0.05, 0.27), (0.1, 0.0)):
         assert seen[gap] == pytest.approx(known, abs=5e-3)
     evidence("clamp(2 f): " + ", ".join(f"{v:.3f} at a gap of {gap}" for gap, v in seen.items()))
 

@@ -62,7 +62,7 @@ def mixture(terms, *parts):
 
 
 def mean_depth(bias, d=0.7, parts=((0.1, 0.3), (0.9, 0.7))):
-    """z_avg of the search kernel of E-VAL-04; the receiver's own distance is d."""
+    """z_avg of a search kernel that a blocker covers by a tenth; the receiver's own distance is d."""
     numbers, room, means, todo, _ = rooms(1, 4)
     numbers[[NEAREST, SCALE, SEARCH_BIAS]] = 1e-9, 1.0, bias
     room[D], room[Z], means[:] = d, d, mixture(4, *parts)

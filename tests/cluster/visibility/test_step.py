@@ -82,7 +82,7 @@ def table(delta):
 @pytest.mark.feature("VAL-14")
 def test_step_needs_the_receivers_plane(evidence):
     off = {delta: table(delta) for delta in (0.2, 0.5, 1.0)}
-    for delta, bound in ((0.2, 0.04), (0.5, 0.04), (1.0, 0.05)):  # E-VAL-14: 0.036, 0.033, 0.050
+    for delta, bound in ((0.2, 0.04), (0.5, 0.04), (1.0, 0.05)):  # 0.036, 0.033, 0.050 by another hand
         assert off[delta]["plane, cone"] < bound
         assert off[delta]["constant bias"] > 0.28  # it shadows itself
         assert off[delta]["plane"] >= off[delta]["plane, cone"] - 0.002

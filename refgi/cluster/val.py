@@ -44,16 +44,43 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     """
     lights = choose_lights(frame, settings)  # Sec. 6, VPL generation
     areas, maps = clustered(frame, lights, settings)
-    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     block = block_side(frame, lights, settings)
-    light = clustered_irradiance(  # Sec. 4 and 6
-        receivers, facing(frame), lights, areas, maps, settings, footprint=footprints(frame, settings),
-        given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
-        rays=frame.tracer if settings.behind == "raytrace" else None)
+    light = lit(frame, lights, areas, maps, settings, block)  # Sec. 4 and 6
     if block == 1 or settings.blur == "none":
         skip("cluster.blur", "every pixel sums all lights" if block == 1 else "left out by the settings")
         return light
-    return blur(light, receivers, block, settings, frame.scene.geometry.diagonal)  # Sec. 6, geometry-aware blur
+    return blur(light, surface(frame), block, settings, frame.scene.geometry.diagonal)  # Sec. 6, geometry-aware blur
+
+
+def lit(
+    frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: ShadowMaps | None, settings: ValSettings, block: int
+) -> Array:
+    """Light every pixel by pixel lights that are grouped already.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen.
+    lights : PixelLights
+        The pixel lights.
+    areas : AreaLights
+        Their area lights.
+    maps : ShadowMaps or None
+        What each sees.
+    settings : ValSettings
+        How visibility is found.
+    block : int
+        Side of the blocks of pixels that share the lights out among themselves.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Indirect irradiance, W/m^2, not blurred.
+    """
+    return clustered_irradiance(
+        surface(frame), facing(frame), lights, areas, maps, settings, footprint=footprints(frame, settings),
+        given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
+        rays=frame.tracer if settings.behind == "raytrace" else None)
 
 
 def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> tuple[AreaLights, ShadowMaps | None]:
@@ -122,6 +149,22 @@ def block_side(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> 
     if settings.interleaving is not None:
         return settings.interleaving
     return 1 if frame.width * frame.height * lights.flux.shape[1] <= PAIRS_IN_FULL else PUBLISHED_BLOCK
+
+
+def surface(frame: "Frame") -> Receivers:
+    """Return the points that a frame's pixels see.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen.
+
+    Returns
+    -------
+    Receivers
+        Positions and shading normals.
+    """
+    return Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
 
 
 def facing(frame: "Frame") -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.area_lights import AreaLights
-from refgi.cluster.maps.shadow_maps import ShadowMaps
+from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 
@@ -61,7 +61,7 @@ def hard_visibility(maps: ShadowMaps, areas: AreaLights, m: int, points: Array, 
         points, facing = np.ascontiguousarray(points), np.ascontiguousarray(facing, points.dtype)
         _hard_tiles(maps.depth[k], maps.center[k], maps.frame[k], points, facing, visible)
         if maps.behind is not None:
-            turned = maps.frame[k] * np.array([[-1.0], [1.0], [-1.0]])
+            turned = BACKWARD @ maps.frame[k]
             _hard_tiles(maps.behind[k], maps.center[k], turned, points, facing, visible)
     return visible
 

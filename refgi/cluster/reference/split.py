@@ -27,16 +27,13 @@ from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.rectangle import map_frames
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.reference.chosen import reference_visibility
 from refgi.cluster.reference.members import member_visibility
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.val import PUBLISHED_BLOCK, clustered, facing
+from refgi.cluster.val import PUBLISHED_BLOCK, clustered, facing, lit, surface
 from refgi.errors import expect
 from refgi.lights.selection import choose_lights, footprints
-from refgi.pairs.irradiance import Receivers
 
 if TYPE_CHECKING:
-    from refgi.cluster.maps.shadow_maps import ShadowMaps
     from refgi.frame import Frame
     from refgi.rsm import PixelLights
 
@@ -132,10 +129,10 @@ def split_error(
     pictures = {} if truth is None else {"truth": truth}
     pictures["lights"] = exact_shadows(frame, lights, base)
     for name, changes in STEPS.items():
-        pictures[name] = _picture(frame, lights, areas, maps, dataclasses.replace(base, **changes))
-    interleaved, surface = _picture(frame, lights, areas, maps, base, block), _surface(frame)
-    pictures["interleaved"] = blur(interleaved, surface, block, base, frame.scene.geometry.diagonal)
-    covered = np.asarray(surface.covered, np.bool_)
+        pictures[name] = lit(frame, lights, areas, maps, dataclasses.replace(base, **changes), 1)
+    interleaved, seen = lit(frame, lights, areas, maps, base, block), surface(frame)
+    pictures["interleaved"] = blur(interleaved, seen, block, base, frame.scene.geometry.diagonal)
+    covered = np.asarray(seen.covered, np.bool_)
     return ErrorSplit(steps_between(pictures, covered), pictures, covered)
 
 
@@ -190,22 +187,8 @@ def exact_shadows(frame: "Frame", lights: "PixelLights", settings: ValSettings) 
     frames, none = map_frames(normal), np.zeros((2, count))
     single = AreaLights(position, normal, frames, none, frames[:, :2], none, none[0], none[0], np.ones(count, np.int64),
                         np.arange(count, dtype=np.int32))
-    return clustered_irradiance(_surface(frame), facing(frame), lights, single, None, settings,
+    return clustered_irradiance(surface(frame), facing(frame), lights, single, None, settings,
                                 footprint=footprints(frame, settings), given=member_visibility(frame, lights, single))
-
-
-def _picture(
-    frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None", settings: ValSettings,
-    block: int = 1,
-) -> Array:
-    return clustered_irradiance(
-        _surface(frame), facing(frame), lights, areas, maps, settings, footprint=footprints(frame, settings),
-        given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
-        rays=frame.tracer if settings.behind == "raytrace" else None)
-
-
-def _surface(frame: "Frame") -> Receivers:
-    return Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
 
 
 def _rms(values: Array) -> float:

@@ -14,8 +14,8 @@ test: $(VENV)/dev.stamp
 
 test-all: $(VENV)/dev.stamp
 	$(BIN)/python -m pytest --all
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest tests/rsm tests/lights tests/pairs tests/splat tests/cluster
-	NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest tests/rsm tests/lights tests/pairs tests/splat tests/cluster tests/truth
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest tests/rsm tests/lights tests/pairs tests/splat tests/cluster tests/sssil
+	NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest tests/rsm tests/lights tests/pairs tests/splat tests/cluster tests/sssil tests/truth
 
 check: $(VENV)/dev.stamp
 	$(BIN)/ruff check .

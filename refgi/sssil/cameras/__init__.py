@@ -1,0 +1,1 @@
+"""Further cameras that see what the picture does not (Sec. 5, discussion)."""

@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# a file's tests run in one process, so that few kernels are compiled twice
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
 .PHONY: demo test test-all check evidence bench docs clean
 
@@ -10,12 +12,12 @@ demo: $(VENV)/run.stamp
 	@echo "open out/index.html"
 
 test: $(VENV)/dev.stamp
-	$(BIN)/python -m pytest
+	$(PYTEST)
 
 test-all: $(VENV)/dev.stamp
-	$(BIN)/python -m pytest --all
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest tests/rsm tests/lights tests/pairs tests/splat tests/cluster tests/sssil
-	NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest tests/rsm tests/lights tests/pairs tests/splat tests/cluster tests/sssil tests/truth
+	$(PYTEST) --all
+	NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/rsm tests/lights tests/pairs tests/splat tests/cluster tests/sssil
+	NUMBA_NUM_THREADS=1 $(PYTEST) tests/rsm tests/lights tests/pairs tests/splat tests/cluster tests/sssil tests/truth
 
 check: $(VENV)/dev.stamp
 	$(BIN)/ruff check .
@@ -25,7 +27,7 @@ check: $(VENV)/dev.stamp
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 
 evidence: $(VENV)/dev.stamp
-	$(BIN)/python -m pytest tests -m feature --evidence -q
+	$(PYTEST) tests -m feature --evidence -q
 
 bench: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks --out out/bench

@@ -2,8 +2,9 @@
 
 import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -13,20 +14,16 @@ hypothesis.settings.register_profile("refgi", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("refgi")
 
 ROOT = Path(__file__).parents[1]
-FIGURES = pytest.StashKey[list[str]]()
-_TABLE = pytest.StashKey[list[tuple[str, str, str]]]()
-
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--evidence", action="store_true", help="print feature id, test and measured figure")
     parser.addoption("--all", action="store_true", help="run the slow tests too")
 
 
-def pytest_configure(config: pytest.Config) -> None:
+def pytest_configure() -> None:
     with warnings.catch_warnings():  # third-party modules that warn on their first import
         warnings.simplefilter("ignore")
         import trimesh  # noqa: F401
-    config.stash[_TABLE] = []
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -37,30 +34,34 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             items[:] = [item for item in items if not item.get_closest_marker("slow")]
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
-    report = yield
-    if report.when == "call":
-        figure = "; ".join(item.stash.get(FIGURES, [])) or "-"
-        for mark in item.iter_markers("feature"):
-            for feature in mark.args:
-                outcome = figure if report.passed else f"FAILED ({figure})"
-                item.config.stash[_TABLE].append((feature, item.nodeid, outcome))
-    return report
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Put features where a report carries them from a worker to the process that prints."""
+    item.user_properties += [("feature", feature) for mark in item.iter_markers("feature") for feature in mark.args]
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    table = sorted(config.stash[_TABLE])
-    if config.getoption("--evidence") and table:
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    if not config.getoption("--evidence"):
+        return
+    reports = [report for outcome in ("passed", "failed") for report in terminalreporter.getreports(outcome)]
+    table = sorted(row for report in reports if report.when == "call" for row in _evidence_of(report))
+    if table:
         terminalreporter.section("evidence")
         for feature, test, figure in table:
             terminalreporter.write_line(f"{feature:8} {test}\n         {figure}")
 
 
+def _evidence_of(report: pytest.TestReport) -> list[tuple[str, str, str]]:
+    """Return a row for each feature whose evidence a test measured."""
+    figure = "; ".join(str(text) for kind, text in report.user_properties if kind == "figure") or "-"
+    figure = figure if report.passed else f"FAILED ({figure})"
+    return [(str(feature), report.nodeid, figure) for kind, feature in report.user_properties if kind == "feature"]
+
+
 @pytest.fixture
 def evidence(request: pytest.FixtureRequest) -> Callable[[str], None]:
     """Return a function that keeps a measured figure for the evidence table."""
-    return request.node.stash.setdefault(FIGURES, []).append
+    return lambda figure: request.node.user_properties.append(("figure", figure))
 
 
 @pytest.fixture(scope="session")

@@ -35,8 +35,8 @@ NUMBERS = {
 class HssilSettings:
     """What `hssil` can be set to; the defaults are the paper's, those of docs/methods/hssil where it is silent.
 
-    Sampling (Sec. 3.2): `levels` levels from `start` resolution on; at each, `samples` points of the crown from `radius`
-    to twice as many texels around a receiver (none: the smallest with which the levels cover the screen), and
+    Sampling (Sec. 3.2): `levels` levels from `start` resolution on; at each, `samples` points of the crown from
+    `radius` to twice as many texels around a receiver (none: the smallest with which the levels cover the screen), and
     `inner_samples` (none: a third) of the disc within, at the first level. `pattern` says who shares them: a "row" of
     receivers, each "pixel" its own, one "fixed" mirror-symmetric set for all, or "all" texels, each once, whatever
     `samples`. `seed` draws them.

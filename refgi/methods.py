@@ -51,6 +51,8 @@ METHODS = {
         Method("val", "refgi.cluster.val:val", "ValSettings", True,
                "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights",
                memory="refgi.cluster.memory:extra_bytes"),
+        Method("hssil", "refgi.sssil.hssil:hssil", "HssilSettings", False,
+               "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees"),
         Method("gather", "refgi.splat.gathering.gather:gather", "GatherSettings", False,
                "Reflective Shadow Maps (2005): gathering around the projected point"),
         Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import numpy.typing as npt
 
 from refgi.sssil.cameras.several import several_cameras
@@ -91,6 +92,8 @@ def gathered(frame: "Frame", level: Level, index: int, settings: HssilSettings) 
     (3, h, w) ndarray
         Irradiance, W/m^2.
     """
+    if settings.only_level not in (None, index):
+        return np.zeros_like(level.radiance)
     if settings.visibility == "bitmask":
         return bitmask_gather(level, index, settings, frame.scene.geometry.diagonal)
     if settings.visibility == "rays":

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.papers.subjects import seen_by
 from refgi.papers.val.figure8 import clustered_along, moved
 from refgi.papers.val.figure12 import pieces
 from refgi.papers.val.figure13 import _penumbra
@@ -15,7 +16,7 @@ from refgi.papers.val.motion import changes, mean_motion, motion
 from refgi.papers.val.painting import cluster_of_pixel, painted, palette
 from refgi.papers.val.scenes import ATRIUM_FACES, BUILDERS, blob_at, body
 from refgi.papers.val.sequence import EXACT, FEWER, INTERLEAVED, RESTARTED, WARM
-from refgi.papers.val.subjects import HORSE, Clustered, clustered, frame_of, seen_by, settings_of
+from refgi.papers.val.subjects import HORSE, Clustered, clustered, frame_of, settings_of
 from refgi.papers.val.table2 import STEPS, own_seconds
 from refgi.papers.workbench import Workbench
 from refgi.rsm import PixelLights

@@ -16,11 +16,11 @@ from refgi.papers.multires.subjects import (
     drawing,
     full_sum,
     scene_of,
-    seen_by,
     settings_of,
     subsplats_of,
 )
 from refgi.papers.records import Figure, Plot, Table
+from refgi.papers.subjects import seen_by
 from refgi.papers.timing import interleaved
 from refgi.splat.multires import MultiresSettings, multires
 

@@ -16,6 +16,7 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.papers.multires.scenes import BUILDERS
+from refgi.papers.subjects import Subjects, seen_by
 from refgi.splat.multires import MultiresSettings, multires, shared_subsplats
 from refgi.splat.refinement.grid import Subsplats
 
@@ -29,68 +30,8 @@ TEAPOT, BUDDHA, DRAGON, BUNNIES = "simple", "carved", "serpent", "flock"  # of t
 CLAMP = 0.04  # least distance, share of the diagonal
 LARGE = 2  # where counts and times are taken
 
-
-def scene_of(bench: "Workbench", name: str) -> "Scene":
-    """Return a stand-in or a built-in scene with the run's size.
-
-    Parameters
-    ----------
-    bench : Workbench
-        Keeps it.
-    name : str
-        A name of `scenes.BUILDERS`, or what `load_scene` takes.
-
-    Returns
-    -------
-    Scene
-        Its camera takes square pictures.
-    """
-    if name not in BUILDERS:
-        return bench.scene(name)
-    size = bench.scale.size
-    return bench.once(("stand-in", name), lambda: BUILDERS[name]().with_camera(width=size, height=size))
-
-
-def frame_of(bench: "Workbench", name: str, factor: int = 1) -> Frame:
-    """Return a frame of a scene.
-
-    Parameters
-    ----------
-    bench : Workbench
-        Keeps the frame.
-    name : str
-        As for `scene_of`.
-    factor : int
-        Pixels a side, in units of the run's: 2 where counts and times are taken.
-
-    Returns
-    -------
-    Frame
-        Its buffers stay once they are computed.
-    """
-    scene = scene_of(bench, name)
-    return bench.once(("view", name, factor), lambda: seen_by(bench, scene, factor))
-
-
-def seen_by(bench: "Workbench", scene: "Scene", factor: int = 1) -> Frame:
-    """Return a fresh frame of a scene whose camera or light may have moved.
-
-    Parameters
-    ----------
-    bench : Workbench
-        Sizes.
-    scene : Scene
-        What is seen.
-    factor : int
-        As for `frame_of`.
-
-    Returns
-    -------
-    Frame
-        Nothing is computed yet.
-    """
-    size = factor * bench.scale.size
-    return Frame(scene, width=size, height=size, rsm_resolution=bench.scale.rsm_resolution)
+_SUBJECTS = Subjects(BUILDERS)
+scene_of, frame_of = _SUBJECTS.scene_of, _SUBJECTS.frame_of
 
 
 def settings_of(bench: "Workbench", scene: str, **changes: Any) -> MultiresSettings:

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING
 from refgi.cluster.val import val
 from refgi.papers import pictures
 from refgi.papers.records import Bar, Figure, Ratios
+from refgi.papers.subjects import seen_by
 from refgi.papers.timing import interleaved
 from refgi.papers.val.scenes import march
 from refgi.papers.val.sequence import RESTARTED, frame_count, note, sequence, table
-from refgi.papers.val.subjects import AREA_LIGHTS, ATRIUM, MARCH, drawing, published, rounds, scene_of, seen_by
+from refgi.papers.val.subjects import AREA_LIGHTS, ATRIUM, MARCH, drawing, published, rounds, scene_of
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -9,10 +9,11 @@ from scipy.sparse.csgraph import connected_components
 from refgi.cluster.val import val
 from refgi.papers import pictures
 from refgi.papers.records import Figure, Table
+from refgi.papers.subjects import seen_by
 from refgi.papers.timing import interleaved
 from refgi.papers.val.scenes import blob_at
 from refgi.papers.val.sequence import frame_count, note, sequence, table
-from refgi.papers.val.subjects import drawing, published, rounds, seen_by
+from refgi.papers.val.subjects import drawing, published, rounds
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

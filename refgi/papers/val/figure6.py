@@ -11,6 +11,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Table
+from refgi.papers.subjects import seen_by
 from refgi.papers.val.painting import painted
 from refgi.papers.val.subjects import (
     CORNER,
@@ -19,7 +20,6 @@ from refgi.papers.val.subjects import (
     clustered,
     frame_of,
     scene_of,
-    seen_by,
     settings_of,
     shadowed,
 )

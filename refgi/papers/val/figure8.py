@@ -13,10 +13,11 @@ from refgi.frame import Frame
 from refgi.papers.curves import Axes, Curve, drawn
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Plot, Table
+from refgi.papers.subjects import seen_by
 from refgi.papers.val.lit import lit
 from refgi.papers.val.motion import Motion, mean_motion, motion
 from refgi.papers.val.painting import painted
-from refgi.papers.val.subjects import HORSE, SMALL, Clustered, clustered, scene_of, seen_by, settings_of, shadowed
+from refgi.papers.val.subjects import HORSE, SMALL, Clustered, clustered, scene_of, settings_of, shadowed
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -12,6 +12,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Table
+from refgi.papers.subjects import seen_by
 from refgi.papers.val.lit import lit
 from refgi.papers.val.motion import Motion, changes, mean_motion, motion
 from refgi.papers.val.subjects import (
@@ -21,7 +22,6 @@ from refgi.papers.val.subjects import (
     clustered,
     published,
     rays_to,
-    seen_by,
     settings_of,
 )
 from refgi.stages import Memory, observe

@@ -21,6 +21,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
+from refgi.papers.subjects import Subjects, seen_by
 from refgi.papers.val.scenes import BUILDERS
 from refgi.shadowed import receivers, shadowed_sum
 from refgi.truth.vpl import VplSettings, vpl
@@ -39,6 +40,9 @@ CLAMP = 0.04  # least distance between light and receiver, share of the diagonal
 PAPER_SIZE = 800  # pixels along a side, of what is timed
 JUDGED, SMALL, MOVING = 1 / 2, 1 / 4, 1 / 8  # where each pixel has a ray to each light: one picture, several, many
 
+_SUBJECTS = Subjects(BUILDERS)
+scene_of, frame_of = _SUBJECTS.scene_of, _SUBJECTS.frame_of
+
 
 class Clustered(NamedTuple):
     """Pixel lights and what stands for their visibility."""
@@ -46,66 +50,6 @@ class Clustered(NamedTuple):
     lights: "PixelLights"
     clusters: Clusters
     areas: AreaLights
-
-
-def scene_of(bench: "Workbench", name: str) -> "Scene":
-    """Return a stand-in.
-
-    Parameters
-    ----------
-    bench : Workbench
-        Keeps it.
-    name : str
-        A name of `scenes.BUILDERS`.
-
-    Returns
-    -------
-    Scene
-        As it was built.
-    """
-    return bench.once(("stand-in of val", name), BUILDERS[name])
-
-
-def frame_of(bench: "Workbench", name: str, factor: float = 1) -> Frame:
-    """Return a frame of a stand-in.
-
-    Parameters
-    ----------
-    bench : Workbench
-        Keeps the frame.
-    name : str
-        As for `scene_of`.
-    factor : float
-        Pixels a side, in units of the run's.
-
-    Returns
-    -------
-    Frame
-        Its buffers stay once they are computed.
-    """
-    scene = scene_of(bench, name)
-    return bench.once(("view of val", name, factor), lambda: seen_by(bench, scene, factor))
-
-
-def seen_by(bench: "Workbench", scene: "Scene", factor: float = 1) -> Frame:
-    """Return a fresh frame of a scene whose bodies or light may have moved.
-
-    Parameters
-    ----------
-    bench : Workbench
-        Sizes.
-    scene : Scene
-        What is seen, in a square picture.
-    factor : float
-        As for `frame_of`.
-
-    Returns
-    -------
-    Frame
-        Nothing is computed yet.
-    """
-    size = max(8, round(factor * bench.scale.size))
-    return Frame(scene, width=size, height=size, rsm_resolution=bench.scale.rsm_resolution)
 
 
 def settings_of(bench: "Workbench", **changes: Any) -> ValSettings:

@@ -1,6 +1,5 @@
 """W: fetch for every surface point the value of the same point in another view (Sec. 3.3)."""
 
-import math
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -80,7 +79,8 @@ def look_up(
     dtype = position.dtype
     moved = np.zeros(3) if origin is None else np.subtract(there.origin, origin)
     eye = (projection.origin[0] + moved).astype(dtype)
-    scale = np.array([projection.width, projection.height], dtype) / (2 * projection.half).astype(dtype)
+    size = np.array([projection.width, projection.height])
+    scale = np.concatenate([size / (2 * projection.half), (size - 1) / 2]).astype(dtype)
     found, weight = plane(position.shape, dtype), plane(covered.shape, dtype)
     limits = np.array([depth_tolerance, normal_cosine, SNAP], dtype)
     _look_up(values, there.depth, there.normal, eye, projection.frame[0].astype(dtype), scale, limits,
@@ -94,73 +94,76 @@ def _look_up(
     nearest: bool, position: Array, normal: Array, covered: Array, found: Array, weight: Array,
 ) -> None:
     for row in prange(covered.shape[0]):
-        for column in range(covered.shape[1]):
-            for c in range(3):
-                found[c, row, column] = 0
-            weight[row, column] = 0
-            if covered[row, column]:
-                x, y, z = _place(position, row, column, eye, frame, scale, depth)
-                if z > 0:
-                    _fetch(values, depth, normal_there, x, y, z, limits, nearest, normal, row, column, found, weight)
+        _place(np.int64(row), eye, frame, scale, position, covered, found)
+        _fetch(np.int64(row), values, depth, normal_there, limits, nearest, normal, found, weight)
 
 
 @kernel
 def _place(
-    position: Array, row: int, column: int, eye: Array, frame: Array, scale: Array, depth: Array
-) -> tuple[Any, Any, Any]:
-    """Return column, row (a texel's centre at whole numbers) and depth of a point; depth -1 off the picture."""
+    row: int, eye: Array, frame: Array, scale: Array, position: Array, covered: Array, place: Array
+) -> None:
+    """Find column, row (a texel's centre at whole numbers) and depth of a row of points; depth -1 where none is."""
     real = position.dtype.type
-    half = real(0.5)
-    dx, dy, dz = position[0, row, column] - eye[0], position[1, row, column] - eye[1], position[2, row, column] - eye[2]
-    z = frame[2, 0] * dx + frame[2, 1] * dy + frame[2, 2] * dz
-    right = frame[0, 0] * dx + frame[0, 1] * dy + frame[0, 2] * dz
-    down = frame[1, 0] * dx + frame[1, 1] * dy + frame[1, 2] * dz
-    if not z > 0:
-        return half, half, real(-1)
-    height, width = depth.shape
-    x = right / z * scale[0] + (real(width) - real(1)) * half
-    y = down / z * scale[1] + (real(height) - real(1)) * half
-    inside = (x >= -half) & (y >= -half) & (x <= real(width) - half) & (y <= real(height) - half)
-    return x, y, (z if inside else real(-1))
+    rx, ry, rz = frame[0, 0] * scale[0], frame[0, 1] * scale[0], frame[0, 2] * scale[0]
+    ux, uy, uz = frame[1, 0] * scale[1], frame[1, 1] * scale[1], frame[1, 2] * scale[1]
+    fx, fy, fz = frame[2, 0], frame[2, 1], frame[2, 2]
+    for column in range(covered.shape[1]):
+        dx = position[0, row, column] - eye[0]
+        dy = position[1, row, column] - eye[1]
+        dz = position[2, row, column] - eye[2]
+        depth = fx * dx + fy * dy + fz * dz
+        ahead = (depth > real(0)) & covered[row, column]
+        place[0, row, column] = (rx * dx + ry * dy + rz * dz) / depth + scale[2]
+        place[1, row, column] = (ux * dx + uy * dy + uz * dz) / depth + scale[3]
+        place[2, row, column] = depth if ahead else real(-1)
 
 
 @kernel
 def _fetch(
-    values: Array, depth: Array, normal_there: Array, x: float, y: float, z: float, limits: Array, nearest: bool,
-    normal: Array, row: int, column: int, found: Array, weight: Array,
+    row: int, values: Array, depth: Array, normal_there: Array, limits: Array, nearest: bool, normal: Array,
+    found: Array, weight: Array,
 ) -> None:
-    """Average the texels around a place that show the same surface as the point."""
+    """Average the texels around each place of `found` that show the same surface; the mean takes its place."""
     real = values.dtype.type
-    one = real(1)
+    one, half, zero = real(1), real(0.5), real(0)
     height, width = depth.shape
-    left, share_right = _split(x, limits, nearest)
-    top, share_below = _split(y, limits, nearest)
-    red, green, blue, total = real(0), real(0), real(0), real(0)
-    first_red, first_green, first_blue = red, green, blue
-    for tap in range(4):
-        i, j = top + (tap >> 1), left + (tap & 1)
-        share = (share_right if tap & 1 else one - share_right) * (share_below if tap >> 1 else one - share_below)
-        if share > 0 and 0 <= i < height and 0 <= j < width:
-            cosine = (normal_there[0, i, j] * normal[0, row, column] + normal_there[1, i, j] * normal[1, row, column]
-                      + normal_there[2, i, j] * normal[2, row, column])
-            if abs(depth[i, j] - z) <= limits[0] * z and cosine >= limits[1]:
-                if total == 0:
-                    first_red, first_green, first_blue = values[0, i, j], values[1, i, j], values[2, i, j]
-                total += share
-                red += share * (values[0, i, j] - first_red)  # differences: a constant stays itself to the bit
-                green += share * (values[1, i, j] - first_green)
-                blue += share * (values[2, i, j] - first_blue)
-    if total > 0:
-        found[0, row, column], found[1, row, column] = first_red + red / total, first_green + green / total
-        found[2, row, column], weight[row, column] = first_blue + blue / total, min(total, one)
+    right_end, bottom_end = real(width) - half, real(height) - half
+    tolerance, least_cosine, snap = limits[0], limits[1], limits[2]
+    for column in range(weight.shape[1]):
+        x, y, z = found[0, row, column], found[1, row, column], found[2, row, column]
+        red, green, blue, total = zero, zero, zero, zero
+        first_red, first_green, first_blue = zero, zero, zero
+        if z > 0 and -half <= x <= right_end and -half <= y <= bottom_end:
+            nx, ny, nz = normal[0, row, column], normal[1, row, column], normal[2, row, column]
+            left, share_right = _split(x, snap, nearest)
+            top, share_below = _split(y, snap, nearest)
+            for below in range(2 if share_below > 0 else 1):
+                i = top + below
+                share_row = share_below if below else one - share_below
+                for beside in range(2 if share_right > 0 else 1):
+                    j = left + beside
+                    if 0 <= i < height and 0 <= j < width and abs(depth[i, j] - z) <= tolerance * z:
+                        cosine = normal_there[0, i, j] * nx + normal_there[1, i, j] * ny + normal_there[2, i, j] * nz
+                        if cosine >= least_cosine:
+                            share = share_row * (share_right if beside else one - share_right)
+                            if total == zero:
+                                first_red, first_green, first_blue = values[0, i, j], values[1, i, j], values[2, i, j]
+                            total += share
+                            red += share * (values[0, i, j] - first_red)  # differences: a constant stays, to the bit
+                            green += share * (values[1, i, j] - first_green)
+                            blue += share * (values[2, i, j] - first_blue)
+        scale = one / total if total > zero else zero
+        found[0, row, column] = first_red + red * scale
+        found[1, row, column] = first_green + green * scale
+        found[2, row, column] = first_blue + blue * scale
+        weight[row, column] = min(total, one)
 
 
 @kernel
-def _split(x: float, limits: Array, nearest: bool) -> tuple[int, Any]:
+def _split(x: Any, snap: Any, nearest: bool) -> tuple[int, Any]:
     """Return the texel before a place and the share of the one behind it, 0 where the place is a centre."""
-    real = limits.dtype.type
-    near = math.floor(x + real(0.5))
-    if nearest or abs(x - real(near)) <= limits[2]:
-        return int(near), real(0)
-    before = math.floor(x)
-    return int(before), x - real(before)
+    near = np.floor(x + snap)
+    share = x - near
+    if nearest:
+        return int(np.rint(x)), share - share
+    return int(near), (share if share > snap else share - share)

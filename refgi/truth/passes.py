@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.rays import Tracer
+from refgi.rsm.projection import Projection
 from refgi.scene import LightTable, Scene
 from refgi.shadowed import Receivers, add_free
 from refgi.truth.caustics import Film, photon_pass
@@ -15,6 +16,7 @@ from refgi.truth.light_side import pick
 from refgi.truth.lit_points import LitPoints, join, trace_lit_points
 from refgi.truth.paths import Paths, Shadows
 from refgi.truth.scattering import pass_through, scatter
+from refgi.truth.seen import aim_paths, seen_points
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import Surfaces
 
@@ -31,6 +33,7 @@ class Task(NamedTuple):
     lights: LightTable
     to: Receivers
     caustics: Film | None = None
+    view: Projection | None = None  # only what it sees emits; None: everything does
 
 
 def one_pass(task: Task, number: int) -> Array:
@@ -91,9 +94,10 @@ def lit_points(task: Task, random: np.random.Generator) -> LitPoints:
         Of all lights, in whole blocks.
     """
     n, geometry = task.settings.light_grid, task.scene.geometry
-    return join([trace_lit_points(task.tracer, task.surfaces, task.lights, k,
-                                  light_rays(light, geometry, random.random((n * n, 2))), task.settings.shared_bound)
-                 for k, light in enumerate(task.scene.lights)])
+    parts = [trace_lit_points(task.tracer, task.surfaces, task.lights, k,
+                              light_rays(light, geometry, random.random((n * n, 2))), task.settings.shared_bound)
+             for k, light in enumerate(task.scene.lights)]
+    return join(parts if task.view is None else [seen_points(task.tracer, task.view, part) for part in parts])
 
 
 def _hemisphere(task: Task, words: Array, sums: Array) -> None:
@@ -113,16 +117,29 @@ def _follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums
     """Trace paths to the next surface and add its light; to every surface along them where nothing blocks."""
     while True:
         task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
+        unseen = _unseen(task, paths)
         for k, light in enumerate(task.scene.lights):
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = _shadows(len(paths.reach))
             gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.offset), paths, shadows)
+            if unseen is not None:
+                shadows.reach[unseen] = 0
             _settle(task, shadows, first, count, sums, True)
         if task.settings.visibility:
             return
         pass_through(task.surfaces, task.tracer.offset, paths)
         if not (paths.reach > 0).any():
             return
+
+
+def _unseen(task: Task, paths: Paths) -> Array | None:
+    """Return which paths end where the camera does not see; None where that does not matter."""
+    if task.view is None:
+        return None
+    rays = _shadows(len(paths.reach))
+    aim_paths(task.view, task.surfaces, task.tracer.offset, paths, rays)
+    task.tracer.fill_occluded(rays.origin, rays.direction, rays.reach, rays.blocked)
+    return rays.blocked
 
 
 def _settle(task: Task, rays: Shadows, first: int, per_receiver: int, sums: Array, visibility: bool) -> None:

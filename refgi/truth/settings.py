@@ -8,6 +8,7 @@ from typing import Literal
 from refgi.errors import expect
 
 Estimator = Literal["combined", "hemisphere", "light"]
+Emitters = Literal["all", "seen"]
 
 # By trial the least error in equal time on the Cornell box, at 0.5 s as at 5 s; half or twice of each differs little.
 PICKS, DIRECTIONS, DIRECTIONS_ALONE, BOUND = 16, 8, 16, 0.1
@@ -21,6 +22,8 @@ class TruthSettings:
     - `samples` per pixel (picks of lit points plus hemisphere directions; at least two passes are made), `seconds`
       (checked after each pass), `target_error` (root mean square standard error of the picture over its mean).
     - `visibility=False`: nothing blocks between emitter and receiver; the emitter's direct light stays shadowed.
+    - `emitters="seen"`: only what the camera sees lights anything (inside its picture, facing it, nothing between), as
+      for a method that knows the picture alone. `visibility` remains a choice of its own.
     - `bounces` before the receiver, diffuse or glossy, 1 or more.
     - `caustics`: add light through mirror-like lobes and glass, by `photons` from each light in a pass; those lobes are
       then left out of the estimators.
@@ -37,6 +40,7 @@ class TruthSettings:
     seconds: float | None = None
     target_error: float | None = None
     visibility: bool = True
+    emitters: Emitters = "all"
     bounces: int = 1
     caustics: bool = False
     photons: int = 1 << 18
@@ -51,6 +55,7 @@ class TruthSettings:
     def __post_init__(self) -> None:
         expect(self.estimator in ("combined", "hemisphere", "light"), "estimator",
                "'combined', 'hemisphere' or 'light'", self.estimator)
+        expect(self.emitters in ("all", "seen"), "emitters", "'all' or 'seen'", self.emitters)
         for key, low, high in (("samples", 1, 2**31), ("bounces", 1, 64), ("seed", 0, 2**32 - 1),
                                ("light_grid", 1, 1024), ("picks", 1, 1024), ("photons", 1, 2**28), ("batch", 1, 2**30)):
             value = getattr(self, key)
@@ -64,6 +69,8 @@ class TruthSettings:
         expect(self.bounces == 1 or self.estimator != "light", "bounces",
                "1 for the light estimator, which knows no further bounce", self.bounces)
         expect(self.bounces == 1 or self.visibility, "visibility", "True for more than one bounce", self.visibility)
+        expect(self.emitters == "all" or (self.bounces == 1 and not self.caustics), "emitters",
+               "'all' for caustics or more than one bounce", self.emitters)
 
     @property
     def picks_per_pass(self) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
+from refgi.rsm.projection import camera_projection
 from refgi.scene import Scene
 from refgi.shadowed import Receivers, receivers
 from refgi.stages import report_progress, stage
@@ -120,7 +121,8 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
     to = receivers(scene.geometry, position, normal, triangle_id, tracer.offset)
     caustics = film(scene, triangle_id.shape) if settings.caustics else None
     found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else math.inf)
-    task = Task(scene, settings, tracer, found, lights_of(scene), to, caustics)
+    view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None
+    task = Task(scene, settings, tracer, found, lights_of(scene), to, caustics, view)
     file = Path(settings.checkpoint) if settings.checkpoint else None
     name = _fingerprint(task) if file else ""
     moments = load(file, name) if file and file.exists() else no_passes(len(to.pixel))
@@ -163,6 +165,7 @@ def _fingerprint(task: Task) -> str:
         settings.estimator, settings.visibility, settings.bounces, settings.caustics, settings.seed,
         settings.light_grid, settings.picks_per_pass, settings.directions_per_pass, settings.bound,
         settings.photons)).encode())
-    for array in (*task.surfaces, *task.lights, *task.to):
+    seen_by = () if task.view is None else (task.view.origin, task.view.frame, task.view.half)
+    for array in (*task.surfaces, *task.lights, *task.to, *seen_by):
         digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).data)
     return digest.hexdigest()

@@ -1,0 +1,288 @@
+"""Where a receiver's samples lie: low-discrepancy points of a crown, and who shares them (Sec. 3.2, Fig. 2).
+
+Offsets are whole texels (ox, oy), columns to the right and rows down from the receiver. A point (u, v) of the unit
+square lies r sqrt(1 + 3 u) from it in the crown, r sqrt(u) in the disc within, at the angle 2 pi v: so that equal
+areas get equally many points. A point stands for the texel it falls into.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.jit import kernel
+from refgi.sampling import hash_bits
+from refgi.sssil.settings import HssilSettings
+
+Array = npt.NDArray[Any]
+
+# shares of the turn of a two-dimensional Kronecker sequence: 1 / g and 1 / g^2 where g^3 = g + 1
+FIRST_STEP, SECOND_STEP = 0.7548776662466927, 0.5698402909980532
+TO_UNIT = 2.0**-32
+
+
+def row_offsets(
+    settings: HssilSettings, index: int, number: int, rows: int, radius: float | None = None
+) -> tuple[Array, Array]:
+    """Return the samples that a row of receivers shares.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        Says how many, of which pattern ("row", "fixed" or "all"), and draws them.
+    index : int
+        0 for the first level, whose inner disc is sampled as well.
+    number : int
+        Which level of the pyramid.
+    rows : int
+        How many rows there are.
+    radius : float, optional
+        Inner radius of the crown, texels; that of the settings unless given.
+
+    Returns
+    -------
+    offsets : (rows, n, 2) ndarray of int32
+        Texels (ox, oy) from the receiver; one row for all with "fixed" and "all". In these two, a sample is followed by
+        its mirror image (-ox, oy); those with ox = 0 come last.
+    weight : (n,) ndarray of float64
+        Texels of the level that each sample stands for.
+
+    Raises
+    ------
+    InputError
+        If every pixel has a pattern of its own, or no radius is known.
+    """
+    expect(settings.pattern != "pixel", "pattern", "one that receivers share", settings.pattern)
+    radius = known_radius(settings, radius)
+    inner = settings.inner if index == 0 else 0
+    if settings.pattern == "all":
+        offsets = _every_texel(0.0 if index == 0 else radius, 2.0 * radius)
+        return offsets[None], np.ones(len(offsets))
+    if settings.pattern == "fixed":
+        offsets, weight = _mirrored(settings, radius, inner, number)
+        return offsets[None], weight
+    points = sample_points(inner, settings.samples)
+    offsets = np.empty((rows, len(points), 2), np.int32)
+    _fill_rows(points, inner, radius, level_key(settings.seed, number), offsets)
+    return offsets, sample_weight(radius, inner, settings.samples)
+
+
+def offsets_at(
+    settings: HssilSettings, index: int, number: int, row: int, column: int, radius: float | None = None
+) -> Array:
+    """Return the samples of one receiver, whatever the pattern.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        Says how many and of which pattern, and draws them.
+    index : int
+        0 for the first level, whose inner disc is sampled as well.
+    number : int
+        Which level of the pyramid.
+    row, column : int
+        The receiver.
+    radius : float, optional
+        Inner radius of the crown, texels; that of the settings unless given.
+
+    Returns
+    -------
+    (n, 2) ndarray of int32
+        Texels (ox, oy) from the receiver, in the order of `row_offsets` and its weights.
+    """
+    if settings.pattern != "pixel":
+        offsets, _ = row_offsets(settings, index, number, row + 1, radius)
+        here: Array = offsets[min(row, len(offsets) - 1)]
+        return here
+    inner = settings.inner if index == 0 else 0
+    points = sample_points(inner, settings.samples)
+    key = pixel_key(row_key(level_key(settings.seed, number), row), column)
+    return np.array([pixel_offset(points, inner, known_radius(settings, radius), key, j) for j in range(len(points))],
+                    np.int32).reshape(-1, 2)
+
+
+def known_radius(settings: HssilSettings, radius: float | None) -> float:
+    """Return the inner radius of the crowns.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        May know it.
+    radius : float or None
+        Goes before that of the settings.
+
+    Returns
+    -------
+    float
+        Texels.
+
+    Raises
+    ------
+    InputError
+        If neither knows.
+    """
+    found = settings.radius if radius is None else radius
+    expect(found is not None, "radius", "texels, or the size of the first level to choose it by", found)
+    return float(found)  # type: ignore[arg-type]
+
+
+def sample_points(inner: int, crown: int) -> Array:
+    """Return the points of the unit square that all patterns shift: those of the inner disc, then the crown's.
+
+    Parameters
+    ----------
+    inner, crown : int
+        How many.
+
+    Returns
+    -------
+    (inner + crown, 2) ndarray of float64
+        In [0, 1).
+    """
+    count = np.concatenate([np.arange(inner), np.arange(crown)])
+    points: Array = (0.5 + count[:, None] * np.array([FIRST_STEP, SECOND_STEP])) % 1.0
+    return points
+
+
+def sample_weight(radius: float, inner: int, crown: int) -> Array:
+    """Return how many texels each sample stands for.
+
+    Parameters
+    ----------
+    radius : float
+        Inner radius of the crown, texels.
+    inner, crown : int
+        How many samples the disc and the crown have.
+
+    Returns
+    -------
+    (inner + crown,) ndarray of float64
+        pi r^2 / inner in the disc, 3 pi r^2 / crown in the crown: the areas shared out.
+    """
+    disc = math.pi * radius**2
+    return np.repeat([disc / max(inner, 1), 3.0 * disc / crown], [inner, crown])
+
+
+@kernel
+def level_key(seed: Any, number: Any) -> Any:
+    """Return what draws the samples of one level.
+
+    Parameters
+    ----------
+    seed, number : int
+        Of the settings, and of the level.
+
+    Returns
+    -------
+    uint32
+        A hash of both.
+    """
+    return hash_bits(np.uint32(seed) ^ hash_bits(np.uint32(number) + np.uint32(0x9E3779B9)))
+
+
+@kernel
+def row_key(key: Any, row: Any) -> Any:
+    """Return what draws the samples of one row.
+
+    Parameters
+    ----------
+    key : uint32
+        Of the level.
+    row : int
+        Row of the receivers.
+
+    Returns
+    -------
+    uint32
+        A hash of both.
+    """
+    return hash_bits(key ^ hash_bits(np.uint32(row) + np.uint32(0x85EBCA6B)))
+
+
+@kernel
+def pixel_key(key: Any, column: Any) -> Any:
+    """Return what draws the samples of one receiver.
+
+    Parameters
+    ----------
+    key : uint32
+        Of the row.
+    column : int
+        Column of the receiver.
+
+    Returns
+    -------
+    uint32
+        A hash of both.
+    """
+    return hash_bits(key ^ hash_bits(np.uint32(column) + np.uint32(0xC2B2AE35)))
+
+
+@kernel
+def pixel_offset(points: Array, inner: int, radius: float, key: Any, j: int) -> Any:
+    """Return one sample of a receiver or of a row: a point of the common set, shifted (Cranley and Patterson 1976).
+
+    Parameters
+    ----------
+    points : (n, 2) ndarray of float64
+        Of `sample_points`.
+    inner : int
+        How many of them lie in the inner disc.
+    radius : float
+        Inner radius of the crown, texels.
+    key : uint32
+        Draws the shift.
+    j : int
+        Which sample.
+
+    Returns
+    -------
+    ox, oy : int64
+        Texels from the receiver.
+    """
+    u = (points[j, 0] + hash_bits(key) * TO_UNIT) % 1.0
+    angle = 2.0 * math.pi * (points[j, 1] + hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT)
+    length = radius * math.sqrt(u if j < inner else 1.0 + 3.0 * u)
+    return (np.int64(math.floor(length * math.cos(angle) + 0.5)),
+            np.int64(math.floor(length * math.sin(angle) + 0.5)))
+
+
+@kernel
+def _fill_rows(points: Array, inner: int, radius: float, key: Any, offsets: Array) -> None:
+    for row in range(offsets.shape[0]):
+        here = row_key(key, row)
+        for j in range(offsets.shape[1]):
+            offsets[row, j, 0], offsets[row, j, 1] = pixel_offset(points, inner, radius, here, j)
+
+
+def _every_texel(low: float, high: float) -> Array:
+    """Return each texel at a distance of [low, high) but the middle: mirror images adjacent, ox = 0 last."""
+    reach = math.ceil(high)
+    oy, ox = np.mgrid[-reach : reach + 1, 0 : reach + 1]
+    square = ox**2 + oy**2
+    kept = (square >= low**2) & (square < high**2) & (square > 0)
+    right, middle = kept & (ox > 0), kept & (ox == 0)
+    half = np.stack([ox[right], oy[right]], axis=1)
+    both = np.stack([half, half * (-1, 1)], axis=1).reshape(-1, 2)
+    return np.concatenate([both, np.stack([ox[middle], oy[middle]], axis=1)]).astype(np.int32)
+
+
+def _mirrored(settings: HssilSettings, radius: float, inner: int, number: int) -> tuple[Array, Array]:
+    """Return a mirror-symmetric set and its weights: half of the points on the right, an odd one above or below."""
+    key = level_key(settings.seed, number)
+    shift = np.array([hash_bits(key), hash_bits(key ^ np.uint32(0x27D4EB2F))]) * TO_UNIT
+    weight = sample_weight(radius, inner, settings.samples)
+    pairs, middles = [], []
+    for first, count, near in ((0, inner, 0.0), (inner, settings.samples, 1.0)):
+        u, v = ((sample_points(0, (count + 1) // 2) + shift) % 1.0).T
+        length = radius * np.sqrt(near + (3.0 if near else 1.0) * u)
+        x, y = length * np.cos(math.pi * (v - 0.5)), length * np.sin(math.pi * (v - 0.5))
+        right, even = np.floor(np.stack([x, y], axis=1) + 0.5), count // 2
+        both = np.stack([right, right * (-1, 1)], axis=1)[:even].reshape(-1, 2)
+        middle = np.stack([np.zeros(count % 2), np.floor(np.copysign(length, y)[even:] + 0.5)], axis=1)
+        pairs.append((both, weight[first : first + 2 * even]))
+        middles.append((middle, weight[first : first + count % 2]))
+    offsets, weights = zip(*pairs, *middles, strict=True)
+    return np.concatenate(offsets).astype(np.int32), np.concatenate(weights)

@@ -94,8 +94,8 @@ def _look_up(
     nearest: bool, position: Array, normal: Array, covered: Array, found: Array, weight: Array,
 ) -> None:
     for row in prange(covered.shape[0]):
-        _place(np.int64(row), eye, frame, scale, position, covered, found)
-        _fetch(np.int64(row), values, depth, normal_there, limits, nearest, normal, found, weight)
+        _place(row, eye, frame, scale, position, covered, found)
+        _fetch(row, values, depth, normal_there, limits, nearest, normal, found, weight)
 
 
 @kernel

@@ -1,1 +1,11 @@
-"""Light of earlier frames (Sec. 3.3), and sequences of frames that share it."""
+"""Indirect light kept from frame to frame: most of a sequence's noise goes, at the price of light that lags behind.
+
+Each pixel's surface point is found in the frame before, where that surface was then (`motion`), and the light it had
+there is blended with the new (`filter`). `Sequence` renders scenes one after the other and keeps of each what the next
+needs; `path` moves camera, lights and objects through one scene.
+"""
+
+from refgi.sssil.temporal.sequence import Sequence, Step
+from refgi.sssil.temporal.settings import TemporalSettings
+
+__all__ = ["Sequence", "Step", "TemporalSettings"]

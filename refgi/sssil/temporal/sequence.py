@@ -1,0 +1,116 @@
+"""Frames of a sequence, each lit with the help of the one before."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.frame import Frame
+from refgi.scene.model import Scene
+from refgi.sssil.settings import LAST_SEED, HssilSettings
+from refgi.sssil.temporal.filter import History, remember, temporal_filter
+from refgi.sssil.temporal.settings import TemporalSettings
+
+Array = npt.NDArray[Any]
+Light = Callable[[Frame, Any], Array]
+
+USUAL = TemporalSettings()
+
+
+class Step(NamedTuple):
+    """One frame of a sequence."""
+
+    frame: Frame
+    irradiance: Array  # (3, h, w) indirect, filtered, W/m^2
+    radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
+    reused: float  # share of the pixels with a surface that the frame before shows as well
+
+
+class Sequence:
+    """Render scenes one after the other; iterating gives a `Step` each.
+
+    Parameters
+    ----------
+    scenes : iterable of Scene
+        The frames: one scene with moving camera, lights or vertices. Taken one by one, so that a generator will do.
+    settings : object, optional
+        Those of the method; its seed advances by 1 a frame, so that noise differs from frame to frame.
+    temporal : TemporalSettings, optional
+        The temporal filter; None renders each frame by itself.
+    method : callable, optional
+        Function of a frame and settings that gives its indirect irradiance; `hssil` where absent.
+    first : int
+        Number of the first frame, which counts for the seed.
+    history : History, optional
+        What the frame before the first left.
+    **frame_options : object
+        Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
+
+    Raises
+    ------
+    InputError
+        While iterating, if what should be a scene is none, or has other triangles than the one before.
+
+    Notes
+    -----
+    Of earlier frames only the last one's `History` is kept. Under one `stages.Memory` frames share what is the same
+    object in both: the G-buffer while camera and geometry rest, an RSM while its light does.
+    """
+
+    def __init__(
+        self, scenes: Iterable[Scene], settings: Any = None, temporal: TemporalSettings | None = USUAL, *,
+        method: Light | None = None, first: int = 0, history: History | None = None, **frame_options: Any,
+    ) -> None:
+        expect(temporal is None or isinstance(temporal, TemporalSettings), "temporal", "TemporalSettings or None",
+               temporal)
+        self.settings = HssilSettings() if settings is None else settings
+        self.temporal = temporal
+        self._scenes, self._method, self._first, self._history = scenes, method or _hssil(), first, history
+        self._frame_options = frame_options
+
+    def __iter__(self) -> Iterator[Step]:
+        history = self._history
+        for number, scene in enumerate(self._scenes, self._first):
+            expect(isinstance(scene, Scene), f"scene of frame {number}", "a Scene", type(scene).__name__)
+            step, history = self._step(scene, number, history)
+            yield step
+            del step  # whoever took it may let go of it before the next is made
+
+    def _step(self, scene: Scene, number: int, history: History | None) -> tuple[Step, History | None]:
+        frame = Frame(scene, **self._frame_options)
+        new = self._method(frame, seeded(self.settings, number))
+        if self.temporal is None:
+            return Step(frame, new, frame.radiance(new), 0.0), None
+        light, reused = new, 0.0
+        if history is not None:
+            light, reused = temporal_filter(new, frame, scene.geometry, history, self.temporal)
+        left = remember(frame, scene.geometry, new if self.temporal.form == "printed" else light)
+        return Step(frame, light, frame.radiance(light), reused), left
+
+
+def _hssil() -> Light:
+    from refgi.sssil.hssil import hssil
+
+    return hssil
+
+
+def seeded(settings: Any, number: int) -> Any:
+    """Return settings with the random numbers of a frame.
+
+    Parameters
+    ----------
+    settings : dataclass
+        A method's settings.
+    number : int
+        Which frame: 0 leaves them as they are.
+
+    Returns
+    -------
+    dataclass
+        The same object where the method draws no random numbers.
+    """
+    if number == 0 or "seed" not in {field.name for field in dataclasses.fields(settings)}:
+        return settings
+    return dataclasses.replace(settings, seed=(settings.seed + number) % (LAST_SEED + 1))

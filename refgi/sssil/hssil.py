@@ -1,5 +1,6 @@
 """Hierarchical Screen-Space Indirect Illumination (Soler, Hoel, Rochet, Jay and Holzschuch 2009)."""
 
+import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy.typing as npt
 
 from refgi.sssil.cameras.several import several_cameras
 from refgi.sssil.crown.gather import gather
-from refgi.sssil.crown.reach import expect_reach
+from refgi.sssil.crown.reach import chosen_radius, expect_reach
 from refgi.sssil.level import Level
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.settings import HssilSettings
@@ -61,6 +62,7 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
     """
     levels = pyramid(frame, settings)  # Sec. 4, hierarchical maps
     expect_reach(levels[0].shape, settings)
+    settings = dataclasses.replace(settings, radius=chosen_radius(levels[0].shape, settings))
     light, below = None, None
     for index in reversed(range(len(levels))):  # Sec. 3.2: starting from the smallest
         here = gathered(frame, levels[index], index, settings)

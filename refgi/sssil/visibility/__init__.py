@@ -1,1 +1,1 @@
-"""What lies between a receiver and a sample: beyond the paper, which leaves it out."""
+"""What the paper leaves out: whether anything stands between a receiver and a sample, by rays or by the depth map."""

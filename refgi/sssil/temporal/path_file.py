@@ -1,0 +1,217 @@
+"""Paths from TOML files, as pydantic models: strict, no unknown keys, every error of a file at once.
+
+Angles are in degrees here; times (`at`) are shares of the sequence, so that one file serves any number of frames. A key
+says what it changes, and whatever no key names stays as the scene has it.
+"""
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from refgi.errors import InputError, expect
+from refgi.scene.files import read_bytes
+from refgi.scene.light import DirectionalLight, PointLight, SpotLight
+from refgi.scene.model import Scene
+from refgi.scene.motion import faces_of
+from refgi.scene.values import is_direction
+from refgi.sssil.temporal.path import Array, Curve, Motion, Path, Track
+
+MOST_FRAMES = 100_000
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Time = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1)]
+Triple = tuple[Number, Number, Number]
+# by key of the file: the field of the camera or light
+CAMERA = {"eye": "eye", "target": "target", "up": "up", "vfov_deg": "vfov"}
+LIGHTS: dict[type, dict[str, str]] = {
+    SpotLight: {"position": "position", "direction": "direction", "intensity_w_per_sr": "intensity"},
+    PointLight: {"position": "position", "intensity_w_per_sr": "intensity"},
+    DirectionalLight: {"direction": "direction", "irradiance_w_per_m2": "irradiance"}}
+
+
+class Entry(BaseModel):
+    """What every table of the file has in common."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class CameraKey(Entry):
+    """The camera at one time."""
+
+    at: Time
+    eye: Triple | None = None
+    target: Triple | None = None
+    up: Triple | None = None
+    vfov_deg: Number | None = None
+
+
+class LightKey(Entry):
+    """A light at one time."""
+
+    at: Time
+    position: Triple | None = None
+    direction: Triple | None = None
+    intensity_w_per_sr: Triple | None = None
+    irradiance_w_per_m2: Triple | None = None
+
+
+class ObjectKey(Entry):
+    """An object at one time: how far it is turned and moved from where the scene has it."""
+
+    at: Time
+    turn_deg: Number | None = None
+    move: Triple | None = None
+
+
+class LightEntry(Entry):
+    """A light on its way."""
+
+    light: Annotated[int, Field(ge=0)] = 0
+    keys: Annotated[list[LightKey], Field(min_length=1)]
+
+
+class ObjectEntry(Entry):
+    """Faces on their way: those of a material, or from one number up to, not including, another."""
+
+    material: str | None = None
+    faces: tuple[int, int] | None = None
+    axis: Triple = (0.0, 1.0, 0.0)
+    center: Triple | None = None
+    keys: Annotated[list[ObjectKey], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def sound(self) -> Self:
+        """Refuse faces named twice or not at all, and an axis without direction."""
+        if (self.material is None) == (self.faces is None):
+            raise ValueError("expected either material or faces")
+        if not is_direction(self.axis):
+            raise ValueError("axis: expected a finite vector, not zero")
+        return self
+
+
+class PathFile(Entry):
+    """The whole file."""
+
+    frames: Annotated[int, Field(ge=1, le=MOST_FRAMES)] | None = None
+    curve: Curve = "catmull_rom"
+    camera: list[CameraKey] = []
+    lights: list[LightEntry] = []
+    objects: list[ObjectEntry] = []
+
+
+def read_path(file: str | FilePath, scene: Scene) -> tuple[Path, int | None]:
+    """Read what moves through a scene, and how.
+
+    Parameters
+    ----------
+    file : str or Path
+        A TOML file.
+    scene : Scene
+        Its lights and materials are what the file's can be.
+
+    Returns
+    -------
+    path : Path
+        The way of camera, lights and objects.
+    frames : int or None
+        How many frames the file asks for.
+
+    Raises
+    ------
+    InputError
+        One error with all faults of the file, one a line.
+    """
+    file = FilePath(file)
+    entry = _validated(file)
+    faults: list[str] = []
+    camera = _tracks(entry.camera, CAMERA, "camera", faults)
+    lights = dict(_lights(entry, scene, faults))
+    objects = tuple(_objects(entry, scene, faults))
+    if faults:
+        raise InputError("\n".join(f"{file}: {fault}" for fault in faults))
+    return Path(entry.curve, camera, lights, objects), entry.frames
+
+
+def _validated(file: FilePath) -> PathFile:
+    try:
+        tree = tomllib.loads(read_bytes(file).decode())
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{file}: damaged TOML: {error}") from error
+    try:
+        return PathFile.model_validate_json(json.dumps(tree, default=str))  # as JSON, a list may be a tuple
+    except ValidationError as error:
+        faults = [_fault(detail) for detail in error.errors(include_url=False)]
+        raise InputError("\n".join(f"{file}: {fault}" for fault in faults)) from error
+
+
+def _fault(detail: Any) -> str:
+    """Return "key: what was expected, got value" of one pydantic error."""
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in detail["loc"]).removeprefix(".")
+    text = str(detail["msg"]).removeprefix("Value error, ").replace("Input should be", "expected")
+    if detail["type"] == "extra_forbidden":
+        text = "unknown key"
+    shown = repr(detail["input"]) if detail["type"] not in ("value_error", "missing") else ""
+    return f"{key}: {text}{f', got {shown[:80]}' if shown else ''}"
+
+
+def _tracks(keys: Sequence[Any], fields: Mapping[str, str], where: str, faults: list[str]) -> dict[str, Track]:
+    """Return a track for each field that any of the keys names; angles come out in rad."""
+    times = [key.at for key in keys]
+    if times != sorted(set(times)):
+        faults.append(f"{where}: expected keys with ascending times (at), got {times}")
+        return {}
+    tracks = {}
+    for name, field in fields.items():
+        given = [(key.at, value) for key in keys if (value := getattr(key, name)) is not None]
+        if given:
+            values = np.array([value for _, value in given], np.float64).reshape(len(given), -1)
+            in_rad = np.radians(values) if name.endswith("_deg") else values
+            tracks[field] = Track(np.array([at for at, _ in given]), in_rad)
+    return tracks
+
+
+def _lights(entry: PathFile, scene: Scene, faults: list[str]) -> Iterator[tuple[int, dict[str, Track]]]:
+    seen = set()
+    for number, given in enumerate(entry.lights):
+        where = f"lights[{number}]"
+        if given.light >= len(scene.lights) or given.light in seen:
+            faults.append(f"{where}.light: expected 0 to {len(scene.lights) - 1}, each once, got {given.light}")
+            continue
+        seen.add(given.light)
+        known = LIGHTS[type(scene.lights[given.light])]
+        named = {name for key in given.keys for name in key.model_fields_set} - {"at"}
+        faults += [f"{where}.keys: {name}: light {given.light} has none, but {', '.join(known)}"
+                   for name in sorted(named - set(known))]
+        yield given.light, _tracks(given.keys, known, f"{where}.keys", faults)
+
+
+def _objects(entry: PathFile, scene: Scene, faults: list[str]) -> Iterator[Motion]:
+    for number, given in enumerate(entry.objects):
+        where = f"objects[{number}]"
+        try:
+            faces = _faces(given, scene)
+        except InputError as error:
+            faults.append(f"{where}.{error}")
+            continue
+        corners = scene.geometry.vertices[scene.geometry.faces[faces]].reshape(-1, 3)
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        tracks = _tracks(given.keys, {"turn_deg": "turn", "move": "move"}, f"{where}.keys", faults)
+        x, y, z = middle.tolist() if given.center is None else given.center
+        yield Motion(faces, given.axis, (x, y, z), tracks.get("turn"), tracks.get("move"))
+
+
+def _faces(given: ObjectEntry, scene: Scene) -> Array:
+    if given.material is not None:
+        return faces_of(scene, given.material)
+    assert given.faces is not None  # the entry has seen to it
+    first, end = given.faces
+    expect(0 <= first < end <= scene.face_count, "faces", f"first and end within 0 to {scene.face_count}", given.faces)
+    selected = np.zeros(scene.face_count, np.bool_)
+    selected[first:end] = True
+    return selected

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from refgi.compare.plot import CARD, INK, LINE, METHOD_COLOURS
 
 MARKERS = "os^Dvp"
+MOST_MARKED = 64  # points of a line that are marked; more would hide it
 
 
 class Curve(NamedTuple):
@@ -73,8 +74,10 @@ def _draw(plot: Any, curves: Sequence[Curve], axes: Axes) -> None:
     for number, curve in enumerate(curves):
         colour = METHOD_COLOURS[number % len(METHOD_COLOURS)]
         points = [(x, y) for x, y in zip(curve.x, curve.y, strict=True) if _drawable(x, y, axes)]
-        plot.plot([x for x, _ in points], [y for _, y in points], marker=MARKERS[number % len(MARKERS)],
-                  markersize=5, color=colour, linewidth=1.6, label=curve.name, markerfacecolor=colour,
+        marked = {"marker": MARKERS[number % len(MARKERS)], "markersize": 5, "markerfacecolor": colour,
+                  "linewidth": 1.6}
+        plot.plot([x for x, _ in points], [y for _, y in points], color=colour, label=curve.name,
+                  **(marked if len(points) <= MOST_MARKED else {"linewidth": 1.1}),
                   linestyle=(0, (4, 3)) if curve.dashed else "-")
     plot.set(xscale="log" if axes.log_x else "linear", yscale="log" if axes.log_y else "linear")
     for axis in (plot.xaxis, plot.yaxis):

@@ -1,0 +1,29 @@
+"""The figures of hierarchical screen-space indirect illumination (Soler et al. 2009).
+
+The game that the paper shows is not published: built-in scenes stand in for it (`scenes`). Figures 1 and 3 are drawings
+of the method. The last three entries go beyond the paper's figures: its temporal filter, visibility, and which of its
+approximations costs how much.
+"""
+
+from refgi.papers.catalogue import Entry
+from refgi.papers.hssil.figure4 import figure4
+from refgi.papers.hssil.figure5 import figure5
+from refgi.papers.hssil.figure6 import figure6
+from refgi.papers.hssil.figure7 import figure7
+from refgi.papers.hssil.figure8 import figure8
+from refgi.papers.hssil.figure9 import figure9
+from refgi.papers.hssil.filtered import filtered
+from refgi.papers.hssil.splitting import splitting
+from refgi.papers.hssil.visible import visible
+
+FIGURES = (
+    Entry("fig4", "Figure 4", "Level by level", figure4),
+    Entry("fig5", "Figure 5", "Point or disc, against path tracing", figure5),
+    Entry("fig6", "Figure 6", "Times of five setups", figure6),
+    Entry("fig7", "Figure 7", "Time by level", figure7),
+    Entry("fig8", "Figure 8", "Three setups and a picture", figure8),
+    Entry("fig9", "Figure 9", "Several cameras", figure9),
+    Entry("temporal", "Section 3.3", "Noise and the frames before", filtered),
+    Entry("visibility", "Visibility", "Beyond the paper", visible),
+    Entry("error", "Error, split", "Beyond the paper", splitting),
+)

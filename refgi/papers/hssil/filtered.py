@@ -1,0 +1,215 @@
+"""Section 3.3: what the temporal filter takes away from noise, frame by frame, and what it leaves behind in motion."""
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.papers import pictures
+from refgi.papers.curves import Axes, Curve, drawn
+from refgi.papers.hssil.subjects import HALL, SMALL, WIDE, every_texel, frame_of, lit, scene_of, settings_of
+from refgi.papers.judging import errors_of
+from refgi.papers.records import Figure, Picture, Plot, Table
+from refgi.papers.val.motion import changes
+from refgi.sssil import HssilSettings
+from refgi.sssil.temporal.sequence import Sequence
+from refgi.sssil.temporal.settings import TemporalSettings
+from refgi.stages import observe
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+    from refgi.papers.workbench import Workbench
+    from refgi.scene import Scene
+
+Array = npt.NDArray[Any]
+
+SIZE = 2 * SMALL
+RAW, PRINTED, RECURSIVE = "each frame alone", "as printed", "recursive"
+WAYS = {RAW: None, PRINTED: TemporalSettings(form="printed"), RECURSIVE: TemporalSettings()}
+RESTING, MOVING = "resting camera", "moving camera"
+SAMPLES = 16  # few, so that there is noise to filter
+WAY = (1.6, 0.1, 0.5)  # m: how far the camera moves in all
+
+
+class Course(NamedTuple):
+    """One way to light one sequence."""
+
+    noise: list[float]  # RMSE against every texel, % of the mean, frame by frame
+    change: float  # from frame to frame, of what every texel does not show, % of the mean
+    reused: float  # share of pixels found in the frame before, mean
+    last: Array
+    share: float  # of the frame's indirect light, time of the filter, %
+
+
+def filtered(bench: "Workbench") -> Figure:
+    """Filter sequences with a resting and with a moving camera.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Sizes, and how many frames.
+
+    Returns
+    -------
+    Figure
+        Noise frame by frame, beside what independent frames would give.
+    """
+    count = frame_count(bench)
+    frame = frame_of(bench, HALL, SIZE, wide=WIDE)
+    settings = settings_of(frame, samples=SAMPLES)
+    found = {motion: courses(bench, scenes, settings, frame) for motion, scenes in
+             ((RESTING, [scene_of(bench, HALL)] * count), (MOVING, moved(scene_of(bench, HALL), count)))}
+    rows = tuple((f"{motion}, {way}", one.noise[0], one.noise[-1], 100 * (one.noise[-1] / one.noise[0]) ** 2,
+                  one.change, 100 * one.reused, one.share)
+                 for motion, ways in found.items() for way, one in ways.items())
+    return Figure(
+        shows="Blending each frame with the one before, warped to the new camera, takes away noise at next to no cost. "
+              "The paper has no figure of it.",
+        facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", f"{count} frames",
+               f"half resolution, 4 levels, {SAMPLES} samples, new ones in each frame", "a = 0.9"),
+        pictures=_pictures(frame, found, settings), columns=3,
+        tables=(Table("Noise in % of the mean, against every texel of the same crowns; flicker: how it changes from "
+                      "frame to frame", (
+            "", "first frame", "last frame", "variance left, %", "flicker", "found again, %",
+            "filter, % of the time"), rows),),
+        plots=(Plot(drawn(_curves(found), Axes("frame", "RMSE, % of the mean")),
+                    "Noise frame by frame; dashed: what independent frames of the first one's noise would give."),),
+        notes=_notes(found))
+
+
+def frame_count(bench: "Workbench") -> int:
+    """Return how many frames a sequence has.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Says how often things are done.
+
+    Returns
+    -------
+    int
+        4 or more.
+    """
+    return max(4, 3 * bench.scale.repeats)
+
+
+def moved(scene: "Scene", count: int) -> "list[Scene]":
+    """Return a scene from a camera that moves on between frames.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    count : int
+        Frames.
+
+    Returns
+    -------
+    list of Scene
+        All of the same geometry.
+    """
+    start, target = (np.array(place) for place in (scene.camera.eye, scene.camera.target))
+    along = np.linspace(0, 1, count)[:, None] * np.array(WAY)
+    return [scene.with_camera(eye=tuple(start + step), target=tuple(target + step / 2)) for step in along]
+
+
+def courses(bench: "Workbench", scenes: "list[Scene]", settings: HssilSettings, like: "Frame") -> dict[str, Course]:
+    """Light a sequence in each way.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Sizes.
+    scenes : list of Scene
+        The frames.
+    settings : HssilSettings
+        How each is lit.
+    like : Frame
+        Says how large they are.
+
+    Returns
+    -------
+    dict of str to Course
+        By the names of `WAYS`.
+    """
+    options: dict[str, Any] = {"width": like.width, "height": like.height, "rsm_resolution": bench.scale.rsm_resolution}
+    limit = list(Sequence(scenes, every_texel(settings), None, method=lit, **options))
+    right = [step.irradiance for step in limit]
+    covered = [step.frame.gbuffer.covered for step in limit]
+    mean = float(np.mean([light[:, seen].mean() for light, seen in zip(right, covered, strict=True)]))
+
+    def course(temporal: TemporalSettings | None) -> Course:
+        with observe() as log:
+            steps = list(Sequence(scenes, settings, temporal, method=lit, **options))
+        light = [step.irradiance for step in steps]
+        off = [errors_of(*three).rmse for three in zip(light, right, covered, strict=True)]
+        beyond = [one - true for one, true in zip(light, right, strict=True)]
+        filtering, whole = log.seconds("sssil.temporal"), sum(log.seconds(name) for name in (
+            "sssil.pyramid", "sssil.gather", "sssil.upsample"))
+        return Course(off, changes(beyond, covered, mean), float(np.mean([step.reused for step in steps[1:]])),
+                      light[-1], 100 * filtering / whole)
+
+    return {name: course(temporal) for name, temporal in WAYS.items()}
+
+
+def left(a: float, frames: int) -> list[float]:
+    """Return which share of its variance independent noise keeps under the recursive filter.
+
+    Parameters
+    ----------
+    a : float
+        Weight of the frame before.
+    frames : int
+        How many.
+
+    Returns
+    -------
+    list of float
+        1 for the first frame, towards (1 - a) / (1 + a).
+
+    Examples
+    --------
+    >>> [round(share, 3) for share in left(0.9, 3)]
+    [1.0, 0.82, 0.674]
+    """
+    end = (1 - a) / (1 + a)
+    return [end + (1 - end) * a ** (2 * k) for k in range(frames)]
+
+
+def _curves(found: dict[str, dict[str, Course]]) -> list[Curve]:
+    curves = []
+    for motion, ways in found.items():
+        for way, one in ways.items():
+            curves.append(Curve(f"{motion}, {way}", range(1, len(one.noise) + 1), one.noise))
+    first = found[RESTING][RAW].noise
+    expected = [math.sqrt(share) * first[0] for share in left(TemporalSettings().weight, len(first))]
+    return [*curves, Curve("independent frames, recursive", range(1, len(first) + 1), expected, dashed=True)]
+
+
+def _pictures(frame: "Frame", found: dict[str, dict[str, Course]], settings: HssilSettings) -> tuple[Picture, ...]:
+    exposure = pictures.exposure_of(found[RESTING][RECURSIVE].last, frame.gbuffer.covered)
+    return tuple(pictures.indirect(f"{motion.split()[0]}_{way.replace(' ', '_')}", f"{motion}, {way}",
+                                   f"last frame, RMSE {one.noise[-1]:.1f} %", one.last, exposure, settings)
+                 for motion, ways in found.items() for way, one in ways.items())
+
+
+def _notes(found: dict[str, dict[str, Course]]) -> tuple[str, ...]:
+    def kept(motion: str, way: str) -> float:
+        noise = found[motion][way].noise
+        return 100 * (noise[-1] / max(noise[0], 1e-30)) ** 2
+
+    a, frames = TemporalSettings().weight, len(found[RESTING][RAW].noise)
+    expected = 100 * left(a, frames)[-1]
+    share = [one.share for ways in found.values() for one in (ways[RECURSIVE],)]
+    calm = found[MOVING][RAW].change / max(found[MOVING][RECURSIVE].change, 1e-30)
+    return (
+        f"With a resting camera {kept(RESTING, RECURSIVE):.0f} % of the variance is left after {frames} frames of the "
+        f"recursive filter (independent frames: {expected:.0f} %, in the end {100 * (1 - a) / (1 + a):.0f} %); the "
+        f"form as printed, a mean of two frames, leaves {kept(RESTING, PRINTED):.0f} % "
+        f"({100 * (a**2 + (1 - a) ** 2):.0f} %).",
+        f"With a moving camera {kept(MOVING, RECURSIVE):.0f} % is left, {100 * found[MOVING][RECURSIVE].reused:.0f} % "
+        f"of the pixels are found again in the frame before, and flicker falls to a {calm:.0f}th; light that went "
+        "along with the view is as old as its pixels.",
+        f"The filter takes {share[0]:.0f} to {share[1]:.0f} % of the time of the indirect light: little, as the paper "
+        "says.")

@@ -1,0 +1,278 @@
+"""Scenes, frames, settings and references that the figures share.
+
+A full run has the paper's sizes: 1280 x 720 pixels where times are taken, 720 x 720 where Figure 5 judges. In a smaller
+run a radius shrinks with the picture, so that the same share of it is reached.
+"""
+
+import dataclasses
+import math
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.compare.maps import luminance
+from refgi.errors import RefgiWarning
+from refgi.frame import Frame
+from refgi.papers.curves import Curve
+from refgi.papers.hssil.scenes import BUILDERS
+from refgi.papers.subjects import Subjects, seen_by
+from refgi.sssil import HssilSettings
+from refgi.sssil.hssil import hssil
+from refgi.truth import TruthSettings, trace_truth
+
+if TYPE_CHECKING:
+    from refgi.papers.workbench import Workbench
+    from refgi.scene import Scene
+
+Array = npt.NDArray[Any]
+
+HALL, SPOT, BASKET, HORSE, BOX = "hall", "spot", "basket", "horse", "box"
+TITLES = {BOX: "Cornell Box", HORSE: "Cornell Horse", HALL: "hall", SPOT: "hall with a spot", BASKET: "basket"}
+PAPER_HEIGHT, WIDE = 720, 16 / 9  # the paper's pictures are 1280 x 720
+LARGE = PAPER_HEIGHT / 512  # pixels a side in units of a full run's
+JUDGED, SMALL = 1 / 2, 1 / 4  # where one picture is traced, where many are
+RADIUS, RADIUS_FIGURE_5 = 20.0, 40.0  # texels of the first level
+
+_SUBJECTS = Subjects(BUILDERS)
+scene_of, frame_of = _SUBJECTS.scene_of, _SUBJECTS.frame_of
+
+
+def wide_frame(bench: "Workbench", name: str, factor: float = LARGE, **options: Any) -> Frame:
+    """Return a frame of the paper's shape.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Keeps the frame.
+    name : str
+        The scene.
+    factor : float
+        Height in units of the run's size: 1280 x 720 pixels in a full run where absent.
+    **options : object
+        Passed to `Frame`.
+
+    Returns
+    -------
+    Frame
+        Its buffers stay once they are computed.
+    """
+    return frame_of(bench, name, factor, wide=WIDE, **options)
+
+
+def wide_view(bench: "Workbench", scene: "Scene", factor: float = LARGE) -> Frame:
+    """Return a fresh frame of the paper's shape.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Sizes.
+    scene : Scene
+        What is seen.
+    factor : float
+        As for `wide_frame`.
+
+    Returns
+    -------
+    Frame
+        Nothing is computed yet.
+    """
+    return seen_by(bench, scene, factor, wide=WIDE)
+
+
+def settings_of(frame: Frame, **changes: Any) -> HssilSettings:
+    """Return the paper's settings with a radius that reaches as much of this picture as the paper's does of 1280 x 720.
+
+    Parameters
+    ----------
+    frame : Frame
+        Says how large the picture is.
+    **changes : object
+        What differs.
+
+    Returns
+    -------
+    HssilSettings
+        Half resolution, 4 levels of 64 samples where nothing else is said.
+    """
+    return HssilSettings(**({"radius": scaled_radius(frame, RADIUS)} | changes))
+
+
+def scaled_radius(frame: Frame, radius: float, height: int = PAPER_HEIGHT) -> float:
+    """Return a radius of the paper in texels of another picture.
+
+    Parameters
+    ----------
+    frame : Frame
+        The picture.
+    radius : float
+        In a picture of the paper, texels.
+    height : int
+        Rows of that picture.
+
+    Returns
+    -------
+    float
+        1 or more.
+    """
+    return max(1.0, radius * frame.height / height)
+
+
+def every_texel(settings: HssilSettings, **changes: Any) -> HssilSettings:
+    """Return settings that take each texel of disc and crowns once: the limit of many samples.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        Any.
+    **changes : object
+        What differs besides.
+
+    Returns
+    -------
+    HssilSettings
+        Without noise.
+    """
+    return dataclasses.replace(settings, **({"pattern": "all"} | changes))
+
+
+def every_pixel(settings: HssilSettings, **changes: Any) -> HssilSettings:
+    """Return settings by which every pixel lights every pixel.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        Any.
+    **changes : object
+        What differs besides.
+
+    Returns
+    -------
+    HssilSettings
+        One level of full resolution, whatever its cost.
+    """
+    return every_texel(settings, **({"start": "full", "levels": 1, "radius": None} | changes))
+
+
+def lit(frame: Frame, settings: HssilSettings) -> Array:
+    """Light a frame; that the paper's settings do not reach across the picture is known.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen and lit.
+    settings : HssilSettings
+        How.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)
+        return hssil(frame, settings)
+
+
+def ready(frame: Frame) -> Frame:
+    """Compute what deferred shading has before indirect light starts.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene.
+
+    Returns
+    -------
+    Frame
+        The same, its buffers and direct light known.
+    """
+    frame.gbuffer.resolve("position", "depth", "normal", "albedo")
+    assert frame.direct.shape == (3, frame.height, frame.width)
+    return frame
+
+
+def traced(bench: "Workbench", frame: Frame, key: Any, **changes: Any) -> Array:
+    """Return one bounce by path tracing.
+
+    Parameters
+    ----------
+    bench : Workbench
+        Keeps it, and says how many samples.
+    frame : Frame
+        The scene, seen.
+    key : object
+        What tells this frame from others.
+    **changes : object
+        Settings of truth: which emitters count, and whether anything blocks.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2.
+    """
+    settings = TruthSettings(samples=bench.scale.truth_samples, **changes)
+    return bench.once(("traced", key, *sorted(changes.items())), lambda: trace_truth(frame, settings).mean)
+
+
+def reach_of(frame: Frame, settings: HssilSettings) -> float:
+    """Return how far samples reach, in units of the picture's diagonal.
+
+    Parameters
+    ----------
+    frame : Frame
+        Says how large the picture is.
+    settings : HssilSettings
+        Radius, start and levels.
+
+    Returns
+    -------
+    float
+        1 or more where every pixel can light every other one.
+    """
+    if settings.radius is None:
+        return 1.0
+    pixels = settings.radius * 2.0 ** (settings.levels + settings.first_level)
+    return pixels / math.hypot(frame.width, frame.height)
+
+
+def mean_of(light: Array, covered: Array) -> float:
+    """Return the mean irradiance of the pixels with a surface.
+
+    Parameters
+    ----------
+    light : (3, h, w) ndarray
+        Irradiance, W/m^2.
+    covered : (h, w) ndarray of bool
+        Pixels with a surface.
+
+    Returns
+    -------
+    float
+        Over all channels; 0 where nothing is seen.
+    """
+    return float(light[:, covered].mean(dtype=np.float64)) if covered.any() else 0.0
+
+
+def scan_line(name: str, light: Array, row: int, *, dashed: bool = False) -> Curve:
+    """Return the luminance along a row of a picture.
+
+    Parameters
+    ----------
+    name : str
+        What the curve is called.
+    light : (3, h, w) ndarray
+        Irradiance, W/m^2.
+    row : int
+        Which row.
+    dashed : bool
+        How it is drawn.
+
+    Returns
+    -------
+    Curve
+        Over the columns, W/m^2.
+    """
+    values = luminance(light[:, row : row + 1])[0].tolist()
+    return Curve(name, range(len(values)), values, dashed)

@@ -1,0 +1,126 @@
+"""Where to put further cameras: where they see lit surfaces that light the picture and that the picture misses."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.frame import Frame
+from refgi.rays import Tracer
+from refgi.sampling import halton
+from refgi.scene.model import Camera
+from refgi.sssil.cameras.transport import NEAREST, Points, framed, lit_points, open_to, seen_points, transport
+from refgi.stages import skip, stage
+
+Array = npt.NDArray[Any]
+
+PAIRS, EYES_PER_PAIR = 32, 4  # candidates: pairs of a receiver and a lit point, places around the middle of each
+WIDE = math.tan(math.radians(40))  # tangent of half the field of view along the picture's longer side, at least
+CLEARANCE = 0.1  # of a free way: so far an eye stays off what ends it
+LEAST_GAIN = 1e-3  # of the light that reaches the picture: less is not worth another picture
+STEEP = 0.99  # cosine between the view and the upward direction from which another direction has to be up
+
+
+@stage("sssil.placement", kept=False)
+def placed_cameras(frame: Frame, count: int) -> tuple[Camera, ...]:
+    """Choose cameras one after the other, each the candidate whose picture brings most light into the frame's.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen and lit.
+    count : int
+        How many cameras at most.
+
+    Returns
+    -------
+    tuple of Camera
+        Fewer than `count`, perhaps none, where no candidate brings a thousandth of the light that there is. Places are
+        relative to the origin of `frame.scene`; sizes are the frame's.
+
+    Notes
+    -----
+    The paper leaves the choice open. A camera lights receiver i by E_i = sum of T_ij over the lit points j it sees, if
+    it sees i as well; cameras are joined by the maximum, so a candidate's gain is the sum of max(0, E_i - best_i) over
+    the picture, where best_i is what the frame's camera and those chosen so far give. T_ij heeds what blocks light,
+    so that no camera is placed to see what only shines through walls. Eyes lie on free lines from the middle of a free
+    segment between a surface that the picture shows and a lit point: never inside a wall. Nothing is random.
+    """
+    tracer, view = frame.tracer, frame.gbuffer.projection
+    to, (lit, flux) = seen_points(frame), lit_points(frame)
+    passing = transport(tracer, to, lit, flux, NEAREST * frame.scene.geometry.diagonal)
+    shown = open_to(tracer, view.origin, lit) & framed(view.origin, view.frame, view.half, lit)
+    missed, least = passing * ~shown, LEAST_GAIN * float(passing.sum())
+    if not float(missed.sum()) > least:
+        skip("sssil.cameras", "the picture shows what lights it")
+        return ()
+    half = _half(frame)
+    eyes, targets = _views(tracer, to, lit, missed, frame.scene.geometry.diagonal)
+    axes = _axes(eyes, targets, frame.scene.camera.up)
+    seen_to = open_to(tracer, eyes, to) & framed(eyes, axes, half, to)
+    seen_lit = open_to(tracer, eyes, lit) & framed(eyes, axes, half, lit)
+    brought = seen_to * np.einsum("cj,ij->ci", seen_lit, passing)
+    best = np.einsum("cj,ij->ci", shown, passing)[0]
+    winners = _greedy(brought, best, least, count)
+    return tuple(_camera(frame, eyes[c], targets[c], axes[c], half) for c in winners)
+
+
+def _half(frame: Frame) -> Array:
+    """Return the tangents of half the field of view: the frame's, or wider."""
+    half: Array = frame.gbuffer.projection.half
+    return np.asarray(half * max(1.0, WIDE / half.max()))
+
+
+def _views(tracer: Tracer, to: Points, lit: Points, missed: Array, diagonal: float) -> tuple[Array, Array]:
+    """Return eyes and targets of candidates, drawn after the light that the picture misses."""
+    upto = np.cumsum(missed.ravel())
+    drawn = np.searchsorted(upto, (np.arange(PAIRS) + 0.5) / PAIRS * upto[-1])
+    i, j = np.repeat(np.divmod(drawn, missed.shape[1]), EYES_PER_PAIR, axis=1)
+    middle = (to.position[i] + lit.position[j]) / 2
+    u, v, share = halton(len(i), (2, 3, 5), start=1).T
+    round_about, up = 2 * math.pi * u, 2 * v - 1
+    flat = np.sqrt(1 - up * up)
+    way = np.stack([flat * np.cos(round_about), up, flat * np.sin(round_about)], axis=1)
+    free = np.minimum(tracer.closest(middle, way).distance, diagonal)
+    for point, normal in ((to.position[i], to.normal[i]), (lit.position[j], lit.normal[j])):
+        free = np.minimum(free, _before_plane(middle - point, way, normal))
+    eyes = middle + ((1 - CLEARANCE) * free * np.sqrt(share))[:, None] * way
+    return eyes, eyes + _unit(_unit(to.position[i] - eyes) + _unit(lit.position[j] - eyes))
+
+
+def _before_plane(start: Array, way: Array, normal: Array) -> Array:
+    """Return how far one gets along a way before the plane through the origin, inf where never to it."""
+    height, sinking = (start * normal).sum(axis=1), -(way * normal).sum(axis=1)
+    return np.asarray(np.divide(height, sinking, out=np.full_like(height, np.inf), where=sinking > 0))
+
+
+def _axes(eyes: Array, targets: Array, up: tuple[float, float, float]) -> Array:
+    """Return right, down and forward of each view."""
+    forward, upward = _unit(targets - eyes), _unit(np.asarray(up))
+    steep = np.abs(forward @ upward) > STEEP
+    right = _unit(np.cross(forward, np.where(steep[:, None], np.eye(3)[np.argmin(np.abs(upward))], upward)))
+    return np.stack([right, np.cross(forward, right), forward], axis=1)
+
+
+def _greedy(brought: Array, best: Array, least: float, count: int) -> list[int]:
+    """Return candidates in the order of what each adds to those before it, as long as it is worth it."""
+    winners: list[int] = []
+    while len(winners) < count:
+        gain = np.maximum(brought - best, 0).sum(axis=1)
+        winner = int(np.argmax(gain))
+        if not gain[winner] > least:
+            break
+        best = np.maximum(best, brought[winner])
+        winners.append(winner)
+    return winners
+
+
+def _camera(frame: Frame, eye: Array, target: Array, axes: Array, half: Array) -> Camera:
+    return Camera(eye.tolist(), target.tolist(), (-axes[1]).tolist(), 2 * math.atan(half[1]), frame.width,
+                  frame.height)  # fmt: skip
+
+
+def _unit(vectors: Array) -> Array:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))

@@ -41,10 +41,6 @@ class Sequence:
         The temporal filter; None renders each frame by itself.
     method : callable, optional
         Function of a frame and settings that gives its indirect irradiance; `hssil` where absent.
-    first : int
-        Number of the first frame, which counts for the seed.
-    history : History, optional
-        What the frame before the first left.
     **frame_options : object
         Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
 
@@ -61,26 +57,45 @@ class Sequence:
 
     def __init__(
         self, scenes: Iterable[Scene], settings: Any = None, temporal: TemporalSettings | None = USUAL, *,
-        method: Light | None = None, first: int = 0, history: History | None = None, **frame_options: Any,
+        method: Light | None = None, **frame_options: Any,
     ) -> None:
         expect(temporal is None or isinstance(temporal, TemporalSettings), "temporal", "TemporalSettings or None",
                temporal)
+        self.scenes = scenes
         self.settings = HssilSettings() if settings is None else settings
         self.temporal = temporal
-        self._scenes, self._method, self._first, self._history = scenes, method or _hssil(), first, history
-        self._frame_options = frame_options
+        self.method = method or _hssil()
+        self.frame_options = frame_options
 
     def __iter__(self) -> Iterator[Step]:
-        history = self._history
-        for number, scene in enumerate(self._scenes, self._first):
+        return self.over(self.scenes)
+
+    def over(self, scenes: Iterable[Scene], first: int = 0, history: History | None = None) -> Iterator[Step]:
+        """Render scenes that follow on others.
+
+        Parameters
+        ----------
+        scenes : iterable of Scene
+            The frames that follow.
+        first : int
+            Number of the first of them, which counts for the seed.
+        history : History, optional
+            What the frame before left.
+
+        Yields
+        ------
+        Step
+            Each frame.
+        """
+        for number, scene in enumerate(scenes, first):
             expect(isinstance(scene, Scene), f"scene of frame {number}", "a Scene", type(scene).__name__)
             step, history = self._step(scene, number, history)
             yield step
             del step  # whoever took it may let go of it before the next is made
 
     def _step(self, scene: Scene, number: int, history: History | None) -> tuple[Step, History | None]:
-        frame = Frame(scene, **self._frame_options)
-        new = self._method(frame, seeded(self.settings, number))
+        frame = Frame(scene, **self.frame_options)
+        new = self.method(frame, seeded(self.settings, number))
         if self.temporal is None:
             return Step(frame, new, frame.radiance(new), 0.0), None
         light, reused = new, 0.0

@@ -1,0 +1,158 @@
+"""`refgi sequence`: the frames of a path through one scene."""
+
+import hashlib
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from refgi.cli.options import machine, shadows, speech, view
+from refgi.cli.session import DONE, FAILED, Session, say
+
+if TYPE_CHECKING:
+    from refgi.cli.progress import Tell
+    from refgi.scene import Scene
+    from refgi.sssil.temporal import Sequence, TemporalSettings
+    from refgi.sssil.temporal.frame_files import FrameFiles
+
+FRAME = ("dtype", "rsm_resolution", "shadows")
+KINDS = {"both": (".exr", ".png"), "exr": (".exr",), "png": (".png",)}
+
+
+@click.command("sequence")
+@view
+@click.argument("path")
+@click.option("--frames", type=click.IntRange(1, 100_000), help="How many; as PATH says where absent.")
+@click.option("--method", default="hssil", show_default=True, help="Short name of a method.")
+@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
+@click.option("--temporal", "filtering", multiple=True, metavar="KEY=VALUE",
+              help="A setting of the temporal filter, such as weight=0.8; repeatable.")
+@click.option("--no-temporal", "unfiltered", is_flag=True, help="Each frame by itself.")
+@machine
+@shadows("map")
+@click.option("--exposure", type=float, help="Factor before the sRGB curve of a PNG; the scene's where absent.")
+@click.option("--format", "kind", type=click.Choice(list(KINDS)), default="both", show_default=True,
+              help="EXR (linear), PNG (tone-mapped), or both.")
+@click.option("--resume", is_flag=True, help="Go on after the frames that are there as EXR.")
+@click.option("--out", required=True, help="Folder for the frames.")
+@speech
+@click.pass_obj
+def _sequence(session: Session, /, **options: Any) -> int:
+    """Render the frames of PATH, a TOML file that moves camera, lights and objects of SCENE.
+
+    `hssil` blends each frame's light with that of the frame before; another method does where --temporal is given.
+    Each frame is written whole as soon as it is done, as PATH's name and a number.
+    """
+    from refgi.cli.memory import require_memory
+    from refgi.cli.progress import progress
+    from refgi.cli.settings import read_settings
+    from refgi.cli.threads import on_threads
+    from refgi.methods import find_method
+    from refgi.sssil.temporal import Sequence
+
+    kind, resume, exposure, out, threads = _taken(options, "kind", "resume", "exposure", "out", "threads")
+    _expect_usable(exposure, kind, resume)
+    method, pairs, seed = _taken(options, "method", "pairs", "seed")
+    light, settings_class = find_method(method).load()
+    settings = read_settings(settings_class, pairs, seed, method)
+    temporal = _temporal(method, *_taken(options, "filtering", "unfiltered"))
+    frame_options = dict(zip(FRAME, _taken(options, *FRAME), strict=True))
+    path, frames = _taken(options, "path", "frames")
+    scene, scenes, frames = _scenes(path, frames, options)
+    require_memory(scene, frame_options["dtype"], frame_options["rsm_resolution"], traced=method == "truth",
+                   settings={method: settings})
+    said = {"method": method, "settings": settings, "temporal": temporal, **frame_options}
+    files = _files(out, path, KINDS[kind], scene, frames, said)
+    sequence = Sequence(scenes, settings, temporal, method=light, **frame_options)
+    with on_threads(threads), progress() as tell:
+        done = files.done(frames) if resume else 0
+        rendered = _render(sequence, files, (done, frames), scene.exposure if exposure is None else exposure, tell)
+    content = {"scene": scene.name, **said, "out": out, "first": done, "frames": rendered}
+    session.result(f"{scene.name} by {method}: {len(rendered)} of {frames} frames rendered -> {out}", content)
+    return FAILED if any(frame["non_finite_pixels"] for frame in rendered) else DONE
+
+
+command = _sequence
+
+
+def _taken(options: dict[str, Any], *names: str) -> Any:
+    return [options.pop(name) for name in names]
+
+
+def _expect_usable(exposure: float | None, kind: str, resume: bool) -> None:
+    from refgi.errors import expect
+
+    expect(exposure is None or 0 < exposure < float("inf"), "--exposure", "a finite number > 0", exposure)
+    expect(not resume or kind != "png", "--resume", "--format both or exr: no PNG holds what to go on from", kind)
+
+
+def _temporal(method: str, pairs: tuple[str, ...], unfiltered: bool) -> "TemporalSettings | None":
+    from refgi.cli.settings import read_settings
+    from refgi.errors import expect
+    from refgi.sssil.temporal import TemporalSettings
+
+    expect(not (pairs and unfiltered), "--temporal", "nothing beside --no-temporal", " ".join(pairs))
+    if unfiltered or not (pairs or method == "hssil"):
+        return None
+    settings: TemporalSettings = read_settings(TemporalSettings, pairs, owner="the temporal filter")
+    return settings
+
+
+def _scenes(path: str, frames: int | None, options: dict[str, Any]) -> "tuple[Scene, Iterator[Scene], int]":
+    """Return the scene as it is without the path, that of every frame, and how many; all of them are usable."""
+    from refgi.cli.view import View
+    from refgi.errors import expect
+    from refgi.sssil.temporal.path import camera_and_lights, scenes_along
+    from refgi.sssil.temporal.path_file import read_path
+
+    scene = View(**options).load()
+    way, own = read_path(path, scene)
+    count = own if frames is None else frames
+    expect(count is not None, "--frames", f"how many, as {path} does not say", "nothing")
+    assert count is not None
+    for frame in range(count):
+        camera_and_lights(scene, way, frame, count)
+    return scene, scenes_along(scene, way, count), count
+
+
+def _files(
+    out: str, path: str, suffixes: tuple[str, ...], scene: "Scene", frames: int, said: dict[str, Any]
+) -> "FrameFiles":
+    from refgi.cli.destination import folder
+    from refgi.compare.environment import versions
+    from refgi.compare.results import CONTENT, UNITS, plain
+    from refgi.scene.files import read_bytes, text_of
+    from refgi.sssil.temporal.frame_files import FrameFiles
+
+    made = {"scene": scene.name, "faces": scene.face_count, "camera": scene.camera, "lights": scene.lights,
+            "path": hashlib.sha256(read_bytes(Path(path))).hexdigest(), "of": frames, "versions": versions(),
+            "units": UNITS, "content": CONTENT}
+    return FrameFiles(folder(out), text_of(Path(path).stem), suffixes, plain({**said, **made}))
+
+
+def _render(
+    sequence: "Sequence", files: "FrameFiles", span: tuple[int, int], exposure: float, tell: "Tell"
+) -> list[dict[str, Any]]:
+    """Render and write the frames from one number up to another; return what is to be said of each."""
+    from refgi.compare.metrics import count_non_finite
+    from refgi.sssil.temporal.frame_files import resumed
+
+    rendered: list[dict[str, Any]] = []
+    done, frames = span
+    if done == frames:
+        return rendered
+    started = time.perf_counter()
+    for number, step in enumerate(resumed(sequence, sequence.scenes, files, done), done):
+        seconds = time.perf_counter() - started
+        files.write(step, number, exposure)
+        bad = count_non_finite(step.radiance)
+        if bad:
+            say(f"frame {number}: {bad} pixels are NaN or infinite")
+        rendered.append({"frame": number, "seconds": seconds, "reused": step.reused, "non_finite_pixels": bad,
+                         "mean_indirect_irradiance": float(step.irradiance.mean(dtype="float64"))})
+        tell(f"frame {number + 1} of {frames}", 1.0)
+        del step  # its buffers serve the next
+        started = time.perf_counter()
+    return rendered

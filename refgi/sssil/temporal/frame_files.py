@@ -1,0 +1,122 @@
+"""Frames of a sequence as files, from which an interrupted sequence can go on."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import InputError, expect
+from refgi.frame import Frame
+from refgi.image import read_exr, write_exr, write_png
+from refgi.scene.model import Scene
+from refgi.sssil.temporal.filter import History, remember
+from refgi.sssil.temporal.sequence import Sequence, Step, seeded
+
+Array = npt.NDArray[Any]
+
+EXR, PNG = ".exr", ".png"
+
+
+class FrameFiles(NamedTuple):
+    """Where frames go, and what makes a frame found there one of these."""
+
+    folder: Path
+    stem: str
+    suffixes: tuple[str, ...]
+    said: Mapping[str, Any]  # attributes of every EXR: settings, versions; finite JSON values
+
+    def of(self, number: int) -> list[Path]:
+        """Return the files of a frame."""
+        return [self.folder / f"{self.stem}_{number:05d}{suffix}" for suffix in self.suffixes]
+
+    def write(self, step: Step, number: int, exposure: float) -> None:
+        """Write a frame, each file whole or not at all, the EXR last: where it is, so are the others."""
+        for file in sorted(self.of(number), reverse=True):
+            if file.suffix == PNG:
+                write_png(file, np.moveaxis(step.radiance, 0, -1), exposure)
+            else:
+                planes = [*zip("RGB", step.radiance, strict=True),
+                          *((f"irradiance.{c}", plane) for c, plane in zip("RGB", step.irradiance, strict=True))]
+                write_exr(file, {name: np.asarray(plane, np.float32) for name, plane in planes},
+                          {**self.said, "frame": number})
+
+    def done(self, frames: int) -> int:
+        """Return how many frames, from the first on, are there.
+
+        Parameters
+        ----------
+        frames : int
+            How many there should be.
+
+        Returns
+        -------
+        int
+            Number of the first that is missing or damaged.
+
+        Raises
+        ------
+        InputError
+            If a frame found is one of another sequence.
+        """
+        for number in range(frames):
+            file = self._exr(number)
+            try:
+                said = read_exr(file)[1]
+            except InputError:
+                return number
+            expect(said == {**self.said, "frame": number}, str(file), "a frame of this sequence, to go on after it",
+                   "one of other settings")
+        return frames
+
+    def light(self, number: int) -> Array:
+        """Return the indirect irradiance of a frame that is there, (3, h, w), W/m^2."""
+        channels = read_exr(self._exr(number))[0]
+        return np.stack([channels[f"irradiance.{c}"] for c in "RGB"])
+
+    def _exr(self, number: int) -> Path:
+        return self.folder / f"{self.stem}_{number:05d}{EXR}"
+
+
+def resumed(sequence: Sequence, scenes: Iterable[Scene], files: FrameFiles, done: int) -> Iterator[Step]:
+    """Render the frames of a sequence that are not there yet, to the bit as if it had not been interrupted.
+
+    Parameters
+    ----------
+    sequence : Sequence
+        How frames are rendered.
+    scenes : iterable of Scene
+        All frames, from the first.
+    files : FrameFiles
+        Where the frames are.
+    done : int
+        How many there are.
+
+    Yields
+    ------
+    Step
+        Frame `done` and those after it.
+
+    Raises
+    ------
+    InputError
+        If the frame before cannot be had back to the bit from its file.
+    """
+    rest = iter(scenes)
+    history = None
+    if done:
+        last = next(islice(rest, done - 1, None))
+        history = _history_after(sequence, last, files, done - 1)
+    yield from sequence.over(rest, done, history)
+
+
+def _history_after(sequence: Sequence, scene: Scene, files: FrameFiles, number: int) -> History | None:
+    if sequence.temporal is None:
+        return None
+    frame = Frame(scene, **sequence.frame_options)
+    if sequence.temporal.form == "printed":  # needs the light before it was filtered
+        return remember(frame, scene.geometry, sequence.method(frame, seeded(sequence.settings, number)))
+    expect(frame.dtype == np.float32, "dtype", "float32 to go on from, which an EXR holds whole", frame.dtype.name)
+    return remember(frame, scene.geometry, files.light(number))

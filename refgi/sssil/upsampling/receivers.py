@@ -1,0 +1,182 @@
+"""Rows of pixels that light is carried over to: normals, and where planes through them run.
+
+On a plane the nearness 1/z is linear in the picture, so differences between neighbouring pixels say what it is at the
+texels around, without rays or normals: of the two differences along each axis the smaller one counts, and none where
+they disagree in sign, which keeps clear of silhouettes.
+
+Symbols: g_x, g_y slope of the nearness (1/m a pixel), F pixels along a texel's side, t_x, t_y a pixel's centre from
+that of its texel (texels, -1/2 to 1/2).
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+from refgi.sssil.upsampling.lines import SPAN, WIDE
+
+Array = npt.NDArray[Any]
+
+NORMAL, SCALE, PLANE, ACROSS, DOWN, HERE = 0, 3 * SPAN, 4 * SPAN, 5 * SPAN, 6 * SPAN, 7 * SPAN
+LEFT, OWN, RIGHT, TENT = 0, SPAN, 2 * SPAN, 3 * SPAN
+
+
+@kernel
+def load_nearness(depth: Array, row: int, left: int, line: Array) -> None:
+    """Write 1/z of a row of pixels and of one more at either end.
+
+    Parameters
+    ----------
+    depth : (h, w) ndarray
+        Depth, m; inf where no surface is seen.
+    row : int
+        Row of pixels; -1 or h continues the picture.
+    left : int
+        First pixel of the block.
+    line : (SPAN,) ndarray
+        Filled from place 0, which is pixel left - 1, on; 0 where no surface is seen.
+
+    Notes
+    -----
+    One pixel beyond the picture's edge, the slope is that at the edge.
+    """
+    zero, one = line.dtype.type(0.0), line.dtype.type(1.0)
+    height, width = depth.shape
+    if row < 0 or row >= height:
+        inner, next_inner = (0, 1) if row < 0 else (height - 1, height - 2)
+        for i in range(WIDE + 2):
+            x = left - 1 + i
+            known = height > 1 and x >= 0 and x < width
+            line[i] = _beyond(depth[inner, x], depth[next_inner, x]) if known else zero
+        return
+    size = min(WIDE + 1, width - left)
+    for i in range(np.uint64(size)):
+        line[np.uint64(1) + i] = one / depth[row, np.uint64(left) + i]
+    for i in range(size + 1, WIDE + 2):
+        line[i] = zero
+    line[0] = zero
+    if left > 0:
+        line[0] = one / depth[row, left - 1]
+    elif width > 1:
+        line[0] = _beyond(depth[row, 0], depth[row, 1])
+    if size < WIDE + 1 and width > 1:
+        line[size + 1] = _beyond(depth[row, width - 1], depth[row, width - 2])
+
+
+@kernel
+def _beyond(depth: Any, inner: Any) -> Any:
+    """Return the nearness as far on the other side of a pixel as another is on this; 0 if not known."""
+    zero, one, two = type(depth)(0.0), type(depth)(1.0), type(depth)(2.0)
+    here, there = one / depth, one / inner
+    value = two * here - there
+    return value if (here > zero) & (there > zero) & (value > zero) else zero
+
+
+@kernel
+def load_receivers(
+    normal: Array, row: int, left: int, factor: int, sharpness: Any, lean: Any, above: Array, nearness: Array,
+    below: Array, here: Array,
+) -> None:
+    """Write normals of a row of pixels, and nearness as their planes have it at the middle of their texels.
+
+    Parameters
+    ----------
+    normal : (3, h, w) ndarray
+        Unit normals.
+    row : int
+        Row of pixels, in the picture.
+    left : int
+        First pixel of the block.
+    factor : int
+        F, pixels along a texel's side.
+    sharpness : float
+        1 / (4 sqrt(2) sigma), sigma the standard deviation of depths as a share of the depth.
+    lean : float
+        How far a texel's surface point is from its middle, to the side that is nearer, along either axis; pixels.
+    above, nearness, below : (SPAN,) ndarray
+        Of `load_nearness`, of this row and those beside it.
+    here : (HERE,) ndarray
+        Filled: normal; sharpness z; nearness at the own texel; its change from texel to texel. SCALE is negative
+        where no surface is seen.
+    """
+    real = here.dtype.type
+    one, zero = real(1.0), real(0.0)
+    side = real(factor)
+    ty = (real(row % factor) + real(0.5)) / side - real(0.5)
+    size = np.uint64(min(WIDE, normal.shape[2] - left))
+    for c in range(3):
+        line = np.uint64(NORMAL + c * SPAN)
+        for i in range(size):
+            here[line + i] = normal[c, row, np.uint64(left) + i]
+    for i in range(np.uint64(WIDE)):
+        value = nearness[i + np.uint64(1)]
+        gx = side * _slope(nearness[i], value, nearness[i + np.uint64(2)])
+        gy = side * _slope(above[i + np.uint64(1)], value, below[i + np.uint64(1)])
+        tx = (real(np.int32(i) % np.int32(factor)) + real(0.5)) / side - real(0.5)
+        here[np.uint64(SCALE) + i] = sharpness / value if value > zero else -one
+        # the nearest of a texel's pixels has its place, not the middle
+        here[np.uint64(PLANE) + i] = value - tx * gx - ty * gy + lean * (abs(gx) + abs(gy))
+        here[np.uint64(ACROSS) + i] = gx
+        here[np.uint64(DOWN) + i] = gy
+
+
+@kernel
+def _slope(before: Any, value: Any, after: Any) -> Any:
+    """Return the smaller of two differences, 0 where they disagree or a neighbour is not known."""
+    zero = type(value)(0.0)
+    first, second = value - before, after - value
+    smaller = first if abs(first) < abs(second) else second
+    known = (before > zero) & (after > zero) & (value > zero)
+    return smaller if known & ((first > zero) == (second > zero)) else zero
+
+
+@kernel
+def write_tent(factor: int, tent: Array) -> None:
+    """Write the spatial weights of a pixel's left, own and right texel.
+
+    Parameters
+    ----------
+    factor : int
+        Pixels along a texel's side.
+    tent : (TENT,) ndarray
+        Filled, for a block that starts with a texel.
+    """
+    for i in range(WIDE):
+        far, own, near, side = tent_weights(i % factor, factor, tent)
+        tent[LEFT + i] = near if side < 0 else far
+        tent[OWN + i] = own
+        tent[RIGHT + i] = far if side < 0 else near
+
+
+@kernel
+def tent_weights(place: int, factor: int, like: Array) -> Any:
+    """Return what three texels in a row weigh for a pixel of the middle one.
+
+    Parameters
+    ----------
+    place : int
+        Of the pixel in its texel, 0 to factor - 1.
+    factor : int
+        Pixels along a texel's side.
+    like : ndarray
+        Of the type of the result.
+
+    Returns
+    -------
+    far, own, near : float
+        Weights; their sum is 1.
+    side : int
+        On which side the near texel lies: -1 before, 1 after the own one.
+
+    Notes
+    -----
+    A tent of half width (4 + t) / 3 texels about the pixel's centre, t its distance from that of the texel, brought to
+    a sum of 1: of all tents the one with which linear functions stay linear, as the bilinear one of 2 x 2 texels has
+    it. It is continuous from texel to texel (t = 1/2: 0, 1/2, 1/2).
+    """
+    real = like.dtype.type
+    offset = 2 * place + 1 - factor
+    t = real(abs(offset)) / real(2 * factor)
+    one, two, six = real(1.0), real(2.0), real(6.0)
+    return (one - two * t) / six, (two - t) / real(3.0), (one + two * two * t) / six, -1 if offset < 0 else 1

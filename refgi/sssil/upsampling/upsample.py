@@ -1,0 +1,97 @@
+"""Irradiance of a level brought to the next finer one, or to the picture, and added to what is known there."""
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.rsm.memory import plane
+from refgi.sssil.upsampling.bilateral import fill_bilateral
+from refgi.sssil.upsampling.lines import PAD
+from refgi.sssil.upsampling.plain import fill_plain
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.sssil.settings import HssilSettings
+
+Array = npt.NDArray[Any]
+
+QUICK_POWER = 8.0  # of the cosine between normals: three multiplications
+
+
+class Guide(NamedTuple):
+    """What the texels of a level, or the pixels of the picture, see: it says which of them belong together."""
+
+    depth: Array  # (h, w) m along the view direction; inf where no surface is seen
+    normal: Array  # (3, h, w) unit vectors
+
+
+@stage("sssil.upsample", kept=False)
+def upsample(
+    coarse: Array, below: Guide, here: Guide, settings: "HssilSettings", added: Array | None = None
+) -> Array:
+    """Carry irradiance over to a finer level and add what that level has of its own.
+
+    Parameters
+    ----------
+    coarse : (3, hc, wc) ndarray
+        Irradiance of the coarser level's texels, W/m^2; its dtype is that of the result.
+    below : Guide
+        What those texels see.
+    here : Guide
+        What the finer level's texels, or the pixels, see: (h, w) of them, hc = ceil(h / F) and wc = ceil(w / F) for F
+        one of 2, 4, .. 32.
+    settings : HssilSettings
+        `upsampling`, `depth_sigma`, `normal_power`; `downsample` says where in a texel its depth was found.
+    added : (3, h, w) ndarray, optional
+        Irradiance to add, W/m^2.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2; 0 where no surface is seen.
+
+    Raises
+    ------
+    InputError
+        If sizes do not fit.
+
+    Notes
+    -----
+    Sec. 3.2 names a joint bilateral filter of 3 x 3 texels (Sec. 5) and gives no weights. Here a texel weighs
+    ``tent * exp(-delta^2 / (2 depth_sigma^2)) * max(0, <n . n'>)^normal_power``: the tent leaves linear functions
+    linear, and delta = z (1/z' - 1/z_plane) compares the texel's depth with that of the plane through the receiver at
+    the texel's place, so that slanted planes keep the whole tent. Equal light stays equal to the bit where the own
+    texel is of the receiver's surface. Where no texel has any weight, the nearest in depth is taken.
+    """
+    dtype = coarse.dtype
+    values, depth, normal, below_depth, below_normal = (
+        np.ascontiguousarray(array, dtype) for array in (coarse, *here, *below))
+    more = None if added is None else np.ascontiguousarray(added, dtype)
+    factor = _factor(depth.shape, below_depth.shape)
+    expect(values.shape == (3, *below_depth.shape), "coarse", f"shape {(3, *below_depth.shape)}", values.shape)
+    for name, array, shape in (("below.normal", below_normal, values.shape), ("here.normal", normal, (3, *depth.shape)),
+                               ("added", more, (3, *depth.shape))):
+        expect(array is None or array.shape == shape, name, f"shape {shape}", array is not None and array.shape)
+    result = plane((3, *depth.shape), dtype)
+    if settings.upsampling != "bilateral":
+        fill_plain(values, below_depth, depth, factor, settings.upsampling == "nearest", more, result)
+        return result
+    real = dtype.type
+    sharpness = real(1.0 / (4.0 * math.sqrt(2.0) * settings.depth_sigma))
+    # the closest of F x F pixels of a slope is at a corner of the texel
+    lean = real(0.0 if settings.downsample == "average" else (factor - 1) / (2 * factor))
+    power = None if settings.normal_power == QUICK_POWER else real(settings.normal_power)
+    fill_bilateral(values, below_depth, below_normal, depth, normal, factor, sharpness, lean, power, more, result)
+    return result
+
+
+def _factor(shape: tuple[int, ...], coarse: tuple[int, ...]) -> int:
+    """Return how many pixels a texel has along a side."""
+    factor = 2
+    while factor <= PAD and coarse != (-(-shape[0] // factor), -(-shape[1] // factor)):
+        factor *= 2
+    expect(factor <= PAD, "coarse", f"texels of 2, 4, .. {PAD} pixels of {shape}", coarse)
+    return factor

@@ -1,7 +1,22 @@
 """Paths from TOML files, as pydantic models: strict, no unknown keys, every error of a file at once.
 
-Angles are in degrees here; times (`at`) are shares of the sequence, so that one file serves any number of frames. A key
-says what it changes, and whatever no key names stays as the scene has it.
+Angles are in degrees here; times (`at`) are shares of the sequence, so that one file serves any number of frames. What
+no key of the camera or a light names stays as the scene has it. A file has ::
+
+    frames = 48
+    curve = "catmull_rom"  # or "linear"
+
+    [[camera]]
+    at = 0.0
+    eye = [0.0, 1.0, 3.0]  # also target, up, vfov_deg
+
+    [[lights]]
+    light = 0
+    keys = [{at = 0.0, position = [0.0, 2.0, 0.0]}, {at = 1.0, position = [1.0, 2.0, 0.0]}]
+
+    [[objects]]
+    material = "red"  # or faces = [first, end]; also axis, center
+    keys = [{at = 0.0}, {at = 1.0, turn_deg = 90.0, move = [0.1, 0.0, 0.0]}]
 """
 
 import json
@@ -39,20 +54,31 @@ class Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-class CameraKey(Entry):
-    """The camera at one time."""
+class Key(Entry):
+    """Some values at one time."""
 
     at: Time
+
+    @model_validator(mode="after")
+    def not_idle(self) -> Self:
+        """Refuse a key that names no value: one could take it for the scene's own."""
+        if self.model_fields_set <= {"at"}:
+            raise ValueError(f"expected a value at {self.at:g}, nothing given")
+        return self
+
+
+class CameraKey(Key):
+    """The camera at one time."""
+
     eye: Triple | None = None
     target: Triple | None = None
     up: Triple | None = None
     vfov_deg: Number | None = None
 
 
-class LightKey(Entry):
+class LightKey(Key):
     """A light at one time."""
 
-    at: Time
     position: Triple | None = None
     direction: Triple | None = None
     intensity_w_per_sr: Triple | None = None
@@ -63,8 +89,8 @@ class ObjectKey(Entry):
     """An object at one time: how far it is turned and moved from where the scene has it."""
 
     at: Time
-    turn_deg: Number | None = None
-    move: Triple | None = None
+    turn_deg: Number = 0.0
+    move: Triple = (0.0, 0.0, 0.0)
 
 
 class LightEntry(Entry):

@@ -1,21 +1,47 @@
-"""Visibility of samples by what the depth map holds between them and the receiver."""
+"""Visibility of samples by what the depth map holds before them: a bitmask of angles (after Therrien et al. 2023).
 
+From a receiver the picture is marched in slices, nearest samples first. The surface at a sample is taken to reach from
+its point away from the eye by a thickness. Both ends lie in the plane of the eye, the receiver and the sample; their
+angles against the direction to the eye, from 0 to 180 degrees, count in 32 sectors, and the surface blocks those whose
+middle it covers. Sectors are steps of
+
+    q(x, y) = y / (|x| + y), 2 - that where x < 0
+
+for a direction with x along the one to the eye and y across: they have 0.64 to 1.27 of equal angles, and no
+arctangent. A sample is seen as far as the two sectors whose middles are next to its angle are free, interpolated; and
+wholly where it stands higher than all before it, which keeps receding surfaces from blocking themselves.
+
+Symbols: d vector from receiver to sample (m), c = max(0, n . d), s = max(0, -m . d) with m = n_j ds_j / pi, t
+thickness (m), l distance of the receiver from the eye (m).
+"""
+
+import math
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.sssil.crown.gather import gather
+from refgi.errors import expect
+from refgi.jit import kernel, prange
+from refgi.sssil.crown.gather import level_factor
+from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
+from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.level import Level
 from refgi.sssil.settings import HssilSettings
+from refgi.sssil.visibility.slices import Steps, fill_slices, slice_offsets, steps_of
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
+SECTORS = 32
+LEAST = 1e-37  # stands in for a divisor of 0 under a numerator of 0
+X, N, L, AREA, INVERSE, LENGTH, PLANES = 0, 3, 6, 9, 10, 11, 12  # planes of a packed level
+PART, TOTAL, HIGHEST, SCRATCH = 0, 6, 9, 10  # lines of scratch: two slices' sums, all sums, least angle so far
+
 
 @stage("sssil.bitmask")
 def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: float) -> Array:
-    """Sum what the samples around each texel of a level send to it.
+    """Sum what the samples around each texel of a level send to it past what the picture shows between.
 
     Parameters
     ----------
@@ -24,13 +50,250 @@ def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: 
     index : int
         0 for the first level, whose inner disc is sampled as well.
     settings : HssilSettings
-        How many samples in how many directions.
+        How many samples in how many slices, which pattern and form factor, and how thick surfaces are.
     diagonal : float
         Of the scene, m.
 
     Returns
     -------
     (3, h, w) ndarray
-        Irradiance, W/m^2.
+        Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi.
+
+    Raises
+    ------
+    InputError
+        If the pattern has no slices.
     """
-    return gather(level, index, settings) if diagonal else np.zeros_like(level.radiance)
+    expect(settings.pattern != "all", "pattern", "row, pixel or fixed with visibility by a bitmask", settings.pattern)
+    rows, columns = level.shape
+    steps = steps_of(settings, index, chosen_radius((rows << index, columns << index), settings))
+    real = level.position.dtype.type
+    scale = _scale(level.depth)
+    packed = np.empty((rows, PLANES, columns), level.position.dtype)
+    _pack(level.position, level.normal, level.radiance, level.area, real(scale), packed)
+    thickness, bulge = real(settings.thickness * diagonal * scale), real(settings.form_factor == "disc")
+    factor = real(level_factor(index, settings))
+    result = np.empty_like(level.radiance)
+    if settings.pattern == "pixel":
+        key = level_key(settings.seed, level.number)
+        _march_pixels(packed, steps, key, thickness, bulge, factor, result)
+    else:
+        offsets, weight = slice_offsets(settings, steps, level.number, rows)
+        _march_rows(packed, offsets, weight.astype(real), thickness, bulge, factor, result)
+    return result
+
+
+def _scale(depth: Array) -> float:
+    """Return the power of two that brings the largest depth to 1: areas and 4th powers then stay within float32."""
+    far = float(np.max(depth, initial=0.0, where=np.isfinite(depth)))
+    return 2.0 ** -math.frexp(far)[1] if far > 0.0 else 1.0
+
+
+@kernel(parallel=True)
+def _pack(position: Array, normal: Array, radiance: Array, area: Array, scale: Any, packed: Array) -> None:
+    """Write the planes of a level row by row; `INVERSE` is 0 where there is no surface."""
+    zero, one, over_pi = scale - scale, scale / scale, scale * scale / type(scale)(math.pi)
+    for row in prange(area.shape[0]):
+        for column in range(area.shape[1]):
+            square = zero
+            for c in range(3):
+                packed[row, X + c, column] = position[c, row, column] * scale
+                packed[row, N + c, column] = normal[c, row, column]
+                packed[row, L + c, column] = radiance[c, row, column]
+                square += packed[row, X + c, column] * packed[row, X + c, column]
+            packed[row, AREA, column] = area[row, column] * over_pi
+            length = math.sqrt(square)
+            packed[row, LENGTH, column] = length
+            packed[row, INVERSE, column] = one / length if square > zero else zero
+
+
+@kernel(parallel=True)
+def _march_rows(packed: Array, offsets: Array, weight: Array, thickness: Any, bulge: Any, factor: Any,
+                result: Array) -> None:
+    for prow in prange(packed.shape[0]):
+        row = np.int64(prow)
+        lines, mask = np.zeros((SCRATCH, packed.shape[2]), packed.dtype), np.zeros(packed.shape[2], np.uint32)
+        shared = min(row, offsets.shape[0] - 1)
+        for k in range(offsets.shape[1]):
+            _march_row(packed, row, offsets[shared, k], weight[shared, k], thickness, bulge, lines, mask, k % 2)
+            if k % 2 == 1 or k + 1 == offsets.shape[1]:
+                _join(lines)
+        _store(packed, row, lines, factor, result)
+
+
+@kernel
+def _march_row(packed: Array, row: int, offsets: Array, weight: Array, thickness: Any, bulge: Any, lines: Array,
+               mask: Array, half: int) -> None:
+    """March one slice for a row of receivers, which are the SIMD lanes."""
+    rows, columns = packed.shape[0], packed.shape[2]
+    mask[:] = np.uint32(0)
+    lines[HIGHEST, :] = packed.dtype.type(4.0)
+    for j in range(offsets.shape[0]):
+        ox, oy = np.int64(offsets[j, 0]), np.int64(offsets[j, 1])
+        size = columns - abs(ox)
+        if row + oy < 0 or row + oy >= rows or size <= 0 or (ox == 0 and oy == 0):
+            continue
+        first, second = np.uint64(max(-ox, 0)), np.uint64(max(ox, 0))
+        if weight[j] > 0.0:
+            _light(packed, row, first, row + oy, second, np.uint64(size), weight[j], bulge, thickness, lines, mask,
+                   PART + 3 * half)
+        else:
+            _block(packed, row, first, row + oy, second, np.uint64(size), thickness, lines, mask)
+
+
+@kernel
+def _light(packed: Array, row: int, first: Any, other: int, second: Any, size: Any, weight: Any, bulge: Any,
+           thickness: Any, lines: Array, mask: Array, part: int) -> None:
+    """Add what one sample sends to each receiver of a row, and let it block."""
+    for i in range(size):
+        p, q = first + i, second + i
+        dx, dy, dz = _between(packed, row, p, other, q)
+        square = dx * dx + dy * dy + dz * dz
+        angle, back = _angles(packed, row, p, other, q, dx, dy, dz, square, thickness)
+        seen = _seen(angle, lines[HIGHEST, p], mask[p])
+        g = seen * _transfer(packed, row, p, other, q, dx, dy, dz, square, weight, bulge)
+        lines[part, p] = lines[part, p] + g * packed[other, L, q]
+        lines[part + 1, p] = lines[part + 1, p] + g * packed[other, L + 1, q]
+        lines[part + 2, p] = lines[part + 2, p] + g * packed[other, L + 2, q]
+        lines[HIGHEST, p] = angle if angle < lines[HIGHEST, p] else lines[HIGHEST, p]
+        mask[p] = mask[p] | _covered(angle, back)
+
+
+@kernel
+def _block(packed: Array, row: int, first: Any, other: int, second: Any, size: Any, thickness: Any, lines: Array,
+           mask: Array) -> None:
+    """Let one sample block the light of those after it, for each receiver of a row."""
+    for i in range(size):
+        p, q = first + i, second + i
+        dx, dy, dz = _between(packed, row, p, other, q)
+        square = dx * dx + dy * dy + dz * dz
+        angle, back = _angles(packed, row, p, other, q, dx, dy, dz, square, thickness)
+        lines[HIGHEST, p] = angle if angle < lines[HIGHEST, p] else lines[HIGHEST, p]
+        mask[p] = mask[p] | _covered(angle, back)
+
+
+@kernel
+def _between(packed: Array, row: int, p: Any, other: int, q: Any) -> Any:
+    return (packed[other, X, q] - packed[row, X, p], packed[other, X + 1, q] - packed[row, X + 1, p],
+            packed[other, X + 2, q] - packed[row, X + 2, p])
+
+
+@kernel
+def _transfer(packed: Array, row: int, p: Any, other: int, q: Any, dx: Any, dy: Any, dz: Any, square: Any, weight: Any,
+              bulge: Any) -> Any:
+    """Return pi c s / (r^4 + s r) (Eq. 4, with its pi) or, without bulge, pi c s / r^4 (Eq. 3)."""
+    real = type(dx)
+    zero, least = real(0.0), real(LEAST)
+    c = packed[row, N, p] * dx + packed[row, N + 1, p] * dy + packed[row, N + 2, p] * dz
+    s = -(packed[other, N, q] * dx + packed[other, N + 1, q] * dy + packed[other, N + 2, q] * dz)
+    s = (s if s > zero else zero) * (packed[other, AREA, q] * weight)
+    below = square * square + bulge * s * math.sqrt(square)
+    return real(math.pi) * (c if c > zero else zero) * s / (below if below > least else least)
+
+
+@kernel
+def _angles(packed: Array, row: int, p: Any, other: int, q: Any, dx: Any, dy: Any, dz: Any, square: Any,
+            thickness: Any) -> Any:
+    """Return the angles q of a sample's front and back, 0 to 2; both 3 where there is no surface."""
+    real = type(dx)
+    zero, none = real(0.0), real(3.0)
+    x = -(packed[row, X, p] * dx + packed[row, X + 1, p] * dy + packed[row, X + 2, p] * dz) * packed[row, INVERSE, p]
+    across = square - x * x
+    y = math.sqrt(across if across > zero else zero)
+    further = thickness * packed[other, INVERSE, q]
+    front = _pseudo_angle(x, y)
+    # the back lies on the sample's ray from the eye, which passes the receiver's ray in proportion to its length
+    back = _pseudo_angle(x + further * (x - packed[row, LENGTH, p]), y + further * y)
+    there = (packed[other, INVERSE, q] > zero) & (square > zero)
+    return front if there else none, back if there else none
+
+
+@kernel
+def _pseudo_angle(x: Any, y: Any) -> Any:
+    real = type(x)
+    zero, least = real(0.0), real(LEAST)
+    below = abs(x) + y
+    part = y / (below if below > least else least)
+    return part if x >= zero else real(2.0) - part
+
+
+@kernel
+def _seen(angle: Any, highest: Any, mask: Any) -> Any:
+    """Return how much of a sample is seen, 0 to 1."""
+    real = type(angle)
+    one = real(1.0)
+    place = angle * real(SECTORS // 2) + real(0.5)  # sector `upper` has its middle at or above the angle
+    upper = np.int32(place)
+    share = place - real(upper)
+    high, low = min(upper, np.int32(SECTORS - 1)), max(np.int32(upper - 1), np.int32(0))
+    low = min(low, np.int32(SECTORS - 1))
+    bit_high, bit_low = np.uint32(mask >> np.uint32(high)) & np.uint32(1), np.uint32(mask >> np.uint32(low)) & np.uint32(1)
+    free = one - (share * real(bit_high) + (one - share) * real(bit_low))
+    return one if angle <= highest else free
+
+
+@kernel
+def _covered(angle: Any, back: Any) -> Any:
+    """Return the sectors whose middles lie from one angle to another."""
+    real = type(angle)
+    half, sectors = real(0.5), real(SECTORS // 2)
+    return np.uint32(_below(np.int32(back * sectors + half)) & ~_below(np.int32(angle * sectors + half)))
+
+
+@kernel
+def _below(sector: Any) -> Any:
+    """Return the bits of all sectors before one, 0 to 32 or more."""
+    last = min(sector, np.int32(SECTORS))
+    half = np.uint32(last >> 1) & np.uint32(31)  # no shift reaches 32 bits, which processors disagree about
+    rest = np.uint32(np.uint32(last) - half) & np.uint32(31)
+    return np.uint32(np.uint32(np.uint32(np.uint32(1) << half) << rest) - np.uint32(1))
+
+
+@kernel
+def _join(lines: Array) -> None:
+    """Add the sums of two slices to each other and to the total: mirror images give mirror images to the bit."""
+    for c in range(3):
+        for i in range(np.uint64(lines.shape[1])):
+            lines[TOTAL + c, i] = lines[TOTAL + c, i] + (lines[PART + c, i] + lines[PART + 3 + c, i])
+    lines[PART : PART + 6] = lines.dtype.type(0.0)
+
+
+@kernel
+def _store(packed: Array, row: int, lines: Array, factor: Any, result: Array) -> None:
+    zero = packed.dtype.type(0.0)
+    for c in range(3):
+        for i in range(np.uint64(packed.shape[2])):
+            result[c, row, i] = factor * lines[TOTAL + c, i] if packed[row, INVERSE, i] > zero else zero
+
+
+@kernel(parallel=True)
+def _march_pixels(packed: Array, steps: Steps, key: Any, thickness: Any, bulge: Any, factor: Any,
+                  result: Array) -> None:
+    for prow in prange(packed.shape[0]):
+        row = np.int64(prow)
+        count = steps.disc + steps.crown + steps.blockers
+        offsets, length = np.empty((steps.slices, count, 2), np.int32), np.empty(count)
+        weight = np.empty((steps.slices, count))
+        lines, mask = np.zeros((SCRATCH, packed.shape[2]), packed.dtype), np.zeros(packed.shape[2], np.uint32)
+        for column in range(packed.shape[2]):
+            fill_slices(steps, pixel_key(row_key(key, row), column), False, length, offsets, weight)
+            for k in range(steps.slices):
+                _march_pixel(packed, row, column, offsets[k], weight[k], thickness, bulge, lines, mask)
+        _join(lines)
+        _store(packed, row, lines, factor, result)
+
+
+@kernel
+def _march_pixel(packed: Array, row: int, column: int, offsets: Array, weight: Array, thickness: Any, bulge: Any,
+                 lines: Array, mask: Array) -> None:
+    rows, columns = packed.shape[0], packed.shape[2]
+    one, p = np.uint64(1), np.uint64(column)
+    mask[p], lines[HIGHEST, p] = np.uint32(0), packed.dtype.type(4.0)
+    for j in range(offsets.shape[0]):
+        a, b = row + np.int64(offsets[j, 1]), column + np.int64(offsets[j, 0])
+        if a < 0 or a >= rows or b < 0 or b >= columns or (a == row and b == column):
+            continue
+        if weight[j] > 0.0:
+            _light(packed, row, p, a, np.uint64(b), one, packed.dtype.type(weight[j]), bulge, thickness, lines, mask, PART)
+        else:
+            _block(packed, row, p, a, np.uint64(b), one, thickness, lines, mask)

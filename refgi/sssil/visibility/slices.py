@@ -1,0 +1,155 @@
+"""Where the samples of a visibility bitmask lie: in slices, directions of the picture that are marched from a receiver.
+
+A slice holds the samples of its share of crown and disc, and blockers: samples of weight 0 that only block. Offsets are
+whole texels (ox, oy) as in `crown.pattern`, nearest first.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.sampling import hash_bits
+from refgi.sssil.crown.pattern import level_key, row_key
+from refgi.sssil.settings import HssilSettings
+
+Array = npt.NDArray[Any]
+
+GOLDEN = 0.6180339887498949  # turns the samples of one slice against those of the next
+TO_UNIT = 2.0**-32
+
+
+class Steps(NamedTuple):
+    """How densely slices are sampled."""
+
+    slices: int
+    disc: int  # samples of each slice in the inner disc
+    crown: int  # and in the crown
+    blockers: int  # and in the inner disc to block alone
+    radius: float  # of the crown, texels
+
+    @property
+    def count(self) -> int:
+        """Samples of a slice."""
+        return self.disc + self.crown + self.blockers
+
+
+def steps_of(settings: HssilSettings, index: int, radius: float) -> Steps:
+    """Return how densely the slices of a level are sampled.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        Samples of crown and disc, shared out to slices; at least one a slice.
+    index : int
+        0 for the first level, whose inner disc is sampled as well.
+    radius : float
+        Inner radius of the crown, texels.
+
+    Returns
+    -------
+    Steps
+        With half as many blockers as the crown has samples.
+    """
+    crown = max(1, round(settings.samples / settings.slices))
+    disc = max(1, round(settings.inner / settings.slices)) if index == 0 and settings.inner else 0
+    return Steps(settings.slices, disc, crown, (crown + 1) // 2, radius)
+
+
+def slice_offsets(settings: HssilSettings, steps: Steps, number: int, rows: int) -> tuple[Array, Array]:
+    """Return the samples that a row of receivers shares, slice by slice.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        Pattern ("row" or "fixed") and seed.
+    steps : Steps
+        Of `steps_of`.
+    number : int
+        Which level of the pyramid.
+    rows : int
+        How many rows there are.
+
+    Returns
+    -------
+    offsets : (rows, slices, n, 2) ndarray of int32
+        Texels (ox, oy), nearest first; one row for all with "fixed", where each slice with an even index is followed
+        by its mirror image, an odd last one is vertical.
+    weight : (rows, slices, n) ndarray of float64
+        Texels of the level that each sample stands for; 0 for a blocker.
+    """
+    fixed = settings.pattern == "fixed"
+    shape = (1 if fixed else rows, steps.slices, steps.count)
+    offsets, weight = np.empty((*shape, 2), np.int32), np.empty(shape)
+    _fill_rows(steps, level_key(settings.seed, number), fixed, offsets, weight)
+    return offsets, weight
+
+
+@kernel(parallel=True)
+def _fill_rows(steps: Steps, key: Any, fixed: bool, offsets: Array, weight: Array) -> None:
+    for row in prange(offsets.shape[0]):
+        here = key if fixed else row_key(key, np.int64(row))
+        length = np.empty(offsets.shape[2])
+        fill_slices(steps, here, fixed, length, offsets[row], weight[row])
+
+
+@kernel
+def fill_slices(steps: Steps, key: Any, mirrored: bool, length: Array, offsets: Array, weight: Array) -> None:
+    """Write the samples around one receiver.
+
+    Parameters
+    ----------
+    steps : Steps
+        How densely.
+    key : uint32
+        Draws the turn of the slices and the shift of samples along them.
+    mirrored : bool
+        Whether slices come in pairs of mirror images.
+    length : (n,) ndarray of float64
+        Scratch.
+    offsets : (slices, n, 2) ndarray of int32
+        Filled.
+    weight : (slices, n) ndarray of float64
+        Filled.
+    """
+    turn, shift = hash_bits(key) * TO_UNIT, hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT
+    pairs = steps.slices // 2
+    for k in range(steps.slices):
+        part = (shift + (k // 2 if mirrored else k) * GOLDEN) % 1.0
+        _fill_lengths(steps, part, length, weight[k])
+        angle = 2.0 * math.pi * (k + turn) / steps.slices
+        if mirrored:  # from the vertical; an odd slice lies on it
+            angle = 2.0 * math.pi * (k // 2 + (1.0 if steps.slices % 2 else 0.5)) / steps.slices
+            angle = 0.0 if k == 2 * pairs else angle
+        right, down = math.sin(angle), math.cos(angle)
+        side = -1 if mirrored and k % 2 == 1 else 1
+        for j in range(length.size):
+            offsets[k, j, 0] = side * np.int64(math.floor(length[j] * right + 0.5))
+            offsets[k, j, 1] = np.int64(math.floor(length[j] * down + 0.5))
+
+
+@kernel
+def _fill_lengths(steps: Steps, shift: float, length: Array, weight: Array) -> None:
+    """Write how far the samples of a slice lie from the receiver, rising, and what each stands for."""
+    share = math.pi * steps.radius**2 / steps.slices
+    filled = 0
+    for j in range(steps.blockers):
+        filled = _insert(steps.radius * (j + shift) / steps.blockers, 0.0, filled, length, weight)
+    for j in range(steps.disc):
+        u = (j + shift) / steps.disc
+        filled = _insert(steps.radius * math.sqrt(u), share / steps.disc, filled, length, weight)
+    for j in range(steps.crown):
+        u = (j + shift) / steps.crown
+        filled = _insert(steps.radius * math.sqrt(1.0 + 3.0 * u), 3.0 * share / steps.crown, filled, length, weight)
+
+
+@kernel
+def _insert(far: float, stands_for: float, filled: int, length: Array, weight: Array) -> int:
+    place = filled
+    while place > 0 and length[place - 1] > far:
+        length[place], weight[place] = length[place - 1], weight[place - 1]
+        place -= 1
+    length[place], weight[place] = far, stands_for
+    return filled + 1

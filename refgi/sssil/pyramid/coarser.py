@@ -7,9 +7,11 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sssil.level import Level
-from refgi.sssil.pyramid.closest import before
+from refgi.sssil.pyramid.closest import choose_texels
 
 Array = npt.NDArray[Any]
+
+TASKS = 16  # blocks of rows that are dealt to threads, whatever their number
 
 
 @kernel(parallel=True)
@@ -25,13 +27,14 @@ def fill_coarser_level(fine: Level, height: int, width: int, level: Level) -> No
     level : Level
         The result.
     """
-    for i in prange(level.area.shape[0]):
-        fill_row(fine, height, width, np.int64(i), level)
+    rows = level.area.shape[0]
+    for task in prange(TASKS):
+        fill_rows(fine, height, width, level, task * rows // TASKS, (task + 1) * rows // TASKS)
 
 
 @kernel
-def fill_row(fine: Level, height: int, width: int, i: int, level: Level) -> None:
-    """Fill one row of a level.
+def fill_rows(fine: Level, height: int, width: int, level: Level, first: int, end: int) -> None:
+    """Fill the rows `first` to `end` - 1 of a level.
 
     Parameters
     ----------
@@ -39,55 +42,52 @@ def fill_row(fine: Level, height: int, width: int, i: int, level: Level) -> None
         The level to start from.
     height, width : int
         Of the picture.
-    i : int
-        The row.
     level : Level
         The result.
+    first, end : int
+        Rows.
     """
-    real = level.area.dtype.type
-    for j in range(level.area.shape[1]):
-        r, c = closest_child(fine.depth, fine.pixel, width, i, j)
-        seen = fine.pixel[r, c] >= 0
-        for axis in range(3):
-            level.position[axis, i, j] = fine.position[axis, r, c]
-            level.normal[axis, i, j] = fine.normal[axis, r, c]
-            level.radiance[axis, i, j] = fine.radiance[axis, r, c]
-        level.depth[i, j] = fine.depth[r, c]
-        level.pixel[i, j] = fine.pixel[r, c]
-        share = pixels_covered(level.number, i, j, height, width) / pixels_covered(fine.number, r, c, height, width)
-        level.area[i, j] = fine.area[r, c] * real(share) if seen else real(0.0)
+    columns = fine.area.shape[1]
+    nearest, place = np.empty(columns + 1, fine.depth.dtype), np.empty((3, columns + 1), np.int32)
+    chosen = np.empty(level.area.shape[1], np.int32)
+    for i in range(first, end):
+        choose_texels(fine.depth, fine.pixel, i, width, nearest, place, chosen)
+        _take(fine, i, place[0], chosen, level)
+        _enlarge(fine, i, place[0], chosen, height, width, level)
 
 
 @kernel
-def closest_child(depth: Array, pixel: Array, width: int, i: int, j: int) -> tuple[int, int]:
-    """Return row and column of the finer texel that a texel takes over.
+def _take(fine: Level, i: int, row: Array, column: Array, level: Level) -> None:
+    """Copy what the chosen texels show."""
+    depth, pixel, area = fine.depth, fine.pixel, fine.area
+    position, normal, radiance = fine.position, fine.normal, fine.radiance
+    to_depth, to_pixel, to_area = level.depth, level.pixel, level.area
+    to_position, to_normal, to_radiance = level.position, level.normal, level.radiance
+    for j in range(np.uint64(to_depth.shape[1])):
+        c = np.uint64(column[j])
+        r = np.uint64(row[c])
+        to_depth[i, j] = depth[r, c]
+        to_pixel[i, j] = pixel[r, c]
+        to_area[i, j] = area[r, c]
+        for axis in range(3):
+            to_position[axis, i, j] = position[axis, r, c]
+        for axis in range(3):
+            to_normal[axis, i, j] = normal[axis, r, c]
+        for axis in range(3):
+            to_radiance[axis, i, j] = radiance[axis, r, c]
 
-    Parameters
-    ----------
-    depth : (h, w) ndarray
-        Of the finer level, m.
-    pixel : (h, w) ndarray of int32
-        Which pixels of the picture the finer texels show.
-    width : int
-        Of the picture.
-    i, j : int
-        The texel.
 
-    Returns
-    -------
-    tuple of 2 ints
-        One of the four, or fewer at the picture's edge.
-    """
-    rows, columns = depth.shape
-    row, column = 2 * i, 2 * j
-    for child in range(1, 4):
-        r, c = 2 * i + child // 2, 2 * j + child % 2
-        if r < rows and c < columns:
-            off_centre = abs(2 * (pixel[r, c] % width) + 1 - width)
-            other = abs(2 * (pixel[row, column] % width) + 1 - width)
-            if before(depth[r, c], off_centre, pixel[r, c], depth[row, column], other, pixel[row, column]):
-                row, column = r, c
-    return row, column
+@kernel
+def _enlarge(fine: Level, i: int, row: Array, column: Array, height: int, width: int, level: Level) -> None:
+    """Let a texel stand for all of its pixels, not those of the finer one alone."""
+    area, real = level.area, level.area.dtype.type
+    last, last_row = area.shape[1] - 1, i == area.shape[0] - 1
+    for j in range(np.uint64(area.shape[1])):
+        area[i, j] = real(4.0) * area[i, j]
+    for j in range(0 if last_row else last, last + 1):  # cut by the picture's edge
+        r, c = row[column[j]], column[j]
+        covered = pixels_covered(level.number, i, j, height, width)
+        area[i, j] = fine.area[r, c] * real(covered / pixels_covered(fine.number, r, c, height, width))
 
 
 @kernel

@@ -1,17 +1,22 @@
 """The pyramids of what a camera sees: position, normal, direct light and sample area (Sec. 4)."""
 
+import itertools
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from refgi.errors import expect
 from refgi.rsm.memory import plane
 from refgi.rsm.projection import Projection
 from refgi.sssil.level import Level
+from refgi.sssil.pyramid.closest import BEYOND
 from refgi.sssil.pyramid.coarser import fill_coarser_level
-from refgi.sssil.pyramid.start import Picture, fill_first_level
-from refgi.sssil.pyramid.view import view_of
+from refgi.sssil.pyramid.mean import average_pixels, average_texels
+from refgi.sssil.pyramid.picture import Picture
+from refgi.sssil.pyramid.start import fill_first_level
+from refgi.sssil.pyramid.view import View, view_of
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import skip, stage
 
@@ -117,14 +122,44 @@ def levels(
     -------
     tuple of Level
         Finest first.
+
+    Raises
+    ------
+    InputError
+        If shapes do not fit, or "hss_tan_f" meets a field of view of 90 degrees or more.
+
+    Notes
+    -----
+    The paper keeps depth alone and finds x and y from the texel's centre, up to half a texel beside the pixel that was
+    kept; here position, normal and radiance are that pixel's own. Nearer pixels win whatever their share: one that
+    covers q of the picture covers ``1 - (1 - q)^(4^k)`` of level k, and the light it sends grows with that. "average"
+    keeps the light; its positions may lie between two surfaces.
     """
+    shape = (projection.height, projection.width)
+    for name, given in (("normal", normal), ("albedo", albedo), ("direct", direct)):
+        expect(given.shape == (3, *shape), name, f"shape {(3, *shape)}", given.shape)
+    expect(depth.shape == shape, "depth", f"shape {shape}", depth.shape)
+    expect(depth.size < BEYOND, "picture", f"fewer than {BEYOND:,} pixels", f"{depth.size:,}")
+    picture = Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(given, depth.dtype)
+                                                     for given in (normal, albedo, direct)))
     view = view_of(projection, as_published)
-    made = [_room(first, (view.height, view.width), depth.dtype)]
-    fill_first_level(Picture(depth, normal, albedo, direct), view, made[0])
-    for number in range(first + 1, first + count):
-        made.append(_room(number, (view.height, view.width), depth.dtype))
-        fill_coarser_level(made[-2], view.height, view.width, made[-1])
+    made = [_room(number, shape, depth.dtype) for number in range(first, first + count)]
+    fill_first_level(picture, view, made[0])
+    if downsample == "closest":
+        for fine, coarse in itertools.pairwise(made):
+            fill_coarser_level(fine, *shape, coarse)
+    else:
+        _average(picture, view, downsample == "average", made)
     return tuple(made)
+
+
+def _average(picture: Picture, view: View, by_surface: bool, made: list[Level]) -> None:
+    """Fill all levels, with means; the first holds the closest pixels."""
+    weights = [level.area if by_surface else plane(level.shape, level.area.dtype) for level in made]
+    average_pixels(picture, view, by_surface, made[0], weights[0])
+    for finer, coarser in itertools.pairwise(range(len(made))):
+        fill_coarser_level(made[finer], view.height, view.width, made[coarser])
+        average_texels(made[finer], weights[finer], by_surface, made[coarser], weights[coarser])
 
 
 def _room(number: int, shape: tuple[int, int], dtype: npt.DTypeLike) -> Level:

@@ -49,8 +49,8 @@ def sample_area(
 
     Notes
     -----
-    The paper lets beta be the angle at the "receiving" surface; it is that of the sample's own. At silhouettes cos(beta)
-    goes to 0 and the area has no bound: cosines under a millionth count as a millionth, which is rounding.
+    The paper lets beta be the angle at the "receiving" surface; it is that of the sample's own. At silhouettes
+    cos(beta) goes to 0 and the area has no bound: a ratio under a millionth, which is rounding, counts as a millionth.
     """
     shape = (projection.height, projection.width)
     expect(depth.shape == shape, "depth", f"shape {shape}", depth.shape)

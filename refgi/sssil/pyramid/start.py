@@ -1,29 +1,21 @@
 """The first level, made from the picture in one pass: position, normal, radiance and sample area of its texels."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sssil.level import Level
-from refgi.sssil.pyramid.closest import choose_among_pixels
+from refgi.sssil.pyramid.closest import choose_pixels
+from refgi.sssil.pyramid.picture import Picture
 from refgi.sssil.pyramid.sample_area import pixel_surface
 from refgi.sssil.pyramid.view import View, centre
 
 Array = npt.NDArray[Any]
 
 TASKS = 32  # blocks of rows that are dealt to threads, whatever their number
-
-
-class Picture(NamedTuple):
-    """What the camera sees, at full resolution."""
-
-    depth: Array  # (H, W) m, inf where no surface is seen
-    normal: Array  # (3, H, W)
-    albedo: Array  # (3, H, W)
-    direct: Array  # (3, H, W) direct irradiance, W/m^2
 
 
 @kernel(parallel=True)
@@ -59,34 +51,51 @@ def fill_rows(picture: Picture, view: View, level: Level, first: int, end: int) 
     first, end : int
         Rows.
     """
-    side = 1 << level.number
-    room_depth = np.empty((2, side, view.width + side), picture.depth.dtype)
-    room_place = np.empty((2, 2, side, view.width + side), np.int32)
+    side, columns = 1 << level.number, level.area.shape[1]
+    nearest = np.empty(view.width + side, picture.depth.dtype)
+    row, chosen = np.empty(view.width + side, np.int32), np.empty(columns, np.int32)
     for i in range(first, end):
-        choose_among_pixels(picture.depth, i, level.number, room_depth, room_place)
-        _take(picture, view, i, room_depth[0, 0], room_place[0, 1, 0], level)
+        choose_pixels(picture.depth, i, side, nearest, row, chosen)
+        for j in range(np.uint64(columns)):
+            column = np.uint64(chosen[j])
+            row[j] = row[column]  # the chosen column is never one before
+        _take(picture, i, row, chosen, level)
+        _place(view, i, row, chosen, level)
 
 
 @kernel
-def _take(picture: Picture, view: View, i: int, depth: Array, pixel: Array, level: Level) -> None:
-    real = level.area.dtype.type
+def _take(picture: Picture, i: int, row: Array, column: Array, level: Level) -> None:
+    """Copy what the chosen pixels show."""
+    depth, normal, albedo, direct = picture.depth, picture.normal, picture.albedo, picture.direct
+    to_depth, to_pixel, to_normal, to_radiance = level.depth, level.pixel, level.normal, level.radiance
+    real, width = depth.dtype.type, depth.shape[1]
+    zero, pi = real(0.0), real(math.pi)
+    for j in range(np.uint64(to_depth.shape[1])):
+        r, c = np.uint64(row[j]), np.uint64(column[j])
+        seen = depth[r, c] < np.inf
+        to_depth[i, j] = depth[r, c]
+        to_pixel[i, j] = row[j] * width + column[j] if seen else -1
+        for axis in range(3):
+            to_normal[axis, i, j] = normal[axis, r, c] if seen else zero
+        for axis in range(3):
+            to_radiance[axis, i, j] = albedo[axis, r, c] * direct[axis, r, c] / pi if seen else zero
+
+
+@kernel
+def _place(view: View, i: int, row: Array, column: Array, level: Level) -> None:
+    """Find where the texels' surfaces are and how much of them they stand for."""
     height, width, side = view.height, view.width, 1 << level.number
+    across, down, ahead, pixel_area = view.across, view.down, view.ahead, view.pixel_area
+    depth, normal, position, area = level.depth, level.normal, level.position, level.area
     rows = min(side, height - i * side)
-    for j in range(level.area.shape[1]):
-        seen = depth[j] < np.inf
-        level.depth[i, j] = depth[j]
-        level.pixel[i, j] = pixel[j] if seen else -1
-        row, c = pixel[j] // width, pixel[j] % width
-        x, y = centre(c, width), centre(row, height)
-        z = float(depth[j]) if seen else 0.0
+    for j in range(np.uint64(area.shape[1])):
+        x, y = centre(column[j], width), centre(row[j], height)
+        z = np.float64(depth[i, j])
         facing = 0.0
         for axis in range(3):
-            ray = (view.ahead[axis] + y * view.down[axis]) + x * view.across[axis]
-            normal = picture.normal[axis, row, c] if seen else real(0.0)
-            facing -= normal * ray
-            level.position[axis, i, j] = z * ray
-            level.normal[axis, i, j] = normal
-            reflected = picture.albedo[axis, row, c] * picture.direct[axis, row, c] * real(1 / math.pi)
-            level.radiance[axis, i, j] = reflected if seen else real(0.0)
-        count = rows * min(side, width - j * side)
-        level.area[i, j] = count * pixel_surface(float(depth[j]), facing, view.pixel_area)
+            ray = (ahead[axis] + y * down[axis]) + x * across[axis]
+            facing -= normal[axis, i, j] * ray
+            position[axis, i, j] = z * ray if z < np.inf else 0.0
+        area[i, j] = rows * side * pixel_surface(z, facing, pixel_area)
+    last = area.shape[1] - 1
+    area[i, last] = area[i, last] / side * (width - last * side)

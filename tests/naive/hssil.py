@@ -130,45 +130,80 @@ def gathered(texels, offsets_at, form, disc_pi=False):
     return light
 
 
-def upsampled(coarse, below, here, factor, kind, agreement):
+def upsampled(coarse, below, here, factor, kind, agreement, lean):
     """Carry light from a level to one that is finer by a factor.
 
-    Bilinear weights of the taps around a texel's centre, for "bilateral" times `agreement(texel, tap)`, 0 where a tap
-    is empty, over their sum, or the tap nearest in depth where that vanishes. "bilinear" and "nearest" look at places alone.
+    Tents of the three by three taps around a texel's centre, 0 where a tap is empty, for "bilateral" times
+    `agreement(cosine of normals, off)`, over their sum, or the tap nearest in depth where that vanishes; `off` is the
+    share by which a tap's nearness 1/z is off the plane through the receiver. A tap stands where its texel is closest
+    if `lean`, else in its middle.
     """
     light = np.zeros((3, len(here), len(here[0])))
     for row in range(len(here)):
         for column in range(len(here[0])):
             if here[row][column] is not None:
-                light[:, row, column] = one_upsampled(coarse, below, here, (row, column), factor, kind, agreement)
+                light[:, row, column] = one_upsampled(coarse, below, here, (row, column), factor, kind, agreement, lean)
     return light
 
 
-def one_upsampled(coarse, below, here, at, factor, kind, agreement):
+def one_upsampled(coarse, below, here, at, factor, kind, agreement, lean):
     texel, (row, column) = here[at[0]][at[1]], at
     if kind == "nearest":
         return coarse[:, row // factor, column // factor]
     y, x = (row + 0.5) / factor - 0.5, (column + 0.5) / factor - 0.5
-    taps = []
-    for i in range(row // factor - 1, row // factor + 2):
-        for j in range(column // factor - 1, column // factor + 2):
-            if 0 <= i < len(below) and 0 <= j < len(below[0]) and (kind == "bilinear" or below[i][j] is not None):
-                taps.append((max(0.0, 1 - abs(i - y)) * max(0.0, 1 - abs(j - x)), below[i][j], coarse[:, i, j]))
-    if kind == "bilateral":
-        taps = [(weight * agreement(texel, tap), tap, light) for weight, tap, light in taps]
-    total = sum(weight for weight, _, _ in taps)
-    if total > 0:
-        return sum(weight * light for weight, _, light in taps) / total
+    taps = [(i, j, tent(i - y, y, kind) * tent(j - x, x, kind)) for i in around(y, len(below))
+            for j in around(x, len(below[0])) if below[i][j] is not None]
     if not taps:
         return np.zeros(3)
-    return min(taps, key=lambda tap: abs(tap[1]["depth"] - texel["depth"]))[2]
+    if kind == "bilateral":
+        down, across = (factor * slope(here, row, column, axis) for axis in (0, 1))
+        nearer = (factor - 1) / (2 * factor) * (abs(down) + abs(across)) if lean else 0.0
+        weighed = []
+        for i, j, weight in taps:
+            plane = 1 / texel["depth"] + (i - y) * down + (j - x) * across + nearer
+            off = texel["depth"] * (1 / below[i][j]["depth"] - plane)
+            weighed.append((i, j, weight * agreement(max(0.0, texel["normal"] @ below[i][j]["normal"]), off)))
+        taps = weighed
+    total = sum(weight for _, _, weight in taps)
+    if total > 0:
+        return sum(weight * coarse[:, i, j] for i, j, weight in taps) / total
+    i, j, _ = min(taps, key=lambda tap: abs(below[tap[0]][tap[1]]["depth"] - texel["depth"]))
+    return coarse[:, i, j]
+
+
+def around(x, count):
+    """Return the taps that are at most one from that which holds x, of those there are."""
+    own = math.floor(x + 0.5)
+    return range(max(0, own - 1), min(count, own + 2))
+
+
+def tent(d, x, kind):
+    """Return the weight of a tap at the distance d from x: half as wide as keeps linear functions linear, sum 1."""
+    half = 1.0 if kind == "bilinear" else (4 + abs(x - math.floor(x + 0.5))) / 3
+    own = math.floor(x + 0.5)
+    weights = {k: max(0.0, 1 - abs(own + k - x) / half) for k in (-1, 0, 1)}
+    return weights[round(d + x) - own] / sum(weights.values())
+
+
+def slope(here, row, column, axis):
+    """Return the change of 1/z from a texel to the next: the smaller of both differences, 0 where signs disagree."""
+    def nearness(step):
+        i, j = (row + step, column) if axis == 0 else (row, column + step)
+        if 0 <= i < len(here) and 0 <= j < len(here[0]):
+            return 0.0 if here[i][j] is None else 1 / here[i][j]["depth"]
+        back = nearness(-step) if (len(here), len(here[0]))[axis] > 1 else 0.0
+        return max(0.0, 2 * nearness(0) - back) if back > 0 else 0.0  # on in a straight line beyond the picture's edge
+    before, after = nearness(0) - nearness(-1), nearness(1) - nearness(0)
+    if before * after <= 0 or nearness(-1) == 0 or nearness(1) == 0:
+        return 0.0
+    return before if abs(before) < abs(after) else after
 
 
 def depth_and_normal(sigma, power):
-    """Return exp(-dz^2 / (2 sigma^2)) <n.n'>^power, dz relative to the receiver's depth."""
-    def agreement(texel, tap):
-        dz = (tap["depth"] - texel["depth"]) / texel["depth"]
-        return math.exp(-dz * dz / (2 * sigma * sigma)) * max(0.0, texel["normal"] @ tap["normal"]) ** power
+    """Return exp(-off^2 / (2 sigma^2)) cosine^power, with exp(-16 u) as the 16th power of its cubic series."""
+    def agreement(cosine, off):
+        u = off * off / (32 * sigma * sigma)
+        return max(0.0, 1 - u + u * u / 2 - u**3 / 6) ** 16 * cosine**power
     return agreement
 
 
@@ -186,7 +221,9 @@ def hssil(texels, *, first, count, offsets, agreement, mode="closest", form="dis
         if only in (None, index):
             added = gathered(here, lambda *at, i=index: offsets(i, first + i, *at), form, disc_pi)
         added *= 4.0**index if level_factor else 1.0
-        light = added if light is None else added + upsampled(light, levels[index + 1], here, 2, upsampling, agreement)
+        if light is not None:
+            added += upsampled(light, levels[index + 1], here, 2, upsampling, agreement, mode != "average")
+        light = added
     if first:
-        return upsampled(light, levels[0], texels, 2**first, upsampling, agreement)
+        return upsampled(light, levels[0], texels, 2**first, upsampling, agreement, mode != "average")
     return light

@@ -1,0 +1,84 @@
+"""The whole method, from the picture to its indirect light, against a slow twin that knows the paper alone."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.frame import Frame
+from refgi.scene import PointLight, SpotLight
+from refgi.sssil.crown.pattern import offsets_at, row_offsets
+from refgi.sssil.hssil import hssil
+from refgi.sssil.settings import HssilSettings
+from tests.naive import hssil as naive
+from tests.truth.scenes import corner_room
+
+ROUNDING = 1e-9  # of the brightest pixel: float64 in another order
+LIGHTS = (SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.4, 0.8, (2.0, 1.5, 1.0)),
+          PointLight((0.2, 0.9, 0.3), (0.3, 0.3, 0.3)))
+VIEW = {"eye": (1.7, 1.4, 1.5), "target": (-0.4, 0.35, -0.5), "vfov": math.radians(70)}
+
+
+@pytest.fixture(scope="module")
+def frame():
+    """A corner with a plate in front of it and the void behind: 17 x 13, so that levels end in half texels."""
+    return Frame(corner_room(*LIGHTS).with_camera(**VIEW), width=17, height=13, dtype=np.float64, shadows="exact")
+
+
+def twin(frame, settings):
+    """Return the twin's irradiance with the samples that the settings draw."""
+    buffer, printed = frame.gbuffer, settings.as_published
+    depth, normal, albedo = buffer.resolve("depth", "normal", "albedo")
+    view = buffer.projection
+    texels = naive.first_texels(depth, normal, albedo * frame.direct / math.pi, view.frame[0], view.half,
+                                "hss_tan_f" in printed)
+    return naive.hssil(texels, first=settings.first_level, count=settings.levels, offsets=samples(settings),
+                       agreement=naive.depth_and_normal(settings.depth_sigma, settings.normal_power),
+                       mode=settings.downsample, form=settings.form_factor, upsampling=settings.upsampling,
+                       only=settings.only_level, disc_pi="hss_disc_pi" in printed,
+                       level_factor="hss_level_factor" in printed)
+
+
+def samples(settings):
+    """Return the function that lists (ox, oy, w) for a receiver of a level."""
+    def listed(index, level, row, column):
+        if settings.pattern == "all":
+            return naive.everything(settings.radius, index, (13, 17))
+        inner = settings.inner if index == 0 else 0
+        if settings.pattern == "fixed":
+            offsets, weight = row_offsets(settings, index, level, 1)
+            return [(ox, oy, w) for (ox, oy), w in zip(offsets[0].tolist(), weight.tolist(), strict=True)]
+        return naive.weighted(offsets_at(settings, index, level, row, column).tolist(), inner, settings.radius)
+    return listed
+
+
+SETTINGS = {
+    "every pixel": HssilSettings(pattern="all", start="full", levels=1, radius=11.0),
+    "every texel of four levels": HssilSettings(pattern="all", start="full", levels=4, radius=2.0),
+    "from half resolution": HssilSettings(pattern="all", levels=3, radius=2.0),
+    "from quarter resolution": HssilSettings(pattern="all", start="quarter", levels=2, radius=2.0),
+    "a row's samples": HssilSettings(levels=3, radius=2.0, samples=9),
+    "a pixel's samples": HssilSettings(pattern="pixel", start="full", levels=3, radius=3.0, samples=8, seed=4),
+    "fixed samples": HssilSettings(pattern="fixed", levels=3, radius=2.0, samples=11, inner_samples=5),
+    "no inner samples": HssilSettings(pattern="pixel", levels=3, radius=2.0, samples=8, inner_samples=0),
+    "averages": HssilSettings(levels=3, radius=2.0, pattern="all", start="full", downsample="average"),
+    "closest places, average light": HssilSettings(levels=3, radius=2.0, downsample="closest_average"),
+    "points": HssilSettings(levels=3, radius=2.0, form_factor="point"),
+    "bilinear": HssilSettings(levels=3, radius=2.0, upsampling="bilinear"),
+    "nearest": HssilSettings(levels=3, radius=2.0, upsampling="nearest"),
+    "wide weights": HssilSettings(levels=3, radius=2.0, depth_sigma=0.3, normal_power=1.5),
+    "the second level alone": HssilSettings(levels=3, radius=2.0, only_level=1),
+    "as printed": HssilSettings(levels=3, radius=2.0, as_published=HssilSettings.SWITCHES),
+    "tan f alone": HssilSettings(levels=3, radius=2.0, as_published={"hss_tan_f"}),
+}
+
+
+@pytest.mark.feature("HSS-12")
+@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.filterwarnings("ignore:radius")
+def test_the_twin(frame, name, evidence):
+    settings = SETTINGS[name]
+    light, expected = hssil(frame, settings), twin(frame, settings)
+    off = np.abs(light - expected).max() / expected.max()
+    evidence(f"{name}: off by {off:.0e} of the brightest pixel")
+    assert off < ROUNDING

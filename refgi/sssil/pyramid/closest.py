@@ -61,18 +61,19 @@ def choose_pixels(depth: Array, i: int, side: int, nearest: Array, row: Array, c
 def _choose_columns(nearest: Array, side: int, first: int, end: int, start: int, step: int, chosen: Array) -> None:
     """Choose from column `start` of each texel on, which lies next to the centre line, away from it."""
     if side == 2:  # a constant stride is loaded in SIMD lanes
-        for j in range(np.uint64(end - first)):
-            c = np.uint64(2) * (j + np.uint64(first))
-            left, right = nearest[c], nearest[c + np.uint64(1)]
-            is_right = (right <= left) if step < 0 else (right < left)
-            chosen[j + np.uint64(first)] = np.int32(c) + (np.int32(1) if is_right else np.int32(0))
+        for k in range(np.uint64(end - first)):
+            j = k + np.uint64(first)
+            left = np.uint64(2) * j
+            right = left + np.uint64(1)
+            is_right = (nearest[right] <= nearest[left]) if step < 0 else (nearest[right] < nearest[left])
+            chosen[j] = np.int32(left) + (np.int32(1) if is_right else np.int32(0))
         return
-    for j in range(first, end):
-        best = j * side + start
+    for texel in range(first, end):
+        best = texel * side + start
         for away in range(1, side):
-            c = j * side + start + away * step
+            c = texel * side + start + away * step
             best = c if nearest[c] < nearest[best] else best
-        chosen[j] = best
+        chosen[texel] = best
 
 
 @kernel
@@ -142,12 +143,14 @@ def before(depth: Any, off_centre: int, pixel: int, other_depth: Any, other_off_
 
     Parameters
     ----------
-    depth, other_depth : float
+    depth : float
         Along the view direction, m; inf where no surface is seen.
-    off_centre, other_off_centre : int
+    off_centre : int
         Distance from the centre line, half pixels.
-    pixel, other_pixel : int
+    pixel : int
         Row * width + column.
+    other_depth, other_off_centre, other_pixel : float, int, int
+        Those of the other.
 
     Returns
     -------

@@ -45,7 +45,7 @@ def figure8(bench: "Workbench") -> Figure:
         Direct light, indirect light by three setups, and the final picture.
     """
     frame = ready(wide_frame(bench, HALL))
-    limit = lit(frame, settings_of(frame, start="full", levels=6, pattern="all"))
+    limit = lit(frame, settings_of(frame, radius=None, start="full", levels=6, pattern="all"))
     made = {setup: _made(frame, setup, limit) for setup in SHOWN}
     seconds = spent(bench)
     rows = tuple((setup.title, 1e3 * seconds[setup.title].total, setup.total[0], setup.total[1],

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from refgi.papers import pictures
 from refgi.papers.hssil.scenes import side_views
-from refgi.papers.hssil.subjects import BASKET, LARGE, every_texel, lit, mean_of, settings_of, traced, wide_frame
+from refgi.papers.hssil.subjects import BASKET, LARGE, every_texel, lit, mean_of, smaller, traced, wide_frame
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Cell, Figure, Picture, Table
 from refgi.sssil import HssilSettings
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 SIZE = LARGE / 2
-LEVELS = 5  # so that what is missing is what is not seen
 ONE, SIDES, PLACED, MORE = "one", "sides", "placed", "more"
 TITLES = {ONE: "one camera", SIDES: "two side views besides", PLACED: "one camera placed besides",
           MORE: "three cameras placed besides"}
@@ -48,7 +47,7 @@ def figure9(bench: "Workbench") -> Figure:
         Light by one camera, by side views of one's own, by cameras that are placed, and by path tracing.
     """
     frame = wide_frame(bench, BASKET, SIZE)
-    base = every_texel(settings_of(frame, levels=LEVELS))
+    base = every_texel(smaller(frame, 1, radius=None))  # what is missing is what is not seen
     ways = {key: _way(frame, HssilSettings(**(vars(base) | changes))) for key, changes in _changes().items()}
     free = traced(bench, frame, (BASKET, SIZE), visibility=False)
     exact = traced(bench, frame, (BASKET, SIZE))
@@ -59,7 +58,7 @@ def figure9(bench: "Workbench") -> Figure:
     return Figure(
         shows="A plant basket lit on its far side: with one camera its light is missing, with side views it comes "
               "back.",
-        facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", f"{LEVELS} levels from half "
+        facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", f"{base.levels} levels from half "
                "resolution, every texel", f"path tracing with {bench.scale.truth_samples} samples a pixel"),
         pictures=_pictures(frame, ways, free, exact), columns=3,
         tables=(Table("Light and error in % of the mean of path tracing in which nothing blocks",

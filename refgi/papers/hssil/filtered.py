@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from refgi.papers import pictures
 from refgi.papers.curves import Axes, Curve, drawn
-from refgi.papers.hssil.subjects import HALL, SMALL, WIDE, every_texel, frame_of, lit, scene_of, settings_of
+from refgi.papers.hssil.subjects import HALL, SMALL, WIDE, every_texel, frame_of, lit, scene_of, smaller
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Plot, Table
 from refgi.papers.val.motion import changes
@@ -57,7 +57,7 @@ def filtered(bench: "Workbench") -> Figure:
     """
     count = frame_count(bench)
     frame = frame_of(bench, HALL, SIZE, wide=WIDE)
-    settings = settings_of(frame, samples=SAMPLES)
+    settings = smaller(frame, samples=SAMPLES)
     found = {motion: courses(bench, scenes, settings, frame) for motion, scenes in
              ((RESTING, [scene_of(bench, HALL)] * count), (MOVING, moved(scene_of(bench, HALL), count)))}
     rows = tuple((f"{motion}, {way}", one.noise[0], one.noise[-1], 100 * (one.noise[-1] / one.noise[0]) ** 2,
@@ -67,7 +67,7 @@ def filtered(bench: "Workbench") -> Figure:
         shows="Blending each frame with the one before, warped to the new camera, takes away noise at next to no cost. "
               "The paper has no figure of it.",
         facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", f"{count} frames",
-               f"half resolution, 4 levels, {SAMPLES} samples, new ones in each frame", "a = 0.9"),
+               f"half resolution, {settings.levels} levels, {SAMPLES} samples, new ones in each frame", "a = 0.9"),
         pictures=_pictures(frame, found, settings), columns=3,
         tables=(Table("Noise in % of the mean, against every texel of the same crowns; flicker: how it changes from "
                       "frame to frame", (

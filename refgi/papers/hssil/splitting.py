@@ -11,14 +11,14 @@ from refgi.papers.hssil.subjects import (
     BOX,
     HALL,
     HORSE,
-    SMALL,
+    JUDGED,
     TITLES,
     every_pixel,
     every_texel,
     frame_of,
     lit,
     mean_of,
-    settings_of,
+    smaller,
     traced,
 )
 from refgi.papers.judging import errors_of
@@ -35,8 +35,8 @@ SCENES = (BOX, HORSE, HALL)
 # each step from the picture before it; the first is path tracing of all light
 STEPS = {"truth": "path tracing", "seen": "only what the camera sees shines", "open": "nothing blocks (v = 1)",
          "pixels": "a pixel is a point (Eq. 3)", "discs": "a pixel is a disc (Eq. 4)",
-         "levels": "five levels, averaged", "closest": "the closest of four for their average",
-         "reach": "the paper's radius and 4 levels", "start": "from half resolution on",
+         "levels": "levels, averaged", "closest": "the closest of four for their average",
+         "reach": "the paper's reach", "start": "from half resolution on",
          "samples": "64 samples a level"}
 SHOWN = ("seen", "open", "discs", "levels", "closest", "reach", "samples")
 
@@ -50,8 +50,8 @@ class Variant(NamedTuple):
 
 VARIANTS = (
     Variant("as published", {}), Variant("from full resolution on", {"start": "full"}),
-    Variant("from quarter resolution on", {"start": "quarter"}), Variant("3 levels", {"levels": 3}),
-    Variant("5 levels", {"levels": 5}), Variant("6 levels", {"levels": 6}), Variant("16 samples", {"samples": 16}),
+    Variant("from quarter resolution on", {"start": "quarter"}), Variant("a level more", {"further": 1}),
+    Variant("two levels more", {"further": 2}), Variant("16 samples", {"samples": 16}),
     Variant("256 samples", {"samples": 256}), Variant("every texel", {"pattern": "all"}),
     Variant("every pixel its own samples", {"pattern": "pixel"}),
     Variant("levels averaged", {"downsample": "average"}),
@@ -84,12 +84,13 @@ def splitting(bench: "Workbench") -> Figure:
         What each approximation changes, and the published picture with one thing changed at a time.
     """
     found = {name: _split(bench, name) for name in SCENES}
-    frame = frame_of(bench, HORSE, SMALL)
+    frame = frame_of(bench, HORSE, JUDGED)
     return Figure(
         shows="The paper says that its picture may be heavily biased, by what is not seen and by v = 1, and gives no "
               "figures.",
         facts=(f"{frame.width}² pixels", f"path tracing with {bench.scale.truth_samples} samples a pixel",
-               f"radius {settings_of(frame).radius:g}: as much of the picture as 20 texels of 1280 x 720"),
+               f"{smaller(frame).levels} levels of half resolution, a radius of {smaller(frame).radius:.3g}: texels as "
+               "small beside their distance, and as much of the picture, as by the paper's settings at 1280 x 720"),
         pictures=_pictures(found[HORSE]), columns=4,
         tables=(Table("What each approximation changes in the picture before it, in % of the mean of path tracing: "
                       "root mean square, and change of the mean",
@@ -115,22 +116,22 @@ def chain(frame: "Frame") -> dict[str, HssilSettings]:
     dict of str to HssilSettings
         By the keys of `STEPS`, each with one thing changed from the one before.
     """
-    published = settings_of(frame)
+    published = smaller(frame)
     discs = every_pixel(published)
-    levels = dataclasses.replace(discs, levels=5, downsample="average")
+    levels = dataclasses.replace(discs, levels=published.levels + 2, downsample="average")
     closest = dataclasses.replace(levels, downsample="closest")
-    reach = every_texel(published, start="full", radius=2 * (published.radius or 1))
+    reach = every_texel(published, start="full", levels=published.levels + 1)
     return {"pixels": dataclasses.replace(discs, form_factor="point"), "discs": discs, "levels": levels,
             "closest": closest, "reach": reach, "start": every_texel(published), "samples": published}
 
 
 def _split(bench: "Workbench", name: str) -> Split:
-    frame = frame_of(bench, name, SMALL)
-    made = {"truth": traced(bench, frame, (name, SMALL)),
-            "seen": traced(bench, frame, (name, SMALL), emitters="seen"),
-            "open": traced(bench, frame, (name, SMALL), emitters="seen", visibility=False)}
+    frame = frame_of(bench, name, JUDGED)
+    made = {"truth": traced(bench, frame, (name, JUDGED)),
+            "seen": traced(bench, frame, (name, JUDGED), emitters="seen"),
+            "open": traced(bench, frame, (name, JUDGED), emitters="seen", visibility=False)}
     made |= {key: lit(frame, settings) for key, settings in chain(frame).items()}
-    variants = {one.title: lit(frame, settings_of(frame, **one.changes)) for one in VARIANTS}
+    variants = {one.title: lit(frame, smaller(frame, **one.changes)) for one in VARIANTS}
     return Split(made, variants, frame.gbuffer.covered)
 
 

@@ -18,7 +18,7 @@ from refgi.papers.hssil.subjects import (
     frame_of,
     lit,
     mean_of,
-    settings_of,
+    smaller,
     traced,
 )
 from refgi.papers.judging import Errors, errors_of
@@ -39,7 +39,6 @@ RAYS: Visibility = "rays"
 NAMES: dict[Visibility, str] = {NONE: "v = 1, as published", BITMASK: "bitmask of the screen",
                                 RAYS: "a ray to each sample"}
 THICKNESS = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # share of the diagonal
-LEVELS = 5  # all light that the picture can give: what is left is visibility
 
 
 class Judged(NamedTuple):
@@ -77,7 +76,7 @@ def visible(bench: "Workbench") -> Figure:
     return Figure(
         shows="The paper supposes that all that is seen sees each other (v = 1), and gives no bound of the error.",
         facts=(*(view.frame.scene.description for view in found.values()), f"{one.frame.width}² pixels",
-               f"{LEVELS} levels from half resolution", f"{one.settings[NONE].samples} samples",
+               f"{one.settings[NONE].levels} levels from half resolution", f"{one.settings[NONE].samples} samples",
                f"path tracing with {bench.scale.truth_samples} samples a pixel"),
         pictures=tuple(picture for name, view in found.items() for picture in _pictures(name, view)), columns=4,
         tables=(Table("Error in % of the mean, against path tracing in which only what the camera sees shines",
@@ -89,7 +88,7 @@ def visible(bench: "Workbench") -> Figure:
 
 def _judged(bench: "Workbench", name: str) -> Judged:
     frame = frame_of(bench, name, JUDGED)
-    base = settings_of(frame, levels=LEVELS)
+    base = smaller(frame, 1, radius=None)  # all light that the picture can give: what is left is visibility
     settings = {key: dataclasses.replace(base, visibility=key) for key in NAMES}
     light = {key: lit(frame, one) for key, one in settings.items()}
     exact = traced(bench, frame, (name, JUDGED), emitters="seen")

@@ -47,7 +47,8 @@ def look_up(
     covered : (h', w') ndarray of bool
         Which points there are.
     depth_tolerance : float
-        Largest difference of a texel's depth from the point's, as a share of the point's.
+        Largest difference of a texel's depth from the point's, or from that of the point's tangent plane where the
+        texel sees it, as a share of the point's.
     normal_cosine : float
         Smallest cosine between a texel's normal and the point's.
     fetch : {"bilinear", "nearest"}
@@ -69,6 +70,9 @@ def look_up(
 
     Notes
     -----
+    The paper compares depths. On a plane seen at a grazing angle those of neighbouring texels differ by more than any
+    useful tolerance: there a texel passes as well whose depth is that of the plane.
+
     A point within 1/256 texel of a texel's centre takes that texel alone, so that a view which did not move gives its
     values back unchanged, however often it is asked.
     """
@@ -95,7 +99,7 @@ def _look_up(
 ) -> None:
     for row in prange(covered.shape[0]):
         _place(row, eye, frame, scale, position, covered, found)
-        _fetch(row, values, depth, normal_there, limits, nearest, normal, found, weight)
+        _fetch(row, values, depth, normal_there, frame, scale, limits, nearest, normal, found, weight)
 
 
 @kernel
@@ -120,15 +124,16 @@ def _place(
 
 @kernel
 def _fetch(
-    row: int, values: Array, depth: Array, normal_there: Array, limits: Array, nearest: bool, normal: Array,
-    found: Array, weight: Array,
+    row: int, values: Array, depth: Array, normal_there: Array, frame: Array, scale: Array, limits: Array,
+    nearest: bool, normal: Array, found: Array, weight: Array,
 ) -> None:
     """Average the texels around each place of `found` that show the same surface; the mean takes its place."""
     real = values.dtype.type
     one, half, zero = real(1), real(0.5), real(0)
     height, width = depth.shape
     right_end, bottom_end = real(width) - half, real(height) - half
-    tolerance, least_cosine, snap = limits[0], limits[1], limits[2]
+    least_cosine, snap = limits[1], limits[2]
+    view = _rays(frame, scale)
     for column in range(weight.shape[1]):
         x, y, z = found[0, row, column], found[1, row, column], found[2, row, column]
         red, green, blue, total = zero, zero, zero, zero
@@ -137,26 +142,49 @@ def _fetch(
             nx, ny, nz = normal[0, row, column], normal[1, row, column], normal[2, row, column]
             left, share_right = _split(x, snap, nearest)
             top, share_below = _split(y, snap, nearest)
+            margin = limits[0] * z
             for below in range(2 if share_below > 0 else 1):
                 i = top + below
                 share_row = share_below if below else one - share_below
                 for beside in range(2 if share_right > 0 else 1):
                     j = left + beside
-                    if 0 <= i < height and 0 <= j < width and abs(depth[i, j] - z) <= tolerance * z:
-                        cosine = normal_there[0, i, j] * nx + normal_there[1, i, j] * ny + normal_there[2, i, j] * nz
-                        if cosine >= least_cosine:
-                            share = share_row * (share_right if beside else one - share_right)
-                            if total == zero:
-                                first_red, first_green, first_blue = values[0, i, j], values[1, i, j], values[2, i, j]
-                            total += share
-                            red += share * (values[0, i, j] - first_red)  # differences: a constant stays, to the bit
-                            green += share * (values[1, i, j] - first_green)
-                            blue += share * (values[2, i, j] - first_blue)
-        scale = one / total if total > zero else zero
-        found[0, row, column] = first_red + red * scale
-        found[1, row, column] = first_green + green * scale
-        found[2, row, column] = first_blue + blue * scale
+                    if not (0 <= i < height and 0 <= j < width):
+                        continue
+                    cosine = normal_there[0, i, j] * nx + normal_there[1, i, j] * ny + normal_there[2, i, j] * nz
+                    near = abs(depth[i, j] - z) <= margin
+                    if not near and cosine >= least_cosine:  # the depth of the tangent plane: z <n.r> / <n.r_tap>
+                        slant = _slant(real(j), real(i), nx, ny, nz, view)
+                        plane_depth = z * _slant(x, y, nx, ny, nz, view)
+                        near = slant < 0 and abs(depth[i, j] * slant - plane_depth) <= margin * -slant
+                    if near and cosine >= least_cosine:
+                        share = share_row * (share_right if beside else one - share_right)
+                        if total == zero:
+                            first_red, first_green, first_blue = values[0, i, j], values[1, i, j], values[2, i, j]
+                        total += share
+                        red += share * (values[0, i, j] - first_red)  # differences: a constant stays, to the bit
+                        green += share * (values[1, i, j] - first_green)
+                        blue += share * (values[2, i, j] - first_blue)
+        inverse = one / total if total > zero else zero
+        found[0, row, column] = first_red + red * inverse
+        found[1, row, column] = first_green + green * inverse
+        found[2, row, column] = first_blue + blue * inverse
         weight[row, column] = min(total, one)
+
+
+@kernel
+def _rays(frame: Array, scale: Array) -> Any:
+    """Return a step to the right, one down, the ray through the middle, and the middle's place."""
+    across, down = scale.dtype.type(1) / scale[0], scale.dtype.type(1) / scale[1]
+    return (frame[0, 0] * across, frame[0, 1] * across, frame[0, 2] * across, frame[1, 0] * down, frame[1, 1] * down,
+            frame[1, 2] * down, frame[2, 0], frame[2, 1], frame[2, 2], scale[2], scale[3])
+
+
+@kernel
+def _slant(x: Any, y: Any, nx: Any, ny: Any, nz: Any, view: Any) -> Any:
+    """Return <n . r> of the view ray of depth 1 through a place; `view` is made by `_rays`."""
+    r0, r1, r2, d0, d1, d2, f0, f1, f2, middle_x, middle_y = view
+    return (r0 * nx + r1 * ny + r2 * nz) * (x - middle_x) + (d0 * nx + d1 * ny + d2 * nz) * (y - middle_y) + (
+        f0 * nx + f1 * ny + f2 * nz)
 
 
 @kernel

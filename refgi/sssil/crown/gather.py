@@ -1,7 +1,8 @@
-"""What the samples of a crown send to every texel of a level (Sec. 3.1, Eq. 3 and 4).
+"""What the samples of a crown send to every texel of a level (Sec. 3.2, indirect lighting shader).
 
-Symbols: d vector from receiver to sample (m), n and n_j their normals, m_j = -n_j ds_j / pi with the area ds_j that
-the sample stands for, c = max(0, n . d), s = max(0, m_j . d).
+Threads take strips of a level, so narrow that what their samples read stays in the cache of a core. Where receivers
+share samples, `add_two` reads them as they lie; where each has its own, they are copied into a line first. Samples
+that are dark for a whole strip are passed over, which changes no bit of a sum.
 """
 
 import math
@@ -11,14 +12,18 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.sssil.crown.add import ROWS, WIDE, add_two, close_group
+from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, pack
 from refgi.sssil.crown.pattern import (
+    PHASES,
     level_key,
     pixel_key,
-    pixel_offset,
     row_key,
     row_offsets,
     sample_points,
     sample_weight,
+    shift_of,
+    shifted,
 )
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.level import Level
@@ -26,6 +31,9 @@ from refgi.sssil.settings import HssilSettings
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
+
+BAND = 32  # rows that a thread takes at once
+GROUP = 256  # samples that are summed before they are added to the total
 
 
 @stage("sssil.gather")
@@ -47,22 +55,53 @@ def gather(level: Level, index: int, settings: HssilSettings) -> Array:
         Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi and visibility.
     """
     rows, columns = level.shape
-    radius = settings.radius
-    if radius is None:
-        radius = chosen_radius((rows << index, columns << index), settings)
+    radius = chosen_radius((rows << index, columns << index), settings)
     real = level.position.dtype.type
-    result = np.zeros_like(level.radiance)
-    factor = real(level_factor(index, settings))
-    inner = settings.inner if index == 0 else 0
-    own = settings.pattern == "pixel"
-    if own:
-        offsets, weight = np.zeros((1, 0, 2), np.int32), sample_weight(radius, inner, settings.samples)
-    else:
-        offsets, weight = row_offsets(settings, index, level.number, rows, radius)
-    _gather_plainly(level.position, level.normal, level.radiance, level.area, offsets, weight, own,
-                    sample_points(inner, settings.samples), inner, radius,
-                    level_key(settings.seed, level.number), settings.form_factor == "disc", factor, result)
+    disc, factor = settings.form_factor == "disc", real(math.pi * level_factor(index, settings))
+    result = np.empty_like(level.radiance)
+    if settings.pattern == "pixel":
+        inner = settings.inner if index == 0 else 0
+        points, weight = sample_points(inner, settings.samples), sample_weight(radius, inner, settings.samples)
+        key = level_key(settings.seed, level.number)
+        emitters = pack(level, 1, math.ceil(2 * radius), WIDE)
+        _gather_own(emitters, level.normal, points, inner, radius, key, weight.astype(real), disc, factor, result)
+        return result
+    offsets, weight = shared_offsets(settings, index, level, radius)
+    emitters = pack(level, offsets.shape[1], int(np.abs(offsets[..., 0]).max(initial=0)), WIDE)
+    paired = settings.pattern != "row"
+    _gather_shared(emitters, level.normal, offsets, weight.astype(real), paired, disc, factor, result)
     return result
+
+
+def shared_offsets(settings: HssilSettings, index: int, level: Level, radius: float) -> tuple[Array, Array]:
+    """Return samples by row and phase of receivers, without those that reach no texel.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        Says how many and of which pattern, and draws them.
+    index : int
+        0 for the first level.
+    level : Level
+        Receivers and senders.
+    radius : float
+        Inner radius of the crown, texels.
+
+    Returns
+    -------
+    offsets : (1 or h, phases, n, 2) ndarray of int32
+        Texels (ox, oy) from the receiver.
+    weight : (n,) ndarray of float64
+        Texels of the level that each sample stands for.
+    """
+    rows, columns = level.shape
+    phases = PHASES if settings.pattern == "row" else 1
+    of_phase = [row_offsets(settings, index, level.number, rows, radius, phase) for phase in range(phases)]
+    offsets, weight = np.stack([offsets for offsets, _ in of_phase], axis=1), of_phase[0][1]
+    if phases == 1:
+        near = (np.abs(offsets[0, 0]) < (columns, rows)).all(axis=1)
+        return offsets[:, :, near], weight[near]
+    return offsets, weight
 
 
 def level_factor(index: int, settings: HssilSettings) -> float:
@@ -89,40 +128,134 @@ def level_factor(index: int, settings: HssilSettings) -> float:
 
 
 @kernel(parallel=True)
-def _gather_plainly(
-    position: Array, normal: Array, radiance: Array, area: Array, offsets: Array, weight: Array, own: bool,
-    points: Array, inner: int, radius: float, key: Any, disc: bool, factor: Any, result: Array,
+def _gather_shared(
+    emitters: Emitters, normal: Array, offsets: Array, weight: Array, paired: bool, disc: bool, factor: Any,
+    result: Array,
 ) -> None:
-    rows, columns = area.shape
-    real = position.dtype.type
-    pi, zero, least = real(math.pi), real(0.0), real(1e-37)
-    for y in prange(rows):
-        row = np.int64(y)
-        here = row_key(key, row)
-        shared = min(row, offsets.shape[0] - 1)
-        for column in range(columns):
-            mine = pixel_key(here, column)
-            red, green, blue = zero, zero, zero
-            for j in range(weight.size):
-                if own:
-                    ox, oy = pixel_offset(points, inner, radius, mine, j)
-                else:
-                    ox, oy = np.int64(offsets[shared, j, 0]), np.int64(offsets[shared, j, 1])
-                a, b = row + oy, column + ox
-                if a < 0 or a >= rows or b < 0 or b >= columns or (ox == 0 and oy == 0):
-                    continue
-                dx = position[0, a, b] - position[0, row, column]
-                dy = position[1, a, b] - position[1, row, column]
-                dz = position[2, a, b] - position[2, row, column]
-                square = dx * dx + dy * dy + dz * dz
-                c = normal[0, row, column] * dx + normal[1, row, column] * dy + normal[2, row, column] * dz
-                s = -(normal[0, a, b] * dx + normal[1, a, b] * dy + normal[2, a, b] * dz)
-                s = max(zero, s) * (area[a, b] * real(weight[j]) / pi)
-                below = square * square + (s * math.sqrt(square) if disc else zero)
-                g = pi * max(zero, c) * s / max(below, least)
-                red += g * radiance[0, a, b]
-                green += g * radiance[1, a, b]
-                blue += g * radiance[2, a, b]
-            result[0, row, column] = factor * red
-            result[1, row, column] = factor * green
-            result[2, row, column] = factor * blue
+    rows = normal.shape[1]
+    packed, lit, phases, strip = emitters.packed, emitters.lit, emitters.phases, emitters.strip
+    line, pad = emitters.line, emitters.pad
+    strips, bands = (line - 2 * pad) // strip, (rows + BAND - 1) // BAND
+    for task in prange(strips * bands):
+        left, top = np.int64(task) // bands * strip, np.int64(task) % bands * BAND
+        tile = np.empty(ROWS * WIDE, packed.dtype)
+        starts, weights = np.empty(weight.size + 1, np.int64), np.empty(weight.size + 1, packed.dtype)
+        for row in range(top, min(rows, top + BAND)):
+            shared = min(row, offsets.shape[0] - 1)
+            for phase in range(phases):
+                first = row * PLANES * phases * line + phase * line + pad + left
+                _load(tile, strip, packed, phases * line, first, normal, row, phase + phases * left, phases)
+                count = _list_lit(offsets[shared, phase], weight, paired, lit, row, phase, pad + left, strip, line,
+                                  starts, weights)
+                for j in range(0, count, 2):
+                    add_two(tile, strip, packed, phases * line, starts[j], weights[j], starts[j + 1], weights[j + 1],
+                            disc)
+                    if (j + 2) % GROUP == 0:
+                        close_group(tile, strip)
+                close_group(tile, strip)
+                _store(tile, strip, factor, row, phase + phases * left, phases, result)
+
+
+@kernel
+def _load(
+    tile: Array, lanes: int, packed: Array, step: int, first: int, normal: Array, row: int, column: int, phases: int
+) -> None:
+    """Copy the receivers of a strip into a tile and clear its sums."""
+    zero = packed.dtype.type(0.0)
+    y, x, by = np.uint64(row), np.uint64(column), np.uint64(phases)
+    inside = np.uint64(max(0, min(lanes, (normal.shape[2] - column + phases - 1) // phases)))
+    for c in range(3):
+        here, to = np.uint64(first + c * step), np.uint64(c * WIDE)
+        for i in range(np.uint64(lanes)):
+            tile[to + i] = packed[here + i]
+        to = np.uint64((c + 3) * WIDE)
+        for i in range(np.uint64(lanes)):
+            tile[to + i] = zero
+        for i in range(inside):
+            tile[to + i] = normal[c, y, x + by * i]
+    for c in range(6, ROWS):
+        to = np.uint64(c * WIDE)
+        for i in range(np.uint64(lanes)):
+            tile[to + i] = zero
+
+
+@kernel
+def _list_lit(
+    offsets: Array, weight: Array, paired: bool, lit: Array, row: int, phase: int, first: int, lanes: int, line: int,
+    starts: Array, weights: Array,
+) -> int:
+    """List where samples of a strip start that are not dark, in twos; a dark one stands in for a missing partner."""
+    rows, phases = lit.shape[0] - 1, lit.shape[1]
+    dark = rows * PLANES * phases * line
+    count, kept = 0, 0
+    for j in range(weight.size):
+        a, column = row + np.int64(offsets[j, 1]), phase + np.int64(offsets[j, 0])
+        of, lane = column % phases, first + column // phases
+        found = 0 <= a < rows and 0 <= lane and lane + lanes <= line and not (offsets[j, 0] == 0 and offsets[j, 1] == 0)
+        if found:
+            found = lit[a, of, (lane + lanes - 1) // BLOCK + 1] > lit[a, of, lane // BLOCK]
+        if found or paired:
+            starts[count] = (a * PLANES * phases + of) * line + lane if found else dark
+            weights[count] = weight[j]
+            count += 1
+        kept += 1 if found else 0
+        if paired and j % 2 == 1 and kept == 0:
+            count -= 2
+        kept = kept if j % 2 == 0 else 0
+    starts[count], weights[count] = dark, weight.dtype.type(0.0)
+    return count
+
+
+@kernel
+def _store(tile: Array, lanes: int, factor: Any, row: int, column: int, phases: int, result: Array) -> None:
+    y, x, by = np.uint64(row), np.uint64(column), np.uint64(phases)
+    inside = np.uint64(max(0, min(lanes, (result.shape[2] - column + phases - 1) // phases)))
+    for c in range(3):
+        total = np.uint64((c + 9) * WIDE)
+        for i in range(inside):
+            result[c, y, x + by * i] = factor * tile[total + i]
+
+
+@kernel(parallel=True)
+def _gather_own(
+    emitters: Emitters, normal: Array, points: Array, inner: int, radius: float, key: Any, weight: Array, disc: bool,
+    factor: Any, result: Array,
+) -> None:
+    rows = normal.shape[1]
+    packed, line, pad, strip = emitters.packed, emitters.line, emitters.pad, emitters.strip
+    strips, bands = (line - 2 * pad) // strip, (rows + BAND - 1) // BAND
+    for task in prange(strips * bands):
+        left, top = np.int64(task) // bands * strip, np.int64(task) % bands * BAND
+        tile, shifts = np.empty(ROWS * WIDE, packed.dtype), np.empty((3, WIDE))
+        lines = np.empty(2 * PLANES * WIDE, packed.dtype)
+        for row in range(top, min(rows, top + BAND)):
+            first = row * PLANES * line + pad + left
+            _load(tile, strip, packed, line, first, normal, row, left, 1)
+            for i in range(strip):
+                shifts[0, i], shifts[1, i], shifts[2, i] = shift_of(pixel_key(row_key(key, row), left + i))
+            for j in range(0, weight.size, 2):
+                k = min(j + 1, weight.size - 1)
+                _expand(packed, line, first, row, rows, points, j, inner, radius, shifts, strip, lines, 0)
+                _expand(packed, line, first, row, rows, points, k, inner, radius, shifts, strip, lines, PLANES * WIDE)
+                second = weight[k] if k > j else weight.dtype.type(0.0)
+                add_two(tile, strip, lines, WIDE, 0, weight[j], PLANES * WIDE, second, disc)
+                if (j + 2) % GROUP == 0:
+                    close_group(tile, strip)
+            close_group(tile, strip)
+            _store(tile, strip, factor, row, left, 1, result)
+
+
+@kernel
+def _expand(
+    packed: Array, line: int, first: int, row: int, rows: int, points: Array, j: int, inner: int, radius: float,
+    shifts: Array, lanes: int, lines: Array, to: int,
+) -> None:
+    """Copy the texels of one sample of each receiver of a strip into a line."""
+    near = 0.0 if j < inner else 1.0
+    for i in range(np.uint64(lanes)):
+        ox, oy = shifted(points, j, near, radius, shifts[0, i], shifts[1, i], shifts[2, i])
+        lane = first % line + np.int64(i) + ox
+        inside = 0 <= row + oy < rows and 0 <= lane < line and not (ox == 0 and oy == 0)
+        texel = np.uint64((row + oy) * PLANES * line + lane if inside else rows * PLANES * line)
+        for c in range(PLANES):
+            lines[np.uint64(to + c * WIDE) + i] = packed[texel + np.uint64(c * line)]

@@ -21,12 +21,13 @@ Array = npt.NDArray[Any]
 # shares of the turn of a two-dimensional Kronecker sequence: 1 / g and 1 / g^2 where g^3 = g + 1
 FIRST_STEP, SECOND_STEP = 0.7548776662466927, 0.5698402909980532
 TO_UNIT = 2.0**-32
+PHASES = 4  # columns x, x + 4, x + 8, ... of a row share samples: rows that share all would show as streaks
 
 
 def row_offsets(
-    settings: HssilSettings, index: int, number: int, rows: int, radius: float | None = None
+    settings: HssilSettings, index: int, number: int, rows: int, radius: float | None = None, phase: int = 0
 ) -> tuple[Array, Array]:
-    """Return the samples that a row of receivers shares.
+    """Return the samples that receivers of a row share: every fourth one with the pattern "row".
 
     Parameters
     ----------
@@ -40,6 +41,8 @@ def row_offsets(
         How many rows there are.
     radius : float, optional
         Inner radius of the crown, texels; that of the settings unless given.
+    phase : int
+        Column modulo PHASES; patterns "fixed" and "all" are those of every column.
 
     Returns
     -------
@@ -65,7 +68,7 @@ def row_offsets(
         return offsets[None], weight
     points = sample_points(inner, settings.samples)
     offsets = np.empty((rows, len(points), 2), np.int32)
-    _fill_rows(points, inner, radius, level_key(settings.seed, number), offsets)
+    _fill_rows(points, inner, radius, level_key(settings.seed, number), phase, offsets)
     return offsets, sample_weight(radius, inner, settings.samples)
 
 
@@ -93,7 +96,7 @@ def offsets_at(
         Texels (ox, oy) from the receiver, in the order of `row_offsets` and its weights.
     """
     if settings.pattern != "pixel":
-        offsets, _ = row_offsets(settings, index, number, row + 1, radius)
+        offsets, _ = row_offsets(settings, index, number, row + 1, radius, column % PHASES)
         here: Array = offsets[min(row, len(offsets) - 1)]
         return here
     inner = settings.inner if index == 0 else 0
@@ -138,12 +141,12 @@ def sample_points(inner: int, crown: int) -> Array:
 
     Returns
     -------
-    (inner + crown, 2) ndarray of float64
-        In [0, 1).
+    (inner + crown, 3) ndarray of float64
+        u in [0, 1), cos 2 pi v and sin 2 pi v.
     """
     count = np.concatenate([np.arange(inner), np.arange(crown)])
-    points: Array = (0.5 + count[:, None] * np.array([FIRST_STEP, SECOND_STEP])) % 1.0
-    return points
+    u, v = (0.5 + count * FIRST_STEP) % 1.0, (0.5 + count * SECOND_STEP) % 1.0
+    return np.stack([u, np.cos(2.0 * math.pi * v), np.sin(2.0 * math.pi * v)], axis=1)
 
 
 def sample_weight(radius: float, inner: int, crown: int) -> Array:
@@ -221,12 +224,60 @@ def pixel_key(key: Any, column: Any) -> Any:
 
 
 @kernel
-def pixel_offset(points: Array, inner: int, radius: float, key: Any, j: int) -> Any:
-    """Return one sample of a receiver or of a row: a point of the common set, shifted (Cranley and Patterson 1976).
+def shift_of(key: Any) -> Any:
+    """Return how the common points are shifted for a receiver or a row (Cranley and Patterson 1976).
 
     Parameters
     ----------
-    points : (n, 2) ndarray of float64
+    key : uint32
+        Draws the shift.
+
+    Returns
+    -------
+    u, cosine, sine : float64
+        What is added to u, modulo 1, and the turn that is added to the angle.
+    """
+    angle = 2.0 * math.pi * TO_UNIT * hash_bits(key ^ np.uint32(0x27D4EB2F))
+    return hash_bits(key) * TO_UNIT, math.cos(angle), math.sin(angle)
+
+
+@kernel
+def shifted(points: Array, j: Any, near: float, radius: float, u: float, cosine: float, sine: float) -> Any:
+    """Return where a shifted point lies.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray of float64
+        Of `sample_points`.
+    j : int
+        Which of them.
+    near : float
+        0 for a point of the disc, 1 for one of the crown.
+    radius : float
+        Inner radius of the crown, texels.
+    u, cosine, sine : float
+        Of `shift_of`.
+
+    Returns
+    -------
+    ox, oy : int64
+        Texels from the receiver.
+    """
+    share = points[j, 0] + u
+    share = share - 1.0 if share >= 1.0 else share
+    length = radius * math.sqrt(near + (1.0 + 2.0 * near) * share)
+    x = length * (points[j, 1] * cosine - points[j, 2] * sine)
+    y = length * (points[j, 1] * sine + points[j, 2] * cosine)
+    return np.int64(math.floor(x + 0.5)), np.int64(math.floor(y + 0.5))
+
+
+@kernel
+def pixel_offset(points: Array, inner: int, radius: float, key: Any, j: int) -> Any:
+    """Return one sample of a receiver with samples of its own.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray of float64
         Of `sample_points`.
     inner : int
         How many of them lie in the inner disc.
@@ -242,19 +293,17 @@ def pixel_offset(points: Array, inner: int, radius: float, key: Any, j: int) -> 
     ox, oy : int64
         Texels from the receiver.
     """
-    u = (points[j, 0] + hash_bits(key) * TO_UNIT) % 1.0
-    angle = 2.0 * math.pi * (points[j, 1] + hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT)
-    length = radius * math.sqrt(u if j < inner else 1.0 + 3.0 * u)
-    return (np.int64(math.floor(length * math.cos(angle) + 0.5)),
-            np.int64(math.floor(length * math.sin(angle) + 0.5)))
+    u, cosine, sine = shift_of(key)
+    return shifted(points, j, 0.0 if j < inner else 1.0, radius, u, cosine, sine)
 
 
 @kernel
-def _fill_rows(points: Array, inner: int, radius: float, key: Any, offsets: Array) -> None:
+def _fill_rows(points: Array, inner: int, radius: float, key: Any, phase: int, offsets: Array) -> None:
     for row in range(offsets.shape[0]):
-        here = row_key(key, row)
+        u, cosine, sine = shift_of(pixel_key(row_key(key, row), phase))
         for j in range(offsets.shape[1]):
-            offsets[row, j, 0], offsets[row, j, 1] = pixel_offset(points, inner, radius, here, j)
+            near = 0.0 if j < inner else 1.0
+            offsets[row, j, 0], offsets[row, j, 1] = shifted(points, j, near, radius, u, cosine, sine)
 
 
 def _every_texel(low: float, high: float) -> Array:
@@ -276,7 +325,8 @@ def _mirrored(settings: HssilSettings, radius: float, inner: int, number: int) -
     weight = sample_weight(radius, inner, settings.samples)
     pairs, middles = [], []
     for first, count, near in ((0, inner, 0.0), (inner, settings.samples, 1.0)):
-        u, v = ((sample_points(0, (count + 1) // 2) + shift) % 1.0).T
+        half = np.arange((count + 1) // 2)
+        u, v = (0.5 + half * FIRST_STEP + shift[0]) % 1.0, (0.5 + half * SECOND_STEP + shift[1]) % 1.0
         length = radius * np.sqrt(near + (3.0 if near else 1.0) * u)
         x, y = length * np.cos(math.pi * (v - 0.5)), length * np.sin(math.pi * (v - 0.5))
         right, even = np.floor(np.stack([x, y], axis=1) + 0.5), count // 2

@@ -1,0 +1,130 @@
+"""A level's texels as the sum over samples reads them: lines of lanes with darkness around.
+
+The columns of a level are dealt out to phases, column x to phase x modulo P, and those of one phase lie next to each
+other: receivers that share samples are the SIMD lanes, and what they read is contiguous. Around the columns, and in
+one row below the last, there is nothing: samples off the picture need no test.
+
+Lengths are scaled by a power of two, so that fourth powers of distances stay far from the ends of float32.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.rsm.memory import plane
+from refgi.sssil.level import Level
+
+Array = npt.NDArray[Any]
+
+BLOCK = 16  # lanes that are known to be dark together, and that padding comes in
+PLANES = 9  # position, m = -normal area / pi, radiance
+LOOK = 8  # every so many rows and columns are asked for their depth
+
+
+class Emitters(NamedTuple):
+    """Texels of a level, ready to be summed over."""
+
+    packed: Array  # (PLANES (h + 1) phases line,) by row, plane, phase and lane; the last row is dark
+    lit: Array  # (h + 1, phases, line / BLOCK + 1) int32: how many blocks before this one send light
+    phases: int  # P
+    line: int  # lanes of a phase, with those around
+    pad: int  # lanes before the first column
+    strip: int  # lanes that are summed at once
+    scale: float  # power of two that lengths were multiplied by
+
+
+def pack(level: Level, phases: int, farthest: int, most: int) -> Emitters:
+    """Lay out the texels of a level for sums over samples.
+
+    Parameters
+    ----------
+    level : Level
+        The texels.
+    phases : int
+        P, among which columns are dealt out.
+    farthest : int
+        Columns that a sample may lie away; farther ones reach none.
+    most : int
+        Lanes that may be summed at once, a multiple of BLOCK.
+
+    Returns
+    -------
+    Emitters
+        In the dtype of the level.
+    """
+    rows, columns = level.shape
+    lanes = -(-columns // phases)
+    strips = -(-lanes // most)
+    strip = -(-lanes // (strips * BLOCK)) * BLOCK
+    pad = -(-(min(farthest, columns) // phases + 1) // BLOCK) * BLOCK
+    line = 2 * pad + strips * strip
+    packed = plane((PLANES * (rows + 1) * phases * line,), level.position.dtype)
+    lit = np.empty((rows + 1, phases, line // BLOCK + 1), np.int32)
+    scale = _scale(level.depth)
+    real = level.position.dtype.type
+    _pack(level.position, level.normal, level.radiance, level.area, phases, line, pad, real(scale),
+          real(scale * scale / math.pi), packed, lit)
+    return Emitters(packed, lit, phases, line, pad, strip, scale)
+
+
+def _scale(depth: Array) -> float:
+    """Return the power of two that brings the middle of the depths' range to about 1."""
+    some = depth[::LOOK, ::LOOK]
+    some = some[(some > 0) & (some < np.inf)]
+    if not some.size:
+        return 1.0
+    return 2.0 ** -round((math.log2(float(some.min())) + math.log2(float(some.max()))) / 2)
+
+
+@kernel(parallel=True)
+def _pack(
+    position: Array, normal: Array, radiance: Array, area: Array, phases: int, line: int, pad: int, scale: Any,
+    share: Any, packed: Array, lit: Array,
+) -> None:
+    rows, columns = area.shape
+    for y in prange(rows + 1):
+        row = np.int64(y)
+        start = row * PLANES * phases * line
+        packed[start : start + PLANES * phases * line] = 0
+        if row < rows:
+            for phase in range(phases):
+                _pack_line(position, normal, radiance, area, row, phase, phases, start + phase * line + pad,
+                           phases * line, scale, share, packed)
+        for phase in range(phases):
+            _count_lit(packed, start + phase * line, phases * line, lit[row, phase])
+
+
+@kernel
+def _pack_line(
+    position: Array, normal: Array, radiance: Array, area: Array, row: int, phase: int, phases: int, first: int,
+    step: int, scale: Any, share: Any, packed: Array,
+) -> None:
+    lanes = np.uint64(max(0, (area.shape[1] - phase + phases - 1) // phases))
+    y, x, by, to, plane_step = np.uint64(row), np.uint64(phase), np.uint64(phases), np.uint64(first), np.uint64(step)
+    for c in range(3):
+        here = to + np.uint64(c) * plane_step
+        for i in range(lanes):
+            packed[here + i] = position[c, y, x + by * i] * scale
+        here = here + np.uint64(3) * plane_step
+        for i in range(lanes):
+            packed[here + i] = -normal[c, y, x + by * i] * (area[y, x + by * i] * share)
+        here = here + np.uint64(3) * plane_step
+        for i in range(lanes):
+            packed[here + i] = radiance[c, y, x + by * i]
+
+
+@kernel
+def _count_lit(packed: Array, first: int, step: int, lit: Array) -> None:
+    """Count the blocks of a line that hold any radiance, up to each."""
+    zero = packed.dtype.type(0.0)
+    lit[0] = 0
+    for block in range(lit.size - 1):
+        most = zero
+        for c in range(6, 9):
+            here = first + c * step + block * BLOCK
+            for i in range(here, here + BLOCK):
+                most = most if most > packed[i] else packed[i]
+        lit[block + 1] = lit[block] + (1 if most > zero else 0)

@@ -145,20 +145,18 @@ def levels(
     view = view_of(projection, as_published)
     made = [_room(number, shape, depth.dtype) for number in range(first, first + count)]
     fill_first_level(picture, view, made[0])
-    if downsample == "closest":
-        for fine, coarse in itertools.pairwise(made):
-            fill_coarser_level(fine, *shape, coarse)
-    else:
+    for fine, coarse in itertools.pairwise(made):
+        fill_coarser_level(fine, *shape, coarse)
+    if downsample != "closest":
         _average(picture, view, downsample == "average", made)
     return tuple(made)
 
 
 def _average(picture: Picture, view: View, by_surface: bool, made: list[Level]) -> None:
-    """Fill all levels, with means; the first holds the closest pixels."""
+    """Put means into levels that hold the closest pixels."""
     weights = [level.area if by_surface else plane(level.shape, level.area.dtype) for level in made]
     average_pixels(picture, view, by_surface, made[0], weights[0])
     for finer, coarser in itertools.pairwise(range(len(made))):
-        fill_coarser_level(made[finer], view.height, view.width, made[coarser])
         average_texels(made[finer], weights[finer], by_surface, made[coarser], weights[coarser])
 
 

@@ -1,0 +1,172 @@
+"""Levels of what a camera sees: against the literal twin, the buffers they are made of, and mirrored pictures."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.errors import InputError
+from refgi.frame import Frame
+from refgi.jit import threads
+from refgi.rsm.projection import camera_projection
+from refgi.scene import load_scene
+from refgi.sssil.pyramid.levels import pyramid, useful_levels
+from refgi.sssil.settings import HssilSettings
+from refgi.stages import observe
+from tests.naive import view_pyramid as naive
+from tests.sssil.pyramid.pictures import FLOAT32, FLOAT64, camera, made, random_picture, same
+
+MODES = ("closest", "average", "closest_average")
+
+
+def literal(picture, view, first, count, mode):
+    """The same levels by the twin."""
+    half_v = math.tan(view.vfov / 2)
+    depth, *vectors = picture
+    return naive.levels({
+        "depth": depth, "normal": np.moveaxis(vectors[0], 0, -1), "albedo": np.moveaxis(vectors[1], 0, -1),
+        "direct": np.moveaxis(vectors[2], 0, -1), "f_v": view.vfov,
+        "f_h": 2 * math.atan(half_v * view.width / view.height), "axes": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+    }, first, count, mode)
+
+
+def assert_equal_to(expected, level, width, rtol):
+    assert level.shape == (len(expected), len(expected[0]))
+    for i, j in np.ndindex(level.shape):
+        texel = expected[i][j]
+        if texel is None:
+            assert level.pixel[i, j] == -1
+            assert level.depth[i, j] == np.inf
+            for plane in (level.position, level.normal, level.radiance, level.area[None]):
+                assert (plane[:, i, j] == 0).all()
+            continue
+        assert level.pixel[i, j] == texel["pixel"][0] * width + texel["pixel"][1]
+        for key, plane in (("z", level.depth), ("A", level.area)):
+            np.testing.assert_allclose(plane[i, j], texel[key], rtol=rtol)
+        for key, plane in (("p", level.position), ("n", level.normal), ("L", level.radiance)):
+            np.testing.assert_allclose(plane[:, i, j], texel[key], rtol=rtol, atol=rtol)
+
+
+@pytest.mark.feature("HSS-01", "HSS-09")
+@pytest.mark.parametrize("mode", MODES)
+def test_levels_are_those_of_the_literal_twin(mode, evidence):
+    """Odd sizes, ties, background, normals that look away; all three starts."""
+    for seed, (width, height) in enumerate([(1, 1), (2, 3), (1, 9), (14, 1), (21, 13), (24, 10)]):
+        picture, view = random_picture(width, height, seed), camera(width, height)
+        for first in range(3):
+            for level, expected in zip(made(picture, view, first, 3, mode), literal(picture, view, first, 3, mode),
+                                       strict=True):
+                assert_equal_to(expected, level, width, FLOAT64)
+    evidence(f"{mode}: pixels chosen equal, the rest to {FLOAT64:g}")
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_float32_is_float64_to_its_rounding(mode):
+    picture, view = random_picture(37, 22), camera(37, 22)
+    picture = tuple(plane.astype(np.float32).astype(np.float64) for plane in picture)
+    for level, expected in zip(made(picture, view, 1, 4, mode, np.float32), literal(picture, view, 1, 4, mode),
+                               strict=True):
+        assert_equal_to(expected, level, 37, 4 * FLOAT32)  # normals that graze magnify the rounding of their own
+
+
+@pytest.mark.feature("HSS-01")
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_level_0_is_the_buffers_and_the_light_that_leaves_them(dtype, evidence):
+    """Radiance is that of the composed picture without emission; positions are the G-buffer's, from the eye."""
+    frame = Frame(load_scene("cornell_box"), width=75, height=53, dtype=dtype)
+    level = pyramid(frame, HssilSettings(start="full", levels=1))[0]
+    buffer = frame.gbuffer
+    dark = frame.materials.emission[buffer.material_id].max(axis=-1) == 0
+    covered = buffer.covered & dark
+    assert covered.sum() > 1000
+    leaving = frame.radiance()
+    np.testing.assert_allclose(level.radiance[:, covered], leaving[:, covered],
+                               rtol=FLOAT32 if dtype == np.float32 else FLOAT64)
+    assert np.array_equal(level.depth, buffer.depth)
+    assert np.array_equal(level.normal, buffer.normal)
+    assert np.array_equal(level.pixel >= 0, buffer.covered)
+    eye = np.array(frame.scene.camera.eye)[:, None]
+    away = np.abs(level.position[:, buffer.covered] - (buffer.position[:, buffer.covered] - eye)).max()
+    size = np.abs(buffer.position).max() + np.abs(eye).max()
+    assert away <= (FLOAT32 if dtype == np.float32 else FLOAT64) * size
+    evidence(f"{np.dtype(dtype).name}: L is albedo/pi E, positions within {away:.1e} m of the G-buffer's")
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_mirrored_pictures_have_mirrored_levels(mode, evidence):
+    """To the bit, as long as texels mirror each other."""
+    for first in range(3):
+        picture, view = random_picture(48, 20, first), camera(48, 20)
+        depth, normal, albedo, direct = (plane[..., ::-1].copy() for plane in picture)
+        normal[0] *= -1
+        for level, mirrored in zip(made(picture, view, first, 4 - first, mode, np.float32),
+                                   made((depth, normal, albedo, direct), view, first, 4 - first, mode, np.float32),
+                                   strict=True):
+            turned = [plane[..., ::-1].copy() for plane in mirrored[1:]]
+            turned[0][0] *= -1  # x of positions and normals
+            turned[2][0] *= -1
+            column = turned[-1] % 48
+            turned[-1] = np.where(turned[-1] < 0, -1, turned[-1] - column + 47 - column)
+            assert same(level, (0, *turned))
+    evidence(f"{mode}: equal bits down to texels of 8 x 8 pixels")
+
+
+def test_a_later_start_has_the_levels_of_an_earlier_one():
+    picture, view = random_picture(45, 27), camera(45, 27)
+    full = made(picture, view, 0, 4)
+    for first in (1, 2):
+        for level, expected in zip(made(picture, view, first, 4 - first), full[first:], strict=True):
+            assert same(level, expected)
+            assert level.number == expected.number
+
+
+def test_bits_do_not_depend_on_threads():
+    picture, view = random_picture(67, 41), camera(67, 41)
+    for mode in MODES:
+        with threads(1):
+            one = made(picture, view, 1, 3, mode)
+        with threads(2):
+            two = made(picture, view, 1, 3, mode)
+        assert all(map(same, one, two))
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e6])
+def test_any_distance_and_grazing_normals_stay_finite(scale):
+    depth, normal, albedo, direct = random_picture(19, 11)
+    normal[:] = np.array([0, 1, 1e-9])[:, None, None]  # along most rays
+    for mode in MODES:
+        for level in made((depth * scale, normal, albedo, direct), camera(19, 11), 1, 3, mode, np.float32):
+            for plane in (level.position, level.normal, level.radiance, level.area):
+                assert np.isfinite(plane).all()
+            assert (level.area >= 0).all()
+            assert not np.isnan(level.depth).any()
+
+
+def test_nothing_seen_is_nothing():
+    picture = random_picture(9, 5, behind=2.0)
+    for mode in MODES:
+        for level in made(picture, camera(9, 5), 0, 3, mode):
+            assert (level.pixel == -1).all()
+            assert (level.depth == np.inf).all()
+            assert not any(plane.any() for plane in (level.area, level.position, level.normal, level.radiance))
+
+
+def test_levels_whose_crowns_miss_the_picture_are_left_out():
+    """A crown from 20 texels on needs a level of more than 20 texels from corner to corner."""
+    frame = Frame(load_scene("cornell_box"), width=64, height=64)
+    with observe() as log:
+        numbers = [level.number for level in pyramid(frame, HssilSettings(radius=20, levels=4))]
+    assert numbers == [1, 2]  # 32 x 32 and 16 x 16: 22.6; 8 x 8: 11.3
+    assert log.status("sssil.level") == ["skipped"]
+    assert useful_levels((64, 64), HssilSettings(radius=None, levels=9)) == 9
+    assert useful_levels((1, 1), HssilSettings(radius=1, levels=9)) == 9
+    assert useful_levels((1, 1), HssilSettings(radius=2, levels=9)) == 1
+
+
+def test_planes_that_do_not_fit_are_refused():
+    depth, normal, albedo, direct = random_picture(9, 5)
+    with pytest.raises(InputError, match=r"albedo: expected shape \(3, 5, 9\), got \(3, 5, 8\)"):
+        made((depth, normal, albedo[..., :-1], direct), camera(9, 5), 0, 1)
+    with pytest.raises(InputError, match=r"depth: expected shape \(5, 9\)"):
+        made((depth[:-1], normal, albedo, direct), camera(9, 5), 0, 1)
+    assert camera_projection(camera(9, 5)).shape == (5, 9)

@@ -93,6 +93,8 @@ class HssilSettings:
                "inner_samples", f"none or a whole number, 0 to {MOST_SAMPLES:,}", self.inner_samples)
         expect(self.only_level is None or (is_count(self.only_level) and 0 <= self.only_level < self.levels),
                "only_level", f"none or a level, 0 to {self.levels - 1}", self.only_level)
+        expect(self.visibility != "bitmask" or self.pattern != "all", "pattern",
+               "'row', 'pixel' or 'fixed' with the visibility 'bitmask'", self.pattern)
         object.__setattr__(self, "views", tuple(self.views))
         expect(all(isinstance(view, Camera) for view in self.views), "views", "cameras", self.views)
         object.__setattr__(self, "as_published", frozenset(self.as_published))

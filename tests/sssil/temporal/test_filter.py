@@ -17,6 +17,7 @@ from refgi.sssil.temporal.motion import points_before
 from tests.naive.reprojection import recursion
 
 SIZE = {"width": 40, "height": 30}
+QUICK = {"rsm_resolution": 8}  # of no effect on indirect light that is made up
 # 2,400 values or more of 40 frames' noise: the variance's own standard error is 2 to 3 %, four of them
 VARIANCE_OFF = 0.12
 # rounding of float32 places in a room a metre across, twice
@@ -42,7 +43,7 @@ def constant(value):
 
 
 def filtered(scenes, light, **changed):
-    return list(Sequence(scenes, None, TemporalSettings(**changed), method=light, dtype=np.float64))
+    return list(Sequence(scenes, None, TemporalSettings(**changed), method=light, dtype=np.float64, **QUICK))
 
 
 def turned(scene, angle, selected=None, move=(0.0, 0.0, 0.0)):
@@ -52,40 +53,49 @@ def turned(scene, angle, selected=None, move=(0.0, 0.0, 0.0)):
     return dataclasses.replace(scene, geometry=geometry)
 
 
+def at_rest(frame, lights, settings):
+    """Light of a frame that is rendered again and again."""
+    results, history = [], None
+    for new in lights:
+        light = new
+        if history is not None:
+            light, reused = temporal_filter(new, frame, frame.scene.geometry, history, settings)
+            assert reused == 1
+        history = remember(frame, frame.scene.geometry, new if settings.form == "printed" else light)
+        results.append(light[:, frame.gbuffer.covered])
+    return results
+
+
 @pytest.mark.feature("HSS-13")
 @pytest.mark.parametrize(("form", "a"), [("recursive", 0.9), ("recursive", 0.5), ("printed", 0.9)])
 def test_variance_that_stays(room, evidence, form, a):
-    last = filtered([room] * 40, noise(), form=form, weight=a)[-1]
-    covered = last.frame.gbuffer.covered
-    left = last.irradiance[:, covered].var() * 12
-    expected = a**2 + (1 - a) ** 2 if form == "printed" else (1 - a) / (1 + a)
-    assert TemporalSettings(form=form, weight=a).variance == pytest.approx(expected)
+    frame, settings = Frame(room, dtype=np.float64), TemporalSettings(form=form, weight=a)
+    frames = 40 if form == "recursive" else 3  # a^40 of the first is left
+    last = at_rest(frame, np.random.default_rng(0).random((frames, 3, 30, 40)), settings)[-1]
+    left, expected = last.var() * 12, a**2 + (1 - a) ** 2 if form == "printed" else (1 - a) / (1 + a)
+    assert settings.variance == pytest.approx(expected)
     assert abs(left / expected - 1) < VARIANCE_OFF
-    assert last.irradiance[:, covered].mean() == pytest.approx(0.5, abs=0.01)  # 4 standard errors of the mean: 0.005
+    assert last.mean() == pytest.approx(0.5, abs=4 * math.sqrt(expected / 12 / last.size))  # 4 standard errors
     evidence(f"{form}, a = {a}: {left:.3f} of the variance stays, {expected:.3f} in theory")
 
 
 @pytest.mark.feature("HSS-13")
 def test_a_static_camera_converges(room, evidence):
-    frames = [np.random.default_rng(i).random((3, 30, 40)) for i in range(12)]
-    values = iter(frames)
-    steps = filtered([room] * 12, lambda *_: next(values))
-    covered = steps[-1].frame.gbuffer.covered
-    error = np.abs(steps[-1].irradiance - recursion(frames, 0.9))[:, covered].max()
+    frame = Frame(room, dtype=np.float64)
+    lights = np.random.default_rng(1).random((8, 3, 30, 40))
+    covered = frame.gbuffer.covered
+    error = np.abs(at_rest(frame, lights, TemporalSettings())[-1] - recursion(lights, 0.9)[:, covered]).max()
     assert error < 1e-14
-    steady = [frames[0]] + [frames[1]] * 60
-    values = iter(steady)
-    left = [np.abs(step.irradiance - frames[1])[:, covered].max() for step in filtered([room] * 61,
-                                                                                     lambda *_: next(values))]
-    assert left[60] / left[0] == pytest.approx(0.9**60, rel=1e-9)
-    assert all(step.reused == 1 for step in steps[1:])
-    evidence(f"equals the recursion to {error:.0e}; steady light: the first frame's share after 60 is 0.9^60")
+    steady = [lights[0]] + [lights[1]] * 12
+    left = [np.abs(light - lights[1][:, covered]).max() for light in at_rest(frame, steady, TemporalSettings())]
+    assert left[12] / left[0] == pytest.approx(0.9**12, rel=1e-9)
+    evidence(f"equals the recursion to {error:.0e}; steady light: the first frame's share after 12 is 0.9^12")
 
 
 def test_equal_light_stays_equal_to_the_bit(room):
     x, y, z = room.camera.eye
     scenes = [room.with_camera(eye=(x + 0.01 * i, y, z)) for i in range(4)]
-    for step in Sequence(scenes, method=constant(0.1)):
+    for step in Sequence(scenes, method=constant(0.1), **QUICK):
         assert (step.irradiance[:, step.frame.gbuffer.covered] == np.float32(0.1)).all()
 
 
@@ -262,13 +272,13 @@ def test_the_same_bits_on_any_number_of_threads(room):
     for count in (1, 2):
         with threads(count):
             scenes = [turned(room, 0.02 * i, faces_of(room, "white")) for i in range(3)]
-            results.append([s.irradiance for s in Sequence(scenes, method=noise())])
+            results.append([s.irradiance for s in Sequence(scenes, method=noise(), **QUICK)])
     assert all(map(np.array_equal, *results))
 
 
 def test_nothing_but_background(room):
     away = room.with_camera(target=(0.278, 0.273, -9.0))
-    for step in Sequence([away, away], method=constant(0.0)):
+    for step in Sequence([away, away], method=constant(0.0), **QUICK):
         assert not step.irradiance.any()
         assert step.reused == 0
 

@@ -12,7 +12,7 @@ from refgi.rsm.projection import camera_projection
 from refgi.scene import load_scene
 from refgi.sssil.pyramid.levels import pyramid, useful_levels
 from refgi.sssil.settings import HssilSettings
-from refgi.stages import observe
+from refgi.stages import Memory, observe
 from tests.naive import view_pyramid as naive
 from tests.sssil.pyramid.pictures import FLOAT32, FLOAT64, camera, made, random_picture, same
 
@@ -161,6 +161,16 @@ def test_levels_whose_crowns_miss_the_picture_are_left_out():
     assert useful_levels((64, 64), HssilSettings(radius=None, levels=9)) == 9
     assert useful_levels((1, 1), HssilSettings(radius=1, levels=9)) == 9
     assert useful_levels((1, 1), HssilSettings(radius=2, levels=9)) == 1
+
+
+def test_levels_are_kept_while_only_samples_change():
+    frame, memory = Frame(load_scene("cornell_box"), width=16, height=16), Memory()
+    found = []
+    for settings in (HssilSettings(), HssilSettings(samples=7, seed=3), HssilSettings(downsample="average")):
+        with observe(memory=memory) as log:
+            pyramid(frame, settings)
+        found += log.status("sssil.pyramid")
+    assert found == ["ran", "reused", "ran"]
 
 
 def test_planes_that_do_not_fit_are_refused():

@@ -36,6 +36,7 @@ PAPER_HEIGHT, WIDE = 720, 16 / 9  # the paper's pictures are 1280 x 720
 LARGE = PAPER_HEIGHT / 512  # pixels a side in units of a full run's
 JUDGED, SMALL = 1 / 2, 1 / 4  # where one picture is traced, where many are
 RADIUS, RADIUS_FIGURE_5 = 20.0, 40.0  # texels of the first level
+FAR_SEED = 1 << 20  # pictures that others are judged by share no random numbers with them
 
 _SUBJECTS = Subjects(BUILDERS)
 scene_of, frame_of = _SUBJECTS.scene_of, _SUBJECTS.frame_of
@@ -109,7 +110,7 @@ def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
     frame : Frame
         Says how large the picture is.
     further : int
-        How many levels more.
+        How many levels more, or fewer.
     **changes : object
         What differs.
 
@@ -121,7 +122,7 @@ def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
     share = math.hypot(frame.width, frame.height) / math.hypot(WIDE * PAPER_HEIGHT, PAPER_HEIGHT)
     levels = max(1, round(4 + math.log2(share)))
     radius = max(1.0, RADIUS * share * 2.0 ** (4 - levels))
-    return HssilSettings(**({"radius": radius, "levels": levels + further} | changes))
+    return HssilSettings(**({"radius": radius, "levels": max(1, levels + further)} | changes))
 
 
 def scaled_radius(frame: Frame, radius: float, height: int = PAPER_HEIGHT) -> float:
@@ -198,6 +199,51 @@ def lit(frame: Frame, settings: HssilSettings) -> Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)
         return hssil(frame, settings)
+
+
+def noise_of(frame: Frame, settings: HssilSettings, first: Array | None = None) -> float:
+    """Return how noisy a picture is, whatever it is noisy around: by another picture with other random numbers.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen and lit.
+    settings : HssilSettings
+        How it is lit.
+    first : (3, h, w) ndarray, optional
+        The picture, where it is known.
+
+    Returns
+    -------
+    float
+        Standard deviation, W/m^2: root mean square over pixels with a surface.
+    """
+    one = lit(frame, settings) if first is None else first
+    other = lit(frame, dataclasses.replace(settings, seed=settings.seed + 1))
+    return math.sqrt(0.5 * np.mean((one.astype(np.float64) - other)[:, frame.gbuffer.covered] ** 2))
+
+
+def expected_light(frame: Frame, settings: HssilSettings, seeds: int) -> Array:
+    """Return the mean picture of many: what is left when all noise is gone.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, seen and lit.
+    settings : HssilSettings
+        How it is lit.
+    seeds : int
+        How many pictures.
+
+    Returns
+    -------
+    (3, h, w) ndarray of float64
+        Irradiance, W/m^2. With Eq. 4 it depends on the number of samples: each is a disc as large as its share.
+    """
+    total = np.zeros((3, frame.height, frame.width))
+    for seed in range(seeds):
+        total += lit(frame, dataclasses.replace(settings, seed=FAR_SEED + seed))
+    return total / seeds
 
 
 def ready(frame: Frame) -> Frame:

@@ -38,6 +38,7 @@ BITMASK: Visibility = "bitmask"
 RAYS: Visibility = "rays"
 NAMES: dict[Visibility, str] = {NONE: "v = 1, as published", BITMASK: "bitmask of the screen",
                                 RAYS: "a ray to each sample"}
+MANY = 1024  # samples: next to no noise is left
 THICKNESS = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # share of the diagonal
 
 
@@ -46,9 +47,11 @@ class Judged(NamedTuple):
 
     frame: "Frame"
     settings: dict[Visibility, HssilSettings]
-    light: dict[Visibility, Array]
+    light: dict[Visibility, Array]  # of many samples
+    usual: dict[Visibility, Array]  # of the paper's
     exact: Array  # path tracing, seen emitters
     off: dict[Visibility, Errors]
+    off_usual: dict[Visibility, Errors]
     seconds: dict[Visibility, float]
     sweep: dict[float, float]  # RMSE of the bitmask by thickness
 
@@ -76,11 +79,12 @@ def visible(bench: "Workbench") -> Figure:
     return Figure(
         shows="The paper supposes that all that is seen sees each other (v = 1), and gives no bound of the error.",
         facts=(*(view.frame.scene.description for view in found.values()), f"{one.frame.width}² pixels",
-               f"{one.settings[NONE].levels} levels from half resolution", f"{one.settings[NONE].samples} samples",
+               f"{one.settings[NONE].levels} levels from half resolution", f"{MANY} samples",
                f"path tracing with {bench.scale.truth_samples} samples a pixel"),
         pictures=tuple(picture for name, view in found.items() for picture in _pictures(name, view)), columns=4,
         tables=(Table("Error in % of the mean, against path tracing in which only what the camera sees shines",
-                      ("", "mean, W/m²", "RMSE", "MAE", "darker by", "ms", "times as long"), tuple(rows)),),
+                      ("", "mean, W/m²", "RMSE", "MAE", "darker by", f"RMSE, {one.settings[NONE].samples} samples",
+                       f"ms, {one.settings[NONE].samples} samples", "times as long"), tuple(rows)),),
         plots=(Plot(drawn(curves, Axes("assumed thickness, share of the diagonal", "RMSE, % of the mean", log_x=True)),
                     "Error of the bitmask over the thickness that surfaces are assumed to have."),),
         notes=_notes(found))
@@ -90,23 +94,25 @@ def _judged(bench: "Workbench", name: str) -> Judged:
     frame = frame_of(bench, name, JUDGED)
     base = smaller(frame, 1, radius=None)  # all light that the picture can give: what is left is visibility
     settings = {key: dataclasses.replace(base, visibility=key) for key in NAMES}
-    light = {key: lit(frame, one) for key, one in settings.items()}
+    many = {key: dataclasses.replace(one, samples=MANY) for key, one in settings.items()}
+    light = {key: lit(frame, one) for key, one in many.items()}
+    usual = {key: lit(frame, one) for key, one in settings.items()}
     exact = traced(bench, frame, (name, JUDGED), emitters="seen")
     covered = frame.gbuffer.covered
+    off, off_usual = ({key: errors_of(one, exact, covered) for key, one in made.items()} for made in (light, usual))
     taken = interleaved({key: partial(lit, frame, one) for key, one in settings.items()},
-                          max(1, bench.scale.repeats // 2))
+                        max(1, bench.scale.repeats // 2))
     seconds: dict[Visibility, float] = {key: taken[key] for key in settings}
-    sweep = {share: errors_of(lit(frame, dataclasses.replace(settings[BITMASK], thickness=share)), exact, covered).rmse
+    sweep = {share: errors_of(lit(frame, dataclasses.replace(many[BITMASK], thickness=share)), exact, covered).rmse
              for share in THICKNESS}
-    return Judged(frame, settings, light, exact, {key: errors_of(one, exact, covered) for key, one in light.items()},
-                  seconds, sweep)
+    return Judged(frame, settings, light, usual, exact, off, off_usual, seconds, sweep)
 
 
 def _rows(title: str, one: Judged) -> list[tuple[Cell, ...]]:
     covered = one.frame.gbuffer.covered
-    return [(f"{title}, {NAMES[key]}", mean_of(light, covered), *one.off[key], 1e3 * one.seconds[key],
-             one.seconds[key] / one.seconds[NONE]) for key, light in one.light.items()] + [
-        (f"{title}, path tracing", mean_of(one.exact, covered), 0.0, 0.0, 0.0, None, None)]
+    return [(f"{title}, {NAMES[key]}", mean_of(light, covered), *one.off[key], one.off_usual[key].rmse,
+             1e3 * one.seconds[key], one.seconds[key] / one.seconds[NONE]) for key, light in one.light.items()] + [
+        (f"{title}, path tracing", mean_of(one.exact, covered), 0.0, 0.0, 0.0, 0.0, None, None)]
 
 
 def _pictures(name: str, one: Judged) -> list[Picture]:

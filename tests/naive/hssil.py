@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+LEAST = 1e-20  # smaller sums of weights are none
+
 
 def first_texels(depth, normal, radiance, frame, half, tan_f=False):
     """Return the picture as a level: positions from depths and pixel centres, areas by Eq. 2 with dP = 1 pixel.
@@ -134,9 +136,9 @@ def upsampled(coarse, below, here, factor, kind, agreement, lean):
     """Carry light from a level to one that is finer by a factor.
 
     Tents of the three by three taps around a texel's centre, 0 where a tap is empty, for "bilateral" times
-    `agreement(cosine of normals, off)`, over their sum, or the tap nearest in depth where that vanishes; `off` is the
-    share by which a tap's nearness 1/z is off the plane through the receiver. A tap stands where its texel is closest
-    if `lean`, else in its middle.
+    `agreement(cosine of normals, off)`, over their sum; `off` is the share by which a tap's nearness 1/z is off the
+    plane through the receiver. Where the sum vanishes, the tap that is least off is taken. A tap stands where its texel
+    is closest if `lean`, else in its middle.
     """
     light = np.zeros((3, len(here), len(here[0])))
     for row in range(len(here)):
@@ -162,13 +164,12 @@ def one_upsampled(coarse, below, here, at, factor, kind, agreement, lean):
         for i, j, weight in taps:
             plane = 1 / texel["depth"] + (i - y) * down + (j - x) * across + nearer
             off = texel["depth"] * (1 / below[i][j]["depth"] - plane)
-            weighed.append((i, j, weight * agreement(max(0.0, texel["normal"] @ below[i][j]["normal"]), off)))
-        taps = weighed
-    total = sum(weight for _, _, weight in taps)
-    if total > 0:
-        return sum(weight * coarse[:, i, j] for i, j, weight in taps) / total
-    i, j, _ = min(taps, key=lambda tap: abs(below[tap[0]][tap[1]]["depth"] - texel["depth"]))
-    return coarse[:, i, j]
+            weighed.append((i, j, weight * agreement(max(0.0, texel["normal"] @ below[i][j]["normal"]), off), abs(off)))
+        if sum(weight for _, _, weight, _ in weighed) < LEAST:
+            i, j, _, _ = min(weighed, key=lambda tap: tap[3])
+            return coarse[:, i, j]
+        taps = [tap[:3] for tap in weighed]
+    return sum(weight * coarse[:, i, j] for i, j, weight in taps) / sum(weight for _, _, weight in taps)
 
 
 def around(x, count):

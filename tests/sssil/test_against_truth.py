@@ -1,0 +1,124 @@
+"""The method against path tracing with only what the camera sees as emitters, and against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+
+from refgi.form_factors import polygon_form_factor
+from refgi.frame import Frame
+from refgi.scene import PointLight, load_scene
+from refgi.sssil.crown.gather import gather
+from refgi.sssil.hssil import hssil
+from refgi.sssil.level import Level
+from refgi.sssil.settings import HssilSettings
+from refgi.truth import TruthSettings, trace_truth
+from tests.truth.scenes import corner_room
+
+SIGMAS = 4.0
+LAMP = PointLight((0.2, 1.1, 0.3), (0.6, 0.5, 0.4))
+VIEW = {"eye": (1.7, 1.4, 1.5), "target": (-0.4, 0.35, -0.5), "vfov": math.radians(60)}
+
+
+def everything(**others):
+    """Return settings with which every pixel lights every pixel."""
+    return HssilSettings(radius=None, levels=1, start="full", pattern="all", **others)
+
+
+def room(size, blocker):
+    return Frame(corner_room(LAMP, blocker=blocker).with_camera(**VIEW), width=size, height=size, shadows="exact")
+
+
+# Eq. 3 is the midpoint rule of the integral over what is seen: it errs by pixels next to each other in the corners and,
+# with the plate, by those that edges of shadows cross. Both shrink as one over the pixels along a side;
+# the first is 1.2 over them here.
+FIRST_ORDER = 1.5
+SIZES = {"none": (16, 32, 64), "rays": (16, 32)}  # a ray for each pair: the fourth power of the size
+
+
+@pytest.mark.feature("HSS-03")
+@pytest.mark.parametrize("visibility", ["none", "rays"])
+@pytest.mark.parametrize("blocker", [False, True])
+def test_every_pixel_lights_every_pixel(visibility, blocker, evidence):
+    """Equal to the truth of seen emitters, without visibility or, a ray for each pair, with it."""
+    figures = []
+    for size in SIZES[visibility]:
+        frame = room(size, blocker)
+        light = hssil(frame, everything(form_factor="point", visibility=visibility))
+        traced = trace_truth(frame, TruthSettings(emitters="seen", visibility=visibility == "rays", samples=24 * 40))
+        covered = frame.gbuffer.covered
+        off = np.abs(light[:, covered].mean(axis=1, dtype=float) / traced.picture_mean - 1).max()
+        sigma = (np.sqrt(traced.picture_variance) / traced.picture_mean).max()
+        typical = np.median(np.abs(light - traced.mean)[:, covered] / traced.picture_mean[:, None])
+        figures.append(f"{off:.2%} at {size}^2 (truth's error {sigma:.2%}, median pixel {typical:.2%})")
+        assert off < FIRST_ORDER / size + SIGMAS * sigma
+        assert typical < FIRST_ORDER / size
+    evidence(f"{'with' if blocker else 'without'} a plate, visibility {visibility}: mean off by {', '.join(figures)}")
+
+
+SPHERE, FACES = 3e-3, 200_000  # midpoint rule at 32 x 32 pixels, own pixel left out (1e-3), facets
+
+
+@pytest.mark.feature("HSS-03")
+@pytest.mark.filterwarnings("ignore:radius")
+def test_the_part_of_a_sphere_that_is_seen(evidence):
+    """E = L A / (4 R^2) everywhere: cos cos / r^2 is 1 / (4 R^2) for all pairs, A is seen, L = rho I / (pi R^2)."""
+    found, size, tangent = load_scene(f"integrating_sphere:faces={FACES},albedo=0.5"), 32, math.tan(math.radians(40))
+    eye, light = (0.1, -0.3, 0.2), PointLight((0.0, 0.0, 0.0), (0.8, 1.6, 0.4))
+    lit = found.with_lights(light).with_camera(eye=eye, target=(0.1, -0.3, -1.0), vfov=2 * math.atan(tangent))
+    frame = Frame(lit, width=size, height=size, shadows="exact")
+
+    def area(v, u):  # of the sphere behind a point of the image plane at distance 1
+        ray = np.array([u, v, -1.0]) / math.sqrt(1 + u * u + v * v)
+        far = -(ray @ eye) + math.sqrt((ray @ eye) ** 2 + 1 - np.dot(eye, eye))
+        return far**2 / (ray @ (np.array(eye) + far * ray)) * (1 + u * u + v * v) ** -1.5
+
+    seen, _ = dblquad(area, -tangent, tangent, -tangent, tangent, epsabs=1e-6)
+    expected = 0.5 * np.array(light.intensity) / math.pi * seen / 4
+    ratio = hssil(frame, everything(form_factor="point")) / expected[:, None, None]
+    disc = hssil(frame, everything()) / expected[:, None, None]
+    evidence(f"mean of E / (L A / 4 R^2) {ratio.mean():.5f}, pixels {ratio.min():.4f} to {ratio.max():.4f}; "
+             f"Eq. 4 {disc.mean():.4f}")
+    assert np.abs(ratio - 1).max() < SPHERE
+    assert 0.97 < disc.mean() < 1
+
+
+# Points at height 1 over a plane of constant radiance that is seen in squares of side s: E over its true value with
+# Eq. 3 and Eq. 4, mean and spread over where the points are. By a sum over an endless plane, apart from this code.
+DARKENING = {2.0: (0.983, 0.230, 0.699, 0.074), 1.0: (0.998, 0.013, 0.893, 0.006), 0.5: (1.0, 0.0, 0.970, 0.0),
+             0.25: (1.0, 0.0, 0.992, 0.0), 0.1: (1.0, 0.0, 0.999, 0.0)}
+ROUNDED = 0.002  # the figures have three digits; the plane ends
+SCATTER = 0.1  # of the spread, as a spread of 200 points is found again
+
+
+@pytest.mark.feature("HSS-04")
+@pytest.mark.parametrize("side", DARKENING)
+def test_a_disc_is_darker_than_a_point(side, evidence):
+    count, rows = (56, 2) if side == 0.1 else (40, 5 if side < 1 else 10)
+    level, expected = over_a_plane(side, count, rows)
+    found = {}
+    for form in ("point", "disc"):
+        ratio = gather(level, 0, everything(form_factor=form))[0, count:] / expected
+        found[form] = (ratio.mean(), ratio.std())
+    evidence(f"squares of {side:g} heights: Eq. 3 {found['point'][0]:.3f} +- {found['point'][1]:.3f}, "
+             f"Eq. 4 {found['disc'][0]:.3f} +- {found['disc'][1]:.3f}")
+    point, point_spread, disc, disc_spread = DARKENING[side]
+    for (mean, spread), (true_mean, true_spread) in zip(found.values(), ((point, point_spread), (disc, disc_spread)),
+                                                        strict=True):
+        assert abs(mean - true_mean) < ROUNDED + SCATTER * true_spread
+        assert abs(spread - true_spread) < ROUNDED + 3 * SCATTER * true_spread
+
+
+def over_a_plane(side, count, rows):
+    """Return a level of a plane's squares with rows of points above it, and what those receive."""
+    random, end = np.random.default_rng(3), count * side / 2
+    shape = (count + rows, count)
+    position, normal, area = np.zeros((3, *shape)), np.zeros((3, *shape)), np.zeros(shape)
+    position[0, :count], position[2, :count] = np.meshgrid(*[(np.arange(count) + 0.5) * side - end] * 2)
+    position[::2, count:] = random.uniform(-side / 2, side / 2, (2, rows, count))
+    position[1, count:], normal[1, count:], normal[1, :count], area[:count] = 1, -1, 1, side * side
+    corners = [(-end, 0, end), (end, 0, end), (end, 0, -end), (-end, 0, -end)]
+    factors = [polygon_form_factor(point, (0, -1, 0), corners) for point in position[:, count:].reshape(3, -1).T]
+    level = Level(0, position, np.ones(shape), normal, np.ones((3, *shape)), area, np.arange(area.size).reshape(shape))
+    return level, math.pi * np.reshape(factors, (rows, count))

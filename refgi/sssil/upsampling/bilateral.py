@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sssil.upsampling import lines, receivers, weights
-from refgi.sssil.upsampling.lines import PAD, SPAN, WIDE
+from refgi.sssil.upsampling.lines import SPAN, WIDE
+from refgi.sssil.upsampling.tent import LINES, OFFSET, write_tents
 
 Array = npt.NDArray[Any]
 
 BAND = 16  # rows of texels of a block
-LEAST = 1e-20  # sum of weights that is too small to divide by
 
 
 @kernel(parallel=True)
@@ -42,85 +42,79 @@ def fill_bilateral(
     result : (3, h, w) ndarray
         Filled.
     """
-    height, width = depth.shape
-    rows = below_depth.shape[0]
-    across, side = (width + WIDE - 1) // WIDE, np.int64(factor)
-    for task in prange(across * ((rows + BAND - 1) // BAND)):
+    tents = np.empty((factor, LINES), depth.dtype)
+    write_tents(tents)
+    across = (depth.shape[1] + WIDE - 1) // WIDE
+    bands = (below_depth.shape[0] + BAND - 1) // BAND
+    for task in prange(across * bands):
         left, first = np.int64(task) % across * WIDE, np.int64(task) // across * BAND
-        texels, near = np.zeros((3, lines.LINES), depth.dtype), np.zeros((3, SPAN), depth.dtype)
-        here, tent = np.zeros(receivers.HERE, depth.dtype), np.zeros(receivers.TENT, depth.dtype)
-        sums = np.zeros(weights.SUMS, depth.dtype)
-        receivers.write_tent(side, tent)
-        for row in range(first - 1, first + 1):
-            lines.load_texels(light, below_depth, below_normal, row, left, side, texels[(row + 3) % 3])
-        for y in range(first * side - 1, first * side + 1):
-            receivers.load_nearness(depth, y, left, near[(y + 3) % 3])
-        for row in range(first, min(first + BAND, rows)):
-            lines.load_texels(light, below_depth, below_normal, row + 1, left, side, texels[(row + 1) % 3])
-            for y in range(row * side, min((row + 1) * side, height)):
-                receivers.load_nearness(depth, y + 1, left, near[(y + 1) % 3])
-                receivers.load_receivers(normal, y, left, side, sharpness, lean, near[(y + 2) % 3], near[y % 3],
-                                         near[(y + 1) % 3], here)
-                _sum_up(texels, row, y % side, here, tent, side, power, sums)
-                _store(texels, row, y, left, here, sums, side, added, result)
+        _fill_block(light, below_depth, below_normal, depth, normal, left, first, tents, sharpness, lean, power, added,
+                    result)
 
 
 @kernel
-def _sum_up(
-    texels: Array, row: int, place: int, here: Array, tent: Array, factor: int, power: Any, sums: Array
+def _fill_block(
+    light: Array, below_depth: Array, below_normal: Array, depth: Array, normal: Array, left: int, first: int,
+    tents: Array, sharpness: Any, lean: Any, power: Any, added: Array | None, result: Array,
 ) -> None:
-    far, own, near, side = receivers.tent_weights(place, factor, here)
-    above, middle, below = texels[(row + 2) % 3], texels[row % 3], texels[(row + 1) % 3]
-    weights.start_sums(middle, here, power, sums)
-    weights.add_texels(middle, here, tent, factor, 0, own, power, sums)
-    weights.add_texels(above, here, tent, factor, -1, near if side < 0 else far, power, sums)
-    weights.add_texels(below, here, tent, factor, 1, far if side < 0 else near, power, sums)
+    texels, near = np.zeros((3, lines.LINES), depth.dtype), np.zeros((3, SPAN), depth.dtype)
+    here, means = np.zeros(receivers.HERE, depth.dtype), np.zeros(weights.MEANS, depth.dtype)
+    room, side = np.zeros((7, lines.ROOM), depth.dtype), len(tents)
+    for row in range(first - 1, first + 1):
+        lines.load_texels(light, below_depth, below_normal, row, left, side, room, texels[(row + 3) % 3])
+    for y in range(first * side - 1, first * side + 1):
+        receivers.load_nearness(depth, y, left, near[(y + 3) % 3])
+    for row in range(first, min(first + BAND, below_depth.shape[0])):
+        lines.load_texels(light, below_depth, below_normal, row + 1, left, side, room, texels[(row + 1) % 3])
+        for y in range(row * side, min((row + 1) * side, depth.shape[0])):
+            tent = tents[y % side]
+            receivers.load_nearness(depth, y + 1, left, near[(y + 1) % 3])
+            receivers.load_receivers(normal, y, left, side, sharpness, lean, near[(y + 2) % 3], near[y % 3],
+                                     near[(y + 1) % 3], tent[OFFSET:], here)
+            weights.average(texels[(row + 2) % 3], texels[row % 3], texels[(row + 1) % 3], here, tent, power, means)
+            _store(texels, row, y, left, here, means, side, added, result)
 
 
 @kernel
 def _store(
-    texels: Array, row: int, y: int, left: int, here: Array, sums: Array, factor: int, added: Array | None,
+    texels: Array, row: int, y: int, left: int, here: Array, means: Array, factor: int, added: Array | None,
     result: Array,
 ) -> None:
-    real = sums.dtype.type
-    zero, one, least = real(0.0), real(1.0), real(LEAST)
+    real = means.dtype.type
+    zero, least = real(0.0), real(weights.LEAST)
     start, size = np.uint64(left), np.uint64(min(WIDE, result.shape[2] - left))
     scarce = 0
-    for i in range(size):
-        vanished = sums[np.uint64(weights.TOTAL) + i] < least
-        scarce += 1 if vanished & (here[np.uint64(receivers.SCALE) + i] > zero) else 0
+    for i in range(np.uint64(WIDE)):
+        unknown = (means[np.uint64(weights.TOTAL) + i] < least) & (here[np.uint64(receivers.SCALE) + i] > zero)
+        scarce += 1 if unknown else 0
     if scarce > 0:
-        _take_nearest(texels, row, y % factor, here, sums, factor, np.int64(size))
+        _take_nearest(texels, row, y % factor, here, means, factor)
     for c in range(3):
         line = np.uint64(c * SPAN)
         for i in range(size):
-            total = sums[np.uint64(weights.TOTAL) + i]
-            value = sums[np.uint64(weights.SUM) + line + i] / (total if total >= least else one)
-            value = value + sums[np.uint64(weights.REFERENCE) + line + i]
+            value = means[line + i]
             if added is not None:
                 value = value + added[c, y, start + i]
             result[c, y, start + i] = value if here[np.uint64(receivers.SCALE) + i] > zero else zero
 
 
 @kernel
-def _take_nearest(texels: Array, row: int, place: int, here: Array, sums: Array, factor: int, size: int) -> None:
-    """Put the light of the texel that is nearest in depth where no texel has any weight."""
-    real = sums.dtype.type
+def _take_nearest(texels: Array, row: int, place: int, here: Array, means: Array, factor: int) -> None:
+    """Take the light of the texel that is nearest in depth where no texel has any weight."""
+    real = means.dtype.type
     up = -1 if 2 * place + 1 < factor else 1
-    for i in range(size):
-        if sums[weights.TOTAL + i] >= real(LEAST) or here[receivers.SCALE + i] <= real(0.0):
+    for i in range(WIDE):
+        if means[weights.TOTAL + i] >= real(weights.LEAST) or here[receivers.SCALE + i] <= real(0.0):
             continue
         nearer = -1 if 2 * (i % factor) + 1 < factor else 1
         best, slot, at = real(lines.NOWHERE / 2), -1, 0
         for dy in (0, up, -up):
             for dx in (0, nearer, -nearer):
-                x = PAD + i + dx * factor
+                x = (dx + 1) * lines.SET + i
                 plane = (here[receivers.PLANE + i] + real(dy) * here[receivers.DOWN + i]
                          + real(dx) * here[receivers.ACROSS + i])
                 off = abs(texels[(row + dy + 3) % 3, lines.NEARNESS + x] - plane)
                 if off < best:
                     best, slot, at = off, (row + dy + 3) % 3, x
         for c in range(3):
-            sums[weights.SUM + c * SPAN + i] = real(0.0)
-            light = texels[slot, lines.LIGHT + c * SPAN + at] if slot >= 0 else real(0.0)
-            sums[weights.REFERENCE + c * SPAN + i] = light
+            means[c * SPAN + i] = texels[slot, lines.LIGHT + c * SPAN + at] if slot >= 0 else real(0.0)

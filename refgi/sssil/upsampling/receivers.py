@@ -15,11 +15,11 @@ import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.sssil.upsampling.lines import SPAN, WIDE
+from refgi.sssil.upsampling.tent import offset
 
 Array = npt.NDArray[Any]
 
 NORMAL, SCALE, PLANE, ACROSS, DOWN, HERE = 0, 3 * SPAN, 4 * SPAN, 5 * SPAN, 6 * SPAN, 7 * SPAN
-LEFT, OWN, RIGHT, TENT = 0, SPAN, 2 * SPAN, 3 * SPAN
 
 
 @kernel
@@ -76,9 +76,9 @@ def _beyond(depth: Any, inner: Any) -> Any:
 @kernel
 def load_receivers(
     normal: Array, row: int, left: int, factor: int, sharpness: Any, lean: Any, above: Array, nearness: Array,
-    below: Array, here: Array,
+    below: Array, offsets: Array, here: Array,
 ) -> None:
-    """Write normals of a row of pixels, and nearness as their planes have it at the middle of their texels.
+    """Write normals of a row of pixels, and nearness as their planes have it at the places of texels.
 
     Parameters
     ----------
@@ -93,17 +93,18 @@ def load_receivers(
     sharpness : float
         1 / (4 sqrt(2) sigma), sigma the standard deviation of depths as a share of the depth.
     lean : float
-        How far a texel's surface point is from its middle, to the side that is nearer, along either axis; pixels.
+        How far a texel's surface point is from its middle, to the side that is nearer, along either axis; texels.
     above, nearness, below : (SPAN,) ndarray
         Of `load_nearness`, of this row and those beside it.
+    offsets : (>= WIDE,) ndarray
+        Where the pixels' centres lie from those of their texels, to the right, texels.
     here : (HERE,) ndarray
-        Filled: normal; sharpness z; nearness at the own texel; its change from texel to texel. SCALE is negative
-        where no surface is seen.
+        Filled: normal; sharpness z, 0 where no surface is seen; nearness at the own texel; its change from texel to
+        texel.
     """
     real = here.dtype.type
-    one, zero = real(1.0), real(0.0)
-    side = real(factor)
-    ty = (real(row % factor) + real(0.5)) / side - real(0.5)
+    zero, side = real(0.0), real(factor)
+    ty = offset(row % factor, factor, here)
     size = np.uint64(min(WIDE, normal.shape[2] - left))
     for c in range(3):
         line = np.uint64(NORMAL + c * SPAN)
@@ -113,12 +114,11 @@ def load_receivers(
         value = nearness[i + np.uint64(1)]
         gx = side * _slope(nearness[i], value, nearness[i + np.uint64(2)])
         gy = side * _slope(above[i + np.uint64(1)], value, below[i + np.uint64(1)])
-        tx = (real(np.int32(i) % np.int32(factor)) + real(0.5)) / side - real(0.5)
-        here[np.uint64(SCALE) + i] = sharpness / value if value > zero else -one
-        # the nearest of a texel's pixels has its place, not the middle
-        here[np.uint64(PLANE) + i] = value - tx * gx - ty * gy + lean * (abs(gx) + abs(gy))
         here[np.uint64(ACROSS) + i] = gx
         here[np.uint64(DOWN) + i] = gy
+        here[np.uint64(SCALE) + i] = sharpness / value if value > zero else zero
+        # the nearest of a texel's pixels lends its place, not the middle
+        here[np.uint64(PLANE) + i] = value - offsets[i] * gx - ty * gy + lean * (abs(gx) + abs(gy))
 
 
 @kernel
@@ -127,56 +127,5 @@ def _slope(before: Any, value: Any, after: Any) -> Any:
     zero = type(value)(0.0)
     first, second = value - before, after - value
     smaller = first if abs(first) < abs(second) else second
-    known = (before > zero) & (after > zero) & (value > zero)
-    return smaller if known & ((first > zero) == (second > zero)) else zero
-
-
-@kernel
-def write_tent(factor: int, tent: Array) -> None:
-    """Write the spatial weights of a pixel's left, own and right texel.
-
-    Parameters
-    ----------
-    factor : int
-        Pixels along a texel's side.
-    tent : (TENT,) ndarray
-        Filled, for a block that starts with a texel.
-    """
-    for i in range(WIDE):
-        far, own, near, side = tent_weights(i % factor, factor, tent)
-        tent[LEFT + i] = near if side < 0 else far
-        tent[OWN + i] = own
-        tent[RIGHT + i] = far if side < 0 else near
-
-
-@kernel
-def tent_weights(place: int, factor: int, like: Array) -> Any:
-    """Return what three texels in a row weigh for a pixel of the middle one.
-
-    Parameters
-    ----------
-    place : int
-        Of the pixel in its texel, 0 to factor - 1.
-    factor : int
-        Pixels along a texel's side.
-    like : ndarray
-        Of the type of the result.
-
-    Returns
-    -------
-    far, own, near : float
-        Weights; their sum is 1.
-    side : int
-        On which side the near texel lies: -1 before, 1 after the own one.
-
-    Notes
-    -----
-    A tent of half width (4 + t) / 3 texels about the pixel's centre, t its distance from that of the texel, brought to
-    a sum of 1: of all tents the one with which linear functions stay linear, as the bilinear one of 2 x 2 texels has
-    it. It is continuous from texel to texel (t = 1/2: 0, 1/2, 1/2).
-    """
-    real = like.dtype.type
-    offset = 2 * place + 1 - factor
-    t = real(abs(offset)) / real(2 * factor)
-    one, two, six = real(1.0), real(2.0), real(6.0)
-    return (one - two * t) / six, (two - t) / real(3.0), (one + two * two * t) / six, -1 if offset < 0 else 1
+    smaller = smaller if first * second > zero else zero
+    return smaller if (before > zero) & (after > zero) & (value > zero) else zero

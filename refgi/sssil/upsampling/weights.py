@@ -1,11 +1,10 @@
-"""Weighted sums of three by three texels for a row of pixels; the pixels are the SIMD lanes.
+"""Weighted sums over three by three texels for a row of pixels; the pixels are the SIMD lanes.
 
-A texel weighs tent * exp(-delta^2 / (2 sigma^2)) * max(0, <n . n'>)^p for a pixel: delta = z (1/z' - d), with d the
-nearness that the plane through the pixel has where the texel lies. Left and right texels are added to each other
-first, so that mirrored pictures give mirrored sums to the bit.
+A texel weighs tent * exp(-u) * max(0, <n . n'>)^p for a pixel, u = delta^2 / (2 sigma^2), delta = z (1/z' - d) with d
+the nearness that the plane through the pixel has at the texel's place. The exponential is taken as (1 - u / 16)^16, 0
+from u = 16 (5.7 sigma) on, so that with p = 8 the product is the eighth power of cosine * (1 - u / 16)^2.
 
-The exponential of -u is taken as q(u / 16)^16, q the cubic of its series, 0 from q's root on: within 6e-5 of it
-everywhere, and 0 beyond 7 sigma.
+Left and right texels are added to each other first: pictures that mirror each other get sums that do, to the bit.
 """
 
 from typing import Any
@@ -16,132 +15,127 @@ import numpy.typing as npt
 from refgi.elementary import pow
 from refgi.jit import kernel
 from refgi.sssil.upsampling import lines, receivers
-from refgi.sssil.upsampling.lines import PAD, SPAN, WIDE
+from refgi.sssil.upsampling.lines import SPAN, WIDE
 
 Array = npt.NDArray[Any]
 
-SUM, TOTAL, REFERENCE, SUMS = 0, 3 * SPAN, 4 * SPAN, 7 * SPAN
-SURE = 1 / 16  # weight but for the tent from which on the own texel is what others are compared with
-HALF, SIXTH = 0.5, 1 / 6
+TOTAL, MEANS = 3 * SPAN, 4 * SPAN  # after three lines of light
+LEAST = 1e-20  # sum of weights that is too small to divide by
+SURE = 1 / 16  # weight but for the tent from which on the own texel's light is what others are compared with
 
 
 @kernel
-def alike(n0: Any, n1: Any, n2: Any, m0: Any, m1: Any, m2: Any, off: Any, power: Any) -> Any:
+def alike(cosine: Any, off: Any, power: Any) -> Any:
     """Return how much two points are of the same surface.
 
     Parameters
     ----------
-    n0, n1, n2, m0, m1, m2 : float
-        Unit normals.
+    cosine : float
+        Between their normals.
     off : float
-        delta / (4 sqrt(2) sigma).
+        delta / (4 sqrt(2) sigma), whose square is u / 16.
     power : float or None
-        Exponent of the cosine between the normals; None stands for 8.
+        p; None stands for 8.
 
     Returns
     -------
     float
-        exp(-delta^2 / (2 sigma^2)) max(0, cosine)^power, 0 to 1.
+        0 to 1.
     """
-    real = type(off)
-    zero, one, two = real(0.0), real(1.0), real(2.0)
-    cosine = n0 * m0 + n1 * m1 + n2 * m2
-    cosine = cosine if cosine > zero else zero
-    v = off * off
-    v = v if v < two else two
-    q = one - v * (one - v * (real(HALF) - v * real(SIXTH)))
+    zero, one = type(off)(0.0), type(off)(1.0)
+    kept = cosine if cosine > zero else zero
+    q = one - off * off
     q = q if q > zero else zero
-    q2 = q * q
+    w = q * q
     if power is None:
-        w = cosine * q2
-        w2 = w * w
-        w4 = w2 * w2
+        w = kept * w
+    w2 = w * w
+    w4 = w2 * w2
+    if power is None:
         return w4 * w4
-    q4 = q2 * q2
-    q8 = q4 * q4
-    return pow(cosine, power) * (q8 * q8)
+    return (w4 * w4) * pow(kept, power)
 
 
 @kernel
-def start_sums(texels: Array, here: Array, power: Any, sums: Array) -> None:
-    """Clear the sums of a row and choose what values are compared with.
-
-    Parameters
-    ----------
-    texels : (LINES,) ndarray
-        The row of texels that has the pixels.
-    here : (HERE,) ndarray
-        The pixels.
-    power : float or None
-        Of `alike`.
-    sums : (SUMS,) ndarray
-        SUM and TOTAL are cleared; REFERENCE is the own texel's light where that is likely of the same surface, else 0:
-        then equal light stays equal to the bit.
-    """
-    zero, sure = sums.dtype.type(0.0), sums.dtype.type(SURE)
-    for i in range(np.uint64(WIDE)):
-        weight = _alike_at(texels, np.uint64(PAD) + i, here, i, here[np.uint64(receivers.PLANE) + i], power)
-        own = weight >= sure
-        for c in range(3):
-            line = np.uint64(c * SPAN)
-            light = texels[np.uint64(lines.LIGHT) + line + np.uint64(PAD) + i]
-            sums[np.uint64(REFERENCE) + line + i] = light if own else zero
-            sums[np.uint64(SUM) + line + i] = zero
-        sums[np.uint64(TOTAL) + i] = zero
-
-
-@kernel
-def add_texels(
-    texels: Array, here: Array, tent: Array, factor: int, step: int, share: Any, power: Any, sums: Array
+def average(
+    above: Array, middle: Array, below: Array, here: Array, tent: Array, power: Any, means: Array
 ) -> None:
-    """Add one row of texels to the sums of a row of pixels.
+    """Average the light of three by three texels for each pixel of a row.
 
     Parameters
     ----------
-    texels : (LINES,) ndarray
-        The row of texels.
+    above, middle, below : (lines.LINES,) ndarray
+        Rows of texels; the middle one has the pixels.
     here : (HERE,) ndarray
         The pixels.
-    tent : (TENT,) ndarray
-        Weights of left, own and right texels.
-    factor : int
-        Pixels along a texel's side.
-    step : int
-        -1, 0 or 1: where the row lies from that which has the pixels.
-    share : float
-        Weight of the row.
+    tent : (tent.LINES,) ndarray
+        Spatial weights.
     power : float or None
         Of `alike`.
-    sums : (SUMS,) ndarray
-        Of differences to REFERENCE, and of weights.
+    means : (MEANS,) ndarray
+        Filled: light, three lines, and the sum of the weights; light is 0 where that is too small.
+
+    Notes
+    -----
+    Means are taken of differences to the own texel's light where that is likely of the same surface, so that equal
+    light stays equal to the bit.
     """
-    rows = sums.dtype.type(step)
-    left, own, right = np.uint64(PAD - factor), np.uint64(PAD), np.uint64(PAD + factor)
+    real = means.dtype.type
+    zero, one, sure, least = real(0.0), real(1.0), real(SURE), real(LEAST)
     for i in range(np.uint64(WIDE)):
-        across = here[np.uint64(receivers.ACROSS) + i]
-        plane = here[np.uint64(receivers.PLANE) + i] + rows * here[np.uint64(receivers.DOWN) + i]
-        a = _alike_at(texels, left + i, here, i, plane - across, power) * tent[np.uint64(receivers.LEFT) + i] * share
-        b = _alike_at(texels, own + i, here, i, plane, power) * tent[np.uint64(receivers.OWN) + i] * share
-        c = _alike_at(texels, right + i, here, i, plane + across, power) * tent[np.uint64(receivers.RIGHT) + i] * share
-        sums[np.uint64(TOTAL) + i] += (a + c) + b
-        _add(texels, 0, left + i, own + i, right + i, a, b, c, i, sums)
-        _add(texels, 1, left + i, own + i, right + i, a, b, c, i, sums)
-        _add(texels, 2, left + i, own + i, right + i, a, b, c, i, sums)
+        across, plane = here[np.uint64(receivers.ACROSS) + i], here[np.uint64(receivers.PLANE) + i]
+        down = here[np.uint64(receivers.DOWN) + i]
+        u0, u1, u2 = _weights(above, here, tent, 0, i, plane - down, across, power)
+        m0, m1, m2 = _weights(middle, here, tent, 3, i, plane, across, power)
+        d0, d1, d2 = _weights(below, here, tent, 6, i, plane + down, across, power)
+        total = ((u0 + u2) + u1) + ((m0 + m2) + m1) + ((d0 + d2) + d1)
+        likely = m1 >= sure * tent[np.uint64(4 * SPAN) + i]
+        known = total >= least
+        inverse = one / (total if known else one)
+        # written out: a loop over the channels would cost the compiler its even split into lanes
+        red, green, blue = _light(middle, i)
+        red, green, blue = red if likely else zero, green if likely else zero, blue if likely else zero
+        r = (_sum(above, 0, i, u0, u1, u2, red) + _sum(middle, 0, i, m0, m1, m2, red)
+             + _sum(below, 0, i, d0, d1, d2, red))
+        g = (_sum(above, 1, i, u0, u1, u2, green) + _sum(middle, 1, i, m0, m1, m2, green)
+             + _sum(below, 1, i, d0, d1, d2, green))
+        b = (_sum(above, 2, i, u0, u1, u2, blue) + _sum(middle, 2, i, m0, m1, m2, blue)
+             + _sum(below, 2, i, d0, d1, d2, blue))
+        means[i] = red + r * inverse if known else zero
+        means[np.uint64(SPAN) + i] = green + g * inverse if known else zero
+        means[np.uint64(2 * SPAN) + i] = blue + b * inverse if known else zero
+        means[np.uint64(TOTAL) + i] = total
+
+
+@kernel
+def _weights(
+    texels: Array, here: Array, tent: Array, first: int, i: Any, plane: Any, across: Any, power: Any
+) -> Any:
+    """Return what left, own and right texel of a row weigh."""
+    line, span = np.uint64(first * SPAN) + i, np.uint64(SPAN)
+    left = _alike_at(texels, np.uint64(lines.LEFT) + i, here, i, plane - across, power) * tent[line]
+    own = _alike_at(texels, np.uint64(lines.OWN) + i, here, i, plane, power) * tent[line + span]
+    right = _alike_at(texels, np.uint64(lines.RIGHT) + i, here, i, plane + across, power) * tent[line + span + span]
+    return left, own, right
 
 
 @kernel
 def _alike_at(texels: Array, at: Any, here: Array, i: Any, plane: Any, power: Any) -> Any:
-    n, m, span = np.uint64(receivers.NORMAL), np.uint64(lines.NORMAL), np.uint64(SPAN)
+    n, m, span = np.uint64(receivers.NORMAL) + i, np.uint64(lines.NORMAL) + at, np.uint64(SPAN)
+    cosine = here[n] * texels[m] + here[n + span] * texels[m + span] + here[n + span + span] * texels[m + span + span]
     off = (texels[np.uint64(lines.NEARNESS) + at] - plane) * here[np.uint64(receivers.SCALE) + i]
-    return alike(here[n + i], here[n + span + i], here[n + span + span + i], texels[m + at], texels[m + span + at],
-                 texels[m + span + span + at], off, power)
+    return alike(cosine, off, power)
 
 
 @kernel
-def _add(
-    texels: Array, channel: int, left: Any, own: Any, right: Any, a: Any, b: Any, c: Any, i: Any, sums: Array
-) -> None:
-    line = np.uint64(lines.LIGHT + channel * SPAN)
-    reference = sums[np.uint64(REFERENCE + channel * SPAN) + i]
-    beside = a * (texels[line + left] - reference) + c * (texels[line + right] - reference)
-    sums[np.uint64(SUM + channel * SPAN) + i] += beside + b * (texels[line + own] - reference)
+def _light(texels: Array, i: Any) -> Any:
+    at, span = np.uint64(lines.OWN + lines.LIGHT) + i, np.uint64(SPAN)
+    return texels[at], texels[at + span], texels[at + span + span]
+
+
+@kernel
+def _sum(texels: Array, channel: int, i: Any, left: Any, own: Any, right: Any, reference: Any) -> Any:
+    at = np.uint64(lines.LIGHT + channel * SPAN) + i
+    beside = (left * (texels[np.uint64(lines.LEFT) + at] - reference)
+              + right * (texels[np.uint64(lines.RIGHT) + at] - reference))
+    return beside + own * (texels[np.uint64(lines.OWN) + at] - reference)

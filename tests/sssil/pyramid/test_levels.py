@@ -19,7 +19,7 @@ from tests.sssil.pyramid.pictures import FLOAT32, FLOAT64, camera, made, random_
 MODES = ("closest", "average", "closest_average")
 
 
-def literal(picture, view, first, count, mode):
+def literal(picture, view, first, count, mode, tangents="half"):
     """The same levels by the twin."""
     half_v = math.tan(view.vfov / 2)
     depth, *vectors = picture
@@ -27,7 +27,7 @@ def literal(picture, view, first, count, mode):
         "depth": depth, "normal": np.moveaxis(vectors[0], 0, -1), "albedo": np.moveaxis(vectors[1], 0, -1),
         "direct": np.moveaxis(vectors[2], 0, -1), "f_v": view.vfov,
         "f_h": 2 * math.atan(half_v * view.width / view.height), "axes": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
-    }, first, count, mode)
+    }, first, count, mode, tangents)
 
 
 def assert_equal_to(expected, level, width, rtol):
@@ -58,6 +58,13 @@ def test_levels_are_those_of_the_literal_twin(mode, evidence):
                                        strict=True):
                 assert_equal_to(expected, level, width, FLOAT64)
     evidence(f"{mode}: pixels chosen equal, the rest to {FLOAT64:g}")
+
+
+def test_areas_of_levels_may_have_the_printed_tangents():
+    picture, view = random_picture(14, 9), camera(14, 9, 50.0)
+    for level, expected in zip(made(picture, view, 1, 2, as_published=frozenset({"hss_tan_f"})),
+                               literal(picture, view, 1, 2, "closest", "whole"), strict=True):
+        assert_equal_to(expected, level, 14, FLOAT64)
 
 
 @pytest.mark.parametrize("mode", MODES)

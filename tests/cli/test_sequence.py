@@ -1,0 +1,130 @@
+"""`refgi sequence`: the frames it writes, how it goes on after an interruption, what it refuses before computing."""
+
+import json
+
+import imageio.v3
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from refgi.cli.group import VerbGroup
+from refgi.image import read_exr
+from refgi.scene import load_scene
+from refgi.splat import SiiSettings
+from refgi.splat.sii import sii
+from refgi.sssil.temporal import Sequence, TemporalSettings
+from refgi.sssil.temporal.path import scenes_along
+from refgi.sssil.temporal.path_file import read_path
+
+PATH = """
+frames = 4
+objects = [{material = "red", keys = [{at = 0.0}, {at = 1.0, move = [0.02, 0.0, 0.0]}]}]
+camera = [{at = 0.0, eye = [0.278, 0.273, -0.8]}, {at = 1.0, eye = [0.3, 0.28, -0.8]}]
+"""
+TINY = ["--size", "12x10", "--rsm-resolution", "16"]
+# a method that compiles fast and draws random numbers
+SII = ["--method", "sii", "--set", "lights=16", "--temporal", "weight=0.5"]
+
+
+@pytest.fixture
+def way(tmp_path):
+    path = tmp_path / "way.toml"
+    path.write_text(PATH)
+    return path
+
+
+def run(*arguments):
+    return CliRunner().invoke(VerbGroup.refgi(), ["sequence", *(str(a) for a in arguments)])
+
+
+def lights(folder, numbers):
+    channels = [read_exr(folder / f"way_{number:05d}.exr")[0] for number in numbers]
+    return [np.stack([own[f"irradiance.{c}"] for c in "RGB"]) for own in channels]
+
+
+def refused(result, *words):
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    for word in words:
+        assert word in result.stderr
+    return True
+
+
+def test_frames_are_what_python_computes(way, tmp_path):
+    result = run("cornell_box", way, *TINY, *SII, "--out", tmp_path / "new", "--json", "--seed", "7")
+    assert result.exit_code == 0, result.output
+    assert {p.name for p in (tmp_path / "new").iterdir()} == {f"way_{i:05d}.{k}" for i in range(4) for k in
+                                                              ("exr", "png")}
+    scene = load_scene("cornell_box").with_camera(width=12, height=10)
+    path, frames = read_path(way, scene)
+    steps = Sequence(scenes_along(scene, path, frames), SiiSettings(lights=16, seed=7), TemporalSettings(weight=0.5),
+                     method=sii, rsm_resolution=16)
+    told = json.loads(result.stdout)
+    assert told["temporal"]["weight"] == 0.5
+    for number, (step, light) in enumerate(zip(steps, lights(tmp_path / "new", range(4)), strict=True)):
+        assert np.array_equal(light, step.irradiance)
+        assert told["frames"][number]["reused"] == step.reused
+    assert imageio.v3.imread(tmp_path / "new" / "way_00003.png").shape == (10, 12, 3)
+    attributes = read_exr(tmp_path / "new" / "way_00003.exr")[1]
+    assert (attributes["frame"], attributes["of"], attributes["settings"]["lights"]) == (3, 4, 16)
+
+
+@pytest.mark.parametrize("form", ["recursive", "printed"])
+def test_an_interrupted_sequence_goes_on_to_the_bit(way, tmp_path, form):
+    arguments = ["cornell_box", way, *TINY, *SII, "--temporal", f"form={form}", "--format", "exr", "--out",
+                 tmp_path / "out"]
+    assert run(*arguments).exit_code == 0
+    whole = lights(tmp_path / "out", range(4))
+    (tmp_path / "out" / "way_00002.exr").unlink()
+    (tmp_path / "out" / "way_00003.exr").write_bytes(b"cut short")
+    result = run(*arguments, "--resume")
+    assert result.exit_code == 0, result.output
+    assert "2 of 4 frames rendered" in result.stdout
+    assert all(map(np.array_equal, whole, lights(tmp_path / "out", range(4))))
+    assert "0 of 4 frames rendered" in run(*arguments, "--resume").stdout
+    assert refused(run(*arguments, "--resume", "--set", "lights=32"), "way_00000.exr", "one of other settings")
+
+
+def test_another_method_is_not_filtered_unless_asked(way, tmp_path):
+    plain = [*TINY, "--method", "sii", "--set", "lights=16", "--format", "exr", "--json"]
+    assert json.loads(run("cornell_box", way, *plain, "--out", tmp_path).stdout)["temporal"] is None
+    told = json.loads(run("cornell_box", way, *plain, "--temporal", "weight=0.25", "--frames", "1", "--out",
+                          tmp_path).stdout)
+    assert told["temporal"]["weight"] == 0.25
+    assert len(told["frames"]) == 1
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--temporal", "weight=2"], ["weight: expected a share"]),
+    (["--temporal", "wieght=0.5"], ["is not a setting of the temporal filter", "weight"]),
+    (["--temporal", "weight=0.5", "--no-temporal"], ["--no-temporal"]),
+    (["--set", "samplse=3"], ["samples"]),
+    (["--resume", "--format", "png"], ["--resume"]),
+    (["--exposure", "0"], ["--exposure"]),
+    (["--method", "nothing"], ["method: expected one of"]),
+])
+def test_what_is_refused_before_anything_is_computed(way, tmp_path, arguments, words):
+    assert refused(run("cornell_box", way, *TINY, *arguments, "--out", tmp_path / "out"), *words)
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_all_faults_of_a_path_are_told_in_a_line_each(way, tmp_path):
+    way.write_text('frames = 0\ncurve = "straight"\nlights = [{keys = []}]')
+    result = run("cornell_box", way, *TINY, "--out", tmp_path / "out")
+    assert refused(result, "frames: ", "curve: ", "lights[0].keys: ")
+    assert result.stderr.count("\n") == 3
+
+
+def test_how_many_frames_must_be_said(way, tmp_path):
+    way.write_text("camera = [{at = 0.0, vfov_deg = 30.0}]")
+    assert refused(run("cornell_box", way, *TINY, "--out", tmp_path / "out"), "--frames", "how many")
+
+
+def test_hssil_renders_and_filters(way, tmp_path):
+    result = run("cornell_box", way, *TINY, "--set", "radius=none", "--frames", "2", "--out", tmp_path, "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert told["method"] == "hssil"
+    assert told["temporal"]["weight"] == 0.9
+    assert told["frames"][1]["reused"] > 0.8
+    assert told["frames"][1]["mean_indirect_irradiance"] > 0

@@ -10,15 +10,17 @@ from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.sampling import halton
 from refgi.scene.model import Camera
-from refgi.sssil.cameras.transport import NEAREST, Points, framed, lit_points, open_to, seen_points, transport
+from refgi.sssil.cameras.transport import Points, Views, lit_points, seen_points, sight, transport
 from refgi.stages import skip, stage
 
 Array = npt.NDArray[Any]
 
-PAIRS, EYES_PER_PAIR = 32, 4  # candidates: pairs of a receiver and a lit point, places around the middle of each
-WIDE = math.tan(math.radians(40))  # tangent of half the field of view along the picture's longer side, at least
+PAIRS, EYES_PER_PAIR = 256, 2  # candidates: pairs of a receiver and a lit point, places around the middle of each
+WIDE = math.tan(math.radians(44))  # tangent of half the field of view along the picture's longer side, at least
 CLEARANCE = 0.1  # of a free way: so far an eye stays off what ends it
 LEAST_GAIN = 1e-3  # of the light that reaches the picture: less is not worth another picture
+NEAREST = 1 / 32  # of the scene's diagonal: pairs nearer than that count as if they were that far apart
+COARSEST = 1 / 32  # of the scene's diagonal: a pixel that long on a surface shows it half as well
 STEEP = 0.99  # cosine between the view and the upward direction from which another direction has to be up
 
 
@@ -47,33 +49,44 @@ def placed_cameras(frame: Frame, count: int) -> tuple[Camera, ...]:
     so that no camera is placed to see what only shines through walls. Eyes lie on free lines from the middle of a free
     segment between a surface that the picture shows and a lit point: never inside a wall. Nothing is random.
     """
-    tracer, view = frame.tracer, frame.gbuffer.projection
+    tracer, diagonal = frame.tracer, frame.scene.geometry.diagonal
     to, (lit, flux) = seen_points(frame), lit_points(frame)
-    passing = transport(tracer, to, lit, flux, NEAREST * frame.scene.geometry.diagonal)
-    shown = open_to(tracer, view.origin, lit) & framed(view.origin, view.frame, view.half, lit)
-    missed, least = passing * ~shown, LEAST_GAIN * float(passing.sum())
+    passing = transport(tracer, to, lit, flux, NEAREST * diagonal)
+    shown = sight(tracer, _own_view(frame), lit, COARSEST * diagonal)
+    missed, least = passing * (1 - shown), LEAST_GAIN * float(passing.sum())
     if not float(missed.sum()) > least:
         skip("sssil.cameras", "the picture shows what lights it")
         return ()
-    half = _half(frame)
-    eyes, targets = _views(tracer, to, lit, missed, frame.scene.geometry.diagonal)
-    axes = _axes(eyes, targets, frame.scene.camera.up)
-    seen_to = open_to(tracer, eyes, to) & framed(eyes, axes, half, to)
-    seen_lit = open_to(tracer, eyes, lit) & framed(eyes, axes, half, lit)
-    brought = seen_to * np.einsum("cj,ij->ci", seen_lit, passing)
-    best = np.einsum("cj,ij->ci", shown, passing)[0]
-    winners = _greedy(brought, best, least, count)
-    return tuple(_camera(frame, eyes[c], targets[c], axes[c], half) for c in winners)
+    eyes, ahead = _looks(tracer, to, lit, missed, diagonal)
+    views = _wide_views(frame, eyes, ahead)
+    brought = _brought(passing, sight(tracer, views, lit, COARSEST * diagonal))
+    brought *= sight(tracer, views, to, COARSEST * diagonal)
+    winners = _greedy(brought, _brought(passing, shown)[0], least, count)
+    return tuple(_camera(frame, views, winner) for winner in winners)
 
 
-def _half(frame: Frame) -> Array:
-    """Return the tangents of half the field of view: the frame's, or wider."""
-    half: Array = frame.gbuffer.projection.half
-    return np.asarray(half * max(1.0, WIDE / half.max()))
+def _brought(passing: Array, shown: Array) -> Array:
+    """Return what each receiver gets from the lit points that each view shows."""
+    return np.asarray(np.einsum("cj,ij->ci", shown, passing))
 
 
-def _views(tracer: Tracer, to: Points, lit: Points, missed: Array, diagonal: float) -> tuple[Array, Array]:
-    """Return eyes and targets of candidates, drawn after the light that the picture misses."""
+def _own_view(frame: Frame) -> Views:
+    own = frame.gbuffer.projection
+    return Views(own.origin, own.frame, own.half, 2 * own.half[1] / own.height)
+
+
+def _wide_views(frame: Frame, eyes: Array, ahead: Array) -> Views:
+    """Return views with the frame's field of view, or a wider one of the same shape."""
+    own, upward = frame.gbuffer.projection, _unit(np.asarray(frame.scene.camera.up))
+    half = own.half * max(1.0, WIDE / own.half.max())
+    steep = np.abs(ahead @ upward) > STEEP
+    right = _unit(np.cross(ahead, np.where(steep[:, None], np.eye(3)[np.argmin(np.abs(upward))], upward)))
+    axes = np.stack([right, np.cross(ahead, right), ahead], axis=1)
+    return Views(eyes, axes, half, 2 * half[1] / own.height)
+
+
+def _looks(tracer: Tracer, to: Points, lit: Points, missed: Array, diagonal: float) -> tuple[Array, Array]:
+    """Return eyes and directions of candidates, drawn after the light that the picture misses."""
     upto = np.cumsum(missed.ravel())
     drawn = np.searchsorted(upto, (np.arange(PAIRS) + 0.5) / PAIRS * upto[-1])
     i, j = np.repeat(np.divmod(drawn, missed.shape[1]), EYES_PER_PAIR, axis=1)
@@ -86,21 +99,13 @@ def _views(tracer: Tracer, to: Points, lit: Points, missed: Array, diagonal: flo
     for point, normal in ((to.position[i], to.normal[i]), (lit.position[j], lit.normal[j])):
         free = np.minimum(free, _before_plane(middle - point, way, normal))
     eyes = middle + ((1 - CLEARANCE) * free * np.sqrt(share))[:, None] * way
-    return eyes, eyes + _unit(_unit(to.position[i] - eyes) + _unit(lit.position[j] - eyes))
+    return eyes, _unit(_unit(to.position[i] - eyes) + _unit(lit.position[j] - eyes))
 
 
 def _before_plane(start: Array, way: Array, normal: Array) -> Array:
     """Return how far one gets along a way before the plane through the origin, inf where never to it."""
     height, sinking = (start * normal).sum(axis=1), -(way * normal).sum(axis=1)
     return np.asarray(np.divide(height, sinking, out=np.full_like(height, np.inf), where=sinking > 0))
-
-
-def _axes(eyes: Array, targets: Array, up: tuple[float, float, float]) -> Array:
-    """Return right, down and forward of each view."""
-    forward, upward = _unit(targets - eyes), _unit(np.asarray(up))
-    steep = np.abs(forward @ upward) > STEEP
-    right = _unit(np.cross(forward, np.where(steep[:, None], np.eye(3)[np.argmin(np.abs(upward))], upward)))
-    return np.stack([right, np.cross(forward, right), forward], axis=1)
 
 
 def _greedy(brought: Array, best: Array, least: float, count: int) -> list[int]:
@@ -116,8 +121,9 @@ def _greedy(brought: Array, best: Array, least: float, count: int) -> list[int]:
     return winners
 
 
-def _camera(frame: Frame, eye: Array, target: Array, axes: Array, half: Array) -> Camera:
-    return Camera(eye.tolist(), target.tolist(), (-axes[1]).tolist(), 2 * math.atan(half[1]), frame.width,
+def _camera(frame: Frame, views: Views, index: int) -> Camera:
+    eye, (_, down, ahead) = views.eye[index], views.axes[index]
+    return Camera(eye.tolist(), (eye + ahead).tolist(), (-down).tolist(), 2 * math.atan(views.half[1]), frame.width,
                   frame.height)  # fmt: skip
 
 

@@ -16,9 +16,8 @@ from refgi.rsm import choose_pixel_lights, reflective_shadow_map
 
 Array = npt.NDArray[Any]
 
-LIT_POINTS, RECEIVERS = 512, 256  # the choice among cameras is the same with four times as many
+LIT_POINTS, RECEIVERS = 256, 256
 MAP_RESOLUTION = 64  # texels along a side of the maps that lit points are drawn from
-NEAREST = 1 / 32  # of the scene's diagonal: pairs nearer than that count as if they were that far apart
 
 
 class Points(NamedTuple):
@@ -110,27 +109,45 @@ def transport(tracer: Tracer, to: Points, lit: Points, flux: float, nearest: flo
     return np.asarray(flux / math.pi * passed)
 
 
-def open_to(tracer: Tracer, eyes: Array, points: Points) -> Array:
-    """Tell which points could be seen from which places, if one looked there.
+class Views(NamedTuple):
+    """Pictures of one size and field of view."""
+
+    eye: Array  # (c, 3) m
+    axes: Array  # (c, 3, 3) right, down, forward
+    half: Array  # (2,) tangents of half the field of view, horizontal and vertical
+    pixel: float  # width of a pixel at a depth of 1 m, m
+
+
+def sight(tracer: Tracer, views: Views, points: Points, coarsest: float) -> Array:
+    """Return how well each picture shows each point.
 
     Parameters
     ----------
     tracer : Tracer
         What may lie between.
-    eyes : (e, 3) ndarray
-        The places, m.
+    views : Views
+        The pictures.
     points : Points
         The points.
+    coarsest : float
+        Length of a pixel on a surface that makes it half as good, m.
 
     Returns
     -------
-    (e, n) ndarray of bool
-        True where the point faces the place and nothing lies between.
+    (c, n) ndarray of float64
+        0 where a point is outside, faces away or is hidden; else 1 / (1 + (length / coarsest)^2) with the length of a
+        pixel on the surface there, which grows with distance and towards grazing views.
     """
-    seen: Array = ((eyes[:, None] - points.position) * points.normal).sum(axis=2) > 0
-    e, n = np.nonzero(seen)
-    seen[e, n] = free(tracer, eyes[e], points.position[n] + tracer.offset * points.normal[n])
-    return seen
+    way = points.position - views.eye[:, None]
+    right, down, depth = np.moveaxis(np.einsum("cad,cnd->can", views.axes, way), 1, 0)
+    inside = (depth > 0) & (np.abs(right) <= views.half[0] * depth) & (np.abs(down) <= views.half[1] * depth)
+    facing = np.maximum(-(way * points.normal).sum(axis=2), 0)
+    c, n = np.nonzero(inside & (facing > 0))
+    facing, depth = facing[c, n] / np.linalg.norm(way[c, n], axis=1), depth[c, n]
+    good = np.zeros(inside.shape)
+    good[c, n] = 1 / (1 + (views.pixel * depth / (coarsest * facing)) ** 2)
+    good[c, n] *= free(tracer, views.eye[c], points.position[n] + tracer.offset * points.normal[n])
+    return good
 
 
 def free(tracer: Tracer, starts: Array, ends: Array) -> Array:
@@ -152,26 +169,3 @@ def free(tracer: Tracer, starts: Array, ends: Array) -> Array:
     tracer.fill_occluded(np.ascontiguousarray(starts, np.float32), np.ascontiguousarray(ends - starts, np.float32),
                          np.ones(len(starts), np.float32), blocked)
     return ~blocked
-
-
-def framed(eyes: Array, axes: Array, half: Array, points: Points) -> Array:
-    """Tell which points lie within which pictures, whatever hides them.
-
-    Parameters
-    ----------
-    eyes : (c, 3) ndarray
-        Centres of projection, m.
-    axes : (c, 3, 3) ndarray
-        Right, down, forward.
-    half : (2,) ndarray
-        Tangents of half the field of view, horizontal and vertical.
-    points : Points
-        The points.
-
-    Returns
-    -------
-    (c, n) ndarray of bool
-        True where a point is inside.
-    """
-    along = np.einsum("cad,cnd->can", axes, points.position - eyes[:, None])
-    return np.asarray((along[:, 2] > 0) & (np.abs(along[:, :2]) <= half[:, None] * along[:, 2:]).all(axis=1))

@@ -40,7 +40,9 @@ KINDS = {"both": (".exr", ".png"), "exr": (".exr",), "png": (".png",)}
 @speech
 @click.pass_obj
 def _sequence(session: Session, /, **options: Any) -> int:
-    """Render the frames of PATH, a TOML file that moves camera, lights and objects of SCENE.
+    """Render SCENE along a path of camera, lights and objects.
+
+    PATH is a TOML file with keys of camera, lights and objects at shares of the sequence.
 
     `hssil` blends each frame's light with that of the frame before; another method does where --temporal is given.
     Each frame is written whole as soon as it is done, as PATH's name and a number.

@@ -17,7 +17,7 @@ from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
 
-WIDE = 320  # lanes of a tile
+WIDE = 160  # lanes of a tile
 ROWS = 12  # position, normal, sum of a group of samples, sum of all
 LEAST = 1e-37  # stands in for a denominator of 0, where the numerator is 0 as well
 
@@ -76,10 +76,14 @@ def add_two(
         Texels, plane by plane; those of neighbouring receivers' samples are neighbours.
     step : int
         Elements from plane to plane.
-    first, second : int
-        Where the two samples of the first receiver are in the first plane.
-    first_weight, second_weight : float
-        Texels that each stands for.
+    first : int
+        Where the first sample of the first receiver is in the first plane.
+    first_weight : float
+        Texels that it stands for.
+    second : int
+        Likewise the second.
+    second_weight : float
+        Texels that it stands for.
     disc : bool
         Eq. 4 instead of Eq. 3.
     """

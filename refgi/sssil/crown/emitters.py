@@ -44,7 +44,7 @@ def pack(level: Level, phases: int, farthest: int, most: int) -> Emitters:
     level : Level
         The texels.
     phases : int
-        P, among which columns are dealt out.
+        P, 1 or 2, among which columns are dealt out.
     farthest : int
         Columns that a sample may lie away; farther ones reach none.
     most : int
@@ -84,7 +84,7 @@ def _pack(
     position: Array, normal: Array, radiance: Array, area: Array, phases: int, line: int, pad: int, scale: Any,
     share: Any, packed: Array, lit: Array,
 ) -> None:
-    rows, columns = area.shape
+    rows = area.shape[0]
     for y in prange(rows + 1):
         row = np.int64(y)
         start = row * PLANES * phases * line
@@ -99,25 +99,32 @@ def _pack(
 
 @kernel
 def _pack_line(
-    position: Array, normal: Array, radiance: Array, area: Array, row: int, phase: int, phases: int, first: int,
+    position: Array, normal: Array, radiance: Array, area: Array, row: Any, phase: int, phases: int, first: Any,
     step: int, scale: Any, share: Any, packed: Array,
 ) -> None:
     lanes = np.uint64(max(0, (area.shape[1] - phase + phases - 1) // phases))
-    y, x, by, to, plane_step = np.uint64(row), np.uint64(phase), np.uint64(phases), np.uint64(first), np.uint64(step)
+    y, x, to, by = np.uint64(row), np.uint64(phase), np.uint64(first), np.uint64(step)
+    two = np.uint64(2)
     for c in range(3):
-        here = to + np.uint64(c) * plane_step
-        for i in range(lanes):
-            packed[here + i] = position[c, y, x + by * i] * scale
-        here = here + np.uint64(3) * plane_step
-        for i in range(lanes):
-            packed[here + i] = -normal[c, y, x + by * i] * (area[y, x + by * i] * share)
-        here = here + np.uint64(3) * plane_step
-        for i in range(lanes):
-            packed[here + i] = radiance[c, y, x + by * i]
+        p, m, r = to + np.uint64(c) * by, to + np.uint64(c + 3) * by, to + np.uint64(c + 6) * by
+        if phases == 2:  # written out, so that the compiler knows the step
+            for i in range(lanes):
+                packed[p + i] = position[c, y, x + two * i] * scale
+            for i in range(lanes):
+                packed[m + i] = -normal[c, y, x + two * i] * (area[y, x + two * i] * share)
+            for i in range(lanes):
+                packed[r + i] = radiance[c, y, x + two * i]
+        else:
+            for i in range(lanes):
+                packed[p + i] = position[c, y, i] * scale
+            for i in range(lanes):
+                packed[m + i] = -normal[c, y, i] * (area[y, i] * share)
+            for i in range(lanes):
+                packed[r + i] = radiance[c, y, i]
 
 
 @kernel
-def _count_lit(packed: Array, first: int, step: int, lit: Array) -> None:
+def _count_lit(packed: Array, first: Any, step: int, lit: Array) -> None:
     """Count the blocks of a line that hold any radiance, up to each."""
     zero = packed.dtype.type(0.0)
     lit[0] = 0

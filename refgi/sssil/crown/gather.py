@@ -15,13 +15,12 @@ from refgi.jit import kernel, prange
 from refgi.sssil.crown.add import ROWS, WIDE, add_two, close_group
 from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, pack
 from refgi.sssil.crown.pattern import (
-    PHASES,
     level_key,
     pixel_key,
     row_key,
-    row_offsets,
     sample_points,
     sample_weight,
+    shared_offsets,
     shift_of,
     shifted,
 )
@@ -66,42 +65,19 @@ def gather(level: Level, index: int, settings: HssilSettings) -> Array:
         emitters = pack(level, 1, math.ceil(2 * radius), WIDE)
         _gather_own(emitters, level.normal, points, inner, radius, key, weight.astype(real), disc, factor, result)
         return result
-    offsets, weight = shared_offsets(settings, index, level, radius)
+    offsets, weight = _reaching(*shared_offsets(settings, index, level.number, rows, radius), rows, columns)
     emitters = pack(level, offsets.shape[1], int(np.abs(offsets[..., 0]).max(initial=0)), WIDE)
     paired = settings.pattern != "row"
     _gather_shared(emitters, level.normal, offsets, weight.astype(real), paired, disc, factor, result)
     return result
 
 
-def shared_offsets(settings: HssilSettings, index: int, level: Level, radius: float) -> tuple[Array, Array]:
-    """Return samples by row and phase of receivers, without those that reach no texel.
-
-    Parameters
-    ----------
-    settings : HssilSettings
-        Says how many and of which pattern, and draws them.
-    index : int
-        0 for the first level.
-    level : Level
-        Receivers and senders.
-    radius : float
-        Inner radius of the crown, texels.
-
-    Returns
-    -------
-    offsets : (1 or h, phases, n, 2) ndarray of int32
-        Texels (ox, oy) from the receiver.
-    weight : (n,) ndarray of float64
-        Texels of the level that each sample stands for.
-    """
-    rows, columns = level.shape
-    phases = PHASES if settings.pattern == "row" else 1
-    of_phase = [row_offsets(settings, index, level.number, rows, radius, phase) for phase in range(phases)]
-    offsets, weight = np.stack([offsets for offsets, _ in of_phase], axis=1), of_phase[0][1]
-    if phases == 1:
-        near = (np.abs(offsets[0, 0]) < (columns, rows)).all(axis=1)
-        return offsets[:, :, near], weight[near]
-    return offsets, weight
+def _reaching(offsets: Array, weight: Array, rows: int, columns: int) -> tuple[Array, Array]:
+    """Return the samples without those that reach no texel from anywhere, where all receivers share one set."""
+    if offsets.shape[:2] != (1, 1):
+        return offsets, weight
+    near = (np.abs(offsets[0, 0]) < (columns, rows)).all(axis=1)
+    return offsets[:, :, near], weight[near]
 
 
 def level_factor(index: int, settings: HssilSettings) -> float:
@@ -191,7 +167,7 @@ def _list_lit(
     for j in range(weight.size):
         a, column = row + np.int64(offsets[j, 1]), phase + np.int64(offsets[j, 0])
         of, lane = column % phases, first + column // phases
-        found = 0 <= a < rows and 0 <= lane and lane + lanes <= line and not (offsets[j, 0] == 0 and offsets[j, 1] == 0)
+        found = 0 <= a < rows and lane >= 0 and lane + lanes <= line and not (offsets[j, 0] == 0 and offsets[j, 1] == 0)
         if found:
             found = lit[a, of, (lane + lanes - 1) // BLOCK + 1] > lit[a, of, lane // BLOCK]
         if found or paired:
@@ -232,7 +208,7 @@ def _gather_own(
             first = row * PLANES * line + pad + left
             _load(tile, strip, packed, line, first, normal, row, left, 1)
             for i in range(strip):
-                shifts[0, i], shifts[1, i], shifts[2, i] = shift_of(pixel_key(row_key(key, row), left + i))
+                shifts[0, i], shifts[1, i], shifts[2, i] = shift_of(pixel_key(row_key(key, row), left + i), 0)
             for j in range(0, weight.size, 2):
                 k = min(j + 1, weight.size - 1)
                 _expand(packed, line, first, row, rows, points, j, inner, radius, shifts, strip, lines, 0)

@@ -3,6 +3,10 @@
 Offsets are whole texels (ox, oy), columns to the right and rows down from the receiver. A point (u, v) of the unit
 square lies r sqrt(1 + 3 u) from it in the crown, r sqrt(u) in the disc within, at the angle 2 pi v: so that equal
 areas get equally many points. A point stands for the texel it falls into.
+
+Receivers of a row share samples with the pattern "row". Each row takes the stretch of one long Kronecker sequence that
+follows the row above, so that rows which upsampling mixes complement each other; a shift by a hash of seed and level
+makes the share of samples that a texel gets the share of the crown that it covers, for every receiver.
 """
 
 import math
@@ -21,13 +25,13 @@ Array = npt.NDArray[Any]
 # shares of the turn of a two-dimensional Kronecker sequence: 1 / g and 1 / g^2 where g^3 = g + 1
 FIRST_STEP, SECOND_STEP = 0.7548776662466927, 0.5698402909980532
 TO_UNIT = 2.0**-32
-PHASES = 4  # columns x, x + 4, x + 8, ... of a row share samples: rows that share all would show as streaks
+PHASES = 2  # even columns of a row share samples, and odd ones: rows that share all would show as streaks
 
 
 def row_offsets(
     settings: HssilSettings, index: int, number: int, rows: int, radius: float | None = None, phase: int = 0
 ) -> tuple[Array, Array]:
-    """Return the samples that receivers of a row share: every fourth one with the pattern "row".
+    """Return the samples that receivers of a row share: every second one with the pattern "row".
 
     Parameters
     ----------
@@ -58,17 +62,46 @@ def row_offsets(
         If every pixel has a pattern of its own, or no radius is known.
     """
     expect(settings.pattern != "pixel", "pattern", "one that receivers share", settings.pattern)
+    offsets, weight = shared_offsets(settings, index, number, rows, radius)
+    return offsets[:, min(phase, offsets.shape[1] - 1)], weight
+
+
+def shared_offsets(
+    settings: HssilSettings, index: int, number: int, rows: int, radius: float | None = None
+) -> tuple[Array, Array]:
+    """Return the samples that receivers share, by row and by column modulo 2.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        Says how many, of which pattern ("row", "fixed" or "all"), and draws them.
+    index : int
+        0 for the first level, whose inner disc is sampled as well.
+    number : int
+        Which level of the pyramid.
+    rows : int
+        How many rows there are.
+    radius : float, optional
+        Inner radius of the crown, texels; that of the settings unless given.
+
+    Returns
+    -------
+    offsets : (rows, PHASES, n, 2) ndarray of int32
+        Texels (ox, oy) from the receiver; (1, 1, n, 2) with "fixed" and "all".
+    weight : (n,) ndarray of float64
+        Texels of the level that each sample stands for.
+    """
     radius = known_radius(settings, radius)
     inner = settings.inner if index == 0 else 0
     if settings.pattern == "all":
-        offsets = _every_texel(0.0 if index == 0 else radius, 2.0 * radius)
-        return offsets[None], np.ones(len(offsets))
+        every = _every_texel(0.0 if index == 0 else radius, 2.0 * radius)
+        return every[None, None], np.ones(len(every))
     if settings.pattern == "fixed":
-        offsets, weight = _mirrored(settings, radius, inner, number)
-        return offsets[None], weight
+        mirrored, weight = _mirrored(settings, radius, inner, number)
+        return mirrored[None, None], weight
     points = sample_points(inner, settings.samples)
-    offsets = np.empty((rows, len(points), 2), np.int32)
-    _fill_rows(points, inner, radius, level_key(settings.seed, number), phase, offsets)
+    offsets = np.empty((rows, PHASES, len(points), 2), np.int32)
+    _fill_rows(points, inner, radius, level_key(settings.seed, number), offsets)
     return offsets, sample_weight(radius, inner, settings.samples)
 
 
@@ -224,21 +257,24 @@ def pixel_key(key: Any, column: Any) -> Any:
 
 
 @kernel
-def shift_of(key: Any) -> Any:
-    """Return how the common points are shifted for a receiver or a row (Cranley and Patterson 1976).
+def shift_of(key: Any, block: Any) -> Any:
+    """Return how the common points are shifted (Cranley and Patterson 1976).
 
     Parameters
     ----------
     key : uint32
         Draws the shift.
+    block : int
+        Points of the sequence to go ahead.
 
     Returns
     -------
     u, cosine, sine : float64
         What is added to u, modulo 1, and the turn that is added to the angle.
     """
-    angle = 2.0 * math.pi * TO_UNIT * hash_bits(key ^ np.uint32(0x27D4EB2F))
-    return hash_bits(key) * TO_UNIT, math.cos(angle), math.sin(angle)
+    u = (hash_bits(key) * TO_UNIT + block * FIRST_STEP) % 1.0
+    v = (hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT + block * SECOND_STEP) % 1.0
+    return u, math.cos(2.0 * math.pi * v), math.sin(2.0 * math.pi * v)
 
 
 @kernel
@@ -293,17 +329,21 @@ def pixel_offset(points: Array, inner: int, radius: float, key: Any, j: int) -> 
     ox, oy : int64
         Texels from the receiver.
     """
-    u, cosine, sine = shift_of(key)
+    u, cosine, sine = shift_of(key, 0)
     return shifted(points, j, 0.0 if j < inner else 1.0, radius, u, cosine, sine)
 
 
 @kernel
-def _fill_rows(points: Array, inner: int, radius: float, key: Any, phase: int, offsets: Array) -> None:
-    for row in range(offsets.shape[0]):
-        u, cosine, sine = shift_of(pixel_key(row_key(key, row), phase))
-        for j in range(offsets.shape[1]):
-            near = 0.0 if j < inner else 1.0
-            offsets[row, j, 0], offsets[row, j, 1] = shifted(points, j, near, radius, u, cosine, sine)
+def _fill_rows(points: Array, inner: int, radius: float, key: Any, offsets: Array) -> None:
+    rows, phases, count, _ = offsets.shape
+    for row in range(rows):
+        for phase in range(phases):
+            u, cosine, sine = shift_of(key, (row * phases + phase) * (count - inner))
+            here = offsets[row, phase]
+            for j in range(np.uint64(inner)):
+                here[j, 0], here[j, 1] = shifted(points, j, 0.0, radius, u, cosine, sine)
+            for j in range(np.uint64(inner), np.uint64(count)):
+                here[j, 0], here[j, 1] = shifted(points, j, 1.0, radius, u, cosine, sine)
 
 
 def _every_texel(low: float, high: float) -> Array:

@@ -67,7 +67,7 @@ def reach(settings: HssilSettings, radius: float) -> float:
     float
         Texels of the first level.
     """
-    return radius * float(2**settings.levels)
+    return radius * float(1 << settings.levels)
 
 
 def expect_reach(shape: tuple[int, int], settings: HssilSettings) -> None:

@@ -44,6 +44,9 @@ PAPERS = {
         Paper("val", "Real-time Indirect Illumination with Clustered Visibility",
               "Zhao Dong, Thorsten Grosch, Tobias Ritschel, Jan Kautz and Hans-Peter Seidel, VMV 2009",
               "refgi.papers.val"),
+        Paper("hssil", "Hierarchical Screen-Space Indirect Illumination For Video Games",
+              "Cyril Soler, Olivier Hoel, Franck Rochet, Frederic Jay and Nicolas Holzschuch, INRIA RR-7162, 2009",
+              "refgi.papers.hssil"),
     )
 }
 

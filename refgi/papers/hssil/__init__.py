@@ -6,6 +6,7 @@ approximations costs how much.
 """
 
 from refgi.papers.catalogue import Entry
+from refgi.papers.hssil.figure2 import figure2
 from refgi.papers.hssil.figure4 import figure4
 from refgi.papers.hssil.figure5 import figure5
 from refgi.papers.hssil.figure6 import figure6
@@ -17,6 +18,7 @@ from refgi.papers.hssil.splitting import splitting
 from refgi.papers.hssil.visible import visible
 
 FIGURES = (
+    Entry("fig2", "Figure 2", "Discs and crowns", figure2),
     Entry("fig4", "Figure 4", "Level by level", figure4),
     Entry("fig5", "Figure 5", "Point or disc, against path tracing", figure5),
     Entry("fig6", "Figure 6", "Times of five setups", figure6),

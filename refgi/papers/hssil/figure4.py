@@ -55,7 +55,7 @@ def figure4(bench: "Workbench") -> Figure:
         facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", "half resolution",
                f"radius {settings.radius:g} texels", f"{settings.samples} samples a level"),
         pictures=_pictures(frame, settings, parts), columns=3,
-        tables=(Table("Light by level", ("", "crown, pixels", "mean, W/m²", "% of six levels"),
+        tables=(Table("Light by level", ("", "from, pixels away", "to", "mean, W/m²", "% of six levels"),
                       tuple(_rows(frame, settings, parts))),),
         plots=(Plot(drawn(curves, Axes("pixel", "irradiance, W/m²")),
                     f"Luminance along row {row + 1}, level by level."),),
@@ -127,7 +127,7 @@ def _rows(frame: "Frame", settings: HssilSettings, parts: Parts) -> list[tuple[A
     rows = []
     for k, mean in enumerate(means):
         near, far = _crown(settings, k)
-        rows.append((f"level {k + 1}", f"{near:g} to {far:g}", mean, 100 * mean / total))
+        rows.append((f"level {k + 1}", near, far, mean, 100 * mean / total))
     return rows
 
 
@@ -137,9 +137,9 @@ def _notes(frame: "Frame", parts: Parts) -> tuple[str, ...]:
     total = sum(means) or 1.0
     share = [f"{100 * mean / total:.0f}" for mean in means]
     return (
-        f"Levels 1 to 6 hold {', '.join(share)} % of the light: the nearest level, which takes most of the time "
-        "(Figure 7), holds the light of edges and folds, the far ones that of the room.",
+        f"Levels 1 to 6 hold {', '.join(share)} % of the light here: the nearest level, which takes most of "
+        "the time (Figure 7), holds the light of edges and folds, the far ones that of the room.",
         f"The levels' pictures add up to the picture of all to {apart(parts):.1g} of its largest value: upsampling "
         "takes no light away and adds none, as the paper says, up to rounding.",
-        "In levels 2 and 3 the shape of the crown shows around the spot's disc, as in the paper: a receiver whose "
-        "crown has left the lit floor gets nothing from that level and all from the next.")
+        "In levels 2 and 3 the shape of the crown shows as an arc around the lit floor, as in the paper: a receiver "
+        "whose crown has left it gets nothing from that level, and all from the next.")

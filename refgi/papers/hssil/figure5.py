@@ -3,7 +3,6 @@
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import numpy.typing as npt
 
 from refgi.compare.maps import luminance
@@ -152,7 +151,8 @@ def _pictures(frame: "Frame", light: dict[str, Array], right: dict[str, Array], 
 def _marked(picture: Picture, row: int) -> Picture:
     """Draw the line that is plotted."""
     pixels = picture.pixels.copy()
-    pixels[row] = (pixels[row] + np.array((255.0, 60.0, 60.0))) / 2
+    thick = max(1, len(pixels) // 240)  # so that it is seen on a page, where pictures are small
+    pixels[row - thick // 2 : row - thick // 2 + thick] = (255, 60, 60)
     return dataclasses.replace(picture, pixels=pixels)
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from refgi.frame import Frame
 from refgi.papers import pictures
 from refgi.papers.curves import Axes, Curve, drawn
-from refgi.papers.hssil.subjects import HALL, SMALL, WIDE, expected_light, frame_of, lit, scene_of, smaller
+from refgi.papers.hssil.subjects import HALL, WIDE, expected_light, frame_of, lit, scene_of, smaller
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Plot, Table
 from refgi.papers.val.motion import changes
@@ -27,7 +27,7 @@ Array = npt.NDArray[Any]
 RAW, PRINTED, RECURSIVE = "each frame alone", "as printed", "recursive"
 WAYS = {RAW: None, PRINTED: TemporalSettings(form="printed"), RECURSIVE: TemporalSettings()}
 RESTING, MOVING = "resting camera", "moving camera"
-SAMPLES = 16  # few, so that there is noise to filter
+SIZE = 3 / 8  # of the run's: each frame is judged by the mean of many pictures
 WAY = (1.6, 0.1, 0.5)  # m: how far the camera moves in all
 
 
@@ -55,8 +55,8 @@ def filtered(bench: "Workbench") -> Figure:
         Noise frame by frame, beside what independent frames would give.
     """
     count = frame_count(bench)
-    frame = frame_of(bench, HALL, SMALL, wide=WIDE)
-    settings = smaller(frame, samples=SAMPLES)
+    frame = frame_of(bench, HALL, SIZE, wide=WIDE)
+    settings = smaller(frame)
     found = {motion: courses(bench, scenes, settings, frame) for motion, scenes in
              ((RESTING, [scene_of(bench, HALL)] * count), (MOVING, moved(scene_of(bench, HALL), count)))}
     rows = tuple((f"{motion}, {way}", one.noise[0], one.noise[-1], 100 * (one.noise[-1] / one.noise[0]) ** 2,
@@ -66,7 +66,8 @@ def filtered(bench: "Workbench") -> Figure:
         shows="Blending each frame with the one before, warped to the new camera, takes away noise at next to no cost. "
               "The paper has no figure of it.",
         facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", f"{count} frames",
-               f"half resolution, {settings.levels} levels, {SAMPLES} samples, new ones in each frame", "a = 0.9"),
+               "half resolution", f"{settings.levels} levels", f"{settings.samples} samples, others in each frame",
+               "a = 0.9"),
         pictures=_pictures(frame, found, settings), columns=3,
         tables=(Table(f"Noise in % of the mean, against the mean of {bench.scale.truth_samples} pictures with other "
                       "samples; flicker: how it changes from frame to frame", (
@@ -201,6 +202,7 @@ def _notes(found: dict[str, dict[str, Course]]) -> tuple[str, ...]:
     a, frames = TemporalSettings().weight, len(found[RESTING][RAW].noise)
     expected = 100 * left(a, frames)[-1]
     share = [ways[RECURSIVE].share for ways in found.values()]
+    least, most = min(share), max(share)
     calm = found[MOVING][RAW].change / max(found[MOVING][RECURSIVE].change, 1e-30)
     return (
         f"With a resting camera {kept(RESTING, RECURSIVE):.0f} % of the variance is left after {frames} frames of the "
@@ -210,5 +212,5 @@ def _notes(found: dict[str, dict[str, Course]]) -> tuple[str, ...]:
         f"With a moving camera {kept(MOVING, RECURSIVE):.0f} % is left, {100 * found[MOVING][RECURSIVE].reused:.0f} % "
         f"of the pixels are found again in the frame before, and flicker falls to 1 / {calm:.1f}; some "
         "light went along with the view from where it looked different.",
-        f"Beside the {SAMPLES} samples of so small a picture the filter takes {min(share):.0f} to {max(share):.0f} % "
-        "of the time; the paper calls its cost negligible and does not print it.")
+        f"The filter takes {least:.0f} to {most:.0f} % of the time of so small a picture's indirect "
+        "light; the paper calls its cost negligible and does not print it.")

@@ -21,7 +21,7 @@ SOIL = Material("soil", (0.16, 0.11, 0.07))
 PAVING = Material("paving", (0.55, 0.54, 0.52))
 BASKET_SIZE = (1.5, 0.7, 0.5)  # m: along x, y, z
 BASKET_CAMERA = Camera((0.25, 1.3, 3.4), (0.0, 0.62, -0.3), vfov=math.radians(36))
-SIDE_EYES = ((1.9, 0.9, -0.95), (-1.9, 0.9, -0.95))  # m: beside the basket, in front of the wall
+SIDE_EYES = ((2.6, 1.2, -1.0), (-2.6, 1.2, -1.0))  # m: beside the basket, in front of the wall
 
 
 def hall_with_spot() -> Scene:
@@ -47,11 +47,11 @@ def basket() -> Scene:
     Scene
         About 21 thousand faces, 4 materials.
     """
-    pieces = [rectangle((-4.0, 0.0, 4.0), (8.0, 0.0, 0.0), (0.0, 0.0, -5.1), PAVING, "paving", (8, 8)),
-              rectangle((-4.0, 0.0, -1.1), (8.0, 0.0, 0.0), (0.0, 3.0, 0.0), WALL, "wall", (8, 4)),
+    pieces = [rectangle((-4.0, 0.0, 4.0), (8.0, 0.0, 0.0), (0.0, 0.0, -5.7), PAVING, "paving", (8, 8)),
+              rectangle((-4.0, 0.0, -1.7), (8.0, 0.0, 0.0), (0.0, 3.0, 0.0), WALL, "wall", (8, 4)),
               *_trough(), *(_bush(x) for x in (-0.47, 0.0, 0.47))]
     geometry, materials = merge(pieces, smooth=True)
-    lamp = SpotLight((2.0, 0.8, -0.98), (-1.7, -0.4, 0.73), math.radians(5.5), math.radians(8), (44.0, 41.0, 36.0))
+    lamp = SpotLight((2.0, 0.8, -1.45), (-1.9, -0.4, 1.2), math.radians(6), math.radians(9), (44.0, 41.0, 36.0))
     street = SpotLight((-2.4, 3.2, 2.4), (2.2, -3.0, -2.2), math.radians(14), math.radians(26), (2.2, 2.3, 2.6))
     return Scene("basket", geometry, materials, BASKET_CAMERA, (lamp, street),
                  "A plant basket before a wall; a spot lights its far side, another one dimly its front.", exposure=2.0)
@@ -65,7 +65,7 @@ def side_views() -> tuple[Camera, ...]:
     tuple of Camera
         From its right and from its left.
     """
-    return tuple(Camera(eye, (0.0, 0.4, -0.5), vfov=math.radians(62)) for eye in SIDE_EYES)
+    return tuple(Camera(eye, (0.0, 0.7, -0.9), vfov=math.radians(62)) for eye in SIDE_EYES)
 
 
 def _trough() -> list[Mesh]:

@@ -3,7 +3,7 @@
 from refgi.sssil.pyramid.memory import level_bytes
 from refgi.sssil.settings import HssilSettings
 
-PACKED_FLOATS = 15  # of a texel of the level that is summed: senders as the kernels read them, its light, and that below
+PACKED_FLOATS = 15  # of a texel of the level that is summed: senders as kernels read them, its light and that below
 VIEW_FLOATS = 32  # of a pixel of a further view: its G-buffer, direct and indirect light, and temporaries
 RAY_BYTES = 1 << 26  # rays that are held at a time
 

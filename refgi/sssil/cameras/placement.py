@@ -45,15 +45,16 @@ def placed_cameras(frame: Frame, count: int) -> tuple[Camera, ...]:
     -----
     The paper leaves the choice open. A camera lights receiver i by E_i = sum of T_ij over the lit points j it sees, if
     it sees i as well; cameras are joined by the maximum, so a candidate's gain is the sum of max(0, E_i - best_i) over
-    the picture, where best_i is what the frame's camera and those chosen so far give. T_ij heeds what blocks light,
-    so that no camera is placed to see what only shines through walls. Eyes lie on free lines from the middle of a free
-    segment between a surface that the picture shows and a lit point: never inside a wall. Nothing is random.
+    the picture, where best_i is what the frame's camera and those chosen so far give. Of a candidate, points count by
+    how well it shows them (`sight`); of the frame's camera, fully. T_ij heeds what blocks light, so that no camera is
+    placed to see what only shines through walls. Eyes lie on free lines from the middle of a free segment between a
+    surface that the picture shows and a lit point: never inside a wall. Nothing is random.
     """
     tracer, diagonal = frame.tracer, frame.scene.geometry.diagonal
     to, (lit, flux) = seen_points(frame), lit_points(frame)
     passing = transport(tracer, to, lit, flux, NEAREST * diagonal)
-    shown = sight(tracer, _own_view(frame), lit, COARSEST * diagonal)
-    missed, least = passing * (1 - shown), LEAST_GAIN * float(passing.sum())
+    shown = sight(tracer, _own_view(frame), lit, COARSEST * diagonal) > 0
+    missed, least = passing * ~shown, LEAST_GAIN * float(passing.sum())
     if not float(missed.sum()) > least:
         skip("sssil.cameras", "the picture shows what lights it")
         return ()

@@ -1,0 +1,154 @@
+"""Light from further cameras comes back where it was missing, never takes any away and never makes too much."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.frame import Frame
+from refgi.jit import threads
+from refgi.scene import load_scene
+from refgi.scene.model import Camera
+from refgi.sssil import HssilSettings
+from refgi.sssil.cameras.placement import placed_cameras
+from refgi.sssil.cameras.several import seen_by, several_cameras
+from refgi.sssil.hssil import hssil
+from refgi.stages import observe
+from tests.sssil.cameras.hidden_side import SIDE_VIEW, from_the_lit_side, hidden_side
+
+# every pixel sends to every other: what is left is the pixels' size. Depth changes by up to 5 % from one pixel of so
+# small a picture to the next, where it looks along a surface.
+BRUTE = {"levels": 1, "start": "full", "pattern": "all", "radius": None, "form_factor": "point",
+         "depth_tolerance": 0.1}
+PIXELS = 0.06  # those of the further view are 3 cm long on the lit disc of 80 cm, and up to 40 cm on the wall's far end
+FACETS = 0.01  # of the sphere, and of its pixels
+QUICK = {"levels": 3, "samples": 8, "radius": None}
+
+
+@pytest.fixture(scope="module")
+def basket():
+    return Frame(hidden_side(), shadows="exact")
+
+
+@pytest.fixture(scope="module")
+def exact(basket):
+    return from_the_lit_side(*(plane.astype(float) for plane in basket.gbuffer.resolve("position", "normal")))
+
+
+def on_the_wall(frame):
+    """Return pixels of the wall off its edges, where light has no steps."""
+    x, y, z = frame.gbuffer.position
+    return (z < -1.99) & (np.abs(x) < 1.8) & (y > 0.25) & (y < 2.3)
+
+
+@pytest.mark.feature("HSS-15")
+def test_light_of_a_side_that_the_camera_does_not_see_comes_back(basket, exact, evidence):
+    """Analytic (Fig. 9): one camera finds none at all, a view from the side what quadrature gives."""
+    assert not hssil(basket, HssilSettings(**BRUTE)).any()
+    found = hssil(basket, HssilSettings(views=(SIDE_VIEW,), **BRUTE))
+    wall = on_the_wall(basket)
+    assert (found[0, wall] > 0).mean() > 0.7
+    near = wall & (found[0] > 0) & (basket.gbuffer.position[0] > 0)  # where the view from the side is not a grazing one
+    ratio = found[0, near] / exact[0, near]
+    assert abs(ratio - 1).max() < PIXELS
+    over = (found - exact)[:, wall].max() / exact.max()
+    assert over < PIXELS
+    evidence(f"Fig. 9: 0 with one camera; with a side view {ratio.min():.3f} to {ratio.max():.3f} of the closed form "
+             f"near it, nowhere more above it than {over:.3f} of the brightest")
+
+
+@pytest.mark.feature("HSS-15")
+def test_placed_cameras_bring_it_back_by_themselves(basket, exact, evidence):
+    """Analytic: two cameras bring four fifths of all the light, nowhere more than there is."""
+    frames = [Frame(basket.scene, shadows="exact"), basket]
+    shares = []
+    for cameras, frame in zip((1, 2), frames, strict=True):
+        found = hssil(frame, HssilSettings(cameras=cameras, **BRUTE))
+        shares.append(found.sum() / exact.sum())
+        assert (found - exact)[:, on_the_wall(frame)].max() < PIXELS * exact.max()
+    assert shares[0] > 0.4
+    assert shares[1] > 0.8
+    evidence(f"Fig. 9: {shares[0]:.2f} of the light by one placed camera, {shares[1]:.2f} by two")
+
+
+@pytest.mark.feature("HSS-15")
+def test_it_is_never_darker_than_one_camera(evidence):
+    """Property: to the bit, in every pixel and channel, for a noisy pattern as well."""
+    frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
+    one = hssil(frame, HssilSettings(**QUICK))
+    more = hssil(frame, HssilSettings(cameras=2, **QUICK))
+    assert (more >= one).all()
+    assert more.sum() > 1.01 * one.sum()
+    evidence(f"Cornell box: nowhere darker to the bit, {more.sum() / one.sum():.3f} times the light by two more")
+
+
+@pytest.mark.feature("HSS-15")
+def test_it_is_never_above_what_all_surfaces_send(evidence):
+    """Analytic: inside a sphere all surfaces together light every point alike, a camera sees a part of them."""
+    scene = load_scene("integrating_sphere:faces=2000").with_camera(eye=(0, 0.1, 0.3), target=(-0.3, -1, -0.3))
+    frame = Frame(scene, width=48, height=48, shadows="exact")
+    light, inner, outer = scene.lights[0], math.cos(math.radians(20)), math.cos(math.radians(32))
+    flux = light.intensity[0] * 2 * math.pi * (1 - inner + (inner - outer) / 2)  # the falloff's mean is 1/2
+    whole = 0.5 * flux / (4 * math.pi)  # albedo Phi / (4 pi R^2)
+    one, more = (hssil(frame, HssilSettings(cameras=cameras, **BRUTE)).mean() / whole for cameras in (0, 2))
+    highest = hssil(frame, HssilSettings(cameras=2, **BRUTE)).max() / whole
+    assert one < 0.2
+    assert more > 0.9
+    assert highest < 1 + FACETS
+    evidence(f"sphere: {one:.3f} of all by one camera, {more:.3f} with two placed ones, at most {highest:.3f}")
+
+
+def test_the_camera_itself_as_a_further_view_changes_nothing():
+    """Property: each point is found where it is, to the bit."""
+    frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
+    np.testing.assert_array_equal(hssil(frame, HssilSettings(views=(frame.scene.camera,), **QUICK)),
+                                  hssil(frame, HssilSettings(**QUICK)))
+
+
+def test_the_largest_counts_not_the_last():
+    """Property: views in any order, and a view twice, give the same."""
+    frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
+    views = placed_cameras(frame, 2)
+    assert len(views) == 2
+    first, second, twice = (hssil(frame, HssilSettings(views=given, **QUICK))
+                            for given in (views, views[::-1], (*views, views[0])))
+    np.testing.assert_array_equal(first, second)
+    np.testing.assert_array_equal(first, twice)
+
+
+def test_views_of_a_scene_far_from_the_origin_are_moved_with_it(basket):
+    """Property: 2^14 m off, where float32 would have no places left; to the bit."""
+    far = np.array((2.0**14, 0.0, -(2.0**14)))
+    frame = Frame(hidden_side(shift=far), shadows="exact")
+    assert any(frame.origin)
+    view = Camera(tuple(far + SIDE_VIEW.eye), tuple(far + SIDE_VIEW.target), vfov=SIDE_VIEW.vfov)
+    near = hssil(basket, HssilSettings(views=(SIDE_VIEW,), **BRUTE))
+    np.testing.assert_array_equal(hssil(frame, HssilSettings(views=(view,), **BRUTE)), near)
+
+
+def test_maps_and_rays_are_shared_and_the_picture_is_as_large():
+    frame = Frame(load_scene("cornell_box"), width=21, height=13, rsm_resolution=64)
+    with observe() as log:
+        hssil(frame, HssilSettings(views=(Camera((0.2, 0.2, -0.5), (0.3, 0.2, 0.5), width=99),), **QUICK))
+    assert log.status("rsm.reflective_shadow_map") == ["ran"]
+    assert log.status("rsm.gbuffer") == ["ran", "ran"]
+    other = seen_by(frame, frame.scene.camera)
+    assert other.rsms is frame.rsms
+    assert (other.width, other.height, other.rsm_resolution) == (21, 13, 64)
+
+
+def test_the_light_given_is_left_as_it_was():
+    frame = Frame(load_scene("cornell_box"), width=9, height=7, rsm_resolution=64)
+    light = np.zeros((3, 7, 9), np.float32)
+    joined = several_cameras(frame, light, HssilSettings(views=(frame.scene.camera,)), lambda *_: light + 1)
+    assert not light.any()
+    assert (joined == frame.gbuffer.covered).all()
+
+
+def test_bits_do_not_depend_on_the_number_of_threads():
+    pictures = []
+    for count in (1, 2):
+        with threads(count):
+            frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
+            pictures.append(hssil(frame, HssilSettings(cameras=1, **QUICK)))
+    np.testing.assert_array_equal(*pictures)

@@ -21,7 +21,7 @@ BAND = 16  # rows of texels of a block
 @kernel(parallel=True)
 def fill_bilateral(
     light: Array, below_depth: Array, below_normal: Array, depth: Array, normal: Array, factor: int, sharpness: Any,
-    lean: Any, power: Any, added: Array | None, result: Array,
+    lean: Any, power: Any, added: Array, adds: bool, result: Array,
 ) -> None:
     """Carry irradiance of texels over to pixels of the same surface.
 
@@ -37,8 +37,10 @@ def fill_bilateral(
         Pixels along a texel's side.
     sharpness, lean, power : float
         Of `load_receivers` and `alike`; power may be None.
-    added : (3, h, w) ndarray or None
+    added : (3, h, w) ndarray
         Irradiance that is added where a surface is seen, W/m^2.
+    adds : bool
+        Whether it is.
     result : (3, h, w) ndarray
         Filled.
     """
@@ -49,36 +51,35 @@ def fill_bilateral(
     for task in prange(across * bands):
         left, first = np.int64(task) % across * WIDE, np.int64(task) // across * BAND
         _fill_block(light, below_depth, below_normal, depth, normal, left, first, tents, sharpness, lean, power, added,
-                    result)
+                    adds, result)
 
 
 @kernel
 def _fill_block(
     light: Array, below_depth: Array, below_normal: Array, depth: Array, normal: Array, left: int, first: int,
-    tents: Array, sharpness: Any, lean: Any, power: Any, added: Array | None, result: Array,
+    tents: Array, sharpness: Any, lean: Any, power: Any, added: Array, adds: bool, result: Array,
 ) -> None:
     texels, near = np.zeros((3, lines.LINES), depth.dtype), np.zeros((3, SPAN), depth.dtype)
     here, means = np.zeros(receivers.HERE, depth.dtype), np.zeros(weights.MEANS, depth.dtype)
     room, side = np.zeros((7, lines.ROOM), depth.dtype), len(tents)
-    for row in range(first - 1, first + 1):
-        lines.load_texels(light, below_depth, below_normal, row, left, side, room, texels[(row + 3) % 3])
-    for y in range(first * side - 1, first * side + 1):
-        receivers.load_nearness(depth, y, left, near[(y + 3) % 3])
-    for row in range(first, min(first + BAND, below_depth.shape[0])):
-        lines.load_texels(light, below_depth, below_normal, row + 1, left, side, room, texels[(row + 1) % 3])
-        for y in range(row * side, min((row + 1) * side, depth.shape[0])):
-            tent = tents[y % side]
-            receivers.load_nearness(depth, y + 1, left, near[(y + 1) % 3])
+    # two rows of texels and two of pixels are loaded before the first that is filled
+    for y in range((first - 2) * side, min((first + BAND) * side, depth.shape[0])):
+        row, tent = y // side, tents[y % side]
+        if y % side == 0:
+            lines.load_texels(light, below_depth, below_normal, row + 1, left, side, room, texels[(row + 4) % 3])
+        if y >= first * side - 2:
+            receivers.load_nearness(depth, y + 1, left, near[(y + 4) % 3])
+        if y >= first * side:
             receivers.load_receivers(normal, y, left, side, sharpness, lean, near[(y + 2) % 3], near[y % 3],
                                      near[(y + 1) % 3], tent[OFFSET:], here)
             weights.average(texels[(row + 2) % 3], texels[row % 3], texels[(row + 1) % 3], here, tent, power, means)
-            _store(texels, row, y, left, here, means, side, added, result)
+            _store(texels, row, y, left, here, means, side, added, adds, result)
 
 
 @kernel
 def _store(
-    texels: Array, row: int, y: int, left: int, here: Array, means: Array, factor: int, added: Array | None,
-    result: Array,
+    texels: Array, row: int, y: int, left: int, here: Array, means: Array, factor: int, added: Array,
+    adds: bool, result: Array,
 ) -> None:
     real = means.dtype.type
     zero, least = real(0.0), real(weights.LEAST)
@@ -93,7 +94,7 @@ def _store(
         line = np.uint64(c * SPAN)
         for i in range(size):
             value = means[line + i]
-            if added is not None:
+            if adds:
                 value = value + added[c, y, start + i]
             result[c, y, start + i] = value if here[np.uint64(receivers.SCALE) + i] > zero else zero
 

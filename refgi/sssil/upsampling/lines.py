@@ -14,7 +14,7 @@ from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
 
-WIDE, PAD = 128, 32  # pixels of a block along a row, and the most that a texel beside it may have
+WIDE, PAD = 320, 32  # pixels of a block along a row, and the most that a texel beside it may have
 SPAN = WIDE + 16  # places of a line: an odd number of cache lines
 LIGHT, NORMAL, NEARNESS, SET = 0, 3 * SPAN, 6 * SPAN, 7 * SPAN  # of a set: three lines, three, one
 LEFT, OWN, RIGHT, LINES = 0, SET, 2 * SET, 3 * SET

@@ -12,7 +12,8 @@ Array = npt.NDArray[Any]
 
 @kernel(parallel=True)
 def fill_plain(
-    light: Array, below_depth: Array, depth: Array, factor: int, nearest: bool, added: Array | None, result: Array
+    light: Array, below_depth: Array, depth: Array, factor: int, nearest: bool, added: Array, adds: bool,
+    result: Array,
 ) -> None:
     """Carry irradiance of texels over to pixels, whatever they see.
 
@@ -28,28 +29,30 @@ def fill_plain(
         Pixels along a texel's side.
     nearest : bool
         Take a pixel's own texel instead of the bilinear mean of four.
-    added : (3, h, w) ndarray or None
+    added : (3, h, w) ndarray
         Irradiance that is added where a surface is seen, W/m^2.
+    adds : bool
+        Whether it is.
     result : (3, h, w) ndarray
         Filled.
     """
-    height, width = depth.shape
+    width = depth.shape[1]
     real = depth.dtype.type
     infinite, zero = real(np.inf), real(0.0)
-    for row in prange(height):
+    for row in prange(depth.shape[0]):
         y = np.int64(row)
         for x in range(width):
             seen = depth[y, x] < infinite
             weights = _weights(below_depth, y, x, factor, nearest)
             for c in range(3):
                 value = _mean(light, c, y, x, factor, weights) if seen else zero
-                if added is not None:
+                if adds:
                     value = value + (added[c, y, x] if seen else zero)
                 result[c, y, x] = value
 
 
 @kernel
-def _weights(below_depth: Array, y: int, x: int, factor: int, nearest: bool) -> Any:
+def _weights(below_depth: Array, y: Any, x: int, factor: int, nearest: bool) -> Any:
     """Return the weights of own texel, row's neighbour, column's neighbour and both's; their sum is 1 or 0."""
     real = below_depth.dtype.type
     one = real(1.0)
@@ -64,7 +67,7 @@ def _weights(below_depth: Array, y: int, x: int, factor: int, nearest: bool) -> 
 
 
 @kernel
-def _mean(light: Array, c: int, y: int, x: int, factor: int, weights: Any) -> Any:
+def _mean(light: Array, c: int, y: Any, x: int, factor: int, weights: Any) -> Any:
     zero = light.dtype.type(0.0)
     own, row, column, both = weights
     i, j, ni, nj = x // factor, y // factor, x // factor + _side(x, factor), y // factor + _side(y, factor)

@@ -76,15 +76,17 @@ def upsample(
                                ("added", more, (3, *depth.shape))):
         expect(array is None or array.shape == shape, name, f"shape {shape}", array is not None and array.shape)
     result = plane((3, *depth.shape), dtype)
+    adds, more = (False, result) if more is None else (True, more)
     if settings.upsampling != "bilateral":
-        fill_plain(values, below_depth, depth, factor, settings.upsampling == "nearest", more, result)
+        fill_plain(values, below_depth, depth, factor, settings.upsampling == "nearest", more, adds, result)
         return result
     real = dtype.type
     sharpness = real(1.0 / (4.0 * math.sqrt(2.0) * settings.depth_sigma))
     # the closest of F x F pixels of a slope is at a corner of the texel
     lean = real(0.0 if settings.downsample == "average" else (factor - 1) / (2 * factor))
     power = None if settings.normal_power == QUICK_POWER else real(settings.normal_power)
-    fill_bilateral(values, below_depth, below_normal, depth, normal, factor, sharpness, lean, power, more, result)
+    fill_bilateral(values, below_depth, below_normal, depth, normal, factor, sharpness, lean, power, more, adds,
+                   result)
     return result
 
 

@@ -106,9 +106,9 @@ def temporal_filter(
                             depth_tolerance=settings.depth_tolerance, normal_cosine=settings.normal_cosine,
                             fetch=settings.fetch)
     real = irradiance.dtype.type
-    reused = int(np.count_nonzero(weight)) / max(1, int(np.count_nonzero(buffer.covered)))
-    _blend(irradiance, speed, real(settings.weight), real(-math.log2(math.e) / settings.speed), weight, found)
-    return Filtered(found, reused)
+    reused = np.empty(len(weight), np.int64)  # pixels of each row
+    _blend(irradiance, speed, real(settings.weight), real(-math.log2(math.e) / settings.speed), weight, found, reused)
+    return Filtered(found, int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))))
 
 
 def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
@@ -136,11 +136,15 @@ def _at(geometry: Geometry, origin: tuple[float, float, float]) -> Geometry:
 
 @kernel(parallel=True)
 def _blend(
-    irradiance: Array, speed: Array | None, a: float, falloff: float, weight: Array, blended: Array
+    irradiance: Array, speed: Array | None, a: float, falloff: float, weight: Array, blended: Array, reused: Array
 ) -> None:
     """Turn W(F_{i-1}) into F_i and its weight into a; differences, so that equal light stays as it is, to the bit."""
     none = weight.dtype.type(0)
     for row in prange(weight.shape[0]):
+        count = 0
+        for column in range(weight.shape[1]):
+            count += weight[row, column] > none
+        reused[row] = count
         for column in range(weight.shape[1]):
             share = a if weight[row, column] > none else none
             if speed is not None:

@@ -1,12 +1,14 @@
 """`--set key=value`: text checked against a settings dataclass, all errors at once."""
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any, get_args, get_type_hints
 
 from refgi.errors import InputError
 from refgi.scene.files import did_you_mean
+from refgi.scene.values import is_number
 
 ABSENT = frozenset({"none", "null", ""})
 
@@ -95,9 +97,9 @@ def _unknown(key: str, known: list[str], owner: str) -> str:
 
 
 def _read(values: dict[str, Any], key: str, text: str, hint: Any) -> str | None:
-    from pydantic import TypeAdapter, ValidationError
+    from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-    adapter = TypeAdapter(hint)
+    adapter = TypeAdapter(hint, config=ConfigDict(extra="forbid"))
     first: ValidationError | None = None
     for candidate in _candidates(text, hint):
         try:
@@ -107,21 +109,31 @@ def _read(values: dict[str, Any], key: str, text: str, hint: Any) -> str | None:
         else:
             return None
     assert first is not None
-    reasons = dict.fromkeys(error["msg"][:1].lower() + error["msg"][1:] for error in first.errors()
-                            if error["type"] != "none_required")
+    reasons = dict.fromkeys(_reason(error) for error in first.errors() if error["type"] != "none_required")
     return f"{key}: {' or '.join(reasons)}, got {text!r}"
+
+
+def _reason(error: Any) -> str:
+    of = f"{error['loc'][-1]}: " if error["type"] in ("missing", "unexpected_keyword_argument") else ""
+    text = error["msg"].removeprefix("Value error, ")
+    return f"{of}{text[:1].lower()}{text[1:]}"
 
 
 def _candidates(text: str, hint: Any) -> list[Any]:
     """Return what a text may stand for: None, itself, JSON, a list with commas."""
     if text.lower() in ABSENT and type(None) in get_args(hint):
         return [None]
-    candidates: list[Any] = [text]
     try:
-        candidates.append(json.loads(text))
+        read = json.loads(text, object_hook=_in_radians)
     except ValueError:
-        candidates.append([part.strip() for part in text.split(",") if part.strip()])
-    return candidates
+        return [text, [part.strip() for part in text.split(",") if part.strip()]]
+    return [read, text] if isinstance(read, list | dict) else [text, read]  # what was meant is tried, and blamed, first
+
+
+def _in_radians(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an object with its angles in radians: `vfov_deg`, as in a scene file, is a camera's `vfov`."""
+    return {key.removesuffix("_deg"): math.radians(value) if key.endswith("_deg") and is_number(value) else value
+            for key, value in entry.items()}
 
 
 def _make(wanted: type, values: Mapping[str, Any]) -> tuple[Any, list[str]]:

@@ -25,8 +25,8 @@ def hidden_side(width=96, height=64, shift=(0.0, 0.0, 0.0)):
              ((-0.5, 1, 0.4), (1, 0, 0), (0, 0, -0.8), red)]
     geometry, materials = merge([rectangle(tuple(move + corner), a, b, material, "side")
                                  for corner, a, b, material in sides])
-    camera = Camera(tuple(move + (0, 1.1, 5)), tuple(move + (0, 0.8, 0)), vfov=math.radians(40), width=width,
-                    height=height)
+    camera = Camera(tuple(np.add(move, (0, 1.1, 5))), tuple(np.add(move, (0, 0.8, 0))), vfov=math.radians(40),
+                    width=width, height=height)
     light = SpotLight(tuple(move + LIGHT), (0, 0, 1), HALF_ANGLE, HALF_ANGLE, (INTENSITY,) * 3)
     return Scene("hidden_side", geometry, materials, camera, (light,))
 

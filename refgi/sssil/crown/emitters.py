@@ -84,17 +84,23 @@ def _pack(
     position: Array, normal: Array, radiance: Array, area: Array, phases: int, line: int, pad: int, scale: Any,
     share: Any, packed: Array, lit: Array,
 ) -> None:
-    rows = area.shape[0]
-    for y in prange(rows + 1):
-        row = np.int64(y)
-        start = row * PLANES * phases * line
-        packed[start : start + PLANES * phases * line] = 0
-        if row < rows:
-            for phase in range(phases):
-                _pack_line(position, normal, radiance, area, row, phase, phases, start + phase * line + pad,
-                           phases * line, scale, share, packed)
-        for phase in range(phases):
-            _count_lit(packed, start + phase * line, phases * line, lit[row, phase])
+    for row in prange(area.shape[0] + 1):
+        _pack_row(position, normal, radiance, area, np.int64(row), phases, line, pad, scale, share, packed, lit)
+
+
+@kernel
+def _pack_row(
+    position: Array, normal: Array, radiance: Array, area: Array, row: Any, phases: int, line: int, pad: int,
+    scale: Any, share: Any, packed: Array, lit: Array,
+) -> None:
+    start, step, zero = row * PLANES * phases * line, phases * line, packed.dtype.type(0.0)
+    for i in range(np.uint64(start), np.uint64(start + PLANES * step)):
+        packed[i] = zero
+    for phase in range(phases):
+        if row < area.shape[0]:
+            _pack_line(position, normal, radiance, area, row, phase, phases, start + phase * line + pad, step, scale,
+                       share, packed)
+        _count_lit(packed, start + phase * line, step, row, phase, lit)
 
 
 @kernel
@@ -124,14 +130,16 @@ def _pack_line(
 
 
 @kernel
-def _count_lit(packed: Array, first: Any, step: int, lit: Array) -> None:
+def _count_lit(packed: Array, first: Any, step: int, row: Any, phase: int, lit: Array) -> None:
     """Count the blocks of a line that hold any radiance, up to each."""
     zero = packed.dtype.type(0.0)
-    lit[0] = 0
-    for block in range(lit.size - 1):
+    count = 0
+    lit[row, phase, 0] = 0
+    for block in range(lit.shape[2] - 1):
         most = zero
         for c in range(6, 9):
-            here = first + c * step + block * BLOCK
-            for i in range(here, here + BLOCK):
-                most = most if most > packed[i] else packed[i]
-        lit[block + 1] = lit[block] + (1 if most > zero else 0)
+            here = np.uint64(first + c * step + block * BLOCK)
+            for i in range(np.uint64(BLOCK)):
+                most = most if most > packed[here + i] else packed[here + i]
+        count += 1 if most > zero else 0
+        lit[row, phase, block + 1] = count

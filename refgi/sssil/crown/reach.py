@@ -49,7 +49,7 @@ def covering_radius(shape: tuple[int, int], levels: int) -> float:
     >>> covering_radius((300, 400), 4)
     31.25
     """
-    return max(1.0, math.hypot(*shape) / 2**levels)
+    return max(1.0, math.hypot(*shape) / float(1 << levels))
 
 
 def reach(settings: HssilSettings, radius: float) -> float:

@@ -1,0 +1,225 @@
+"""Sums over samples: against loops written from the paper, and what they must keep whatever the numbers."""
+
+import dataclasses
+import math
+
+import numba
+import numpy as np
+import pytest
+
+from refgi.jit import threads
+from refgi.sssil.crown.gather import gather
+from refgi.sssil.crown.pattern import offsets_at, row_offsets, sample_weight
+from refgi.sssil.level import Level
+from refgi.sssil.settings import HssilSettings
+from tests.naive import crown as naive
+
+SETTINGS = HssilSettings(radius=3.3, samples=9, levels=2)
+# of the largest value: terms of a sum of up to 200, each with a dozen roundings
+ROUNDING = {np.float64: 4e-15, np.float32: 2e-6}
+
+
+def random_level(shape, dtype=np.float64, seed=0, background=0.2, number=1):
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=(3, *shape))
+    position, radiance, area = rng.normal(size=(3, *shape)), rng.random((3, *shape)), 0.01 * rng.random(shape)
+    seen = rng.random(shape) >= background
+    planes = (position * seen, np.where(seen, 1.0 + rng.random(shape), np.inf),
+              normal / np.linalg.norm(normal, axis=0) * seen, radiance * seen, area * seen)
+    pixel = np.where(seen, np.arange(seen.size).reshape(shape), -1).astype(np.int32)
+    return Level(number, *(np.ascontiguousarray(plane, dtype) for plane in planes), pixel)
+
+
+def weights(settings, index):
+    if settings.pattern == "pixel":
+        return sample_weight(settings.radius, settings.inner if index == 0 else 0, settings.samples)
+    return row_offsets(settings, index, 1, 1)[1]
+
+
+@pytest.mark.parametrize("form", ["disc", "point"])
+@pytest.mark.parametrize("pattern", ["row", "fixed", "all", "pixel"])
+def test_equals_the_sum_written_as_loops(pattern, form):
+    """Oracle: every pattern and form, float64, first level and a later one, odd sizes."""
+    for shape, index in (((7, 11), 0), ((9, 6), 1)):
+        level = random_level(shape, seed=index)
+        settings = dataclasses.replace(SETTINGS, pattern=pattern, form_factor=form)
+        expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
+                                  lambda row, column, s=settings, i=index: offsets_at(s, i, 1, row, column),
+                                  weights(settings, index), form)
+        assert expected.max() > 0
+        np.testing.assert_allclose(gather(level, index, settings), expected, rtol=0,
+                                   atol=ROUNDING[np.float64] * expected.max())
+
+
+def test_single_precision_rounds_and_no_more():
+    """Oracle: float32 against the loops on the same numbers; several strips of lanes, some of them dark."""
+    level = random_level((5, 700), np.float32)
+    level.radiance[:, :, 100:500] = 0
+    settings = dataclasses.replace(SETTINGS, samples=4)
+    expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
+                              lambda row, column: offsets_at(settings, 0, 1, row, column), weights(settings, 0), "disc")
+    found = gather(level, 0, settings)
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING[np.float32] * expected.max())
+
+
+@pytest.mark.parametrize("pattern", ["row", "pixel"])
+def test_same_bits_for_any_number_of_threads(pattern):
+    """Property: one thread and all of them."""
+    level, settings = random_level((70, 33), np.float32), dataclasses.replace(SETTINGS, pattern=pattern)
+    found = gather(level, 0, settings)
+    with threads(1):
+        np.testing.assert_array_equal(gather(level, 0, settings), found)
+    assert numba.get_num_threads() >= 1
+
+
+@pytest.mark.feature("HSS-10")
+@pytest.mark.parametrize("pattern", ["fixed", "all"])
+def test_a_mirrored_level_receives_mirrored_light(pattern, evidence):
+    """Property: to the bit, with the axis of the mirror along x, both precisions, even and odd widths."""
+    for dtype, width in ((np.float32, 21), (np.float64, 22)):
+        level = random_level((13, width), dtype)
+        sign = np.array([-1, 1, 1], dtype)[:, None, None]
+        mirrored = level._replace(**{name: np.ascontiguousarray(getattr(level, name)[..., ::-1])
+                                     for name in ("depth", "radiance", "area", "pixel")},
+                                  position=np.ascontiguousarray(level.position[..., ::-1] * sign),
+                                  normal=np.ascontiguousarray(level.normal[..., ::-1] * sign))
+        settings = dataclasses.replace(SETTINGS, pattern=pattern, samples=16)
+        there = gather(mirrored, 0, settings)
+        np.testing.assert_array_equal(there[..., ::-1], gather(level, 0, settings))
+    evidence(f"pattern {pattern}: mirrored level, mirrored irradiance to the bit, float32 and float64")
+
+
+@pytest.mark.parametrize("power", [-40, -10, 20, 40])
+def test_scale_of_the_scene_changes_no_bit(power):
+    """Property: lengths times 2^k and areas times 4^k, from 1e-12 to 1e12, in float32."""
+    level = random_level((9, 20), np.float32)
+    scale = np.float32(2.0**power)
+    there = level._replace(position=level.position * scale, depth=level.depth * scale, area=level.area * scale**2)
+    np.testing.assert_array_equal(gather(there, 0, SETTINGS), gather(level, 0, SETTINGS))
+
+
+@pytest.mark.parametrize("form", ["disc", "point"])
+def test_hard_numbers_stay_finite_and_bounded(form):
+    """Property: texels at one place, depths from 1e-3 to 1e6, areas of grazing views; Eq. 4 knows a bound."""
+    for dtype in (np.float32, np.float64):
+        level = random_level((12, 24), dtype)
+        rng = np.random.default_rng(3)
+        level.position[...] *= (10.0 ** rng.uniform(-3, 6, level.shape)).astype(dtype)
+        level.position[:, 3:5, 4:9] = level.position[:, :1, :1]
+        level.depth[level.area > 0] = np.abs(level.position).max(axis=0)[level.area > 0] + 1e-3
+        level.area[...] *= (10.0 ** rng.uniform(-9, 12, level.shape)).astype(dtype)
+        found = gather(level, 0, dataclasses.replace(SETTINGS, form_factor=form))
+        assert np.isfinite(found).all()
+        assert (found >= 0).all()
+        if form == "disc":  # each sample fills at most the hemisphere
+            assert found.max() <= math.pi * level.radiance.max() * 12 * (1 + 1e-5)
+
+
+def test_one_texel_and_none_seen_receive_nothing():
+    """Property: 1 x 1, one row, one column, and all background."""
+    for shape, background in (((1, 1), 0.0), ((1, 1), 1.0), ((6, 5), 1.0)):
+        assert not gather(random_level(shape, background=background), 0, SETTINGS).any()
+    for shape in ((1, 9), (9, 1)):
+        found = gather(random_level(shape, background=0.0), 0, dataclasses.replace(SETTINGS, pattern="all"))
+        assert found.any()
+        assert np.isfinite(found).all()
+
+
+def test_printed_forms_differ_by_their_factor():
+    """Analytic: Eq. 4 without its pi is 1 / pi of it; 2^2k again is 4 per level; Eq. 3 has no pi to lose."""
+    level = random_level((6, 8))
+
+    def light(index, *names, form="disc"):
+        settings = dataclasses.replace(SETTINGS, as_published=frozenset(names), form_factor=form)
+        return gather(level, index, settings)
+
+    np.testing.assert_allclose(light(1, "hss_disc_pi"), light(1) / math.pi, rtol=1e-14)
+    np.testing.assert_allclose(light(2, "hss_level_factor"), light(2) * 16, rtol=1e-14)
+    np.testing.assert_array_equal(light(0, "hss_level_factor"), light(0))
+    np.testing.assert_array_equal(light(1, "hss_disc_pi", form="point"), light(1, form="point"))
+
+
+def groove(number, size):
+    """Two planes that meet at a right angle, seen from straight above; 2^number pixels a side of a texel."""
+    count = size >> number
+    at = ((np.arange(count) + 0.5) * 2**number - size / 2) / size
+    x, y = np.broadcast_to(at, (count, count)), np.broadcast_to(at[:, None], (count, count))
+    position = np.stack([x, y, np.abs(x) - 3.0])
+    normal = np.stack([-np.sign(x), np.zeros_like(x), np.ones_like(x)]) / math.sqrt(2)
+    area = np.full((count, count), math.sqrt(2) * (2**number / size) ** 2)
+    radiance = np.ones((3, count, count))
+    pixel = np.zeros((count, count), np.int32)
+    return Level(number, *map(np.ascontiguousarray, (position, -position[2], normal, radiance, area)), pixel)
+
+
+@pytest.mark.feature("HSS-08")
+def test_mean_light_does_not_depend_on_the_split_into_levels(evidence):
+    """Analytic: one level of radius 16, two of 8 and three of 4 reach as far; the printed 2^2k counts areas twice."""
+    def mean(levels, *printed):
+        settings = HssilSettings(radius=16.0 / 2 ** (levels - 1), levels=levels, pattern="all",
+                                 as_published=frozenset(printed))
+        return sum(gather(groove(k, 64), k, settings).mean() for k in range(levels))
+
+    one, two, three, twice = mean(1), mean(2), mean(3), mean(3, "hss_level_factor")
+    assert two == pytest.approx(one, rel=0.02)  # rims of coarse crowns are off by half a coarse texel
+    assert three == pytest.approx(one, rel=0.05)
+    assert twice > 1.5 * one
+    evidence(f"mean E of 2 and 3 levels over that of one: {two / one:.4f}, {three / one:.4f}; "
+             f"with the printed 2^2k: {twice / one:.2f}")
+
+
+@pytest.mark.feature("HSS-06")
+@pytest.mark.parametrize("pattern", ["row", "pixel"])
+def test_error_falls_with_samples_and_the_mean_stays(pattern, evidence):
+    """Statistical: Eq. 3 on a bounded scene, 12 seeds: no bias, and the error falls at least as N^-1/2."""
+    level, count = groove(0, 32), 12
+    level.position[2, :, 16:] += 0.5  # the halves are apart: no pair is near
+    settings = HssilSettings(radius=6.0, levels=1, pattern=pattern, form_factor="point")
+    exact = _of_shares(level, settings.radius)
+    error = []
+    for samples in (16, 64, 256):
+        found = np.array([gather(level, 1, dataclasses.replace(settings, samples=samples, seed=seed))[0]
+                          for seed in range(count)])
+        means = found.mean(axis=(1, 2))
+        assert abs(means.mean() - exact.mean()) < 4.0 * means.std(ddof=1) / math.sqrt(count) + 1e-3 * exact.mean()
+        error.append(math.sqrt(((found - exact) ** 2).mean()) / exact.mean())
+    assert error[0] / error[1] > 1.9  # 2 for independent samples
+    assert error[1] / error[2] > 1.9
+    evidence(f"pattern {pattern}: relative error {error[0]:.3f}, {error[1]:.4f}, {error[2]:.4f} with 16, 64, 256 "
+             f"samples; mean over seeds within {abs(means.mean() / exact.mean() - 1):.1e}")
+
+
+def _of_shares(level, radius):
+    """Sum every texel by the share of it that lies in the crown: what the mean of all patterns must be."""
+    reach = math.ceil(2 * radius) + 1
+    offsets = [(x, y) for x in range(-reach, reach + 1) for y in range(-reach, reach + 1)]
+    share = [naive.share_inside(x, y, radius, 2 * radius) for x, y in offsets]
+    kept = [(offset, s) for offset, s in zip(offsets, share, strict=True) if s > 0]
+    position, normal, area = level.position, level.normal, level.area
+    total = np.zeros(level.shape)
+    rows, columns = np.mgrid[: level.shape[0], : level.shape[1]]
+    for (ox, oy), s in kept:
+        a, b = rows + oy, columns + ox
+        inside = (a >= 0) & (a < level.shape[0]) & (b >= 0) & (b < level.shape[1])
+        a, b = np.where(inside, a, 0), np.where(inside, b, 0)
+        d = position[:, a, b] - position
+        square = np.maximum((d * d).sum(axis=0), 1e-30)
+        c, t = np.maximum((normal * d).sum(axis=0), 0), np.maximum(-(normal[:, a, b] * d).sum(axis=0), 0)
+        total += np.where(inside, s * c * t * area[a, b] / square**2, 0) * level.radiance[0, a, b]
+    return total
+
+
+@pytest.mark.feature("HSS-19")
+def test_the_first_level_has_most_of_the_samples(evidence):
+    """Analytic: pairs of each level at 1280 x 720, half resolution; the paper's share of time is the crowns'."""
+    sizes = [math.ceil(1280 / 2**k) * math.ceil(720 / 2**k) for k in range(1, 6)]
+    crowns = [64 * size for size in sizes]
+    share = crowns[0] / sum(crowns[:4])
+    assert share == pytest.approx(0.753, abs=5e-4)
+    fifth = crowns[4] / sum(crowns[:4])
+    assert fifth < 0.01
+    settings = HssilSettings()
+    disc = settings.inner * sizes[0]
+    evidence(f"first of 4 levels: {share:.1%} of the crowns' samples, {(crowns[0] + disc) / (sum(crowns[:4]) + disc):.1%}"
+             f" with its disc of {settings.inner}; a fifth adds {fifth:.2%}")

@@ -221,5 +221,6 @@ def test_the_first_level_has_most_of_the_samples(evidence):
     assert fifth < 0.01
     settings = HssilSettings()
     disc = settings.inner * sizes[0]
-    evidence(f"first of 4 levels: {share:.1%} of the crowns' samples, {(crowns[0] + disc) / (sum(crowns[:4]) + disc):.1%}"
-             f" with its disc of {settings.inner}; a fifth adds {fifth:.2%}")
+    whole = (crowns[0] + disc) / (sum(crowns[:4]) + disc)
+    evidence(f"first of 4 levels: {share:.1%} of the crowns' samples, {whole:.1%} with its disc of {settings.inner}; "
+             f"a fifth adds {fifth:.2%}")

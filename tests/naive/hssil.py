@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-LEAST = 1e-20  # smaller sums of weights are none
+from tests.naive import upsampling
 
 
 def first_texels(depth, normal, radiance, frame, half, tan_f=False):
@@ -132,89 +132,33 @@ def gathered(texels, offsets_at, form, disc_pi=False):
     return light
 
 
-def upsampled(coarse, below, here, factor, kind, agreement, lean):
-    """Carry light from a level to one that is finer by a factor.
-
-    Tents of the three by three taps around a texel's centre, 0 where a tap is empty, for "bilateral" times
-    `agreement(cosine of normals, off)`, over their sum; `off` is the share by which a tap's nearness 1/z is off the
-    plane through the receiver. Where the sum vanishes, the tap that is least off is taken. A tap stands where its texel
-    is closest if `lean`, else in its middle.
-    """
-    light = np.zeros((3, len(here), len(here[0])))
-    for row in range(len(here)):
-        for column in range(len(here[0])):
-            if here[row][column] is not None:
-                light[:, row, column] = one_upsampled(coarse, below, here, (row, column), factor, kind, agreement, lean)
-    return light
-
-
-def one_upsampled(coarse, below, here, at, factor, kind, agreement, lean):
-    texel, (row, column) = here[at[0]][at[1]], at
-    if kind == "nearest":
-        return coarse[:, row // factor, column // factor]
-    y, x = (row + 0.5) / factor - 0.5, (column + 0.5) / factor - 0.5
-    taps = [(i, j, tent(i - y, y, kind) * tent(j - x, x, kind)) for i in around(y, len(below))
-            for j in around(x, len(below[0])) if below[i][j] is not None]
-    if not taps:
-        return np.zeros(3)
+def upsampled(coarse, below, here, factor, kind, closest, sigma, power):
+    """Carry light from a level to one that is finer by a factor; `closest` tells where a texel of `below` stands."""
+    below_depth, below_normal = seen(below)
+    depth, normal = seen(here)
     if kind == "bilateral":
-        down, across = (factor * slope(here, row, column, axis) for axis in (0, 1))
-        nearer = (factor - 1) / (2 * factor) * (abs(down) + abs(across)) if lean else 0.0
-        weighed = []
-        for i, j, weight in taps:
-            plane = 1 / texel["depth"] + (i - y) * down + (j - x) * across + nearer
-            off = texel["depth"] * (1 / below[i][j]["depth"] - plane)
-            weighed.append((i, j, weight * agreement(max(0.0, texel["normal"] @ below[i][j]["normal"]), off), abs(off)))
-        if sum(weight for _, _, weight, _ in weighed) < LEAST:
-            i, j, _, _ = min(weighed, key=lambda tap: tap[3])
-            return coarse[:, i, j]
-        taps = [tap[:3] for tap in weighed]
-    return sum(weight * coarse[:, i, j] for i, j, weight in taps) / sum(weight for _, _, weight in taps)
+        return upsampling.bilateral(coarse, below_depth, below_normal, depth, normal, factor, sigma, power, closest)
+    if kind == "bilinear":
+        return upsampling.bilinear(coarse, below_depth, depth, factor)
+    rows, columns = np.indices(depth.shape) // factor
+    return np.where(np.isinf(depth), 0.0, coarse[:, rows, columns])
 
 
-def around(x, count):
-    """Return the taps that are at most one from that which holds x, of those there are."""
-    own = math.floor(x + 0.5)
-    return range(max(0, own - 1), min(count, own + 2))
+def seen(texels):
+    """Return depths, inf where there is no surface, and normals of a level."""
+    depth = np.array([[math.inf if texel is None else texel["depth"] for texel in row] for row in texels])
+    normal = np.array([[np.zeros(3) if texel is None else texel["normal"] for texel in row] for row in texels])
+    return depth, np.moveaxis(normal, 2, 0)
 
 
-def tent(d, x, kind):
-    """Return the weight of a tap at the distance d from x: half as wide as keeps linear functions linear, sum 1."""
-    half = 1.0 if kind == "bilinear" else (4 + abs(x - math.floor(x + 0.5))) / 3
-    own = math.floor(x + 0.5)
-    weights = {k: max(0.0, 1 - abs(own + k - x) / half) for k in (-1, 0, 1)}
-    return weights[round(d + x) - own] / sum(weights.values())
-
-
-def slope(here, row, column, axis):
-    """Return the change of 1/z from a texel to the next: the smaller of both differences, 0 where signs disagree."""
-    def nearness(step):
-        i, j = (row + step, column) if axis == 0 else (row, column + step)
-        if 0 <= i < len(here) and 0 <= j < len(here[0]):
-            return 0.0 if here[i][j] is None else 1 / here[i][j]["depth"]
-        back = nearness(-step) if (len(here), len(here[0]))[axis] > 1 else 0.0
-        return max(0.0, 2 * nearness(0) - back) if back > 0 else 0.0  # on in a straight line beyond the picture's edge
-    before, after = nearness(0) - nearness(-1), nearness(1) - nearness(0)
-    if before * after <= 0 or nearness(-1) == 0 or nearness(1) == 0:
-        return 0.0
-    return before if abs(before) < abs(after) else after
-
-
-def depth_and_normal(sigma, power):
-    """Return exp(-off^2 / (2 sigma^2)) cosine^power, with exp(-16 u) as the 16th power of its cubic series."""
-    def agreement(cosine, off):
-        u = off * off / (32 * sigma * sigma)
-        return max(0.0, 1 - u + u * u / 2 - u**3 / 6) ** 16 * cosine**power
-    return agreement
-
-
-def hssil(texels, *, first, count, offsets, agreement, mode="closest", form="disc", upsampling="bilateral",
+def hssil(texels, *, first, count, offsets, mode="closest", form="disc", kind="bilateral", sigma=0.02, power=8.0,
           only=None, disc_pi=False, level_factor=False):
     """Return the irradiance of a picture: gather at each level, coarsest first, carry up, add (Sec. 3.2).
 
     `offsets(index, level, row, column)` lists (ox, oy, w); level 0 is full resolution, `first` the level of index 0.
     """
     levels = [level(texels, first + index, mode) for index in range(count)]
+    filtering = (kind, mode != "average", sigma, power)
     light = None
     for index in reversed(range(count)):
         here = levels[index]
@@ -223,8 +167,6 @@ def hssil(texels, *, first, count, offsets, agreement, mode="closest", form="dis
             added = gathered(here, lambda *at, i=index: offsets(i, first + i, *at), form, disc_pi)
         added *= 4.0**index if level_factor else 1.0
         if light is not None:
-            added += upsampled(light, levels[index + 1], here, 2, upsampling, agreement, mode != "average")
+            added += upsampled(light, levels[index + 1], here, 2, *filtering)
         light = added
-    if first:
-        return upsampled(light, levels[0], texels, 2**first, upsampling, agreement, mode != "average")
-    return light
+    return upsampled(light, levels[0], texels, 2**first, *filtering) if first else light

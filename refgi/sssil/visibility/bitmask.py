@@ -1,15 +1,15 @@
 """Visibility of samples by what the depth map holds before them: a bitmask of angles (after Therrien et al. 2023).
 
 From a receiver the picture is marched in slices, nearest samples first. The surface at a sample is taken to reach from
-its point away from the eye by a thickness. Both ends lie in the plane of the eye, the receiver and the sample; their
-angles against the direction to the eye, from 0 to 180 degrees, count in 32 sectors, and the surface blocks those whose
-middle it covers. Sectors are steps of
+its point away from the eye by a thickness. Both ends lie in the plane of the eye, the receiver and the sample. How high
+they stand there above the receiver's own plane counts in 32 sectors, from its horizon on the sample's side over its
+normal to the other horizon; the surface blocks the sectors whose middle it covers. Sectors are steps of
 
-    q(x, y) = y / (|x| + y), 2 - that where x < 0
+    q(a, b) = a / (a + |b|), 2 - that where b < 0, 0 where a < 0
 
-for a direction with x along the one to the eye and y across: they have 0.64 to 1.27 of equal angles, and no
-arctangent. A sample is seen as far as the two sectors whose middles are next to its angle are free, interpolated; and
-wholly where it stands higher than all before it, which keeps receding surfaces from blocking themselves.
+for a direction with a along the normal and b along the horizon: they have 0.64 to 1.27 of equal angles, and need no
+arctangent. A sample is seen as far as the two sectors whose middles are next to it are free, interpolated; and wholly
+where it stands as high as all before it, which keeps receding surfaces from blocking themselves.
 
 Symbols: d vector from receiver to sample (m), c = max(0, n . d), s = max(0, -m . d) with m = n_j ds_j / pi, t
 thickness (m), l distance of the receiver from the eye (m).
@@ -35,8 +35,9 @@ Array = npt.NDArray[Any]
 
 SECTORS = 32
 LEAST = 1e-37  # stands in for a divisor of 0 under a numerator of 0
-X, N, L, AREA, INVERSE, LENGTH, PLANES = 0, 3, 6, 9, 10, 11, 12  # planes of a packed level
-PART, TOTAL, HIGHEST, SCRATCH = 0, 6, 9, 10  # lines of scratch: two slices' sums, all sums, least angle so far
+# planes of a packed level; 1 / l, l, and the cosine of the direction to the eye against the normal
+X, N, L, AREA, INVERSE, LENGTH, FACING, PLANES = 0, 3, 6, 9, 10, 11, 12, 13
+PART, TOTAL, HIGHEST, SCRATCH = 0, 6, 9, 10  # lines of scratch: two slices' sums, all sums, largest q so far
 
 
 @stage("sssil.bitmask")
@@ -95,16 +96,18 @@ def _pack(position: Array, normal: Array, radiance: Array, area: Array, scale: A
     zero, one, over_pi = scale - scale, scale / scale, scale * scale / type(scale)(math.pi)
     for row in prange(area.shape[0]):
         for column in range(area.shape[1]):
-            square = zero
+            square, along = zero, zero
             for c in range(3):
                 packed[row, X + c, column] = position[c, row, column] * scale
                 packed[row, N + c, column] = normal[c, row, column]
                 packed[row, L + c, column] = radiance[c, row, column]
                 square += packed[row, X + c, column] * packed[row, X + c, column]
+                along -= packed[row, X + c, column] * normal[c, row, column]
             packed[row, AREA, column] = area[row, column] * over_pi
             length = math.sqrt(square)
             packed[row, LENGTH, column] = length
             packed[row, INVERSE, column] = one / length if square > zero else zero
+            packed[row, FACING, column] = along * packed[row, INVERSE, column]
 
 
 @kernel(parallel=True)
@@ -122,18 +125,18 @@ def _march_rows(packed: Array, offsets: Array, weight: Array, thickness: Any, bu
 
 
 @kernel
-def _march_row(packed: Array, row: int, offsets: Array, weight: Array, thickness: Any, bulge: Any, lines: Array,
+def _march_row(packed: Array, row: Any, offsets: Array, weight: Array, thickness: Any, bulge: Any, lines: Array,
                mask: Array, half: int) -> None:
     """March one slice for a row of receivers, which are the SIMD lanes."""
     rows, columns = packed.shape[0], packed.shape[2]
     mask[:] = np.uint32(0)
-    lines[HIGHEST, :] = packed.dtype.type(4.0)
+    lines[HIGHEST, :] = packed.dtype.type(0.0)
     for j in range(offsets.shape[0]):
         ox, oy = np.int64(offsets[j, 0]), np.int64(offsets[j, 1])
         size = columns - abs(ox)
         if row + oy < 0 or row + oy >= rows or size <= 0 or (ox == 0 and oy == 0):
             continue
-        first, second = np.uint64(max(-ox, 0)), np.uint64(max(ox, 0))
+        first, second = np.uint64((abs(ox) - ox) // 2), np.uint64((abs(ox) + ox) // 2)
         if weight[j] > 0.0:
             _light(packed, row, first, row + oy, second, np.uint64(size), weight[j], bulge, thickness, lines, mask,
                    PART + 3 * half)
@@ -142,49 +145,50 @@ def _march_row(packed: Array, row: int, offsets: Array, weight: Array, thickness
 
 
 @kernel
-def _light(packed: Array, row: int, first: Any, other: int, second: Any, size: Any, weight: Any, bulge: Any,
+def _light(packed: Array, row: Any, first: Any, other: Any, second: Any, size: Any, weight: Any, bulge: Any,
            thickness: Any, lines: Array, mask: Array, part: int) -> None:
     """Add what one sample sends to each receiver of a row, and let it block."""
     for i in range(size):
         p, q = first + i, second + i
-        dx, dy, dz = _between(packed, row, p, other, q)
+        dx, dy, dz, c = _pair(packed, row, p, other, q)
         square = dx * dx + dy * dy + dz * dz
-        angle, back = _angles(packed, row, p, other, q, dx, dy, dz, square, thickness)
-        seen = _seen(angle, lines[HIGHEST, p], mask[p])
-        g = seen * _transfer(packed, row, p, other, q, dx, dy, dz, square, weight, bulge)
+        front, back = _heights(packed, row, p, other, q, dx, dy, dz, c, thickness)
+        seen = _seen(front, lines[HIGHEST, p], mask[p])
+        g = seen * _transfer(packed, other, q, dx, dy, dz, c, square, weight, bulge)
         lines[part, p] = lines[part, p] + g * packed[other, L, q]
         lines[part + 1, p] = lines[part + 1, p] + g * packed[other, L + 1, q]
         lines[part + 2, p] = lines[part + 2, p] + g * packed[other, L + 2, q]
-        lines[HIGHEST, p] = angle if angle < lines[HIGHEST, p] else lines[HIGHEST, p]
-        mask[p] = mask[p] | _covered(angle, back)
+        lines[HIGHEST, p] = front if front > lines[HIGHEST, p] else lines[HIGHEST, p]
+        mask[p] = mask[p] | _covered(back, front)
 
 
 @kernel
-def _block(packed: Array, row: int, first: Any, other: int, second: Any, size: Any, thickness: Any, lines: Array,
+def _block(packed: Array, row: Any, first: Any, other: Any, second: Any, size: Any, thickness: Any, lines: Array,
            mask: Array) -> None:
     """Let one sample block the light of those after it, for each receiver of a row."""
     for i in range(size):
         p, q = first + i, second + i
-        dx, dy, dz = _between(packed, row, p, other, q)
-        square = dx * dx + dy * dy + dz * dz
-        angle, back = _angles(packed, row, p, other, q, dx, dy, dz, square, thickness)
-        lines[HIGHEST, p] = angle if angle < lines[HIGHEST, p] else lines[HIGHEST, p]
-        mask[p] = mask[p] | _covered(angle, back)
+        dx, dy, dz, c = _pair(packed, row, p, other, q)
+        front, back = _heights(packed, row, p, other, q, dx, dy, dz, c, thickness)
+        lines[HIGHEST, p] = front if front > lines[HIGHEST, p] else lines[HIGHEST, p]
+        mask[p] = mask[p] | _covered(back, front)
 
 
 @kernel
-def _between(packed: Array, row: int, p: Any, other: int, q: Any) -> Any:
-    return (packed[other, X, q] - packed[row, X, p], packed[other, X + 1, q] - packed[row, X + 1, p],
-            packed[other, X + 2, q] - packed[row, X + 2, p])
+def _pair(packed: Array, row: Any, p: Any, other: Any, q: Any) -> Any:
+    """Return d and n . d of a receiver and a sample."""
+    dx = packed[other, X, q] - packed[row, X, p]
+    dy = packed[other, X + 1, q] - packed[row, X + 1, p]
+    dz = packed[other, X + 2, q] - packed[row, X + 2, p]
+    return dx, dy, dz, packed[row, N, p] * dx + packed[row, N + 1, p] * dy + packed[row, N + 2, p] * dz
 
 
 @kernel
-def _transfer(packed: Array, row: int, p: Any, other: int, q: Any, dx: Any, dy: Any, dz: Any, square: Any, weight: Any,
+def _transfer(packed: Array, other: Any, q: Any, dx: Any, dy: Any, dz: Any, c: Any, square: Any, weight: Any,
               bulge: Any) -> Any:
     """Return pi c s / (r^4 + s r) (Eq. 4, with its pi) or, without bulge, pi c s / r^4 (Eq. 3)."""
     real = type(dx)
     zero, least = real(0.0), real(LEAST)
-    c = packed[row, N, p] * dx + packed[row, N + 1, p] * dy + packed[row, N + 2, p] * dz
     s = -(packed[other, N, q] * dx + packed[other, N + 1, q] * dy + packed[other, N + 2, q] * dz)
     s = (s if s > zero else zero) * (packed[other, AREA, q] * weight)
     below = square * square + bulge * s * math.sqrt(square)
@@ -192,52 +196,54 @@ def _transfer(packed: Array, row: int, p: Any, other: int, q: Any, dx: Any, dy: 
 
 
 @kernel
-def _angles(packed: Array, row: int, p: Any, other: int, q: Any, dx: Any, dy: Any, dz: Any, square: Any,
-            thickness: Any) -> Any:
-    """Return the angles q of a sample's front and back, 0 to 2; both 3 where there is no surface."""
-    real = type(dx)
-    zero, none = real(0.0), real(3.0)
-    x = -(packed[row, X, p] * dx + packed[row, X + 1, p] * dy + packed[row, X + 2, p] * dz) * packed[row, INVERSE, p]
-    across = square - x * x
+def _heights(packed: Array, row: Any, p: Any, other: Any, q: Any, dx: Any, dy: Any, dz: Any, c: Any,
+             thickness: Any) -> Any:
+    """Return q of a sample's front and back, 0 to 2; both 0 where there is no surface."""
+    zero = type(dx)(0.0)
+    toward = packed[row, X, p] * dx + packed[row, X + 1, p] * dy + packed[row, X + 2, p] * dz
+    x = -toward * packed[row, INVERSE, p]  # along the receiver's direction to the eye
+    across = dx * dx + dy * dy + dz * dz - x * x
     y = math.sqrt(across if across > zero else zero)
-    further = thickness * packed[other, INVERSE, q]
-    front = _pseudo_angle(x, y)
-    # the back lies on the sample's ray from the eye, which passes the receiver's ray in proportion to its length
-    back = _pseudo_angle(x + further * (x - packed[row, LENGTH, p]), y + further * y)
-    there = (packed[other, INVERSE, q] > zero) & (square > zero)
-    return front if there else none, back if there else none
+    # the back lies on the sample's ray from the eye: further by a share of all that grows along it
+    share, length, facing = thickness * packed[other, INVERSE, q], packed[row, LENGTH, p], packed[row, FACING, p]
+    front = _height(x, y, c, facing)
+    back = _height(x + share * (x - length), y + share * y, c + share * (c - facing * length), facing)
+    there = packed[other, INVERSE, q] > zero
+    return front if there else zero, back if there else zero
 
 
 @kernel
-def _pseudo_angle(x: Any, y: Any) -> Any:
+def _height(x: Any, y: Any, c: Any, facing: Any) -> Any:
+    """Return q of a direction with x to the eye, y across and c along the normal."""
     real = type(x)
     zero, least = real(0.0), real(LEAST)
-    below = abs(x) + y
-    part = y / (below if below > least else least)
-    return part if x >= zero else real(2.0) - part
+    a = (c if c > zero else zero) * y
+    b = facing * (x * x + y * y) - c * x  # both times y and the length of the normal within the slice
+    below = a + abs(b)
+    part = a / (below if below > least else least)
+    return part if b >= zero else (real(2.0) - part if a > zero else zero)
 
 
 @kernel
-def _seen(angle: Any, highest: Any, mask: Any) -> Any:
+def _seen(height: Any, highest: Any, mask: Any) -> Any:
     """Return how much of a sample is seen, 0 to 1."""
-    real = type(angle)
+    real, last = type(height), np.int32(SECTORS - 1)
     one = real(1.0)
-    place = angle * real(SECTORS // 2) + real(0.5)  # sector `upper` has its middle at or above the angle
-    upper = np.int32(place)
+    place = height * real(SECTORS // 2) + real(0.5)
+    upper = np.int32(place)  # its middle is above the sample, that of the sector before it below
     share = place - real(upper)
-    high, low = min(upper, np.int32(SECTORS - 1)), max(np.int32(upper - 1), np.int32(0))
-    low = min(low, np.int32(SECTORS - 1))
-    bit_high, bit_low = np.uint32(mask >> np.uint32(high)) & np.uint32(1), np.uint32(mask >> np.uint32(low)) & np.uint32(1)
+    high, low = np.uint32(min(upper, last)), np.uint32(min(max(np.int32(upper - 1), np.int32(0)), last))
+    bit_high, bit_low = np.uint32(mask >> high) & np.uint32(1), np.uint32(mask >> low) & np.uint32(1)
     free = one - (share * real(bit_high) + (one - share) * real(bit_low))
-    return one if angle <= highest else free
+    return one if height >= highest else free
 
 
 @kernel
-def _covered(angle: Any, back: Any) -> Any:
-    """Return the sectors whose middles lie from one angle to another."""
-    real = type(angle)
+def _covered(back: Any, front: Any) -> Any:
+    """Return the sectors whose middles lie between the heights of back and front."""
+    real = type(front)
     half, sectors = real(0.5), real(SECTORS // 2)
-    return np.uint32(_below(np.int32(back * sectors + half)) & ~_below(np.int32(angle * sectors + half)))
+    return np.uint32(_below(np.int32(front * sectors + half)) & ~_below(np.int32(back * sectors + half)))
 
 
 @kernel
@@ -259,7 +265,7 @@ def _join(lines: Array) -> None:
 
 
 @kernel
-def _store(packed: Array, row: int, lines: Array, factor: Any, result: Array) -> None:
+def _store(packed: Array, row: Any, lines: Array, factor: Any, result: Array) -> None:
     zero = packed.dtype.type(0.0)
     for c in range(3):
         for i in range(np.uint64(packed.shape[2])):
@@ -284,16 +290,17 @@ def _march_pixels(packed: Array, steps: Steps, key: Any, thickness: Any, bulge: 
 
 
 @kernel
-def _march_pixel(packed: Array, row: int, column: int, offsets: Array, weight: Array, thickness: Any, bulge: Any,
+def _march_pixel(packed: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any, bulge: Any,
                  lines: Array, mask: Array) -> None:
     rows, columns = packed.shape[0], packed.shape[2]
     one, p = np.uint64(1), np.uint64(column)
-    mask[p], lines[HIGHEST, p] = np.uint32(0), packed.dtype.type(4.0)
+    mask[p], lines[HIGHEST, p] = np.uint32(0), packed.dtype.type(0.0)
     for j in range(offsets.shape[0]):
         a, b = row + np.int64(offsets[j, 1]), column + np.int64(offsets[j, 0])
         if a < 0 or a >= rows or b < 0 or b >= columns or (a == row and b == column):
             continue
         if weight[j] > 0.0:
-            _light(packed, row, p, a, np.uint64(b), one, packed.dtype.type(weight[j]), bulge, thickness, lines, mask, PART)
+            stands_for = packed.dtype.type(weight[j])
+            _light(packed, row, p, a, np.uint64(b), one, stands_for, bulge, thickness, lines, mask, PART)
         else:
             _block(packed, row, p, a, np.uint64(b), one, thickness, lines, mask)

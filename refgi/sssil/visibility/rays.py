@@ -21,9 +21,9 @@ from refgi.sssil.crown.pattern import (
     pixel_key,
     pixel_offset,
     row_key,
-    row_offsets,
     sample_points,
     sample_weight,
+    shared_offsets,
 )
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.level import Level
@@ -51,7 +51,7 @@ class Surfels(NamedTuple):
 class Samples(NamedTuple):
     """Where the samples of a level lie."""
 
-    offsets: Array  # (1 or h, m, 2) int32 texels; no m where each receiver has its own
+    offsets: Array  # (1 or h, phases, m, 2) int32 texels, by row and column; no m where each receiver has its own
     weight: Array  # (m,) texels that a sample stands for
     points: Array  # (m, 2) of the unit square, for receivers with samples of their own
     inner: int  # how many of them lie in the inner disc
@@ -107,8 +107,8 @@ def _surfels(level: Level, frame: "Frame") -> Surfels:
     here = receivers(frame.scene.geometry, position, normal, triangle, frame.tracer.offset)
     facing, origin = np.zeros((3, level.pixel.size)), np.zeros((3, level.pixel.size), np.float32)
     facing[:, seen], origin[:, seen] = here.facing, here.origin
-    flat = (level.position.reshape(3, -1), level.normal.reshape(3, -1), level.area.reshape(-1))
-    return Surfels(*(np.ascontiguousarray(plane, np.float64) for plane in flat), facing, origin)
+    position, normal = (plane.reshape(3, -1).astype(np.float64) for plane in (level.position, level.normal))
+    return Surfels(position, normal, level.area.reshape(-1).astype(np.float64), facing, origin)
 
 
 def _samples(level: Level, index: int, settings: HssilSettings) -> Samples:
@@ -116,9 +116,9 @@ def _samples(level: Level, index: int, settings: HssilSettings) -> Samples:
     radius = chosen_radius((rows << index, columns << index), settings)
     inner = settings.inner if index == 0 else 0
     if settings.pattern == "pixel":
-        offsets, weight = np.zeros((1, 0, 2), np.int32), sample_weight(radius, inner, settings.samples)
+        offsets, weight = np.zeros((1, 1, 0, 2), np.int32), sample_weight(radius, inner, settings.samples)
     else:
-        offsets, weight = row_offsets(settings, index, level.number, rows, radius)
+        offsets, weight = shared_offsets(settings, index, level.number, rows, radius)
     points = sample_points(inner, settings.samples)
     return Samples(offsets, weight, points, inner, radius, level_key(settings.seed, level.number))
 
@@ -134,16 +134,17 @@ def _aim(surfels: Surfels, samples: Samples, shape: tuple[int, int], first: int,
 
 
 @kernel
-def _aim_one(surfels: Surfels, samples: Samples, shape: tuple[int, int], receiver: int, ray: int, disc: bool,
+def _aim_one(surfels: Surfels, samples: Samples, shape: tuple[int, int], receiver: Any, ray: Any, disc: bool,
              origins: Array, directions: Array, reach: Array, worth: Array, sender: Array) -> None:
     row, column = receiver // shape[1], receiver % shape[1]
     key = pixel_key(row_key(samples.key, row), column)
-    shared = min(row, samples.offsets.shape[0] - 1)
+    own = samples.offsets.shape[2] == 0
+    shared, phase = min(row, samples.offsets.shape[0] - 1), column % samples.offsets.shape[1]
     for j in range(samples.weight.size):
-        if samples.offsets.shape[1] == 0:
+        if own:
             ox, oy = pixel_offset(samples.points, samples.inner, samples.radius, key, j)
         else:
-            ox, oy = np.int64(samples.offsets[shared, j, 0]), np.int64(samples.offsets[shared, j, 1])
+            ox, oy = np.int64(samples.offsets[shared, phase, j, 0]), np.int64(samples.offsets[shared, phase, j, 1])
         a, b = row + oy, column + ox
         reach[ray + j] = 0.0
         if 0 <= a < shape[0] and 0 <= b < shape[1]:
@@ -157,7 +158,7 @@ def _aim_one(surfels: Surfels, samples: Samples, shape: tuple[int, int], receive
 
 
 @kernel
-def _pair(surfels: Surfels, i: int, j: int, weight: float, disc: bool) -> float:
+def _pair(surfels: Surfels, i: int, j: int, weight: float, disc: bool) -> Any:
     """Return g of one pair; 0 where either end lies behind the plane of the other's triangle, which hides it."""
     square, c, s, above, before = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(3):

@@ -31,7 +31,7 @@ class Steps(NamedTuple):
     radius: float  # of the crown, texels
 
     @property
-    def count(self) -> int:
+    def per_slice(self) -> int:
         """Samples of a slice."""
         return self.disc + self.crown + self.blockers
 
@@ -81,7 +81,7 @@ def slice_offsets(settings: HssilSettings, steps: Steps, number: int, rows: int)
         Texels of the level that each sample stands for; 0 for a blocker.
     """
     fixed = settings.pattern == "fixed"
-    shape = (1 if fixed else rows, steps.slices, steps.count)
+    shape = (1 if fixed else rows, steps.slices, steps.per_slice)
     offsets, weight = np.empty((*shape, 2), np.int32), np.empty(shape)
     _fill_rows(steps, level_key(settings.seed, number), fixed, offsets, weight)
     return offsets, weight

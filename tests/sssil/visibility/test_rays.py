@@ -1,0 +1,123 @@
+"""Samples with shadow rays, against segments cut with triangles one by one, and the limits of what they may give."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from refgi.frame import Frame
+from refgi.jit import threads
+from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, merge
+from refgi.sssil.crown.pattern import offsets_at, sample_weight
+from refgi.sssil.pyramid.levels import pyramid
+from refgi.sssil.settings import HssilSettings
+from refgi.sssil.visibility.bitmask import bitmask_gather
+from refgi.sssil.visibility.rays import ray_gather
+from tests.naive import bitmask as naive
+
+WHITE = Material("white", (0.6, 0.6, 0.6))
+ROUNDING = 1e-12  # float64 sums of some 20 terms of like sign
+SETTINGS = HssilSettings(radius=4, levels=1, samples=12, start="full")
+MARGIN = 1e-4  # share of a segment where triangles do not count: its ends lie on some
+
+
+def rectangle(corner, along, across):
+    corner, along, across = (np.asarray(v, float) for v in (corner, along, across))
+    return Mesh(np.stack([corner, corner + along, corner + along + across, corner + across]),
+                np.array([[0, 1, 2], [0, 2, 3]]), None, WHITE)
+
+
+def scene(*, blocker):
+    """A floor and a wall that meet, lit from above, and a shelf between them."""
+    meshes = [rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2)), rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0))]
+    if blocker:
+        meshes.append(rectangle((-0.4, 0.3, -0.9), (0.7, 0, 0), (0, 0, 0.9)))
+    geometry, materials = merge(meshes)
+    lamp = SpotLight((0.2, 1.8, 1.5), (-0.1, -0.7, -1.0), 0.9, 0.9, (10.0, 12.0, 8.0))
+    return Scene("by hand", geometry, materials, Camera((0.2, 1.1, 3.1), (0.0, 0.5, 0.0), vfov=0.8), (lamp,))
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return Frame(scene(blocker=True), width=12, height=9, dtype=np.float64, rsm_resolution=64)
+
+
+def around(level, index, settings):
+    weight = sample_weight(settings.radius, settings.inner if index == 0 else 0, settings.samples)
+    return lambda row, column: [(int(ox), int(oy), w) for (ox, oy), w in zip(
+        offsets_at(settings, index, level.number, row, column), weight, strict=True)]
+
+
+def twin(level, settings, frame=None):
+    if frame is None:
+        return naive.light(level._asdict(), around(level, 0, settings), settings.form_factor)
+    geometry, eye = frame.scene.geometry, np.asarray(frame.scene.camera.eye)
+    corners = geometry.vertices[geometry.faces]
+
+    def see(receiver, sender):
+        ends = (level.position[:, *texel] + eye for texel in (receiver, sender))
+        return float(not naive.blocked_by_triangles(corners, *ends, MARGIN))
+
+    return naive.light(level._asdict(), around(level, 0, settings), settings.form_factor, see)
+
+
+@pytest.mark.feature("REF-02")
+@pytest.mark.parametrize(("pattern", "form"), [("row", "disc"), ("pixel", "point")])
+def test_twin(frame, pattern, form, evidence):
+    settings = dataclasses.replace(SETTINGS, pattern=pattern, form_factor=form)
+    (level,) = pyramid(frame, settings)
+    expected, free = twin(level, settings, frame), twin(level, settings)
+    got = ray_gather(level, 0, settings, frame)
+    error = np.abs(got - expected).max() / expected.max()
+    evidence(f"{pattern}: V of all samples as segments cut with every triangle, to {error:.0e} of the largest; "
+             f"{1 - expected.sum() / free.sum():.1%} of the light is blocked")
+    assert expected.sum() < 0.97 * free.sum()
+    assert error < ROUNDING
+
+
+@pytest.mark.feature("REF-02")
+def test_nothing_between_is_the_unoccluded_sum(evidence):
+    frame = Frame(scene(blocker=False), width=12, height=9, dtype=np.float64, rsm_resolution=64)
+    (level,) = pyramid(frame, SETTINGS)
+    expected, got = twin(level, SETTINGS), ray_gather(level, 0, SETTINGS, frame)
+    error = np.abs(got - expected).max() / expected.max()
+    evidence(f"nothing between: the sum without visibility to {error:.0e}")
+    assert error < ROUNDING
+
+
+def test_batches_and_threads_change_no_bit(frame):
+    (level,) = pyramid(frame, SETTINGS)
+    expected = ray_gather(level, 0, SETTINGS, frame)
+    for batch in (1, 100):
+        np.testing.assert_array_equal(ray_gather(level, 0, SETTINGS, frame, batch=batch), expected)
+    with threads(1):
+        np.testing.assert_array_equal(ray_gather(level, 0, SETTINGS, frame), expected)
+
+
+def test_background_receives_nothing():
+    away = dataclasses.replace(scene(blocker=False), camera=Camera((0.2, 1.1, 3.1), (0.0, 2.0, 0.0), vfov=0.8))
+    frame = Frame(away, width=7, height=5, rsm_resolution=64)
+    (level,) = pyramid(frame, SETTINGS)
+    got = ray_gather(level, 0, SETTINGS, frame)
+    assert (level.pixel < 0).any()
+    assert got.dtype == np.float32
+    assert not got[:, level.pixel < 0].any()
+    assert np.isfinite(got).all()
+
+
+@pytest.mark.feature("HSS-17")
+def test_over_brightness_and_what_the_bitmask_leaves_of_it(evidence):
+    """Samples of slices without visibility and with the bitmask, against rays to every texel."""
+    settings = HssilSettings(radius=6, levels=1, samples=64, start="full", pattern="all")
+    frame = Frame(scene(blocker=True), width=48, height=36, rsm_resolution=128)
+    (level,) = pyramid(frame, settings)
+    true = ray_gather(level, 0, settings, frame)
+    dense = dataclasses.replace(settings, pattern="row", slices=16, samples=512, thickness=0.01)
+    free, masked = (bitmask_gather(level, 0, dataclasses.replace(dense, thickness=t), frame.scene.geometry.diagonal)
+                    for t in (0.0, dense.thickness))
+    over, left = (light.sum() / true.sum() - 1 for light in (free, masked))
+    error, rest = (np.abs(light - true).mean() / true.mean() for light in (free, masked))
+    evidence(f"below a shelf: V = 1 is {over:.1%} too bright, {left:.1%} with the bitmask; mean error of a texel "
+             f"{error:.1%} and {rest:.1%}")
+    assert abs(left) < 0.5 * over
+    assert rest < error

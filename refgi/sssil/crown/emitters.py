@@ -93,14 +93,25 @@ def _pack_row(
     position: Array, normal: Array, radiance: Array, area: Array, row: Any, phases: int, line: int, pad: int,
     scale: Any, share: Any, packed: Array, lit: Array,
 ) -> None:
-    start, step, zero = row * PLANES * phases * line, phases * line, packed.dtype.type(0.0)
-    for i in range(np.uint64(start), np.uint64(start + PLANES * step)):
-        packed[i] = zero
+    start, step = row * PLANES * phases * line, phases * line
     for phase in range(phases):
+        lanes = 0
         if row < area.shape[0]:
+            lanes = (area.shape[1] - phase + phases - 1) // phases
             _pack_line(position, normal, radiance, area, row, phase, phases, start + phase * line + pad, step, scale,
                        share, packed)
+        for k in range(PLANES):
+            here = start + (k * phases + phase) * line
+            _darken(packed, here, here + pad)
+            _darken(packed, here + pad + lanes, here + line)
         _count_lit(packed, start + phase * line, step, row, phase, lit)
+
+
+@kernel
+def _darken(packed: Array, first: Any, last: Any) -> None:
+    zero = packed.dtype.type(0.0)
+    for i in range(np.uint64(first), np.uint64(last)):
+        packed[i] = zero
 
 
 @kernel
@@ -132,14 +143,19 @@ def _pack_line(
 @kernel
 def _count_lit(packed: Array, first: Any, step: int, row: Any, phase: int, lit: Array) -> None:
     """Count the blocks of a line that hold any radiance, up to each."""
-    zero = packed.dtype.type(0.0)
     count = 0
     lit[row, phase, 0] = 0
     for block in range(lit.shape[2] - 1):
-        most = zero
-        for c in range(6, 9):
-            here = np.uint64(first + c * step + block * BLOCK)
-            for i in range(np.uint64(BLOCK)):
-                most = most if most > packed[here + i] else packed[here + i]
-        count += 1 if most > zero else 0
+        count += 1 if _any_light(packed, first + 6 * step + block * BLOCK, step) else 0
         lit[row, phase, block + 1] = count
+
+
+@kernel
+def _any_light(packed: Array, first: Any, step: int) -> bool:
+    zero = packed.dtype.type(0.0)
+    for c in range(3):
+        here = np.uint64(first + c * step)
+        for i in range(np.uint64(BLOCK)):
+            if packed[here + i] > zero:
+                return True
+    return False

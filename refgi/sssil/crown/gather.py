@@ -57,16 +57,16 @@ def gather(level: Level, index: int, settings: HssilSettings) -> Array:
     radius = chosen_radius((rows << index, columns << index), settings)
     real = level.position.dtype.type
     disc, factor = settings.form_factor == "disc", real(math.pi * level_factor(index, settings))
-    result = np.empty_like(level.radiance)
+    farthest, result = math.ceil(2 * radius), np.empty_like(level.radiance)
     if settings.pattern == "pixel":
         inner = settings.inner if index == 0 else 0
         points, weight = sample_points(inner, settings.samples), sample_weight(radius, inner, settings.samples)
         key = level_key(settings.seed, level.number)
-        emitters = pack(level, 1, math.ceil(2 * radius), WIDE)
+        emitters = pack(level, 1, farthest, WIDE)
         _gather_own(emitters, level.normal, points, inner, radius, key, weight.astype(real), disc, factor, result)
         return result
     offsets, weight = _reaching(*shared_offsets(settings, index, level.number, rows, radius), rows, columns)
-    emitters = pack(level, offsets.shape[1], int(np.abs(offsets[..., 0]).max(initial=0)), WIDE)
+    emitters = pack(level, offsets.shape[1], farthest, WIDE)
     paired = settings.pattern != "row"
     _gather_shared(emitters, level.normal, offsets, weight.astype(real), paired, disc, factor, result)
     return result

@@ -12,6 +12,7 @@ from refgi.papers.hssil.subjects import (
     BOX,
     LARGE,
     RADIUS_FIGURE_5,
+    doubt,
     every_texel,
     frame_of,
     lit,
@@ -65,7 +66,9 @@ def figure5(bench: "Workbench") -> Figure:
     off = {key: errors_of(one, right[OPEN], covered) for key, one in (light | right).items()}
     spikes = {key: noise_of(frame, ways[key], light[key]) ** 2 for key in (POINT, DISC)}
     names = NAMES | {key: title for key, (title, _) in TRUTHS.items()}
-    rows = tuple((names[key], *off[key], largest(one, right[OPEN], row)) for key, one in (light | right).items())
+    top = {key: largest(one, right[OPEN], row) for key, one in (light | right).items()}
+    noise = {key: doubt(bench, frame, (BOX, LARGE), **changes) for key, (_, changes) in TRUTHS.items()}
+    rows = tuple((names[key], *off[key], top[key], noise.get(key)) for key in light | right)
     return Figure(
         shows="One bounce by path tracing and by the method, fed with exact direct light: with the point form factor "
               "(Eq. 3) spikes, with that of a disc (Eq. 4) none.",
@@ -74,10 +77,11 @@ def figure5(bench: "Workbench") -> Figure:
                f"path tracing with {bench.scale.truth_samples} samples a pixel"),
         pictures=_pictures(frame, light, right, off, row, ways), columns=4,
         tables=(Table("Errors in % of the mean, against path tracing in which only what the camera sees shines and "
-                      "nothing blocks", ("", "RMSE", "MAE", "darker by", "highest above it along the line, %"), rows),),
+                      "nothing blocks", ("", "RMSE", "MAE", "darker by", "highest above it along the line, %",
+                              "standard error"), rows),),
         plots=(Plot(drawn(_curves(light, right, row), Axes("pixel", "irradiance, W/m²", log_y=True)),
                     f"Luminance along row {row + 1}, which the first pictures mark."),),
-        notes=_notes(off, spikes, reach_of(frame, settings)))
+        notes=_notes(off, spikes, top, reach_of(frame, settings)))
 
 
 def settings_of_figure(frame: "Frame") -> HssilSettings:
@@ -161,16 +165,16 @@ def _said(key: str) -> str:
             ALL: "everything shines"}[key]
 
 
-def _notes(off: dict[str, Errors], spikes: dict[str, float], reach: float) -> tuple[str, ...]:
+def _notes(off: dict[str, Errors], spikes: dict[str, float], top: dict[str, float], reach: float) -> tuple[str, ...]:
     ratio = spikes[POINT] / max(spikes[DISC], 1e-30)
     return (
-        f"With 64 samples Eq. 3 has {ratio:.1f} times the variance of Eq. 4: the spikes of the "
-        "paper's red curve, and their absence from its green one.",
+        f"With 64 samples Eq. 3 has {ratio:.1f} times the variance of Eq. 4, and along the line it "
+        f"rises up to {top[POINT]:.0f} % of the mean above path tracing, Eq. 4 up to {top[DISC]:.0f} %: the spikes of "
+        "the paper's red curve, and their absence from its green one.",
         f"In the limit of every texel Eq. 3 is {off[POINT_LIMIT].rmse:.1f} % off path tracing of the same emitters "
         f"without visibility (RMSE) and Eq. 4 {off[DISC_LIMIT].rmse:.1f} %. Eq. 4 is the darker one, by "
         f"{off[DISC_LIMIT].lost - off[POINT_LIMIT].lost:.1f} % of the mean: a disc near a receiver sends less than its "
         "point form says, and a texel at full resolution is a small disc only where surfaces are some texels apart.",
-        f"What blocks is worth {-off[DISC_LIMIT].lost:.1f} % too little here; with it the light of seen emitters falls "
-        f"by {off[SEEN].lost:.1f} %, and what the camera does not see would add "
-        f"{off[SEEN].lost - off[ALL].lost:.1f} %.",
+        f"Where surfaces block each other, path tracing of the same emitters falls by {off[SEEN].lost:.1f} %; what the "
+        f"camera does not see would add {off[SEEN].lost - off[ALL].lost:.1f} %: the bias that the paper speaks of.",
         f"Four levels reach {100 * reach:.0f} % of the picture's diagonal, as in the paper.")

@@ -28,7 +28,7 @@ RAW, PRINTED, RECURSIVE = "each frame alone", "as printed", "recursive"
 WAYS = {RAW: None, PRINTED: TemporalSettings(form="printed"), RECURSIVE: TemporalSettings()}
 RESTING, MOVING = "resting camera", "moving camera"
 SIZE = 3 / 8  # of the run's: each frame is judged by the mean of many pictures
-WAY = (1.6, 0.1, 0.5)  # m: how far the camera moves in all
+STEP = (0.04, 0.002, 0.012)  # m: how far the camera moves from frame to frame
 
 
 class Course(NamedTuple):
@@ -59,8 +59,8 @@ def filtered(bench: "Workbench") -> Figure:
     settings = smaller(frame)
     found = {motion: courses(bench, scenes, settings, frame) for motion, scenes in
              ((RESTING, [scene_of(bench, HALL)] * count), (MOVING, moved(scene_of(bench, HALL), count)))}
-    rows = tuple((f"{motion}, {way}", one.noise[0], one.noise[-1], 100 * (one.noise[-1] / one.noise[0]) ** 2,
-                  one.change, 100 * one.reused, one.share)
+    rows = tuple((f"{motion}, {way}", one.noise[0], one.noise[-1], kept(ways, way), one.change, 100 * one.reused,
+                  one.share)
                  for motion, ways in found.items() for way, one in ways.items())
     return Figure(
         shows="Blending each frame with the one before, warped to the new camera, takes away noise at next to no cost. "
@@ -110,7 +110,7 @@ def moved(scene: "Scene", count: int) -> "list[Scene]":
         All of the same geometry.
     """
     start, target = (np.array(place) for place in (scene.camera.eye, scene.camera.target))
-    along = np.linspace(0, 1, count)[:, None] * np.array(WAY)
+    along = np.arange(count)[:, None] * np.array(STEP)
     return [scene.with_camera(eye=tuple(start + step), target=tuple(target + step / 2)) for step in along]
 
 
@@ -153,6 +153,25 @@ def courses(bench: "Workbench", scenes: "list[Scene]", settings: HssilSettings, 
     return {name: course(temporal) for name, temporal in WAYS.items()}
 
 
+def kept(ways: dict[str, Course], way: str) -> float:
+    """Return how much of the variance is left in the last frame.
+
+    Parameters
+    ----------
+    ways : dict of str to Course
+        One sequence in each way.
+    way : str
+        Which.
+
+    Returns
+    -------
+    float
+        In % of the mean variance of unfiltered frames.
+    """
+    alone = float(np.mean(np.square(ways[RAW].noise)))
+    return 100 * ways[way].noise[-1] ** 2 / max(alone, 1e-30)
+
+
 def left(a: float, frames: int) -> list[float]:
     """Return which share of its variance independent noise keeps under the recursive filter.
 
@@ -182,9 +201,10 @@ def _curves(found: dict[str, dict[str, Course]]) -> list[Curve]:
     for motion, ways in found.items():
         for way, one in ways.items():
             curves.append(Curve(f"{motion}, {way}", range(1, len(one.noise) + 1), one.noise))
-    first = found[RESTING][RAW].noise
-    expected = [math.sqrt(share) * first[0] for share in left(TemporalSettings().weight, len(first))]
-    return [*curves, Curve("independent frames, recursive", range(1, len(first) + 1), expected, dashed=True)]
+    alone = found[RESTING][RAW].noise
+    usual = math.sqrt(np.mean(np.square(alone)))
+    expected = [math.sqrt(share) * usual for share in left(TemporalSettings().weight, len(alone))]
+    return [*curves, Curve("independent frames, recursive", range(1, len(alone) + 1), expected, dashed=True)]
 
 
 def _pictures(frame: Frame, found: dict[str, dict[str, Course]], settings: HssilSettings) -> tuple[Picture, ...]:
@@ -195,22 +215,20 @@ def _pictures(frame: Frame, found: dict[str, dict[str, Course]], settings: Hssil
 
 
 def _notes(found: dict[str, dict[str, Course]]) -> tuple[str, ...]:
-    def kept(motion: str, way: str) -> float:
-        noise = found[motion][way].noise
-        return 100 * (noise[-1] / max(noise[0], 1e-30)) ** 2
-
     a, frames = TemporalSettings().weight, len(found[RESTING][RAW].noise)
     expected = 100 * left(a, frames)[-1]
     share = [ways[RECURSIVE].share for ways in found.values()]
     least, most = min(share), max(share)
+    resting, moving = ({way: kept(ways, way) for way in WAYS} for ways in found.values())
+    again = 100 * found[MOVING][RECURSIVE].reused
     calm = found[MOVING][RAW].change / max(found[MOVING][RECURSIVE].change, 1e-30)
     return (
-        f"With a resting camera {kept(RESTING, RECURSIVE):.0f} % of the variance is left after {frames} frames of the "
+        f"With a resting camera {resting[RECURSIVE]:.0f} % of the variance is left after {frames} frames of the "
         f"recursive filter (independent frames: {expected:.0f} %, in the end {100 * (1 - a) / (1 + a):.0f} %); the "
-        f"form as printed, a mean of two frames, leaves {kept(RESTING, PRINTED):.0f} % "
+        f"form as printed, a mean of two frames, leaves {resting[PRINTED]:.0f} % "
         f"({100 * (a**2 + (1 - a) ** 2):.0f} %).",
-        f"With a moving camera {kept(MOVING, RECURSIVE):.0f} % is left, {100 * found[MOVING][RECURSIVE].reused:.0f} % "
+        f"With a moving camera {moving[RECURSIVE]:.0f} % is left, {again:.0f} % "
         f"of the pixels are found again in the frame before, and flicker falls to 1 / {calm:.1f}; some "
-        "light went along with the view from where it looked different.",
+        "light went along from where the picture lit it differently.",
         f"The filter takes {least:.0f} to {most:.0f} % of the time of so small a picture's indirect "
         "light; the paper calls its cost negligible and does not print it.")

@@ -13,6 +13,7 @@ from refgi.papers.hssil.subjects import (
     HORSE,
     JUDGED,
     TITLES,
+    doubt,
     every_pixel,
     every_texel,
     expected_light,
@@ -70,6 +71,7 @@ class Split(NamedTuple):
     made: dict[str, Array]  # by the keys of STEPS
     variants: dict[str, Array]
     covered: Array
+    noise: float  # standard error of path tracing of all light, % of the mean
 
 
 def splitting(bench: "Workbench") -> Figure:
@@ -135,7 +137,7 @@ def _split(bench: "Workbench", name: str) -> Split:
     made |= {key: lit(frame, settings) for key, settings in chain(frame).items()}
     variants = {one.title: lit(frame, smaller(frame, **one.changes)) for one in VARIANTS if one.title != FRAMES}
     variants[FRAMES] = expected_light(frame, smaller(frame), 19)
-    return Split(made, variants, frame.gbuffer.covered)
+    return Split(made, variants, frame.gbuffer.covered, doubt(bench, frame, (name, JUDGED)))
 
 
 def _changes(found: dict[str, Split]) -> list[tuple[Cell, ...]]:
@@ -189,4 +191,5 @@ def _notes(found: dict[str, Split]) -> tuple[str, ...]:
         f"the closest of four instead of their average {each('closest')} %, the radius {each('reach')} %, half "
         f"resolution {each('start')} %, and 64 samples {each('samples')} %. The mean of "
         "19 frames, which has as little noise as the temporal filter leaves, shows what remains of the last.",
-        f"Together they come to {whole} % of the mean.")
+        f"Together they come to {whole} % of the mean. Path tracing's own standard error, "
+        f"{', '.join(f'{one.noise:.1f}' for one in found.values())} %, is part of the first three.")

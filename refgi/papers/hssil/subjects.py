@@ -22,7 +22,7 @@ from refgi.papers.hssil.scenes import BUILDERS
 from refgi.papers.subjects import Subjects, seen_by
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
-from refgi.truth import TruthSettings, trace_truth
+from refgi.truth import TruthResult, TruthSettings, trace_truth
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench
@@ -283,8 +283,31 @@ def traced(bench: "Workbench", frame: Frame, key: Any, **changes: Any) -> Array:
     (3, h, w) ndarray
         Irradiance, W/m^2.
     """
-    settings = TruthSettings(samples=bench.scale.truth_samples, **changes)
-    return bench.once(("traced", key, *sorted(changes.items())), lambda: trace_truth(frame, settings).mean)
+    return _truth(bench, frame, key, **changes).mean
+
+
+def doubt(bench: "Workbench", frame: Frame, key: Any, **changes: Any) -> float:
+    """Return how noisy path tracing itself is.
+
+    Parameters
+    ----------
+    bench : Workbench
+        As for `traced`.
+    frame : Frame
+        As for `traced`.
+    key : object
+        As for `traced`.
+    **changes : object
+        As for `traced`.
+
+    Returns
+    -------
+    float
+        Standard error in % of the mean irradiance: root mean square over pixels with a surface.
+    """
+    found, covered = _truth(bench, frame, key, **changes), frame.gbuffer.covered
+    error = math.sqrt(float(found.variance_of_mean[:, covered].mean()))
+    return 100 * error / max(mean_of(found.mean, covered), 1e-30)
 
 
 def reach_of(frame: Frame, settings: HssilSettings) -> float:
@@ -347,3 +370,8 @@ def scan_line(name: str, light: Array, row: int, *, dashed: bool = False) -> Cur
     """
     values = luminance(light[:, row : row + 1])[0].tolist()
     return Curve(name, range(len(values)), values, dashed)
+
+
+def _truth(bench: "Workbench", frame: Frame, key: Any, **changes: Any) -> TruthResult:
+    settings = TruthSettings(samples=bench.scale.truth_samples, **changes)
+    return bench.once(("traced", key, *sorted(changes.items())), lambda: trace_truth(frame, settings))

@@ -15,6 +15,7 @@ from refgi.papers.hssil.subjects import (
     HORSE,
     JUDGED,
     TITLES,
+    doubt,
     frame_of,
     lit,
     mean_of,
@@ -53,6 +54,7 @@ class Judged(NamedTuple):
     off: dict[Visibility, Errors]
     off_usual: dict[Visibility, Errors]
     seconds: dict[Visibility, float]
+    noise: float  # standard error of path tracing, % of the mean
     sweep: dict[float, float]  # RMSE of the bitmask by thickness
 
 
@@ -105,14 +107,15 @@ def _judged(bench: "Workbench", name: str) -> Judged:
     seconds: dict[Visibility, float] = {key: taken[key] for key in settings}
     sweep = {share: errors_of(lit(frame, dataclasses.replace(many[BITMASK], thickness=share)), exact, covered).rmse
              for share in THICKNESS}
-    return Judged(frame, settings, light, usual, exact, off, off_usual, seconds, sweep)
+    return Judged(frame, settings, light, usual, exact, off, off_usual, seconds,
+                  doubt(bench, frame, (name, JUDGED), emitters="seen"), sweep)
 
 
 def _rows(title: str, one: Judged) -> list[tuple[Cell, ...]]:
     covered = one.frame.gbuffer.covered
     return [(f"{title}, {NAMES[key]}", mean_of(light, covered), *one.off[key], one.off_usual[key].rmse,
              1e3 * one.seconds[key], one.seconds[key] / one.seconds[NONE]) for key, light in one.light.items()] + [
-        (f"{title}, path tracing", mean_of(one.exact, covered), 0.0, 0.0, 0.0, 0.0, None, None)]
+        (f"{title}, path tracing", mean_of(one.exact, covered), one.noise, None, 0.0, None, None, None)]
 
 
 def _pictures(name: str, one: Judged) -> list[Picture]:
@@ -144,5 +147,6 @@ def _notes(found: dict[str, Judged]) -> tuple[str, ...]:
         f"Rays take {cost[RAYS]} times as long as no visibility, the bitmask {cost[BITMASK]} times. Its best thickness "
         f"here is {best} of the diagonal: thinner surfaces let light through, thicker ones cast shadows of what is "
         "not there.",
-        "What rays leave is noise of the samples, light of texels instead of points, and near receivers the disc that "
-        "stands for each texel.")
+        f"Path tracing's own standard error is {' and '.join(f'{one.noise:.1f}' for one in found.values())} % (in its "
+        "row). What rays leave besides is noise of the samples, light of texels instead of points, and near receivers "
+        "the disc that stands for each texel.")

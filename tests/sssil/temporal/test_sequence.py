@@ -80,6 +80,14 @@ def test_without_a_filter_each_frame_is_by_itself(room):
         assert step.reused == 0
 
 
+def test_the_printed_form_averages_two_frames(room):
+    settings = HssilSettings(seed=3)
+    steps = list(Sequence([room] * 3, settings, TemporalSettings(weight=0.75, form="printed"), method=white, **QUICK))
+    one, two = (white(steps[2].frame, HssilSettings(seed=seed)) for seed in (4, 5))
+    covered = steps[2].frame.gbuffer.covered
+    assert np.allclose(steps[2].irradiance[:, covered], (0.75 * one + 0.25 * two)[:, covered], atol=1e-6)
+
+
 def test_radiance_is_that_of_the_filtered_light(room):
     for step in Sequence([room] * 2, method=white, **QUICK):
         assert np.array_equal(step.radiance, step.frame.radiance(step.irradiance))

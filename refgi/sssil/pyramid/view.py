@@ -60,7 +60,8 @@ def view_of(projection: Projection, as_published: frozenset[str] = frozenset()) 
     if "hss_tan_f" in as_published:
         for half in (horizontal, vertical):
             degrees = math.degrees(2 * math.atan(half))
-            expect(half < 1.0 - ROUNDING, "as_published 'hss_tan_f'", "a field of view of less than 90 degrees", f"{degrees:.5g}")
+            expect(half < 1.0 - ROUNDING, "as_published 'hss_tan_f'", "a field of view of less than 90 degrees",
+                   f"{degrees:.5g}")
         # tan f = 2 t / (1 - t^2) with t = tan(f / 2)
         tangents *= 4 / ((1 - horizontal * horizontal) * (1 - vertical * vertical))
     pixel_area = 4 * tangents / (projection.width * projection.height)

@@ -12,6 +12,7 @@ from refgi.papers.hssil.figure4 import SHOWN, apart, parts_of
 from refgi.papers.hssil.figure5 import settings_of_figure
 from refgi.papers.hssil.figure7 import expected
 from refgi.papers.hssil.filtered import left
+from refgi.papers.hssil.references import scan_line
 from refgi.papers.hssil.scenes import side_views
 from refgi.papers.hssil.splitting import STEPS, chain
 from refgi.papers.hssil.subjects import (
@@ -22,7 +23,6 @@ from refgi.papers.hssil.subjects import (
     every_texel,
     frame_of,
     reach_of,
-    scan_line,
     scene_of,
     settings_of,
     smaller,

@@ -200,6 +200,6 @@ def _notes(settings: HssilSettings, drawn_by: Array, exact: Array) -> tuple[str,
         f"samples and {exact[inside].mean():.3f} times by every texel: no cracks and no overlaps, as the paper says, "
         "but where a circle cuts a coarse texel, whose pairs are all within or all without.",
         f"Around that mean the coverage by every texel varies by {100 * away[1]:.1f} %, at the circles; that by "
-        f"samples by {100 * away[0]:.1f} %, most of it because only so many rows were counted.",
+        f"samples by {100 * away[0]:.1f} %, at softer circles and by the chance of the rows that were counted.",
         f"A sample of a crown stands for {3 * math.pi * (settings.radius or 1) ** 2 / settings.samples:.0f} texels: "
         "that is what its disc of Eq. 4 is as large as.")

@@ -8,7 +8,8 @@ import numpy.typing as npt
 
 from refgi.papers import pictures
 from refgi.papers.curves import Axes, drawn
-from refgi.papers.hssil.subjects import SPOT, lit, mean_of, scan_line, settings_of, wide_frame
+from refgi.papers.hssil.references import mean_of, scan_line
+from refgi.papers.hssil.subjects import SPOT, lit, settings_of, wide_frame
 from refgi.papers.records import Figure, Picture, Plot, Table
 from refgi.sssil import HssilSettings
 

@@ -8,19 +8,16 @@ import numpy.typing as npt
 from refgi.compare.maps import luminance
 from refgi.papers import pictures
 from refgi.papers.curves import Axes, Curve, drawn
+from refgi.papers.hssil.references import doubt, noise_of, scan_line, traced
 from refgi.papers.hssil.subjects import (
     BOX,
     LARGE,
     RADIUS_FIGURE_5,
-    doubt,
     every_texel,
     frame_of,
     lit,
-    noise_of,
     reach_of,
     scaled_radius,
-    scan_line,
-    traced,
 )
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.records import Figure, Picture, Plot, Table
@@ -79,7 +76,7 @@ def figure5(bench: "Workbench") -> Figure:
         tables=(Table("Errors in % of the mean, against path tracing in which only what the camera sees shines and "
                       "nothing blocks", ("", "RMSE", "MAE", "darker by", "highest above it along the line, %",
                               "standard error"), rows),),
-        plots=(Plot(drawn(_curves(light, right, row), Axes("pixel", "irradiance, W/m²", log_y=True)),
+        plots=(Plot(drawn(_curves(light, right, row), Axes("pixel", "irradiance, W/m²")),
                     f"Luminance along row {row + 1}, which the first pictures mark."),),
         notes=_notes(off, spikes, top, reach_of(frame, settings)))
 

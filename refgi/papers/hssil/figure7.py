@@ -57,7 +57,7 @@ def expected(levels: int) -> list[float]:
     Examples
     --------
     >>> [round(share, 3) for share in expected(4)]
-    [0.801, 0.15, 0.038, 0.009]
+    [0.803, 0.15, 0.038, 0.009]
     """
     work = [(1 + INNER * (k == 0)) / 4**k for k in range(levels)]
     return [one / sum(work) for one in work]

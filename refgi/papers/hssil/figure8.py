@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.papers import pictures
-from refgi.papers.hssil.subjects import HALL, lit, mean_of, noise_of, reach_of, ready, settings_of, wide_frame
+from refgi.papers.hssil.references import mean_of, noise_of
+from refgi.papers.hssil.subjects import HALL, lit, reach_of, ready, settings_of, wide_frame
 from refgi.papers.hssil.times import SETUPS, Setup, Spent, spent
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Table

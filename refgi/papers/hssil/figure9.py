@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.papers import pictures
+from refgi.papers.hssil.references import mean_of, traced
 from refgi.papers.hssil.scenes import side_views
-from refgi.papers.hssil.subjects import BASKET, LARGE, every_texel, lit, mean_of, smaller, traced, wide_frame
+from refgi.papers.hssil.subjects import BASKET, LARGE, every_texel, lit, smaller, wide_frame
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Cell, Figure, Picture, Table
 from refgi.sssil import HssilSettings

@@ -9,7 +9,8 @@ import numpy.typing as npt
 from refgi.frame import Frame
 from refgi.papers import pictures
 from refgi.papers.curves import Axes, Curve, drawn
-from refgi.papers.hssil.subjects import HALL, WIDE, expected_light, frame_of, lit, scene_of, smaller
+from refgi.papers.hssil.references import expected_light
+from refgi.papers.hssil.subjects import HALL, WIDE, frame_of, lit, scene_of, smaller
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Plot, Table
 from refgi.papers.val.motion import changes

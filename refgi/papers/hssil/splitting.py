@@ -7,21 +7,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy.typing as npt
 
 from refgi.papers import pictures
+from refgi.papers.hssil.references import doubt, expected_light, mean_of, traced
 from refgi.papers.hssil.subjects import (
     BOX,
     HALL,
     HORSE,
     JUDGED,
     TITLES,
-    doubt,
     every_pixel,
     every_texel,
-    expected_light,
     frame_of,
     lit,
-    mean_of,
     smaller,
-    traced,
 )
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Cell, Figure, Picture, Table

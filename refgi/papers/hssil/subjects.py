@@ -1,4 +1,4 @@
-"""Scenes, frames, settings and references that the figures share.
+"""Scenes, frames and settings that the figures share.
 
 A full run has the paper's sizes: 1280 x 720 pixels where times are taken, 720 x 720 where Figure 5 judges. In a smaller
 run the radius of these figures shrinks with the picture, so that as many levels reach the same share of it. What is
@@ -11,22 +11,17 @@ import math
 import warnings
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import numpy.typing as npt
 
-from refgi.compare.maps import luminance
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
-from refgi.papers.curves import Curve
 from refgi.papers.hssil.scenes import BUILDERS
-from refgi.papers.subjects import Subjects, seen_by
+from refgi.papers.subjects import Subjects
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
-from refgi.truth import TruthResult, TruthSettings, trace_truth
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench
-    from refgi.scene import Scene
 
 Array = npt.NDArray[Any]
 
@@ -34,9 +29,8 @@ HALL, SPOT, BASKET, HORSE, BOX = "hall", "spot", "basket", "horse", "box"
 TITLES = {BOX: "Cornell Box", HORSE: "Cornell Horse", HALL: "hall", SPOT: "hall with a spot", BASKET: "basket"}
 PAPER_HEIGHT, WIDE = 720, 16 / 9  # the paper's pictures are 1280 x 720
 LARGE = PAPER_HEIGHT / 512  # pixels a side in units of a full run's
-JUDGED, SMALL = 1 / 2, 1 / 4  # where one picture is traced, where many are
+JUDGED = 1 / 2  # where pictures are traced, or every pixel lights every pixel
 RADIUS, RADIUS_FIGURE_5 = 20.0, 40.0  # texels of the first level
-FAR_SEED = 1 << 20  # pictures that others are judged by share no random numbers with them
 
 _SUBJECTS = Subjects(BUILDERS)
 scene_of, frame_of = _SUBJECTS.scene_of, _SUBJECTS.frame_of
@@ -62,26 +56,6 @@ def wide_frame(bench: "Workbench", name: str, factor: float = LARGE, **options: 
         Its buffers stay once they are computed.
     """
     return frame_of(bench, name, factor, wide=WIDE, **options)
-
-
-def wide_view(bench: "Workbench", scene: "Scene", factor: float = LARGE) -> Frame:
-    """Return a fresh frame of the paper's shape.
-
-    Parameters
-    ----------
-    bench : Workbench
-        Sizes.
-    scene : Scene
-        What is seen.
-    factor : float
-        As for `wide_frame`.
-
-    Returns
-    -------
-    Frame
-        Nothing is computed yet.
-    """
-    return seen_by(bench, scene, factor, wide=WIDE)
 
 
 def settings_of(frame: Frame, **changes: Any) -> HssilSettings:
@@ -201,51 +175,6 @@ def lit(frame: Frame, settings: HssilSettings) -> Array:
         return hssil(frame, settings)
 
 
-def noise_of(frame: Frame, settings: HssilSettings, first: Array | None = None) -> float:
-    """Return how noisy a picture is, whatever it is noisy around: by another picture with other random numbers.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene, seen and lit.
-    settings : HssilSettings
-        How it is lit.
-    first : (3, h, w) ndarray, optional
-        The picture, where it is known.
-
-    Returns
-    -------
-    float
-        Standard deviation, W/m^2: root mean square over pixels with a surface.
-    """
-    one = lit(frame, settings) if first is None else first
-    other = lit(frame, dataclasses.replace(settings, seed=settings.seed + 1))
-    return math.sqrt(0.5 * np.mean((one.astype(np.float64) - other)[:, frame.gbuffer.covered] ** 2))
-
-
-def expected_light(frame: Frame, settings: HssilSettings, seeds: int) -> Array:
-    """Return the mean picture of many: what is left when all noise is gone.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene, seen and lit.
-    settings : HssilSettings
-        How it is lit.
-    seeds : int
-        How many pictures.
-
-    Returns
-    -------
-    (3, h, w) ndarray of float64
-        Irradiance, W/m^2. With Eq. 4 it depends on the number of samples: each is a disc as large as its share.
-    """
-    total = np.zeros((3, frame.height, frame.width))
-    for seed in range(seeds):
-        total += lit(frame, dataclasses.replace(settings, seed=FAR_SEED + seed))
-    return total / seeds
-
-
 def ready(frame: Frame) -> Frame:
     """Compute what deferred shading has before indirect light starts.
 
@@ -262,52 +191,6 @@ def ready(frame: Frame) -> Frame:
     frame.gbuffer.resolve("position", "depth", "normal", "albedo")
     assert frame.direct.shape == (3, frame.height, frame.width)
     return frame
-
-
-def traced(bench: "Workbench", frame: Frame, key: Any, **changes: Any) -> Array:
-    """Return one bounce by path tracing.
-
-    Parameters
-    ----------
-    bench : Workbench
-        Keeps it, and says how many samples.
-    frame : Frame
-        The scene, seen.
-    key : object
-        What tells this frame from others.
-    **changes : object
-        Settings of truth: which emitters count, and whether anything blocks.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2.
-    """
-    return _truth(bench, frame, key, **changes).mean
-
-
-def doubt(bench: "Workbench", frame: Frame, key: Any, **changes: Any) -> float:
-    """Return how noisy path tracing itself is.
-
-    Parameters
-    ----------
-    bench : Workbench
-        As for `traced`.
-    frame : Frame
-        As for `traced`.
-    key : object
-        As for `traced`.
-    **changes : object
-        As for `traced`.
-
-    Returns
-    -------
-    float
-        Standard error in % of the mean irradiance: root mean square over pixels with a surface.
-    """
-    found, covered = _truth(bench, frame, key, **changes), frame.gbuffer.covered
-    error = math.sqrt(float(found.variance_of_mean[:, covered].mean()))
-    return 100 * error / max(mean_of(found.mean, covered), 1e-30)
 
 
 def reach_of(frame: Frame, settings: HssilSettings) -> float:
@@ -329,49 +212,3 @@ def reach_of(frame: Frame, settings: HssilSettings) -> float:
         return 1.0
     pixels = settings.radius * 2.0 ** (settings.levels + settings.first_level)
     return pixels / math.hypot(frame.width, frame.height)
-
-
-def mean_of(light: Array, covered: Array) -> float:
-    """Return the mean irradiance of the pixels with a surface.
-
-    Parameters
-    ----------
-    light : (3, h, w) ndarray
-        Irradiance, W/m^2.
-    covered : (h, w) ndarray of bool
-        Pixels with a surface.
-
-    Returns
-    -------
-    float
-        Over all channels; 0 where nothing is seen.
-    """
-    return float(light[:, covered].mean(dtype=np.float64)) if covered.any() else 0.0
-
-
-def scan_line(name: str, light: Array, row: int, *, dashed: bool = False) -> Curve:
-    """Return the luminance along a row of a picture.
-
-    Parameters
-    ----------
-    name : str
-        What the curve is called.
-    light : (3, h, w) ndarray
-        Irradiance, W/m^2.
-    row : int
-        Which row.
-    dashed : bool
-        How it is drawn.
-
-    Returns
-    -------
-    Curve
-        Over the columns, W/m^2.
-    """
-    values = luminance(light[:, row : row + 1])[0].tolist()
-    return Curve(name, range(len(values)), values, dashed)
-
-
-def _truth(bench: "Workbench", frame: Frame, key: Any, **changes: Any) -> TruthResult:
-    settings = TruthSettings(samples=bench.scale.truth_samples, **changes)
-    return bench.once(("traced", key, *sorted(changes.items())), lambda: trace_truth(frame, settings))

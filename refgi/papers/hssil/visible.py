@@ -10,18 +10,8 @@ from refgi.compare.maps import error_scale, luminance
 from refgi.compare.report import number
 from refgi.papers import pictures
 from refgi.papers.curves import Axes, Curve, drawn
-from refgi.papers.hssil.subjects import (
-    HALL,
-    HORSE,
-    JUDGED,
-    TITLES,
-    doubt,
-    frame_of,
-    lit,
-    mean_of,
-    smaller,
-    traced,
-)
+from refgi.papers.hssil.references import doubt, mean_of, traced
+from refgi.papers.hssil.subjects import HALL, HORSE, JUDGED, TITLES, frame_of, lit, smaller
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.records import Cell, Figure, Picture, Plot, Table
 from refgi.papers.timing import interleaved

@@ -106,8 +106,8 @@ def _scenes(path: str, frames: int | None, options: dict[str, Any]) -> "tuple[Sc
     """Return the scene as it is without the path, that of every frame, and how many; all of them are usable."""
     from refgi.cli.view import View
     from refgi.errors import expect
-    from refgi.sssil.temporal.path import camera_and_lights, scenes_along
-    from refgi.sssil.temporal.path_file import read_path
+    from refgi.scene.path import camera_and_lights, scenes_along
+    from refgi.scene.pathfile import read_path
 
     scene = View(**options).load()
     way, own = read_path(path, scene)

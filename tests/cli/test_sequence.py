@@ -10,11 +10,11 @@ from click.testing import CliRunner
 from refgi.cli.group import VerbGroup
 from refgi.image import read_exr
 from refgi.scene import load_scene
+from refgi.scene.path import scenes_along
+from refgi.scene.pathfile import read_path
 from refgi.splat import SiiSettings
 from refgi.splat.sii import sii
 from refgi.sssil.temporal import Sequence, TemporalSettings
-from refgi.sssil.temporal.path import scenes_along
-from refgi.sssil.temporal.path_file import read_path
 
 PATH = """
 frames = 4

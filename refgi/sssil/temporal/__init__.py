@@ -2,7 +2,7 @@
 
 Each pixel's surface point is found in the frame before, where that surface was then (`motion`), and the light it had
 there is blended with the new (`filter`). `Sequence` renders scenes one after the other and keeps of each what the next
-needs; `path` moves camera, lights and objects through one scene.
+needs; `refgi.scene.path` moves camera, lights and objects through one scene.
 """
 
 from refgi.sssil.temporal.sequence import Sequence, Step

@@ -33,8 +33,8 @@ from refgi.scene.files import read_bytes
 from refgi.scene.light import DirectionalLight, PointLight, SpotLight
 from refgi.scene.model import Scene
 from refgi.scene.motion import faces_of
+from refgi.scene.path import Array, Curve, Motion, Path, Track
 from refgi.scene.values import is_direction
-from refgi.sssil.temporal.path import Array, Curve, Motion, Path, Track
 
 MOST_FRAMES = 100_000
 Number = Annotated[float, Field(allow_inf_nan=False)]

@@ -8,8 +8,8 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.scene import DirectionalLight, PointLight, load_scene
-from refgi.sssil.temporal.path import Motion, Path, Track, scenes_along, value_at
-from refgi.sssil.temporal.path_file import read_path
+from refgi.scene.path import Motion, Path, Track, scenes_along, value_at
+from refgi.scene.pathfile import read_path
 
 FILE = """
 frames = 5

@@ -1,8 +1,6 @@
 """Where a receiver's samples lie: low-discrepancy points of a crown, and who shares them (Sec. 3.2, Fig. 2).
 
-Offsets are whole texels (ox, oy), columns to the right and rows down from the receiver. A point (u, v) of the unit
-square lies r sqrt(1 + 3 u) from it in the crown, r sqrt(u) in the disc within, at the angle 2 pi v: so that equal
-areas get equally many points. A point stands for the texel it falls into.
+Offsets are whole texels (ox, oy), columns to the right and rows down from the receiver.
 
 Receivers of a row share samples with the pattern "row". Each row takes the stretch of one long Kronecker sequence that
 follows the row above, so that rows which upsampling mixes complement each other; a shift by a hash of seed and level
@@ -18,13 +16,27 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.sampling import hash_bits
+from refgi.sssil.crown.points import (
+    FIRST_STEP,
+    SECOND_STEP,
+    TO_UNIT,
+    level_key,
+    pixel_key,
+    pixel_offset,
+    row_key,
+    sample_points,
+    sample_weight,
+    shift_of,
+    shifted,
+)
 from refgi.sssil.settings import HssilSettings
+
+__all__ = [
+    "PHASES", "known_radius", "level_key", "offsets_at", "pixel_key", "pixel_offset", "row_key", "row_offsets",
+    "sample_points", "sample_weight", "shared_offsets", "shift_of", "shifted"]
 
 Array = npt.NDArray[Any]
 
-# shares of the turn of a two-dimensional Kronecker sequence: 1 / g and 1 / g^2 where g^3 = g + 1
-FIRST_STEP, SECOND_STEP = 0.7548776662466927, 0.5698402909980532
-TO_UNIT = 2.0**-32
 PHASES = 2  # even columns of a row share samples, and odd ones: rows that share all would show as streaks
 
 
@@ -162,175 +174,6 @@ def known_radius(settings: HssilSettings, radius: float | None) -> float:
     found = settings.radius if radius is None else radius
     expect(found is not None, "radius", "texels, or the size of the first level to choose it by", found)
     return float(found)  # type: ignore[arg-type]
-
-
-def sample_points(inner: int, crown: int) -> Array:
-    """Return the points of the unit square that all patterns shift: those of the inner disc, then the crown's.
-
-    Parameters
-    ----------
-    inner, crown : int
-        How many.
-
-    Returns
-    -------
-    (inner + crown, 3) ndarray of float64
-        u in [0, 1), cos 2 pi v and sin 2 pi v.
-    """
-    count = np.concatenate([np.arange(inner), np.arange(crown)])
-    u, v = (0.5 + count * FIRST_STEP) % 1.0, (0.5 + count * SECOND_STEP) % 1.0
-    return np.stack([u, np.cos(2.0 * math.pi * v), np.sin(2.0 * math.pi * v)], axis=1)
-
-
-def sample_weight(radius: float, inner: int, crown: int) -> Array:
-    """Return how many texels each sample stands for.
-
-    Parameters
-    ----------
-    radius : float
-        Inner radius of the crown, texels.
-    inner, crown : int
-        How many samples the disc and the crown have.
-
-    Returns
-    -------
-    (inner + crown,) ndarray of float64
-        pi r^2 / inner in the disc, 3 pi r^2 / crown in the crown: the areas shared out.
-    """
-    disc = math.pi * radius**2
-    return np.repeat([disc / max(inner, 1), 3.0 * disc / crown], [inner, crown])
-
-
-@kernel
-def level_key(seed: Any, number: Any) -> Any:
-    """Return what draws the samples of one level.
-
-    Parameters
-    ----------
-    seed, number : int
-        Of the settings, and of the level.
-
-    Returns
-    -------
-    uint32
-        A hash of both.
-    """
-    return hash_bits(np.uint32(seed) ^ hash_bits(np.uint32(number) + np.uint32(0x9E3779B9)))
-
-
-@kernel
-def row_key(key: Any, row: Any) -> Any:
-    """Return what draws the samples of one row.
-
-    Parameters
-    ----------
-    key : uint32
-        Of the level.
-    row : int
-        Row of the receivers.
-
-    Returns
-    -------
-    uint32
-        A hash of both.
-    """
-    return hash_bits(key ^ hash_bits(np.uint32(row) + np.uint32(0x85EBCA6B)))
-
-
-@kernel
-def pixel_key(key: Any, column: Any) -> Any:
-    """Return what draws the samples of one receiver.
-
-    Parameters
-    ----------
-    key : uint32
-        Of the row.
-    column : int
-        Column of the receiver.
-
-    Returns
-    -------
-    uint32
-        A hash of both.
-    """
-    return hash_bits(key ^ hash_bits(np.uint32(column) + np.uint32(0xC2B2AE35)))
-
-
-@kernel
-def shift_of(key: Any, block: Any) -> Any:
-    """Return how the common points are shifted (Cranley and Patterson 1976).
-
-    Parameters
-    ----------
-    key : uint32
-        Draws the shift.
-    block : int
-        Points of the sequence to go ahead.
-
-    Returns
-    -------
-    u, cosine, sine : float64
-        What is added to u, modulo 1, and the turn that is added to the angle.
-    """
-    u = (hash_bits(key) * TO_UNIT + block * FIRST_STEP) % 1.0
-    v = (hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT + block * SECOND_STEP) % 1.0
-    return u, math.cos(2.0 * math.pi * v), math.sin(2.0 * math.pi * v)
-
-
-@kernel
-def shifted(points: Array, j: Any, near: float, radius: float, u: float, cosine: float, sine: float) -> Any:
-    """Return where a shifted point lies.
-
-    Parameters
-    ----------
-    points : (n, 3) ndarray of float64
-        Of `sample_points`.
-    j : int
-        Which of them.
-    near : float
-        0 for a point of the disc, 1 for one of the crown.
-    radius : float
-        Inner radius of the crown, texels.
-    u, cosine, sine : float
-        Of `shift_of`.
-
-    Returns
-    -------
-    ox, oy : int64
-        Texels from the receiver.
-    """
-    share = points[j, 0] + u
-    share = share - 1.0 if share >= 1.0 else share
-    length = radius * math.sqrt(near + (1.0 + 2.0 * near) * share)
-    x = length * (points[j, 1] * cosine - points[j, 2] * sine)
-    y = length * (points[j, 1] * sine + points[j, 2] * cosine)
-    return np.int64(math.floor(x + 0.5)), np.int64(math.floor(y + 0.5))
-
-
-@kernel
-def pixel_offset(points: Array, inner: int, radius: float, key: Any, j: int) -> Any:
-    """Return one sample of a receiver with samples of its own.
-
-    Parameters
-    ----------
-    points : (n, 3) ndarray of float64
-        Of `sample_points`.
-    inner : int
-        How many of them lie in the inner disc.
-    radius : float
-        Inner radius of the crown, texels.
-    key : uint32
-        Draws the shift.
-    j : int
-        Which sample.
-
-    Returns
-    -------
-    ox, oy : int64
-        Texels from the receiver.
-    """
-    u, cosine, sine = shift_of(key, 0)
-    return shifted(points, j, 0.0 if j < inner else 1.0, radius, u, cosine, sine)
 
 
 @kernel

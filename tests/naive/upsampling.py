@@ -10,11 +10,11 @@ import math
 import numpy as np
 
 
-def tent(t):
-    """Far, own and near weight of a pixel whose centre lies t texels (0 to 1/2) from that of its texel."""
-    half_width = (4 + t) / 3
-    weights = [max(0.0, 1 - distance / half_width) for distance in (1 + t, t, 1 - t)]
-    return [weight / sum(weights) for weight in weights]
+def tent(step, t):
+    """Weight of the texel before (-1), of the own (0) or the one after (1), t texels (-1 to 1) from the own's point."""
+    half_width = (4 + abs(t)) / 3 if abs(t) < 0.5 else 1
+    weights = [max(0.0, 1 - abs(t - place) / half_width) for place in (-1, 0, 1)]
+    return weights[step + 1] / sum(weights)
 
 
 def gauss(u):
@@ -63,7 +63,8 @@ def bilateral(light, below_depth, below_normal, depth, normal, factor, sigma=0.0
 def _pixel(light, below_depth, below_normal, depth, normal, factor, sigma, power, closest, i, j):
     gx, gy = slope(depth, i, j, 0, 1), slope(depth, i, j, 1, 0)
     ty, tx = offset(i, factor), offset(j, factor)
-    corner = (factor - 1) / 2 * (abs(gx) + abs(gy)) if closest else 0.0
+    if closest:  # the nearest of the texel's pixels, at its corner, lies there
+        tx, ty = (t - (factor - 1) / (2 * factor) * np.sign(g) for t, g in ((tx, gx), (ty, gy)))
     total, weights, nearest, least = np.zeros(3), 0.0, np.zeros(3), math.inf
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
@@ -72,20 +73,15 @@ def _pixel(light, below_depth, below_normal, depth, normal, factor, sigma, power
                 continue
             if math.isinf(below_depth[row, column]):
                 continue
-            plane = 1 / depth[i, j] + factor * ((dx - tx) * gx + (dy - ty) * gy) + corner
+            plane = 1 / depth[i, j] + factor * ((dx - tx) * gx + (dy - ty) * gy)
             delta = depth[i, j] * (1 / below_depth[row, column] - plane)
             cosine = max(0.0, float(np.dot(normal[:, i, j], below_normal[:, row, column])))
-            spatial = tent(abs(tx))[_kind(dx, tx)] * tent(abs(ty))[_kind(dy, ty)]
+            spatial = tent(dx, tx) * tent(dy, ty)
             weight = spatial * gauss(delta**2 / (2 * sigma**2)) * cosine**power
             total, weights = total + weight * light[:, row, column], weights + weight
             if abs(delta) < least:
                 least, nearest = abs(delta), light[:, row, column]
     return total / weights if weights > 1e-20 else nearest
-
-
-def _kind(step, t):
-    """0 far, 1 own, 2 near."""
-    return 1 if step == 0 else 2 if (step < 0) == (t < 0) else 0
 
 
 def bilinear(light, below_depth, depth, factor):

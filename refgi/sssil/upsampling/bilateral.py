@@ -11,7 +11,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.sssil.upsampling import lines, receivers, weights
 from refgi.sssil.upsampling.lines import SPAN, WIDE
-from refgi.sssil.upsampling.tent import LINES, OFFSET, write_tents
+from refgi.sssil.upsampling.tent import write_offsets
 
 Array = npt.NDArray[Any]
 
@@ -44,35 +44,35 @@ def fill_bilateral(
     result : (3, h, w) ndarray
         Filled.
     """
-    tents = np.empty((factor, LINES), depth.dtype)
-    write_tents(tents)
+    offsets = np.empty(WIDE, depth.dtype)
+    write_offsets(factor, offsets)
     across = (depth.shape[1] + WIDE - 1) // WIDE
     bands = (below_depth.shape[0] + BAND - 1) // BAND
     for task in prange(across * bands):
         left, first = np.int64(task) % across * WIDE, np.int64(task) // across * BAND
-        _fill_block(light, below_depth, below_normal, depth, normal, left, first, tents, sharpness, lean, power, added,
-                    adds, result)
+        _fill_block(light, below_depth, below_normal, depth, normal, left, first, factor, offsets, sharpness, lean,
+                    power, added, adds, result)
 
 
 @kernel
 def _fill_block(
     light: Array, below_depth: Array, below_normal: Array, depth: Array, normal: Array, left: int, first: int,
-    tents: Array, sharpness: Any, lean: Any, power: Any, added: Array, adds: bool, result: Array,
+    side: int, offsets: Array, sharpness: Any, lean: Any, power: Any, added: Array, adds: bool, result: Array,
 ) -> None:
     texels, near = np.zeros((3, lines.LINES), depth.dtype), np.zeros((3, SPAN), depth.dtype)
     here, means = np.zeros(receivers.HERE, depth.dtype), np.zeros(weights.MEANS, depth.dtype)
-    room, side = np.zeros((7, lines.ROOM), depth.dtype), len(tents)
+    room = np.zeros((7, lines.ROOM), depth.dtype)
     # two rows of texels and two of pixels are loaded before the first that is filled
     for y in range((first - 2) * side, min((first + BAND) * side, depth.shape[0])):
-        row, tent = y // side, tents[y % side]
+        row = y // side
         if y % side == 0:
             lines.load_texels(light, below_depth, below_normal, row + 1, left, side, room, texels[(row + 4) % 3])
         if y >= first * side - 2:
             receivers.load_nearness(depth, y + 1, left, near[(y + 4) % 3])
         if y >= first * side:
             receivers.load_receivers(normal, y, left, side, sharpness, lean, near[(y + 2) % 3], near[y % 3],
-                                     near[(y + 1) % 3], tent[OFFSET:], here)
-            weights.average(texels[(row + 2) % 3], texels[row % 3], texels[(row + 1) % 3], here, tent, power, means)
+                                     near[(y + 1) % 3], offsets, here)
+            weights.average(texels[(row + 2) % 3], texels[row % 3], texels[(row + 1) % 3], here, power, means)
             _store(texels, row, y, left, here, means, side, added, adds, result)
 
 

@@ -4,8 +4,7 @@ On a plane the nearness 1/z is linear in the picture, so differences between nei
 texels around, without rays or normals: of the two differences along each axis the smaller one counts, and none where
 they disagree in sign, which keeps clear of silhouettes.
 
-Symbols: g_x, g_y slope of the nearness (1/m a pixel), F pixels along a texel's side, t_x, t_y a pixel's centre from
-that of its texel (texels, -1/2 to 1/2).
+Symbols: g_x, g_y slope of the nearness (1/m a texel).
 """
 
 from typing import Any
@@ -19,7 +18,8 @@ from refgi.sssil.upsampling.tent import offset
 
 Array = npt.NDArray[Any]
 
-NORMAL, SCALE, PLANE, ACROSS, DOWN, HERE = 0, 3 * SPAN, 4 * SPAN, 5 * SPAN, 6 * SPAN, 7 * SPAN
+NORMAL, SCALE, PLANE = 0, 3 * SPAN, 4 * SPAN
+ACROSS, DOWN, X, Y, HERE = 5 * SPAN, 6 * SPAN, 7 * SPAN, 8 * SPAN, 9 * SPAN
 
 
 @kernel
@@ -93,18 +93,18 @@ def load_receivers(
     sharpness : float
         1 / (4 sqrt(2) sigma), sigma the standard deviation of depths as a share of the depth.
     lean : float
-        How far a texel's surface point is from its middle, to the side that is nearer, along either axis; texels.
+        How far the point that a texel stands for is from its middle, to the nearer side along either axis; texels.
     above, nearness, below : (SPAN,) ndarray
         Of `load_nearness`, of this row and those beside it.
     offsets : (>= WIDE,) ndarray
         Where the pixels' centres lie from those of their texels, to the right, texels.
     here : (HERE,) ndarray
-        Filled: normal; sharpness z, 0 where no surface is seen; nearness at the own texel; its change from texel to
-        texel.
+        Filled: normal; sharpness z, 0 where no surface is seen; nearness at the own texel's point; its change from
+        texel to texel; where the pixel lies from that point, texels.
     """
     real = here.dtype.type
     zero, side = real(0.0), real(factor)
-    ty = offset(row % factor, factor, here)
+    offset_y = offset(row % factor, factor, here)
     size = np.uint64(min(WIDE, normal.shape[2] - left))
     for c in range(3):
         line = np.uint64(NORMAL + c * SPAN)
@@ -117,8 +117,12 @@ def load_receivers(
         here[np.uint64(ACROSS) + i] = gx
         here[np.uint64(DOWN) + i] = gy
         here[np.uint64(SCALE) + i] = sharpness / value if value > zero else zero
-        # the nearest of a texel's pixels lends its place, not the middle
-        here[np.uint64(PLANE) + i] = value - offsets[i] * gx - ty * gy + lean * (abs(gx) + abs(gy))
+        # what a texel stands for is at its corner that is nearest, not in its middle
+        x = offsets[i] - (lean if gx > zero else (-lean if gx < zero else zero))
+        y = offset_y - (lean if gy > zero else (-lean if gy < zero else zero))
+        here[np.uint64(X) + i] = x
+        here[np.uint64(Y) + i] = y
+        here[np.uint64(PLANE) + i] = value - x * gx - y * gy
 
 
 @kernel

@@ -1,72 +1,59 @@
-"""Spatial weights of three by three texels.
+"""Spatial weights of three texels in a row.
 
-The tent about a pixel's centre has a half width of (4 + t) / 3 texels, t the distance of the pixel's centre from that
-of its texel, along each axis; brought to a sum of 1 its weights are (1 - 2 t) / 6, (2 - t) / 3 and (1 + 4 t) / 6 for
-the far, the own and the near texel. Of all tents it is the one that leaves linear functions linear, as the bilinear
-weights of two by two texels do; it goes over to (0, 1/2, 1/2) where the next texel begins.
+The tent about a place t texels (up to 1/2) from the middle one has a half width of (4 + |t|) / 3; brought to a sum of 1
+its weights are (1 - 2 |t|) / 6, (2 - |t|) / 3 and (1 + 4 |t|) / 6 for the far, the own and the near texel. Of all tents
+it is the one that leaves linear functions linear, as the bilinear weights of two texels do, which it goes over to at
+|t| = 1/2 and which stand in beyond.
 """
 
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.sssil.upsampling.lines import SPAN, WIDE
 
 Array = npt.NDArray[Any]
 
-OFFSET, LINES = 9 * SPAN, 10 * SPAN  # after the weights of above left, above, above right, left, ..
+SIXTH, THIRD = 1 / 6, 1 / 3
 
 
 @kernel
-def write_tents(tents: Array) -> None:
-    """Write what texels weigh for rows of pixels.
+def tent_at(t: Any) -> Any:
+    """Return the weights of three texels in a row.
 
     Parameters
     ----------
-    tents : (F, LINES) ndarray
-        Filled, for each of the rows of pixels that a texel of F x F pixels has, and for blocks that begin with a texel:
-        nine lines of weights and one of offsets.
-    """
-    factor = len(tents)
-    for y in range(factor):
-        for x in range(WIDE):
-            tents[y, np.uint64(OFFSET + x)] = offset(x % factor, factor, tents)
-            for dy in range(-1, 2):
-                for dx in range(-1, 2):
-                    weight = weight_of(y, dy, factor, tents) * weight_of(x % factor, dx, factor, tents)
-                    tents[y, np.uint64((3 * dy + dx + 4) * SPAN + x)] = weight
-
-
-@kernel
-def weight_of(place: int, step: int, factor: int, like: Array) -> Any:
-    """Return the weight of one of three texels along an axis.
-
-    Parameters
-    ----------
-    place : int
-        Of the pixel in its texel, 0 to factor - 1.
-    step : int
-        -1: the texel before, 0: the own, 1: the one after.
-    factor : int
-        Pixels along a texel's side.
-    like : ndarray
-        Of the type of the result.
+    t : float
+        Where the receiver lies from the point that the middle texel stands for, texels, -1 to 1.
 
     Returns
     -------
-    float
-        The sum over the three is 1.
+    before, own, after : float
+        Weights; their sum is 1.
     """
-    real = like.dtype.type
-    along = offset(place, factor, like)
-    t = abs(along)
-    if step == 0:
-        return (real(2.0) - t) / real(3.0)
-    if (step < 0) == (along < real(0.0)):
-        return (real(1.0) + real(4.0) * t) / real(6.0)
-    return (real(1.0) - real(2.0) * t) / real(6.0)
+    real = type(t)
+    zero, one, two, four = real(0.0), real(1.0), real(2.0), real(4.0)
+    away = abs(t)
+    inner = away < real(0.5)
+    far = (one - two * away) * real(SIXTH) if inner else zero
+    own = (two - away) * real(THIRD) if inner else one - away
+    near = (one + four * away) * real(SIXTH) if inner else away
+    return near if t < zero else far, own, far if t < zero else near
+
+
+@kernel
+def write_offsets(factor: int, offsets: Array) -> None:
+    """Write where the centres of pixels lie from those of their texels.
+
+    Parameters
+    ----------
+    factor : int
+        Pixels along a texel's side.
+    offsets : (n,) ndarray
+        Filled with texels, -1/2 to 1/2; the first pixel is the first of a texel.
+    """
+    for i in range(len(offsets)):
+        offsets[i] = offset(i % factor, factor, offsets)
 
 
 @kernel

@@ -63,7 +63,8 @@ def upsample(
     Sec. 3.2 names a joint bilateral filter of 3 x 3 texels (Sec. 5) and gives no weights. Here a texel weighs
     ``tent * exp(-delta^2 / (2 depth_sigma^2)) * max(0, <n . n'>)^normal_power``: the tent leaves linear functions
     linear, and delta = z (1/z' - 1/z_plane) compares the texel's depth with that of the plane through the receiver at
-    the texel's place, so that slanted planes keep the whole tent. Equal light stays equal to the bit where the own
+    the texel's place, so that slanted planes keep the whole tent. That place is where the plane has the nearest of the
+    texel's pixels, unless depths are averaged. Equal light stays equal to the bit where the own
     texel is of the receiver's surface. Where no texel has any weight, the nearest in depth is taken.
     """
     dtype = coarse.dtype

@@ -16,6 +16,7 @@ from refgi.elementary import pow
 from refgi.jit import kernel
 from refgi.sssil.upsampling import lines, receivers
 from refgi.sssil.upsampling.lines import SPAN, WIDE
+from refgi.sssil.upsampling.tent import tent_at
 
 Array = npt.NDArray[Any]
 
@@ -57,9 +58,7 @@ def alike(cosine: Any, off: Any, power: Any) -> Any:
 
 
 @kernel
-def average(
-    above: Array, middle: Array, below: Array, here: Array, tent: Array, power: Any, means: Array
-) -> None:
+def average(above: Array, middle: Array, below: Array, here: Array, power: Any, means: Array) -> None:
     """Average the light of three by three texels for each pixel of a row.
 
     Parameters
@@ -68,8 +67,6 @@ def average(
         Rows of texels; the middle one has the pixels.
     here : (HERE,) ndarray
         The pixels.
-    tent : (tent.LINES,) ndarray
-        Spatial weights.
     power : float or None
         Of `alike`.
     means : (MEANS,) ndarray
@@ -85,11 +82,13 @@ def average(
     for i in range(np.uint64(WIDE)):
         across, plane = here[np.uint64(receivers.ACROSS) + i], here[np.uint64(receivers.PLANE) + i]
         down = here[np.uint64(receivers.DOWN) + i]
-        u0, u1, u2 = _weights(above, here, tent, 0, i, plane - down, across, power)
-        m0, m1, m2 = _weights(middle, here, tent, 3, i, plane, across, power)
-        d0, d1, d2 = _weights(below, here, tent, 6, i, plane + down, across, power)
+        columns = tent_at(here[np.uint64(receivers.X) + i])
+        upper, own, lower = tent_at(here[np.uint64(receivers.Y) + i])
+        u0, u1, u2 = _weights(above, here, columns, upper, i, plane - down, across, power)
+        m0, m1, m2 = _weights(middle, here, columns, own, i, plane, across, power)
+        d0, d1, d2 = _weights(below, here, columns, lower, i, plane + down, across, power)
         total = ((u0 + u2) + u1) + ((m0 + m2) + m1) + ((d0 + d2) + d1)
-        likely = m1 >= sure * tent[np.uint64(4 * SPAN) + i]
+        likely = m1 >= sure * (own * columns[1])
         known = total >= least
         inverse = one / (total if known else one)
         # written out: a loop over the channels would cost the compiler its even split into lanes
@@ -109,13 +108,12 @@ def average(
 
 @kernel
 def _weights(
-    texels: Array, here: Array, tent: Array, first: int, i: Any, plane: Any, across: Any, power: Any
+    texels: Array, here: Array, columns: Any, row: Any, i: Any, plane: Any, across: Any, power: Any
 ) -> Any:
     """Return what left, own and right texel of a row weigh."""
-    line, span = np.uint64(first * SPAN) + i, np.uint64(SPAN)
-    left = _alike_at(texels, np.uint64(lines.LEFT) + i, here, i, plane - across, power) * tent[line]
-    own = _alike_at(texels, np.uint64(lines.OWN) + i, here, i, plane, power) * tent[line + span]
-    right = _alike_at(texels, np.uint64(lines.RIGHT) + i, here, i, plane + across, power) * tent[line + span + span]
+    left = _alike_at(texels, np.uint64(lines.LEFT) + i, here, i, plane - across, power) * (row * columns[0])
+    own = _alike_at(texels, np.uint64(lines.OWN) + i, here, i, plane, power) * (row * columns[1])
+    right = _alike_at(texels, np.uint64(lines.RIGHT) + i, here, i, plane + across, power) * (row * columns[2])
     return left, own, right
 
 

@@ -36,6 +36,7 @@ def test_the_camera_placed_first_faces_the_side_that_the_picture_misses(evidence
     assert (depth > 0).all()
     assert abs(right[0]) < view.half[0] * depth[0]
     assert abs(down[0]) < view.half[1] * depth[0]
+    assert camera.up[1] > 0
     assert (camera.width, camera.height) == (40, 30)
     evidence(f"Fig. 9: eye at {np.round(camera.eye, 2).tolist()}, between the lit side and the wall")
 

@@ -129,6 +129,7 @@ def _march_row(packed: Array, row: Any, offsets: Array, weight: Array, thickness
                mask: Array, half: int) -> None:
     """March one slice for a row of receivers, which are the SIMD lanes."""
     rows, columns = packed.shape[0], packed.shape[2]
+    here, part = packed[row], np.uint64(PART + 3 * half)
     mask[:] = np.uint32(0)
     lines[HIGHEST, :] = packed.dtype.type(0.0)
     for j in range(offsets.shape[0]):
@@ -136,80 +137,79 @@ def _march_row(packed: Array, row: Any, offsets: Array, weight: Array, thickness
         size = columns - abs(ox)
         if row + oy < 0 or row + oy >= rows or size <= 0 or (ox == 0 and oy == 0):
             continue
-        first, second = np.uint64((abs(ox) - ox) // 2), np.uint64((abs(ox) + ox) // 2)
+        there, first, second = packed[row + oy], np.uint64((abs(ox) - ox) // 2), np.uint64((abs(ox) + ox) // 2)
         if weight[j] > 0.0:
-            _light(packed, row, first, row + oy, second, np.uint64(size), weight[j], bulge, thickness, lines, mask,
-                   PART + 3 * half)
+            _light(here, first, there, second, np.uint64(size), weight[j], bulge, thickness, lines, mask, part)
         else:
-            _block(packed, row, first, row + oy, second, np.uint64(size), thickness, lines, mask)
+            _block(here, first, there, second, np.uint64(size), thickness, lines, mask)
 
 
 @kernel
-def _light(packed: Array, row: Any, first: Any, other: Any, second: Any, size: Any, weight: Any, bulge: Any,
-           thickness: Any, lines: Array, mask: Array, part: int) -> None:
+def _light(here: Array, first: Any, there: Array, second: Any, size: Any, weight: Any, bulge: Any,
+           thickness: Any, lines: Array, mask: Array, part: Any) -> None:
     """Add what one sample sends to each receiver of a row, and let it block."""
     for i in range(size):
         p, q = first + i, second + i
-        dx, dy, dz, c = _pair(packed, row, p, other, q)
+        dx, dy, dz, c = _pair(here, p, there, q)
         square = dx * dx + dy * dy + dz * dz
-        front, back = _heights(packed, row, p, other, q, dx, dy, dz, c, thickness)
+        front, back = _heights(here, p, there, q, dx, dy, dz, c, thickness)
         seen = _seen(front, lines[HIGHEST, p], mask[p])
-        g = seen * _transfer(packed, other, q, dx, dy, dz, c, square, weight, bulge)
-        lines[part, p] = lines[part, p] + g * packed[other, L, q]
-        lines[part + 1, p] = lines[part + 1, p] + g * packed[other, L + 1, q]
-        lines[part + 2, p] = lines[part + 2, p] + g * packed[other, L + 2, q]
+        g = seen * _transfer(there, q, dx, dy, dz, c, square, weight, bulge)
+        lines[part, p] = lines[part, p] + g * there[L, q]
+        lines[part + np.uint64(1), p] = lines[part + np.uint64(1), p] + g * there[L + 1, q]
+        lines[part + np.uint64(2), p] = lines[part + np.uint64(2), p] + g * there[L + 2, q]
         lines[HIGHEST, p] = front if front > lines[HIGHEST, p] else lines[HIGHEST, p]
         mask[p] = mask[p] | _covered(back, front)
 
 
 @kernel
-def _block(packed: Array, row: Any, first: Any, other: Any, second: Any, size: Any, thickness: Any, lines: Array,
+def _block(here: Array, first: Any, there: Array, second: Any, size: Any, thickness: Any, lines: Array,
            mask: Array) -> None:
     """Let one sample block the light of those after it, for each receiver of a row."""
     for i in range(size):
         p, q = first + i, second + i
-        dx, dy, dz, c = _pair(packed, row, p, other, q)
-        front, back = _heights(packed, row, p, other, q, dx, dy, dz, c, thickness)
+        dx, dy, dz, c = _pair(here, p, there, q)
+        front, back = _heights(here, p, there, q, dx, dy, dz, c, thickness)
         lines[HIGHEST, p] = front if front > lines[HIGHEST, p] else lines[HIGHEST, p]
         mask[p] = mask[p] | _covered(back, front)
 
 
 @kernel
-def _pair(packed: Array, row: Any, p: Any, other: Any, q: Any) -> Any:
+def _pair(here: Array, p: Any, there: Array, q: Any) -> Any:
     """Return d and n . d of a receiver and a sample."""
-    dx = packed[other, X, q] - packed[row, X, p]
-    dy = packed[other, X + 1, q] - packed[row, X + 1, p]
-    dz = packed[other, X + 2, q] - packed[row, X + 2, p]
-    return dx, dy, dz, packed[row, N, p] * dx + packed[row, N + 1, p] * dy + packed[row, N + 2, p] * dz
+    dx = there[X, q] - here[X, p]
+    dy = there[X + 1, q] - here[X + 1, p]
+    dz = there[X + 2, q] - here[X + 2, p]
+    return dx, dy, dz, here[N, p] * dx + here[N + 1, p] * dy + here[N + 2, p] * dz
 
 
 @kernel
-def _transfer(packed: Array, other: Any, q: Any, dx: Any, dy: Any, dz: Any, c: Any, square: Any, weight: Any,
+def _transfer(there: Array, q: Any, dx: Any, dy: Any, dz: Any, c: Any, square: Any, weight: Any,
               bulge: Any) -> Any:
     """Return pi c s / (r^4 + s r) (Eq. 4, with its pi) or, without bulge, pi c s / r^4 (Eq. 3)."""
     real = type(dx)
     zero, least = real(0.0), real(LEAST)
-    s = -(packed[other, N, q] * dx + packed[other, N + 1, q] * dy + packed[other, N + 2, q] * dz)
-    s = (s if s > zero else zero) * (packed[other, AREA, q] * weight)
+    s = -(there[N, q] * dx + there[N + 1, q] * dy + there[N + 2, q] * dz)
+    s = (s if s > zero else zero) * (there[AREA, q] * weight)
     below = square * square + bulge * s * math.sqrt(square)
     return real(math.pi) * (c if c > zero else zero) * s / (below if below > least else least)
 
 
 @kernel
-def _heights(packed: Array, row: Any, p: Any, other: Any, q: Any, dx: Any, dy: Any, dz: Any, c: Any,
+def _heights(here: Array, p: Any, there: Array, q: Any, dx: Any, dy: Any, dz: Any, c: Any,
              thickness: Any) -> Any:
     """Return q of a sample's front and back, 0 to 2; both 0 where there is no surface."""
     zero = type(dx)(0.0)
-    toward = packed[row, X, p] * dx + packed[row, X + 1, p] * dy + packed[row, X + 2, p] * dz
-    x = -toward * packed[row, INVERSE, p]  # along the receiver's direction to the eye
+    toward = here[X, p] * dx + here[X + 1, p] * dy + here[X + 2, p] * dz
+    x = -toward * here[INVERSE, p]  # along the receiver's direction to the eye
     across = dx * dx + dy * dy + dz * dz - x * x
     y = math.sqrt(across if across > zero else zero)
     # the back lies on the sample's ray from the eye: further by a share of all that grows along it
-    share, length, facing = thickness * packed[other, INVERSE, q], packed[row, LENGTH, p], packed[row, FACING, p]
+    share, length, facing = thickness * there[INVERSE, q], here[LENGTH, p], here[FACING, p]
     front = _height(x, y, c, facing)
     back = _height(x + share * (x - length), y + share * y, c + share * (c - facing * length), facing)
-    there = packed[other, INVERSE, q] > zero
-    return front if there else zero, back if there else zero
+    seen = there[INVERSE, q] > zero
+    return front if seen else zero, back if seen else zero
 
 
 @kernel
@@ -221,7 +221,8 @@ def _height(x: Any, y: Any, c: Any, facing: Any) -> Any:
     b = facing * (x * x + y * y) - c * x  # both times y and the length of the normal within the slice
     below = a + abs(b)
     part = a / (below if below > least else least)
-    return part if b >= zero else (real(2.0) - part if a > zero else zero)
+    beyond = (b < zero) & (a > zero)
+    return real(2.0) - part if beyond else part
 
 
 @kernel
@@ -293,7 +294,7 @@ def _march_pixels(packed: Array, steps: Steps, key: Any, thickness: Any, bulge: 
 def _march_pixel(packed: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any, bulge: Any,
                  lines: Array, mask: Array) -> None:
     rows, columns = packed.shape[0], packed.shape[2]
-    one, p = np.uint64(1), np.uint64(column)
+    here, part, one, p = packed[row], np.uint64(PART), np.uint64(1), np.uint64(column)
     mask[p], lines[HIGHEST, p] = np.uint32(0), packed.dtype.type(0.0)
     for j in range(offsets.shape[0]):
         a, b = row + np.int64(offsets[j, 1]), column + np.int64(offsets[j, 0])
@@ -301,6 +302,6 @@ def _march_pixel(packed: Array, row: Any, column: Any, offsets: Array, weight: A
             continue
         if weight[j] > 0.0:
             stands_for = packed.dtype.type(weight[j])
-            _light(packed, row, p, a, np.uint64(b), one, stands_for, bulge, thickness, lines, mask, PART)
+            _light(here, p, packed[a], np.uint64(b), one, stands_for, bulge, thickness, lines, mask, part)
         else:
-            _block(packed, row, p, a, np.uint64(b), one, thickness, lines, mask)
+            _block(here, p, packed[a], np.uint64(b), one, thickness, lines, mask)

@@ -68,7 +68,7 @@ class HssilSettings:
     normal_power: float = 8.0
     visibility: Visibility = "none"
     slices: int = 8
-    thickness: float = 0.02
+    thickness: float = 0.01
     cameras: int = 0
     views: tuple[Camera, ...] = ()
     depth_tolerance: float = 0.02

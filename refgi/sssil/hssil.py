@@ -63,16 +63,15 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
     levels = pyramid(frame, settings)  # Sec. 4, hierarchical maps
     expect_reach(levels[0].shape, settings)
     settings = dataclasses.replace(settings, radius=chosen_radius(levels[0].shape, settings))
-    light, below = None, None
-    for index in reversed(range(len(levels))):  # Sec. 3.2: starting from the smallest
+    light = gathered(frame, levels[-1], len(levels) - 1, settings)
+    for index in reversed(range(len(levels) - 1)):  # Sec. 3.2: starting from the smallest
         here = gathered(frame, levels[index], index, settings)
-        light = here if light is None or below is None else upsample(light, below, guide(levels[index]), settings, here)
-        below = guide(levels[index])
-    if light.shape[1:] == (frame.height, frame.width):
+        light = upsample(light, guide(levels[index + 1]), guide(levels[index]), settings, here)
+    if levels[0].number == 0:
         skip("sssil.upsample", "light was gathered at full resolution")
         return light
-    buffer = frame.gbuffer
-    return upsample(light, below, Guide(*buffer.resolve("depth", "normal")), settings)
+    depth, normal = frame.gbuffer.resolve("depth", "normal")
+    return upsample(light, guide(levels[0]), Guide(depth, normal), settings)
 
 
 def gathered(frame: "Frame", level: Level, index: int, settings: HssilSettings) -> Array:

@@ -2,7 +2,7 @@
 
 ``ds = z^2 4 tan(f_h / 2) tan(f_v / 2) dP / (W H) cos(alpha) / cos(beta)`` with z the depth, alpha the angle of the
 pixel's ray with the view direction and beta that with the surface's normal. For the ray d of length 1 along the view
-direction cos(alpha) is 1 / |d| and cos(beta) is -n.d / |d|: their ratio is 1 / -n.d, without a root.
+direction cos(alpha) is ``1 / |d|`` and cos(beta) is ``-n.d / |d|``: their ratio is 1 / -n.d, without a root.
 """
 
 from typing import Any

@@ -3,7 +3,7 @@
 From a receiver the picture is marched in slices, nearest samples first. The surface at a sample is taken to reach from
 its point away from the eye by a thickness. Both ends lie in the plane of the eye, the receiver and the sample. How high
 they stand there above the receiver's own plane counts in 32 sectors, from its horizon on the sample's side over its
-normal to the other horizon; the surface blocks the sectors whose middle it covers. Sectors are steps of
+normal to the other horizon; the surface blocks the sectors whose middle it covers. Sectors are steps of ::
 
     q(a, b) = a / (a + |b|), 2 - that where b < 0, 0 where a < 0
 

@@ -57,7 +57,7 @@ def seen():
     {"radius": 1.0, "levels": 6}, {"depth_sigma": 1e-6}, {"depth_sigma": 1e6, "normal_power": 0.0},
     {"normal_power": 1e4}, {"normal_power": 2.5}, {"thickness": 0.0, "visibility": "bitmask", "slices": 1},
     {"cameras": 1}, {"cameras": 1, "depth_tolerance": 0.0, "normal_cosine": 1.0},
-    {"as_published": {"hss_tan_f", "hss_disc_pi", "hss_level_factor"}},
+    {"as_published": ("hss_tan_f", "hss_disc_pi", "hss_level_factor")},
 ], ids=str)
 def test_every_setting_gives_a_sound_picture(seen, how):
     """Property: finite, not negative, black where nothing is seen, no sample above pi L."""

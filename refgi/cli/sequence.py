@@ -128,10 +128,19 @@ def _files(
     from refgi.scene.files import read_bytes, text_of
     from refgi.sssil.temporal.frame_files import FrameFiles
 
-    made = {"scene": scene.name, "faces": scene.face_count, "camera": scene.camera, "lights": scene.lights,
-            "path": hashlib.sha256(read_bytes(Path(path))).hexdigest(), "of": frames, "versions": versions(),
-            "units": UNITS, "content": CONTENT}
+    made = {"scene": scene.name, "faces": scene.face_count, "surfaces": _digest(scene), "camera": scene.camera,
+            "lights": scene.lights, "path": hashlib.sha256(read_bytes(Path(path))).hexdigest(), "of": frames,
+            "versions": versions(), "units": UNITS, "content": CONTENT}
     return FrameFiles(folder(out), text_of(Path(path).stem), suffixes, plain({**said, **made}))
+
+
+def _digest(scene: "Scene") -> str:
+    """Return a name for triangles and materials: frames of others are frames of another sequence."""
+    shape = scene.geometry
+    digest = hashlib.sha256(repr(scene.materials).encode())
+    for array in (shape.vertices, shape.faces, shape.material_of_face, shape.vertex_normals):
+        digest.update(b"" if array is None else array.tobytes())
+    return digest.hexdigest()
 
 
 def _render(

@@ -100,7 +100,7 @@ def scenes_along(scene: Scene, path: Path, frames: int) -> Iterator[Scene]:
     Raises
     ------
     InputError
-        If a frame's camera or light is not usable; names the frame.
+        If a frame's camera, light or object is not usable; names the frame.
     """
     for motion in path.objects:
         scene = dataclasses.replace(scene, geometry=with_own_vertices(scene.geometry, motion.faces))
@@ -110,7 +110,7 @@ def scenes_along(scene: Scene, path: Path, frames: int) -> Iterator[Scene]:
         camera, lights = camera_and_lights(scene, path, frame, frames)
         keys = [value_at(t, time, path.curve) for m in path.objects for t in (m.turn, m.move) if t is not None]
         if placed is None or not all(map(np.array_equal, keys, placed[0])):
-            placed = keys, _placed(scene.geometry, path, time)
+            placed = keys, _placed(scene.geometry, path, frame, frames)
         yield dataclasses.replace(scene, geometry=placed[1], camera=camera, lights=lights)
 
 
@@ -169,12 +169,16 @@ def _changed(given: Any, tracks: Mapping[str, Track], time: float, curve: Curve)
     return dataclasses.replace(given, **changes) if changes else given
 
 
-def _placed(geometry: Geometry, path: Path, time: float) -> Geometry:
+def _placed(geometry: Geometry, path: Path, frame: int, frames: int) -> Geometry:
+    time = frame_time(frame, frames)
     for motion in path.objects:
         angle = 0.0 if motion.turn is None else float(value_at(motion.turn, time, path.curve)[0])
         x, y, z = np.zeros(3) if motion.move is None else value_at(motion.move, time, path.curve)
         angle = math.remainder(angle, 2 * math.pi)  # a whole turn is none, to the bit
-        geometry = moved(geometry, motion.faces, rotation_about(motion.axis, angle), motion.center, (x, y, z))
+        try:
+            geometry = moved(geometry, motion.faces, rotation_about(motion.axis, angle), motion.center, (x, y, z))
+        except InputError as error:
+            raise InputError(f"frame {frame} of {frames}: {error}") from error
     return geometry
 
 

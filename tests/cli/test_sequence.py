@@ -85,6 +85,27 @@ def test_an_interrupted_sequence_goes_on_to_the_bit(way, tmp_path, form):
     assert refused(run(*arguments, "--resume", "--set", "lights=32"), "way_00000.exr", "one of other settings")
 
 
+def test_frames_without_their_png_are_rendered_again(way, tmp_path):
+    arguments = ["cornell_box", way, *TINY, *SII, "--out", tmp_path / "out"]
+    assert run(*arguments, "--format", "exr", "--frames", "2").exit_code == 0
+    before = lights(tmp_path / "out", range(2))
+    assert "2 of 2 frames rendered" in run(*arguments, "--frames", "2", "--resume").stdout
+    assert all(map(np.array_equal, before, lights(tmp_path / "out", range(2))))
+    (tmp_path / "out" / "way_00001.png").unlink()
+    assert "1 of 2 frames rendered" in run(*arguments, "--frames", "2", "--resume").stdout
+    assert (tmp_path / "out" / "way_00001.png").exists()
+
+
+def test_frames_of_other_shapes_are_not_gone_on_from(tmp_path):
+    still = tmp_path / "way.toml"
+    still.write_text("frames = 2\ncamera = [{at = 0.0, vfov_deg = 30.0}]")
+    arguments = [still, *TINY, "--method", "sii", "--set", "lights=16", "--out", tmp_path / "out"]
+    assert run("metaballs:t=0.1,resolution=8", *arguments).exit_code == 0
+    (tmp_path / "out" / "way_00001.exr").unlink()
+    result = run("metaballs:t=0.100001,resolution=8", *arguments, "--resume")
+    assert refused(result, "way_00000.exr", "one of other settings")
+
+
 def test_another_method_is_not_filtered_unless_asked(way, tmp_path):
     plain = [*TINY, "--method", "sii", "--set", "lights=16", "--format", "exr", "--json"]
     assert json.loads(run("cornell_box", way, *plain, "--out", tmp_path).stdout)["temporal"] is None

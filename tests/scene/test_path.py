@@ -170,6 +170,13 @@ def test_a_frame_whose_camera_is_not_usable_is_named(room, written):
         list(scenes_along(room, path, 3))
 
 
+def test_a_frame_whose_object_is_not_usable_is_named(room, written):
+    text = "objects = [{faces = [0, 1], keys = [{at = 0.0}, {at = 1.0, move = [1e30, 0.0, 0.0]}]}]"
+    path, _ = read_path(written(text), room)
+    with pytest.raises(InputError, match="frame 1 of 3: geometry: vertex"):
+        list(scenes_along(room, path, 3))
+
+
 def test_each_kind_of_light_has_its_own_keys(room, written):
     lights = PointLight((0, 1, 0), (1, 1, 1)), DirectionalLight((0, -1, 0), (1, 1, 1))
     text = """

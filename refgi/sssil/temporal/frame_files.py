@@ -54,7 +54,7 @@ class FrameFiles(NamedTuple):
         Returns
         -------
         int
-            Number of the first that is missing or damaged.
+            Number of the first of which a file is missing or the EXR damaged.
 
         Raises
         ------
@@ -69,6 +69,8 @@ class FrameFiles(NamedTuple):
                 return number
             expect(said == {**self.said, "frame": number}, str(file), "a frame of this sequence, to go on after it",
                    "one of other settings")
+            if not all(other.exists() for other in self.of(number)):
+                return number
         return frames
 
     def light(self, number: int) -> Array:

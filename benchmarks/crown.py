@@ -40,7 +40,7 @@ def driver(add):
             for i in range(6 * WIDE):
                 tile[i] = packed[i % WIDE + i // WIDE * step]
             for j in range(0, starts.shape[1], 2):
-                add(tile, WIDE, packed, step, starts[row, j], one, starts[row, j + 1], one, True)
+                add(tile, 0, WIDE, packed, step, starts[row, j], one, starts[row, j + 1], one, True)
             for i in range(3 * WIDE):
                 result[row, i] = tile[6 * WIDE + i]
     return run

@@ -17,7 +17,7 @@ from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
 
-WIDE = 160  # lanes of a tile
+WIDE = 320  # lanes of a tile
 ROWS = 12  # position, normal, sum of a group of samples, sum of all
 LEAST = 1e-37  # stands in for a denominator of 0, where the numerator is 0 as well
 
@@ -61,7 +61,7 @@ def term(px: Any, py: Any, pz: Any, nx: Any, ny: Any, nz: Any, qx: Any, qy: Any,
 
 @kernel
 def add_two(
-    tile: Array, lanes: int, packed: Array, step: int, first: int, first_weight: Any, second: int,
+    tile: Array, low: int, lanes: int, packed: Array, step: int, first: int, first_weight: Any, second: int,
     second_weight: Any, disc: bool,
 ) -> None:
     """Add what two samples send to each receiver of a tile; the two are added to each other first.
@@ -70,8 +70,10 @@ def add_two(
     ----------
     tile : (ROWS * WIDE,) ndarray
         Receivers and their sums.
+    low : int
+        The first receiver that is lit.
     lanes : int
-        How many of them are in use.
+        How many of them are, from there on.
     packed : (n,) ndarray
         Texels, plane by plane; those of neighbouring receivers' samples are neighbours.
     step : int
@@ -87,8 +89,9 @@ def add_two(
     disc : bool
         Eq. 4 instead of Eq. 3.
     """
+    tile = tile[low:]
     # unsigned: no checks for places counted from the end
-    by, a, b = np.uint64(step), np.uint64(first), np.uint64(second)
+    by, a, b = np.uint64(step), np.uint64(first + low), np.uint64(second + low)
     a1, a2, a3, a4 = a + by, a + by * np.uint64(2), a + by * np.uint64(3), a + by * np.uint64(4)
     a5, a6, a7, a8 = a4 + by, a4 + by * np.uint64(2), a4 + by * np.uint64(3), a4 + by * np.uint64(4)
     b1, b2, b3, b4 = b + by, b + by * np.uint64(2), b + by * np.uint64(3), b + by * np.uint64(4)

@@ -19,7 +19,7 @@ from refgi.sssil.level import Level
 
 Array = npt.NDArray[Any]
 
-BLOCK = 16  # lanes that are known to be dark together, and that padding comes in
+BLOCK = 8  # lanes that are known to be dark together, and that padding and sums come in
 PLANES = 9  # position, m = -normal area / pi, radiance
 LOOK = 8  # every so many rows and columns are asked for their depth
 
@@ -28,7 +28,8 @@ class Emitters(NamedTuple):
     """Texels of a level, ready to be summed over."""
 
     packed: Array  # (PLANES (h + 1) phases line,) by row, plane, phase and lane; the last row is dark
-    lit: Array  # (h + 1, phases, line / BLOCK + 1) int32: how many blocks before this one send light
+    lit_from: Array  # (h + 1, phases, line / BLOCK + 1) int32: lane of the first lit block from this one on
+    lit_to: Array  # likewise: lane behind the last lit block before this one
     phases: int  # P
     line: int  # lanes of a phase, with those around
     pad: int  # lanes before the first column
@@ -62,12 +63,12 @@ def pack(level: Level, phases: int, farthest: int, most: int) -> Emitters:
     pad = -(-(min(farthest, columns) // phases + 1) // BLOCK) * BLOCK
     line = 2 * pad + strips * strip
     packed = plane((PLANES * (rows + 1) * phases * line,), level.position.dtype)
-    lit = np.empty((rows + 1, phases, line // BLOCK + 1), np.int32)
+    lit_from, lit_to = np.empty((2, rows + 1, phases, line // BLOCK + 1), np.int32)
     scale = _scale(level.depth)
     real = level.position.dtype.type
     _pack(level.position, level.normal, level.radiance, level.area, phases, line, pad, real(scale),
-          real(scale * scale / math.pi), packed, lit)
-    return Emitters(packed, lit, phases, line, pad, strip, scale)
+          real(scale * scale / math.pi), packed, lit_from, lit_to)
+    return Emitters(packed, lit_from, lit_to, phases, line, pad, strip, scale)
 
 
 def _scale(depth: Array) -> float:
@@ -82,16 +83,17 @@ def _scale(depth: Array) -> float:
 @kernel(parallel=True)
 def _pack(
     position: Array, normal: Array, radiance: Array, area: Array, phases: int, line: int, pad: int, scale: Any,
-    share: Any, packed: Array, lit: Array,
+    share: Any, packed: Array, lit_from: Array, lit_to: Array,
 ) -> None:
     for row in prange(area.shape[0] + 1):
-        _pack_row(position, normal, radiance, area, np.int64(row), phases, line, pad, scale, share, packed, lit)
+        _pack_row(position, normal, radiance, area, np.int64(row), phases, line, pad, scale, share, packed, lit_from,
+                  lit_to)
 
 
 @kernel
 def _pack_row(
     position: Array, normal: Array, radiance: Array, area: Array, row: Any, phases: int, line: int, pad: int,
-    scale: Any, share: Any, packed: Array, lit: Array,
+    scale: Any, share: Any, packed: Array, lit_from: Array, lit_to: Array,
 ) -> None:
     start, step = row * PLANES * phases * line, phases * line
     for phase in range(phases):
@@ -104,7 +106,7 @@ def _pack_row(
             here = start + (k * phases + phase) * line
             _darken(packed, here, here + pad)
             _darken(packed, here + pad + lanes, here + line)
-        _count_lit(packed, start + phase * line, step, row, phase, lit)
+        _find_lit(packed, start + phase * line, step, row, phase, lit_from, lit_to)
 
 
 @kernel
@@ -141,13 +143,16 @@ def _pack_line(
 
 
 @kernel
-def _count_lit(packed: Array, first: Any, step: int, row: Any, phase: int, lit: Array) -> None:
-    """Count the blocks of a line that hold any radiance, up to each."""
-    count = 0
-    lit[row, phase, 0] = 0
-    for block in range(lit.shape[2] - 1):
-        count += 1 if _any_light(packed, first + 6 * step + block * BLOCK, step) else 0
-        lit[row, phase, block + 1] = count
+def _find_lit(packed: Array, first: Any, step: int, row: Any, phase: int, lit_from: Array, lit_to: Array) -> None:
+    """Find the blocks of a line that hold any radiance: the next from each on, and the last before it."""
+    blocks = lit_to.shape[2] - 1
+    lit_to[row, phase, 0], lit_from[row, phase, blocks] = 0, blocks * BLOCK
+    for block in range(blocks):
+        lit = _any_light(packed, first + 6 * step + block * BLOCK, step)
+        lit_to[row, phase, block + 1] = (block + 1) * BLOCK if lit else lit_to[row, phase, block]
+    for block in range(blocks - 1, -1, -1):
+        lit = lit_to[row, phase, block + 1] == (block + 1) * BLOCK
+        lit_from[row, phase, block] = block * BLOCK if lit else lit_from[row, phase, block + 1]
 
 
 @kernel

@@ -1,8 +1,8 @@
 """What the samples of a crown send to every texel of a level (Sec. 3.2, indirect lighting shader).
 
 Threads take strips of a level, so narrow that what their samples read stays in the cache of a core. Where receivers
-share samples, `add_two` reads them as they lie; where each has its own, they are copied into a line first. Samples
-that are dark for a whole strip are passed over, which changes no bit of a sum.
+share samples, `add_two` reads them as they lie; where each has its own, they are copied into a line first. Receivers
+whose samples are dark are passed over at either end of a strip, which changes no bit of a sum.
 """
 
 import math
@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.rsm.memory import plane
 from refgi.sssil.crown.add import ROWS, WIDE, add_two, close_group
 from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, pack
 from refgi.sssil.crown.pattern import (
@@ -57,7 +58,7 @@ def gather(level: Level, index: int, settings: HssilSettings) -> Array:
     radius = chosen_radius((rows << index, columns << index), settings)
     real = level.position.dtype.type
     disc, factor = settings.form_factor == "disc", real(math.pi * level_factor(index, settings))
-    farthest, result = math.ceil(2 * radius), np.empty_like(level.radiance)
+    farthest, result = math.ceil(2 * radius), plane(level.radiance.shape, level.radiance.dtype)
     if settings.pattern == "pixel":
         inner = settings.inner if index == 0 else 0
         points, weight = sample_points(inner, settings.samples), sample_weight(radius, inner, settings.samples)
@@ -109,23 +110,25 @@ def _gather_shared(
     result: Array,
 ) -> None:
     rows = normal.shape[1]
-    packed, lit, phases, strip = emitters.packed, emitters.lit, emitters.phases, emitters.strip
-    line, pad = emitters.line, emitters.pad
+    packed, lit_from, lit_to = emitters.packed, emitters.lit_from, emitters.lit_to
+    phases, strip, line, pad = emitters.phases, emitters.strip, emitters.line, emitters.pad
     strips, bands = (line - 2 * pad) // strip, (rows + BAND - 1) // BAND
     for task in prange(strips * bands):
         left, top = np.int64(task) // bands * strip, np.int64(task) % bands * BAND
         tile = np.empty(ROWS * WIDE, packed.dtype)
-        starts, weights = np.empty(weight.size + 1, np.int64), np.empty(weight.size + 1, packed.dtype)
+        starts, weights = np.empty((3, weight.size + 1), np.int64), np.empty(weight.size + 1, packed.dtype)
         for row in range(top, min(rows, top + BAND)):
             shared = min(row, offsets.shape[0] - 1)
             for phase in range(phases):
                 first = row * PLANES * phases * line + phase * line + pad + left
                 _load(tile, strip, packed, phases * line, first, normal, row, phase + phases * left, phases)
-                count = _list_lit(offsets[shared, phase], weight, paired, lit, row, phase, pad + left, strip, line,
-                                  starts, weights)
+                count = _list_lit(offsets[shared, phase], weight, paired, lit_from, lit_to, row, phase, pad + left,
+                                  strip, line, starts, weights)
                 for j in range(0, count, 2):
-                    add_two(tile, strip, packed, phases * line, starts[j], weights[j], starts[j + 1], weights[j + 1],
-                            disc)
+                    low = min(starts[1, j], starts[1, j + 1]) // BLOCK * BLOCK
+                    lanes = (max(starts[2, j], starts[2, j + 1]) - low + BLOCK - 1) // BLOCK * BLOCK
+                    add_two(tile, low, lanes, packed, phases * line, starts[0, j], weights[j], starts[0, j + 1],
+                            weights[j + 1], disc)
                     if (j + 2) % GROUP == 0:
                         close_group(tile, strip)
                 close_group(tile, strip)
@@ -157,28 +160,34 @@ def _load(
 
 @kernel
 def _list_lit(
-    offsets: Array, weight: Array, paired: bool, lit: Array, row: int, phase: int, first: int, lanes: int, line: int,
-    starts: Array, weights: Array,
+    offsets: Array, weight: Array, paired: bool, lit_from: Array, lit_to: Array, row: int, phase: int, first: int,
+    lanes: int, line: int, starts: Array, weights: Array,
 ) -> int:
-    """List where samples of a strip start that are not dark, in twos; a dark one stands in for a missing partner."""
-    rows, phases = lit.shape[0] - 1, lit.shape[1]
+    """List where samples of a strip start that are not dark, and for which of its lanes they are not.
+
+    In twos where samples are paired; a dark one stands in for a missing partner.
+    """
+    rows, phases = lit_to.shape[0] - 1, lit_to.shape[1]
     dark = rows * PLANES * phases * line
+    start, low, high = starts[0], starts[1], starts[2]
     count, kept = 0, 0
     for j in range(weight.size):
         a, column = row + np.int64(offsets[j, 1]), phase + np.int64(offsets[j, 0])
-        of, lane = column % phases, first + column // phases
-        found = 0 <= a < rows and lane >= 0 and lane + lanes <= line and not (offsets[j, 0] == 0 and offsets[j, 1] == 0)
-        if found:
-            found = lit[a, of, (lane + lanes - 1) // BLOCK + 1] > lit[a, of, lane // BLOCK]
-        if found or paired:
-            starts[count] = (a * PLANES * phases + of) * line + lane if found else dark
-            weights[count] = weight[j]
-            count += 1
+        of, lane = column & (phases - 1), first + (column >> (phases - 1))  # phases are 1 or 2
+        start[count], low[count], high[count], weights[count] = dark, lanes, 0, weight[j]
+        inside = 0 <= a < rows and lane >= 0 and lane + lanes <= line
+        if inside and not (offsets[j, 0] == 0 and offsets[j, 1] == 0):
+            start[count] = (a * PLANES * phases + of) * line + lane
+            block, last = np.uint64(lane) // np.uint64(BLOCK), np.uint64(lane + lanes - 1) // np.uint64(BLOCK)
+            low[count] = max(0, lit_from[a, of, block] - lane)
+            high[count] = min(lanes, lit_to[a, of, last + np.uint64(1)] - lane)
+        found = low[count] < high[count]
+        count += 1 if found or paired else 0
         kept += 1 if found else 0
         if paired and j % 2 == 1 and kept == 0:
             count -= 2
         kept = kept if j % 2 == 0 else 0
-    starts[count], weights[count] = dark, weight.dtype.type(0.0)
+    start[count], low[count], high[count], weights[count] = dark, lanes, 0, weight.dtype.type(0.0)
     return count
 
 
@@ -214,7 +223,7 @@ def _gather_own(
                 _expand(packed, line, first, row, rows, points, j, inner, radius, shifts, strip, lines, 0)
                 _expand(packed, line, first, row, rows, points, k, inner, radius, shifts, strip, lines, PLANES * WIDE)
                 second = weight[k] if k > j else weight.dtype.type(0.0)
-                add_two(tile, strip, lines, WIDE, 0, weight[j], PLANES * WIDE, second, disc)
+                add_two(tile, 0, strip, lines, WIDE, 0, weight[j], PLANES * WIDE, second, disc)
                 if (j + 2) % GROUP == 0:
                     close_group(tile, strip)
             close_group(tile, strip)

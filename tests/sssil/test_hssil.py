@@ -148,3 +148,17 @@ def test_memory_is_counted():
     assert method.extra_bytes(changed(start="full"), 1 << 20, 4) > 2 * plain
     assert method.extra_bytes(changed(cameras=2), 1 << 20, 4) > plain
     assert method.extra_bytes(changed(visibility="rays"), 1 << 20, 4) > plain
+
+
+@pytest.mark.parametrize(("samples", "least"), [
+    ({"samples": 20000}, 20000 * 2 * 8),  # int32 offsets of each row's even and odd columns
+    ({"samples": 20000, "visibility": "bitmask"}, 20000 * (8 + 8)),  # offsets and weights
+], ids=str)
+def test_samples_of_rows_are_counted(samples, least):
+    few, many = (find_method("hssil").extra_bytes(changed(start="full", **how), 1 << 20, 4) for how in ({}, samples))
+    assert many - few > 1024 * least
+
+
+def test_all_texels_around_a_receiver_are_counted():
+    few, many = (find_method("hssil").extra_bytes(changed(pattern="all", radius=r), 64 * 48, 4) for r in (20.0, 2000.0))
+    assert many - few > 3e9  # measured

@@ -85,17 +85,24 @@ def _take(picture: Picture, i: int, row: Array, column: Array, level: Level) -> 
 def _place(view: View, i: int, row: Array, column: Array, level: Level) -> None:
     """Find where the texels' surfaces are and how much of them they stand for."""
     height, width, side = view.height, view.width, 1 << level.number
-    across, down, ahead, pixel_area = view.across, view.down, view.ahead, view.pixel_area
     depth, normal, position, area = level.depth, level.normal, level.position, level.area
-    rows = min(side, height - i * side)
+    (ax, ay, az), (dx, dy, dz), (fx, fy, fz) = _three(view.across), _three(view.down), _three(view.ahead)
+    rows, pixel_area, at = min(side, height - i * side), view.pixel_area, np.uint64(i)
     for j in range(np.uint64(area.shape[1])):
         x, y = centre(column[j], width), centre(row[j], height)
-        z = np.float64(depth[i, j])
-        facing = 0.0
-        for axis in range(3):
-            ray = (ahead[axis] + y * down[axis]) + x * across[axis]
-            facing -= normal[axis, i, j] * ray
-            position[axis, i, j] = z * ray if z < np.inf else 0.0
-        area[i, j] = rows * side * pixel_surface(z, facing, pixel_area)
+        z = np.float64(depth[at, j])
+        rx, ry, rz = (fx + y * dx) + x * ax, (fy + y * dy) + x * ay, (fz + y * dz) + x * az
+        facing = -normal[0, at, j] * rx - normal[1, at, j] * ry - normal[2, at, j] * rz
+        seen = z < np.inf
+        position[0, at, j] = z * rx if seen else 0.0
+        position[1, at, j] = z * ry if seen else 0.0
+        position[2, at, j] = z * rz if seen else 0.0
+        area[at, j] = rows * side * pixel_surface(z, facing, pixel_area)
     last = area.shape[1] - 1
     area[i, last] = area[i, last] / side * (width - last * side)
+
+
+@kernel
+def _three(vector: Array) -> tuple[float, float, float]:
+    """Return a vector as numbers, which stores to arrays cannot change."""
+    return vector[0], vector[1], vector[2]

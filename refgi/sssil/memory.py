@@ -49,5 +49,5 @@ def _sample_bytes(settings: HssilSettings, texels: int) -> int:
         return 0
     rows = 1 if settings.pattern == "fixed" else rows
     if settings.visibility == "bitmask":  # half as many blockers as samples of the crown
-        return SLICED_BYTES * rows * (3 * settings.samples // 2 + settings.inner + 3 * settings.slices)
+        return SLICED_BYTES * rows * (3 * settings.samples // 2 + settings.inner + 3 * settings.slice_count)
     return OFFSET_BYTES * rows * (settings.samples + settings.inner)

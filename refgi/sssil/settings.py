@@ -1,6 +1,7 @@
 """What `hssil` can be set to."""
 
 import dataclasses
+import math
 from typing import Any, ClassVar, Literal, get_args
 
 from refgi.errors import expect
@@ -19,11 +20,13 @@ CHOICES: dict[str, Any] = {
     "visibility": Visibility}
 FIRST_LEVEL = {"full": 0, "half": 1, "quarter": 2}
 LAST_SEED = 2**32 - 1
-MOST_LEVELS, MOST_SAMPLES, MOST_SLICES, MOST_CAMERAS = 16, 1 << 16, 64, 16
+MOST_LEVELS, MOST_SAMPLES, MOST_SLICES, MOST_CAMERAS = 16, 1 << 16, 256, 16
 LARGEST_RADIUS = 65536.0  # texels: the widest picture there may be
 # least and most of each number
-COUNTS = (("levels", 1, MOST_LEVELS), ("samples", 1, MOST_SAMPLES), ("seed", 0, LAST_SEED), ("slices", 1, MOST_SLICES),
+COUNTS = (("levels", 1, MOST_LEVELS), ("samples", 1, MOST_SAMPLES), ("seed", 0, LAST_SEED),
           ("cameras", 0, MOST_CAMERAS))
+# the same of those that may be none
+COUNTS_OR_NONE = (("inner_samples", 0, MOST_SAMPLES), ("slices", 1, MOST_SLICES))
 # least and most of each number that may have a fraction, and what it is
 NUMBERS = {
     "depth_sigma": (1e-6, 1e6, "a share of the depth"), "normal_power": (0.0, 1e4, "an exponent"),
@@ -47,10 +50,10 @@ class HssilSettings:
 
     `upsampling` from level to level is "bilateral", with weights of `depth_sigma` (share of the depth) and
     `normal_power`, "bilinear" or "nearest". `visibility` of samples is ignored as published ("none"), found by a
-    "bitmask" of the screen in `slices` directions with surfaces of `thickness` (share of the scene's diagonal), or by
-    "rays". Extra `views`, and as many `cameras` as asked for where they see most of what the picture does not, light
-    what they see as well; they are joined by the maximum where depth and normal agree within `depth_tolerance` (share
-    of the depth) and `normal_cosine`. `as_published` names forms to use as printed.
+    "bitmask" of the screen in `slices` directions (none: the root of `samples`) with surfaces of `thickness` (share of
+    the scene's diagonal), or by "rays". Extra `views`, and as many `cameras` as asked for where they see most of what
+    the picture does not, light what they see as well; they are joined by the maximum where depth and normal agree
+    within `depth_tolerance` (share of the depth) and `normal_cosine`. `as_published` names forms to use as printed.
     """
 
     radius: float | None = 20.0
@@ -67,7 +70,7 @@ class HssilSettings:
     depth_sigma: float = 0.02
     normal_power: float = 8.0
     visibility: Visibility = "none"
-    slices: int = 8
+    slices: int | None = None
     thickness: float = 0.01
     cameras: int = 0
     views: tuple[Camera, ...] = ()
@@ -89,8 +92,10 @@ class HssilSettings:
             expect(is_number(value) and low <= value <= high, key, f"{what}, {low:g} to {high:g}", value)
         expect(self.radius is None or (is_number(self.radius) and 1 <= self.radius <= LARGEST_RADIUS), "radius",
                f"none or 1 to {LARGEST_RADIUS:g} texels", self.radius)
-        expect(self.inner_samples is None or (is_count(self.inner_samples) and 0 <= self.inner_samples <= MOST_SAMPLES),
-               "inner_samples", f"none or a whole number, 0 to {MOST_SAMPLES:,}", self.inner_samples)
+        for key, least, most in COUNTS_OR_NONE:
+            count = getattr(self, key)
+            expect(count is None or (is_count(count) and least <= count <= most), key,
+                   f"none or a whole number, {least} to {most:,}", count)
         expect(self.only_level is None or (is_count(self.only_level) and 0 <= self.only_level < self.levels),
                "only_level", f"none or a level, 0 to {self.levels - 1}", self.only_level)
         expect(self.visibility != "bitmask" or self.pattern != "all", "pattern",
@@ -110,3 +115,8 @@ class HssilSettings:
     def inner(self) -> int:
         """Samples of the first level's disc: as dense as the crown's unless given."""
         return max(1, round(self.samples / 3)) if self.inner_samples is None else self.inner_samples
+
+    @property
+    def slice_count(self) -> int:
+        """Directions that a bitmask is marched in: as many as samples along each unless given."""
+        return max(1, round(math.sqrt(self.samples))) if self.slices is None else self.slices

@@ -53,9 +53,10 @@ def steps_of(settings: HssilSettings, index: int, radius: float) -> Steps:
     Steps
         With half as many blockers as the crown has samples.
     """
-    crown = max(1, round(settings.samples / settings.slices))
-    disc = max(1, round(settings.inner / settings.slices)) if index == 0 and settings.inner else 0
-    return Steps(settings.slices, disc, crown, (crown + 1) // 2, radius)
+    slices = settings.slice_count
+    crown = max(1, round(settings.samples / slices))
+    disc = max(1, round(settings.inner / slices)) if index == 0 and settings.inner else 0
+    return Steps(slices, disc, crown, (crown + 1) // 2, radius)
 
 
 def slice_offsets(settings: HssilSettings, steps: Steps, number: int, rows: int) -> tuple[Array, Array]:

@@ -32,7 +32,7 @@ from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
-BAND = 32  # rows that a thread takes at once
+BAND = 4  # rows that a thread takes at once
 GROUP = 256  # samples that are summed before they are added to the total
 
 

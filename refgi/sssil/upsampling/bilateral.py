@@ -11,11 +11,12 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.sssil.upsampling import lines, receivers, weights
 from refgi.sssil.upsampling.lines import SPAN, WIDE
-from refgi.sssil.upsampling.tent import write_offsets
+from refgi.sssil.upsampling.tent import TENTS, write_tents
 
 Array = npt.NDArray[Any]
 
-BAND = 16  # rows of texels of a block
+BAND = 8  # rows of texels of a block
+LANES = 32  # pixels that are looked at together for one without any weight: whole texels of any size
 
 
 @kernel(parallel=True)
@@ -44,78 +45,92 @@ def fill_bilateral(
     result : (3, h, w) ndarray
         Filled.
     """
-    offsets = np.empty(WIDE, depth.dtype)
-    write_offsets(factor, offsets)
+    tents = np.empty(TENTS, depth.dtype)
+    write_tents(factor, lean, tents)
     across = (depth.shape[1] + WIDE - 1) // WIDE
     bands = (below_depth.shape[0] + BAND - 1) // BAND
     for task in prange(across * bands):
         left, first = np.int64(task) % across * WIDE, np.int64(task) // across * BAND
-        _fill_block(light, below_depth, below_normal, depth, normal, left, first, factor, offsets, sharpness, lean,
+        _fill_block(light, below_depth, below_normal, depth, normal, left, first, factor, tents, sharpness, lean,
                     power, added, adds, result)
 
 
 @kernel
 def _fill_block(
     light: Array, below_depth: Array, below_normal: Array, depth: Array, normal: Array, left: int, first: int,
-    side: int, offsets: Array, sharpness: Any, lean: Any, power: Any, added: Array, adds: bool, result: Array,
+    side: int, tents: Array, sharpness: Any, lean: Any, power: Any, added: Array, adds: bool, result: Array,
 ) -> None:
-    texels, near = np.zeros((3, lines.LINES), depth.dtype), np.zeros((3, SPAN), depth.dtype)
-    here, means = np.zeros(receivers.HERE, depth.dtype), np.zeros(weights.MEANS, depth.dtype)
-    room = np.zeros((7, lines.ROOM), depth.dtype)
+    texels, near = np.empty((3, lines.LINES), depth.dtype), np.empty((3, SPAN), depth.dtype)
+    here, means = np.zeros(receivers.HERE, depth.dtype), np.empty(weights.MEANS, depth.dtype)
+    bounds, room = np.empty(lines.BOUNDS, depth.dtype), np.empty((2, SPAN), depth.dtype)
+    wide = min(WIDE, (depth.shape[1] - left + LANES - 1) // LANES * LANES)
     # two rows of texels and two of pixels are loaded before the first that is filled
     for y in range((first - 2) * side, min((first + BAND) * side, depth.shape[0])):
-        row = y // side
-        if y % side == 0:
-            lines.load_texels(light, below_depth, below_normal, row + 1, left, side, room, texels[(row + 4) % 3])
+        row, place = y // side, y % side
+        if place == 0:
+            lines.load_texels(light, below_depth, below_normal, row + 1, left, wide, side, room, texels[(row + 4) % 3])
+            if row >= first:
+                lines.load_bounds(light, row, left, wide, side, room, bounds)
         if y >= first * side - 2:
-            receivers.load_nearness(depth, y + 1, left, near[(y + 4) % 3])
+            receivers.load_nearness(depth, y + 1, left, wide, near[(y + 4) % 3])
         if y >= first * side:
-            receivers.load_receivers(normal, y, left, side, sharpness, lean, near[(y + 2) % 3], near[y % 3],
-                                     near[(y + 1) % 3], offsets, here)
-            weights.average(texels[(row + 2) % 3], texels[row % 3], texels[(row + 1) % 3], here, power, means)
-            _store(texels, row, y, left, here, means, side, added, adds, result)
+            receivers.load_receivers(normal, y, left, wide, side, sharpness, lean, near[(y + 2) % 3], near[y % 3],
+                                     near[(y + 1) % 3], tents, here)
+            above, middle, below = texels[(row + 2) % 3], texels[row % 3], texels[(row + 1) % 3]
+            weights.average(above, middle, below, here, bounds, tents, place, wide, side, power, means)
+            for start in range(0, wide, LANES):
+                if _any_unknown(here, means, start):
+                    _take_nearest(above, middle, below, here, tents, place, side, start, means)
+            _store(y, left, here, means, added, adds, result)
 
 
 @kernel
-def _store(
-    texels: Array, row: int, y: int, left: int, here: Array, means: Array, factor: int, added: Array,
-    adds: bool, result: Array,
-) -> None:
+def _any_unknown(here: Array, means: Array, start: int) -> bool:
+    """Return whether a pixel of a few has no texel of any weight."""
     real = means.dtype.type
-    zero, least = real(0.0), real(weights.LEAST)
-    start, size = np.uint64(left), np.uint64(min(WIDE, result.shape[2] - left))
-    scarce = 0
-    for i in range(np.uint64(WIDE)):
-        unknown = (means[np.uint64(weights.TOTAL) + i] < least) & (here[np.uint64(receivers.SCALE) + i] > zero)
-        scarce += 1 if unknown else 0
-    if scarce > 0:
-        _take_nearest(texels, row, y % factor, here, means, factor)
-    for c in range(3):
-        line = np.uint64(c * SPAN)
-        for i in range(size):
-            value = means[line + i]
-            if adds:
-                value = value + added[c, y, start + i]
-            result[c, y, start + i] = value if here[np.uint64(receivers.SCALE) + i] > zero else zero
+    count = 0
+    for i in range(np.uint64(start), np.uint64(start + LANES)):
+        seen = here[np.uint64(receivers.SCALE) + i] > real(0.0)
+        count += seen & (means[np.uint64(weights.TOTAL) + i] == real(0.0))
+    return count > 0
 
 
 @kernel
-def _take_nearest(texels: Array, row: int, place: int, here: Array, means: Array, factor: int) -> None:
+def _take_nearest(
+    above: Array, middle: Array, below: Array, here: Array, tents: Array, place: int, side: int, start: int,
+    means: Array,
+) -> None:
     """Take the light of the texel that is nearest in depth where no texel has any weight."""
     real = means.dtype.type
-    up = -1 if 2 * place + 1 < factor else 1
-    for i in range(WIDE):
-        if means[weights.TOTAL + i] >= real(weights.LEAST) or here[receivers.SCALE + i] <= real(0.0):
+    up = -1 if tents[place] < real(0.0) else 1
+    for i in range(start, start + LANES):
+        if means[weights.TOTAL + i] > real(0.0) or here[receivers.SCALE + i] <= real(0.0):
             continue
-        nearer = -1 if 2 * (i % factor) + 1 < factor else 1
-        best, slot, at = real(lines.NOWHERE / 2), -1, 0
+        nearer = -1 if tents[i] < real(0.0) else 1
+        best = real(lines.NOWHERE / 2)
+        for c in range(3):
+            means[c * SPAN + i] = real(0.0)
         for dy in (0, up, -up):
+            texels = above if dy < 0 else (below if dy > 0 else middle)
             for dx in (0, nearer, -nearer):
-                x = (dx + 1) * lines.SET + i
+                at = i + (dx + 1) * side
                 plane = (here[receivers.PLANE + i] + real(dy) * here[receivers.DOWN + i]
                          + real(dx) * here[receivers.ACROSS + i])
-                off = abs(texels[(row + dy + 3) % 3, lines.NEARNESS + x] - plane)
+                off = abs(texels[lines.NEARNESS + at] - plane)
                 if off < best:
-                    best, slot, at = off, (row + dy + 3) % 3, x
-        for c in range(3):
-            means[c * SPAN + i] = texels[slot, lines.LIGHT + c * SPAN + at] if slot >= 0 else real(0.0)
+                    best = off
+                    for c in range(3):
+                        means[c * SPAN + i] = texels[lines.LIGHT + c * SPAN + at]
+
+
+@kernel
+def _store(y: int, left: int, here: Array, means: Array, added: Array, adds: bool, result: Array) -> None:
+    zero = means.dtype.type(0.0)
+    start, size = np.uint64(left), np.uint64(min(WIDE, result.shape[2] - left))
+    for c in range(3):
+        line = np.uint64(c * SPAN)
+        if adds:
+            for i in range(size):
+                means[line + i] = means[line + i] + added[c, y, start + i]
+        for i in range(size):
+            result[c, y, start + i] = means[line + i] if here[np.uint64(receivers.SCALE) + i] > zero else zero

@@ -13,17 +13,16 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.sssil.upsampling.lines import SPAN, WIDE
-from refgi.sssil.upsampling.tent import offset
+from refgi.sssil.upsampling.lines import SPAN
 
 Array = npt.NDArray[Any]
 
 NORMAL, SCALE, PLANE = 0, 3 * SPAN, 4 * SPAN
-ACROSS, DOWN, X, Y, HERE = 5 * SPAN, 6 * SPAN, 7 * SPAN, 8 * SPAN, 9 * SPAN
+ACROSS, DOWN, HERE = 5 * SPAN, 6 * SPAN, 7 * SPAN
 
 
 @kernel
-def load_nearness(depth: Array, row: int, left: int, line: Array) -> None:
+def load_nearness(depth: Array, row: int, left: int, wide: int, line: Array) -> None:
     """Write 1/z of a row of pixels and of one more at either end.
 
     Parameters
@@ -34,6 +33,8 @@ def load_nearness(depth: Array, row: int, left: int, line: Array) -> None:
         Row of pixels; -1 or h continues the picture.
     left : int
         First pixel of the block.
+    wide : int
+        Pixels of the block.
     line : (SPAN,) ndarray
         Filled from place 0, which is pixel left - 1, on; 0 where no surface is seen.
 
@@ -45,22 +46,22 @@ def load_nearness(depth: Array, row: int, left: int, line: Array) -> None:
     height, width = depth.shape
     if row < 0 or row >= height:
         inner, next_inner = (0, 1) if row < 0 else (height - 1, height - 2)
-        for i in range(WIDE + 2):
+        for i in range(wide + 2):
             x = left - 1 + i
             known = height > 1 and x >= 0 and x < width
             line[i] = _beyond(depth[inner, x], depth[next_inner, x]) if known else zero
         return
-    size = min(WIDE + 1, width - left)
+    size = min(wide + 1, width - left)
     for i in range(np.uint64(size)):
         line[np.uint64(1) + i] = one / depth[row, np.uint64(left) + i]
-    for i in range(size + 1, WIDE + 2):
+    for i in range(size + 1, wide + 2):
         line[i] = zero
     line[0] = zero
     if left > 0:
         line[0] = one / depth[row, left - 1]
     elif width > 1:
         line[0] = _beyond(depth[row, 0], depth[row, 1])
-    if size < WIDE + 1 and width > 1:
+    if size < wide + 1 and width > 1:
         line[size + 1] = _beyond(depth[row, width - 1], depth[row, width - 2])
 
 
@@ -75,8 +76,8 @@ def _beyond(depth: Any, inner: Any) -> Any:
 
 @kernel
 def load_receivers(
-    normal: Array, row: int, left: int, factor: int, sharpness: Any, lean: Any, above: Array, nearness: Array,
-    below: Array, offsets: Array, here: Array,
+    normal: Array, row: int, left: int, wide: int, factor: int, sharpness: Any, lean: Any, above: Array,
+    nearness: Array, below: Array, tents: Array, here: Array,
 ) -> None:
     """Write normals of a row of pixels, and nearness as their planes have it at the places of texels.
 
@@ -88,6 +89,8 @@ def load_receivers(
         Row of pixels, in the picture.
     left : int
         First pixel of the block.
+    wide : int
+        Pixels of the block.
     factor : int
         F, pixels along a texel's side.
     sharpness : float
@@ -96,21 +99,21 @@ def load_receivers(
         How far the point that a texel stands for is from its middle, to the nearer side along either axis; texels.
     above, nearness, below : (SPAN,) ndarray
         Of `load_nearness`, of this row and those beside it.
-    offsets : (>= WIDE,) ndarray
-        Where the pixels' centres lie from those of their texels, to the right, texels.
+    tents : (TENTS,) ndarray
+        Of `write_tents`.
     here : (HERE,) ndarray
         Filled: normal; sharpness z, 0 where no surface is seen; nearness at the own texel's point; its change from
-        texel to texel; where the pixel lies from that point, texels.
+        texel to texel.
     """
     real = here.dtype.type
     zero, side = real(0.0), real(factor)
-    offset_y = offset(row % factor, factor, here)
-    size = np.uint64(min(WIDE, normal.shape[2] - left))
+    offset_y = tents[row % factor]
+    size = np.uint64(min(wide, normal.shape[2] - left))
     for c in range(3):
         line = np.uint64(NORMAL + c * SPAN)
         for i in range(size):
             here[line + i] = normal[c, row, np.uint64(left) + i]
-    for i in range(np.uint64(WIDE)):
+    for i in range(np.uint64(wide)):
         value = nearness[i + np.uint64(1)]
         gx = side * _slope(nearness[i], value, nearness[i + np.uint64(2)])
         gy = side * _slope(above[i + np.uint64(1)], value, below[i + np.uint64(1)])
@@ -118,11 +121,7 @@ def load_receivers(
         here[np.uint64(DOWN) + i] = gy
         here[np.uint64(SCALE) + i] = sharpness / value if value > zero else zero
         # what a texel stands for is at its corner that is nearest, not in its middle
-        x = offsets[i] - (lean if gx > zero else (-lean if gx < zero else zero))
-        y = offset_y - (lean if gy > zero else (-lean if gy < zero else zero))
-        here[np.uint64(X) + i] = x
-        here[np.uint64(Y) + i] = y
-        here[np.uint64(PLANE) + i] = value - x * gx - y * gy
+        here[np.uint64(PLANE) + i] = (value - (tents[i] * gx - lean * abs(gx))) - (offset_y * gy - lean * abs(gy))
 
 
 @kernel

@@ -11,9 +11,11 @@ from typing import Any
 import numpy.typing as npt
 
 from refgi.jit import kernel
+from refgi.sssil.upsampling.lines import SPAN, WIDE
 
 Array = npt.NDArray[Any]
 
+BEFORE, AFTER, TENTS = SPAN, 4 * SPAN, 7 * SPAN
 SIXTH, THIRD = 1 / 6, 1 / 3
 
 
@@ -42,18 +44,26 @@ def tent_at(t: Any) -> Any:
 
 
 @kernel
-def write_offsets(factor: int, offsets: Array) -> None:
-    """Write where the centres of pixels lie from those of their texels.
+def write_tents(factor: int, lean: Any, tents: Array) -> None:
+    """Write where the centres of a row's pixels lie from those of their texels, and what the texels beside weigh.
 
     Parameters
     ----------
     factor : int
         Pixels along a texel's side.
-    offsets : (n,) ndarray
-        Filled with texels, -1/2 to 1/2; the first pixel is the first of a texel.
+    lean : float
+        How far the point that a texel stands for is from its middle, texels.
+    tents : (TENTS,) ndarray
+        Filled: offsets, texels, -1/2 to 1/2; weights of the texel before and of the one after as shares of the
+        own texel's, three lines each: for points after the middle by `lean`, in it, and before it by `lean`.
     """
-    for i in range(len(offsets)):
-        offsets[i] = offset(i % factor, factor, offsets)
+    for i in range(WIDE):
+        t = offset(i % factor, factor, tents)
+        tents[i] = t
+        for lie in range(3):
+            before, own, after = tent_at(t + tents.dtype.type(lie - 1) * lean)
+            tents[BEFORE + lie * SPAN + i] = before / own
+            tents[AFTER + lie * SPAN + i] = after / own
 
 
 @kernel

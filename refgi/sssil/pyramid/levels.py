@@ -42,7 +42,8 @@ def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
         Finest first; fewer than asked for where the samples of the last ones would all lie off the picture.
     """
     buffer = frame.gbuffer
-    depth, normal, albedo = buffer.resolve("depth", "normal", "albedo")
+    # positions, which direct light needs, come from the same pass
+    depth, normal, albedo, _ = buffer.resolve("depth", "normal", "albedo", "position")
     count = useful_levels((frame.height, frame.width), settings)
     if count < settings.levels:
         skip("sssil.level", f"no texel of level {settings.first_level + count} has another in its crown")

@@ -33,10 +33,10 @@ class Method(NamedTuple):
         loaded = import_module(module)
         return getattr(loaded, function), getattr(loaded, self.settings)
 
-    def extra_bytes(self, settings: Any, pixels: int, float_bytes: int) -> int:
-        """Return what settings add to the memory of a picture whose floats have 4 or 8 bytes."""
+    def extra_bytes(self, settings: Any, size: tuple[int, int], float_bytes: int) -> int:
+        """Return what settings add to the memory of a picture of some width and height and floats of 4 or 8 bytes."""
         module, _, function = self.memory.partition(":")
-        added: int = getattr(import_module(module), function)(settings, pixels, float_bytes) if module else 0
+        added: int = getattr(import_module(module), function)(settings, size, float_bytes) if module else 0
         return added
 
 

@@ -87,7 +87,7 @@ def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: boo
     float_bytes = 8 if dtype == "float64" else 4
     needed = needed_bytes(scene, width, height, float_bytes=float_bytes, rsm_resolution=rsm_resolution, traced=traced,
                           compared=compared)
-    extra = {name: find_method(name).extra_bytes(own, width * height, float_bytes)
+    extra = {name: find_method(name).extra_bytes(own, (width, height), float_bytes)
              for name, own in (settings or {}).items()}
     most = max(extra, key=extra.__getitem__, default="")
     added, available = extra.get(most, 0), available_bytes()

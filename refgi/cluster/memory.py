@@ -10,15 +10,15 @@ from refgi.cluster.settings import ValSettings
 LISTED_FLOATS = 24  # of a pixel, where receivers are gathered by lists: measured, and a fifth more
 
 
-def extra_bytes(settings: ValSettings, pixels: int, float_bytes: int) -> int:
+def extra_bytes(settings: ValSettings, size: tuple[int, int], float_bytes: int) -> int:
     """Estimate the memory that area lights add to a picture.
 
     Parameters
     ----------
     settings : ValSettings
         How many area lights, and what their maps are.
-    pixels : int
-        Of the picture.
+    size : tuple of 2 ints
+        Width and height of the picture, pixels.
     float_bytes : int
         4 or 8.
 
@@ -33,7 +33,7 @@ def extra_bytes(settings: ValSettings, pixels: int, float_bytes: int) -> int:
     series = settings.visibility == "series"
     at_once = min(count, numba.get_num_threads() + 1) if series else 0  # one of them is read from
     filtered = at_once * texels * _filtered_bytes(settings, float_bytes)
-    return depth + filtered + pixels * LISTED_FLOATS * float_bytes
+    return depth + filtered + size[0] * size[1] * LISTED_FLOATS * float_bytes
 
 
 def _maps(settings: ValSettings) -> int:

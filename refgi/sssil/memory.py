@@ -2,49 +2,54 @@
 
 import math
 
+from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.memory import level_bytes
 from refgi.sssil.settings import HssilSettings
 
-PACKED_FLOATS = 33  # of a texel of the level that is summed: senders with darkness around, its light and that below
+PLANES, LIGHT_FLOATS = 9, 6  # of a texel of the level that is summed: as senders, and its light and that below
+PADDING = 64  # lanes around a row of senders at least, twice 16 for even and for odd columns
 VIEW_FLOATS = 32  # of a pixel of a further view: its G-buffer, direct and indirect light, and temporaries
 RAY_BYTES = 1 << 26  # rays that are held at a time
-TALLEST = 4  # as high as wide: taller pictures are rare, and their samples are not counted wholly
 OFFSET_BYTES, SLICED_BYTES = 16, 32  # of a sample in an even and an odd column of a row, and of one in a slice
 CANDIDATE_BYTES = 104  # of a texel that may be among all around a receiver
 LISTED_RAY_BYTES = 48  # of a sample of one receiver
 
 
-def extra_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
+def extra_bytes(settings: HssilSettings, size: tuple[int, int], float_bytes: int) -> int:
     """Estimate the memory that levels, samples and further views add to a picture.
 
     Parameters
     ----------
     settings : HssilSettings
         First level, number of levels, pattern, views.
-    pixels : int
-        Of the picture.
+    size : tuple of 2 ints
+        Width and height of the picture, pixels.
     float_bytes : int
         4 or 8.
 
     Returns
     -------
     int
-        Bytes, rather too many than too few but for pictures more than four times as high as wide.
+        Bytes, rather too many than too few.
     """
-    texels = -(-pixels >> 2 * settings.first_level)
-    view = level_bytes(settings, pixels, float_bytes) + PACKED_FLOATS * texels * float_bytes
+    pixels = size[0] * size[1]
+    columns, rows = (-(-side >> settings.first_level) for side in size)
+    radius = chosen_radius((rows, columns), settings)
+    padded = columns + 2 * min(math.ceil(2 * radius), columns) + PADDING
+    view = level_bytes(settings, pixels, float_bytes)
+    view += (PLANES * padded * (rows + 1) + LIGHT_FLOATS * columns * rows) * float_bytes
     further = VIEW_FLOATS * pixels * float_bytes if settings.cameras or settings.views else 0
-    return view + further + _sample_bytes(settings, texels) + (RAY_BYTES if settings.visibility == "rays" else 0)
+    samples = _sample_bytes(settings, rows, columns, radius)
+    return view + further + samples + (RAY_BYTES if settings.visibility == "rays" else 0)
 
 
-def _sample_bytes(settings: HssilSettings, texels: int) -> int:
+def _sample_bytes(settings: HssilSettings, rows: int, columns: int, radius: float) -> int:
     """Return what the list of the first level's samples takes, the longest of all levels'."""
-    rows = math.ceil(math.sqrt(TALLEST * texels))
     if settings.pattern == "all":
-        # of a picture as high as assumed, the diagonal over 2^K
-        radius = settings.radius or max(1.0, math.hypot(rows, rows / TALLEST) / 2**settings.levels)
-        rays = LISTED_RAY_BYTES * math.pi * (2 * radius) ** 2 if settings.visibility == "rays" else 0
-        return int(CANDIDATE_BYTES * (4 * radius + 3) * (2 * radius + 2) + rays)
+        reach = math.ceil(2 * radius)
+        candidates = (2 * min(reach, rows) + 1) * (min(reach, columns) + 1)
+        rays = 2 * LISTED_RAY_BYTES * candidates if settings.visibility == "rays" else 0
+        return CANDIDATE_BYTES * candidates + rays
     if settings.pattern == "pixel":
         return 0
     rows = 1 if settings.pattern == "fixed" else rows

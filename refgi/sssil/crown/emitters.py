@@ -21,7 +21,6 @@ Array = npt.NDArray[Any]
 
 BLOCK = 8  # lanes that are known to be dark together, and that padding and sums come in
 PLANES = 9  # position, m = -normal area / pi, radiance
-LOOK = 8  # every so many rows and columns are asked for their depth
 
 
 class Emitters(NamedTuple):
@@ -73,8 +72,7 @@ def pack(level: Level, phases: int, farthest: int, most: int) -> Emitters:
 
 def _scale(depth: Array) -> float:
     """Return the power of two that brings the middle of the depths' range to about 1."""
-    some = depth[::LOOK, ::LOOK]
-    some = some[(some > 0) & (some < np.inf)]
+    some = depth[(depth > 0) & (depth < np.inf)]
     if not some.size:
         return 1.0
     return 2.0 ** -round((math.log2(float(some.min())) + math.log2(float(some.max()))) / 2)

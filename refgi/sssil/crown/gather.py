@@ -66,7 +66,7 @@ def gather(level: Level, index: int, settings: HssilSettings) -> Array:
         emitters = pack(level, 1, farthest, WIDE)
         _gather_own(emitters, level.normal, points, inner, radius, key, weight.astype(real), disc, factor, result)
         return result
-    offsets, weight = _reaching(*shared_offsets(settings, index, level.number, rows, radius), rows, columns)
+    offsets, weight = _reaching(*shared_offsets(settings, index, level.number, rows, radius, columns), rows, columns)
     emitters = pack(level, offsets.shape[1], farthest, WIDE)
     paired = settings.pattern != "row"
     _gather_shared(emitters, level.normal, offsets, weight.astype(real), paired, disc, factor, result)

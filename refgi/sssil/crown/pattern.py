@@ -79,7 +79,8 @@ def row_offsets(
 
 
 def shared_offsets(
-    settings: HssilSettings, index: int, number: int, rows: int, radius: float | None = None
+    settings: HssilSettings, index: int, number: int, rows: int, radius: float | None = None,
+    columns: int | None = None,
 ) -> tuple[Array, Array]:
     """Return the samples that receivers share, by row and by column modulo 2.
 
@@ -95,6 +96,8 @@ def shared_offsets(
         How many rows there are.
     radius : float, optional
         Inner radius of the crown, texels; that of the settings unless given.
+    columns : int, optional
+        How many columns there are: "all" then leaves out what is farther away than any texel of so small a picture.
 
     Returns
     -------
@@ -106,7 +109,8 @@ def shared_offsets(
     radius = known_radius(settings, radius)
     inner = settings.inner if index == 0 else 0
     if settings.pattern == "all":
-        every = _every_texel(0.0 if index == 0 else radius, 2.0 * radius)
+        within = (rows, columns) if columns is not None else None
+        every = _every_texel(0.0 if index == 0 else radius, 2.0 * radius, within)
         return every[None, None], np.ones(len(every))
     if settings.pattern == "fixed":
         mirrored, weight = _mirrored(settings, radius, inner, number)
@@ -189,14 +193,15 @@ def _fill_rows(points: Array, inner: int, radius: float, key: Any, offsets: Arra
                 here[j, 0], here[j, 1] = shifted(points, j, 1.0, radius, u, cosine, sine)
 
 
-def _every_texel(low: float, high: float) -> Array:
+def _every_texel(low: float, high: float, within: tuple[int, int] | None) -> Array:
     """Return each texel at a distance of [low, high) but the middle: mirror images adjacent, ox = 0 last."""
     reach = math.ceil(high)
-    oy, ox = np.mgrid[-reach : reach + 1, 0 : reach + 1]
+    down, right = (reach, reach) if within is None else (min(reach, size - 1) for size in within)
+    oy, ox = np.mgrid[-down : down + 1, 0 : right + 1]
     square = ox**2 + oy**2
     kept = (square >= low**2) & (square < high**2) & (square > 0)
-    right, middle = kept & (ox > 0), kept & (ox == 0)
-    half = np.stack([ox[right], oy[right]], axis=1)
+    beside, middle = kept & (ox > 0), kept & (ox == 0)
+    half = np.stack([ox[beside], oy[beside]], axis=1)
     both = np.stack([half, half * (-1, 1)], axis=1).reshape(-1, 2)
     return np.concatenate([both, np.stack([ox[middle], oy[middle]], axis=1)]).astype(np.int32)
 

@@ -202,8 +202,11 @@ def _heights(here: Array, p: Any, there: Array, q: Any, dx: Any, dy: Any, dz: An
     zero = type(dx)(0.0)
     toward = here[X, p] * dx + here[X + 1, p] * dy + here[X + 2, p] * dz
     x = -toward * here[INVERSE, p]  # along the receiver's direction to the eye
-    across = dx * dx + dy * dy + dz * dz - x * x
-    y = math.sqrt(across if across > zero else zero)
+    # |p x d| and not the root of d^2 - x^2, of which nothing is left where one of both is near the eye
+    ax = here[X + 1, p] * dz - here[X + 2, p] * dy
+    ay = here[X + 2, p] * dx - here[X, p] * dz
+    az = here[X, p] * dy - here[X + 1, p] * dx
+    y = math.sqrt(ax * ax + ay * ay + az * az) * here[INVERSE, p]
     # the back lies on the sample's ray from the eye: further by a share of all that grows along it
     share, length, facing = thickness * there[INVERSE, q], here[LENGTH, p], here[FACING, p]
     front = _height(x, y, c, facing)

@@ -94,7 +94,7 @@ def ray_gather(level: Level, index: int, settings: HssilSettings, frame: "Frame"
         _aim(surfels, samples, level.shape, first, last, settings.form_factor == "disc", rays[0], rays[1], reach, worth,
              sender)
         frame.tracer.fill_occluded(rays[0][:size], rays[1][:size], reach[:size], blocked[:size])
-        _add_free(radiance, first, last, count, blocked, worth, sender, total)
+        add_free(radiance, first, last, count, blocked, worth, sender, total)
         report_progress(last / total.shape[1])
     return (total * level_factor(index, settings)).reshape(level.radiance.shape).astype(level.radiance.dtype)
 
@@ -118,7 +118,7 @@ def _samples(level: Level, index: int, settings: HssilSettings) -> Samples:
     if settings.pattern == "pixel":
         offsets, weight = np.zeros((1, 1, 0, 2), np.int32), sample_weight(radius, inner, settings.samples)
     else:
-        offsets, weight = shared_offsets(settings, index, level.number, rows, radius)
+        offsets, weight = shared_offsets(settings, index, level.number, rows, radius, columns)
     points = sample_points(inner, settings.samples)
     return Samples(offsets, weight, points, inner, radius, level_key(settings.seed, level.number))
 
@@ -176,12 +176,33 @@ def _pair(surfels: Surfels, i: int, j: int, weight: float, disc: bool) -> Any:
 
 
 @kernel(parallel=True)
-def _add_free(radiance: Array, first: int, last: int, count: int, blocked: Array, worth: Array, sender: Array,
+def add_free(radiance: Array, first: int, last: int, count: int, blocked: Array, worth: Array, sender: Array,
               total: Array) -> None:
-    """Add up what comes along each receiver's free rays, in their order."""
+    """Add up what comes along each receiver's free rays, two by two: mirror images are added to each other first.
+
+    Parameters
+    ----------
+    radiance : (3, t) ndarray of float64
+        Of every texel, W/m^2/sr.
+    first, last : int
+        Receivers: these and those up to the last.
+    count : int
+        Rays of each.
+    blocked : (n,) ndarray of bool
+        Which rays are blocked, receiver by receiver.
+    worth : (n,) ndarray of float64
+        What the radiance at a ray's end is multiplied by.
+    sender : (n,) ndarray of int64
+        Texel at a ray's end.
+    total : (3, t) ndarray of float64
+        Added to, W/m^2.
+    """
     for i in prange(last - first):
         here = np.int64(i)
-        for ray in range(here * count, (here + 1) * count):
-            if not blocked[ray]:
-                for c in range(3):
-                    total[c, first + here] += worth[ray] * radiance[c, sender[ray]]
+        end = (here + 1) * count
+        for ray in range(here * count, end, 2):
+            for c in range(3):
+                pair = 0.0 if blocked[ray] else worth[ray] * radiance[c, sender[ray]]
+                if ray + 1 < end and not blocked[ray + 1]:
+                    pair += worth[ray + 1] * radiance[c, sender[ray + 1]]
+                total[c, first + here] += pair

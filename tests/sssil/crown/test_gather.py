@@ -90,6 +90,17 @@ def test_a_mirrored_level_receives_mirrored_light(pattern, evidence):
     evidence(f"pattern {pattern}: mirrored level, mirrored irradiance to the bit, float32 and float64")
 
 
+def test_one_near_texel_among_far_ones_leaves_no_nan():
+    """Depths of 1e-3 m and 1e8 m: 4th powers of their distances are at the ends of float32."""
+    far = random_level((8, 8), np.float32, background=0.0)
+    scale = np.full((8, 8), 1e8, np.float32)
+    scale[0, 0] = 1e-3
+    level = far._replace(position=far.position * scale, depth=far.depth * scale, area=far.area * scale**2)
+    got = gather(level, 0, SETTINGS)
+    assert np.isfinite(got).all()
+    assert got.max() > 0
+
+
 @pytest.mark.parametrize("power", [-40, -10, 20, 40])
 def test_scale_of_the_scene_changes_no_bit(power):
     """Property: lengths times 2^k and areas times 4^k, from 1e-12 to 1e12, in float32."""

@@ -208,6 +208,23 @@ def test_any_scale():
         np.testing.assert_array_equal(bitmask_gather(larger, 0, SETTINGS, DIAGONAL * scale), expected)
 
 
+@pytest.mark.parametrize("near", [1e-2, 1e-4])
+def test_bars_near_the_eye_cost_no_digits(near):
+    """Float32 against float64: heights over a plane are no differences of large squares."""
+    room, bars = seen(24, 32), np.s_[..., 1::4]
+    nearer = np.ones_like(room.depth)
+    nearer[bars] = near / room.depth[bars]
+    normal = room.normal.copy()
+    normal[bars] = np.array([0.0, 0.0, -1.0])[:, None, None]
+    level = room._replace(position=room.position * nearer, depth=room.depth * nearer, area=room.area * nearer**2,
+                          normal=normal)
+    expected = bitmask_gather(level, 0, SETTINGS, DIAGONAL)
+    single = level._replace(**{name: getattr(level, name).astype(np.float32)
+                               for name in ("position", "depth", "normal", "radiance", "area")})
+    off = np.abs(bitmask_gather(single, 0, SETTINGS, DIAGONAL) - expected).max(axis=0) / expected.max()
+    assert (off > SINGLE).mean() <= TIES
+
+
 def test_surfaces_in_the_same_place_give_nothing():
     level = seen(6, 8, dtype=np.float32)
     one = level._replace(position=np.broadcast_to(level.position[:, :1, :1], level.position.shape).copy())

@@ -12,7 +12,7 @@ from refgi.sssil.crown.pattern import offsets_at, sample_weight
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.rays import ray_gather
+from refgi.sssil.visibility.rays import add_free, ray_gather
 from tests.naive import bitmask as naive
 
 WHITE = Material("white", (0.6, 0.6, 0.6))
@@ -92,6 +92,19 @@ def test_batches_and_threads_change_no_bit(frame):
         np.testing.assert_array_equal(ray_gather(level, 0, SETTINGS, frame, batch=batch), expected)
     with threads(1):
         np.testing.assert_array_equal(ray_gather(level, 0, SETTINGS, frame), expected)
+
+
+def test_mirror_images_are_added_to_each_other_first():
+    """Exchanging the two of each pair of samples changes no bit, whichever of them are blocked."""
+    rng = np.random.default_rng(8)
+    radiance, worth, sender = rng.random((3, 50)), rng.random(40), rng.permutation(50)[:40]
+    blocked = rng.random(40) < 0.3
+    exchanged = np.arange(40).reshape(-1, 2)[:, ::-1].ravel()
+    sums = np.zeros((2, 3, 1))
+    add_free(radiance, 0, 1, 40, blocked, worth, sender, sums[0])
+    add_free(radiance, 0, 1, 40, blocked[exchanged], worth[exchanged], sender[exchanged], sums[1])
+    np.testing.assert_array_equal(sums[0], sums[1])
+    np.testing.assert_allclose(sums[0, :, 0], radiance[:, sender] @ (worth * ~blocked), rtol=1e-14)
 
 
 def test_background_receives_nothing():

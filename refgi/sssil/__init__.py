@@ -7,6 +7,11 @@ and far away at low resolution.
 keeps light from frame to frame, `cameras` add what the picture does not see, `visibility` tells what lies between.
 """
 
+from refgi.sssil.crown.gather import gather
+from refgi.sssil.hssil import hssil
+from refgi.sssil.level import Level
+from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.settings import HssilSettings
+from refgi.sssil.upsampling.upsample import Guide, upsample
 
-__all__ = ["HssilSettings"]
+__all__ = ["Guide", "HssilSettings", "Level", "gather", "hssil", "pyramid", "upsample"]

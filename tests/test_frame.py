@@ -164,6 +164,7 @@ def test_methods_are_found_by_name_or_refused():
     [
         ("import refgi", "numpy"),
         ("from refgi.methods import render; render('cornell_box', 'sii', width=8, height=8)", "embreex"),
+        ("from refgi.methods import render; render('cornell_box', 'hssil', width=8, height=8)", "embreex"),
         ("from refgi.methods import render; render('cornell_box', 'sii', width=8, height=8)", "trimesh"),
         ("from refgi.methods import render; render('cornell_box', 'sii', width=8, height=8)", "pydantic"),
     ],

@@ -1,4 +1,4 @@
-"""Pixel lights: texels of reflective shadow maps taken as point lights (papers.md section 0 and procedure P1).
+"""Pixel lights: texels of reflective shadow maps taken as point lights (docs/radiometry).
 
 N texels of a map of T are chosen with equal chance, so each stands for T/N texels: Phi_i = Phi_t T / N. Texels
 without flux count in N but are dropped from the list. With a `warp` texels are drawn after their importance, and each

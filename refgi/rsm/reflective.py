@@ -1,6 +1,6 @@
 """The reflective shadow map: the scene from a light, with the flux that each texel's surface reflects.
 
-Phi_t = albedo * (integral of I over the texel's directions), W, without cosine or distance (papers.md section 0); a
+Phi_t = albedo * (integral of I over the texel's directions), W, without cosine or distance (docs/radiometry); a
 directional light gives albedo * E_perp * A_perp. Glass reflects nothing here. The Phong lobe of a material leaves in
 the mirror direction r = d - 2 (n . d) n of the incoming direction d, with its own flux.
 """

@@ -3,7 +3,7 @@
 With image-plane coordinates (x, y), r^2 = x^2 + y^2:
 
 - perspective: cos a = (1 + r^2)^(-1/2), density of solid angle (1 + r^2)^(-3/2),
-- paraboloid: cos a = (1 - r^2)/(1 + r^2), density 4/(1 + r^2)^2, cut at the unit disc (papers.md section 0).
+- paraboloid: cos a = (1 - r^2)/(1 + r^2), density 4/(1 + r^2)^2, cut at the unit disc (docs/radiometry).
 
 A spot's intensity depends on r alone. Where it is constant over a texel its integral is a difference of corners; where
 a circle cuts the texel it is a closed form along y and a Gauss rule along x; elsewhere a 4 x 4 Gauss rule. All maps

@@ -1,4 +1,4 @@
-"""Slow literal twin of clustering lights into area lights (Dong et al. 2009, Sec. 5, 6; papers.md P5)."""
+"""Slow literal twin of clustering lights into area lights (Dong et al. 2009, Sec. 5, 6)."""
 
 import math
 

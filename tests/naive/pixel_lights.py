@@ -1,4 +1,4 @@
-"""Slow literal twin of the choice of pixel lights (papers.md section 0 and P1)."""
+"""Slow literal twin of the choice of pixel lights."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Slow literal twin of the upsampling of multiresolution splats (papers.md P7, E-AMS-09), texel by texel in float64.
+"""Slow literal twin of the upsampling of multiresolution splats, texel by texel in float64.
 
 Leaves are a mapping {(level, i, j): value}; a cell (level, i, j) has the pixels of rows 2^level i .. 2^level (i+1) - 1.
 Outside the picture lies a copy of its outermost texels.

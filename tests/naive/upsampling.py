@@ -1,4 +1,4 @@
-"""Slow literal twin of upsampling between levels (papers.md E-HSS-12), pixel by pixel in float64.
+"""Slow literal twin of upsampling between levels, pixel by pixel in float64.
 
 Weights of three by three texels: tent * (1 - u/16)^16 * max(0, <n . n'>)^power, u = delta^2 / (2 sigma^2), where
 (1 - u/16)^16, 0 from u = 16 on, stands for exp(-u). delta = z (1/z' - 1/z_plane): 1/z is linear in the picture along

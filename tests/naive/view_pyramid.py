@@ -25,7 +25,7 @@ def ds(picture, row, column, tangents="half"):
     z, n, along = picture["depth"][row][column], picture["normal"][row][column], ray(picture, row, column)
     cos_alpha = np.dot(along, picture["axes"][2]) / np.linalg.norm(along)
     cos_beta = -np.dot(n, along) / np.linalg.norm(along)
-    if cos_beta <= 0:  # E-HSS-02
+    if cos_beta <= 0:  # seen from behind
         return 0.0
     share = 0.5 if tangents == "half" else 1.0
     pixel = 4 * math.tan(share * picture["f_h"]) * math.tan(share * picture["f_v"]) / (width * height)

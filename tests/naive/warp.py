@@ -1,4 +1,4 @@
-"""Slow literal twin of hierarchical warping for square maps of 2^L x 2^L texels (papers.md P2)."""
+"""Slow literal twin of hierarchical warping for square maps of 2^L x 2^L texels."""
 
 
 def pyramid(importance):

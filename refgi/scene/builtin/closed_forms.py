@@ -32,7 +32,7 @@ def integrating_sphere(faces: int = 20_000, albedo: float = 0.5, radius: float =
     Notes
     -----
     The kernel cos cos / r^2 equals 1 / (4 R^2) between any two points of a sphere, so that one bounce gives the same
-    irradiance albedo Phi0 / (4 pi R^2) everywhere, Phi0 being the flux of the light (papers.md section 0).
+    irradiance albedo Phi0 / (4 pi R^2) everywhere, Phi0 being the flux of the light (docs/radiometry).
     """
     expect(8 <= faces <= MOST_FACES, "faces", f"8 to {MOST_FACES}", faces)
     expect(1e-6 <= radius <= 1e6, "radius", "1e-6 to 1e6 m", radius)

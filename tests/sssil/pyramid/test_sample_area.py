@@ -13,7 +13,7 @@ from refgi.scene.builtin.surfaces import rectangle
 from refgi.sssil.pyramid.sample_area import GRAZING, sample_area
 from tests.sssil.pyramid.pictures import FLOAT64, camera, random_picture
 
-SUM_720P = 1e-3  # papers.md, HSS-02; pixels on the outline count whole or not at all
+SUM_720P = 1e-3  # 0.1 % is asked at 720 lines; pixels on the outline count whole or not at all
 # one pixel's area by its centre's ray: the midpoint rule, off by about the square of its angle, 3 mrad
 MIDPOINT = 1e-5
 
@@ -70,7 +70,7 @@ def test_a_pixel_of_a_plane_has_the_area_between_its_corners(evidence):
 @pytest.mark.feature("HSS-02")
 @pytest.mark.parametrize(("degrees", "factor"), [(30, 4.64), (45, 5.83), (60, 9.0), (75, 23.7)])
 def test_tangents_as_printed(degrees, factor, evidence):
-    """Eq. 3 takes tan f for tan f/2: E-HSS-03's table, a square picture."""
+    """Eq. 3 takes tan f for tan f/2: the table of docs/radiometry, a square picture."""
     view = camera_projection(camera(8, 8, degrees))
     depth, normal, *_ = random_picture(8, 8, behind=0.0)
     area = sample_area(depth, normal, view)

@@ -3,10 +3,13 @@
 import os
 import tempfile
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from refgi.errors import InputError, expect
 from refgi.image import is_text
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 SUFFIXES = (".exr", ".png")
 
@@ -71,6 +74,29 @@ def folder(out: str) -> Path:
     path = Path(out)
     _require(path, path)
     return path
+
+
+def write_light(file: Path, radiance: "npt.NDArray[Any]", irradiance: "npt.NDArray[Any]", said: Any) -> None:
+    """Write a picture as an EXR: R, G, B and irradiance.R, .G, .B as float32, whole or not at all.
+
+    Parameters
+    ----------
+    file : Path
+        Where to.
+    radiance : (3, h, w) ndarray
+        What the camera receives, W/m^2/sr.
+    irradiance : (3, h, w) ndarray
+        Indirect irradiance, W/m^2.
+    said : dict
+        Attributes: finite JSON values.
+    """
+    import numpy as np
+
+    from refgi.image import write_exr
+
+    planes = [*zip("RGB", radiance, strict=True),
+              *((f"irradiance.{channel}", plane) for channel, plane in zip("RGB", irradiance, strict=True))]
+    write_exr(file, {name: np.asarray(plane, np.float32) for name, plane in planes}, said)
 
 
 def _is_folder(path: Path) -> bool:

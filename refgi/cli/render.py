@@ -82,15 +82,14 @@ def _content(picture: "Picture", method: str, settings: Any, seconds: float) -> 
 def _write(picture: "Picture", files: "Pictures", content: dict[str, Any], exposure: float) -> None:
     import numpy as np
 
+    from refgi.cli.destination import write_light
     from refgi.compare.results import CONTENT, UNITS, plain
-    from refgi.image import write_exr, write_png
+    from refgi.image import write_png
 
     if files.exr is not None:
-        planes = [*zip("RGB", picture.radiance, strict=True),
-                  *((f"irradiance.{c}", plane) for c, plane in zip("RGB", picture.irradiance, strict=True))]
         said = {key: content[key] for key in ("scene", "method", "settings", "dtype", "versions")}
-        write_exr(files.exr, {name: np.asarray(plane, np.float32) for name, plane in planes},
-                  plain({**said, "units": UNITS, "content": CONTENT}))
+        write_light(files.exr, picture.radiance, picture.irradiance,
+                    plain({**said, "units": UNITS, "content": CONTENT}))
     if files.png is not None:
         write_png(files.png, np.moveaxis(picture.radiance, 0, -1), exposure)
 

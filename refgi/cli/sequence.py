@@ -12,10 +12,10 @@ from refgi.cli.options import machine, shadows, speech, view
 from refgi.cli.session import DONE, FAILED, Session, say
 
 if TYPE_CHECKING:
+    from refgi.cli.frame_files import FrameFiles
     from refgi.cli.progress import Tell
     from refgi.scene import Scene
     from refgi.sssil.temporal import Sequence, TemporalSettings
-    from refgi.sssil.temporal.frame_files import FrameFiles
 
 FRAME = ("dtype", "rsm_resolution", "shadows")
 KINDS = {"both": (".exr", ".png"), "exr": (".exr",), "png": (".png",)}
@@ -123,10 +123,10 @@ def _files(
     out: str, path: str, suffixes: tuple[str, ...], scene: "Scene", frames: int, said: dict[str, Any]
 ) -> "FrameFiles":
     from refgi.cli.destination import folder
+    from refgi.cli.frame_files import FrameFiles
     from refgi.compare.environment import versions
     from refgi.compare.results import CONTENT, UNITS, plain
     from refgi.scene.files import read_bytes, text_of
-    from refgi.sssil.temporal.frame_files import FrameFiles
 
     made = {"scene": scene.name, "faces": scene.face_count, "surfaces": _digest(scene), "camera": scene.camera,
             "lights": scene.lights, "path": hashlib.sha256(read_bytes(Path(path))).hexdigest(), "of": frames,
@@ -147,8 +147,8 @@ def _render(
     sequence: "Sequence", files: "FrameFiles", span: tuple[int, int], exposure: float, tell: "Tell"
 ) -> list[dict[str, Any]]:
     """Render and write the frames from one number up to another; return what is to be said of each."""
+    from refgi.cli.frame_files import resumed
     from refgi.compare.metrics import count_non_finite
-    from refgi.sssil.temporal.frame_files import resumed
 
     rendered: list[dict[str, Any]] = []
     done, frames = span

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from refgi.papers.hssil.figure2 import counted, coverage, profile
+from refgi.papers.hssil.figure2 import covered, profile
 from refgi.papers.hssil.figure4 import SHOWN, apart, parts_of
 from refgi.papers.hssil.figure5 import settings_of_figure
 from refgi.papers.hssil.figure7 import expected
@@ -106,8 +106,8 @@ def test_stand_ins_are_kept_and_frames_fit_the_run(bench):
 def test_levels_cover_each_distance_once(evidence):
     """Closed form: 1 everywhere within the last circle, but where circles cut texels."""
     settings = HssilSettings(radius=8.0, levels=3, samples=64)
-    every = profile(coverage([counted(every_texel(settings), k, 1) for k in range(3)], settings))
-    drawn = profile(coverage([counted(settings, k, 2048) for k in range(3)], settings))
+    every = profile(covered(every_texel(settings), 1))
+    drawn = profile(covered(settings, 2048))
     assert every[0] == 0.0  # the receiver itself
     for low, high in ((2, 14), (18, 28), (36, 56)):
         np.testing.assert_allclose(every[low:high], 1.0, atol=1e-12)

@@ -1,7 +1,7 @@
 """Figure 2: where samples lie, and how often the levels cover each pair of pixels."""
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,8 @@ from refgi.papers.hssil.subjects import RADIUS, every_texel
 from refgi.papers.records import Cell, Figure, Picture, Plot, Table
 from refgi.papers.val.painting import palette
 from refgi.sssil import HssilSettings
-from refgi.sssil.crown.pattern import offsets_at, row_offsets
+from refgi.sssil.crown.coverage import coverage
+from refgi.sssil.crown.pattern import offsets_at
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench
@@ -23,13 +24,6 @@ Array = npt.NDArray[Any]
 ROWS = 256  # of receivers whose samples are counted, in units of a run's repeats
 GROUND, RINGS = 0.08, 0.3  # grey values
 SCALE = Scale(0.0, 2.0, DIVERGING, "times covered")
-
-
-class Level(NamedTuple):
-    """How one level covers the texels around a receiver."""
-
-    weight: Array  # (n, n) texels of this level that stand for each offset, in the mean over receivers
-    samples: int
 
 
 def figure2(bench: "Workbench") -> Figure:
@@ -47,9 +41,7 @@ def figure2(bench: "Workbench") -> Figure:
     """
     settings = HssilSettings(radius=max(2.0, RADIUS * bench.scale.size / 512))
     rows = ROWS * bench.scale.repeats
-    levels = [counted(settings, k, rows) for k in range(settings.levels)]
-    every = [counted(every_texel(settings), k, 1) for k in range(settings.levels)]
-    drawn_by, exact = coverage(levels, settings), coverage(every, settings)
+    drawn_by, exact = covered(settings, rows), covered(every_texel(settings), 1)
     along = {"64 samples, mean of many rows": profile(drawn_by), "every texel": profile(exact)}
     return Figure(
         shows="Each level samples a crown from r to 2 r of its texels, the first one the disc within as well: together "
@@ -58,87 +50,55 @@ def figure2(bench: "Workbench") -> Figure:
                f"{settings.inner} in the disc", f"means over {rows} rows of receivers"),
         pictures=_pictures(settings, drawn_by, exact), columns=3,
         tables=(Table("Crowns", ("", "from, texels of the first level", "to", "samples", "texels for each sample",
-                                 "covered within, mean"), tuple(_rows(settings, levels, drawn_by))),),
+                                 "covered within, mean"), tuple(_rows(settings, drawn_by))),),
         plots=(Plot(drawn([Curve(name, range(len(values)), values) for name, values in along.items()],
                           Axes("distance, texels of the first level", "times covered")),
                     "How often a pair of pixels at a distance is covered: once but where circles cut coarse texels."),),
         notes=_notes(settings, drawn_by, exact))
 
 
-def counted(settings: HssilSettings, index: int, rows: int) -> Level:
-    """Count how many texels stand for each offset, in the mean over rows of receivers.
-
-    Parameters
-    ----------
-    settings : HssilSettings
-        Radius and pattern.
-    index : int
-        Which level, 0 for the first.
-    rows : int
-        How many rows draw samples.
-
-    Returns
-    -------
-    Level
-        1 for each texel that is covered once.
-    """
-    offsets, weight = row_offsets(settings, index, settings.first_level + index, rows)
-    reach = math.ceil(2 * (settings.radius or 1)) + 1
-    found = np.zeros((2 * reach + 1, 2 * reach + 1))
-    share = np.broadcast_to(weight / len(offsets), offsets.shape[:2])
-    np.add.at(found, (offsets[..., 1] + reach, offsets[..., 0] + reach), share)
-    return Level(found, offsets.shape[1])
-
-
-def coverage(levels: list[Level], settings: HssilSettings) -> Array:
+def covered(settings: HssilSettings, rows: int) -> Array:
     """Return how often a pair of pixels is covered, by where one lies from the other.
 
     Parameters
     ----------
-    levels : list of Level
-        The first one first.
     settings : HssilSettings
-        Radius.
+        Radius, levels and pattern.
+    rows : int
+        How many rows of receivers draw samples.
 
     Returns
     -------
     (n, n) ndarray
-        Offsets in texels of the first level, 0 in the middle. A receiver lies anywhere in its coarse texel, so that an
-        offset falls on up to four coarse ones, with the weights of a bilinear look-up.
+        Offsets in texels of the first level as far as the last crown reaches, 0 in the middle.
     """
-    reach = round((settings.radius or 1) * 2 ** len(levels))
-    total = np.zeros((2 * reach + 1, 2 * reach + 1))
-    for k, level in enumerate(levels):
-        middle = level.weight.shape[0] // 2
-        place = np.arange(-reach, reach + 1) / 2**k + middle
-        column = np.maximum(0, 1 - np.abs(place[:, None] - np.arange(level.weight.shape[0])))
-        total += column @ level.weight @ column.T
-    return total
+    side = round((settings.radius or 1) * 2**settings.levels) + 1
+    return coverage(settings, (side, side), rows)
 
 
-def profile(covered: Array) -> list[float]:
+def profile(times: Array) -> list[float]:
     """Return the mean over all directions.
 
     Parameters
     ----------
-    covered : (n, n) ndarray
-        By offset, 0 in the middle.
+    times : (n, n) ndarray
+        How often an offset is covered, 0 in the middle.
 
     Returns
     -------
     list of float
         By distance, rounded to whole texels.
     """
-    distance = _distance(covered)
-    counts = np.bincount(distance.ravel())[: len(covered) // 2 + 1]
-    sums = np.bincount(distance.ravel(), covered.ravel())[: len(counts)]
+    distance = _distance(times)
+    counts = np.bincount(distance.ravel())[: len(times) // 2 + 1]
+    sums = np.bincount(distance.ravel(), times.ravel())[: len(counts)]
     means: list[float] = (sums / counts).tolist()
     return means
 
 
-def _distance(covered: Array) -> Array:
-    middle = len(covered) // 2
-    row, column = np.indices(covered.shape) - middle
+def _distance(times: Array) -> Array:
+    middle = len(times) // 2
+    row, column = np.indices(times.shape) - middle
     rounded: Array = np.asarray(np.round(np.hypot(row, column)), np.int64)
     return rounded
 
@@ -180,14 +140,15 @@ def _pictures(settings: HssilSettings, drawn_by: Array, exact: Array) -> tuple[P
             pictures.mapped("exact", "coverage by every texel", said, exact, everywhere, SCALE))
 
 
-def _rows(settings: HssilSettings, levels: list[Level], covered: Array) -> list[tuple[Cell, ...]]:
-    radius, distance = settings.radius or 1, _distance(covered)
+def _rows(settings: HssilSettings, times: Array) -> list[tuple[Cell, ...]]:
+    radius, distance = settings.radius or 1, _distance(times)
     rows: list[tuple[Cell, ...]] = []
-    for k, level in enumerate(levels):
+    for k in range(settings.levels):
         near, far = (0.0 if k == 0 else radius * 2**k), radius * 2 ** (k + 1)
         within = (distance >= near) & (distance < far)
         share = 3 * math.pi * radius**2 / settings.samples
-        rows.append((f"level {k + 1}", near, far, level.samples, share, float(covered[within].mean())))
+        samples = settings.samples + (settings.inner if k == 0 else 0)
+        rows.append((f"level {k + 1}", near, far, samples, share, float(times[within].mean())))
     return rows
 
 

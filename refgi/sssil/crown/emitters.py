@@ -63,15 +63,26 @@ def pack(level: Level, phases: int, farthest: int, most: int) -> Emitters:
     line = 2 * pad + strips * strip
     packed = plane((PLANES * (rows + 1) * phases * line,), level.position.dtype)
     lit_from, lit_to = np.empty((2, rows + 1, phases, line // BLOCK + 1), np.int32)
-    scale = _scale(level.depth)
+    scale = length_scale(level.depth)
     real = level.position.dtype.type
     _pack(level.position, level.normal, level.radiance, level.area, phases, line, pad, real(scale),
           real(scale * scale / math.pi), packed, lit_from, lit_to)
     return Emitters(packed, lit_from, lit_to, phases, line, pad, strip, scale)
 
 
-def _scale(depth: Array) -> float:
-    """Return the power of two that brings the middle of the depths' range to about 1."""
+def length_scale(depth: Array) -> float:
+    """Return the power of two that brings the middle of the depths' range to about 1.
+
+    Parameters
+    ----------
+    depth : (h, w) ndarray
+        Depths of a level, m; inf where there is no surface.
+
+    Returns
+    -------
+    float
+        What lengths are multiplied by; 1 where no surface is seen.
+    """
     some = depth[(depth > 0) & (depth < np.inf)]
     if not some.size:
         return 1.0

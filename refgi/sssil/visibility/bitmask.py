@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
+from refgi.sssil.crown.emitters import length_scale
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
 from refgi.sssil.crown.reach import chosen_radius
@@ -69,7 +70,7 @@ def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: 
     rows, columns = level.shape
     steps = steps_of(settings, index, chosen_radius((rows << index, columns << index), settings))
     real = level.position.dtype.type
-    scale = _scale(level.depth)
+    scale = length_scale(level.depth)
     packed = np.empty((rows, PLANES, columns), level.position.dtype)
     _pack(level.position, level.normal, level.radiance, level.area, real(scale), packed)
     thickness, bulge = real(settings.thickness * diagonal * scale), real(settings.form_factor == "disc")
@@ -82,12 +83,6 @@ def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: 
         offsets, weight = slice_offsets(settings, steps, level.number, rows)
         _march_rows(packed, offsets, weight.astype(real), thickness, bulge, factor, result)
     return result
-
-
-def _scale(depth: Array) -> float:
-    """Return the power of two that brings the largest depth to 1: areas and 4th powers then stay within float32."""
-    far = float(np.max(depth, initial=0.0, where=np.isfinite(depth)))
-    return 2.0 ** -math.frexp(far)[1] if far > 0.0 else 1.0
 
 
 @kernel(parallel=True)

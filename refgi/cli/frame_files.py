@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cli.destination import write_light
 from refgi.errors import InputError, expect
 from refgi.frame import Frame
-from refgi.image import read_exr, write_exr, write_png
+from refgi.image import read_exr, write_png
 from refgi.scene.model import Scene
 from refgi.sssil.temporal.filter import History, remember
 from refgi.sssil.temporal.sequence import Sequence, Step, seeded
@@ -38,10 +39,7 @@ class FrameFiles(NamedTuple):
             if file.suffix == PNG:
                 write_png(file, np.moveaxis(step.radiance, 0, -1), exposure)
             else:
-                planes = [*zip("RGB", step.radiance, strict=True),
-                          *((f"irradiance.{c}", plane) for c, plane in zip("RGB", step.irradiance, strict=True))]
-                write_exr(file, {name: np.asarray(plane, np.float32) for name, plane in planes},
-                          {**self.said, "frame": number})
+                write_light(file, step.radiance, step.irradiance, {**self.said, "frame": number})
 
     def done(self, frames: int) -> int:
         """Return how many frames, from the first on, are there.

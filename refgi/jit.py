@@ -6,8 +6,9 @@ the bit for every thread count and on every machine with the same arithmetic.
 
 Numba keys its disk cache by the source file of a kernel alone, so a change in an *imported* kernel leaves a stale
 caller behind. Here each kernel's cache folder is keyed by its module's source **and the sources of every refgi
-module it imports, directly or not**, together with the versions of numba, llvmlite and NumPy and the CPU's features.
-A cache file that cannot be read is dropped and rebuilt.
+module it imports, directly or not**, together with the versions of numba, llvmlite and NumPy and the CPU's features,
+and by nothing else: every copy of the same sources finds the same kernels. A cache file that cannot be read is dropped
+and rebuilt.
 """
 
 import atexit
@@ -28,6 +29,7 @@ import llvmlite
 import llvmlite.binding
 import numba
 import numpy as np
+from numba.core.caching import _CacheLocator
 
 from refgi.errors import RefgiWarning
 
@@ -105,15 +107,41 @@ def threads(count: int | None) -> Iterator[None]:
         numba.set_num_threads(before)
 
 
+class KeyedFolder(_CacheLocator):
+    """Where Numba keeps a kernel: in the folder of its module's key, whatever the source's own folder and time."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        config: Any = numba.config
+        self._folder, self._line = str(config.CACHE_DIR), function.__code__.co_firstlineno
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> "KeyedFolder":  # noqa: ARG003
+        """Return the locator of a function."""
+        return cls(py_func)
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return self._folder
+
+    def get_source_stamp(self) -> str:
+        """Return what marks a changed source: nothing, as the folder's name does."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """Return what tells functions of one name apart: the line."""
+        return str(self._line)
+
+
 @contextmanager
 def _cache_folder(module: str) -> Iterator[None]:
     config: Any = numba.config
-    before = config.CACHE_DIR
+    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
     config.CACHE_DIR = str(_usable(cache_root()) / _key(module))
+    config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KeyedFolder.__name__}"
     try:
         yield
     finally:
-        config.CACHE_DIR = before
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
 
 
 @cache

@@ -2,6 +2,7 @@
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -50,6 +51,14 @@ def test_a_changed_import_recompiles_the_caller(package):
     assert run(package) == "5.0 1"
     write_inner(package, "x + 2.0")
     assert run(package) == "7.0 0"
+
+
+def test_a_copy_of_the_sources_finds_the_same_kernels(package, tmp_path):
+    assert run(package) == "5.0 0"
+    copy = tmp_path / "elsewhere" / package.name
+    shutil.copytree(package, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "elsewhere" / "cache").symlink_to(tmp_path / "cache")
+    assert run(copy) == "5.0 1"
 
 
 def test_a_caller_imported_after_an_edit_does_not_pass_for_the_edited_one(package):

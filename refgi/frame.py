@@ -88,7 +88,7 @@ class Frame:
     @cached_property
     def lights(self) -> LightTable:
         """The scene's lights as arrays."""
-        return light_table(self.scene.lights, self.dtype)
+        return light_table(self.scene.lights)
 
     @cached_property
     def gbuffer(self) -> "GBuffer":

@@ -15,6 +15,7 @@ from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.radiometry import DIRECTIONAL, POINT, orthonormal_basis, radiant_intensity
 from refgi.sampling import cosine_hemisphere, halton
+from refgi.scene.cone import CAP
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -142,14 +143,14 @@ def _emit(lights: "LightTable", k: int, numbers: Array, geometry: "Geometry") ->
 
 @kernel
 def _emit_from_point(lights: Any, k: int, numbers: Array, direction: Array, power: Array) -> None:
-    cos_outer = -1.0 if lights.kind[k] == POINT else lights.cos_outer[k]
+    cap = 2.0 if lights.kind[k] == POINT else lights.cone[k, CAP]  # 1 - cosine of its half-angle
     ax, ay, az = (0.0, 0.0, 1.0) if lights.kind[k] == POINT else (
         lights.direction[k, 0], lights.direction[k, 1], lights.direction[k, 2])
     tx, ty, tz, bx, by, bz = orthonormal_basis(ax, ay, az)
-    weight = 2.0 * math.pi * (1.0 - cos_outer) / len(numbers)
+    weight = 2.0 * math.pi * cap / len(numbers)
     for i in range(len(numbers)):
-        z = 1.0 - numbers[i, 0] * (1.0 - cos_outer)  # uniform over the cone
-        radius, phi = math.sqrt(max(0.0, 1.0 - z * z)), 2.0 * math.pi * numbers[i, 1]
+        height = numbers[i, 0] * cap  # 1 - cosine, uniform over the cone
+        z, radius, phi = 1.0 - height, math.sqrt(height * (2.0 - height)), 2.0 * math.pi * numbers[i, 1]
         x, y = radius * math.cos(phi), radius * math.sin(phi)
         wx, wy, wz = tx * x + bx * y + ax * z, ty * x + by * y + ay * z, tz * x + bz * y + az * z
         direction[i, 0], direction[i, 1], direction[i, 2] = wx, wy, wz

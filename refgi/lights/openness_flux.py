@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.draws import ROULETTE, draws
 from refgi.errors import expect
 from refgi.stages import stage
 
@@ -77,9 +78,8 @@ def roulette(lights: "PixelLights", openness: Array, floor: float, seed: int) ->
     """
     _check(lights, openness)
     expect(0 < floor <= 1, "floor", "above 0, up to 1", floor)
-    expect(seed >= 0, "seed", "a whole number >= 0", seed)
     chance = np.maximum(1 - np.asarray(openness, np.float64), floor)
-    kept = np.random.default_rng(seed).random(len(chance)) < chance
+    kept = draws(seed, ROULETTE, len(chance)) < chance
     gain = (1 / chance[kept]).astype(lights.flux.dtype)
     taken: dict[str, Any] = {name: part[..., kept] for name, part in lights._asdict().items()
                              if isinstance(part, np.ndarray)}

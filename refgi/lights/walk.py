@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.draws import LIGHT_PATHS, draws
 from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.radiometry import DIRECTIONAL, POINT, orthonormal_basis, radiant_intensity
@@ -94,7 +95,7 @@ def walk_lights(
     expect(paths >= count, "lights", f"at least one path for each of {count} lights", paths)
     expect(1 <= bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", bounces)
     used = 2 + 2 * bounces
-    shift = np.random.default_rng(seed).random(used).tolist() if seed else None
+    shift = draws(seed, LIGHT_PATHS, used).tolist() if seed else None
     left: list[Left] = []
     for k, share in enumerate(equal_shares(paths, count)):
         numbers = halton(share, BASES[:used], shift, start=1)

@@ -15,6 +15,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
+from refgi.draws import PIXEL_LIGHTS, draws
 from refgi.errors import expect
 from refgi.rsm.cells import cell_sums, cells_of_grid, cells_of_nearest, lit_texels
 from refgi.rsm.gbuffer import taken
@@ -176,10 +177,9 @@ def _points(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Ar
         maps = rsm.projection.maps
         one = grid(math.isqrt(share // maps))
         return np.concatenate([np.stack([one[:, 0], (k + one[:, 1]) / maps], axis=1) for k in range(maps)])
-    generator = np.random.default_rng([seed, index])
     if pattern == "random":
-        return generator.random((share, 2))
-    shift = None if seed == 0 and index == 0 else (generator.random(), generator.random())
+        return draws(seed, PIXEL_LIGHTS, 2 * share, index).reshape(share, 2)
+    shift = None if seed == 0 and index == 0 else draws(seed, PIXEL_LIGHTS, 2, index).tolist()
     return halton(share, shift=shift)
 
 

@@ -55,12 +55,12 @@ def sine_cosine(t: Any) -> tuple[Any, Any]:
     Parameters
     ----------
     t : float
-        0 to 1, float32 or float64.
+        -1/4 (a depth less the largest bias) to 1, float32 or float64.
 
     Returns
     -------
     tuple of 2 floats
-        Within 2e-7 or 4e-16.
+        Within 2.4e-7 (float64: 4e-16) from 0 on, 4.5e-7 (8e-16) below.
     """
     real = type(t)
     u = t - real(0.5)

@@ -16,6 +16,9 @@ from refgi.jit import kernel
 
 SPOT, POINT, DIRECTIONAL = 0, 1, 2  # LightTable.kind
 
+UNCERTAIN = 1e-14  # of a length: more than rounding takes from the products of three components
+FOR_FLOAT32 = 1e-7  # from here on it is less than 1e-7 of the cosine over that at the edge
+
 
 @kernel
 def smooth_edge(above: Any, span: Any) -> Any:
@@ -43,8 +46,8 @@ def smooth_edge(above: Any, span: Any) -> Any:
 
 
 @kernel
-def spot_falloff(d: Any, axis: Any, cone: Any) -> Any:
-    """Return the share of a spot's on-axis intensity in one direction, within 8 units in the last place.
+def spot_falloff(d: Any, axis: Any, cone: Any, plain: float) -> Any:
+    """Return the share of a spot's on-axis intensity in one direction.
 
     Parameters
     ----------
@@ -54,27 +57,46 @@ def spot_falloff(d: Any, axis: Any, cone: Any) -> Any:
         Direction the spot shines in, of any length; float64.
     cone : (6,) ndarray of float64
         Of `refgi.scene.cone.cone_row`.
+    plain : float
+        Sine of the angle inside the cone from which on float64 alone will do: `FOR_FLOAT32`, or inf for nowhere.
 
     Returns
     -------
     float
-        0 to 1, float64.
+        0 to 1, float64, within 8 units in the last place of float32 or float64.
 
     Notes
     -----
     cos a - cos b = sin(b - a) sin(b + a) / (cos a + cos b) with the angle a off the axis and the outer half-angle b,
     and |d| sin a = |d x axis|, |d| cos a = d . axis for an axis of length 1. What sin(b - a) cancels is known to twice
-    the precision.
+    the precision where it matters.
     """
+    along = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
+    x, y, z = d[1] * axis[2] - d[2] * axis[1], d[2] * axis[0] - d[0] * axis[2], d[0] * axis[1] - d[1] * axis[0]
+    square = x * x + y * y + z * z
+    across, length = math.sqrt(square), math.sqrt(square + along * along)
+    edge, slack = cone[0] * along - cone[2] * across, UNCERTAIN * length
+    if edge < -slack:
+        return 0.0
+    above = edge * (cone[0] * along + cone[2] * across) / (length * (along + length * cone[2]))
+    if edge > slack and above * (edge - slack) > cone[4] * edge:
+        return 1.0
+    if not edge > plain * length:
+        above = _above_the_edge(d, axis, cone)
+    return smooth_edge(above, cone[4])
+
+
+@kernel
+def _above_the_edge(d: Any, axis: Any, cone: Any) -> Any:
+    """Return cos a - cos b, rounded a few times."""
     along, across = length_along(d, axis), length_across(d, axis)
-    sine, cosine = (cone[0], cone[1]), (cone[2], cone[3])
-    one, other = multiply(sine, along), multiply(cosine, across)
+    one, other = multiply((cone[0], cone[1]), along), multiply((cone[2], cone[3]), across)
     edge = add(one, (-other[0], -other[1]))  # |d| sin(b - a)
     if edge[0] < 0.0:
-        return 0.0
+        return -1.0
     length = root(add(multiply(along, along), multiply(across, across)))
-    above = multiply(edge, add(one, other))[0] / multiply(length, add(along, multiply(length, cosine)))[0]
-    return smooth_edge(above, cone[4])
+    below = multiply(length, add(along, multiply(length, (cone[2], cone[3]))))
+    return multiply(edge, add(one, other))[0] / below[0]
 
 
 @kernel
@@ -98,7 +120,7 @@ def radiant_intensity(lights: Any, k: int, wx: Any, wy: Any, wz: Any) -> Any:
     share = 1.0
     if lights.kind[k] == SPOT:
         axis = lights.direction
-        share = spot_falloff((wx, wy, wz), (axis[k, 0], axis[k, 1], axis[k, 2]), lights.cone[k])
+        share = spot_falloff((wx, wy, wz), (axis[k, 0], axis[k, 1], axis[k, 2]), lights.cone[k], np.inf)
     peak = lights.intensity
     return peak[k, 0] * share, peak[k, 1] * share, peak[k, 2] * share
 
@@ -137,9 +159,13 @@ def incident_light(lights: Any, k: int, x: Any, y: Any, z: Any) -> Any:
     if distance == zero:
         return zero, zero, zero, zero, zero, zero, zero
     wx, wy, wz = dx / distance, dy / distance, dz / distance
-    ir, ig, ib = radiant_intensity(lights, k, -dx, -dy, -dz)
     falloff = 1.0 / (distance * distance)
-    return wx, wy, wz, distance, ir * falloff, ig * falloff, ib * falloff
+    if lights.kind[k] == SPOT:
+        axis = lights.direction
+        plain = FOR_FLOAT32 if isinstance(x, np.float32) else np.inf
+        falloff *= spot_falloff((-dx, -dy, -dz), (axis[k, 0], axis[k, 1], axis[k, 2]), lights.cone[k], plain)
+    peak = lights.intensity
+    return wx, wy, wz, distance, peak[k, 0] * falloff, peak[k, 1] * falloff, peak[k, 2] * falloff
 
 
 @kernel

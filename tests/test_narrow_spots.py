@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from refgi.radiometry import incident_light, radiant_intensity, spot_falloff
+from refgi.radiometry import FOR_FLOAT32, incident_light, radiant_intensity, spot_falloff
 from refgi.rays import Tracer
 from refgi.rsm import direct_irradiance, gbuffer, reflective_shadow_map
 from refgi.rsm.projection import paraboloid_projection, spot_projection
@@ -17,6 +17,7 @@ from refgi.splat import walk_lights
 from refgi.truth.light_grid import light_rays
 from tests.rsm.shapes import geometry
 
+PLAIN = {np.float32: FOR_FLOAT32, np.float64: math.inf}
 ULP = 8  # as promised in the docstring of `spot_falloff`
 DEGREES = (1e-5, 3e-5, 1e-4, 1e-3, 0.02, 0.1, 0.3, 1.0, 10.0, 35.0, 60.0, 89.0, 89.99, 89.9999)
 FLOOR = geometry([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], [[0, 1, 2], [0, 2, 3]])
@@ -56,7 +57,7 @@ def test_the_falloff_is_exact_to_a_few_units_in_the_last_place(real, degrees):
         axis /= np.linalg.norm(axis)
         cone = cone_row(share * outer, outer)
         for d in directions_about(axis, outer, share * outer, 60, rng).astype(real):
-            got = real(spot_falloff(tuple(float(c) for c in d), tuple(axis), cone))
+            got = real(spot_falloff(tuple(float(c) for c in d), tuple(axis), cone, PLAIN[real]))
             exact = exact_falloff(d, axis, share * outer, outer)
             assert (got == 0) == (exact < np.finfo(real).tiny)
             worst = max(worst, abs(float((mpmath.mpf(float(got)) - exact) / float(np.spacing(real(float(exact)))))))

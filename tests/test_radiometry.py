@@ -33,7 +33,7 @@ def rectangle(corner, x0, x1, y0, y1):
 def test_spot_falloff_is_the_smoothstep():
     cone = cone_row(math.acos(0.9), math.acos(0.5))
     for cos_angle in np.linspace(-1.0, 1.0, 81):
-        got = spot_falloff((0.0, math.sqrt(1 - cos_angle**2), cos_angle), (0.0, 0.0, 1.0), cone)
+        got = spot_falloff((0.0, math.sqrt(1 - cos_angle**2), cos_angle), (0.0, 0.0, 1.0), cone, math.inf)
         assert got == pytest.approx(naive.spot_intensity(1.0, cos_angle, 0.9, 0.5), abs=ROUNDING[np.float64])
 
 
@@ -41,7 +41,7 @@ def test_spot_with_equal_cones_is_a_step():
     for outer in (1e-7, 0.3, 1.5):
         cone = cone_row(outer, outer)
         for angle, expected in ((0.0, 1.0), (0.999999 * outer, 1.0), (1.000001 * outer, 0.0), (3.0, 0.0)):
-            assert spot_falloff((0.0, math.sin(angle), math.cos(angle)), (0.0, 0.0, 1.0), cone) == expected
+            assert spot_falloff((0.0, math.sin(angle), math.cos(angle)), (0.0, 0.0, 1.0), cone, math.inf) == expected
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])

@@ -17,7 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.radiometry import corner_solid_angle_paraboloid, corner_solid_angle_perspective, smooth_edge, spot_falloff
+from refgi.radiometry import (
+    FOR_FLOAT32,
+    corner_solid_angle_paraboloid,
+    corner_solid_angle_perspective,
+    smooth_edge,
+    spot_falloff,
+)
 from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 from refgi.scene.cone import cone_row
 from refgi.stages import stage
@@ -328,6 +334,6 @@ def _sample_spot(projection: Projection, axis: Array, cone: Array, share: Array)
                 y *= projection.half[1]
                 scale = 1.0 / math.sqrt(1.0 + x * x + y * y)
                 density = scale * scale * scale
-                total += density * spot_falloff((x, y, 1.0), (ax, ay, az), cone)
+                total += density * spot_falloff((x, y, 1.0), (ax, ay, az), cone, FOR_FLOAT32)
                 whole += density
             share[row, column] = total / whole

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.radiometry import lobe_fraction, radiant_intensity
+from refgi.lobes import inverse_fraction, lobe_direction
+from refgi.radiometry import radiant_intensity
 from refgi.rays import MISS, Tracer
 from refgi.rsm.projection import camera_projection, project
 from refgi.rsm.solid_angle import texel_solid_angles
@@ -27,6 +28,7 @@ from refgi.truth.surfaces import Surfaces, around, face_cross, face_normal, shad
 Array = npt.NDArray[Any]
 
 MIRROR_EXPONENT = 100.0  # lobes from here on count as mirror-like: half of their flux lies within 7 degrees
+SHARP_LOBE = 1e3  # half of its flux lies within 2.1 degrees: chance meets it too rarely, though its error does not show
 LONGEST_CHAIN = 16
 
 
@@ -38,6 +40,7 @@ class Film(NamedTuple):
     solid_angle: Array  # (h, w) of each pixel, sr
     mirrors: Surfaces  # with only the mirror-like lobes
     ior: Array  # (k,) by material; 0: opaque
+    longest: int  # surfaces that a photon meets
 
 
 class Photons(NamedTuple):
@@ -53,7 +56,8 @@ class Photons(NamedTuple):
     towards: Array  # (n, 3) float64: face normal there, on the side it came from
 
 
-def film(scene: Scene, shape: tuple[int, int]) -> Film | None:
+def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EXPONENT, *,
+         longest: int = LONGEST_CHAIN) -> Film | None:
     """Prepare the counting of photons, or return None for a scene without mirror or glass.
 
     Parameters
@@ -62,6 +66,10 @@ def film(scene: Scene, shape: tuple[int, int]) -> Film | None:
         The scene.
     shape : tuple of 2 ints
         Rows and columns of the picture.
+    least_exponent : float
+        Lobes from here on count as mirrors.
+    longest : int
+        Surfaces that a photon meets at most; at 2, one bounce, glass is opaque.
 
     Returns
     -------
@@ -71,11 +79,13 @@ def film(scene: Scene, shape: tuple[int, int]) -> Film | None:
     table = material_table(scene.materials)
     mirrors = surfaces(scene)
     mirrors.diffuse[:] = 0
-    mirrors.specular[table.exponent < MIRROR_EXPONENT] = 0
+    mirrors.specular[table.exponent < least_exponent] = 0
+    if longest == 2:
+        table.ior[:] = 0
     if not (mirrors.specular.any() or table.ior.any()):
         return None
     solid_angle = texel_solid_angles(camera_projection(scene.camera, shape[1], shape[0]))
-    return Film(scene, shape, solid_angle, mirrors, table.ior)
+    return Film(scene, shape, solid_angle, mirrors, table.ior, longest)
 
 
 def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, random: np.random.Generator) -> Array:
@@ -105,7 +115,7 @@ def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, ra
         rays = light_rays(light, film.scene.geometry, random.random((side * side, 2)))
         batch = _photons(rays.origins + tracer.offset * rays.directions, rays.directions)
         _power(lights, k, isinstance(light, DirectionalLight), rays.measure, rays.directions, batch.flux)
-        for bounce in range(LONGEST_CHAIN):
+        for bounce in range(film.longest):
             tracer.fill_closest(batch.origin, batch.direction, batch.reach, batch.triangle_id, batch.distance)
             words = random.integers(2**32, size=len(batch.reach), dtype=np.uint32)
             landing = (batch.triangle_id != MISS) & (bounce > 0)
@@ -238,10 +248,9 @@ def _off_lobe(n: tuple[float, float, float], g: tuple[float, float, float], d: t
               exponent: float, word: Any) -> tuple[tuple[float, float, float], float]:
     """Return a direction of a lobe and 1 / K, or 0 where it points below the surface."""
     u, v = (hash_bits(word) + 0.5) * 2.0**-32, (hash_bits(word ^ np.uint32(0xB5297A4D)) + 0.5) * 2.0**-32
-    z = u ** (1 / (exponent + 1))
-    across, phi = math.sqrt(max(0.0, 1 - z * z)), 2 * np.pi * v
     cos_in = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
     mirror = (d[0] + 2 * cos_in * n[0], d[1] + 2 * cos_in * n[1], d[2] + 2 * cos_in * n[2])
-    w = around(mirror, across * math.cos(phi), across * math.sin(phi), z)
+    x, y, z = lobe_direction(u, v, exponent)
+    w = around(mirror, x, y, z)
     above = min(w[0] * g[0] + w[1] * g[1] + w[2] * g[2], w[0] * n[0] + w[1] * n[1] + w[2] * n[2])
-    return w, 1 / lobe_fraction(cos_in, exponent) if above > 0 else 0.0
+    return w, inverse_fraction(cos_in, exponent) if above > 0 else 0.0

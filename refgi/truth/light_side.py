@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.lobes import lobe_gap, lobe_power
 from refgi.sampling import hash_bits
 from refgi.shadowed import Receivers
 from refgi.truth.lit_points import BLOCK, LitPoints
@@ -42,12 +43,17 @@ def _glossy(points: LitPoints, j: int, dx: Any, dy: Any, dz: Any, nx: Any, ny: A
     zero = np.float32(0)
     r2 = max(dx * dx + dy * dy + dz * dz, TINY)
     cos_x = nx * dx + ny * dy + nz * dz
-    along = -(points.axis[0, j] * dx + points.axis[1, j] * dy + points.axis[2, j] * dz)
     above = -(points.normal[0, j] * dx + points.normal[1, j] * dy + points.normal[2, j] * dz)
-    if along <= zero or above <= zero or cos_x <= zero:
+    if above <= zero or cos_x <= zero:
         return zero
     r = np.sqrt(r2)
-    pattern = points.peak[j] * np.float32((along / r) ** points.exponent[j])
+    if points.exponent[j] == np.float32(1):
+        along = -(points.axis[0, j] * dx + points.axis[1, j] * dy + points.axis[2, j] * dz)
+        power = (along if along > zero else zero) / r
+    else:
+        power = lobe_power(lobe_gap(points.axis[0, j], points.axis[1, j], points.axis[2, j], -dx, -dy, -dz),
+                           points.exponent[j])
+    pattern = points.peak[j] * power
     return min(pattern * (cos_x / r) / r2, points.bound[j])
 
 

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.radiometry import DIRECTIONAL, lobe_fraction, radiant_intensity
+from refgi.lobes import lobe_norm
+from refgi.radiometry import DIRECTIONAL, radiant_intensity
 from refgi.rays import MISS, Tracer
 from refgi.scene import LightTable
 from refgi.truth.light_grid import LightRays
@@ -128,7 +129,7 @@ def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Arr
             exponent = 1.0 if part == 0 else surfaces.exponent[material]
             points.power[used] = power
             points.exponent[used] = exponent
-            points.peak[used] = 1.0 if part == 0 else (exponent + 1) / (2 * lobe_fraction(cos_in, exponent))
+            points.peak[used] = 1.0 if part == 0 else np.pi * lobe_norm(cos_in, exponent)
             points.bound[used] = bound / area
             for c in range(3):
                 points.position[c, used] = y[c]

@@ -23,6 +23,10 @@ from refgi.truth.surfaces import Surfaces
 Array = npt.NDArray[Any]
 
 
+# A lobe may point below an interpolated horizon: K is 1/2 no more, but <r.w>^P / K stays below 18 for K >= 1e-12.
+BELOW_HORIZON = 9.0
+
+
 class Task(NamedTuple):
     """Everything a pass works on."""
 
@@ -158,7 +162,9 @@ def _reach(task: Task) -> float:
         return np.inf
     most = max((footprint(light, task.scene.geometry, task.settings.light_grid)[1] for light in task.scene.lights),
                default=0.0)
-    peak = float((surfaces.exponent + 1)[surfaces.specular.any(axis=1)].max(initial=1.0))  # K is at least 1/2
+    peak = float((surfaces.exponent + 1)[surfaces.specular.any(axis=1)].max(initial=1.0))  # of (P + 1) / (2 K)
+    if len(surfaces.normals):
+        peak *= BELOW_HORIZON
     return float(np.sqrt(peak * most / bound))
 
 

@@ -1,13 +1,12 @@
 """Where a path goes after it found a surface: through it, where nothing blocks, or on by the surface's reflection."""
 
-import math
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.radiometry import lobe_fraction
+from refgi.lobes import inverse_fraction, lobe_direction
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
 from refgi.shadowed import Receivers
@@ -108,12 +107,11 @@ def _scatter(surfaces: Surfaces, offset: float, word: Any, paths: Paths, ray: in
         part, factor = rho, cos_n / (cos_g * chance)
     else:
         exponent = surfaces.exponent[material]
-        z = u ** (1 / (exponent + 1))
-        across, phi = math.sqrt(max(0.0, 1 - z * z)), 2 * np.pi * v
         mirror = (2 * cos_n * n[0] - back[0], 2 * cos_n * n[1] - back[1], 2 * cos_n * n[2] - back[2])
-        w = around(mirror, across * math.cos(phi), across * math.sin(phi), z)
-        part, factor = glossy, dot(g, w) / (lobe_fraction(dot(n, w), exponent) * cos_g * (1 - chance))
-    if dot(g, w) <= 0:
+        x0, x1, x2 = lobe_direction(u, v, exponent)
+        w = around(mirror, x0, x1, x2)
+        part, factor = glossy, dot(g, w) * inverse_fraction(dot(n, w), exponent) / (cos_g * (1 - chance))
+    if dot(g, w) <= 0 or factor <= 0:
         return
     paths.reach[ray] = np.inf
     for c in range(3):

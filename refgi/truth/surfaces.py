@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.radiometry import lobe_fraction, orthonormal_basis
+from refgi.lobes import lobe_gap, lobe_norm, lobe_power
+from refgi.radiometry import orthonormal_basis
 from refgi.scene import LightTable, Scene, light_table, material_table
 
 Array = npt.NDArray[Any]
@@ -177,7 +178,7 @@ def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float
     material : int
         Which material.
     n, light, w : tuple of 3 floats
-        Unit vectors: shading normal, towards the light, away from the point.
+        Shading normal, towards the light, away from the point; unit vectors, but for w, whose length may be rounded.
 
     Returns
     -------
@@ -187,10 +188,11 @@ def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float
     exponent = surfaces.exponent[material]
     cos_in = n[0] * light[0] + n[1] * light[1] + n[2] * light[2]
     cos_out = n[0] * w[0] + n[1] * w[1] + n[2] * w[2]
-    r_w = 2 * cos_in * cos_out - (light[0] * w[0] + light[1] * w[1] + light[2] * w[2])  # r = 2 (n.l) n - l
-    if r_w <= 0 or cos_out <= 0:
+    if cos_out <= 0:
         return 0.0
-    return (exponent + 1) / (2 * lobe_fraction(cos_in, exponent)) * r_w**exponent
+    twice = 2 * cos_in  # r = 2 (n.l) n - l
+    gap = lobe_gap(twice * n[0] - light[0], twice * n[1] - light[1], twice * n[2] - light[2], w[0], w[1], w[2])
+    return np.pi * lobe_norm(cos_in, exponent) * lobe_power(gap, exponent) if gap < 1 else 0.0
 
 
 @kernel

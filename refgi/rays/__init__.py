@@ -8,7 +8,8 @@ library of the wheel cannot be found).
 """
 
 from refgi.rays.embree import MISS
+from refgi.rays.offsets import STEPS, far_offset, ray_offset
 from refgi.rays.openness import openness
 from refgi.rays.tracer import Hits, Tracer
 
-__all__ = ["MISS", "Hits", "Tracer", "openness"]
+__all__ = ["MISS", "STEPS", "Hits", "Tracer", "far_offset", "openness", "ray_offset"]

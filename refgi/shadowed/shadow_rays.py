@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.lobes import lobe_gap, lobe_norm, lobe_power
-from refgi.rays import Tracer
+from refgi.rays import Tracer, far_offset, ray_offset
 from refgi.shadowed.receivers import Receivers
 from refgi.stages import report_progress, stage
 
@@ -78,7 +78,7 @@ def _add_lights(tracer: Tracer, to: Receivers, receivers: tuple[int, int], sende
     pairs = (receivers[1] - receivers[0]) * count
     origin, direction, worth = (np.empty((pairs, 3), np.float32) for _ in range(3))
     reach, blocked = np.empty(pairs, np.float32), np.empty(pairs, np.bool_)
-    aim(to, receivers, senders, lights, tracer.offset, (origin, direction, reach, worth))
+    aim(to, receivers, senders, lights, tracer.grain, (origin, direction, reach, worth))
     if visibility:
         tracer.fill_occluded(origin, direction, reach, blocked)
     else:
@@ -87,7 +87,7 @@ def _add_lights(tracer: Tracer, to: Receivers, receivers: tuple[int, int], sende
 
 
 @kernel(parallel=True)
-def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int], offset: float,
+def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int], grain: float,
         rays: tuple[Array, Array, Array, Array]) -> None:
     """Write the shadow ray of each pair of a block, and what the pair is worth.
 
@@ -101,29 +101,32 @@ def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tup
         Pixel lights.
     lights : tuple of 2 ints
         First sender of the block and one past the last.
-    offset : float
-        How far segments end above the sender, m.
+    grain : float
+        The tracer's: segments end above the sender by `ray_offset` and `far_offset`, m.
     rays : tuple of 4 arrays
         Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2, float32, light by light for each receiver;
         the reach is 0 where a pair has nothing to give.
     """
     count = lights[1] - lights[0]
     for i in prange(receivers[1] - receivers[0]):
-        _aim_all(to, receivers[0] + i, senders, lights, offset, rays, i * count)
+        _aim_all(to, receivers[0] + i, senders, lights, grain, rays, i * count)
 
 
 @kernel
-def _aim_all(to: Receivers, r: int, senders: Senders, lights: tuple[int, int], offset: float,
+def _aim_all(to: Receivers, r: int, senders: Senders, lights: tuple[int, int], grain: float,
              rays: tuple[Array, Array, Array, Array], ray: int) -> None:
     for k in range(lights[0], lights[1]):
-        _aim(to, r, senders, k, offset, rays, ray + k - lights[0])
+        _aim(to, r, senders, k, grain, rays, ray + k - lights[0])
 
 
 @kernel
-def _aim(to: Receivers, r: int, senders: Senders, j: int, offset: float, rays: tuple[Array, Array, Array, Array],
+def _aim(to: Receivers, r: int, senders: Senders, j: int, grain: float, rays: tuple[Array, Array, Array, Array],
          ray: int) -> None:
     origins, directions, reach, worth = rays
     reach[ray] = 0
+    dx, dy = senders.position[0, j] - to.position[0, r], senders.position[1, j] - to.position[1, r]
+    offset = (ray_offset(senders.position[0, j], senders.position[1, j], senders.position[2, j], grain)
+              + far_offset(dx, dy, senders.position[2, j] - to.position[2, r]))
     r2, cos_x, cos_y, above = 0.0, 0.0, 0.0, 0.0
     for c in range(3):
         d = senders.position[c, j] - to.position[c, r]

@@ -77,7 +77,7 @@ def _light_side(task: Task, words: Array, sums: Array) -> None:
     picks, glossy = task.settings.picks, bool((points.exponent > 1).any() or (points.peak > 1).any())
     for first, last in _spans(task, picks):
         rays = _shadows((last - first) * picks)
-        pick(points, task.to, (first, last), picks, int(words[2]), glossy, np.float32(task.tracer.offset),
+        pick(points, task.to, (first, last), picks, int(words[2]), glossy, np.float32(task.tracer.grain),
              (rays.origin, rays.direction, rays.reach, rays.worth))
         _settle(task, rays, first, picks, sums, task.settings.visibility)
 
@@ -113,7 +113,7 @@ def _hemisphere(task: Task, words: Array, sums: Array) -> None:
         send(task.to, (first, last), points, int(words[3]), reach, paths)
         for bounce in range(task.settings.bounces):
             if bounce:
-                scatter(task.surfaces, task.tracer.offset, int(words[3 + bounce]), task.to, first, count, paths)
+                scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.to, first, count, paths)
             _follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums)
 
 
@@ -125,13 +125,13 @@ def _follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums
         for k, light in enumerate(task.scene.lights):
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = _shadows(len(paths.reach))
-            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.offset), paths, shadows)
+            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), paths, shadows)
             if unseen is not None:
                 shadows.reach[unseen] = 0
             _settle(task, shadows, first, count, sums, True)
         if task.settings.visibility:
             return
-        pass_through(task.surfaces, task.tracer.offset, paths)
+        pass_through(task.surfaces, task.tracer.grain, paths)
         if not (paths.reach > 0).any():
             return
 
@@ -141,7 +141,7 @@ def _unseen(task: Task, paths: Paths) -> Array | None:
     if task.view is None:
         return None
     rays = _shadows(len(paths.reach))
-    aim_paths(task.view, task.surfaces, task.tracer.offset, paths, rays)
+    aim_paths(task.view, task.surfaces, task.tracer.grain, paths, rays)
     task.tracer.fill_occluded(rays.origin, rays.direction, rays.reach, rays.blocked)
     return rays.blocked
 

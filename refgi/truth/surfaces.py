@@ -19,6 +19,7 @@ import numpy.typing as npt
 from refgi.jit import kernel
 from refgi.lobes import lobe_gap, lobe_norm, lobe_power
 from refgi.radiometry import orthonormal_basis
+from refgi.rays import ray_offset
 from refgi.scene import LightTable, Scene, light_table, material_table
 
 Array = npt.NDArray[Any]
@@ -164,6 +165,57 @@ def shading_normal(surfaces: Surfaces, triangle: int, y: tuple[float, float, flo
         return g
     scale = (-1.0 if nx * g[0] + ny * g[1] + nz * g[2] < 0 else 1.0) / length
     return nx * scale, ny * scale, nz * scale
+
+
+@kernel
+def height_above(surfaces: Surfaces, triangle: int, y: tuple[float, float, float],
+                 g: tuple[float, float, float]) -> float:
+    """Return how far the rounding of a ray's distance moved a found point off its face.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    triangle : int
+        Which triangle was found.
+    y : tuple of 3 floats
+        Where, m.
+    g : tuple of 3 floats
+        Unit face normal.
+
+    Returns
+    -------
+    float
+        Length along g, m.
+    """
+    v, i = surfaces.vertices, surfaces.faces[triangle, 0]
+    return (y[0] - v[i, 0]) * g[0] + (y[1] - v[i, 1]) * g[1] + (y[2] - v[i, 2]) * g[2]
+
+
+@kernel
+def lift(surfaces: Surfaces, triangle: int, y: tuple[float, float, float], g: tuple[float, float, float],
+         grain: float) -> float:
+    """Return how far along the face normal from a found point a ray must start.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    triangle : int
+        Which triangle was found.
+    y : tuple of 3 floats
+        Where, as the ray's rounded distance has it, m.
+    g : tuple of 3 floats
+        Unit face normal on the side to start on.
+    grain : float
+        The tracer's, m.
+
+    Returns
+    -------
+    float
+        Length, m: the offset from the face.
+    """
+    return ray_offset(y[0], y[1], y[2], grain) - height_above(surfaces, triangle, y, g)
 
 
 @kernel

@@ -118,7 +118,7 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
         If the checkpoint file is damaged or of another computation.
     """
     started = time.perf_counter()
-    to = receivers(scene.geometry, position, normal, triangle_id, tracer.offset)
+    to = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
     caustics = film(scene, triangle_id.shape) if settings.caustics else _sharp_lobes(scene, triangle_id.shape, settings)
     found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else SHARP_LOBE)
     view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None

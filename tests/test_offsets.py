@@ -43,7 +43,10 @@ def with_plane_below(scene, half, depth=1e-3):
         None if normals is None else np.concatenate([normals, np.tile([0.0, 1.0, 0.0], (4, 1))])))
 
 
-def closed_box(ball=Material("ball", (0.5, 0.5, 0.6))):
+BALL = Material("ball", (0.5, 0.5, 0.6))
+
+
+def closed_box(ball=BALL):
     """A box of 2 m with a ball and a plate, camera and lamp inside."""
     import trimesh
 
@@ -51,7 +54,7 @@ def closed_box(ball=Material("ball", (0.5, 0.5, 0.6))):
     walls += [rectangle((x, 0, -1), (0, 2, 0), (0, 0, 2), Material("red", (0.7, 0.2, 0.1))) for x in (-1, 1)]
     walls += [rectangle((-1, 0, z), (2, 0, 0), (0, 2, 0)) for z in (-1, 1)]
     sphere = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
-    walls.append(Mesh(np.asarray(sphere.vertices) + (0.3, 0.5, -0.2), np.asarray(sphere.faces), None, ball))
+    walls.append(Mesh(np.add(sphere.vertices, (0.3, 0.5, -0.2)), np.asarray(sphere.faces), None, ball))
     walls.append(rectangle((-0.6, 0.0, 0.1), (0.0, 0.8, 0.0), (0.3, 0.0, -0.6)))
     lamp = SpotLight((0.4, 1.7, 0.5), (-0.6, -0.8, -0.5), 0.4, 0.7, (3.0, 2.0, 1.0))
     camera = Camera((0.0, 1.2, 0.95), (0.0, 0.7, 0.0), (0, 1, 0), 1.2, 24, 24)
@@ -150,7 +153,7 @@ def test_pieces_cover_what_was_cut_and_grow_with_their_distance(tilt):
     assert (np.linalg.norm(edge, axis=2) <= 1.01 * np.maximum(grain, REACH * middle)).all()
     # every edge inside belongs to two pieces: no corner of one lies on the middle of another's edge
     edges = np.sort(np.stack([pieces.faces, np.roll(pieces.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    _, index, count = np.unique(pieces.vertices, axis=0, return_inverse=True, return_counts=True)
+    _, index = np.unique(pieces.vertices, axis=0, return_inverse=True)
     edges = np.sort(index.reshape(-1)[edges], axis=1)
     _, times = np.unique(edges, axis=0, return_counts=True)
     assert times.max() == 2
@@ -205,11 +208,12 @@ def test_offsets_are_steps_of_the_point_at_hand(real):
 
 def test_receivers_start_above_their_face_where_the_raster_is_off_it():
     plane = quad(1.0)
-    position = np.array([[0.1, 0.2, 0.3], [1e-5, -2e-5, 0.5], [0.1, 0.3, -0.2]])
+    position = np.array([[0.1, 0.2, 0.3], [1e-5, -2e-5, 0.5], [0.1, 0.3, -0.2]])  # a column is a point
     normal = np.tile([[0.0], [1.0], [0.0]], 3)
     to = receivers(plane, position, normal, np.zeros(3, int), GRAIN)
-    lift = STEPS * (np.abs(position).sum(axis=0) + GRAIN)
-    np.testing.assert_allclose(to.origin[1], lift + (0, 0, 0.5), rtol=1e-5)  # 0.5 m above is meant
+    expected = STEPS * (np.abs(position).sum(axis=0) + GRAIN)
+    expected[2] += 0.5  # that far above is meant
+    np.testing.assert_allclose(to.origin[1], expected, rtol=1e-5)
     np.testing.assert_allclose(to.position, position, rtol=1e-6)
 
 

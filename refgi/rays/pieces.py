@@ -43,7 +43,8 @@ def cut(vertices: Array, faces: Array, grain: float) -> Pieces:
         The same arrays where nothing is cut.
     """
     places = vertices.astype(np.float64)
-    whole, left, of = [], faces, np.arange(len(faces), dtype=np.int32)
+    whole: list[tuple[Array, Array]] = []
+    left, of = faces, np.arange(len(faces), dtype=np.int32)
     while True:
         start, end = places[left], places[np.roll(left, -1, axis=1)]
         middle, way = (start + end) / 2, end - start

@@ -204,7 +204,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
 
 
 @kernel
-def _short_of(lights: LightTable, k: int, far: float, grain: float) -> float:
+def _short_of(lights: LightTable, k: int, far: float, grain: float) -> Any:
     """Return the share of the way to a light up to which things block: a lamp may lie in a surface itself."""
     offset = ray_offset(lights.position[k, 0], lights.position[k, 1], lights.position[k, 2], grain)
     return max(0.0, 1.0 - STEPS - offset / far)

@@ -102,7 +102,8 @@ def _aim(points: LitPoints, j: int, to: Receivers, r: int, grain: Any, origins: 
     real = np.float32
     from_x, from_y = real(0), real(0)
     x, y, z = points.position[0, j], points.position[1, j], points.position[2, j]
-    offset = ray_offset(x, y, z, grain) + far_offset(x - to.position[0, r], y - to.position[1, r], z - to.position[2, r])
+    offset = ray_offset(x, y, z, grain)
+    offset += far_offset(x - to.position[0, r], y - to.position[1, r], z - to.position[2, r])
     for c in range(3):
         origins[ray, c] = to.origin[c, r]
         directions[ray, c] = points.position[c, j] + offset * points.facing[c, j] - to.origin[c, r]

@@ -169,7 +169,7 @@ def shading_normal(surfaces: Surfaces, triangle: int, y: tuple[float, float, flo
 
 @kernel
 def height_above(surfaces: Surfaces, triangle: int, y: tuple[float, float, float],
-                 g: tuple[float, float, float]) -> float:
+                 g: tuple[float, float, float]) -> Any:
     """Return how far the rounding of a ray's distance moved a found point off its face.
 
     Parameters
@@ -194,7 +194,7 @@ def height_above(surfaces: Surfaces, triangle: int, y: tuple[float, float, float
 
 @kernel
 def lift(surfaces: Surfaces, triangle: int, y: tuple[float, float, float], g: tuple[float, float, float],
-         grain: float) -> float:
+         grain: float) -> Any:
     """Return how far along the face normal from a found point a ray must start.
 
     Parameters

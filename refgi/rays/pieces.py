@@ -42,6 +42,8 @@ def cut(vertices: Array, faces: Array, grain: float) -> Pieces:
     Pieces
         The same arrays where nothing is cut.
     """
+    if not _any_longer(vertices, faces, grain):
+        return Pieces(vertices, faces, None)
     places = vertices.astype(np.float64)
     whole: list[tuple[Array, Array]] = []
     left, of = faces, np.arange(len(faces), dtype=np.int32)
@@ -51,8 +53,6 @@ def cut(vertices: Array, faces: Array, grain: float) -> Pieces:
         length = np.sqrt((way * way).sum(axis=2))
         split = length > np.maximum(grain, REACH * np.sqrt((middle * middle).sum(axis=2)))
         cuts = split.any(axis=1)
-        if not whole and not cuts.any():
-            return Pieces(vertices, faces, None)
         whole.append((left[~cuts], of[~cuts]))
         if not cuts.any():
             break
@@ -61,8 +61,20 @@ def cut(vertices: Array, faces: Array, grain: float) -> Pieces:
         numbers[split] = len(places) + np.arange(np.count_nonzero(split))
         places = np.concatenate([places, middle[cuts][split]])
         left, of = _halved(left, numbers, of)
+    if len(whole) == 1:
+        return Pieces(vertices, faces, None)
     joined = [np.concatenate(parts) for parts in zip(*whole, strict=True)]
     return Pieces(places.astype(np.float32), joined[0].astype(np.int32), joined[1])
+
+
+def _any_longer(vertices: Array, faces: Array, grain: float) -> bool:
+    """Tell whether a side of any triangle's box is longer, which is asked in little memory."""
+    lowest, highest = vertices[faces[:, 0]], vertices[faces[:, 0]]
+    for k in (1, 2):
+        corner = vertices[faces[:, k]]
+        np.minimum(lowest, corner, out=lowest)
+        np.maximum(highest, corner, out=highest)
+    return bool((highest - lowest).max() * np.sqrt(3) > grain)
 
 
 def _halved(faces: Array, middles: Array, of: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from refgi.frame import Frame
 from refgi.rays import MISS, Tracer, openness
 from refgi.rays.offsets import GRAIN, STEPS, far_offset, grain_of, ray_offset
 from refgi.rays.pieces import REACH, cut
-from refgi.scene import Camera, Geometry, Material, Mesh, SpotLight
+from refgi.scene import Camera, Geometry, Material, Mesh, SpotLight, light_table, material_table
 from refgi.shadowed import receivers
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 from tests.truth.scenes import rectangle, scene
@@ -77,6 +77,35 @@ def multires_by_rays(frame):
     return multires(frame, MultiresSettings(visibility="rays"))
 
 
+def shares_of_rays(frame):
+    """Share of rays from what is seen to points of the floor and a wall: what the reference modes of `val` ask for."""
+    from refgi.cluster.reference.unobstructed import free_share
+
+    u, v = np.random.default_rng(9).uniform(0.05, 0.95, (2, 32))
+    targets = np.stack([2 * u - 1, np.zeros(32), 2 * v - 1])
+    up = np.array([[0.0], [1.0], [0.0]])
+    covered = frame.gbuffer.covered
+    return free_share(frame.tracer, frame.gbuffer.position[:, covered], frame.gbuffer.normal[:, covered], targets, up,
+                      None, frame.tracer.grain)
+
+
+def cameras_sight(frame):
+    from refgi.sssil.cameras.transport import free
+
+    position, normal = (part[:, frame.gbuffer.covered].T.astype(float)
+                        for part in (frame.gbuffer.position, frame.gbuffer.normal))
+    lifted = position + frame.tracer.offsets(position)[:, None] * normal
+    return free(frame.tracer, lifted, np.roll(lifted, 7, axis=0)).astype(float)
+
+
+def walked_lights(frame):
+    from refgi.lights.walk import walk_lights
+
+    materials, lamps = material_table(frame.scene.materials), light_table(frame.scene.lights)
+    lights = walk_lights(frame.tracer, frame.scene.geometry, materials, lamps, paths=64, bounces=3, seed=1)
+    return np.concatenate([lights.position, lights.flux])
+
+
 USERS = {
     "truth": lambda frame: trace_truth(frame, TruthSettings(samples=48)).mean,
     "two bounces": lambda frame: trace_truth(frame, TruthSettings("hemisphere", samples=32, bounces=2)).mean,
@@ -85,6 +114,9 @@ USERS = {
     "vpl": lambda frame: vpl(frame, VplSettings(lights=64)),
     "hssil": hssil_by_rays,
     "multires": multires_by_rays,
+    "reference modes of val": shares_of_rays,
+    "further cameras": cameras_sight,
+    "random walk": walked_lights,
     "openness": lambda frame: openness(frame.tracer, frame.gbuffer.position, frame.gbuffer.normal,
                                        frame.gbuffer.covered, radius=0.3, rays=16),
 }

@@ -54,7 +54,7 @@ class Failing:
         self.name, self.error, self.handle, self.last, self.released = name, error, handle, 0, []
 
     def __getattr__(self, name):
-        def call(*arguments):
+        def call(*_):
             if name == "rtcGetDeviceError":
                 error, self.last = self.last, 0
                 return error

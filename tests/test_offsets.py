@@ -249,6 +249,25 @@ def test_receivers_start_above_their_face_where_the_raster_is_off_it():
     np.testing.assert_allclose(to.position, position, rtol=1e-6)
 
 
+@pytest.mark.parametrize(("size", "shift"), [(1.0, 0.0), (1e-3, 0.0), (1e5, 0.0), (1.0, 100.0)])
+def test_nothing_blocks_in_a_convex_room(size, shift):
+    """Property: every segment between walls is free, at either end and at every length."""
+    def place(corner):
+        return tuple(size * np.asarray(corner, float) + shift)
+
+    walls = [rectangle(place((-1, y, 1)), (2 * size, 0, 0), (0, 0, -2 * size)) for y in (0, 2)]
+    walls += [rectangle(place((x, 0, -1)), (0, 2 * size, 0), (0, 0, 2 * size)) for x in (-1, 1)]
+    walls += [rectangle(place((-1, 0, z)), (2 * size, 0, 0), (0, 2 * size, 0)) for z in (-1, 1)]
+    lamp = SpotLight(place((0.4, 1.7, 0.5)), (-0.6, -0.8, -0.5), 0.4, 1.2, (3.0, 2.0, 1.0))
+    camera = Camera(place((0.0, 1.2, 0.95)), place((0.1, 0.7, 0.0)), (0, 1, 0), 1.6, 24, 24)
+    frame = small(dataclasses.replace(scene(walls, lamp), camera=camera))
+    free, open_ = (vpl(frame, VplSettings(lights=128, visibility=v)) for v in (True, False))
+    assert open_.mean() > 0
+    assert (free == open_).all()
+    free, open_ = (trace_truth(frame, TruthSettings("light", samples=32, visibility=v)).mean for v in (True, False))
+    assert (free == open_).all()
+
+
 def own_hits(frame, rays=16):
     """Share of random rays from what the camera sees that hit the face they leave."""
     tracer, buffer = frame.tracer, frame.gbuffer

@@ -201,6 +201,15 @@ def test_nothing_is_cut_where_triangles_are_alike():
         assert pieces.faces is shape.faces
 
 
+@pytest.mark.parametrize(("side", "pieces"), [(0.69, 2), (0.71, 4), (0.99, 4), (1.01, 8)])
+def test_edges_up_to_the_grain_stay_whole(side, pieces):
+    """A square around the coordinates' origin: first its diagonal is longer than the grain, then its sides are."""
+    plane = quad(side * 4)
+    found = cut(plane.vertices.astype(np.float32), plane.faces, 8.0)
+    assert len(found.faces) == pieces
+    assert (found.face is None) == (pieces == 2)
+
+
 @pytest.mark.parametrize("tilt", [0.0, 0.37])
 def test_no_ray_slips_between_pieces(tilt):
     quads = [quad(1e5, 0.0, tilt), *(quad(1.0, 5.0 + k) for k in range(4))]
@@ -247,6 +256,18 @@ def test_receivers_start_above_their_face_where_the_raster_is_off_it():
     expected[2] += 0.5  # that far above is meant
     np.testing.assert_allclose(to.origin[1], expected, rtol=1e-5)
     np.testing.assert_allclose(to.position, position, rtol=1e-6)
+
+
+def test_a_lamp_in_a_ceiling_lights_the_floor():
+    """The ceiling that the lamp lies in must not block: shadows by rays, from below and for grazing rays."""
+    floor, ceiling = quad(3.0), quad(3.0, 0.7)
+    tracer = Tracer(geometry(np.concatenate([floor.vertices, ceiling.vertices]),
+                             np.concatenate([floor.faces, ceiling.faces + 4])))
+    x, z = np.meshgrid(np.linspace(-2.9, 2.9, 60), np.linspace(-2.9, 2.9, 60))
+    position = np.stack([x, np.zeros_like(x), z])
+    normal = np.stack([np.zeros_like(x), np.ones_like(x), np.zeros_like(x)])
+    lamp = SpotLight((0.123, 0.7, -0.211), (0.0, -1.0, 0.0), 1.0, 1.5, (1.0, 1.0, 1.0))
+    assert tracer.visible_from_light(position, normal, np.ones(x.shape, bool), lamp).all()
 
 
 @pytest.mark.parametrize(("size", "shift"), [(1.0, 0.0), (1e-3, 0.0), (1e5, 0.0), (1.0, 100.0)])

@@ -258,6 +258,22 @@ def test_receivers_start_above_their_face_where_the_raster_is_off_it():
     np.testing.assert_allclose(to.position, position, rtol=1e-6)
 
 
+@pytest.mark.parametrize("away", [1e2, 1e4, 1e6])
+def test_a_wall_lights_a_plane_far_away(away):
+    """Property: nothing blocks between them; rounding at the far end grows with the length of a ray."""
+    wall = [rectangle((-1, k, 0), (2, 0, 0), (0, 1, 0)) for k in range(4)]
+    ground = rectangle((-1e7, 0, 1e7), (2e7, 0, 0), (0, 0, -2e7))
+    lamp = SpotLight((0.0, 2.0, 3.0), (0.0, 0.0, -1.0), 0.3, 0.5, (3.0, 2.0, 1.0))
+    camera = Camera((0.0, 3.0, away), (0.0, 0.0, away + 3.0), (0, 1, 0), 0.5, 16, 16)
+    frame = small(dataclasses.replace(scene([*wall, ground], lamp), camera=camera))
+    assert (frame.gbuffer.triangle_id >= 8).all()
+    free, open_ = (vpl(frame, VplSettings(lights=64, visibility=v)) for v in (True, False))
+    assert open_.mean() > 0
+    assert (free == open_).all()
+    free, open_ = (trace_truth(frame, TruthSettings("light", samples=32, visibility=v)).mean for v in (True, False))
+    assert (free == open_).all()
+
+
 def test_a_lamp_in_a_ceiling_lights_the_floor():
     """The ceiling that the lamp lies in must not block: shadows by rays, from below and for grazing rays."""
     floor, ceiling = quad(3.0), quad(3.0, 0.7)

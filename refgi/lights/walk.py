@@ -100,7 +100,8 @@ def walk_lights(
     for k, share in enumerate(equal_shares(paths, count)):
         numbers = halton(share, BASES[:used], shift, start=1)
         rays = _emit(lights, k, numbers, geometry)
-        rays = rays._replace(origin=rays.origin + tracer.offset * rays.direction)  # a lamp may lie in a surface
+        # a lamp may lie in a surface
+        rays = rays._replace(origin=rays.origin + tracer.offsets(rays.origin)[:, None] * rays.direction)
         left += _paths(tracer, geometry, materials, rays, bounces)
     return _pixel_lights(left, paths * bounces)
 
@@ -121,7 +122,8 @@ def _paths(
         left.append(Left(position, normal, power * materials.diffuse[material], power * materials.specular[material],
                          mirror, materials.exponent[material]))
         u, v = rays.numbers[:, 2 + 2 * bounce], rays.numbers[:, 3 + 2 * bounce]
-        rays = Rays(position + tracer.offset * normal, _cosine_directions(normal, u, v), left[-1].flux, rays.numbers)
+        start = position + tracer.offsets(position)[:, None] * normal
+        rays = Rays(start, _cosine_directions(normal, u, v), left[-1].flux, rays.numbers)
     return left
 
 

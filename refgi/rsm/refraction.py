@@ -35,9 +35,8 @@ Mode = Literal["back_face", "two_interface"]
 class Rays(Protocol):
     """What finds the nearest triangle along rays, such as `refgi.rays.Tracer`."""
 
-    @property
-    def offset(self) -> float:
-        """How far a ray must start from a surface not to hit it, m."""
+    def offsets(self, points: Array) -> Array:
+        """Return how far a ray must start from a surface not to hit it at points (n, 3), m."""
 
     def closest(self, origins: Array, directions: Array) -> Any:
         """Return `triangle_id` (-1: none) and `distance` of the nearest hits of rays given as (n, 3)."""
@@ -151,7 +150,7 @@ def _straight_exits(rsm: Rsm, behind: Geometry, materials: MaterialTable, front:
 def _bent_exits(geometry: Geometry, materials: MaterialTable, front: Exits, enters: Array, tracer: Rays) -> Exits:
     """Refract at the front and trace to the next glass face from within."""
     bent, share = refract(front.direction, front.normal, 1 / front.eta)
-    start = front.position + tracer.offset * bent
+    start = front.position + tracer.offsets(front.position.T) * bent
     hits = tracer.closest(start.T, bent.T)
     triangle = np.maximum(hits.triangle_id, 0)
     position = start + np.where(hits.triangle_id >= 0, hits.distance, 0) * bent

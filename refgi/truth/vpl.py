@@ -66,7 +66,7 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     lights = choose_pixel_lights(frame.rsms, count=None if settings.pattern == "all" else settings.lights,
                                  pattern=settings.pattern, seed=settings.seed, filtered=settings.filtered)
     buffer = frame.gbuffer
-    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
+    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
     irradiance = np.zeros((3, frame.height, frame.width), frame.dtype)
     irradiance.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, lights, visibility=settings.visibility,
                                                            batch=settings.batch)

@@ -64,7 +64,7 @@ def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSetting
         for side in (1.0, -1.0):
             on = within & (height * side > 0)
             visible[on] = free_share(tracer, points[:, on], facing[:, on], rectangle_points(areas, m, on_square),
-                                     side * areas.normal[:, m, None], None, frame.tracer.offset, ball)
+                                     side * areas.normal[:, m, None], None, frame.tracer.grain, ball)
         return visible
 
     return given

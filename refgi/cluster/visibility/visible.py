@@ -111,7 +111,7 @@ def _soft(
 def _traced(tracer: "Tracer", areas: AreaLights, m: int, near: float, points: Array, facing: Array) -> Array:
     targets = rectangle_points(areas, m, np.array(np.meshgrid(BESIDE, BESIDE)).reshape(2, -1))
     ball = Ball(areas.center[:, m], near)
-    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], None, tracer.offset, ball)
+    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], None, tracer.grain, ball)
 
 
 

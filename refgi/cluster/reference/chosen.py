@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from refgi.cluster.area_lights import AreaLights, Given
+from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.reference.back_projection import back_projected_visibility
 from refgi.cluster.reference.members import member_visibility
 from refgi.cluster.reference.rectangle import rectangle_visibility
@@ -41,8 +42,8 @@ def reference_visibility(
     if settings.visibility == "members":
         return member_visibility(frame, lights, areas)
     if settings.visibility == "rectangle":
-        return rectangle_visibility(frame, areas, settings)
+        return rectangle_visibility(frame, areas, settings, ends=ends_of(frame, lights))
     if settings.visibility == "back_projection" and maps is not None:
-        behind = rectangle_visibility(frame, areas, settings) if settings.behind == "raytrace" else None
+        behind = rectangle_visibility(frame, areas, settings, ends=ends_of(frame, lights)) if settings.behind == "raytrace" else None
         return back_projected_visibility(areas, maps, behind)
     return None

@@ -63,7 +63,8 @@ def seen_extent(buffer: GBuffer) -> Extent:
         Empty where it sees nothing.
     """
     rows = np.empty((6, buffer.height))
-    _row_bounds(*buffer.resolve("position", "covered"), rows)
+    position, covered = buffer.resolve("position", "covered")
+    _row_bounds(position, covered, rows)
     return Extent(rows[:3].min(axis=1), rows[3:].max(axis=1))
 
 

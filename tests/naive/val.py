@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 STEEPEST = math.radians(80)  # half-angle of the widest cone in which blockers are searched
 LIFT = 4e-6  # of map centres off their lights, as a share of the largest coordinate
-NEAR = 0.5  # share of a cluster's radius within which nothing blocks
+NEAR = 0.6  # share of a cluster's radius within which nothing blocks
 LEAST_RATIO = 1.05  # farthest over nearest of what a map holds, on the scale of its depths
 SLACK = 1e-3  # share of its distance by which a blocker lies before a receiver
 NO_BLOCKER = 0.02  # share of the search disc below which the series has found none

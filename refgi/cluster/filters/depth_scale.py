@@ -1,9 +1,9 @@
 """From distances to depths of the series and back: the scale that a depth map is compared on (Sec. 4.1).
 
 The series' bias is a share of its range, so the scale says how near a blocker may come to a receiver and still cast a
-shadow. The paper takes depths of [0, 1] and does not say of what. What a map holds are its occluders alone: stretched
-from the nearest to the farthest of them, and evenly in ratios of distances instead of metres, the same few terms tell
-more of them from what they shade.
+shadow. The paper takes depths of [0, 1] and does not say of what. What a map holds are its occluders alone: on a scale
+stretched from the nearest to the farthest of them, and even in ratios of distances instead of metres, the same few
+terms tell more of them from what they shade.
 
 Symbols: z distance from the map's centre, m; t depth of the series, 0 to `most`; near and far what the map holds, m.
 """
@@ -19,6 +19,7 @@ from refgi.jit import kernel
 Array = npt.NDArray[Any]
 
 LEAST_RATIO = 1.05  # far over near: the bias is then more than the thousandth that the step keeps before surfaces
+MOST_RATIO = 2.0**20  # the same: what is nearer counts as near
 
 
 class DepthScale(NamedTuple):
@@ -56,6 +57,7 @@ def depth_scale(kind: str, near: float, far: float, scene_far: float, most: floa
     """
     if kind == "scene":
         return DepthScale(False, 0.0, most / scene_far, most)
+    near = max(near, far / MOST_RATIO)
     far = max(far, LEAST_RATIO * near)
     top = max(2.0 * most - 1.0, most / 2.0)
     span = math.log2(far / near) if kind == "log_map" else far - near
@@ -73,20 +75,22 @@ def series_depths(scale: DepthScale, distance: Array, depth: Array, count: int) 
     distance : (>= count,) ndarray
         Distances, m; inf where nothing is seen.
     depth : (>= count,) ndarray
-        Filled with t, at most `scale.most`.
+        Filled with t, 0 to `scale.most`.
     count : int
         How many.
     """
     real = distance.dtype.type
-    origin, slope, most = real(scale.origin), real(scale.slope), real(scale.most)
+    origin, slope, most, zero = real(scale.origin), real(scale.slope), real(scale.most), real(0.0)
     if scale.logarithmic:
         inverse = real(1.0) / origin
         for i in range(count):
             t = log2(distance[i] * inverse) * slope
+            t = t if t > zero else zero
             depth[i] = t if t < most else most
     else:
         for i in range(count):
             t = (distance[i] - origin) * slope
+            t = t if t > zero else zero
             depth[i] = t if t < most else most
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-LIFT = 4e-6  # share of the extent's largest coordinate: twice what ends of rays are lifted, above the rounding of float32
+LIFT = 4e-6  # share of the extent's largest coordinate: twice what ends of rays are lifted, above float32's rounding
 BACKWARD = np.diag([-1.0, 1.0, -1.0])  # the frame of the hemisphere behind: right and forward turned round
 
 
@@ -128,9 +128,9 @@ def _farthest_in_columns(depth: Array, columns: Array) -> None:
 
 def _without(maps: ShadowMaps, needed: Array) -> ShadowMaps:
     """Drop the maps on which there is nothing."""
-    of_maps = (name for name in ShadowMaps._fields if name not in ("map_of", "left_out"))
-    return maps._replace(**{name: None if (values := getattr(maps, name)) is None else values[needed]
-                            for name in of_maps})  # fmt: skip
+    kept: dict[str, Any] = {name: values[needed] for name, values in maps._asdict().items()
+                            if name not in ("map_of", "left_out") and values is not None}
+    return maps._replace(**kept)
 
 
 def _draw(

@@ -112,7 +112,8 @@ def scale_of(maps: ShadowMaps, k: int, settings: ValSettings, behind: bool = Fal
         From metres to the series' scale.
     """
     near, far = (maps.near_behind, maps.far_behind) if behind else (maps.near, maps.far)
-    assert near is not None and far is not None
+    assert near is not None
+    assert far is not None
     chain = series(settings)
     return depth_scale(settings.depth_scale, float(near[k]), float(far[k]), float(maps.scene_far[k]), chain.range)
 

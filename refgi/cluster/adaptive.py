@@ -182,7 +182,7 @@ def _by_rays(
 ) -> Array:
     """Return the light of all lights with a ray for each: every light is its own cluster."""
     alone = cluster(lights.position, lights.normal, max(1, lights.position.shape[1]),
-                    diagonal=frame.scene.geometry.diagonal)
+                    diagonal=frame.lit_extent.diagonal)
     areas = area_lights(lights, alone, dataclasses.replace(settings, single_light="point"))
     with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
         light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,

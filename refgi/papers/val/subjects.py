@@ -134,7 +134,7 @@ def clustered(frame: Frame, settings: ValSettings, start: Clusters | None = None
     lights = choose_lights(frame, settings)
     found = cluster(lights.position, lights.normal, settings.area_lights, distance=settings.distance,
                     weights=(settings.position_weight, settings.normal_weight),
-                    diagonal=frame.scene.geometry.diagonal, rounds=settings.rounds, start=start)
+                    diagonal=frame.lit_extent.diagonal, rounds=settings.rounds, start=start)
     return Clustered(lights, found, area_lights(lights, found, settings))
 
 

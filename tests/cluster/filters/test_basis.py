@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.filters.basis import fill_basis, normalise, sine_cosine
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.quantise import eight_bits, half_precision
 from refgi.jit import kernel
 from tests.naive import filters as naive
@@ -100,7 +101,7 @@ def test_channels_are_sines_and_cosines(dtype, tolerance):
 def test_nothing_seen_lies_at_the_far_end():
     depth = np.array([[0.0, 1.0], [4.0, 7.0], [np.inf, 3.999999]], np.float32)
     out = np.empty_like(depth)
-    normalise(depth, 0.2, 0.8, out)
+    normalise(depth, DepthScale(False, 0.0, 0.2, 0.8), out)
     assert np.abs(out - naive.normalised(depth, 0.2, 0.8)).max() < 1e-7
     assert out[1, 1] == out[2, 0] == np.float32(0.8)
 

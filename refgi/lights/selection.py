@@ -175,13 +175,31 @@ def pixel_lights(
                                renormalise=settings.renormalise_weights)
 
 
+def drawn_from_maps(rsms: "Sequence[Rsm]", settings: "LightSettings") -> list[int]:
+    """Return N, how many texels the settings draw from each map.
+
+    Parameters
+    ----------
+    rsms : sequence of Rsm
+        Reflective shadow maps, one a light.
+    settings : LightSettings
+        Number and pattern.
+
+    Returns
+    -------
+    list of int
+        One number a map.
+    """
+    from refgi.rsm.pixel_lights import map_shares
+
+    return map_shares(rsms, None if settings.pattern == "all" else settings.lights, settings.pattern)
+
+
 def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: "LightSettings") -> "PixelLights":
     """Return lights as the paper has them: each with its texel's flux, T/N left out."""
-    from refgi.rsm.pixel_lights import equal_shares
-
     if settings.pattern == "all" or lights.map_index is None:
         return lights
-    drawn = equal_shares(settings.lights, len(rsms))
+    drawn = drawn_from_maps(rsms, settings)
     share = np.array([n / rsm.texels for n, rsm in zip(drawn, rsms, strict=True)], lights.flux.dtype)
     factor = share[lights.map_index]
     lobe = None if lights.lobe_flux is None else lights.lobe_flux * factor

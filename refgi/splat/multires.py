@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.selection import choose_lights, drawn_from_maps, footprints
 from refgi.lights.settings import LightSettings, Pattern, expect_choices
 from refgi.lights.solid_angle import demo_footprints
 from refgi.pairs.settings import PairSettings
@@ -225,7 +225,7 @@ def _footprints(frame: "Frame", lights: "PixelLights", settings: MultiresSetting
     """Return the area of each light: exact, or as the authors' demo has it."""
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings)
-    return demo_footprints(lights, frame.scene.lights)
+    return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings))
 
 
 def _doubled(frame: "Frame") -> "GBuffer":

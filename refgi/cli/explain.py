@@ -28,10 +28,10 @@ ROWS = {  # SII Table 1
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
-@shadows("map")
+@shadows("auto")
 @speech
 @click.pass_obj
-def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
+def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str | None,
             threads: int | None, seed: int | None, **options: Any) -> None:
     """Show what a method runs, skips and reuses, and where light goes.
 

@@ -31,9 +31,9 @@ def texel_areas(rsm: "Rsm") -> Array:
     """
     from refgi.scene import DirectionalLight
 
-    far = isinstance(rsm.light, DirectionalLight)
-    source = -np.asarray(rsm.light.direction, np.float64) if far else np.asarray(rsm.light.position, np.float64)
-    areas = np.zeros_like(rsm.solid_angle)
+    light, areas = rsm.light, np.zeros_like(rsm.solid_angle)
+    far = isinstance(light, DirectionalLight)
+    source = np.asarray(light.direction if isinstance(light, DirectionalLight) else light.position, np.float64)
     _fill_areas(rsm.position, rsm.normal, rsm.solid_angle, rsm.flux, rsm.lobe_flux, source, far, areas)
     return areas
 

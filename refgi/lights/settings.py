@@ -80,6 +80,12 @@ class LightSettings(PairSettings):
         expect(0 <= self.refraction_exponent <= SHARPEST, "refraction_exponent", f"0 to {SHARPEST:g}",
                self.refraction_exponent)
 
+    @property
+    def traces_rays(self) -> bool:
+        """Whether lights are found by rays."""
+        warped_by_rays = self.warp != "none" and self.importance == "openness"
+        return self.source == "walk" or self.openness_flux != "none" or warped_by_rays
+
     def _expect_source(self) -> None:
         expect(self.effective_clamp not in FOOTPRINT_CLAMPS or self.source == "rsm", "clamp",
                "one without footprints with the source 'walk'", self.clamp)

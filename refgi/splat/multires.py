@@ -140,6 +140,11 @@ class MultiresSettings(LightSettings):
                "'ams_disc' with the clamp 'disc' alone", sorted(self.as_published))
 
     @property
+    def traces_rays(self) -> bool:
+        """Whether the method traces rays."""
+        return super().traces_rays or self.visibility == "rays"
+
+    @property
     def effective_clamp(self) -> ClampMode:
         """The clamp in use: "auto" is "disc", and none where lights have no footprints or pairs are those of `vpl`."""
         if self.clamp != "auto":

@@ -31,8 +31,8 @@ ROWS = {  # SII Table 1
 @shadows("auto")
 @speech
 @click.pass_obj
-def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str | None,
-            threads: int | None, seed: int | None, **options: Any) -> None:
+def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
+            shadows: str | None, threads: int | None, seed: int | None, **options: Any) -> None:
     """Show what a method runs, skips and reuses, and where light goes.
 
     The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving.

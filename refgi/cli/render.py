@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 @speech
 @click.pass_obj
 def _render(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
-            shadows: str | None, threads: int | None, seed: int | None, exposure: float | None, out: str, **options: Any) -> int:
+            shadows: str | None, threads: int | None, seed: int | None, exposure: float | None, out: str,
+            **options: Any) -> int:
     """Render SCENE by one method.
 
     An EXR holds the radiance that the camera receives (R, G, B; W/m^2/sr) and the indirect irradiance

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.loss import light_at, lost_share, sample_pixels, warn_of_loss
+from refgi.pairs.loss import light_at, lost_share, sample_for, warn_of_loss
 from refgi.splat.settings import SplatSettings
 from refgi.stages import stage
 
@@ -40,7 +40,7 @@ def cut_loss(
     float
         Of the light without visibility, at sampled pixels.
     """
-    sample = sample_pixels(receivers)
+    sample = sample_for(receivers, lights)
     kept = light.reshape(3, -1)[:, sample.place]
     whole = light_at(sample, lights, settings, footprint)
     return lost_share(whole, float(kept.mean(dtype=np.float64))) if kept.size else 0.0

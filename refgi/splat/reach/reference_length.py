@@ -15,7 +15,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lobe_shape import Widening
-from refgi.pairs.loss import sample_pixels
+from refgi.pairs.loss import sample_for
 from refgi.pairs.packing import pack
 from refgi.scene.values import LARGEST
 from refgi.splat.reach.strength import diffuse_strength, lobe_strength
@@ -30,8 +30,7 @@ Array = npt.NDArray[Any]
 S = TypeVar("S", bound=SplatSettings)
 
 PAPER_OVERDRAW, PAPER_LIGHTS, PAPER_CUT = 125.0, 768, 0.05  # Figure 8
-PAIRS = 1 << 20  # about as many are looked at
-LEAST_SAMPLED = 64  # pixels
+LEAST_SAMPLED = 64  # pixels: enough to count pairs by
 LONGEST = 10.0  # diagonals of the sample: where not even that leaves as many pairs, next to nothing is cut
 
 
@@ -76,7 +75,7 @@ def reference_length(receivers: Receivers, lights: "PixelLights", settings: Spla
         Length, m; 1 where there is nothing to cut.
     """
     packed = pack(lights, settings, np.zeros(lights.flux.shape[1]), np.float64)
-    sample = sample_pixels(receivers, max(LEAST_SAMPLED, PAIRS // max(1, lights.drawn)))
+    sample = sample_for(receivers, lights, least=LEAST_SAMPLED)
     position = sample.position.astype(np.float64)
     peaks = np.concatenate([part[: len(part) - last] for part, last in zip(all_peaks(packed), (1, 0), strict=True)])
     if position.size == 0 or peaks.size == 0:

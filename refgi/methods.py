@@ -121,7 +121,7 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
     method : str
         A name of `METHODS`.
     settings : object, optional
-        The method's settings; the paper's values where absent.
+        The method's settings; its defaults where absent.
     **frame_options : object
         Passed to `Frame`: width, height, dtype, rsm_resolution, shadows (where absent those of `usual_shadows`).
 

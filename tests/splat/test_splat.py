@@ -254,7 +254,8 @@ def test_fragments_grow_as_one_over_the_threshold_until_the_screen_is_full(corne
     receivers = sets.receivers(np.stack([x, 0 * x + 1e-3, z]), np.stack([0 * x, 0 * x - 1, 0 * x]))
     light = sets.lights(np.zeros((3, 1)), np.array([[0.0], [0], [1]]), 1.0)
     lows = np.array([8.0, 4, 2, 1])
-    counts = np.array([fragments(receivers, light, SplatSettings(i_low=low, reference_length=1.0)).total for low in lows])
+    cuts = [SplatSettings(i_low=low, reference_length=1.0) for low in lows]
+    counts = np.array([fragments(receivers, light, cut).total for cut in cuts])
     np.testing.assert_allclose(counts * lows / (counts * lows)[-1], 1, rtol=0.02)
     room, lights, _ = corner
     shares = (0.1, 0.07, 0.05, 0.01, 1e-3, 1e-5, 1e-6)

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lobe_shape import Widening
-from refgi.pairs.loss import sample_for
-from refgi.pairs.packing import pack
+from refgi.pairs.loss import PAIRS, sample_for
+from refgi.pairs.packing import Packed, pack
 from refgi.scene.values import LARGEST
 from refgi.splat.reach.strength import diffuse_strength, lobe_strength
 from refgi.splat.reach.threshold import all_peaks
@@ -30,7 +30,7 @@ Array = npt.NDArray[Any]
 S = TypeVar("S", bound=SplatSettings)
 
 PAPER_OVERDRAW, PAPER_LIGHTS, PAPER_CUT = 125.0, 768, 0.05  # Figure 8
-LEAST_SAMPLED = 64  # pixels: enough to count pairs by
+LEAST_SAMPLED = 64  # pixels, enough to count pairs by; of more lights than go with them every so many-th is looked at
 LONGEST = 10.0  # diagonals of the sample: where not even that leaves as many pairs, next to nothing is cut
 
 
@@ -75,24 +75,34 @@ def reference_length(receivers: Receivers, lights: "PixelLights", settings: Spla
         Length, m; 1 where there is nothing to cut.
     """
     packed = pack(lights, settings, np.zeros(lights.flux.shape[1]), np.float64)
-    sample = sample_for(receivers, lights, least=LEAST_SAMPLED)
-    position = sample.position.astype(np.float64)
-    peaks = np.concatenate([part[: len(part) - last] for part, last in zip(all_peaks(packed), (1, 0), strict=True)])
-    if position.size == 0 or peaks.size == 0:
+    position = sample_for(receivers, lights, least=LEAST_SAMPLED).position.astype(np.float64)
+    step = 1 + lights.flux.shape[1] * LEAST_SAMPLED // PAIRS
+    strength = _strengths(packed, position, step)
+    if strength.size == 0:
         return 1.0
-    strength = np.zeros((len(peaks), position.shape[1]))
-    diffuse = packed.diffuse.shape[1] - 1
-    _diffuse_strengths(position, packed.diffuse, strength[:diffuse])
-    if packed.lobes is not None:
-        _lobe_strengths(position, packed.lobes.lights, packed.lobes.widening, strength[diffuse:])
-    strength *= peaks[:, None] / peaks.max()
-    counted = round(PAPER_OVERDRAW / PAPER_LIGHTS * lights.drawn * position.shape[1])
-    least = 0.0
-    if 0 < counted <= strength.size:
-        least = float(np.partition(strength.reshape(-1), -counted)[-counted])
-    longest = LONGEST * math.hypot(*np.ptp(np.concatenate([position, lights.position], axis=1), axis=1))
-    length = min(longest, math.sqrt(PAPER_CUT / least)) if least > 0 else longest
+    counted = round(PAPER_OVERDRAW / PAPER_LIGHTS * lights.drawn / step * position.shape[1])
+    length = LONGEST * math.hypot(*np.ptp(np.concatenate([position, lights.position], axis=1), axis=1))
+    positive = strength[strength > 0]  # partition takes long over equal numbers
+    if 0 < counted <= len(positive):
+        length = min(length, math.sqrt(PAPER_CUT / float(np.partition(positive, -counted)[-counted])))
     return min(max(length, 1 / LARGEST), LARGEST)
+
+
+def _strengths(packed: Packed, position: Array, step: int) -> Array:
+    """Return B of pairs over the largest I_0, of every so many-th diffuse light and lobe and all places, 1/m^2."""
+    diffuse, lobes = all_peaks(packed)
+    brightest = max(diffuse.max(), lobes.max(initial=0.0))
+    peaks, glossy = diffuse[:-1:step], lobes[::step]
+    strength = np.zeros((len(peaks) + len(glossy), position.shape[1]))
+    _diffuse_strengths(position, np.ascontiguousarray(packed.diffuse[:, :-1:step]), strength[: len(peaks)])
+    if packed.lobes is not None:
+        widening = packed.lobes.widening
+        if widening is not None:
+            widening = widening._replace(cos_theta=np.ascontiguousarray(widening.cos_theta[::step]))
+        lights = np.ascontiguousarray(packed.lobes.lights[:, ::step])
+        _lobe_strengths(position, lights, widening, strength[len(peaks) :])
+    strength *= (np.concatenate([peaks, glossy]) / (brightest or 1.0))[:, None]
+    return strength
 
 
 @kernel(parallel=True)

@@ -13,7 +13,24 @@ Array = npt.NDArray[Any]
 
 @kernel
 def diffuse_strength(position: Array, i: int, lights: Array, k: int) -> float:
-    """Return B / I_0 = cos / r^2 of a packed diffuse light at receiver i, 1/m^2; 0 behind the light."""
+    """Return B / I_0 = cos / r^2 of a packed diffuse light at a receiver.
+
+    Parameters
+    ----------
+    position : (3, n) ndarray
+        Receivers, m.
+    i : int
+        Which receiver.
+    lights : (9, N) ndarray
+        Packed lights: position, reversed normal, flux / pi.
+    k : int
+        Which light.
+
+    Returns
+    -------
+    float
+        1/m^2; 0 behind the light.
+    """
     above, r2 = 0.0, 0.0
     for axis in range(3):
         d = float(lights[axis, k]) - float(position[axis, i])
@@ -24,7 +41,26 @@ def diffuse_strength(position: Array, i: int, lights: Array, k: int) -> float:
 
 @kernel
 def lobe_strength(position: Array, i: int, lights: Array, widening: Widening | None, k: int) -> float:
-    """Return B / I_0 of a packed lobe at receiver i, 1/m^2; 0 behind the light and behind the lobe."""
+    """Return B / I_0 = cos^P / r^2 of a packed lobe at a receiver.
+
+    Parameters
+    ----------
+    position : (3, n) ndarray
+        Receivers, m.
+    i : int
+        Which receiver.
+    lights : (13, N) ndarray
+        Packed lobes: position, reversed normal and axis, exponent, flux times norm.
+    widening : Widening or None
+        How exponents fall near the light.
+    k : int
+        Which lobe.
+
+    Returns
+    -------
+    float
+        1/m^2; 0 behind the light's surface and behind the lobe.
+    """
     above, along, r2 = 0.0, 0.0, 0.0
     for axis in range(3):
         d = float(lights[axis, k]) - float(position[axis, i])

@@ -39,8 +39,9 @@ class Frame:
         Float32 (default) or float64 (the oracle) for every buffer and kernel.
     rsm_resolution : int
         Texels along one side of a reflective shadow map (of one face of a cube).
-    shadows : {"map", "exact"}
-        Direct light's shadows: from the RSM's depth as published, or by rays.
+    shadows : {"map", "exact"}, optional
+        Direct light's shadows: from the RSM's depth as published, as where absent, or by rays. `render` takes rays
+        where its method traces some anyway.
 
     Attributes
     ----------
@@ -63,20 +64,20 @@ class Frame:
         height: int | None = None,
         dtype: npt.DTypeLike = np.float32,
         rsm_resolution: int = 512,
-        shadows: Shadows = "map",
+        shadows: Shadows | None = None,
     ) -> None:
         expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
         self.width = scene.camera.width if width is None else width
         self.height = scene.camera.height if height is None else height
         self.dtype = _dtype(dtype)
         self.rsm_resolution = rsm_resolution
-        self.shadows = shadows
+        self.shadows: Shadows = "map" if shadows is None else shadows
         for key in ("width", "height"):
             size = getattr(self, key)
             expect(is_count(size) and 1 <= size <= 65536, key, "1 to 65536 pixels", size)
         expect(is_count(rsm_resolution) and 1 <= rsm_resolution <= 16384, "rsm_resolution", "1 to 16384 texels",
                rsm_resolution)
-        expect(shadows in ("map", "exact"), "shadows", "'map' or 'exact'", shadows)
+        expect(self.shadows in ("map", "exact"), "shadows", "'map' or 'exact'", shadows)
         expect(scene.face_count > 0, f"scene {scene.name!r}", "at least one triangle", "none")
         expect(len(scene.lights) > 0, f"scene {scene.name!r}", "at least one light", "none")
         self.scene, self.origin = near_origin(scene)

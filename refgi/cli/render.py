@@ -19,13 +19,14 @@ if TYPE_CHECKING:
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
-@shadows("map")
+@shadows("auto")
 @click.option("--exposure", type=float, help="Factor before the sRGB curve of a PNG; the scene's where absent.")
 @click.option("--out", required=True, help="out.exr (linear), out.png (tone-mapped), or a folder for both.")
 @speech
 @click.pass_obj
-def _render(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
-            threads: int | None, seed: int | None, exposure: float | None, out: str, **options: Any) -> int:
+def _render(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
+            shadows: str | None, threads: int | None, seed: int | None, exposure: float | None, out: str,
+            **options: Any) -> int:
     """Render SCENE by one method.
 
     An EXR holds the radiance that the camera receives (R, G, B; W/m^2/sr) and the indirect irradiance

@@ -130,6 +130,12 @@ class ValSettings(LightSettings):
                self.single_light)
         self._expect_heeded()
 
+    @property
+    def traces_rays(self) -> bool:
+        """Whether the method traces rays."""
+        return super().traces_rays or self.maps == "rays" or self.behind == "raytrace" or self.visibility in (
+            "rectangle", "members")
+
     def _expect_heeded(self) -> None:
         """Refuse what a target for the error would not heed."""
         if self.target_error is not None:

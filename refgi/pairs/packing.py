@@ -64,9 +64,10 @@ def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None,
     shines: Array = (lights.flux != 0).any(axis=0)
     glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
     diffuse = pack_diffuse(lights, settings, dtype, shines)
-    clamp = None if settings.clamp == "none" else pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
-    spheres = None
-    if settings.clamp == "sphere" and footprint is not None:
+    clamp, spheres = None, None
+    if settings.effective_clamp != "none":
+        clamp = pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
+    if settings.effective_clamp == "sphere" and footprint is not None:
         spheres = pack_spheres(settings, footprint, shines, dtype)
     lobes = None
     if glossy.any():
@@ -173,10 +174,10 @@ def pack_clamp(settings: PairSettings, footprint: Array | None, chosen: Array, c
         With neutral values for the modes not in use.
     """
     softness = np.zeros(count, dtype)
-    if settings.clamp == "disc" and footprint is not None:
+    if settings.effective_clamp == "disc" and footprint is not None:
         softness[: np.count_nonzero(chosen)] = footprint[chosen] / math.pi
-    least = settings.clamp_value**2 if settings.clamp == "distance" else 0.0
-    bound = settings.clamp_value if settings.clamp == "geometry" else math.inf
+    least = settings.clamp_value**2 if settings.effective_clamp == "distance" else 0.0
+    bound = settings.clamp_value if settings.effective_clamp == "geometry" else math.inf
     return Clamp(np.dtype(dtype).type(least), softness, np.dtype(dtype).type(bound))
 
 

@@ -44,6 +44,11 @@ class VplSettings:
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
         expect(1 <= self.batch <= 2**30, "batch", "1 or more pairs", self.batch)
 
+    @property
+    def traces_rays(self) -> bool:
+        """Whether the method traces rays: without visibility it takes from their tracer how far receivers are moved."""
+        return True
+
 
 def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     """Light every pixel by pixel lights with a shadow ray each.

@@ -17,6 +17,8 @@ from refgi.compare import maps
 from refgi.compare.results import as_json, plain, signed_error, write_results
 from refgi.image import read_exr
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 
 class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)

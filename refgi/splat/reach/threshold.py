@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.draws import RANGE, draws
+from refgi.errors import expect
 from refgi.pairs.packing import Packed, pack
 from refgi.pairs.range import Range
 from refgi.splat.settings import SplatSettings
@@ -42,6 +43,7 @@ def low_irradiance(lights: "PixelLights", settings: SplatSettings) -> float:
 
     Notes
     -----
+    Settings without a reference length get one from `with_reference_length`.
     With `per_light_ilow` this is the I_low of the brightest light.
     """
     packed = pack(lights, settings, np.zeros(lights.flux.shape[1]), np.float64)
@@ -84,7 +86,14 @@ def threshold(peak: Array, settings: SplatSettings) -> float:
     """
     if settings.irradiance_low is not None:
         return settings.irradiance_low
-    return settings.i_low * float(peak.max(initial=0.0)) / settings.reference_length**2
+    return settings.i_low * float(peak.max(initial=0.0)) / _length(settings) ** 2
+
+
+def _length(settings: SplatSettings) -> float:
+    length = settings.reference_length if settings.i_low > 0 else 1.0
+    expect(length is not None, "reference_length", "a length for lights without receivers, m", length)
+    assert length is not None
+    return length
 
 
 def light_range(
@@ -115,7 +124,7 @@ def light_range(
     square = peak / max(low, LEAST_THRESHOLD)
     if "per_light_ilow" in settings.as_published and settings.irradiance_low is None:
         # I_low = x I_0 of the light itself
-        square = np.where(peak > 0, settings.reference_length**2 / settings.i_low, 0.0)
+        square = np.where(peak > 0, _length(settings) ** 2 / settings.i_low, 0.0)
     scale = np.ones(len(peak))
     if settings.stochastic_range:
         scale = 1.0 - draws(settings.seed, RANGE, len(peak), part)  # (0, 1]

@@ -7,14 +7,66 @@ of its faces' normals.
 
 import dataclasses
 import warnings
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from refgi.errors import RefgiWarning, expect
-from refgi.scene.model import Array, Mesh
+from refgi.scene.mesh import Batch, Mesh, batches
+from refgi.scene.values import Array
 
 # A face counts as flat when twice its area is lost in the rounding of the cross product that gives it.
 FLAT = 16 * float(np.finfo(np.float64).eps)
+SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes nor overflows
+
+
+def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str]) -> tuple[list[Mesh], int]:
+    """Return the meshes of a file as `mended` returns each, the sound small ones looked at together.
+
+    Parameters
+    ----------
+    meshes : sequence of Mesh
+        Meshes as read.
+    where : callable
+        Returns file and object of the mesh of some number, for the error's text.
+
+    Returns
+    -------
+    list of Mesh
+        As many.
+    int
+        Number of faces dropped.
+
+    Raises
+    ------
+    InputError
+        As `mended`, for the first mesh that is refused.
+    """
+    kept, done, dropped = list(meshes), np.zeros(len(meshes), np.bool_), 0
+    for batch in batches(meshes):
+        good = _needs_no_mending(batch)
+        done[batch.members] = good
+        if batch.normals is not None:
+            usable = np.repeat(good, np.diff(batch.first_vertex))[:, None]
+            normals = np.where(usable, batch.normals, 1.0)
+            normals /= np.linalg.norm(normals, axis=1)[:, None]
+            for k in np.flatnonzero(good).tolist():
+                number, part = batch.members[k], slice(batch.first_vertex[k], batch.first_vertex[k + 1])
+                kept[number] = dataclasses.replace(meshes[number], normals=normals[part])
+    for number in np.flatnonzero(~done).tolist():
+        kept[number], flat = mended(meshes[number], where(number))
+        dropped += flat
+    return kept, dropped
+
+
+def _needs_no_mending(batch: Batch) -> Array:
+    """Return (k,) which meshes are sound and have neither flat faces nor missing normals."""
+    good = batch.sound()
+    if not good.all():
+        return np.zeros(len(good), np.bool_)  # an index may lead out of the batch
+    faces = batch.faces + np.repeat(batch.first_vertex[:-1], np.diff(batch.first_face))[:, None]
+    good &= ~batch.any_face(zero_area(batch.vertices, faces))
+    return good if batch.normals is None else good & ~batch.any_vertex(_missing(batch.normals))
 
 
 def mended(mesh: Mesh, where: str) -> tuple[Mesh, int]:
@@ -99,12 +151,16 @@ def unit_normals(mesh: Mesh) -> Array:
         Unit vectors; (0, 1, 0) at a vertex that no face with an area uses.
     """
     normals = np.asarray(mesh.normals, np.float64)
-    length = np.linalg.norm(normals, axis=1)
-    missing = ~(np.isfinite(length) & (length > 0))
+    missing = _missing(normals)
     if missing.any():
         normals = np.where(missing[:, None], mean_face_normals(mesh.vertices, mesh.faces), normals)
-        length = np.linalg.norm(normals, axis=1)
-    return np.asarray(normals / length[:, None])
+    return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
+
+
+def _missing(normals: Array) -> Array:
+    """Return (n,) which normals are zero, not finite, or of a length whose square is."""
+    longest = np.abs(normals).max(axis=1, initial=0.0)
+    return np.asarray(~((longest > SHORTEST) & (longest < LONGEST)))
 
 
 def mean_face_normals(vertices: Array, faces: Array) -> Array:

@@ -11,16 +11,18 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from refgi.errors import RefgiWarning, expect
+from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.mesh import Batch, Mesh, batches
+from refgi.scene.model import Geometry
 from refgi.scene.values import Array
 
 # A face counts as flat when twice its area is lost in the rounding of the cross product that gives it.
 FLAT = 16 * float(np.finfo(np.float64).eps)
+SMALLEST_USUAL, LARGEST_USUAL = 0.01, 1000.0  # m across
 SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes nor overflows
 
 
-def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str]) -> tuple[list[Mesh], int]:
+def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list[str]) -> tuple[list[Mesh], int]:
     """Return the meshes of a file as `mended` returns each, the sound small ones looked at together.
 
     Parameters
@@ -29,18 +31,15 @@ def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str]) -> tuple[lis
         Meshes as read.
     where : callable
         Returns file and object of the mesh of some number, for the error's text.
+    faults : list of str
+        Gets the text of the error for each mesh that `mended` refuses.
 
     Returns
     -------
     list of Mesh
-        As many.
+        As many; those that are refused stay as they were.
     int
         Number of faces dropped.
-
-    Raises
-    ------
-    InputError
-        As `mended`, for the first mesh that is refused.
     """
     kept, done, dropped = list(meshes), np.zeros(len(meshes), np.bool_), 0
     for batch in batches(meshes):
@@ -54,8 +53,11 @@ def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str]) -> tuple[lis
                 number, part = batch.members[k], slice(batch.first_vertex[k], batch.first_vertex[k + 1])
                 kept[number] = dataclasses.replace(meshes[number], normals=normals[part])
     for number in np.flatnonzero(~done).tolist():
-        kept[number], flat = mended(meshes[number], where(number))
-        dropped += flat
+        try:
+            kept[number], flat = mended(meshes[number], where(number))
+            dropped += flat
+        except InputError as error:
+            faults.append(str(error))
     return kept, dropped
 
 
@@ -115,6 +117,23 @@ def warn_of_flat_faces(count: int, where: str) -> None:
     if count:
         noun = "face" if count == 1 else "faces"
         warnings.warn(RefgiWarning(f"{where}: {count} {noun} of zero area skipped"), stacklevel=3)
+
+
+def warn_of_unit(geometry: Geometry, where: str) -> None:
+    """Say that a file's unit may not be the metre, if its size is no usual one.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        All triangles.
+    where : str
+        The file they came from.
+    """
+    if not SMALLEST_USUAL <= geometry.diagonal <= LARGEST_USUAL:
+        text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are taken as metres. If the file has another unit "
+                "of s metres, scale its objects in a scene file: \"transform\": "
+                "[s, 0, 0, 0,  0, s, 0, 0,  0, 0, s, 0,  0, 0, 0, 1], such as s = 0.001 for millimetres")
+        warnings.warn(RefgiWarning(text), stacklevel=4)
 
 
 def zero_area(vertices: Array, faces: Array) -> Array:

@@ -134,7 +134,8 @@ def placed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
 
 
 def _moved(mesh: Mesh, matrix: Array, inverse: Array, mirrors: bool) -> Mesh:
-    vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    with np.errstate(over="ignore", invalid="ignore"):  # whoever reads a file looks at coordinates once they are final
+        vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     normals = mesh.normals
     if normals is not None:
         normals = np.asarray(normals, np.float64) @ inverse

@@ -104,6 +104,8 @@ class _Reader:
         attributes = self.document.member(entry, "attributes", where)
         expect("POSITION" in attributes, f"{self.path}: {where}.attributes", "a POSITION", sorted(attributes))
         vertices = accessor(self.document, attributes["POSITION"], "VEC3", f"{where}.attributes.POSITION")
+        if any(key.startswith("COLOR_") for key in attributes):
+            self._pass_over("primitive(s)' vertex colours")
         normals = None
         if "NORMAL" in attributes:
             normals = accessor(self.document, attributes["NORMAL"], "VEC3", f"{where}.attributes.NORMAL")
@@ -128,7 +130,7 @@ class _Reader:
     def _material(self, index: int) -> Material:
         entry, where = self.document.items("materials")[index], f"materials[{index}]"
         surface = self.document.member(entry, "pbrMetallicRoughness", where)
-        if "baseColorTexture" in surface or "emissiveTexture" in entry:
+        if any(key.endswith("Texture") for key in (*surface, *entry)):
             self._pass_over("material(s)' textures")
         base = self.document.numbers(surface, "baseColorFactor", f"{where}.pbrMetallicRoughness", (1.0,) * 4)
         emissive = self.document.numbers(entry, "emissiveFactor", where, (0.0, 0.0, 0.0))

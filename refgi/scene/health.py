@@ -12,14 +12,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect
-from refgi.scene.mesh import Batch, Mesh, batches
+from refgi.scene.mesh import Batch, Mesh, batches, missing_normals
 from refgi.scene.model import Geometry
 from refgi.scene.values import Array
 
 # A face counts as flat when twice its area is lost in the rounding of the cross product that gives it.
 FLAT = 16 * float(np.finfo(np.float64).eps)
 SMALLEST_USUAL, LARGEST_USUAL = 0.01, 1000.0  # m across
-SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes nor overflows
 
 
 def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list[str]) -> tuple[list[Mesh], int]:
@@ -68,7 +67,7 @@ def _needs_no_mending(batch: Batch) -> Array:
         return np.zeros(len(good), np.bool_)  # an index may lead out of the batch
     faces = batch.faces + np.repeat(batch.first_vertex[:-1], np.diff(batch.first_face))[:, None]
     good &= ~batch.any_face(zero_area(batch.vertices, faces))
-    return good if batch.normals is None else good & ~batch.any_vertex(_missing(batch.normals))
+    return good if batch.normals is None else good & ~batch.any_vertex(missing_normals(batch.normals))
 
 
 def mended(mesh: Mesh, where: str) -> tuple[Mesh, int]:
@@ -170,16 +169,10 @@ def unit_normals(mesh: Mesh) -> Array:
         Unit vectors; (0, 1, 0) at a vertex that no face with an area uses.
     """
     normals = np.asarray(mesh.normals, np.float64)
-    missing = _missing(normals)
+    missing = missing_normals(normals)
     if missing.any():
         normals = np.where(missing[:, None], mean_face_normals(mesh.vertices, mesh.faces), normals)
     return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
-
-
-def _missing(normals: Array) -> Array:
-    """Return (n,) which normals are zero, not finite, or of a length whose square is."""
-    longest = np.abs(normals).max(axis=1, initial=0.0)
-    return np.asarray(~((longest > SHORTEST) & (longest < LONGEST)))
 
 
 def mean_face_normals(vertices: Array, faces: Array) -> Array:

@@ -17,6 +17,8 @@ from refgi.scene.values import LARGEST, Array
 SMALL = 1 << 12  # vertices and faces of a mesh that goes into a batch; a larger one is worth a look of its own
 BATCH = 1 << 18  # vertices and faces in a batch: some megabytes
 
+SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes nor overflows
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mesh:
@@ -122,6 +124,23 @@ def expect_all_sound(meshes: Sequence[Mesh], name: Callable[[int], str]) -> None
         sound[batch.members] = batch.sound()
     for number in np.flatnonzero(~sound).tolist():
         meshes[number].expect_sound(name(number))
+
+
+def missing_normals(normals: Array) -> Array:
+    """Return which normals give no direction.
+
+    Parameters
+    ----------
+    normals : (n, 3) ndarray
+        Vectors of any length.
+
+    Returns
+    -------
+    (n,) ndarray of bool
+        True where one is zero, not finite, or so short or long that its square is.
+    """
+    longest = np.abs(np.asarray(normals, np.float64)).max(axis=1, initial=0.0)
+    return np.asarray(~((longest > SHORTEST) & (longest < LONGEST)))
 
 
 def _is_regular(mesh: Mesh) -> bool:

@@ -125,7 +125,7 @@ class Camera:
         for key in ("eye", "target"):
             expect(is_place(getattr(self, key)), f"camera: {key}", f"three finite numbers up to {LARGEST:g} m",
                    getattr(self, key))
-        expect(is_direction(self.up), "camera: up", "a finite vector, not zero", self.up)
+        expect(is_direction(self.up), "camera: up", "a finite vector, not zero, up to 1e+100 long", self.up)
         settle(self, "eye", "target", "up")
         view = np.subtract(self.target, self.eye)
         expect(bool(np.linalg.norm(view) > 1e-9), "camera: target", "a point away from eye", self.target)

@@ -115,7 +115,7 @@ class ObjectEntry(Entry):
         if (self.material is None) == (self.faces is None):
             raise ValueError("expected either material or faces")
         if not is_direction(self.axis):
-            raise ValueError("axis: expected a finite vector, not zero")
+            raise ValueError("axis: expected a finite vector, not zero, up to 1e+100 long")
         return self
 
 

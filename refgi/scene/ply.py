@@ -89,7 +89,7 @@ def _header(content: bytes, path: Path) -> tuple[dict[str, _Element], str, int]:
     for line in lines:
         if line[:1] == ["element"]:
             expect(len(line) == 3 and line[2].isdecimal() and len(line[2]) < 16, f"{path}: element",
-                   "a name and a count", " ".join(line))
+                   "a name and a count of at most 15 digits", " ".join(line))
             current = _Element(line[1], int(line[2]), [], 0)
             elements[line[1]] = current
         elif line[:1] == ["property"]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from refgi.errors import expect
-from refgi.scene.mesh import Mesh
+from refgi.scene.mesh import Mesh, missing_normals
 from refgi.scene.values import Array
 
 IDENTITY = np.eye(4)
@@ -105,7 +105,7 @@ def placed(mesh: Mesh, matrix: Array) -> Mesh:
     Returns
     -------
     Mesh
-        The same object where the matrix is the identity.
+        The same object where the matrix is the identity; else normals are unit vectors, or zero where they are missing.
     """
     return placed_all([mesh], matrix[None])[0]
 
@@ -138,7 +138,8 @@ def _moved(mesh: Mesh, matrix: Array, inverse: Array, mirrors: bool) -> Mesh:
         vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     normals = mesh.normals
     if normals is not None:
-        normals = np.asarray(normals, np.float64) @ inverse
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = np.where(missing_normals(normals)[:, None], 0.0, np.asarray(normals, np.float64)) @ inverse
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
     faces = mesh.faces[:, ::-1] if mirrors else mesh.faces
     return dataclasses.replace(mesh, vertices=vertices, faces=faces, normals=normals)

@@ -88,7 +88,7 @@ def test_normals_only_where_asked_for(tmp_path: Path) -> None:
     (changed("camera", "target", value=[0, 0, 3]), "target", "(0.0, 0.0, 3.0)"),
     (changed("camera", "up", value=[0, 0, 1]), "up", "(0.0, 0.0, 1.0)"),
     (changed("lights", 0, "outer_half_angle_deg", value=0), "outer_half_angle_deg", "0"),
-    (changed("lights", 0, "outer_half_angle_deg", value=90), "lights[0]: outer_half_angle_deg", "90"),
+    (changed("lights", 0, "outer_half_angle_deg", value=90.001), "lights[0]: outer_half_angle_deg", "90.001"),
     (changed("lights", 0, "inner_half_angle_deg", value=31), "inner_half_angle_deg", "31"),
     (changed("lights", 0, "direction", value=[0, 0, 0]), "direction", "(0.0, 0.0, 0.0)"),
     (changed("lights", 0, "intensity_w_per_sr", value=[1, -1, 1]), "intensity_w_per_sr", "-1"),
@@ -257,7 +257,7 @@ def test_more_instances_than_memory_holds(tmp_path: Path, monkeypatch: pytest.Mo
 def test_any_cone_is_taken_or_refused(tmp_path_factory: pytest.TempPathFactory, angle: float) -> None:
     folder = tmp_path_factory.mktemp("cone", numbered=True)
     path = write_scene(folder, **changed("lights", 0, "outer_half_angle_deg", value=angle))
-    if 20 <= angle < 90:
+    if 20 <= angle <= 90:
         assert load_scene(path).lights[0].outer_half_angle == math.radians(angle)
     else:
         with pytest.raises(InputError, match="half_angle_deg"):

@@ -82,13 +82,13 @@ class Document:
         """Return the finite numbers `owner[key]`, as many as `default` has."""
         found = owner.get(key, default)
         if not (isinstance(found, list | tuple) and len(found) == len(default) and _are_finite(found)):
-            expect(False, f"{self.path}: {where}.{key}", f"{len(default)} finite numbers", found)
+            expect(False, f"{self.path}: {where}.{key}", f"{len(default)} finite numbers up to 1e+300", found)
         return tuple(map(float, found))
 
     def number(self, owner: dict[str, Any], key: str, where: str, default: float) -> float:
         """Return the finite number `owner[key]`."""
         found = owner.get(key, default)
-        expect(_are_finite([found]), f"{self.path}: {where}.{key}", "a finite number", found)
+        expect(_are_finite([found]), f"{self.path}: {where}.{key}", "a finite number up to 1e+300", found)
         return float(found)
 
     def name(self, owner: dict[str, Any], default: str) -> str:

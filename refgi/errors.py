@@ -5,6 +5,11 @@ command line prints it as one line. What a renderer sensibly passes over (zero-a
 that says how many.
 """
 
+from collections.abc import Sequence
+
+MOST_FAULTS = 20  # told of one file; more say no more, and a generated file can have as many as it has keys
+LONGEST_VALUE = 400  # characters of a value in an error
+
 
 class RefgiError(Exception):
     """Anything refgi raises on purpose."""
@@ -30,7 +35,54 @@ def expect(condition: bool, parameter: str, expected: str, got: object) -> None:
     expected : str
         What would have been right.
     got : object
-        What was given.
+        What was given; only the start of a long value is shown.
     """
     if not condition:
-        raise InputError(f"{parameter}: expected {expected}, got {got!r}")
+        raise InputError(f"{parameter}: expected {expected}, got {shortened(repr(got))}")
+
+
+def shortened(text: str, most: int = LONGEST_VALUE) -> str:
+    """Return a text that fits in an error.
+
+    Parameters
+    ----------
+    text : str
+        Any.
+    most : int
+        Characters to keep.
+
+    Returns
+    -------
+    str
+        The same, or its start and three dots.
+
+    Examples
+    --------
+    >>> shortened("abcdefgh", 6)
+    'abc...'
+    """
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def first_faults(faults: Sequence[str], separator: str = "\n") -> str:
+    """Join the first faults of a file, and say how many more there are.
+
+    Parameters
+    ----------
+    faults : sequence of str
+        What is wrong, one text each.
+    separator : str
+        Between two of them.
+
+    Returns
+    -------
+    str
+        At most `MOST_FAULTS` of them, and the count of the others.
+
+    Examples
+    --------
+    >>> first_faults(["fault"] * 200_000).splitlines()[-1]
+    '... and 199,980 more'
+    """
+    more = len(faults) - MOST_FAULTS
+    return separator.join([*faults[:MOST_FAULTS], *([f"... and {more:,} more"] if more > 0 else [])])

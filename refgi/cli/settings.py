@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any, get_args, get_type_hints
 
-from refgi.errors import InputError
+from refgi.errors import InputError, first_faults
 from refgi.scene.files import did_you_mean
 from refgi.scene.values import is_number
 
@@ -51,7 +51,7 @@ def read_settings(wanted: type, pairs: Iterable[str], seed: int | None = None, o
             errors.append(problem)
     made, refused = _make(wanted, values)
     if errors + refused:
-        raise InputError(f"{'; '.join(errors + refused)} (settings: {', '.join(known)})")
+        raise InputError(f"{first_faults(errors + refused, '; ')} (settings: {', '.join(known)})")
     return made
 
 
@@ -87,7 +87,7 @@ def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[st
         else:
             sorted_pairs[name].append(rest)
     if errors:
-        raise InputError("; ".join(errors))
+        raise InputError(first_faults(errors, "; "))
     return sorted_pairs
 
 

@@ -190,7 +190,7 @@ def _light_direction(rsm: Rsm, position: Array) -> Array:
         along = np.broadcast_to(np.reshape(rsm.light.direction, (3, 1)), position.shape)
     else:
         along = position - np.reshape(rsm.light.position, (3, 1))
-    return np.asarray(along / np.linalg.norm(along, axis=0))
+    return _unit(along)
 
 
 def _face_cross(geometry: Geometry, triangle: Array) -> Array:
@@ -209,7 +209,13 @@ def _outward_normals(geometry: Geometry, triangle: Array, position: Array) -> Ar
         part = [(np.cross(spoke[:, a], spoke[:, b]) * normal.T).sum(axis=1) for a, b in ((1, 2), (2, 0), (0, 1))]
         smooth = np.einsum("cn,nca->an", np.stack(part), geometry.vertex_normals[faces])
         normal = np.where((smooth * normal).sum(axis=0) > 0, smooth, normal)
-    return np.asarray(normal / np.linalg.norm(normal, axis=0))
+    return _unit(normal)
+
+
+def _unit(vectors: Array) -> Array:
+    """Return vectors (3, n) at unit length; a light on the surface that it lights, and a flat triangle, give zero."""
+    length = np.linalg.norm(vectors, axis=0)
+    return np.divide(vectors, length, out=np.zeros(vectors.shape), where=length > 0)
 
 
 def _with_lobes(rsm: Rsm, exits: Exits, axis: Array, share: Array, exponent: float) -> Rsm:

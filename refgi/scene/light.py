@@ -43,10 +43,10 @@ class SpotLight:
 
     def __post_init__(self) -> None:
         expect(is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
-        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero",
+        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero, up to 1e+100 long",
                self.direction)
-        fits = is_number(self.outer_half_angle) and NARROWEST <= self.outer_half_angle < math.pi / 2
-        expect(fits, "light: outer_half_angle_deg", f"{degrees(NARROWEST):g} or more and less than 90",
+        fits = is_number(self.outer_half_angle) and NARROWEST <= self.outer_half_angle <= math.pi / 2
+        expect(fits, "light: outer_half_angle_deg", f"{degrees(NARROWEST):g} to 90",
                math.degrees(self.outer_half_angle) if is_number(self.outer_half_angle) else self.outer_half_angle)
         expect(0 <= self.inner_half_angle <= self.outer_half_angle, "light: inner_half_angle_deg",
                "0 to outer_half_angle_deg", degrees(self.inner_half_angle))
@@ -75,7 +75,7 @@ class DirectionalLight:
     irradiance: Rgb
 
     def __post_init__(self) -> None:
-        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero",
+        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero, up to 1e+100 long",
                self.direction)
         _expect_power(self.irradiance, "irradiance_w_per_m2")
         settle(self, "direction", "irradiance")

@@ -38,7 +38,8 @@ class SplatSettings(PairSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        expect(0 <= self.i_low <= LARGEST, "i_low", "a share of the brightest light's intensity, 0 or more", self.i_low)
+        expect(0 <= self.i_low <= LARGEST, "i_low", f"a share of the brightest light's intensity, 0 to {LARGEST:g}",
+               self.i_low)
         expect(self.reference_length is None or 1 / LARGEST <= self.reference_length <= LARGEST, "reference_length",
                f"none or {1 / LARGEST:g} to {LARGEST:g} m", self.reference_length)
         expect(self.irradiance_low is None or (math.isfinite(self.irradiance_low) and self.irradiance_low >= 0),

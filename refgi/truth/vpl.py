@@ -42,7 +42,7 @@ class VplSettings:
         expect(self.pattern in ("grid", "halton", "all", "random"), "pattern",
                "'grid', 'halton', 'all' or 'random'", self.pattern)
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
-        expect(1 <= self.batch <= 2**30, "batch", "1 or more pairs", self.batch)
+        expect(1 <= self.batch <= 2**30, "batch", f"1 to {2**30:,} pairs", self.batch)
 
     @property
     def traces_rays(self) -> bool:

@@ -52,7 +52,7 @@ class GatherSettings:
     as_published: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        expect(1 <= self.samples <= 1 << 28, "samples", "1 or more", self.samples)
+        expect(1 <= self.samples <= 1 << 28, "samples", f"1 to {1 << 28:,}", self.samples)
         expect(0 < self.radius <= WIDEST, "radius", f"a share of the map above 0, up to {WIDEST}", self.radius)
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
         expect(self.grid >= 0, "grid", "coarse pixels along a side, or 0", self.grid)

@@ -124,7 +124,8 @@ def light_range(
     square = peak / max(low, LEAST_THRESHOLD)
     if "per_light_ilow" in settings.as_published and settings.irradiance_low is None:
         # I_low = x I_0 of the light itself
-        square = np.where(peak > 0, _length(settings) ** 2 / settings.i_low, 0.0)
+        own = _length(settings) ** 2 / settings.i_low if settings.i_low > 0 else math.inf  # 0: nothing is cut
+        square = np.where(peak > 0, own, 0.0)
     scale = np.ones(len(peak))
     if settings.stochastic_range:
         scale = 1.0 - draws(settings.seed, RANGE, len(peak), part)  # (0, 1]

@@ -1,11 +1,13 @@
 """The light side: each receiver picks lit points in proportion to what they would give it unshadowed.
 
-For receiver x and sender i the unshadowed term is p_i min(q_i <n_x.w> / r^2, b_i), with the sender's pattern q. A
+The picture's pixels take turns with several sets of lit points, so that what one set misses does not show in all of
+them; receivers of one set make up tiles. For receiver x and sender i the unshadowed term is p_i min(q_i <n_x.w> / r^2, b_i), with the sender's pattern q. A
 receiver sums the terms in blocks of 32 and parts of 8, places its picks evenly over the total with one random shift
 (systematic sampling), finds the point that each falls on, and sends it a shadow ray. A pick stands for total / picks,
 so what remains random is visibility and colour. Sums and comparisons run in float32, everywhere in one order.
 """
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,8 @@ from refgi.truth.lit_points import BLOCK, LitPoints
 
 Array = npt.NDArray[Any]
 
-TILE = 256  # receivers that one parallel iteration owns: the SIMD lanes
+TILE = 256  # most receivers that one parallel iteration owns: the SIMD lanes
+LANES = 16  # receivers of a tile are padded to a multiple of this
 PART = 8  # senders whose terms a pick may have to compute again
 PARTS = BLOCK // PART
 TINY = np.float32(1e-30)  # m^2; smaller squared distances count as this one, so that no 0 / 0 arises
@@ -52,15 +55,17 @@ def _glossy(points: LitPoints, j: int, dx: Any, dy: Any, dz: Any, nx: Any, ny: A
 
 
 @kernel
-def _sum_parts(points: LitPoints, tile: Array, glossy: bool, parts: Array) -> None:
-    """Fill the sums of the terms of each part of the senders at each receiver of a tile, two senders at a time."""
+def _sum_parts(points: LitPoints, tile: Array, start: tuple[int, int], parts: Array) -> None:
+    """Fill the sums of the terms of each part of a set's senders at each receiver of a tile, two senders at a time."""
+    first, first_lobe = start
+    lanes = tile.shape[1]
     for p in range(parts.shape[0]):
-        for j in range(p * PART, p * PART + PART, 2):
+        for j in range(first + p * PART, first + p * PART + PART, 2):
             px, py, pz = points.position[0, j], points.position[1, j], points.position[2, j]
             qx, qy, qz = points.position[0, j + 1], points.position[1, j + 1], points.position[2, j + 1]
             power, power_q = points.power[j], points.power[j + 1]
-            if glossy:
-                for i in range(TILE):
+            if j >= first_lobe:
+                for i in range(lanes):
                     x, y, z, nx, ny, nz = tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i], tile[5, i]
                     one = power * _glossy(points, j, px - x, py - y, pz - z, nx, ny, nz)
                     two = power_q * _glossy(points, j + 1, qx - x, qy - y, qz - z, nx, ny, nz)
@@ -69,7 +74,7 @@ def _sum_parts(points: LitPoints, tile: Array, glossy: bool, parts: Array) -> No
             bound, bound_q = points.bound[j], points.bound[j + 1]
             kx, ky, kz = points.axis[0, j], points.axis[1, j], points.axis[2, j]
             lx, ly, lz = points.axis[0, j + 1], points.axis[1, j + 1], points.axis[2, j + 1]
-            for i in range(TILE):
+            for i in range(lanes):
                 x, y, z, nx, ny, nz = tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i], tile[5, i]
                 one = power * _diffuse(px - x, py - y, pz - z, nx, ny, nz, kx, ky, kz, bound)
                 two = power_q * _diffuse(qx - x, qy - y, qz - z, nx, ny, nz, lx, ly, lz, bound_q)
@@ -103,54 +108,79 @@ def _aim(points: LitPoints, j: int, to: Receivers, r: int, offset: Any, origins:
     return real(1) if from_x > real(0) and from_y > real(0) else real(0)
 
 
+def tiles(set_of: Array, first: int, last: int) -> Array:
+    """Cut a span of receivers where their set changes, and into tiles.
+
+    Parameters
+    ----------
+    set_of : (r,) int ndarray
+        Which set of lit points each receiver picks from.
+    first, last : int
+        First receiver of the span and one past the last.
+
+    Returns
+    -------
+    (t, 3) int64 ndarray
+        First receiver of each tile, one past its last, and its set.
+    """
+    changes = first + 1 + np.flatnonzero(np.diff(set_of[first:last]))
+    ends = [first, *changes.tolist(), last]
+    cuts = [(low, min(low + TILE, end)) for begin, end in pairwise(ends) for low in range(begin, end, TILE)]
+    return np.array([(low, high, set_of[low]) for low, high in cuts], np.int64).reshape(-1, 3)
+
+
 @kernel(parallel=True)
-def pick(points: LitPoints, to: Receivers, span: tuple[int, int], picks: int, seed: int, glossy: bool, offset: Any,
-         rays: tuple[Array, Array, Array, Array]) -> None:
-    """Let each receiver of a span pick lit points, and write the shadow rays and what they are worth.
+def pick(points: LitPoints, starts: Array, to: Receivers, tiles: Array, picks: int, seed: int, offset: Any,
+         rays: tuple[Array, Array, Array, Array, Array]) -> None:
+    """Let each receiver of some tiles pick lit points, and write the shadow rays and what they are worth.
 
     Parameters
     ----------
     points : LitPoints
-        Senders, whole blocks.
+        Senders, in sets.
+    starts : (sets, 3) int64 ndarray
+        First block of each set, its first of lobes and one past its last.
     to : Receivers
         Receivers.
-    span : tuple of 2 ints
-        First receiver and one past the last.
+    tiles : (t, 3) int64 ndarray
+        First receiver of each tile, one past its last, and the set that it picks from; one tile after the other.
     picks : int
         Picks of each receiver.
     seed : int
         Random shift: a hash of it and the receiver's pixel.
-    glossy : bool
-        Whether any sender has a lobe.
     offset : float32
         How far segments end above the sender's face, m.
-    rays : tuple of 4 arrays
-        Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2; n = picks x receivers, float32.
+    rays : tuple of 5 arrays
+        Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2, float32, and the point picked (n,) int32;
+        n = picks x receivers. The reach is 0 where there is nothing to gain.
     """
-    first, last = span
-    for number in prange((last - first + TILE - 1) // TILE):
-        low = first + number * TILE
-        count = min(TILE, last - low)
-        tile = np.zeros((6, TILE), np.float32)  # positions and normals; lanes beyond the count receive nothing
+    for number in prange(len(tiles)):
+        low, high, chosen = tiles[number, 0], tiles[number, 1], tiles[number, 2]
+        count = high - low
+        # positions and normals; lanes beyond the count receive nothing
+        tile = np.zeros((6, (count + LANES - 1) // LANES * LANES), np.float32)
         for c in range(3):
-            tile[c, :count] = to.position[c, low : low + count]
-            tile[3 + c, :count] = to.normal[c, low : low + count]
-        parts = np.zeros((len(points.power) // PART, TILE), np.float32)
-        _sum_parts(points, tile, glossy, parts)
-        blocks = np.zeros((len(points.power) // BLOCK, TILE), np.float32)
+            tile[c, :count] = to.position[c, low:high]
+            tile[3 + c, :count] = to.normal[c, low:high]
+        first, first_lobe, size = starts[chosen, 0], starts[chosen, 1], starts[chosen, 2] - starts[chosen, 0]
+        start = (first * BLOCK, first_lobe * BLOCK)
+        parts = np.zeros((size * PARTS, tile.shape[1]), np.float32)
+        _sum_parts(points, tile, start, parts)
+        blocks = np.zeros((size, tile.shape[1]), np.float32)
         for p in range(parts.shape[0]):
-            for i in range(TILE):
-                blocks[p * PART // BLOCK, i] += parts[p, i]
-        _pick_all(points, to, low, count, tile, (picks, seed, glossy, offset), (blocks, parts), first, rays)
+            for i in range(tile.shape[1]):
+                blocks[p // PARTS, i] += parts[p, i]
+        _pick_all(points, to, (low, count, tiles[0, 0]), tile, (picks, seed, offset), (start, blocks, parts), rays)
 
 
 @kernel
-def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Array, how: tuple[int, int, bool, Any],
-              sums: tuple[Array, Array], first: int, rays: tuple[Array, Array, Array, Array]) -> None:
+def _pick_all(points: LitPoints, to: Receivers, span: tuple[int, int, int], tile: Array, how: tuple[int, int, Any],
+              sums: tuple[tuple[int, int], Array, Array], rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
-    origins, directions, reach, worth = rays
-    picks, seed, glossy, offset = how
-    blocks, parts = sums
+    origins, directions, reach, worth, picked = rays
+    picks, seed, offset = how
+    low, count, first = span
+    start, blocks, parts = sums
     real = np.float32
     for i in range(count):
         total = real(0)
@@ -162,6 +192,8 @@ def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Arra
         for s in range(picks):
             ray = (low + i - first) * picks + s
             reach[ray] = real(0)
+            if total <= real(0):
+                continue
             target = (real(s) + shift) * share
             while b < blocks.shape[0] - 1 and before + blocks[b, i] <= target:
                 before += blocks[b, i]
@@ -171,7 +203,8 @@ def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Arra
             while p < end and parts[p, i] <= rest:
                 rest -= parts[p, i]
                 p += 1
-            j, end = p * PART, p * PART + PART - 1
+            j, end = start[0] + p * PART, start[0] + p * PART + PART - 1
+            glossy = j >= start[1]
             term = _term(points, j, tile, i, glossy)
             while j < end and term <= rest:
                 rest -= term
@@ -179,5 +212,6 @@ def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Arra
                 term = _term(points, j, tile, i, glossy)
             if term > real(0):
                 reach[ray] = _aim(points, j, to, low + i, offset, origins, directions, ray)
+                picked[ray] = j
                 for c in range(3):
                     worth[ray, c] = share * points.colour[c, j]

@@ -1,7 +1,8 @@
 """Directly lit surface points, found by fresh rays from every light: the senders of the light side.
 
 Phi = rho I(l) Omega for a spot or point light, rho E_perp A_perp for a directional one (papers' calibrated radiometry):
-no cosine and no distance. A point whose material has a lobe appears twice, once for each part.
+no cosine and no distance. A point whose material has a lobe appears twice, once for each part. Points come in sets, one
+for each set of rays; within a set diffuse parts stand before lobes, in blocks of their own.
 """
 
 from typing import Any, NamedTuple
@@ -9,11 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel
+from refgi.jit import kernel, prange
 from refgi.radiometry import DIRECTIONAL, lobe_fraction, radiant_intensity
 from refgi.rays import MISS, Tracer
 from refgi.scene import LightTable
 from refgi.truth.light_grid import LightRays
+from refgi.truth.paths import CHUNK
 from refgi.truth.surfaces import Surfaces, face_normal, shading_normal
 
 Array = npt.NDArray[Any]
@@ -22,7 +24,7 @@ BLOCK = 32  # points whose contributions are summed before a pick looks inside
 
 
 class LitPoints(NamedTuple):
-    """Senders, as float32 arrays padded with dark points to whole blocks."""
+    """Senders, as float32 arrays."""
 
     position: Array  # (3, n), m
     axis: Array  # (3, n) unit vector of the emission: shading normal, or mirror direction of a lobe
@@ -33,6 +35,15 @@ class LitPoints(NamedTuple):
     exponent: Array  # (n,) of cos around the axis: 1 for the diffuse part
     peak: Array  # (n,) pattern on the axis: 1, or (P + 1) / (2 K)
     bound: Array  # (n,) largest geometry term left to the light side, 1/m^2
+    ray: Array  # (n,) int32: which ray found it, counted through the lights
+    lobe: Array  # (n,) bool: a lobe, not a diffuse part
+
+
+class PointSets(NamedTuple):
+    """Sets of lit points, each padded with dark points to whole blocks."""
+
+    points: LitPoints
+    starts: Array  # (sets, 3) int64, in blocks: first diffuse one, first of lobes, one past the last
 
 
 def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays,
@@ -57,7 +68,7 @@ def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: 
     Returns
     -------
     LitPoints
-        In the order of the rays, without dark points, not padded.
+        Diffuse parts, then lobes, each in the order of the rays, without dark points.
     """
     # a lamp may lie in a surface: look from just beyond it
     origins = (rays.origins + tracer.offset * rays.directions).astype(np.float32)
@@ -67,42 +78,64 @@ def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: 
     tracer.fill_closest(origins, directions, np.full(count, np.inf, np.float32), triangle_id, distance)
     distance += np.float32(tracer.offset)
     points = _empty(2 * count)
-    used = _fill(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance),
-                 (rays.measure, bound), points)
-    return LitPoints(*(part[..., :used] for part in points))
+    points.ray[:] = np.tile(np.arange(k * count, (k + 1) * count), 2)
+    points.lobe[count:] = True
+    _fill(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance, rays.weight),
+          (rays.measure, bound), points)
+    return LitPoints(*(np.compress(points.power > 0, part, axis=-1) for part in points))
 
 
-def join(parts: list[LitPoints]) -> LitPoints:
-    """Put the points of several lights in one list, padded with dark points to whole blocks.
+def join(parts: list[LitPoints], sets: int, per_set: int) -> PointSets:
+    """Sort the points of several lights into their sets, each padded with dark points to whole blocks.
 
     Parameters
     ----------
     parts : list of LitPoints
         One a light.
+    sets : int
+        Sets of rays that each light has sent.
+    per_set : int
+        Rays in each.
 
     Returns
     -------
-    LitPoints
-        C-contiguous arrays; their length is a multiple of `BLOCK`.
+    PointSets
+        C-contiguous arrays.
     """
-    missing = -sum(len(part.power) for part in parts) % BLOCK
-    padded = [*parts, LitPoints(*(field[..., :missing] for field in _empty(BLOCK)))]
-    return LitPoints(*(np.concatenate(fields, axis=-1) for fields in zip(*padded, strict=True)))
+    together = LitPoints(*(np.concatenate(fields, axis=-1) for fields in zip(*(_empty(0), *parts), strict=True)))
+    group = 2 * (together.ray // per_set % sets) + together.lobe
+    counts = np.bincount(group, minlength=2 * sets)
+    blocks = np.concatenate([[0], np.cumsum(-(-counts // BLOCK))])
+    order = np.argsort(group, kind="stable")
+    place = np.arange(len(order)) + np.repeat(blocks[:-1] * BLOCK - (np.cumsum(counts) - counts), counts)
+    points = _empty(int(blocks[-1]) * BLOCK)
+    for field, found in zip(points, together, strict=True):
+        field[..., place] = found[..., order]
+    return PointSets(points, np.stack([blocks[:-2:2], blocks[1:-1:2], blocks[2::2]], axis=1))
 
 
 def _empty(count: int) -> LitPoints:
     position, axis, normal, facing, colour = (np.zeros((3, count), np.float32) for _ in range(5))
     power, exponent, peak, bound = (np.zeros(count, np.float32) for _ in range(4))
-    return LitPoints(position, axis, normal, facing, power, colour, exponent, peak, bound)
+    return LitPoints(position, axis, normal, facing, power, colour, exponent, peak, bound, np.zeros(count, np.int32),
+                     np.zeros(count, np.bool_))
+
+
+@kernel(parallel=True)
+def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
+          scale: tuple[float, float], points: LitPoints) -> None:
+    """Fill the diffuse part of ray i at i and its lobe after all diffuse parts; dark ones keep a power of 0."""
+    count = len(hits[2])
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _fill_span(surfaces, lights, k, hits, scale, points, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
 
 
 @kernel
-def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array],
-          scale: tuple[float, float], points: LitPoints) -> int:
-    origins, directions, triangle_id, distances = hits
+def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
+               scale: tuple[float, float], points: LitPoints, span: tuple[int, int]) -> None:
+    origins, directions, triangle_id, distances, weights = hits
     measure, bound = scale
-    used = 0
-    for i in range(len(triangle_id)):
+    for i in range(span[0], span[1]):
         if triangle_id[i] == MISS:
             continue
         triangle = triangle_id[i]
@@ -120,12 +153,13 @@ def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Arr
             light, area = radiant_intensity(lights, k, d[0], d[1], d[2]), measure * t * t
         for part in range(2):
             rho = surfaces.diffuse[material] if part == 0 else surfaces.specular[material]
-            flux = (rho[0] * light[0] * measure / np.pi, rho[1] * light[1] * measure / np.pi,
-                    rho[2] * light[2] * measure / np.pi)
+            share = measure * weights[i] / np.pi
+            flux = (rho[0] * light[0] * share, rho[1] * light[1] * share, rho[2] * light[2] * share)
             power = max(flux[0], flux[1], flux[2])
             if power <= 0:
                 continue
             exponent = 1.0 if part == 0 else surfaces.exponent[material]
+            used = part * len(triangle_id) + i
             points.power[used] = power
             points.exponent[used] = exponent
             points.peak[used] = 1.0 if part == 0 else (exponent + 1) / (2 * lobe_fraction(cos_in, exponent))
@@ -136,5 +170,3 @@ def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Arr
                 points.normal[c, used] = n[c]
                 points.facing[c, used] = g[c]
                 points.colour[c, used] = flux[c] / power
-            used += 1
-    return used

@@ -17,9 +17,11 @@ from refgi.shadowed import Receivers, receivers
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, film
 from refgi.truth.moments import Moments, add_pass, load, no_passes, save
-from refgi.truth.passes import Task, one_pass
+from refgi.truth.passes import one_pass
+from refgi.truth.pilot import pilot
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import lights_of, surfaces
+from refgi.truth.task import Task, sets_of
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -118,11 +120,8 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
         If the checkpoint file is damaged or of another computation.
     """
     started = time.perf_counter()
-    to = receivers(scene.geometry, position, normal, triangle_id, tracer.offset)
-    caustics = film(scene, triangle_id.shape) if settings.caustics else None
-    found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else math.inf)
-    view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None
-    task = Task(scene, settings, tracer, found, lights_of(scene), to, caustics, view)
+    task = task_of(scene, tracer, position, normal, triangle_id, settings)
+    to = task.to
     file = Path(settings.checkpoint) if settings.checkpoint else None
     name = _fingerprint(task) if file else ""
     moments = load(file, name) if file and file.exists() else no_passes(len(to.pixel))
@@ -132,6 +131,39 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
             save(file, moments, name)
         report_progress(min(1.0, int(moments.passes) / settings.passes))
     return _result(moments, to, settings, triangle_id.shape)
+
+
+def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
+            settings: TruthSettings) -> Task:
+    """Prepare what every pass works on.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    tracer : Tracer
+        Its rays.
+    position, normal : (3, h, w) ndarray
+        The G-buffer's, world space.
+    triangle_id : (h, w) int ndarray
+        Which triangle each pixel sees; -1 for none.
+    settings : TruthSettings
+        How.
+
+    Returns
+    -------
+    Task
+        With receivers sorted by the set of lit points that they pick from.
+    """
+    to = receivers(scene.geometry, position, normal, triangle_id, tracer.offset)
+    set_of = sets_of(to.pixel, triangle_id.shape[1], settings.interleave)
+    order = np.argsort(set_of, kind="stable")
+    to = Receivers(*(np.ascontiguousarray(field[..., order]) for field in to))
+    caustics = film(scene, triangle_id.shape) if settings.caustics else None
+    found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else math.inf)
+    view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None
+    task = Task(scene, settings, tracer, found, lights_of(scene), to, set_of[order], caustics, view)
+    return task._replace(densities=pilot(task))
 
 
 def _enough(moments: Moments, settings: TruthSettings, seconds: float) -> bool:

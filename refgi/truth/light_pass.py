@@ -103,6 +103,6 @@ def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, 
         Shadow rays, not traced, and which point each goes to.
     """
     rays, picked = shadow_batch((span[1] - span[0]) * picks), np.empty((span[1] - span[0]) * picks, np.int32)
-    pick(*sets, task.to, tiles(task.set_of, *span), picks, seed, np.float32(task.tracer.offset),
+    pick(*sets, task.to, tiles(task.set_of, *span), (span[0], picks, seed, np.float32(task.tracer.offset)),
          (rays.origin, rays.direction, rays.reach, rays.worth, picked))
     return rays, picked

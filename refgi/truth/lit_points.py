@@ -68,7 +68,7 @@ def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: 
     Returns
     -------
     LitPoints
-        Diffuse parts, then lobes, each in the order of the rays, without dark points.
+        Diffuse parts, then lobes if the scene has any, each in the order of the rays; where nothing is lit, power 0.
     """
     # a lamp may lie in a surface: look from just beyond it
     origins = (rays.origins + tracer.offset * rays.directions).astype(np.float32)
@@ -77,16 +77,17 @@ def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: 
     triangle_id, distance = np.empty(count, np.int32), np.empty(count, np.float32)
     tracer.fill_closest(origins, directions, np.full(count, np.inf, np.float32), triangle_id, distance)
     distance += np.float32(tracer.offset)
-    points = _empty(2 * count)
-    points.ray[:] = np.tile(np.arange(k * count, (k + 1) * count), 2)
+    kinds = 2 if surfaces.specular.any() else 1
+    points = _empty(kinds * count)
+    points.ray[:] = np.tile(np.arange(k * count, (k + 1) * count), kinds)
     points.lobe[count:] = True
     _fill(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance, rays.weight),
           (rays.measure, bound), points)
-    return LitPoints(*(np.compress(points.power > 0, part, axis=-1) for part in points))
+    return points
 
 
 def join(parts: list[LitPoints], sets: int, per_set: int) -> PointSets:
-    """Sort the points of several lights into their sets, each padded with dark points to whole blocks.
+    """Sort the lit points of several lights into their sets, each padded with dark points to whole blocks.
 
     Parameters
     ----------
@@ -102,15 +103,17 @@ def join(parts: list[LitPoints], sets: int, per_set: int) -> PointSets:
     PointSets
         C-contiguous arrays.
     """
-    together = LitPoints(*(np.concatenate(fields, axis=-1) for fields in zip(*(_empty(0), *parts), strict=True)))
-    group = 2 * (together.ray // per_set % sets) + together.lobe
+    together = parts[0] if len(parts) == 1 else LitPoints(
+        *(np.concatenate(fields, axis=-1) for fields in zip(_empty(0), *parts, strict=True)))
+    lit = np.flatnonzero(together.power)
+    group = (2 * (together.ray // per_set % sets) + together.lobe)[lit]
     counts = np.bincount(group, minlength=2 * sets)
     blocks = np.concatenate([[0], np.cumsum(-(-counts // BLOCK))])
     order = np.argsort(group, kind="stable")
     place = np.arange(len(order)) + np.repeat(blocks[:-1] * BLOCK - (np.cumsum(counts) - counts), counts)
     points = _empty(int(blocks[-1]) * BLOCK)
     for field, found in zip(points, together, strict=True):
-        field[..., place] = found[..., order]
+        field[..., place] = found[..., lit[order]]
     return PointSets(points, np.stack([blocks[:-2:2], blocks[1:-1:2], blocks[2::2]], axis=1))
 
 
@@ -151,7 +154,7 @@ def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array
             light, area = (lights.intensity[k, 0], lights.intensity[k, 1], lights.intensity[k, 2]), measure
         else:
             light, area = radiant_intensity(lights, k, d[0], d[1], d[2]), measure * t * t
-        for part in range(2):
+        for part in range(len(points.power) // len(triangle_id)):
             rho = surfaces.diffuse[material] if part == 0 else surfaces.specular[material]
             share = measure * weights[i] / np.pi
             flux = (rho[0] * light[0] * share, rho[1] * light[1] * share, rho[2] * light[2] * share)

@@ -1,53 +1,50 @@
 """Means over passes: running mean and sum of squared deviations, in float64 (Welford's update).
 
 Passes are independent, so the spread of their values gives the variance of the mean, whatever correlation there is
-between the samples inside a pass or between pixels. The picture's own mean is followed as one more value: pixels
-share lit points, so its error does not follow from theirs.
+between the samples inside a pass or between pixels. Pixels share lit points, so the errors of means over several pixels
+do not follow from theirs: means over blocks of 8 x 8 pixels and over the picture are followed as values of their own.
 """
 
-import os
-import tempfile
-import zipfile
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.errors import InputError
 from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
+
+BLOCK_SIDE = 8  # pixels
 
 
 class Moments(NamedTuple):
     """What all passes so far add up to; updated in place."""
 
     passes: Array  # () int64
-    mean: Array  # (3, r + 1) float64; the last column is the mean over receivers
-    squares: Array  # (3, r + 1) float64, sums of squared deviations from the mean
+    mean: Array  # (3, n) float64
+    squares: Array  # (3, n) float64, sums of squared deviations from the mean
 
     @property
     def variance_of_mean(self) -> Array:
-        """Estimated variance of each mean, (3, r + 1); inf before the second pass."""
+        """Estimated variance of each mean, (3, n); inf before the second pass."""
         n = int(self.passes)
         return self.squares / (n * (n - 1)) if n > 1 else np.full_like(self.squares, np.inf)
 
 
-def no_passes(receivers: int) -> Moments:
+def no_passes(values: int) -> Moments:
     """Return the moments of no passes.
 
     Parameters
     ----------
-    receivers : int
-        How many.
+    values : int
+        How many values a pass has.
 
     Returns
     -------
     Moments
         All zero.
     """
-    return Moments(np.zeros((), np.int64), np.zeros((3, receivers + 1)), np.zeros((3, receivers + 1)))
+    return Moments(np.zeros((), np.int64), np.zeros((3, values)), np.zeros((3, values)))
 
 
 def add_pass(moments: Moments, values: Array) -> None:
@@ -57,76 +54,59 @@ def add_pass(moments: Moments, values: Array) -> None:
     ----------
     moments : Moments
         Updated.
-    values : (3, r) float64 ndarray
-        The pass's irradiance, W/m^2.
+    values : (3, n) float64 ndarray
+        What the pass found, W/m^2.
     """
     moments.passes[...] += 1
-    picture = values.sum(axis=1) / max(1, values.shape[1])
-    _add(moments.mean, moments.squares, values, picture, int(moments.passes))
+    _add(moments.mean, moments.squares, values, int(moments.passes))
 
 
-@kernel(parallel=True)
-def _add(mean: Array, squares: Array, values: Array, picture: Array, count: int) -> None:
-    last = values.shape[1]
-    for i in prange(last + 1):
-        for c in range(3):
-            value = values[c, i] if i < last else picture[c]
-            delta = value - mean[c, i]
-            mean[c, i] += delta / count
-            squares[c, i] += delta * (value - mean[c, i])
-
-
-def save(path: Path, moments: Moments, computation: str) -> None:
-    """Write a checkpoint whole or not at all.
+def blocks_of(pixel: Array, shape: tuple[int, ...]) -> tuple[Array, tuple[int, int]]:
+    """Return which block of 8 x 8 pixels each pixel lies in.
 
     Parameters
     ----------
-    path : Path
-        The file; replaced.
-    moments : Moments
-        All passes so far.
-    computation : str
-        What was computed, so that nothing else continues it.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, computation=np.array(computation), **moments._asdict())
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def load(path: Path, computation: str) -> Moments:
-    """Read a checkpoint.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    computation : str
-        What is to be continued.
+    pixel : (r,) ndarray
+        Flat indices into the picture.
+    shape : tuple of 2 ints
+        Rows and columns of the picture.
 
     Returns
     -------
-    Moments
-        All passes so far.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged or belongs to another computation.
+    (r,) ndarray, tuple of 2 ints
+        Flat index of each pixel's block, and rows and columns of blocks.
     """
-    try:
-        with path.open("rb") as handle, np.load(handle) as file:
-            found = str(file["computation"])
-            moments = Moments(*(np.array(file[name]) for name in Moments._fields))
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError) as trouble:
-        raise InputError(f"checkpoint {path}: expected a whole checkpoint file, got {trouble}") from trouble
-    if found != computation:
-        raise InputError(f"checkpoint {path}: expected one of this scene and these settings, got another's")
-    return moments
+    rows, columns = (-(-size // BLOCK_SIDE) for size in shape)
+    return pixel // shape[1] // BLOCK_SIDE * columns + pixel % shape[1] // BLOCK_SIDE, (rows, columns)
+
+
+def with_means(values: Array, block: Array, blocks: int) -> Array:
+    """Append the means over blocks and over all receivers.
+
+    Parameters
+    ----------
+    values : (3, r) float64 ndarray
+        Irradiance of a pass, W/m^2.
+    block : (r,) int ndarray
+        Which block each receiver counts for.
+    blocks : int
+        How many there are.
+
+    Returns
+    -------
+    (3, r + blocks + 1) ndarray
+        The values, a mean for each block (0 for one without receivers), the mean of all.
+    """
+    counts = np.maximum(np.bincount(block, minlength=blocks), 1)
+    means = np.stack([np.bincount(block, channel, blocks) for channel in values]) / counts
+    whole = values.sum(axis=1, keepdims=True) / max(1, values.shape[1])
+    return np.concatenate([values, means, whole], axis=1)
+
+
+@kernel(parallel=True)
+def _add(mean: Array, squares: Array, values: Array, count: int) -> None:
+    for i in prange(values.shape[1]):
+        for c in range(3):
+            delta = values[c, i] - mean[c, i]
+            mean[c, i] += delta / count
+            squares[c, i] += delta * (values[c, i] - mean[c, i])

@@ -48,7 +48,7 @@ class TruthSettings:
     photons: int = 1 << 18
     seed: int = 0
     light_grid: int = 32
-    interleave: int = 8
+    interleave: int = 4
     uniform_share: float = 0.25
     picks: int = PICKS
     directions: int | None = None

@@ -26,8 +26,8 @@ class Task(NamedTuple):
     tracer: Tracer
     surfaces: Surfaces
     lights: LightTable
-    to: Receivers  # sorted by set
-    set_of: Array  # (r,) which set of lit points each receiver picks from, ascending
+    to: Receivers
+    set_of: Array  # (r,) which set of lit points each receiver picks from
     caustics: Film | None = None
     view: Projection | None = None  # only what it sees emits; None: everything does
     densities: tuple[Density | None, ...] = ()  # of each light's rays; none: even ones

@@ -1,7 +1,8 @@
 """Densities over the unit square, constant in cells: uniform points are moved to where the density is high.
 
-q_ij is the probability of cell (i, j) of an m x m grid. The first coordinate follows the marginal sum_j q_ij, the second
-q_ij / sum_j q_ij within row i; both are linear inside a cell, so a point stands for 1 / (m^2 q_ij) of a uniform one.
+q_ij is the probability of cell (i, j) of an m x m grid. The first coordinate follows the marginal sum_j q_ij, the
+second q_ij / sum_j q_ij within row i; both are linear inside a cell, so a point stands for 1 / (m^2 q_ij) of a uniform
+one.
 """
 
 from typing import Any, NamedTuple

@@ -1,10 +1,11 @@
 """The light side: each receiver picks lit points in proportion to what they would give it unshadowed.
 
 The picture's pixels take turns with several sets of lit points, so that what one set misses does not show in all of
-them; receivers of one set make up tiles. For receiver x and sender i the unshadowed term is p_i min(q_i <n_x.w> / r^2, b_i), with the sender's pattern q. A
-receiver sums the terms in blocks of 32 and parts of 8, places its picks evenly over the total with one random shift
-(systematic sampling), finds the point that each falls on, and sends it a shadow ray. A pick stands for total / picks,
-so what remains random is visibility and colour. Sums and comparisons run in float32, everywhere in one order.
+them; receivers of one set make up tiles. For receiver x and sender i the unshadowed term is
+p_i min(q_i <n_x.w> / r^2, b_i), with the sender's pattern q. A receiver sums the terms in blocks of 32 and parts of 8,
+places its picks evenly over the total with one random shift (systematic sampling), finds the point that each falls on,
+and sends it a shadow ray. A pick stands for total / picks, so what remains random is visibility and colour. Sums and
+comparisons run in float32, everywhere in one order.
 """
 
 from itertools import pairwise

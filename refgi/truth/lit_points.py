@@ -112,8 +112,7 @@ def join(parts: list[LitPoints], sets: int, per_set: int) -> PointSets:
     order = np.argsort(group, kind="stable")
     place = np.arange(len(order)) + np.repeat(blocks[:-1] * BLOCK - (np.cumsum(counts) - counts), counts)
     points = _empty(int(blocks[-1]) * BLOCK)
-    for field, found in zip(points, together, strict=True):
-        field[..., place] = found[..., lit[order]]
+    _copy(together, lit[order], place, points)
     return PointSets(points, np.stack([blocks[:-2:2], blocks[1:-1:2], blocks[2::2]], axis=1))
 
 
@@ -122,6 +121,20 @@ def _empty(count: int) -> LitPoints:
     power, exponent, peak, bound = (np.zeros(count, np.float32) for _ in range(4))
     return LitPoints(position, axis, normal, facing, power, colour, exponent, peak, bound, np.zeros(count, np.int32),
                      np.zeros(count, np.bool_))
+
+
+@kernel
+def _copy(found: LitPoints, order: Array, place: Array, points: LitPoints) -> None:
+    for k in range(len(order)):
+        i, j = order[k], place[k]
+        for c in range(3):
+            points.position[c, j] = found.position[c, i]
+            points.axis[c, j] = found.axis[c, i]
+            points.normal[c, j] = found.normal[c, i]
+            points.facing[c, j] = found.facing[c, i]
+            points.colour[c, j] = found.colour[c, i]
+        points.power[j], points.exponent[j], points.peak[j] = found.power[i], found.exponent[i], found.peak[i]
+        points.bound[j], points.ray[j], points.lobe[j] = found.bound[i], found.ray[i], found.lobe[i]
 
 
 @kernel(parallel=True)

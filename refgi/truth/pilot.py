@@ -20,7 +20,7 @@ from refgi.truth.task import Task, settle
 Array = npt.NDArray[Any]
 
 CELLS = 64  # along one side of a light's grid
-RECEIVERS = 2048  # that are asked, at most
+RECEIVERS, PICKS = 2048, 1 << 15  # that are asked, at most; picks of all of them together, at least
 
 
 def pilot(task: Task) -> tuple[Density | None, ...]:
@@ -53,7 +53,8 @@ def _contributions(task: Task, centres: Array) -> Array:
     if not len(sets.points.power):
         return np.zeros(rays)
     some = _some(task)
-    picks, asked = task.settings.picks, len(some.to.pixel)
+    asked = len(some.to.pixel)
+    picks = max(task.settings.picks, -(-PICKS // asked))
     shadows, picked = pick_points(some, sets, (0, asked), picks, 0)
     settle(some, shadows, 0, picks, np.zeros((3, asked)), task.settings.visibility)
     free = ~shadows.blocked
@@ -73,5 +74,5 @@ def _smooth(values: Array) -> Array:
     """Average each cell with its neighbours, twice: picks are few and lit areas have edges inside cells."""
     for _ in range(2):
         wide = np.pad(values, 1, mode="edge")
-        values = sum(wide[i : i + len(values), j : j + len(values)] for i in range(3) for j in range(3)) / 9
+        values = np.mean([wide[i : i + len(values), j : j + len(values)] for i in range(3) for j in range(3)], axis=0)
     return values

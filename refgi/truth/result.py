@@ -79,6 +79,13 @@ class TruthResult(NamedTuple):
         return (f"95 % confidence intervals over the picture's mean, by Student's t with {freedom} of freedom "
                 f"({self.passes} passes): " + ", ".join(f"+-{factor * error:.2%} {what}" for error, what in parts))
 
+    @property
+    def errors(self) -> dict[str, Any]:
+        """The figures of the error by name, for reports."""
+        return {"pixel": self.pixel_error, "block": self.block_error, "picture": self.picture_error,
+                "passes": self.passes, "degrees_of_freedom": self.degrees_of_freedom,
+                "confidence_factor_95": self.confidence_factor(), "statement": self.error_statement}
+
     def _relative(self, variance: Array, weight: Array) -> float:
         scale, total = float(self.picture_mean.mean()), float(weight.sum())
         if scale == 0 or total == 0:
@@ -115,7 +122,7 @@ def result_of(moments: Moments, pixel: Array, shape: tuple[int, ...], blocks: tu
     mean.reshape(3, -1)[:, pixel] = moments.mean[:, :r]
     variance.reshape(3, -1)[:, pixel] = variance_of_mean[:, :r]
     samples.reshape(-1)[pixel] = passes * per_pass
-    of_blocks = (table[:, r:-1].reshape(3, *grid).copy() for table in (moments.mean, variance_of_mean))
+    block_mean, block_variance = (table[:, r:-1].reshape(3, *grid).copy() for table in (moments.mean, variance_of_mean))
     counts = np.bincount(block, minlength=grid[0] * grid[1]).reshape(grid)
     return TruthResult(mean, variance, samples, moments.mean[:, -1].copy(), variance_of_mean[:, -1].copy(), passes,
-                       *of_blocks, counts)
+                       block_mean, block_variance, counts)

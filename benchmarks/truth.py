@@ -13,12 +13,12 @@ from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.rays.embree import RunDoor
 from refgi.scene import Geometry, load_scene
-from refgi.shadowed import receivers
 from refgi.truth import TruthSettings
 from refgi.truth.moments import add_pass, no_passes
-from refgi.truth.passes import Task, one_pass
+from refgi.truth.passes import one_pass
 from refgi.truth.settings import Estimator
-from refgi.truth.surfaces import lights_of, surfaces
+from refgi.truth.task import Task
+from refgi.truth.truth import task_of
 
 Array = npt.NDArray[Any]
 ESTIMATORS: tuple[Estimator, ...] = ("hemisphere", "light", "combined")
@@ -57,9 +57,8 @@ def rows(quick: bool) -> Iterator[Row]:
 
 
 def _task(frame: Frame, settings: TruthSettings) -> Task:
-    buffer, scene = frame.gbuffer, frame.scene
-    to = receivers(scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
-    return Task(scene, settings, frame.tracer, surfaces(scene), lights_of(scene), to)
+    buffer = frame.gbuffer
+    return task_of(frame.scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id, settings)
 
 
 def _ray_rate(frame: Frame, task: Task, name: str, repeats: int) -> Row:
@@ -90,8 +89,8 @@ def _time_to_error(task: Task, passes: int) -> Iterator[Row]:
         started = time.perf_counter()
         add_pass(moments, one_pass(task, number))
         seconds.append(time.perf_counter() - started)
-    mean = moments.mean[:, :-1]
-    each = (moments.variance_of_mean[:, :-1] * passes / (mean**2 + (0.1 * mean.mean()) ** 2)).mean()
+    mean = moments.mean
+    each = (moments.variance_of_mean * passes / (mean**2 + (0.1 * mean.mean()) ** 2)).mean()
     for target in TARGETS:
         aim = "<= 1" if (target, task.settings.estimator) == (1e-2, "combined") else ""
         needed = float(np.median(seconds) * each / target)

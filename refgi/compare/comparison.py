@@ -138,7 +138,7 @@ class _Runner:
         result, seconds, runs = self._timed(name, lambda frame: trace_truth(frame, settings))
         radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype))
         return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
-                         radiance, seconds, runs)
+                         radiance, seconds, runs, result.errors)
 
     def method(
         self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool

@@ -29,6 +29,7 @@ class Reference:
     radiance: Array  # (3, h, w) W/m^2/sr
     seconds: float
     runs: tuple[stages.Run, ...]
+    errors: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # `TruthResult.errors`
 
 
 @dataclasses.dataclass(frozen=True)

@@ -201,6 +201,7 @@ def _reference(reference: Reference, covered: Array) -> dict[str, Any]:
         "mean_irradiance": float(values.mean()),
         "standard_error_of_a_pixel": float(np.sqrt(reference.variance[:, covered]).mean()),
         "standard_error_of_the_mean": float(np.sqrt(reference.mean_variance).mean()),
+        "errors": reference.errors,
         "files": [f"{reference.name}.exr", f"{reference.name}.png"],
     }
 

@@ -5,8 +5,9 @@ side, and hemisphere sampling at the receiver, split at a bounded geometry term.
 other methods and asks a shadow ray for each, which is what their visibility approximations aim at.
 """
 
+from refgi.truth.result import TruthResult
 from refgi.truth.settings import TruthSettings
-from refgi.truth.truth import TruthResult, trace_truth, truth
+from refgi.truth.truth import trace_truth, truth
 from refgi.truth.vpl import VplSettings, vpl
 
 __all__ = ["TruthResult", "TruthSettings", "VplSettings", "trace_truth", "truth", "vpl"]

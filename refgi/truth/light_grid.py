@@ -1,8 +1,9 @@
-"""Fresh directions over a light: n x n cells of equal measure, one jittered ray in each.
+"""Fresh directions over a light: n x n cells of equal probability, one jittered ray in each.
 
-Spots and points get equal-area maps of the square to the cap or the sphere, so each ray stands for the same solid
-angle, exactly; a directional light gets a rectangle across the scene's bounds. The cells are taken along a Hilbert
-curve: neighbours in the list are neighbours on the surfaces they light, which is what makes systematic picks even.
+Spots and points get equal-area maps of the square to the cap or the sphere; a directional light gets a rectangle across
+the scene's bounds. Without a density each ray stands for the same solid angle or area, exactly; with one, for that over
+the density at its place. The cells are taken along a Hilbert curve: neighbours in the list are neighbours on the
+surfaces they light, which is what makes systematic picks even.
 """
 
 import math
@@ -12,18 +13,59 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.sampling import hilbert_order
+from refgi.sampling import ONE_ULP_BELOW_1, hilbert_order
 from refgi.scene import DirectionalLight, Geometry, Light, SpotLight
+from refgi.truth.density import Density, warp
 
 Array = npt.NDArray[Any]
 
 
 class LightRays(NamedTuple):
-    """One ray for each cell of a light's grid."""
+    """Rays of a light: one for each cell of its grid, or several sets of them."""
 
-    origins: Array  # (n * n, 3) float64, m
-    directions: Array  # (n * n, 3) float64, unit vectors
-    measure: float  # solid angle of a ray, sr; for a directional light its perpendicular area, m^2
+    origins: Array  # (s, 3) float64, m
+    directions: Array  # (s, 3) float64, unit vectors
+    measure: float  # solid angle of a cell of even size, sr; for a directional light its perpendicular area, m^2
+    weight: Array  # (s,) what a ray stands for, in units of `measure`: 1 over the density at its place
+
+
+def stratified_sets(n: int, side: int, random: np.random.Generator) -> Array:
+    """Place side^2 sets of n x n points in the unit square: each set jittered, all of them together jittered finer.
+
+    Parameters
+    ----------
+    n : int
+        Cells along one side of the grid of a set.
+    side : int
+        Parts along one side of a cell: the side^2 sets share out its parts at random, one each.
+    random : numpy.random.Generator
+        Shares out the parts and places the points in them.
+
+    Returns
+    -------
+    (side^2, n * n, 2) ndarray
+        Each set along a Hilbert curve over the grid. Every point is uniform in its cell.
+    """
+    count = side * side
+    part = random.permuted(np.broadcast_to(np.arange(count), (n * n, count)), axis=1).T
+    within = np.stack([part % side, part // side], axis=-1) + random.random((count, n * n, 2))
+    return np.asarray(np.minimum((_cells(n) + within / side) / n, ONE_ULP_BELOW_1))
+
+
+def cell_centres(n: int) -> Array:
+    """Return the centres of n x n cells of the unit square, along a Hilbert curve.
+
+    Parameters
+    ----------
+    n : int
+        Cells along one side.
+
+    Returns
+    -------
+    (n * n, 2) ndarray
+        Points.
+    """
+    return np.asarray((_cells(n) + 0.5) / n)
 
 
 def light_rays(light: Light, geometry: Geometry, jitter: Array) -> LightRays:
@@ -44,9 +86,34 @@ def light_rays(light: Light, geometry: Geometry, jitter: Array) -> LightRays:
         Along a Hilbert curve over the grid.
     """
     n = math.isqrt(len(jitter))
-    square = (_cells(n) + jitter) / n
+    return rays_through(light, geometry, (_cells(n) + jitter) / n, n * n)
+
+
+def rays_through(light: Light, geometry: Geometry, square: Array, cells: int,
+                 density: Density | None = None) -> LightRays:
+    """Send rays through points of the unit square that stands for a light's directions.
+
+    Parameters
+    ----------
+    light : Light
+        The light.
+    geometry : Geometry
+        What it shines on; only its bounds matter, and only to a directional light.
+    square : (s, 2) ndarray
+        Points of the unit square, uniform.
+    cells : int
+        How many rays share the light's whole measure.
+    density : Density, optional
+        Where rays go more often than elsewhere; evenly where absent.
+
+    Returns
+    -------
+    LightRays
+        In the order of the points.
+    """
+    square, weight = (square, np.ones(len(square))) if density is None else warp(density, square)
     if isinstance(light, DirectionalLight):
-        return _parallel(light, geometry, square)
+        return _parallel(light, geometry, square, cells, weight)
     if isinstance(light, SpotLight):
         axis = np.asarray(light.direction, np.float64) / np.linalg.norm(light.direction)
         local, measure = _cap(square, 2 * math.sin(light.outer_half_angle / 2) ** 2)
@@ -54,7 +121,7 @@ def light_rays(light: Light, geometry: Geometry, jitter: Array) -> LightRays:
     else:
         directions, measure = _sphere(square), 4 * math.pi
     return LightRays(np.broadcast_to(np.asarray(light.position, np.float64), directions.shape), directions,
-                     measure / len(jitter))
+                     measure / cells, weight)
 
 
 def footprint(light: Light, geometry: Geometry, n: int) -> tuple[float, float]:
@@ -74,7 +141,7 @@ def footprint(light: Light, geometry: Geometry, n: int) -> tuple[float, float]:
     tuple of 2 floats
         Solid angle (sr) or area (m^2) of a ray, and the largest measure x distance^2 (m^2).
     """
-    measure = light_rays(light, geometry, np.full((n * n, 2), 0.5)).measure
+    measure = rays_through(light, geometry, np.full((1, 2), 0.5), n * n).measure
     if isinstance(light, DirectionalLight):
         return measure, measure
     reach = np.maximum(*(np.abs(np.subtract(corner, light.position)) for corner in geometry.bounds))
@@ -117,7 +184,7 @@ def _sphere(square: Array) -> Array:
                      np.copysign(1 - radius * radius, inside)], axis=1)
 
 
-def _parallel(light: DirectionalLight, geometry: Geometry, square: Array) -> LightRays:
+def _parallel(light: DirectionalLight, geometry: Geometry, square: Array, cells: int, weight: Array) -> LightRays:
     axis = np.asarray(light.direction, np.float64) / np.linalg.norm(light.direction)
     frame = _frame(axis)
     corners = np.stack(np.meshgrid(*np.stack(geometry.bounds, axis=1), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -126,7 +193,7 @@ def _parallel(light: DirectionalLight, geometry: Geometry, square: Array) -> Lig
     low, high = low - margin, high + margin
     local = np.column_stack([low[:2] + square * (high - low)[:2], np.full(len(square), low[2])])
     area = float(np.prod((high - low)[:2]))
-    return LightRays(local @ frame, np.broadcast_to(axis, (len(square), 3)), area / len(square))
+    return LightRays(local @ frame, np.broadcast_to(axis, (len(square), 3)), area / cells, weight)
 
 
 def _frame(axis: Array) -> Array:

@@ -1,11 +1,14 @@
 """The light side: each receiver picks lit points in proportion to what they would give it unshadowed.
 
-For receiver x and sender i the unshadowed term is p_i min(q_i <n_x.w> / r^2, b_i), with the sender's pattern q. A
-receiver sums the terms in blocks of 32 and parts of 8, places its picks evenly over the total with one random shift
-(systematic sampling), finds the point that each falls on, and sends it a shadow ray. A pick stands for total / picks,
-so what remains random is visibility and colour. Sums and comparisons run in float32, everywhere in one order.
+The picture's pixels take turns with several sets of lit points, so that what one set misses does not show in all of
+them; receivers of one set make up tiles. For receiver x and sender i the unshadowed term is
+p_i min(q_i <n_x.w> / r^2, b_i), with the sender's pattern q. A receiver sums the terms in blocks of 32 and parts of 8,
+places its picks evenly over the total with one random shift (systematic sampling), finds the point that each falls on,
+and sends it a shadow ray. A pick stands for total / picks, so what remains random is visibility and colour. Sums and
+comparisons run in float32, everywhere in one order.
 """
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,7 +23,7 @@ from refgi.truth.lit_points import BLOCK, LitPoints
 
 Array = npt.NDArray[Any]
 
-TILE = 256  # receivers that one parallel iteration owns: the SIMD lanes
+TILE = 256  # most receivers that one parallel iteration owns: the SIMD lanes
 PART = 8  # senders whose terms a pick may have to compute again
 PARTS = BLOCK // PART
 TINY = np.float32(1e-30)  # m^2; smaller squared distances count as this one, so that no 0 / 0 arises
@@ -59,21 +62,13 @@ def _glossy(points: LitPoints, j: int, dx: Any, dy: Any, dz: Any, nx: Any, ny: A
 
 
 @kernel
-def _sum_parts(points: LitPoints, tile: Array, glossy: bool, parts: Array) -> None:
-    """Fill the sums of the terms of each part of the senders at each receiver of a tile, two senders at a time."""
-    for p in range(parts.shape[0]):
-        for j in range(p * PART, p * PART + PART, 2):
+def _sum_diffuse(points: LitPoints, tile: Array, first: int, count: int, parts: Array) -> None:
+    """Fill the sums of the terms of each part of diffuse senders at each receiver of a tile, two senders at a time."""
+    for p in range(count):
+        for j in range(first + p * PART, first + p * PART + PART, 2):
             px, py, pz = points.position[0, j], points.position[1, j], points.position[2, j]
             qx, qy, qz = points.position[0, j + 1], points.position[1, j + 1], points.position[2, j + 1]
-            power, power_q = points.power[j], points.power[j + 1]
-            if glossy:
-                for i in range(TILE):
-                    x, y, z, nx, ny, nz = tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i], tile[5, i]
-                    one = power * _glossy(points, j, px - x, py - y, pz - z, nx, ny, nz)
-                    two = power_q * _glossy(points, j + 1, qx - x, qy - y, qz - z, nx, ny, nz)
-                    parts[p, i] = (parts[p, i] + one) + two
-                continue
-            bound, bound_q = points.bound[j], points.bound[j + 1]
+            power, power_q, bound, bound_q = points.power[j], points.power[j + 1], points.bound[j], points.bound[j + 1]
             kx, ky, kz = points.axis[0, j], points.axis[1, j], points.axis[2, j]
             lx, ly, lz = points.axis[0, j + 1], points.axis[1, j + 1], points.axis[2, j + 1]
             for i in range(TILE):
@@ -84,15 +79,31 @@ def _sum_parts(points: LitPoints, tile: Array, glossy: bool, parts: Array) -> No
 
 
 @kernel
-def _term(points: LitPoints, j: int, tile: Array, i: int, glossy: bool) -> Any:
-    """Return the term of one sender at one receiver, bit for bit that which was summed."""
+def _sum_lobes(points: LitPoints, tile: Array, first: int, done: int, parts: Array) -> None:
+    """Fill the sums of the terms of each part of lobes at each receiver of a tile."""
+    for p in range(done, parts.shape[0]):
+        for j in range(first + p * PART, first + p * PART + PART):
+            px, py, pz, power = points.position[0, j], points.position[1, j], points.position[2, j], points.power[j]
+            for i in range(TILE):
+                x, y, z, nx, ny, nz = tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i], tile[5, i]
+                parts[p, i] += power * _glossy(points, j, px - x, py - y, pz - z, nx, ny, nz)
+
+
+@kernel
+def _diffuse_term(points: LitPoints, j: int, tile: Array, i: int) -> Any:
+    """Return the term of one diffuse sender at one receiver, bit for bit that which was summed."""
     dx, dy = points.position[0, j] - tile[0, i], points.position[1, j] - tile[1, i]
     dz = points.position[2, j] - tile[2, i]
-    nx, ny, nz = tile[3, i], tile[4, i], tile[5, i]
-    if glossy:
-        return points.power[j] * _glossy(points, j, dx, dy, dz, nx, ny, nz)
-    return points.power[j] * _diffuse(dx, dy, dz, nx, ny, nz, points.axis[0, j], points.axis[1, j], points.axis[2, j],
-                                      points.bound[j])
+    return points.power[j] * _diffuse(dx, dy, dz, tile[3, i], tile[4, i], tile[5, i], points.axis[0, j],
+                                      points.axis[1, j], points.axis[2, j], points.bound[j])
+
+
+@kernel
+def _lobe_term(points: LitPoints, j: int, tile: Array, i: int) -> Any:
+    """Return the term of one lobe at one receiver, bit for bit that which was summed."""
+    dx, dy = points.position[0, j] - tile[0, i], points.position[1, j] - tile[1, i]
+    dz = points.position[2, j] - tile[2, i]
+    return points.power[j] * _glossy(points, j, dx, dy, dz, tile[3, i], tile[4, i], tile[5, i])
 
 
 @kernel
@@ -113,65 +124,92 @@ def _aim(points: LitPoints, j: int, to: Receivers, r: int, grain: Any, origins: 
     return real(1) if from_x > real(0) and from_y > real(0) else real(0)
 
 
+def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
+    """Sort a span of receivers by their set and cut them into tiles.
+
+    Parameters
+    ----------
+    set_of : (r,) int ndarray
+        Which set of lit points each receiver picks from.
+    first, last : int
+        First receiver of the span and one past the last.
+
+    Returns
+    -------
+    (last - first,) ndarray, (t, 3) ndarray, both int64
+        Receivers; and for each tile where it begins and ends among them, and its set.
+    """
+    order = np.argsort(set_of[first:last], kind="stable")
+    sets = set_of[first:last][order]
+    ends = [0, *(1 + np.flatnonzero(np.diff(sets))).tolist(), last - first]
+    cuts = [(low, min(low + TILE, end), sets[low]) for begin, end in pairwise(ends) for low in range(begin, end, TILE)]
+    return first + order, np.array(cuts, np.int64).reshape(-1, 3)
+
+
 @kernel(parallel=True)
-def pick(points: LitPoints, to: Receivers, span: tuple[int, int], picks: int, seed: int, glossy: bool, grain: Any,
-         rays: tuple[Array, Array, Array, Array]) -> None:
-    """Let each receiver of a span pick lit points, and write the shadow rays and what they are worth.
+def pick(points: LitPoints, starts: Array, to: Receivers, tiles: tuple[Array, Array], how: tuple[int, int, int, Any],
+         rays: tuple[Array, Array, Array, Array, Array]) -> None:
+    """Let each receiver of some tiles pick lit points, and write the shadow rays and what they are worth.
 
     Parameters
     ----------
     points : LitPoints
-        Senders, whole blocks.
+        Senders, in sets.
+    starts : (sets, 3) int64 ndarray
+        First block of each set, its first of lobes and one past its last.
     to : Receivers
         Receivers.
-    span : tuple of 2 ints
-        First receiver and one past the last.
-    picks : int
-        Picks of each receiver.
-    seed : int
-        Random shift: a hash of it and the receiver's pixel.
-    glossy : bool
-        Whether any sender has a lobe.
-    grain : float32
-        The tracer's: segments end above the sender's face by `ray_offset` and `far_offset`, m.
-    rays : tuple of 4 arrays
-        Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2; n = picks x receivers, float32.
+    tiles : tuple of 2 arrays
+        Receivers sorted by set, and the table of tiles.
+    how : tuple of 3 ints and a float32
+        First receiver of the span; picks of each; seed of the random shift, a hash of it and the receiver's pixel; the
+        tracer's grain: segments end above the sender's face by `ray_offset` and `far_offset`, m.
+    rays : tuple of 5 arrays
+        Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2, float32, and the point picked (n,) int32;
+        n = picks x receivers. The reach is 0 where there is nothing to gain.
     """
-    first, last = span
-    for number in prange((last - first + TILE - 1) // TILE):
-        low = first + number * TILE
-        count = min(TILE, last - low)
-        tile = np.zeros((6, TILE), np.float32)  # positions and normals; lanes beyond the count receive nothing
+    members, table = tiles
+    for number in prange(len(table)):
+        low, high, chosen = table[number, 0], table[number, 1], table[number, 2]
+        count = high - low
+        # positions and normals; lanes beyond the count receive nothing
+        tile = np.zeros((6, TILE), np.float32)
         for c in range(3):
-            tile[c, :count] = to.position[c, low : low + count]
-            tile[3 + c, :count] = to.normal[c, low : low + count]
-        parts = np.zeros((len(points.power) // PART, TILE), np.float32)
-        _sum_parts(points, tile, glossy, parts)
-        blocks = np.zeros((len(points.power) // BLOCK, TILE), np.float32)
+            for i in range(count):
+                tile[c, i] = to.position[c, members[low + i]]
+                tile[3 + c, i] = to.normal[c, members[low + i]]
+        first, first_lobe, size = starts[chosen, 0], starts[chosen, 1], starts[chosen, 2] - starts[chosen, 0]
+        start = (first * BLOCK, first_lobe * BLOCK)
+        parts = np.zeros((size * PARTS, TILE), np.float32)
+        diffuse = (first_lobe - first) * PARTS
+        _sum_diffuse(points, tile, start[0], diffuse, parts)
+        _sum_lobes(points, tile, start[0], diffuse, parts)
+        blocks = np.zeros((size, TILE), np.float32)
         for p in range(parts.shape[0]):
             for i in range(TILE):
-                blocks[p * PART // BLOCK, i] += parts[p, i]
-        _pick_all(points, to, low, count, tile, (picks, seed, glossy, grain), (blocks, parts), first, rays)
+                blocks[p // PARTS, i] += parts[p, i]
+        _pick_all(points, to, members[low:high], tile, how, (start, blocks, parts), rays)
 
 
 @kernel
-def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Array, how: tuple[int, int, bool, Any],
-              sums: tuple[Array, Array], first: int, rays: tuple[Array, Array, Array, Array]) -> None:
+def _pick_all(points: LitPoints, to: Receivers, members: Array, tile: Array, how: tuple[int, int, int, Any],
+              sums: tuple[tuple[int, int], Array, Array], rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
-    origins, directions, reach, worth = rays
-    picks, seed, glossy, grain = how
-    blocks, parts = sums
+    origins, directions, reach, worth, picked = rays
+    first, picks, seed, grain = how
+    (first_point, first_lobe), blocks, parts = sums
     real = np.float32
-    for i in range(count):
-        total = real(0)
+    for i in range(len(members)):
+        r, total = members[i], real(0)
         for b in range(blocks.shape[0]):
             total += blocks[b, i]
-        shift = real(hash_bits(np.uint32(to.pixel[low + i]) ^ np.uint32(seed)) >> np.uint32(8)) * real(2.0**-24)
+        for s in range(picks):
+            reach[(r - first) * picks + s] = real(0)
+        shift = real(hash_bits(np.uint32(to.pixel[r]) ^ np.uint32(seed)) >> np.uint32(8)) * real(2.0**-24)
         share = total / real(picks)
         b, before = 0, real(0)  # block, and the sum of those before it
-        for s in range(picks):
-            ray = (low + i - first) * picks + s
-            reach[ray] = real(0)
+        for s in range(picks if total > real(0) else 0):
+            ray = (r - first) * picks + s
             target = (real(s) + shift) * share
             while b < blocks.shape[0] - 1 and before + blocks[b, i] <= target:
                 before += blocks[b, i]
@@ -181,13 +219,21 @@ def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Arra
             while p < end and parts[p, i] <= rest:
                 rest -= parts[p, i]
                 p += 1
-            j, end = p * PART, p * PART + PART - 1
-            term = _term(points, j, tile, i, glossy)
-            while j < end and term <= rest:
-                rest -= term
-                j += 1
-                term = _term(points, j, tile, i, glossy)
+            j, end = first_point + p * PART, first_point + p * PART + PART - 1
+            if j < first_lobe:
+                term = _diffuse_term(points, j, tile, i)
+                while j < end and term <= rest:
+                    rest -= term
+                    j += 1
+                    term = _diffuse_term(points, j, tile, i)
+            else:
+                term = _lobe_term(points, j, tile, i)
+                while j < end and term <= rest:
+                    rest -= term
+                    j += 1
+                    term = _lobe_term(points, j, tile, i)
             if term > real(0):
-                reach[ray] = _aim(points, j, to, low + i, grain, origins, directions, ray)
+                reach[ray] = _aim(points, j, to, r, grain, origins, directions, ray)
+                picked[ray] = j
                 for c in range(3):
                     worth[ray, c] = share * points.colour[c, j]

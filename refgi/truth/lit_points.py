@@ -1,7 +1,8 @@
 """Directly lit surface points, found by fresh rays from every light: the senders of the light side.
 
 Phi = rho I(l) Omega for a spot or point light, rho E_perp A_perp for a directional one (papers' calibrated radiometry):
-no cosine and no distance. A point whose material has a lobe appears twice, once for each part.
+no cosine and no distance. A point whose material has a lobe appears twice, once for each part. Points come in sets, one
+for each set of rays; within a set diffuse parts stand before lobes, in blocks of their own.
 """
 
 from typing import Any, NamedTuple
@@ -9,12 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel
+from refgi.jit import kernel, prange
 from refgi.lobes import lobe_norm
 from refgi.radiometry import DIRECTIONAL, radiant_intensity
 from refgi.rays import MISS, Tracer
 from refgi.scene import LightTable
 from refgi.truth.light_grid import LightRays
+from refgi.truth.paths import CHUNK
 from refgi.truth.surfaces import Surfaces, face_normal, height_above, shading_normal
 
 Array = npt.NDArray[Any]
@@ -23,7 +25,7 @@ BLOCK = 32  # points whose contributions are summed before a pick looks inside
 
 
 class LitPoints(NamedTuple):
-    """Senders, as float32 arrays padded with dark points to whole blocks."""
+    """Senders, as float32 arrays."""
 
     position: Array  # (3, n), m
     axis: Array  # (3, n) unit vector of the emission: shading normal, or mirror direction of a lobe
@@ -34,6 +36,15 @@ class LitPoints(NamedTuple):
     exponent: Array  # (n,) of cos around the axis: 1 for the diffuse part
     peak: Array  # (n,) pattern on the axis: 1, or (P + 1) / (2 K)
     bound: Array  # (n,) largest geometry term left to the light side, 1/m^2
+    ray: Array  # (n,) int32: which ray found it, counted through the lights
+    lobe: Array  # (n,) bool: a lobe, not a diffuse part
+
+
+class PointSets(NamedTuple):
+    """Sets of lit points, each padded with dark points to whole blocks."""
+
+    points: LitPoints
+    starts: Array  # (sets, 3) int64, in blocks: first diffuse one, first of lobes, one past the last
 
 
 def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays,
@@ -58,7 +69,7 @@ def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: 
     Returns
     -------
     LitPoints
-        In the order of the rays, without dark points, not padded.
+        Diffuse parts, then lobes if the scene has any, each in the order of the rays; where nothing is lit, power 0.
     """
     # a lamp may lie in a surface: look from just beyond it
     beyond = tracer.offsets(rays.origins)
@@ -68,43 +79,81 @@ def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: 
     triangle_id, distance = np.empty(count, np.int32), np.empty(count, np.float32)
     tracer.fill_closest(origins, directions, np.full(count, np.inf, np.float32), triangle_id, distance)
     distance += beyond.astype(np.float32)
-    points = _empty(2 * count)
-    used = _fill(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance),
-                 (rays.measure, bound), points)
-    return LitPoints(*(part[..., :used] for part in points))
+    kinds = 2 if surfaces.specular.any() else 1
+    points = _empty(kinds * count)
+    points.ray[:] = np.tile(np.arange(k * count, (k + 1) * count), kinds)
+    points.lobe[count:] = True
+    _fill(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance, rays.weight),
+          (rays.measure, bound), points)
+    return points
 
 
-def join(parts: list[LitPoints]) -> LitPoints:
-    """Put the points of several lights in one list, padded with dark points to whole blocks.
+def join(parts: list[LitPoints], sets: int, per_set: int) -> PointSets:
+    """Sort the lit points of several lights into their sets, each padded with dark points to whole blocks.
 
     Parameters
     ----------
     parts : list of LitPoints
         One a light.
+    sets : int
+        Sets of rays that each light has sent.
+    per_set : int
+        Rays in each.
 
     Returns
     -------
-    LitPoints
-        C-contiguous arrays; their length is a multiple of `BLOCK`.
+    PointSets
+        C-contiguous arrays.
     """
-    missing = -sum(len(part.power) for part in parts) % BLOCK
-    padded = [*parts, LitPoints(*(field[..., :missing] for field in _empty(BLOCK)))]
-    return LitPoints(*(np.concatenate(fields, axis=-1) for fields in zip(*padded, strict=True)))
+    together = parts[0] if len(parts) == 1 else LitPoints(
+        *(np.concatenate(fields, axis=-1) for fields in zip(_empty(0), *parts, strict=True)))
+    lit = np.flatnonzero(together.power)
+    group = (2 * (together.ray // per_set % sets) + together.lobe)[lit]
+    counts = np.bincount(group, minlength=2 * sets)
+    blocks = np.concatenate([[0], np.cumsum(-(-counts // BLOCK))])
+    order = np.argsort(group, kind="stable")
+    place = np.arange(len(order)) + np.repeat(blocks[:-1] * BLOCK - (np.cumsum(counts) - counts), counts)
+    points = _empty(int(blocks[-1]) * BLOCK)
+    _copy(together, lit[order], place, points)
+    return PointSets(points, np.stack([blocks[:-2:2], blocks[1:-1:2], blocks[2::2]], axis=1))
 
 
 def _empty(count: int) -> LitPoints:
     position, axis, normal, facing, colour = (np.zeros((3, count), np.float32) for _ in range(5))
     power, exponent, peak, bound = (np.zeros(count, np.float32) for _ in range(4))
-    return LitPoints(position, axis, normal, facing, power, colour, exponent, peak, bound)
+    return LitPoints(position, axis, normal, facing, power, colour, exponent, peak, bound, np.zeros(count, np.int32),
+                     np.zeros(count, np.bool_))
 
 
 @kernel
-def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array],
-          scale: tuple[float, float], points: LitPoints) -> int:
-    origins, directions, triangle_id, distances = hits
+def _copy(found: LitPoints, order: Array, place: Array, points: LitPoints) -> None:
+    for k in range(len(order)):
+        i, j = order[k], place[k]
+        for c in range(3):
+            points.position[c, j] = found.position[c, i]
+            points.axis[c, j] = found.axis[c, i]
+            points.normal[c, j] = found.normal[c, i]
+            points.facing[c, j] = found.facing[c, i]
+            points.colour[c, j] = found.colour[c, i]
+        points.power[j], points.exponent[j], points.peak[j] = found.power[i], found.exponent[i], found.peak[i]
+        points.bound[j], points.ray[j], points.lobe[j] = found.bound[i], found.ray[i], found.lobe[i]
+
+
+@kernel(parallel=True)
+def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
+          scale: tuple[float, float], points: LitPoints) -> None:
+    """Fill the diffuse part of ray i at i and its lobe after all diffuse parts; dark ones keep a power of 0."""
+    count = len(hits[2])
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _fill_span(surfaces, lights, k, hits, scale, points, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
+
+
+@kernel
+def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
+               scale: tuple[float, float], points: LitPoints, span: tuple[int, int]) -> None:
+    origins, directions, triangle_id, distances, weights = hits
     measure, bound = scale
-    used = 0
-    for i in range(len(triangle_id)):
+    for i in range(span[0], span[1]):
         if triangle_id[i] == MISS:
             continue
         triangle = triangle_id[i]
@@ -122,14 +171,15 @@ def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Arr
             light, area = (lights.intensity[k, 0], lights.intensity[k, 1], lights.intensity[k, 2]), measure
         else:
             light, area = radiant_intensity(lights, k, d[0], d[1], d[2]), measure * t * t
-        for part in range(2):
+        for part in range(len(points.power) // len(triangle_id)):
             rho = surfaces.diffuse[material] if part == 0 else surfaces.specular[material]
-            flux = (rho[0] * light[0] * measure / np.pi, rho[1] * light[1] * measure / np.pi,
-                    rho[2] * light[2] * measure / np.pi)
+            share = measure * weights[i] / np.pi
+            flux = (rho[0] * light[0] * share, rho[1] * light[1] * share, rho[2] * light[2] * share)
             power = max(flux[0], flux[1], flux[2])
             if power <= 0:
                 continue
             exponent = 1.0 if part == 0 else surfaces.exponent[material]
+            used = part * len(triangle_id) + i
             points.power[used] = power
             points.exponent[used] = exponent
             points.peak[used] = 1.0 if part == 0 else np.pi * lobe_norm(cos_in, exponent)
@@ -140,5 +190,3 @@ def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Arr
                 points.normal[c, used] = n[c]
                 points.facing[c, used] = g[c]
                 points.colour[c, used] = flux[c] / power
-            used += 1
-    return used

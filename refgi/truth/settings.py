@@ -28,6 +28,8 @@ class TruthSettings:
     - `caustics`: add light through mirror-like lobes and glass, by `photons` from each light in a pass; those lobes are
       then left out of the estimators.
     - `seed`: which random numbers.
+    - `interleave`^2 sets of lit points a pass: pixel (x, y) picks from set (x mod `interleave`, y mod `interleave`).
+    - `uniform_share` of each light's rays go out evenly, the rest where a pilot found that they light the picture.
     - `light_grid` directions along one side of each light's grid, `picks` of lit points and `directions` over the
       hemisphere (8, or 16 for "hemisphere") of each receiver in a pass; `bound` is the largest geometry term left to
       the light side, in units of 1 / footprint of a light direction.
@@ -46,6 +48,8 @@ class TruthSettings:
     photons: int = 1 << 18
     seed: int = 0
     light_grid: int = 32
+    interleave: int = 4
+    uniform_share: float = 0.5
     picks: int = PICKS
     directions: int | None = None
     bound: float = BOUND
@@ -57,7 +61,8 @@ class TruthSettings:
                "'combined', 'hemisphere' or 'light'", self.estimator)
         expect(self.emitters in ("all", "seen"), "emitters", "'all' or 'seen'", self.emitters)
         for key, low, high in (("samples", 1, 2**31), ("bounces", 1, 64), ("seed", 0, 2**32 - 1),
-                               ("light_grid", 1, 1024), ("picks", 1, 1024), ("photons", 1, 2**28), ("batch", 1, 2**30)):
+                               ("light_grid", 1, 1024), ("interleave", 1, 64), ("picks", 1, 1024),
+                               ("photons", 1, 2**28), ("batch", 1, 2**30)):
             value = getattr(self, key)
             expect(isinstance(value, int) and low <= value <= high, key, f"an integer, {low} to {high}", value)
         expect(self.directions is None or 1 <= self.directions <= 65536, "directions", "1 to 65536",
@@ -65,6 +70,7 @@ class TruthSettings:
         for key in ("seconds", "target_error"):
             value = getattr(self, key)
             expect(value is None or (math.isfinite(value) and value > 0), key, "a finite number > 0", value)
+        expect(0 < self.uniform_share <= 1, "uniform_share", "a number in (0, 1]", self.uniform_share)
         expect(math.isfinite(self.bound) and self.bound > 0, "bound", "a finite number > 0", self.bound)
         expect(self.bounces == 1 or self.estimator != "light", "bounces",
                "1 for the light estimator, which knows no further bounce", self.bounces)

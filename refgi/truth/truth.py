@@ -1,47 +1,37 @@
 """The ground truth: one-bounce irradiance at the G-buffer's points, with its standard error."""
 
+import dataclasses
 import hashlib
 import time
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+import refgi
 from refgi.errors import RefgiWarning
 from refgi.rsm.projection import camera_projection
 from refgi.scene import Scene
-from refgi.shadowed import Receivers, receivers
+from refgi.shadowed import receivers
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
-from refgi.truth.moments import Moments, add_pass, load, no_passes, save
-from refgi.truth.passes import Task, one_pass
+from refgi.truth.checkpoint import Checkpoint
+from refgi.truth.moments import Moments, add_pass, blocks_of, no_passes, with_means
+from refgi.truth.passes import one_pass
+from refgi.truth.pilot import pilot
+from refgi.truth.result import TruthResult, result_of
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import lights_of, surfaces
+from refgi.truth.task import Task, sets_of
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
 Array = npt.NDArray[Any]
 
-
-class TruthResult(NamedTuple):
-    """Irradiance by path tracing, and how sure it is."""
-
-    mean: Array  # (3, h, w) float64, W/m^2
-    variance_of_mean: Array  # (3, h, w) float64, (W/m^2)^2, estimated from the spread of the passes
-    samples: Array  # (h, w) int64 samples a pixel; 0 where nothing is seen
-    picture_mean: Array  # (3,) float64: mean over all pixels that see a surface
-    picture_variance: Array  # (3,) float64: variance of that mean, with the correlation between pixels
-    passes: int
-    lost: int = 0  # values of a pixel in a pass that were not finite numbers and are left out
-
-    @property
-    def standard_error(self) -> Array:
-        """Standard error of each pixel and channel, (3, h, w), W/m^2."""
-        return np.sqrt(self.variance_of_mean)
-
+WHEN_IT_STOPS = {"samples", "seconds", "target_error", "checkpoint", "batch"}  # settings that change no pass
 
 def truth(frame: "Frame", settings: TruthSettings | None = None) -> Array:
     """Compute the one-bounce irradiance by path tracing.
@@ -117,24 +107,28 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
     InputError
         If the checkpoint file is damaged or of another computation.
     """
+    buffer = (position, normal, triangle_id)
+    if settings.seconds is not None:
+        _warm_up(scene, tracer, buffer, settings)
     started = time.perf_counter()
-    to = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
-    caustics = film(scene, triangle_id.shape) if settings.caustics else _sharp_lobes(scene, triangle_id.shape, settings)
-    found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else SHARP_LOBE)
-    view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None
-    task = Task(scene, settings, tracer, found, lights_of(scene), to, caustics, view)
-    file = Path(settings.checkpoint) if settings.checkpoint else None
-    name = _fingerprint(task) if file else ""
-    moments = load(file, name) if file and file.exists() else no_passes(len(to.pixel))
-    while not _enough(moments, settings, time.perf_counter() - started):
-        add_pass(moments, one_pass(task, int(moments.passes)))
+    task = task_of(scene, tracer, *buffer, settings)
+    block, grid = blocks_of(task.to.pixel, triangle_id.shape)
+    values = len(block) + grid[0] * grid[1] + 1
+    file = Checkpoint(Path(settings.checkpoint), _fingerprint(task, triangle_id.shape), values) \
+        if settings.checkpoint else None
+    moments = file.moments if file else no_passes(values)
+    while not _enough(moments, len(block), settings, time.perf_counter() - started):
+        add_pass(moments, with_means(one_pass(task, int(moments.passes)), block, grid[0] * grid[1]))
         if file:
-            save(file, moments, name)
+            file.save_when_due()
         report_progress(min(1.0, int(moments.passes) / settings.passes))
-    result = _result(moments, to, settings, triangle_id.shape)
+    if file:
+        file.save()
+    result = result_of(moments, task.to.pixel, triangle_id.shape, (block, grid),
+                       settings.picks_per_pass + settings.directions_per_pass)
     if result.lost:
-        warnings.warn(RefgiWarning(f"scene {scene.name!r}: {result.lost} of {int(moments.passes) * len(to.pixel)} "
-                                   "values of a pixel in a pass are not finite numbers and left out"), stacklevel=3)
+        warnings.warn(RefgiWarning(f"scene {scene.name!r}: {result.lost} of {int(moments.passes) * len(block)} values "
+                                   "of a pixel in a pass are not finite numbers and left out"), stacklevel=3)
     return result
 
 
@@ -151,7 +145,47 @@ def _sharp_lobes(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) 
     return film(scene, (shape[0], shape[1]), SHARP_LOBE, longest=2) if sharp else None
 
 
-def _enough(moments: Moments, settings: TruthSettings, seconds: float) -> bool:
+def _warm_up(scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array], settings: TruthSettings) -> None:
+    """Run a pass of one pixel that nobody waits for: kernels are compiled or loaded before the clock starts."""
+    covered = np.flatnonzero(buffer[2].reshape(-1) >= 0)[:1]
+    position, normal = (field.reshape(3, 1, -1)[..., covered] for field in buffer[:2])
+    task = task_of(scene, tracer, position, normal, buffer[2].reshape(1, -1)[:, covered], settings)
+    values = with_means(one_pass(task, 0), np.zeros(len(covered), np.int64), 1)
+    add_pass(no_passes(values.shape[1]), values)
+
+
+def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
+            settings: TruthSettings) -> Task:
+    """Prepare what every pass works on.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    tracer : Tracer
+        Its rays.
+    position, normal : (3, h, w) ndarray
+        The G-buffer's, world space.
+    triangle_id : (h, w) int ndarray
+        Which triangle each pixel sees; -1 for none.
+    settings : TruthSettings
+        How.
+
+    Returns
+    -------
+    Task
+        With the densities that the pilot found.
+    """
+    to = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
+    set_of = sets_of(to.pixel, triangle_id.shape[1], settings.interleave)
+    caustics = film(scene, triangle_id.shape) if settings.caustics else _sharp_lobes(scene, triangle_id.shape, settings)
+    found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else SHARP_LOBE)
+    view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None
+    task = Task(scene, settings, tracer, found, lights_of(scene), to, set_of, caustics, view)
+    return task._replace(densities=pilot(task))
+
+
+def _enough(moments: Moments, receivers: int, settings: TruthSettings, seconds: float) -> bool:
     passes = int(moments.passes)
     if passes < 2:
         return False
@@ -159,30 +193,17 @@ def _enough(moments: Moments, settings: TruthSettings, seconds: float) -> bool:
         return True
     if settings.target_error is None:
         return False
-    error = np.sqrt(moments.variance_of_mean[:, :-1].mean()) if moments.mean.shape[1] > 1 else 0.0
+    error = np.sqrt(moments.variance_of_mean[:, :receivers].mean()) if receivers else 0.0
     return bool(error <= settings.target_error * moments.mean[:, -1].mean())
 
 
-def _result(moments: Moments, to: Receivers, settings: TruthSettings, shape: tuple[int, ...]) -> TruthResult:
-    mean, variance = np.zeros((3, *shape)), np.zeros((3, *shape))
-    samples = np.zeros(shape, np.int64)
-    variance_of_mean = moments.variance_of_mean
-    mean.reshape(3, -1)[:, to.pixel] = moments.mean[:, :-1]
-    variance.reshape(3, -1)[:, to.pixel] = variance_of_mean[:, :-1]
-    per_pass = settings.picks_per_pass + settings.directions_per_pass
-    samples.reshape(-1)[to.pixel] = (int(moments.passes) - moments.lost[:-1]) * per_pass
-    return TruthResult(mean, variance, samples, moments.mean[:, -1].copy(), variance_of_mean[:, -1],
-                       int(moments.passes), int(moments.lost[:-1].sum()))
-
-
-def _fingerprint(task: Task) -> str:
-    """Return a name for everything the passes depend on; not for when they stop."""
-    settings = task.settings
-    digest = hashlib.sha256(repr((
-        settings.estimator, settings.visibility, settings.bounces, settings.caustics, settings.seed,
-        settings.light_grid, settings.picks_per_pass, settings.directions_per_pass, settings.bound,
-        settings.photons)).encode())
+def _fingerprint(task: Task, shape: tuple[int, ...]) -> bytes:
+    """Return a digest of everything the passes depend on; not of when they stop."""
+    chosen = {field.name: getattr(task.settings, field.name) for field in dataclasses.fields(task.settings)
+              if field.name not in WHEN_IT_STOPS}
+    digest = hashlib.sha256(repr((refgi.__version__, shape, chosen)).encode())
     seen_by = () if task.view is None else (task.view.origin, task.view.frame, task.view.half)
-    for array in (*task.surfaces, *task.lights, *task.to, *seen_by):
-        digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).data)
-    return digest.hexdigest()
+    film = () if task.caustics is None else (task.caustics.solid_angle, *task.caustics.mirrors, task.caustics.ior)
+    for array in (*task.surfaces, *task.lights, *task.to, *seen_by, *film):
+        digest.update(repr((array.shape, array.dtype.str)).encode() + np.ascontiguousarray(array).data)
+    return digest.digest()

@@ -16,7 +16,7 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.scene import load_scene
 from refgi.truth import TruthSettings, trace_truth, truth
-from refgi.truth.moments import add_pass, load, no_passes, save
+from refgi.truth.moments import add_pass, no_passes, with_means
 
 SIZE, ROOT = 48, Path(__file__).parents[2]
 
@@ -33,13 +33,14 @@ def long_run(frame):
 
 def test_moments_are_mean_and_variance_of_the_passes():
     values = np.random.default_rng(1).normal(3.0, 2.0, size=(7, 3, 50))
-    moments = no_passes(50)
+    block = np.arange(50) // 20  # two blocks of 20 and one of 10; a fourth has nobody
+    moments = no_passes(55)
     for value in values:
-        add_pass(moments, value)
-    assert moments.mean[:, :-1] == pytest.approx(values.mean(axis=0), rel=1e-13)
-    assert moments.variance_of_mean[:, :-1] == pytest.approx(values.var(axis=0, ddof=1) / 7, rel=1e-12)
-    assert moments.mean[:, -1] == pytest.approx(values.mean(axis=(0, 2)), rel=1e-13)
-    assert moments.variance_of_mean[:, -1] == pytest.approx(values.mean(axis=2).var(axis=0, ddof=1) / 7, rel=1e-11)
+        add_pass(moments, with_means(value, block, 4))
+    blocks = np.stack([values[..., block == b].mean(axis=2) for b in range(3)] + [np.zeros((7, 3))], axis=2)
+    expected = np.concatenate([values, blocks, values.mean(axis=2, keepdims=True)], axis=2)
+    assert moments.mean == pytest.approx(expected.mean(axis=0), rel=1e-13)
+    assert moments.variance_of_mean == pytest.approx(expected.var(axis=0, ddof=1) / 7, rel=1e-11)
 
 
 STUDENT = np.array([0.674, 0.945, 0.994])  # shares within 1, 2, 3 sigma at 29 degrees of freedom: 30 passes
@@ -101,63 +102,6 @@ def test_both_doors_give_the_same_picture(frame, monkeypatch, evidence):
     by_run = trace_truth(Frame(frame.scene, width=SIZE, height=SIZE), settings)
     assert np.array_equal(by_run.mean, trace_truth(frame, settings).mean)
     evidence("embreex's run and Embree by address: equal bits")
-
-
-KILLED = """
-import sys
-from refgi.frame import Frame
-from refgi.scene import load_scene
-from refgi.truth import TruthSettings, trace_truth
-frame = Frame(load_scene("cornell_box"), width=48, height=48)
-trace_truth(frame, TruthSettings(samples=24 * 100000, checkpoint=sys.argv[1]))
-"""
-
-
-@pytest.mark.feature("REF-19")
-def test_a_killed_run_goes_on_from_its_last_pass(frame, tmp_path, evidence):
-    file = tmp_path / "truth.npz"
-    child = subprocess.Popen([sys.executable, "-c", KILLED, str(file)], cwd=ROOT)
-    deadline = time.monotonic() + 120
-    while not file.exists() and time.monotonic() < deadline and child.poll() is None:
-        time.sleep(0.05)
-    time.sleep(0.3)
-    child.send_signal(signal.SIGKILL)
-    child.wait()
-    with np.load(file) as stored:
-        done = int(stored["passes"])
-    assert done >= 1
-    settings = TruthSettings(samples=24 * (done + 3), checkpoint=file)
-    resumed = trace_truth(frame, settings)
-    straight = trace_truth(frame, dataclasses.replace(settings, checkpoint=None))
-    assert resumed.passes == straight.passes == done + 3
-    assert all(np.array_equal(a, b) for a, b in zip(resumed, straight, strict=True))
-    evidence(f"killed after pass {done}, went on for 3: equal bits")
-
-
-def test_a_checkpoint_of_something_else_is_refused(frame, tmp_path):
-    file = tmp_path / "truth.npz"
-    trace_truth(frame, TruthSettings(samples=48, checkpoint=file))
-    with pytest.raises(InputError, match="another"):
-        trace_truth(frame, TruthSettings(samples=48, checkpoint=file, seed=3))
-    file.write_bytes(file.read_bytes()[:1000])
-    with pytest.raises(InputError, match=r"truth\.npz"):
-        trace_truth(frame, TruthSettings(samples=48, checkpoint=file))
-    assert [path.name for path in tmp_path.iterdir()] == ["truth.npz"]
-
-
-def test_a_checkpoint_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
-    file, moments = tmp_path / "deep" / "c.npz", no_passes(5)
-    save(file, moments, "a")
-    add_pass(moments, np.ones((3, 5)))
-
-    def full_disk(*_args, **_kwargs):
-        raise OSError("no space left")
-
-    monkeypatch.setattr(np, "savez", full_disk)
-    with pytest.raises(OSError, match="no space"):
-        save(file, moments, "a")
-    assert int(load(file, "a").passes) == 0
-    assert len(list(file.parent.iterdir())) == 1
 
 
 @pytest.mark.feature("REF-05")

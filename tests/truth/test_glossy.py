@@ -15,7 +15,7 @@ from refgi.scene import SpotLight
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.light_grid import light_rays
 from refgi.truth.lit_points import join, trace_lit_points
-from refgi.truth.moments import add_pass, no_passes
+from refgi.truth.moments import add_pass, no_passes, with_means
 from refgi.truth.surfaces import lights_of, lobe_pattern, surfaces
 from tests.naive.truth import mirror_mean
 from tests.test_lobes import literal_power
@@ -115,17 +115,16 @@ def test_the_pattern_of_a_lobe_against_sixty_digits():
 
 
 def test_values_that_are_no_numbers_are_counted_and_left_out():
-    moments = no_passes(3)
+    moments, block = no_passes(6), np.array([0, 0, 1])
     values = [np.full((3, 3), float(k)) for k in range(4)]
     values[1][1, 2] = np.nan
     values[2][0, 2] = np.inf
     for value in values:
-        add_pass(moments, value)
-    assert moments.lost.tolist() == [0, 0, 2, 0]
-    np.testing.assert_allclose(moments.mean[:, :3], [[1.5, 1.5, 1.5]] * 3)
-    np.testing.assert_allclose(moments.mean[:, 3], 1.5)
-    variance = np.var([0, 1, 2, 3], ddof=1) / 4
-    np.testing.assert_allclose(moments.variance_of_mean[:, :3], [[variance, variance, np.var([0, 3], ddof=1) / 2]] * 3)
+        add_pass(moments, with_means(value, block, 2))
+    assert moments.lost.tolist() == [0, 0, 2, 0, 2, 0]
+    np.testing.assert_allclose(moments.mean, [[1.5] * 6] * 3)
+    variance, of_two = np.var([0, 1, 2, 3], ddof=1) / 4, np.var([0, 3], ddof=1) / 2
+    np.testing.assert_allclose(moments.variance_of_mean, [[variance, variance, of_two, variance, of_two, variance]] * 3)
 
 
 def test_a_picture_tells_how_many_values_it_lost(monkeypatch):

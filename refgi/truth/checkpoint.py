@@ -1,0 +1,134 @@
+"""Checkpoints: all passes so far in one file, which a later run of the same computation continues.
+
+The file holds a first line, SHA-256 digests of the computation and of the content, and the content: number of passes
+(int64), means and sums of squares (float64), values left out (int64), little-endian. Its length follows from the
+computation, so nothing of a file that is damaged, or another's, is ever taken in.
+"""
+
+import contextlib
+import hashlib
+import os
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import InputError, RefgiWarning, expect
+from refgi.truth.moments import Moments, no_passes
+
+Array = npt.NDArray[Any]
+
+FIRST_LINE = b"refgi truth checkpoint 2\n"
+DIGEST = 32  # bytes of SHA-256
+SECONDS_BETWEEN = 10.0  # saves are at least that far apart
+
+
+class Checkpoint:
+    """A checkpoint file of one computation.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    computation : bytes
+        SHA-256 digest of everything that the passes depend on.
+    values : int
+        How many values a pass has.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, belongs to another computation or cannot be written, before anything is computed.
+    """
+
+    def __init__(self, path: Path, computation: bytes, values: int) -> None:
+        self._path, self._computation, self._warned = path, computation, False
+        self.moments = _load(path, computation, values) if os.path.lexists(path) else no_passes(values)
+        self._saved = int(self.moments.passes)
+        with _clear_errors(path, "a place for a file of its size"):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with _temporary(path, self._content()):
+                pass
+        self._due = time.monotonic() + SECONDS_BETWEEN
+
+    def save_when_due(self) -> None:
+        """Save if the last attempt is long enough ago."""
+        if time.monotonic() >= self._due:
+            self.save()
+
+    def save(self) -> None:
+        """Write the file whole or not at all; a failure is a warning, once, and the file stays as it was."""
+        if self._saved == int(self.moments.passes):
+            return
+        try:
+            with _temporary(self._path, self._content()) as temporary:
+                temporary.replace(self._path)
+            self._saved = int(self.moments.passes)
+        except OSError as trouble:
+            if not self._warned:
+                warnings.warn(RefgiWarning(f"checkpoint {self._path}: not saved ({trouble.strerror or trouble}); "
+                                           f"it still holds {self._saved} passes, and computing goes on"), stacklevel=3)
+            self._warned = True
+        self._due = time.monotonic() + SECONDS_BETWEEN
+
+    def _content(self) -> bytes:
+        content = b"".join(np.asarray(field, kind).tobytes()
+                           for field, kind in zip(self.moments, ("<i8", "<f8", "<f8", "<i8"), strict=True))
+        return FIRST_LINE + self._computation + _digest(self._computation, content) + content
+
+
+def _load(path: Path, computation: bytes, values: int) -> Moments:
+    with _clear_errors(path, "a checkpoint file"):
+        expect(path.is_file(), f"checkpoint {path}", "a checkpoint file", "something else")
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            head = file.read(len(FIRST_LINE) + 2 * DIGEST)
+            expect(head.startswith(FIRST_LINE) and len(head) == len(FIRST_LINE) + 2 * DIGEST, f"checkpoint {path}",
+                   "a checkpoint file of this version", f"{size} bytes of something else")
+            found, digest = head[len(FIRST_LINE):-DIGEST], head[-DIGEST:]
+            expect(found == computation, f"checkpoint {path}",
+                   "one of this scene, picture, settings and version of refgi", "another's")
+            whole = len(head) + 8 * (1 + 7 * values)
+            expect(size == whole, f"checkpoint {path}", f"a whole file of {whole} bytes", size)
+            content = file.read(whole - len(head))
+    expect(_digest(computation, content) == digest, f"checkpoint {path}", "its own SHA-256 digest", "a damaged file")
+    passes = np.frombuffer(content, "<i8", 1).astype(np.int64).reshape(())
+    mean, squares = np.frombuffer(content, "<f8", 6 * values, 8).astype(np.float64).reshape(2, 3, values)
+    lost = np.frombuffer(content, "<i8", offset=8 * (1 + 6 * values)).astype(np.int64)
+    usable = passes >= 0 and np.isfinite(mean).all() and np.isfinite(squares).all() and (squares >= 0).all()
+    expect(bool(usable and (lost >= 0).all() and (lost <= passes).all()), f"checkpoint {path}", "finite moments",
+           "others")
+    return Moments(passes, np.ascontiguousarray(mean), np.ascontiguousarray(squares), lost)
+
+
+def _digest(computation: bytes, content: bytes) -> bytes:
+    return hashlib.sha256(computation + content).digest()
+
+
+@contextlib.contextmanager
+def _temporary(path: Path, content: bytes) -> Iterator[Path]:
+    """Write a file beside a path, on the disk itself, and remove it unless it is renamed inside the block."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        yield Path(name)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _clear_errors(path: Path, expected: str) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError) as trouble:
+        if isinstance(trouble, InputError):
+            raise
+        raise InputError(f"checkpoint {path}: expected {expected}, got {trouble}") from trouble

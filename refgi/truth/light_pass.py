@@ -1,0 +1,108 @@
+"""The light side of a pass: fresh lit points from every light, picks among them, a shadow ray for each pick."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.truth.light_grid import rays_through, stratified_sets
+from refgi.truth.light_side import pick, tiles
+from refgi.truth.lit_points import PointSets, join, trace_lit_points
+from refgi.truth.paths import Shadows
+from refgi.truth.seen import seen_points
+from refgi.truth.task import Task, settle, shadow_batch, spans
+
+Array = npt.NDArray[Any]
+
+
+def add_light_side(task: Task, words: Array, sums: Array) -> None:
+    """Add what picked lit points send.
+
+    Parameters
+    ----------
+    task : Task
+        What to compute.
+    words : (3,) uint32 ndarray
+        The pass's random numbers: two for the lit points, one for the picks.
+    sums : (3, r) float64 ndarray
+        Added to, W/m^2.
+    """
+    sets, picks = fresh_points(task, np.random.default_rng(words[:2])), task.settings.picks
+    if not len(sets.points.power):
+        return
+    for first, last in spans(task, picks):
+        rays, _ = pick_points(task, sets, (first, last), picks, int(words[2]))
+        settle(task, rays, first, picks, sums, task.settings.visibility)
+
+
+def fresh_points(task: Task, random: np.random.Generator) -> PointSets:
+    """Send fresh rays from every light and return what they light.
+
+    Parameters
+    ----------
+    task : Task
+        What to compute.
+    random : numpy.random.Generator
+        Places the rays in their cells.
+
+    Returns
+    -------
+    PointSets
+        Of all lights.
+    """
+    n, side = task.settings.light_grid, task.settings.interleave
+    count = len(task.scene.lights)
+    return lit_points(task, [stratified_sets(n, side, random) for _ in range(count)], task.densities or (None,) * count)
+
+
+def lit_points(task: Task, squares: list[Array], densities: tuple[Any, ...]) -> PointSets:
+    """Send rays from every light through points of its unit square and return what they light.
+
+    Parameters
+    ----------
+    task : Task
+        What to compute.
+    squares : list of (sets, n, 2) ndarray
+        Points of each light, in sets.
+    densities : tuple of Density or None
+        Of each light.
+
+    Returns
+    -------
+    PointSets
+        Of all lights.
+    """
+    settings, sets, per_set = task.settings, len(squares[0]) if squares else 1, squares[0].shape[1] if squares else 1
+    parts = []
+    for k, (light, square, density) in enumerate(zip(task.scene.lights, squares, densities, strict=True)):
+        rays = rays_through(light, task.scene.geometry, square.reshape(-1, 2), per_set, density)
+        part = trace_lit_points(task.tracer, task.surfaces, task.lights, k, rays, settings.shared_bound)
+        parts.append(part if task.view is None else seen_points(task.tracer, task.view, part))
+    return join(parts, sets, per_set)
+
+
+def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, seed: int) -> tuple[Shadows, Array]:
+    """Let the receivers of a span pick lit points.
+
+    Parameters
+    ----------
+    task : Task
+        Names the receivers.
+    sets : PointSets
+        Lit points.
+    span : tuple of 2 ints
+        First receiver and one past the last.
+    picks : int
+        Picks of each receiver.
+    seed : int
+        Random shift of each receiver's picks.
+
+    Returns
+    -------
+    Shadows, (n,) int32 ndarray
+        Shadow rays, not traced, and which point each goes to.
+    """
+    rays, picked = shadow_batch((span[1] - span[0]) * picks), np.empty((span[1] - span[0]) * picks, np.int32)
+    pick(*sets, task.to, tiles(task.set_of, *span), (span[0], picks, seed, np.float32(task.tracer.grain)),
+         (rays.origin, rays.direction, rays.reach, rays.worth, picked))
+    return rays, picked

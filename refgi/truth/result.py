@@ -1,0 +1,129 @@
+"""TruthResult: irradiance by path tracing, and how sure it is at every scale."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.truth.moments import BLOCK_SIDE, Moments
+
+Array = npt.NDArray[Any]
+
+
+class TruthResult(NamedTuple):
+    """Irradiance by path tracing, and how sure it is.
+
+    Variances are estimated from the spread of the passes, with `degrees_of_freedom` = passes - 1: from two passes they
+    say little more than the order of magnitude. `confidence_factor` turns standard errors into intervals that know it.
+    """
+
+    mean: Array  # (3, h, w) float64, W/m^2
+    variance_of_mean: Array  # (3, h, w) float64, (W/m^2)^2
+    samples: Array  # (h, w) int64 samples a pixel; 0 where nothing is seen
+    picture_mean: Array  # (3,) float64: mean over all pixels that see a surface
+    picture_variance: Array  # (3,) float64: variance of that mean, with the correlation between pixels
+    passes: int
+    block_mean: Array  # (3, ceil(h / 8), ceil(w / 8)) float64: means over the pixels of a block that see a surface
+    block_variance: Array  # the same shape: their variances, with the correlation between pixels
+    block_pixels: Array  # (ceil(h / 8), ceil(w / 8)) int64: how many pixels of a block see a surface
+    lost: int = 0  # values of a pixel in a pass that were not finite numbers and are left out
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard error of each pixel and channel, (3, h, w), W/m^2."""
+        return np.sqrt(self.variance_of_mean)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Of the variances: passes less one."""
+        return self.passes - 1
+
+    @property
+    def pixel_error(self) -> float:
+        """Root mean square standard error of a pixel over the picture's mean."""
+        return self._relative(self.variance_of_mean, self.samples > 0)
+
+    @property
+    def block_error(self) -> float:
+        """Root mean square standard error of a mean over 8 x 8 pixels over the picture's mean."""
+        return self._relative(self.block_variance, self.block_pixels)
+
+    @property
+    def picture_error(self) -> float:
+        """Root mean square standard error of the picture's mean over that mean."""
+        return self._relative(self.picture_variance, np.ones(()))
+
+    def confidence_factor(self, level: float = 0.95) -> float:
+        """Return how many standard errors hold the expectation with a given probability, by Student's t.
+
+        Parameters
+        ----------
+        level : float
+            The probability, in (0, 1).
+
+        Returns
+        -------
+        float
+            12.7 from two passes, 2.36 from eight, towards 1.96 for many, at 95 %.
+        """
+        from scipy.stats import t
+
+        return float(t.ppf(0.5 + level / 2, self.degrees_of_freedom))
+
+    @property
+    def error_statement(self) -> str:
+        """What is known of the error, in a sentence."""
+        factor = self.confidence_factor()
+        parts = ((self.pixel_error, "a pixel"), (self.block_error, f"a block of {BLOCK_SIDE}x{BLOCK_SIDE} pixels"),
+                 (self.picture_error, "the picture's mean"))
+        freedom = "1 degree" if self.passes == 2 else f"{self.degrees_of_freedom} degrees"
+        return (f"95 % confidence intervals over the picture's mean, by Student's t with {freedom} of freedom "
+                f"({self.passes} passes): " + ", ".join(f"+-{factor * error:.2%} {what}" for error, what in parts))
+
+    @property
+    def errors(self) -> dict[str, Any]:
+        """The figures of the error by name, for reports."""
+        return {"pixel": self.pixel_error, "block": self.block_error, "picture": self.picture_error,
+                "passes": self.passes, "degrees_of_freedom": self.degrees_of_freedom,
+                "confidence_factor_95": self.confidence_factor(), "statement": self.error_statement}
+
+    def _relative(self, variance: Array, weight: Array) -> float:
+        scale, total = float(self.picture_mean.mean()), float(weight.sum())
+        if scale == 0 or total == 0:
+            return 0.0
+        return float(np.sqrt((variance.mean(axis=0) * weight).sum() / total) / scale)
+
+
+def result_of(moments: Moments, pixel: Array, shape: tuple[int, ...], blocks: tuple[Array, tuple[int, int]],
+              per_pass: int) -> TruthResult:
+    """Lay out moments as pictures.
+
+    Parameters
+    ----------
+    moments : Moments
+        Of receivers, blocks and picture.
+    pixel : (r,) ndarray
+        Flat index of each receiver into the picture.
+    shape : tuple of 2 ints
+        Rows and columns of the picture.
+    blocks : tuple of (r,) ndarray and tuple of 2 ints
+        Block of each receiver; rows and columns of blocks.
+    per_pass : int
+        Samples of each receiver in a pass.
+
+    Returns
+    -------
+    TruthResult
+        Zero where nothing is seen.
+    """
+    (block, grid), r = blocks, len(pixel)
+    mean, variance = np.zeros((3, *shape)), np.zeros((3, *shape))
+    samples = np.zeros(shape, np.int64)
+    variance_of_mean, passes = moments.variance_of_mean, int(moments.passes)
+    mean.reshape(3, -1)[:, pixel] = moments.mean[:, :r]
+    variance.reshape(3, -1)[:, pixel] = variance_of_mean[:, :r]
+    samples.reshape(-1)[pixel] = (passes - moments.lost[:r]) * per_pass
+    block_mean, block_variance = (table[:, r:-1].reshape(3, *grid).copy() for table in (moments.mean, variance_of_mean))
+    counts = np.bincount(block, minlength=grid[0] * grid[1]).reshape(grid)
+    return TruthResult(mean, variance, samples, moments.mean[:, -1].copy(), variance_of_mean[:, -1].copy(), passes,
+                       block_mean, block_variance, counts, int(moments.lost[:r].sum()))

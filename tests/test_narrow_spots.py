@@ -142,6 +142,7 @@ def test_rays_and_paths_carry_the_power_of_a_spot(degrees):
     light = narrow(degrees, 0.3, (0.1, -1.0, 0.3))
     table, n = light_table([light]), 256
     rays = light_rays(light, FLOOR, np.full((n * n, 2), 0.5))
+    assert rays.measure * n * n == pytest.approx(4 * math.pi * math.sin(light.outer_half_angle / 2) ** 2, rel=1e-14)
     carried = sum(radiant_intensity(table, 0, *d)[0] for d in rays.directions) * rays.measure
     assert carried / power(light) == pytest.approx(1, abs=1e-4)  # midpoints of 256 x 256 cells
     cosine = rays.directions @ table.direction[0]

@@ -1,6 +1,6 @@
 """Seeded random numbers of the methods: a hash of seed, stream and index, which any language reproduces to the bit.
 
-In GLSL, with `uint` of 32 bits:
+In GLSL, with ``uint`` of 32 bits::
 
     uint mix32(uint x) {
         x = (x ^ (x >> 16)) * 0x21F0AAADu;

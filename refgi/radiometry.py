@@ -69,7 +69,7 @@ def spot_falloff(d: Any, axis: Any, cone: Any, plain: float) -> Any:
     Notes
     -----
     cos a - cos b = sin(b - a) sin(b + a) / (cos a + cos b) with the angle a off the axis and the outer half-angle b,
-    and |d| sin a = |d x axis|, |d| cos a = d . axis for an axis of length 1. What sin(b - a) cancels is known to twice
+    and sin a, cos a from the lengths of d x axis and d . axis. What sin(b - a) cancels is known to twice
     the precision where it matters.
     """
     along = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]

@@ -142,6 +142,7 @@ def test_rays_and_paths_carry_the_power_of_a_spot(degrees):
     light = narrow(degrees, 0.3, (0.1, -1.0, 0.3))
     table, n = light_table([light]), 256
     rays = light_rays(light, FLOOR, np.full((n * n, 2), 0.5))
+    assert rays.measure * n * n == pytest.approx(4 * math.pi * math.sin(light.outer_half_angle / 2) ** 2, rel=1e-14)
     carried = sum(radiant_intensity(table, 0, *d)[0] for d in rays.directions) * rays.measure
     assert carried / power(light) == pytest.approx(1, abs=1e-4)  # midpoints of 256 x 256 cells
     cosine = rays.directions @ table.direction[0]
@@ -150,3 +151,16 @@ def test_rays_and_paths_carry_the_power_of_a_spot(degrees):
         left = walk_lights(Tracer(FLOOR), FLOOR, material_table([Material(diffuse=(0.5, 0.5, 0.5))], np.float64),
                            table, paths=20_000)
         assert left.flux[0].sum() / power(light) == pytest.approx(0.5, abs=1e-3)  # quasi-random falloff
+
+
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("degrees", DEGREES)
+def test_what_kernels_need_of_a_cone(degrees, share):
+    outer = math.radians(degrees)
+    row = cone_row(share * outer, outer)
+    with mpmath.workdps(60):
+        sine, cosine = mpmath.sin(outer), mpmath.cos(outer)
+        pairs = ((row[0] + mpmath.mpf(row[1]), sine), (row[2] + mpmath.mpf(row[3]), cosine))
+        assert all(abs(found - exact) <= 2.0**-104 * exact for found, exact in pairs)
+        assert row[4] == float(mpmath.cos(share * outer) - cosine)
+        assert row[5] == float(1 - cosine)

@@ -15,6 +15,7 @@ from refgi.rays.pieces import REACH, cut
 from refgi.scene import Camera, Geometry, Material, Mesh, SpotLight, light_table, material_table
 from refgi.shadowed import receivers
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
+from refgi.truth.surfaces import height_above, lift, surfaces
 from tests.truth.scenes import rectangle, scene
 
 DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -303,6 +304,20 @@ def test_nothing_blocks_in_a_convex_room(size, shift):
     assert (free == open_).all()
     free, open_ = (trace_truth(frame, TruthSettings("light", samples=32, visibility=v)).mean for v in (True, False))
     assert (free == open_).all()
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-3, -1e-3])
+def test_rays_go_on_above_the_face_whatever_their_distance_rounds_to(off):
+    """A found point that is off its face by a millimetre: the next ray starts above the face by the offset alone."""
+    plane = rectangle((-1, 0.3, 1), (2, 0.4, 0), (0, 0, -2))
+    tables = surfaces(scene([plane], SpotLight((0, 5, 0), (0, -1, 0), 0.3, 0.4, (1, 1, 1))))
+    for side in (1.0, -1.0):
+        g = side * np.array([-0.2, 1.0, 0.0]) / np.hypot(0.2, 1)
+        y = np.array([0.2, 0.3 + 0.2 * 1.2, 0.1]) + off * g
+        assert height_above(tables, 0, tuple(y), tuple(g)) == pytest.approx(off, abs=1e-15)
+        start = y + lift(tables, 0, tuple(y), tuple(g), 8.0) * g
+        height = (start - (0.2, 0.3 + 0.2 * 1.2, 0.1)) @ g
+        assert height == pytest.approx(4 * SINGLE * (np.abs(y).sum() + 8), abs=1e-15)
 
 
 def own_hits(frame, rays=16):

@@ -57,7 +57,7 @@ class Photons(NamedTuple):
 
 
 def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EXPONENT, *,
-         longest: int = LONGEST_CHAIN) -> Film | None:
+         longest: int | None = None) -> Film | None:
     """Prepare the counting of photons, or return None for a scene without mirror or glass.
 
     Parameters
@@ -68,8 +68,8 @@ def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EX
         Rows and columns of the picture.
     least_exponent : float
         Lobes from here on count as mirrors.
-    longest : int
-        Surfaces that a photon meets at most; at 2, one bounce, glass is opaque.
+    longest : int, optional
+        Surfaces that a photon meets at most, `LONGEST_CHAIN` where absent; at 2, one bounce, glass is opaque.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EX
     if not (mirrors.specular.any() or table.ior.any()):
         return None
     solid_angle = texel_solid_angles(camera_projection(scene.camera, shape[1], shape[0]))
-    return Film(scene, shape, solid_angle, mirrors, table.ior, longest)
+    return Film(scene, shape, solid_angle, mirrors, table.ior, LONGEST_CHAIN if longest is None else longest)
 
 
 def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, random: np.random.Generator) -> Array:

@@ -91,3 +91,29 @@ def test_glass_without_the_option_is_announced():
     with pytest.warns(RefgiWarning, match="glass is opaque and black"):
         trace_truth(frame, TruthSettings(samples=24))
     trace_truth(frame, TruthSettings(samples=24, caustics=True, photons=1024))  # says nothing
+
+
+def test_a_pane_of_glass_lets_light_through_on_its_far_side(evidence):
+    """Rays start on the side they leave to: a pane shifts and dims a lamp as Snell and Fresnel say."""
+    ior, height, top, thickness = 1.5, 2.0, 1.0, 0.4
+    pane = Material("pane", ior=ior)
+    faces = [rectangle((-1, top, 1), (2, 0, 0), (0, 0, -2), pane),
+             rectangle((-1, top - thickness, -1), (2, 0, 0), (0, 0, 2), pane)]
+    lamp = SpotLight((0.0, height, 0.0), (0.0, -1.0, 0.0), 0.35, 0.35, (3.0, 2.0, 1.0))
+    camera = Camera((0.0, 0.5, 0.0), (0.0, 0.0, 0.0), (0, 0, -1), 0.6, 16, 16)
+    frame = Frame(dataclasses.replace(scene([floor(3.0), *faces], lamp), camera=camera))
+    result = trace_truth(frame, TruthSettings(samples=24 * 4, caustics=True, photons=1 << 16))
+    angle = np.linspace(1e-4, 0.34, 4000)
+    inside = np.arcsin(np.sin(angle) / ior)
+    along = (height - thickness) * np.tan(angle) + thickness * np.tan(inside)
+    across = (np.cos(angle) - ior * np.cos(inside)) / (np.cos(angle) + ior * np.cos(inside))
+    beside = (ior * np.cos(angle) - np.cos(inside)) / (ior * np.cos(angle) + np.cos(inside))
+    share = (across**2 + beside**2) / 2
+    through = (1 - share) / (1 + share)  # with all reflections between the faces
+    expected = through * np.sin(angle) / (along * np.gradient(along, angle))
+    distance = np.hypot(frame.gbuffer.position[0], frame.gbuffer.position[2])
+    ratio = result.mean / (np.reshape(lamp.intensity, (3, 1, 1)) * np.interp(distance, along, expected))
+    error = np.sqrt(result.picture_variance / result.picture_mean**2).mean()
+    evidence(f"pane: {ratio.mean():.5f} of Snell and Fresnel (standard error {error:.5f})")
+    assert distance.max() < 0.3
+    assert abs(ratio.mean() - 1) < FOOTPRINT + 4 * error

@@ -61,8 +61,8 @@ class TruthSettings:
                "'combined', 'hemisphere' or 'light'", self.estimator)
         expect(self.emitters in ("all", "seen"), "emitters", "'all' or 'seen'", self.emitters)
         for key, low, high in (("samples", 1, 2**31), ("bounces", 1, 64), ("seed", 0, 2**32 - 1),
-                               ("light_grid", 1, 1024), ("interleave", 1, 64), ("picks", 1, 1024), ("photons", 1, 2**28),
-                               ("batch", 1, 2**30)):
+                               ("light_grid", 1, 1024), ("interleave", 1, 64), ("picks", 1, 1024),
+                               ("photons", 1, 2**28), ("batch", 1, 2**30)):
             value = getattr(self, key)
             expect(isinstance(value, int) and low <= value <= high, key, f"an integer, {low} to {high}", value)
         expect(self.directions is None or 1 <= self.directions <= 65536, "directions", "1 to 65536",

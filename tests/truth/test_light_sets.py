@@ -88,8 +88,8 @@ def test_weights_make_up_for_the_density(light):
 
 
 def test_neighbouring_pixels_take_turns():
-    sets = sets_of(np.arange(48), 8, 4).reshape(6, 8)
-    assert sets[:2].tolist() == [[0, 1, 2, 3] * 2, [4, 5, 6, 7] * 2]
+    sets = sets_of(np.arange(60), 10, 4).reshape(6, 10)  # a width that 4 does not divide
+    assert sets[:2].tolist() == [[0, 1, 2, 3, 0, 1, 2, 3, 0, 1], [4, 5, 6, 7, 4, 5, 6, 7, 4, 5]]
     assert np.array_equal(sets[:2], sets[4:])
     assert len(np.unique(sets[1:5, 3:7])) == 16
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
-from refgi.lobes import lobe_gap, lobe_power
 from refgi.rays import far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.shadowed import Receivers
@@ -27,6 +27,7 @@ TILE = 256  # most receivers that one parallel iteration owns: the SIMD lanes
 PART = 8  # senders whose terms a pick may have to compute again
 PARTS = BLOCK // PART
 TINY = np.float32(1e-30)  # m^2; smaller squared distances count as this one, so that no 0 / 0 arises
+BELOW_1 = np.float32(1 - 2.0**-24)
 
 
 @kernel
@@ -42,23 +43,30 @@ def _diffuse(dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any, mx: Any, my: 
 
 
 @kernel
-def _glossy(points: LitPoints, j: int, dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any) -> Any:
-    """Return min(q <n.w> / r^2, b) for a sender with or without a lobe."""
+def _lobe(points: LitPoints, j: int) -> Any:
+    """Return what `_shape` needs of sender j: axis, normal, pattern on the axis."""
+    return (points.axis[0, j], points.axis[1, j], points.axis[2, j], points.normal[0, j], points.normal[1, j],
+            points.normal[2, j], points.peak[j])
+
+
+@kernel
+def _shape(lobe: Any, dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any) -> Any:
+    """Return -h = <a.w> - 1 and f, of which G = f 2^(P log2(1 - h)) for a lobe around a; free of branches.
+
+    h = |a - w|^2 / 2, w the direction from the sender: near the axis of a sharp lobe h keeps its digits.
+    """
+    ax, ay, az, mx, my, mz, peak = lobe
     zero = np.float32(0)
-    r2 = max(dx * dx + dy * dy + dz * dz, TINY)
-    cos_x = nx * dx + ny * dy + nz * dz
-    above = -(points.normal[0, j] * dx + points.normal[1, j] * dy + points.normal[2, j] * dz)
-    if above <= zero or cos_x <= zero:
-        return zero
-    r = np.sqrt(r2)
-    if points.exponent[j] == np.float32(1):
-        along = -(points.axis[0, j] * dx + points.axis[1, j] * dy + points.axis[2, j] * dz)
-        power = (along if along > zero else zero) / r
-    else:
-        power = lobe_power(lobe_gap(points.axis[0, j], points.axis[1, j], points.axis[2, j], -dx, -dy, -dz),
-                           points.exponent[j])
-    pattern = points.peak[j] * power
-    return min(pattern * (cos_x / r) / r2, points.bound[j])
+    r2 = dx * dx + dy * dy + dz * dz
+    inverse = np.float32(1) / np.sqrt(r2 if r2 > TINY else TINY)
+    cos_x = (nx * dx + ny * dy + nz * dz) * inverse
+    above = -(mx * dx + my * dy + mz * dz)
+    ex, ey, ez = ax + dx * inverse, ay + dy * inverse, az + dz * inverse
+    h = np.float32(0.5) * (ex * ex + ey * ey + ez * ez)
+    factor = peak * (cos_x if cos_x > zero else zero) * (inverse * inverse)
+    factor = factor if h < BELOW_1 else zero
+    factor = factor if above > zero else zero
+    return -(h if h < BELOW_1 else BELOW_1), factor
 
 
 @kernel
@@ -80,13 +88,22 @@ def _sum_diffuse(points: LitPoints, tile: Array, first: int, count: int, parts: 
 
 @kernel
 def _sum_lobes(points: LitPoints, tile: Array, first: int, done: int, parts: Array) -> None:
-    """Fill the sums of the terms of each part of lobes at each receiver of a tile."""
+    """Fill the sums of the terms of each part of lobes at each receiver of a tile: one loop a function, for SIMD."""
+    power_of, factor = np.empty(TILE, np.float32), np.empty(TILE, np.float32)
     for p in range(done, parts.shape[0]):
         for j in range(first + p * PART, first + p * PART + PART):
-            px, py, pz, power = points.position[0, j], points.position[1, j], points.position[2, j], points.power[j]
+            px, py, pz = points.position[0, j], points.position[1, j], points.position[2, j]
+            power, exponent, bound, lobe = points.power[j], points.exponent[j], points.bound[j], _lobe(points, j)
             for i in range(TILE):
                 x, y, z, nx, ny, nz = tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i], tile[5, i]
-                parts[p, i] += power * _glossy(points, j, px - x, py - y, pz - z, nx, ny, nz)
+                power_of[i], factor[i] = _shape(lobe, px - x, py - y, pz - z, nx, ny, nz)
+            for i in range(TILE):
+                power_of[i] = log2p1(power_of[i])
+            for i in range(TILE):
+                power_of[i] = exp2(exponent * power_of[i])
+            for i in range(TILE):
+                geometry = factor[i] * power_of[i]
+                parts[p, i] += power * (geometry if geometry < bound else bound)
 
 
 @kernel
@@ -103,7 +120,9 @@ def _lobe_term(points: LitPoints, j: int, tile: Array, i: int) -> Any:
     """Return the term of one lobe at one receiver, bit for bit that which was summed."""
     dx, dy = points.position[0, j] - tile[0, i], points.position[1, j] - tile[1, i]
     dz = points.position[2, j] - tile[2, i]
-    return points.power[j] * _glossy(points, j, dx, dy, dz, tile[3, i], tile[4, i], tile[5, i])
+    power_of, factor = _shape(_lobe(points, j), dx, dy, dz, tile[3, i], tile[4, i], tile[5, i])
+    geometry = factor * exp2(points.exponent[j] * log2p1(power_of))
+    return points.power[j] * (geometry if geometry < points.bound[j] else points.bound[j])
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import sys
 import time
 import warnings
 from pathlib import Path
@@ -10,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-import refgi
 from refgi.errors import RefgiWarning
 from refgi.rsm.projection import camera_projection
 from refgi.scene import Scene
@@ -201,7 +201,7 @@ def _fingerprint(task: Task, shape: tuple[int, ...]) -> bytes:
     """Return a digest of everything the passes depend on; not of when they stop."""
     chosen = {field.name: getattr(task.settings, field.name) for field in dataclasses.fields(task.settings)
               if field.name not in WHEN_IT_STOPS}
-    digest = hashlib.sha256(repr((refgi.__version__, shape, chosen)).encode())
+    digest = hashlib.sha256(repr((sys.modules["refgi"].__version__, shape, chosen)).encode())
     seen_by = () if task.view is None else (task.view.origin, task.view.frame, task.view.half)
     film = () if task.caustics is None else (task.caustics.solid_angle, *task.caustics.mirrors, task.caustics.ior)
     for array in (*task.surfaces, *task.lights, *task.to, *seen_by, *film):

@@ -1,4 +1,4 @@
-"""Checkpoints: a killed run goes on to the same bits, a damaged file is one clear error, a full disk loses no picture."""
+"""Checkpoints: a killed run ends with the same bits, a damaged file is one clear error, a full disk loses nothing."""
 
 import dataclasses
 import errno

@@ -2,23 +2,22 @@
 
 import dataclasses
 import math
-import signal
-import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import f
 
 from refgi import jit
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.scene import load_scene
-from refgi.truth import TruthSettings, trace_truth, truth
+from refgi.truth import TruthResult, TruthSettings, trace_truth, truth
 from refgi.truth.moments import add_pass, no_passes, with_means
+from refgi.truth.passes import one_pass
 
-SIZE, ROOT = 48, Path(__file__).parents[2]
+SIZE = 48
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +82,93 @@ def test_scene_means_lie_within_their_own_standard_error(frame, long_run, eviden
     assert 0.6 < spread < 1.6  # rms of 16 values of Student's t (11 degrees): 1.1, give or take 0.2
 
 
+CERTAIN = 1e-4  # a chi-square value beyond the quantiles of this tail comes once in 5,000 runs
+
+
+def test_stated_block_and_picture_errors_are_the_spread_over_seeds(frame, evidence):
+    """Chi-square: squared deviations of 24 runs over the variance that they state on average."""
+    seeds, passes = 24, 6
+    runs = [trace_truth(frame, TruthSettings(samples=24 * passes, seed=2000 + seed)) for seed in range(seeds)]
+    figures = {}
+    for name in ("picture", "block"):
+        means = np.stack([getattr(run, f"{name}_mean") for run in runs]).reshape(seeds, 3, -1)
+        stated = np.stack([getattr(run, f"{name}_variance") for run in runs]).reshape(seeds, 3, -1).mean(axis=0)
+        chi2 = ((means - means.mean(axis=0)) ** 2).sum(axis=0) / stated
+        figures[name] = chi2[1]
+    # the stated variance is a mean of 24 estimates of 5 degrees of freedom: 120 of them, an F distribution
+    low, high = (seeds - 1) * f.ppf([CERTAIN, 1 - CERTAIN], seeds - 1, seeds * (passes - 1))
+    assert low < figures["picture"][0] < high
+    ratio = figures["block"].mean() / (seeds - 1)
+    assert 0.9 < ratio < 1.1  # of 36 blocks, whose errors go together: 0.3 / 6 apart if they did not
+    assert (figures["block"] < high * 1.3).all()
+    evidence(f"24 runs of 6 passes: variance over seeds is {figures['picture'][0] / (seeds - 1):.2f} (picture) and "
+             f"{ratio:.2f} (blocks) of what is stated")
+
+
+@pytest.mark.parametrize("name", ["cornell_box", "atrium"])
+def test_the_default_knows_the_pictures_mean_to_a_thousandth(name, evidence):
+    result = trace_truth(Frame(load_scene(name), width=256, height=192), TruthSettings())
+    evidence(f"{name} at 256x192: {result.error_statement}")
+    assert result.passes == 8
+    assert result.picture_error < 1e-3
+    assert result.picture_error < result.block_error / 4 < result.pixel_error / 8
+
+
+def test_blocks_are_means_of_pixels(frame):
+    found = Frame(frame.scene, width=44, height=20)
+    result = trace_truth(found, TruthSettings(samples=48))
+    seen = result.samples > 0
+    assert result.block_mean.shape == result.block_variance.shape == (3, 3, 6)
+    assert result.block_pixels.shape == (3, 6)
+    for row in range(3):
+        for column in range(6):
+            part = np.s_[8 * row : 8 * row + 8, 8 * column : 8 * column + 8]
+            count = int(seen[part].sum())
+            assert result.block_pixels[row, column] == count
+            expected = result.mean[(slice(None), *part)].sum(axis=(1, 2)) / max(1, count)
+            assert result.block_mean[:, row, column] == pytest.approx(expected, rel=1e-12)
+
+
+def made(passes, pixel, block, picture):
+    """Return a result of 2 x 16 pixels and two blocks with given variances and a mean of 2."""
+    ones, blocks = np.ones((3, 2, 16)), np.ones((3, 1, 2))
+    return TruthResult(2 * ones, pixel * ones, np.full((2, 16), 24), np.full(3, 2.0), np.full(3, picture), passes,
+                       2 * blocks, block * blocks, np.full((1, 2), 16))
+
+
+def test_errors_are_relative_and_say_how_sure_they_are():
+    result = made(2, 0.16, 0.04, 0.01)
+    assert (result.pixel_error, result.block_error, result.picture_error) == pytest.approx((0.2, 0.1, 0.05))
+    assert result.degrees_of_freedom == 1
+    assert result.confidence_factor() == pytest.approx(math.tan(0.95 * math.pi / 2), rel=1e-9)  # one degree: Cauchy
+    assert made(3, 1, 1, 1).confidence_factor(0.8) == pytest.approx(2 * 0.4 * math.sqrt(2 / (4 * 0.9 * 0.1)), rel=1e-9)
+    assert "1 degree of freedom (2 passes)" in result.error_statement
+    assert "+-63.53% the picture's mean" in result.error_statement
+    assert "7 degrees of freedom (8 passes)" in made(8, 1, 1, 1).error_statement
+    assert result.errors == {"pixel": result.pixel_error, "block": result.block_error, "picture": result.picture_error,
+                             "passes": 2, "degrees_of_freedom": 1, "statement": result.error_statement,
+                             "confidence_factor_95": result.confidence_factor()}
+    uneven = result._replace(block_variance=np.array([[[0.04, 0.36]]] * 3), block_pixels=np.array([[30, 2]]))
+    assert uneven.block_error == pytest.approx(math.sqrt((30 * 0.04 + 2 * 0.36) / 32) / 2)
+
+
+def test_nothing_lit_has_no_error():
+    dark = made(8, 0.0, 0.0, 0.0)._replace(picture_mean=np.zeros(3))
+    assert [dark.errors[name] for name in ("pixel", "block", "picture")] == [0, 0, 0]
+
+
+def test_seconds_count_from_the_end_of_compiling(frame, monkeypatch):
+    """The first pass of a process compiles; here it sleeps instead."""
+    module, slow = sys.modules["refgi.truth.truth"], [1.5]
+
+    def pass_after_compiling(*arguments):
+        time.sleep(slow.pop() if slow else 0)
+        return one_pass(*arguments)
+
+    monkeypatch.setattr(module, "one_pass", pass_after_compiling)
+    assert trace_truth(frame, TruthSettings(samples=10**9, seconds=1.2)).passes > 2
+
+
 @pytest.mark.feature("REF-19")
 def test_same_bits_for_threads_and_batches(frame, evidence):
     settings = TruthSettings(samples=72, bounces=2)
@@ -141,7 +227,8 @@ def test_what_comes_back(frame):
 
 @pytest.mark.parametrize(("key", "value"), [
     ("estimator", "magic"), ("samples", 0), ("seconds", -1.0), ("seconds", math.nan), ("target_error", 0.0),
-    ("bounces", 0), ("seed", -1), ("light_grid", 0), ("picks", 0), ("directions", 0), ("bound", 0.0), ("batch", 0),
+    ("bounces", 0), ("seed", -1), ("light_grid", 0), ("interleave", 0), ("uniform_share", 0.0), ("picks", 0),
+    ("directions", 0), ("bound", 0.0), ("batch", 0),
 ])
 def test_unusable_settings_are_refused(key, value):
     with pytest.raises(InputError, match=key):

@@ -125,9 +125,10 @@ def _watch(scene: "Scene", method: str, settings: Any, options: dict[str, Any], 
 
 def _second_frame(scene: "Scene", method: str, settings: Any, options: dict[str, Any], light: bool,
                   camera: bool) -> "list[Run]":
+    from refgi.frame import Frame
     from refgi.stages import Memory
 
-    memory, step = Memory(), STEP * scene.geometry.diagonal
+    memory, step = Memory(), STEP * Frame(scene, **options).seen_extent.diagonal
     _watch(scene, method, settings, options, memory)
     if light:
         scene = scene.with_lights(*(_moved(one, step) for one in scene.lights))

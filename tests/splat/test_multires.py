@@ -156,11 +156,11 @@ def test_slivers_between_doubled_pixels_take_the_light_around():
 
 @pytest.mark.parametrize(("change", "clamp"), [
     ({}, "disc"), ({"pattern": "halton", "warp": "A"}, "disc"), ({"target_error": 0.3}, "disc"),
-    ({"per_light": "light"}, "disc"), ({"supersampled": True}, "disc"), ({"source": "walk", "pattern": "halton"}, "none"),
+    ({"per_light": "light"}, "disc"), ({"supersampled": True}, "disc"), ({"source": "walk"}, "none"),
     ({"openness_flux": "roulette"}, "none"), ({"visibility": "rays"}, "none")])
 def test_near_pairs_are_clamped_where_that_is_possible(box, change, clamp):
     """Wiring: the picture is that of the clamp by its name, and another than that of the other."""
-    settings = MultiresSettings(lights=32, **{"pattern": "grid"} | change)
+    settings = MultiresSettings(lights=32, **change)
     light = multires(box, settings)
     np.testing.assert_array_equal(light, multires(box, dataclasses.replace(settings, clamp=clamp)))
     if clamp == "disc":

@@ -13,7 +13,7 @@ from refgi.cli.group import VerbGroup
 from refgi.cli.lights import read_lights
 from refgi.cluster import ValSettings
 from refgi.image import read_exr
-from refgi.methods import Picture, render
+from refgi.methods import Picture, find_method, render
 from refgi.scene import Camera, PointLight, SpotLight, load_scene
 from refgi.splat import SiiSettings
 
@@ -47,6 +47,18 @@ def plate(tmp_path):
     path = tmp_path / "plate.obj"
     path.write_text("v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 1 3 2\nf 1 4 3\n")
     return path
+
+
+@pytest.mark.parametrize(("method", "asked", "used"), [
+    ("vpl", [], "exact"), ("sii", [], "map"), ("vpl", ["--shadows", "map"], "map"),
+    ("sii", ["--shadows", "exact"], "exact"), ("vpl", ["--shadows", "auto"], "exact")])
+def test_shadows_are_exact_where_the_method_traces_rays(tmp_path, method, asked, used):
+    assert run("cornell_box", *TINY, "--method", method, *asked, "--out", tmp_path / "a.exr").exit_code == 0
+    scene = load_scene("cornell_box").with_camera(width=12, height=10)
+    settings = find_method(method).load()[1](lights=16)
+    picture = render(scene, method, settings, shadows=used, rsm_resolution=16)
+    channels = read_exr(tmp_path / "a.exr")[0]
+    np.testing.assert_array_equal(np.stack([channels[c] for c in "RGB"]), picture.radiance)
 
 
 def test_an_exr_holds_what_python_computes(tmp_path):

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from refgi.cli.group import VerbGroup
 from refgi.image import read_exr
+from refgi.methods import find_method, render
 from refgi.scene import load_scene
 from refgi.scene.path import scenes_along
 from refgi.scene.pathfile import read_path
@@ -67,6 +68,20 @@ def test_frames_are_what_python_computes(way, tmp_path):
     assert imageio.v3.imread(tmp_path / "new" / "way_00003.png").shape == (10, 12, 3)
     attributes = read_exr(tmp_path / "new" / "way_00003.exr")[1]
     assert (attributes["frame"], attributes["of"], attributes["settings"]["lights"]) == (3, 4, 16)
+
+
+@pytest.mark.parametrize(("method", "asked", "used"), [("vpl", [], "exact"), ("sii", [], "map"),
+                                                       ("vpl", ["--shadows", "map"], "map")])
+def test_frames_have_exact_shadows_where_the_method_traces_rays(way, tmp_path, method, asked, used):
+    result = run("cornell_box", way, *TINY, "--method", method, "--set", "lights=4", *asked, "--frames", 1, "--format",
+                 "exr", "--out", tmp_path / "out", "--json")
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["shadows"] == used
+    scene = load_scene("cornell_box").with_camera(width=12, height=10)
+    settings = find_method(method).load()[1](lights=4)
+    picture = render(scene, method, settings, shadows=used, rsm_resolution=16)
+    radiance = read_exr(tmp_path / "out" / "way_00000.exr")[0]
+    np.testing.assert_array_equal(np.stack([radiance[c] for c in "RGB"]), picture.radiance)
 
 
 @pytest.mark.parametrize("form", ["recursive", "printed"])

@@ -11,9 +11,9 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
 from refgi.methods import find_method, render
-from refgi.scene import DirectionalLight, load_scene
+from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
-from refgi.splat.multires import _halved
+from refgi.splat.multires import _footprints, _halved
 from refgi.splat.refinement.grid import representatives
 from refgi.stages import observe
 
@@ -152,6 +152,46 @@ def test_slivers_between_doubled_pixels_take_the_light_around():
     fine[:, 2:4] = False
     light = np.where(fine, np.array([1.0, 1, 9, 9, 3, 3]), 0)[None].repeat(3, axis=0)
     np.testing.assert_array_equal(_halved(light, fine, covered), [[[1, 2, 3]]] * 3)
+
+
+@pytest.mark.parametrize(("change", "clamp"), [
+    ({}, "disc"), ({"pattern": "halton", "warp": "A"}, "disc"), ({"target_error": 0.3}, "disc"),
+    ({"per_light": "light"}, "disc"), ({"supersampled": True}, "disc"), ({"source": "walk"}, "none"),
+    ({"openness_flux": "roulette"}, "none"), ({"visibility": "rays"}, "none")])
+def test_near_pairs_are_clamped_where_that_is_possible(box, change, clamp):
+    """Wiring: the picture is that of the clamp by its name, and another than that of the other."""
+    settings = MultiresSettings(lights=32, **change)
+    light = multires(box, settings)
+    np.testing.assert_array_equal(light, multires(box, dataclasses.replace(settings, clamp=clamp)))
+    if clamp == "disc":
+        assert (light != multires(box, dataclasses.replace(settings, clamp="none"))).any()
+    else:
+        with pytest.raises(InputError, match="clamp"):
+            dataclasses.replace(settings, clamp="disc")
+
+
+def test_the_default_clamp_keeps_subsplats_near_the_full_sum():
+    """Picture: light beside lights grows without bound, and no coarse subsplat can follow it (Fig. 13)."""
+    at, off = frame(width=96, height=96, rsm_resolution=256), {}
+    for clamp in ("auto", "none"):
+        settings = MultiresSettings(clamp=clamp)
+        light, full = multires(at, settings).astype(float), full_sum(at, settings).astype(float)
+        off[clamp] = np.sqrt(((light - full)[:, at.gbuffer.covered] ** 2).mean()) / full[:, at.gbuffer.covered].mean()
+    assert off["auto"] < FLOORS["tent"]
+    assert off["none"] > 2 * off["auto"]
+
+
+def test_the_demos_disc_counts_the_lights_of_each_map(box):
+    """By hand: pi L^2 / (1.5 N) with the 121 and 150 lights that 256 are on a spot's and a point light's map."""
+    spot = box.scene.lights[0]
+    at = Frame(box.scene.with_lights(spot, PointLight((0.3, 0.3, 0.2), (1.0, 1.0, 1.0))), width=8, height=8,
+               rsm_resolution=32)
+    settings = MultiresSettings(lights=256, as_published={"ams_disc"})
+    lights = choose_lights(at, settings)
+    for index, (source, count) in enumerate(zip(at.scene.lights, (121, 150), strict=True)):
+        here = lights.map_index == index
+        square = ((lights.position[:, here].T - np.asarray(source.position)) ** 2).sum(axis=1)
+        np.testing.assert_allclose(_footprints(at, lights, settings)[here], math.pi * square / (1.5 * count), rtol=1e-6)
 
 
 def test_cells_of_background_are_no_subsplats(box):

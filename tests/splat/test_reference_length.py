@@ -146,6 +146,14 @@ def test_lengths_scale_with_powers_of_two_to_the_bit(factor):
     assert reference_length(far, longer, PAPER) == factor * reference_length(to, lights, PAPER)
 
 
+def test_many_lights_have_the_length_of_few():
+    """Property: of 25,600 lights every second is looked at, and the length is a scene's, not a number of lights'."""
+    at = Frame(load_scene("cornell_box"), width=64, height=64, rsm_resolution=160)
+    every, few = SiiSettings(pattern="all", i_low=0.05), SiiSettings(i_low=0.05)
+    lengths = [reference_length(receivers(at), choose_lights(at, settings), settings) for settings in (every, few)]
+    assert lengths[0] == pytest.approx(lengths[1], rel=SAMPLING)
+
+
 def test_nothing_to_cut_has_some_length():
     at, lights = frame(), choose_lights(frame(), PAPER)
     arrays = {key: part[..., :0] for key, part in lights._asdict().items() if isinstance(part, np.ndarray)}

@@ -77,8 +77,8 @@ def many_objects(folder: Path, count: int) -> Path:
 def many_groups(folder: Path, count: int) -> Path:
     materials = "".join(f"newmtl m{k}\nKd 0.5 0.5 {k / count}\n" for k in range(count))
     (folder / f"m{count}.mtl").write_text(materials)
-    groups = "".join(f"mtllib m{count}.mtl\n" * (k % 350 == 0) + f"g {k}\nusemtl m{k}\nv {k} 0 0\nv {k} 1 0\nv {k} 1 1\n"
-                     "f -3 -2 -1\n" for k in range(count))
+    groups = "".join(f"mtllib m{count}.mtl\n" * (k % 350 == 0) + f"g {k}\nusemtl m{k}\nv {k} 0 0\nv {k} 1 0\n"
+                     f"v {k} 1 1\nf -3 -2 -1\n" for k in range(count))
     return written(folder / f"groups{count}.obj", groups.encode())
 
 

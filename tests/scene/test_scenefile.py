@@ -157,7 +157,7 @@ def test_of_very_many_faults_the_first_are_shown_and_the_others_counted(tmp_path
 
 def test_very_long_keys_and_values_are_shortened(tmp_path: Path) -> None:
     path = write_scene(tmp_path, **{"x" * 100_000: ["y" * 100_000] * 3})
-    with pytest.raises(InputError, match="xxx.*unknown key, got .*yyy") as error:
+    with pytest.raises(InputError, match=r"xxx.*unknown key, got .*yyy") as error:
         load_scene(path)
     assert len(str(error.value)) < 2000
 

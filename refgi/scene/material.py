@@ -42,8 +42,9 @@ class Material:
                f"a number from 0 to {SHARPEST:g}", self.exponent)
         expect(is_number(self.ior) and (self.ior == 0 or 1 <= self.ior <= DENSEST), f"material {self.name!r}: ior",
                f"0 (opaque) or a number from 1 to {DENSEST:g}", self.ior)
-        expect(self.is_dielectric or not reflects_too_much(self.diffuse, self.specular), f"material {self.name!r}: diffuse + specular",
-               "at most 1 in each channel", [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
+        possible = self.is_dielectric or not reflects_too_much(self.diffuse, self.specular)
+        expect(possible, f"material {self.name!r}: diffuse + specular", "at most 1 in each channel",
+               [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
         settle(self, "diffuse", "specular", "emission")
 
     @property

@@ -181,6 +181,17 @@ def test_many_missing_meshes_and_materials_are_counted(tmp_path: Path) -> None:
         assert lines[20] == "... and 180 more"
 
 
+def test_no_more_suggestions_are_looked_for_than_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr("refgi.scene.files.did_you_mean", lambda word, _: asked.append(word) or "")
+    monkeypatch.setattr("refgi.scene.schema.did_you_mean", lambda word, _: asked.append(word) or "")
+    for key, other in (("mesh", {}), ("material", {"mesh": "square.ply"})):
+        asked.clear()
+        with pytest.raises(InputError, match="and 180 more"):
+            load_scene(write_scene(tmp_path, objects=[other | {key: f"{number}.ply"} for number in range(200)]))
+        assert len(asked) == 20
+
+
 def test_a_flat_and_a_missing_object_come_at_once(tmp_path: Path) -> None:
     (tmp_path / "flat.ply").write_bytes(ply_bytes(faces=np.array([[0, 1, 1]])))
     objects = [{"mesh": "flat.ply"}, {"mesh": "square.ply"}, {"mesh": "absent.ply"}, {"mesh": "flat.ply"}]

@@ -215,7 +215,7 @@ def _outward_normals(geometry: Geometry, triangle: Array, position: Array) -> Ar
 def _unit(vectors: Array) -> Array:
     """Return vectors (3, n) at unit length; a light on the surface that it lights, and a flat triangle, give zero."""
     length = np.linalg.norm(vectors, axis=0)
-    return np.divide(vectors, length, out=np.zeros(vectors.shape), where=length > 0)
+    return np.asarray(np.divide(vectors, length, out=np.zeros(vectors.shape), where=length > 0))
 
 
 def _with_lobes(rsm: Rsm, exits: Exits, axis: Array, share: Array, exponent: float) -> Rsm:

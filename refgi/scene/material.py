@@ -36,14 +36,15 @@ class Material:
             value = getattr(self, key)
             expect(is_vector(value) and all(0 <= c <= 1 for c in value), f"material {self.name!r}: {key}",
                    "three numbers from 0 to 1", value)
-        expect(not reflects_too_much(self.diffuse, self.specular), f"material {self.name!r}: diffuse + specular",
-               "at most 1 in each channel", [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
         expect(is_vector(self.emission) and min(self.emission) >= 0 and max(self.emission) <= BRIGHTEST,
                f"material {self.name!r}: emission", f"three numbers from 0 to {BRIGHTEST:g}", self.emission)
         expect(is_number(self.exponent) and 0 <= self.exponent <= SHARPEST, f"material {self.name!r}: exponent",
                f"a number from 0 to {SHARPEST:g}", self.exponent)
         expect(is_number(self.ior) and (self.ior == 0 or 1 <= self.ior <= DENSEST), f"material {self.name!r}: ior",
                f"0 (opaque) or a number from 1 to {DENSEST:g}", self.ior)
+        possible = self.is_dielectric or not reflects_too_much(self.diffuse, self.specular)
+        expect(possible, f"material {self.name!r}: diffuse + specular", "at most 1 in each channel",
+               [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
         settle(self, "diffuse", "specular", "emission")
 
     @property

@@ -71,8 +71,8 @@ class Batch(NamedTuple):
     def sound(self) -> Array:
         """Return (k,) whether a mesh's coordinates and indices are what `Mesh.expect_sound` asks for."""
         count = np.repeat(np.diff(self.first_vertex), np.diff(self.first_face))[:, None]
-        far = ~(np.abs(self.vertices) <= LARGEST).all(axis=1)
-        wrong = ((self.faces < 0) | (self.faces >= count)).any(axis=1)
+        far = np.asarray(~(np.abs(self.vertices) <= LARGEST).all(axis=1))
+        wrong = np.asarray(((self.faces < 0) | (self.faces >= count)).any(axis=1))
         return np.asarray(~(self.any_vertex(far) | self.any_face(wrong)))
 
 

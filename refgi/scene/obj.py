@@ -69,7 +69,7 @@ class _Reader:
         elif key == "usemtl" and values:
             self.current = " ".join(values)
         elif key == "mtllib" and values:
-            self._read_library(" ".join(values))
+            self._read_library(" ".join(values), where)
 
     def contents(self) -> Contents:
         expect(bool(self.triangles), f"{self.path}: f", "at least one polygon", 0)
@@ -78,10 +78,14 @@ class _Reader:
         positions, normals = np.array(self.positions), np.array(self.normals)
         return Contents(tuple(self._mesh(name, positions, normals) for name in self.triangles))
 
-    def _read_library(self, name: str) -> None:
-        if name not in self.libraries:
-            self.libraries.add(name)
+    def _read_library(self, name: str, where: str) -> None:
+        if name in self.libraries:
+            return
+        self.libraries.add(name)
+        try:
             self.materials |= read_mtl(self.path.parent / name)
+        except InputError as error:
+            raise InputError(f"{where}: mtllib: {shortened(str(error), 1000)}") from error
 
     def _polygon(self, values: list[str], where: str) -> None:
         expect(len(values) >= 3, where, "three or more corners", len(values))
@@ -145,9 +149,9 @@ def read_mtl(path: Path) -> dict[str, Material]:
         elif words[0].lower().startswith("map_") or words[0].lower() in TEXTURES:
             textures.append(tuple(words))
     _warn_of_textures(textures, path)
-    too_bright = [name for name, found in values.items() if _is_lobed(found) and reflects_too_much(*_reflectances(found))]
+    too_bright = sum(_is_lobed(found) and reflects_too_much(*_reflectances(found)) for found in values.values())
     if too_bright:
-        warnings.warn(RefgiWarning(f"{path}: {len(too_bright):,} of {len(values):,} materials with diffuse + specular "
+        warnings.warn(RefgiWarning(f"{path}: {too_bright:,} of {len(values):,} materials with diffuse + specular "
                                    f"(Kd + Ks) over 1 in a channel: specular left out"), stacklevel=5)
     return {name: _material(name, found, path) for name, found in values.items()}
 
@@ -161,8 +165,8 @@ def _warn_of_textures(textures: Sequence[tuple[str, ...]], path: Path) -> None:
     missing = [" ".join(words[1:]) for words in textures
                if not any(is_there(path.parent / " ".join(words[k:])) for k in range(1, min(len(words), 20)))]
     absent = f"; {len(missing):,} of them name no file: {first_faults([shortened(m, 80) for m in missing], ', ')}"
-    warnings.warn(RefgiWarning(f"{path}: {len(textures):,} texture(s) ({kinds}) passed over{absent if missing else ''}"),
-                  stacklevel=6)
+    text = f"{path}: {len(textures):,} texture(s) ({kinds}) passed over{absent if missing else ''}"
+    warnings.warn(RefgiWarning(text), stacklevel=6)
 
 
 def _is_lobed(found: dict[str, tuple[float, ...]]) -> bool:

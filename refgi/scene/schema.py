@@ -15,8 +15,15 @@ from refgi.scene import model
 from refgi.scene.files import did_you_mean
 from refgi.scene.transform import affine
 
+
 class Names:
-    """The file's materials by name, and how many names without one were met."""
+    """The file's materials by name, and how many names without one were met.
+
+    Parameters
+    ----------
+    materials : object
+        What stands under `materials` in the file, not yet validated.
+    """
 
     def __init__(self, materials: Any) -> None:
         self.known = set(materials) if isinstance(materials, dict) else set()
@@ -117,7 +124,7 @@ class Object(Entry):
     @classmethod
     def known(cls, material: Any, info: ValidationInfo) -> Any:
         """Refuse a name that `materials` does not have."""
-        names: Names = info.context
+        names = info.context or Names(None)
         if isinstance(material, str) and material not in names.known:
             suggestion = names.suggestion(material)
             raise ValueError(f"expected a key of materials, got {shortened(repr(material), 80)}{suggestion}")

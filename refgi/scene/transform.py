@@ -55,7 +55,7 @@ def expect_affine(matrices: Array, where: Callable[[int], str]) -> None:
     InputError
         If a number is not finite, the last row is not 0 0 0 1, or the matrix is singular.
     """
-    finite = np.isfinite(matrices).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     straight = (matrices[:, 3] == IDENTITY[3]).all(axis=1)
     for number in np.flatnonzero(~(finite & straight))[:1].tolist():
         expect(bool(finite[number]), where(number), "16 finite numbers", matrices[number].ravel().tolist())
@@ -81,7 +81,7 @@ def invertible(matrices: Array) -> Array:
     (k,) ndarray of bool
         Products of good matrices may have overflowed or vanished.
     """
-    finite = np.isfinite(matrices).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     linear = _near_one(np.where(finite[:, None, None], matrices[:, :3, :3], 0))
     return np.asarray(np.linalg.det(linear) != 0)
 

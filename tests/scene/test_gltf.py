@@ -57,6 +57,18 @@ def test_geometry_equals_trimesh(tmp_path: Path) -> None:
     assert np.array_equal(mesh.faces, oracle.faces)
 
 
+def test_rotation_and_scale_act_in_their_order(tmp_path: Path) -> None:
+    import trimesh
+
+    def turn(tree: dict[str, Any]) -> None:
+        tree["nodes"][0] = {"mesh": 0, "rotation": [0.1, -0.5, 0.3, 0.806225774829855], "scale": [1, 2, 3],
+                            "translation": [3, 4, 5]}
+
+    path = written(tmp_path, turn)
+    oracle = trimesh.load_scene(path, process=False).to_geometry()
+    assert np.allclose(read_gltf(path).meshes[0].vertices, oracle.vertices, rtol=0, atol=1e-12)
+
+
 def test_mirrored_node_keeps_normals_outward(tmp_path: Path) -> None:
     path = written(tmp_path, lambda tree: tree["nodes"][0].update(scale=[1, 1, -1]))
     mesh = read_gltf(path).meshes[0]

@@ -71,7 +71,7 @@ def test_merge_refuses_unsound_meshes(mesh: Mesh, said: str) -> None:
     lambda: Camera((0, 0, 0), (1, 0, 0), vfov=math.pi), lambda: Camera((0, 0, 0), (1, 0, 0), width=0),
     lambda: PointLight((0, 0, 0), (-1, 0, 0)), lambda: DirectionalLight((0, 0, 0), (1, 1, 1)),
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.0, 0.0, (1, 1, 1)),
-    lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.1, math.pi / 2, (1, 1, 1)),
+    lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.1, math.nextafter(math.pi / 2, 2), (1, 1, 1)),
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.0, 1e-8, (1, 1, 1)),
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.0, "1", (1, 1, 1)),  # type: ignore[arg-type]
     lambda: SpotLight((0, 0, 0), (0, -1, 0), 0.5, 0.4, (1, 1, 1)),

@@ -195,7 +195,10 @@ camera = [{{at = 0.0, vfov_deg = 40.0, eye = {list(room.camera.eye)}}}, {{at = 0
 lights = [{{light = 0, keys = [
     {{at = 0.0, intensity_w_per_sr = [-1.0, 0.0, 0.0], direction = [0.0, 1.0, 0.0]}},
     {{at = 0.5, intensity_w_per_sr = [1.0, 0.0, 0.0], direction = [0.0, 0.0, 0.0]}}]}}]
-objects = [{{material = "red", center = [0.0, 1e10, 0.0], keys = [{{at = 0.0}}, {{at = 1.0, move = [1e30, 0.0, 0.0]}}]}}]
+[[objects]]
+material = "red"
+center = [0.0, 1e10, 0.0]
+keys = [{{at = 0.0}}, {{at = 1.0, move = [1e30, 0.0, 0.0]}}]
 """
     with pytest.raises(InputError) as caught:
         read_path(written(text), room)

@@ -157,7 +157,7 @@ def test_of_very_many_faults_the_first_are_shown_and_the_others_counted(tmp_path
 
 def test_very_long_keys_and_values_are_shortened(tmp_path: Path) -> None:
     path = write_scene(tmp_path, **{"x" * 100_000: ["y" * 100_000] * 3})
-    with pytest.raises(InputError, match="xxx.*unknown key, got .*yyy") as error:
+    with pytest.raises(InputError, match=r"xxx.*unknown key, got .*yyy") as error:
         load_scene(path)
     assert len(str(error.value)) < 2000
 
@@ -179,6 +179,17 @@ def test_many_missing_meshes_and_materials_are_counted(tmp_path: Path) -> None:
         lines = str(error.value).splitlines()
         assert len(lines) == 21
         assert lines[20] == "... and 180 more"
+
+
+def test_no_more_suggestions_are_looked_for_than_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr("refgi.scene.files.did_you_mean", lambda word, _: asked.append(word) or "")
+    monkeypatch.setattr("refgi.scene.schema.did_you_mean", lambda word, _: asked.append(word) or "")
+    for key, other in (("mesh", {}), ("material", {"mesh": "square.ply"})):
+        asked.clear()
+        with pytest.raises(InputError, match="and 180 more"):
+            load_scene(write_scene(tmp_path, objects=[other | {key: f"{number}.ply"} for number in range(200)]))
+        assert len(asked) == 20
 
 
 def test_a_flat_and_a_missing_object_come_at_once(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ class Document:
         items = self.items(key)
         if not (type(index) is int and 0 <= index < len(items)):
             expect(False, f"{self.path}: {referrer}", f"an index into the {len(items)} {key}", index)
-        return items[index]
+        return items[int(index)]
 
     def member(self, owner: dict[str, Any], key: str, where: str) -> dict[str, Any]:
         """Return the object `owner[key]`, empty when absent."""

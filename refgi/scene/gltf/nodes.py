@@ -16,7 +16,7 @@ NO_MATRIX = tuple(np.eye(4).ravel().tolist())
 class Nodes(NamedTuple):
     """The nodes of one scene, parents before children, in the order of the tree."""
 
-    index: list[int]  # (k,) of the file's list of nodes
+    number: list[int]  # (k,) of the file's list of nodes
     parent: list[int]  # (k,) position in this list, -1 for a root
     world: Array  # (k, 4, 4) world from node
 
@@ -39,26 +39,24 @@ def scene_nodes(document: Document) -> Nodes:
     InputError
         If a reference leads nowhere or to a node with another parent, or a matrix is not usable.
     """
-    index, parent = _order(document)
+    numbers, parent = _order(document)
     nodes = document.items("nodes")
-    world = np.tile(np.eye(4), (len(index), 1, 1))
-    keys = [""] * len(index)
-    for k, number in enumerate(index):
-        keys[k] = _fill_local(world[k], document, nodes[number], f"nodes[{number}]")
-    expect_affine(world, lambda k: f"{document.path}: nodes[{index[k]}]{keys[k]}")
+    world = np.tile(np.eye(4), (len(numbers), 1, 1))
+    keys = [_fill_local(world[k], document, nodes[number], f"nodes[{number}]") for k, number in enumerate(numbers)]
+    expect_affine(world, lambda k: f"{document.path}: nodes[{numbers[k]}]{keys[k]}")
     with np.errstate(over="ignore", invalid="ignore"):  # judged below, with the node's name
         for k, above in enumerate(parent):
             if above >= 0:
                 world[k] = world[above] @ world[k] if keys[k] else world[above]
     for k in np.flatnonzero(~invertible(world))[:1].tolist():
-        expect(False, f"{document.path}: nodes[{index[k]}]", "a finite, invertible product with its parents' matrices",
-               world[k].ravel().tolist())
-    return Nodes(index, parent, world)
+        expect(False, f"{document.path}: nodes[{numbers[k]}]",
+               "a finite, invertible product with its parents' matrices", world[k].ravel().tolist())
+    return Nodes(numbers, parent, world)
 
 
 def _order(document: Document) -> tuple[list[int], list[int]]:
     """Return the nodes, depth first and children in order, and the position of each one's parent."""
-    index: list[int] = []
+    numbers: list[int] = []
     parent: list[int] = []
     visited: set[int] = set()
     pending = [(root, -1) for root in reversed(_roots(document))]
@@ -68,11 +66,11 @@ def _order(document: Document) -> tuple[list[int], list[int]]:
         if number in visited:
             expect(False, f"{document.path}: nodes[{number}]", "one parent", "several, or a cycle")
         visited.add(number)
-        index.append(number)
+        numbers.append(number)
         parent.append(above)
         children = _indices(document, node, "children", f"nodes[{number}]")
-        pending += [(child, len(index) - 1) for child in reversed(children)]
-    return index, parent
+        pending += [(child, len(numbers) - 1) for child in reversed(children)]
+    return numbers, parent
 
 
 def _roots(document: Document) -> list[int]:

@@ -58,7 +58,7 @@ class _Reader:
         nodes = scene_nodes(self.document)
         shapes: list[Mesh] = []
         placed_by: list[int] = []
-        for k, index in enumerate(nodes.index):
+        for k, index in enumerate(nodes.number):
             node, where = self.document.items("nodes")[index], f"nodes[{index}]"
             found = self._shapes_of(node, where)
             shapes += found

@@ -138,7 +138,7 @@ def test_flipped_bits_are_found_or_harmless(planes, tmp_path, capfd):
 
 
 def test_a_write_that_reads_back_different_is_an_error_and_leaves_nothing(planes, tmp_path, monkeypatch):
-    monkeypatch.setattr("refgi.image.read_exr", lambda _: ({"R": planes["R"] + 1}, {}))
+    monkeypatch.setattr("refgi.image.exr.read_exr", lambda _: ({"R": planes["R"] + 1}, {}))
     with pytest.raises(InputError, match="reads back different"):
         write_exr(tmp_path / "a.exr", planes, {})
     assert not list(tmp_path.iterdir())

@@ -11,7 +11,8 @@ from refgi.errors import InputError
 if TYPE_CHECKING:
     from refgi.provenance import Job
 
-BESIDE = frozenset({"again", "scene_path", "exposure", "out", "threads", "parents", "force", "allow_empty"})
+BESIDE = frozenset({"again", "scene_path", "exposure", "out", "threads", "parents", "force", "allow_empty",
+                    "json", "debug"})
 
 
 def asked(options: dict[str, Any]) -> "Job":

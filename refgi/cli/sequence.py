@@ -115,12 +115,13 @@ def _temporal(method: str, pairs: tuple[str, ...], unfiltered: bool) -> "Tempora
 def _scene_and_way(path: str, frames: int | None, options: dict[str, Any]) -> "tuple[Scene, Way, int]":
     """Return the scene as it is without the path, the path, and how many frames; all of them are usable."""
     from refgi.cli.view import View
-    from refgi.errors import expect
+    from refgi.errors import blame, expect
     from refgi.scene.path import camera_and_lights
     from refgi.scene.pathfile import read_path
 
     scene = View(**options).load()
-    way, own = read_path(path, scene)
+    with blame(file=path):
+        way, own = read_path(path, scene)
     count = own if frames is None else frames
     expect(count is not None, "--frames", f"how many, as {path} does not say", "nothing")
     assert count is not None

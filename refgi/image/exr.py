@@ -6,7 +6,9 @@ is read back and compared to the bit before it gets its name, because OpenEXR ca
 ones without an error.
 """
 
+import contextlib
 import hashlib
+import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -83,8 +85,8 @@ def read_exr(path: str | Path) -> tuple[Channels, dict[str, Any]]:
     expect(path.is_file(), "path", "a file", str(path))
     import OpenEXR
 
-    try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+    try:  # it prints what it finds damaged, where somebody may want to read JSON
+        with contextlib.redirect_stdout(io.StringIO()), OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: np.ascontiguousarray(channel.pixels) for name, channel in file.channels().items()}
             text = file.header().get(MARK)
     except Exception as error:  # OpenEXR raises RuntimeError, but also IndexError or TypeError on damaged headers

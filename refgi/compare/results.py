@@ -46,12 +46,14 @@ def write_results(comparison: Comparison, folder: Path) -> None:
     scale = error_scale(comparison)
     brightness = maps.luminance_scale(comparison.truth.irradiance, comparison.covered)
     for result in comparison.results.values():
-        _write_picture(comparison, folder, result)
+        record = _write_picture(comparison, folder, result)
         for judge in result.against:
             painted = maps.paint(signed_error(comparison, result, judge), comparison.covered, scale)
-            _write_map(folder / _error_name(result.name, judge), painted, scale, f"{result.name} - {judge}")
+            title = f"{result.name} - {judge}"
+            write_encoded(folder / _error_name(result.name, judge), maps.with_legend(painted, scale, title), record)
         painted = maps.paint(maps.luminance(result.irradiance), comparison.covered, brightness)
-        _write_map(folder / _false_colour_name(result.name), painted, brightness, result.name)
+        encoded = maps.with_legend(painted, brightness, result.name)
+        write_encoded(folder / _false_colour_name(result.name), encoded, record)
     write_text(folder / "results.json", canonical_json(as_json(comparison)) + "\n")
 
 
@@ -181,15 +183,13 @@ def error_scale(comparison: Comparison) -> maps.Scale:
     return maps.error_scale(errors, comparison.covered)
 
 
-def _write_picture(comparison: Comparison, folder: Path, made: Reference | MethodResult) -> None:
+def _write_picture(comparison: Comparison, folder: Path, made: Reference | MethodResult) -> Record:
+    """Write EXR and PNG, and return the record that they hold."""
     record = record_of(comparison, made)
     spread = (made.variance, made.samples) if isinstance(made, Reference) else (None, None)
     write_exr(folder / f"{made.name}.exr", linear_planes(made.radiance, made.irradiance, *spread), record)
     write_preview(folder / f"{made.name}.png", made.radiance, record)
-
-
-def _write_map(path: Path, painted: maps.Pixels, scale: maps.Scale, title: str) -> None:
-    write_encoded(path, maps.with_legend(painted, scale, title))
+    return record
 
 
 def _false_colour_name(method: str) -> str:

@@ -79,7 +79,8 @@ def test_every_method_is_made_again_to_the_bit(method, tmp_path):
     assert made_again(file) == file.read_bytes()
 
 
-@pytest.mark.parametrize("options", [["--dtype", "float64"], ["--shadows", "exact"], ["--rsm-resolution", "24"]], ids=str)
+@pytest.mark.parametrize("options", [["--dtype", "float64"], ["--shadows", "exact"], ["--rsm-resolution", "24"]],
+                         ids=str)
 def test_options_of_the_frame_are_made_again(options, tmp_path):
     run("cornell_box", *TINY, *SII, "--out", tmp_path / "plain.exr")
     file = tmp_path / "a.exr"
@@ -233,8 +234,8 @@ def test_a_picture_is_made_again_as_it_was(arguments, words):
 
 def test_pictures_of_a_comparison_are_made_again(tmp_path):
     out = tmp_path / "out"
-    result = run("cornell_box", *TINY, "--methods", "sii,vpl", "--set", "sii.lights=16", "--set", "vpl.lights=8", "--set",
-                 "truth.samples=48", "--out", out, verb="compare")
+    result = run("cornell_box", *TINY, "--methods", "sii,vpl", "--set", "sii.lights=16", "--set", "vpl.lights=8",
+                 "--set", "truth.samples=48", "--out", out, verb="compare")
     assert result.exit_code == 0, result.output
     for name in ("sii", "vpl", "truth", "unoccluded"):
         assert made_again(out / f"{name}.exr") == (out / f"{name}.exr").read_bytes()
@@ -249,8 +250,8 @@ def test_pictures_of_a_comparison_are_made_again(tmp_path):
 @pytest.mark.parametrize("temporal", [["--temporal", "weight=0.5"], ["--no-temporal"]], ids=str)
 def test_a_frame_of_a_sequence_is_made_again(temporal, room, monkeypatch):
     monkeypatch.chdir(room)
-    result = run("room.json", "path.toml", *TINY, "--method", "sii", *SII, *temporal, "--frames", "3", "--format", "exr",
-                 "--out", "frames", verb="sequence")
+    result = run("room.json", "path.toml", *TINY, "--method", "sii", *SII, *temporal, "--frames", "3", "--format",
+                 "exr", "--out", "frames", verb="sequence")
     assert result.exit_code == 0, result.output
     last = room / "frames" / "path_00002.exr"
     record = read_exr(last)[1]

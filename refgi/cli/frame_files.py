@@ -13,7 +13,8 @@ from refgi.compare.pictures import linear_planes, write_preview
 from refgi.errors import InputError, expect
 from refgi.frame import Frame
 from refgi.image import read_exr, write_exr
-from refgi.provenance import Record, same_sequence
+from refgi.provenance import Record
+from refgi.provenance.frames import same_sequence
 from refgi.scene.model import Scene
 from refgi.sssil.temporal.filter import History, remember
 from refgi.sssil.temporal.sequence import Sequence, Step, seeded

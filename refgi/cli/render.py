@@ -64,13 +64,14 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     from refgi.cli.progress import progress
     from refgi.cli.threads import on_threads
     from refgi.methods import render
-    from refgi.provenance import render_frame
 
     started = time.perf_counter()
     with on_threads(options["threads"]), progress() as tell, stages.observe(progress=tell) as log:
         if job.frame is None:
             picture = render(job.scene, job.method, job.repeatable, **job.options)
         else:
+            from refgi.provenance.frames import render_frame
+
             picture = render_frame(job.scene, job.method, job.settings, job.frame, job.options)
     seconds = time.perf_counter() - started
     require_view(bool(picture.frame.gbuffer.covered.any()), job.scene.name, options["allow_empty"] or again is not None)
@@ -91,12 +92,14 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
 
 
 def _record(job: "Job", picture: "Picture") -> "Record":
-    from refgi.provenance import estimate_record, method_record, scene_record, whole_record
+    from refgi.provenance import estimate_record, method_record, scene_record
 
     frame, estimate = picture.frame, picture.estimate
     options = {"dtype": frame.dtype.name, "rsm_resolution": frame.rsm_resolution, "shadows": frame.shadows}
     record = {**scene_record(job.scene, options, exposure=job.exposure), **method_record(job.method, job.settings)}
     if job.frame is not None:
+        from refgi.provenance.frames import whole_record
+
         record |= whole_record(job.scene, job.frame)
     if estimate is not None:
         record |= estimate_record(estimate.passes, estimate.picture_mean, estimate.picture_variance)

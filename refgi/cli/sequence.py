@@ -54,7 +54,8 @@ def _sequence(session: Session, /, **options: Any) -> int:
     from refgi.cli.settings import read_settings
     from refgi.cli.threads import on_threads
     from refgi.methods import find_method
-    from refgi.provenance import frame_record, method_record, path_record, scene_record
+    from refgi.provenance import method_record, scene_record
+    from refgi.provenance.frames import frame_record, path_record
     from refgi.scene.files import text_of
     from refgi.scene.path import scenes_along
     from refgi.sssil.temporal import Sequence

@@ -5,20 +5,11 @@ method with all settings, what it was computed in, and which refgi did it.
 """
 
 from refgi.provenance.again import Job, job_of, read_record
-from refgi.provenance.frames import (
-    SequenceFrame,
-    frame_record,
-    path_record,
-    render_frame,
-    same_sequence,
-    whole_record,
-)
 from refgi.provenance.plain import plain
 from refgi.provenance.program import program, versions
 from refgi.provenance.record import CONTENT, UNITS, Record, estimate_record, method_record, scene_record
 
 __all__ = [
-    "CONTENT", "UNITS", "Job", "Record", "SequenceFrame", "estimate_record", "frame_record", "job_of", "method_record",
-    "path_record", "plain", "program", "read_record", "render_frame", "same_sequence", "scene_record", "versions",
-    "whole_record",
+    "CONTENT", "UNITS", "Job", "Record", "estimate_record", "job_of", "method_record", "plain", "program",
+    "read_record", "scene_record", "versions",
 ]

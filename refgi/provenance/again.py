@@ -4,18 +4,19 @@ import dataclasses
 import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
 from refgi.errors import InputError, RefgiWarning, blame, expect
 from refgi.image import read_exr
 from refgi.methods import find_method
 from refgi.provenance.content import camera_from, geometry_digest, light_from, materials_digest
-from refgi.provenance.frames import SequenceFrame, require_same_path
 from refgi.provenance.program import program, versions
 from refgi.provenance.record import VERSION, Record
 from refgi.scene import Scene, builtin_scenes, load_scene
 from refgi.scene.files import is_there
-from refgi.sssil.temporal import TemporalSettings
+
+if TYPE_CHECKING:
+    from refgi.provenance.frames import SequenceFrame
 
 COMPUTES = ("numpy", "numba", "llvmlite", "scipy", "embreex")  # what may change a bit of a picture
 PARTS = {"geometry": geometry_digest, "materials": materials_digest}
@@ -30,7 +31,7 @@ class Job(NamedTuple):
     options: dict[str, Any]  # of the frame: dtype, rsm_resolution, shadows
     exposure: float
     passes: int | None = None  # that an estimate bounded by time or error came to
-    frame: SequenceFrame | None = None  # where it is one of a sequence
+    frame: "SequenceFrame | None" = None  # where it is one of a sequence
 
     @property
     def repeatable(self) -> Any:
@@ -155,9 +156,12 @@ def _settings(wanted: type[Any], values: Mapping[str, Any], path: Path) -> Any:
     return wanted(**read)
 
 
-def _frame(record: Mapping[str, Any], path: Path) -> SequenceFrame | None:
+def _frame(record: Mapping[str, Any], path: Path) -> "SequenceFrame | None":
     if "frame" not in record:
         return None
+    from refgi.provenance.frames import SequenceFrame, require_same_path
+    from refgi.sssil.temporal import TemporalSettings
+
     found, temporal = _found(record["path"]["source"], path), record["temporal"]
     require_same_path(record["path"], found)
     return SequenceFrame(record["frame"], record["of"], found,

@@ -27,7 +27,7 @@ DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / 
 STAND_INS = {"dragon_bunny": "atrium:faces=405000", "flying_bunnies": "atrium:faces=417000,seed=2",
              "sponza": "atrium:faces=262000", "cornell_horse": "cornell_sphere:faces=17000"}
 PAPER = {"dragon_bunny": 21, "flying_bunnies": 25}  # frames a second at 1024^2, Table 2
-CLAMPS = {"no clamp": {}, "disc": {"clamp": "disc"}}
+CLAMPS = {"no clamp": {"clamp": "none"}, "disc": {"clamp": "disc"}}
 TARGETS = (0.10, 0.05, 0.02, 0.01)
 
 
@@ -75,17 +75,17 @@ def _moved(scene: Scene, step: float) -> Scene:
 
 def _parts(frame: Frame, settings: MultiresSettings, repeats: int) -> dict[str, float]:
     """Seconds of each step of the method on buffers that rest."""
-    buffer, lights = frame.gbuffer, choose_lights(frame, settings)
+    buffer, lights, area = frame.gbuffer, choose_lights(frame, settings), footprints(frame, settings)
     buffer.resolve("position", "normal", "depth", "covered")
     top = top_level(buffer.height, buffer.width, settings.coarsest)
     need = needs(buffer, settings, top)
     leaves = refine(need, buffer.covered, settings)
     points = at_subsplats(buffer, leaves)
-    values = evaluate(*points, lights, settings)
+    values = evaluate(*points, lights, settings, area)
     return {"mips": seconds(lambda: needs(buffer, settings, top), repeats),
             "refinement": seconds(lambda: refine(need, buffer.covered, settings), repeats),
             "fetching": seconds(lambda: at_subsplats(buffer, leaves), repeats),
-            "lighting": seconds(lambda: evaluate(*points, lights, settings), repeats),
+            "lighting": seconds(lambda: evaluate(*points, lights, settings, area), repeats),
             "upsampling": seconds(lambda: upsample(values, leaves, buffer.covered), repeats)}
 
 
@@ -123,7 +123,7 @@ def _sweep(size: int, repeats: int) -> Iterator[Row]:
     frame = Frame(_scene("sponza"), width=size, height=size)
     for count in (64, 256, 1024):
         for threshold in (0.25, 1.4):
-            settings = MultiresSettings(lights=count, normal_threshold=threshold)
+            settings = MultiresSettings(lights=count, clamp="none", normal_threshold=threshold)
             leaves = shared_subsplats(frame.gbuffer, settings)
             points, lights = at_subsplats(frame.gbuffer, leaves), choose_lights(frame, settings)
             taken = seconds(lambda p=points, x=lights, s=settings: evaluate(*p, x, s), repeats)

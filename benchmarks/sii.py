@@ -19,8 +19,8 @@ from refgi.splat.reach.fragments import fragments
 from refgi.stages import Memory, observe
 
 ROOM = "cornell_sphere:faces=17000"
-FIVE_PERCENT = SiiSettings(reference_length=0.171)  # a sixth of the pairs count, as in Fig. 8: 125 of 768
-CAUSTIC = SiiSettings(lights=4096, warp="B", importance="peak")
+FIVE_PERCENT = SiiSettings(i_low=0.05, reference_length=0.171)  # a sixth of the pairs count, as in Fig. 8: 125 of 768
+CAUSTIC = SiiSettings(lights=4096, warp="B", importance="peak", i_low=0.05, reference_length=1.0)
 
 
 def rows(quick: bool) -> Iterator[Row]:
@@ -69,7 +69,7 @@ def _culling(size: int) -> Iterator[Row]:
     for name, length in scenes.items():
         frame = Frame(load_scene(name), width=size, height=size)
         for bound in ("tangent", "ellipsoid", "quad", "full"):
-            how = SiiSettings(reference_length=length, bound=bound)
+            how = SiiSettings(i_low=0.05, reference_length=length, bound=bound)
             drawn = fragments(_receivers(frame), choose_lights(frame, how), how, None, frame.gbuffer.projection)
             yield Row(f"{name}, {bound}: pairs evaluated over fragments", drawn.evaluated / drawn.total, "ratio",
                       "<= 1.3" if bound == "tangent" else "",

@@ -58,7 +58,7 @@ def rows(quick: bool) -> Iterator[Row]:
 
 def _task(frame: Frame, settings: TruthSettings) -> Task:
     buffer, scene = frame.gbuffer, frame.scene
-    to = receivers(scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
+    to = receivers(scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
     return Task(scene, settings, frame.tracer, surfaces(scene), lights_of(scene), to)
 
 

@@ -6,7 +6,10 @@ that says how many.
 """
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+
+MOST_FAULTS = 20  # told of one file; more say no more, and a generated file can have as many as it has keys
+LONGEST_VALUE = 400  # characters of a value in an error
 
 
 class RefgiError(Exception):
@@ -47,10 +50,10 @@ def expect(condition: bool, parameter: str, expected: str, got: object) -> None:
     expected : str
         What would have been right.
     got : object
-        What was given.
+        What was given; only the start of a long value is shown.
     """
     if not condition:
-        raise InputError(f"{parameter}: expected {expected}, got {got!r}", key=parameter)
+        raise InputError(f"{parameter}: expected {expected}, got {shortened(repr(got))}", key=parameter)
 
 
 @contextlib.contextmanager
@@ -69,3 +72,50 @@ def blame(*, key: str | None = None, file: str | None = None) -> Iterator[None]:
     except InputError as error:
         error.key, error.file = error.key or key, error.file or file
         raise
+
+
+def shortened(text: str, most: int = LONGEST_VALUE) -> str:
+    """Return a text that fits in an error.
+
+    Parameters
+    ----------
+    text : str
+        Any.
+    most : int
+        Characters to keep.
+
+    Returns
+    -------
+    str
+        The same, or its start and three dots.
+
+    Examples
+    --------
+    >>> shortened("abcdefgh", 6)
+    'abc...'
+    """
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def first_faults(faults: Sequence[str], separator: str = "\n") -> str:
+    """Join the first faults of a file, and say how many more there are.
+
+    Parameters
+    ----------
+    faults : sequence of str
+        What is wrong, one text each.
+    separator : str
+        Between two of them.
+
+    Returns
+    -------
+    str
+        At most `MOST_FAULTS` of them, and the count of the others.
+
+    Examples
+    --------
+    >>> first_faults(["fault"] * 200_000).splitlines()[-1]
+    '... and 199,980 more'
+    """
+    more = len(faults) - MOST_FAULTS
+    return separator.join([*faults[:MOST_FAULTS], *([f"... and {more:,} more"] if more > 0 else [])])

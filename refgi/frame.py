@@ -20,6 +20,7 @@ from refgi.stages import stage
 if TYPE_CHECKING:
     from refgi.rays import Tracer
     from refgi.rsm import GBuffer, Rsm
+    from refgi.rsm.extent import Extent
 
 Array = npt.NDArray[Any]
 Shadows = Literal["map", "exact"]
@@ -38,8 +39,9 @@ class Frame:
         Float32 (default) or float64 (the oracle) for every buffer and kernel.
     rsm_resolution : int
         Texels along one side of a reflective shadow map (of one face of a cube).
-    shadows : {"map", "exact"}
-        Direct light's shadows: from the RSM's depth as published, or by rays.
+    shadows : {"map", "exact"}, optional
+        Direct light's shadows: from the RSM's depth as published, as where absent, or by rays. `render` takes rays
+        where its method traces some anyway.
 
     Attributes
     ----------
@@ -62,20 +64,20 @@ class Frame:
         height: int | None = None,
         dtype: npt.DTypeLike = np.float32,
         rsm_resolution: int = 512,
-        shadows: Shadows = "map",
+        shadows: Shadows | None = None,
     ) -> None:
         expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
         self.width = scene.camera.width if width is None else width
         self.height = scene.camera.height if height is None else height
         self.dtype = _dtype(dtype)
         self.rsm_resolution = rsm_resolution
-        self.shadows = shadows
+        self.shadows: Shadows = "map" if shadows is None else shadows
         for key in ("width", "height"):
             size = getattr(self, key)
             expect(is_count(size) and 1 <= size <= 65536, key, "1 to 65536 pixels", size)
         expect(is_count(rsm_resolution) and 1 <= rsm_resolution <= 16384, "rsm_resolution", "1 to 16384 texels",
                rsm_resolution)
-        expect(shadows in ("map", "exact"), "shadows", "'map' or 'exact'", shadows)
+        expect(self.shadows in ("map", "exact"), "shadows", "'map' or 'exact'", shadows)
         expect(scene.face_count > 0, f"scene {scene.name!r}", "at least one triangle", "none")
         expect(len(scene.lights) > 0, f"scene {scene.name!r}", "at least one light", "none")
         self.scene, self.origin = near_origin(scene)
@@ -88,7 +90,7 @@ class Frame:
     @cached_property
     def lights(self) -> LightTable:
         """The scene's lights as arrays."""
-        return light_table(self.scene.lights, self.dtype)
+        return light_table(self.scene.lights)
 
     @cached_property
     def gbuffer(self) -> "GBuffer":
@@ -107,6 +109,27 @@ class Frame:
             reflective_shadow_map(self.scene.geometry, self.materials, light, self.rsm_resolution, self.dtype)
             for light in self.scene.lights
         )
+
+    @cached_property
+    def seen_extent(self) -> "Extent":
+        """The box of what the camera sees; of all triangles where it sees nothing."""
+        from refgi.rsm.extent import seen_extent
+
+        return seen_extent(self.gbuffer).or_whole(self.scene.geometry)
+
+    @cached_property
+    def lit_extent(self) -> "Extent":
+        """The box of what lights reach; of all triangles where that is nothing."""
+        from refgi.rsm.extent import lit_extent
+
+        return lit_extent(self.rsms).or_whole(self.scene.geometry)
+
+    @cached_property
+    def extent(self) -> "Extent":
+        """The scene's extent: the box of what the camera sees and of what lights reach."""
+        from refgi.rsm.extent import joined
+
+        return joined(self.seen_extent, self.lit_extent)
 
     @cached_property
     def tracer(self) -> "Tracer":

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from refgi.errors import InputError
 
 if TYPE_CHECKING:
-    from refgi.frame import Frame
+    from refgi.frame import Frame, Shadows
     from refgi.scene import Scene
 
 Array = npt.NDArray[Any]
@@ -106,6 +106,22 @@ def find_method(name: str) -> Method:
     return METHODS[name]
 
 
+def usual_shadows(settings: Any) -> "Shadows":
+    """Return where direct light's shadows come from unless it is said.
+
+    Parameters
+    ----------
+    settings : object
+        Those of a method; their `traces_rays`, false where there is none, says whether it traces rays.
+
+    Returns
+    -------
+    {"map", "exact"}
+        By rays where some are traced anyway, else from the map, so that no rays need be set up.
+    """
+    return "exact" if getattr(settings, "traces_rays", False) else "map"
+
+
 def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = None, **frame_options: Any) -> Picture:
     """Render a scene by one method.
 
@@ -116,9 +132,9 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
     method : str
         A name of `METHODS`.
     settings : object, optional
-        The method's settings; the paper's values where absent.
+        The method's settings; its defaults where absent.
     **frame_options : object
-        Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
+        Passed to `Frame`: width, height, dtype, rsm_resolution, shadows (where absent those of `usual_shadows`).
 
     Returns
     -------
@@ -136,6 +152,9 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
     settings_class = find_method(method).load()[1]
     if settings is not None and not isinstance(settings, settings_class):
         raise InputError(f"settings: expected {settings_class.__name__}, got {type(settings).__name__}")
+    settings = settings_class() if settings is None else settings
+    if frame_options.get("shadows") is None:
+        frame_options["shadows"] = usual_shadows(settings)
     frame = Frame(load_scene(scene) if isinstance(scene, str | Path) else scene, **frame_options)
-    irradiance, estimate = METHODS[method].compute(frame, settings_class() if settings is None else settings)
+    irradiance, estimate = METHODS[method].compute(frame, settings)
     return Picture(frame, irradiance, frame.radiance(irradiance), estimate)

@@ -1,6 +1,7 @@
 """Radiometry shared by every method, as scalar kernels: lights, solid angles, Phong lobes, local frames.
 
-All kernels take float32 or float64 scalars and keep the type. Angles enter as cosines, directions as unit vectors.
+Kernels take float32 or float64 scalars and keep the type, but for the light of lamps, which is float64: a narrow spot
+is lost in the rounding of float32 cosines. Other angles enter as cosines, directions as unit vectors.
 Units: radiant intensity W/sr, irradiance W/m^2, solid angle sr. The equations are those of docs/radiometry; a lobe
 is cos^P around an axis, and K(th, P) is the part of its flux that leaves above a surface tilted by th.
 """
@@ -10,34 +11,93 @@ from typing import Any
 
 import numpy as np
 
+from refgi.elementary.twofold import add, length_across, length_along, multiply, root
 from refgi.jit import kernel
 
 SPOT, POINT, DIRECTIONAL = 0, 1, 2  # LightTable.kind
+SHARP = 1e6  # Phong exponent from which on a lobe has the shape of its limit
+
+UNCERTAIN = 1e-14  # of a length: more than rounding takes from the products of three components
+FOR_FLOAT32 = 1e-7  # from here on it is less than 1e-7 of the cosine over that at the edge
 
 
 @kernel
-def spot_falloff(cos_angle: Any, cos_inner: Any, cos_outer: Any) -> Any:
-    """Return the share of a spot's on-axis intensity at an angle off its axis: t t (3 - 2 t).
+def smooth_edge(above: Any, span: Any) -> Any:
+    """Return t t (3 - 2 t) of t = above / span, moved into [0, 1].
 
     Parameters
     ----------
-    cos_angle : float
-        Cosine of the angle between the spot's axis and the direction away from it.
-    cos_inner, cos_outer : float
-        Cosines of the half-angles; full intensity inside the first, none outside the second.
+    above : float
+        How much the cosine of an angle off a spot's axis exceeds that of the outer half-angle.
+    span : float
+        How much that of the inner half-angle does, 0 or more; 0 makes a step.
 
     Returns
     -------
     float
         0 to 1.
     """
-    real = type(cos_angle)
-    if cos_angle >= cos_inner:
+    real = type(above)
+    if above >= span:
         return real(1.0)
-    if cos_angle <= cos_outer:
+    if above <= real(0.0):
         return real(0.0)
-    t = (cos_angle - cos_outer) / (cos_inner - cos_outer)
+    t = above / span
     return real(t * t * (real(3.0) - t - t))
+
+
+@kernel
+def spot_falloff(d: Any, axis: Any, cone: Any, plain: float) -> Any:
+    """Return the share of a spot's on-axis intensity in one direction.
+
+    Parameters
+    ----------
+    d : tuple of 3 floats
+        Direction away from the spot, of any length above 0; float64.
+    axis : tuple of 3 floats
+        Direction the spot shines in, of any length; float64.
+    cone : (6,) ndarray of float64
+        Of `refgi.scene.cone.cone_row`.
+    plain : float
+        Sine of the angle inside the cone from which on float64 alone will do: `FOR_FLOAT32`, or inf for nowhere.
+
+    Returns
+    -------
+    float
+        0 to 1, float64, within 8 units in the last place of float32 or float64.
+
+    Notes
+    -----
+    cos a - cos b = sin(b - a) sin(b + a) / (cos a + cos b) with the angle a off the axis and the outer half-angle b,
+    and |d| sin a = |d x axis|, |d| cos a = d . axis for an axis of length 1. What sin(b - a) cancels is known to twice
+    the precision where it matters.
+    """
+    along = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
+    x, y, z = d[1] * axis[2] - d[2] * axis[1], d[2] * axis[0] - d[0] * axis[2], d[0] * axis[1] - d[1] * axis[0]
+    square = x * x + y * y + z * z
+    across, length = math.sqrt(square), math.sqrt(square + along * along)
+    edge, slack = cone[0] * along - cone[2] * across, UNCERTAIN * length
+    if edge < -slack:
+        return 0.0
+    above = edge * (cone[0] * along + cone[2] * across) / (length * (along + length * cone[2]))
+    if edge > slack and above * (edge - slack) > cone[4] * edge:
+        return 1.0
+    if not edge > plain * length:
+        above = _above_the_edge(d, axis, cone)
+    return smooth_edge(above, cone[4])
+
+
+@kernel
+def _above_the_edge(d: Any, axis: Any, cone: Any) -> Any:
+    """Return cos a - cos b, rounded a few times."""
+    along, across = length_along(d, axis), length_across(d, axis)
+    one, other = multiply((cone[0], cone[1]), along), multiply((cone[2], cone[3]), across)
+    edge = add(one, (-other[0], -other[1]))  # |d| sin(b - a)
+    if edge[0] < 0.0:
+        return -1.0
+    length = root(add(multiply(along, along), multiply(across, across)))
+    below = multiply(length, add(along, multiply(length, (cone[2], cone[3]))))
+    return multiply(edge, add(one, other))[0] / below[0]
 
 
 @kernel
@@ -47,23 +107,21 @@ def radiant_intensity(lights: Any, k: int, wx: Any, wy: Any, wz: Any) -> Any:
     Parameters
     ----------
     lights : LightTable
-        Lights in the dtype of the direction.
+        Lights.
     k : int
         Which light.
     wx, wy, wz : float
-        Unit vector away from the light.
+        Vector away from the light, of any length above 0; float64.
 
     Returns
     -------
     tuple of 3 floats
         W/sr, linear RGB.
     """
-    real = type(wx)
-    share = real(1.0)
+    share = 1.0
     if lights.kind[k] == SPOT:
         axis = lights.direction
-        cos_angle = axis[k, 0] * wx + axis[k, 1] * wy + axis[k, 2] * wz
-        share = spot_falloff(cos_angle, lights.cos_inner[k], lights.cos_outer[k])
+        share = spot_falloff((wx, wy, wz), (axis[k, 0], axis[k, 1], axis[k, 2]), lights.cone[k], np.inf)
     peak = lights.intensity
     return peak[k, 0] * share, peak[k, 1] * share, peak[k, 2] * share
 
@@ -75,7 +133,7 @@ def incident_light(lights: Any, k: int, x: Any, y: Any, z: Any) -> Any:
     Parameters
     ----------
     lights : LightTable
-        Lights in the dtype of the point.
+        Lights.
     k : int
         Which light.
     x, y, z : float
@@ -85,23 +143,30 @@ def incident_light(lights: Any, k: int, x: Any, y: Any, z: Any) -> Any:
     -------
     tuple of 7 floats
         Unit vector towards the light (3), distance to it (m; inf when directional), irradiance on a surface
-        perpendicular to that vector (W/m^2, RGB). All zero at the light itself.
+        perpendicular to that vector (W/m^2, RGB). All zero at the light itself; float64.
+
+    Notes
+    -----
+    Float64 whatever the type of the point: how far it lies off a narrow spot's axis would be lost in float32.
     """
-    real = type(x)
-    zero = real(0.0)
+    zero = 0.0
     if lights.kind[k] == DIRECTIONAL:
         axis, given = lights.direction, lights.intensity
-        return -axis[k, 0], -axis[k, 1], -axis[k, 2], real(np.inf), given[k, 0], given[k, 1], given[k, 2]
-    dx = lights.position[k, 0] - x
-    dy = lights.position[k, 1] - y
-    dz = lights.position[k, 2] - z
+        return -axis[k, 0], -axis[k, 1], -axis[k, 2], np.inf, given[k, 0], given[k, 1], given[k, 2]
+    dx = lights.position[k, 0] - np.float64(x)
+    dy = lights.position[k, 1] - np.float64(y)
+    dz = lights.position[k, 2] - np.float64(z)
     distance = math.sqrt(dx * dx + dy * dy + dz * dz)
     if distance == zero:
         return zero, zero, zero, zero, zero, zero, zero
     wx, wy, wz = dx / distance, dy / distance, dz / distance
-    ir, ig, ib = radiant_intensity(lights, k, -wx, -wy, -wz)
-    falloff = real(1.0) / (distance * distance)
-    return wx, wy, wz, distance, ir * falloff, ig * falloff, ib * falloff
+    falloff = 1.0 / (distance * distance)
+    if lights.kind[k] == SPOT:
+        axis = lights.direction
+        plain = FOR_FLOAT32 if isinstance(x, np.float32) else np.inf
+        falloff *= spot_falloff((-dx, -dy, -dz), (axis[k, 0], axis[k, 1], axis[k, 2]), lights.cone[k], plain)
+    peak = lights.intensity
+    return wx, wy, wz, distance, peak[k, 0] * falloff, peak[k, 1] * falloff, peak[k, 2] * falloff
 
 
 @kernel
@@ -186,11 +251,15 @@ def lobe_fraction(cos_theta: Any, exponent: Any) -> Any:
     Notes
     -----
     K = 1 - I(sin^2 th; (P + 1) / 2, 1/2) / 2 with the regularised incomplete beta function I, by its continued
-    fraction on the side where that converges fast. K(th, 0) = 1 - th/pi, K(th, 1) = (1 + cos th)/2.
+    fraction on the side where that converges fast. K(th, 0) = 1 - th/pi, K(th, 1) = (1 + cos th)/2. From P = 10^6 on,
+    where the fraction takes sqrt(P) steps, I(x; a, 1/2) = erfc sqrt(-(a - 1/4) ln x), off by less than 1 / (24 a^2).
     """
     real = type(cos_theta)
     c = min(1.0, abs(np.float64(cos_theta)))
     a = 0.5 * (exponent + 1.0)
+    if exponent >= SHARP:
+        inside = 0.5 * math.erfc(math.sqrt(-(a - 0.25) * math.log1p(-c * c))) if c < 1.0 else 0.0
+        return real(1.0 - inside if cos_theta >= 0 else inside)
     x = (1.0 - c) * (1.0 + c)
     if x < (a + 1.0) / (a + 2.5):
         # x^a (1-x)^(1/2) / (a B(a, 1/2)), the power through log1p because x may be just below 1

@@ -14,6 +14,8 @@ from refgi.scene import DirectionalLight, Geometry, PointLight
 from refgi.splat.sii import SiiSettings, sii
 from refgi.stages import Memory, observe
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 SIZE = {"width": 48, "height": 32, "rsm_resolution": 64}
 SETTINGS = SiiSettings(lights=64)
 

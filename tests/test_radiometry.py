@@ -14,9 +14,11 @@ from refgi.radiometry import (
     lobe_fraction,
     orthonormal_basis,
     radiant_intensity,
+    smooth_edge,
     spot_falloff,
 )
 from refgi.scene import DirectionalLight, PointLight, SpotLight, light_table
+from refgi.scene.cone import cone_row
 from tests.naive import radiometry as naive
 
 ROUNDING = {np.float32: 1e-6, np.float64: 1e-14}  # a dozen operations on numbers near 1
@@ -28,16 +30,25 @@ def rectangle(corner, x0, x1, y0, y1):
     return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
 
 
-@pytest.mark.parametrize("real", [np.float32, np.float64])
-def test_spot_falloff_is_the_smoothstep(real):
-    for cos_angle in np.linspace(0.0, 1.0, 41):
-        got = spot_falloff(real(cos_angle), real(0.9), real(0.5))
-        assert got == pytest.approx(naive.spot_intensity(1.0, cos_angle, 0.9, 0.5), abs=ROUNDING[real])
+def test_spot_falloff_is_the_smoothstep():
+    cone = cone_row(math.acos(0.9), math.acos(0.5))
+    for cos_angle in np.linspace(-1.0, 1.0, 81):
+        got = spot_falloff((0.0, math.sqrt(1 - cos_angle**2), cos_angle), (0.0, 0.0, 1.0), cone, math.inf)
+        assert got == pytest.approx(naive.spot_intensity(1.0, cos_angle, 0.9, 0.5), abs=ROUNDING[np.float64])
 
 
 def test_spot_with_equal_cones_is_a_step():
-    assert spot_falloff(0.8, 0.8, 0.8) == 1.0
-    assert spot_falloff(np.nextafter(0.8, 0), 0.8, 0.8) == 0.0
+    for outer in (1e-7, 0.3, 1.5):
+        cone = cone_row(outer, outer)
+        for angle, expected in ((0.0, 1.0), (0.999999 * outer, 1.0), (1.000001 * outer, 0.0), (3.0, 0.0)):
+            assert spot_falloff((0.0, math.sin(angle), math.cos(angle)), (0.0, 0.0, 1.0), cone, math.inf) == expected
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_smooth_edge(real):
+    for above, span, expected in ((0.5, 1, 0.5), (0.25, 1, 0.15625), (1, 1, 1), (2, 1, 1), (0, 1, 0), (-1, 1, 0),
+                                  (0, 0, 1), (-1, 0, 0)):
+        assert smooth_edge(real(above), real(span)) == expected
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
@@ -47,16 +58,16 @@ def test_incident_light_by_hand(real):
         SpotLight((1.0, 2.0, 3.0), tuple(axis), 0.3, 0.9, (1.0, 2.0, 4.0)),
         PointLight((0.0, 2.0, 0.0), (8.0, 4.0, 2.0)),
         DirectionalLight((0.0, 0.0, 2.0), (1.0, 2.0, 3.0)),
-    ], real)
+    ])
     point = np.array([1.5, 0.5, 4.0])
     got = np.array([incident_light(table, k, *(real(c) for c in point)) for k in range(3)])
     d = np.array([1.0, 2.0, 3.0]) - point
     r = np.linalg.norm(d)
     intensity = naive.spot_intensity(1.0, -(d @ axis) / r, math.cos(0.3), math.cos(0.9)) * np.array([1.0, 2.0, 4.0])
-    assert got[0] == pytest.approx([*(d / r), r, *(intensity / r**2)], rel=10 * ROUNDING[real])
+    assert got[0] == pytest.approx([*(d / r), r, *(intensity / r**2)], rel=10 * ROUNDING[np.float64])
     d = np.array([0.0, 2.0, 0.0]) - point
     r = np.linalg.norm(d)
-    assert got[1] == pytest.approx([*(d / r), r, *(np.array([8.0, 4.0, 2.0]) / r**2)], rel=10 * ROUNDING[real])
+    assert got[1] == pytest.approx([*(d / r), r, *(np.array([8.0, 4.0, 2.0]) / r**2)], rel=10 * ROUNDING[np.float64])
     assert got[2].tolist() == [0, 0, -1, math.inf, 1, 2, 3]
 
 
@@ -136,7 +147,7 @@ def test_orthonormal_basis(real):
         assert np.linalg.det(frame) == pytest.approx(1, abs=5 * ROUNDING[real])
 
 
-@pytest.mark.parametrize("name", ["spot_falloff", "corner_solid_angle_perspective", "corner_solid_angle_paraboloid",
+@pytest.mark.parametrize("name", ["smooth_edge", "corner_solid_angle_perspective", "corner_solid_angle_paraboloid",
                                   "orthonormal_basis", "lobe_fraction"])
 def test_kernels_keep_float32(name):
     function = getattr(radiometry, name)

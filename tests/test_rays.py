@@ -109,7 +109,8 @@ def test_offset_rays_never_hit_the_face_they_leave(scale, centre, evidence):
     inward = -shape.face_normals[faces]
     directions = unit_vectors(100_000, 2)
     directions *= np.sign((directions * inward).sum(axis=1, keepdims=True))
-    origins = ((points + centre) * scale).astype(np.float32) + tracer.offset * inward  # as a G-buffer would have it
+    places = (points + centre) * scale
+    origins = places.astype(np.float32) + tracer.offsets(places)[:, None] * inward  # as a G-buffer would have it
     hits = tracer.closest(origins, directions)
     assert (hits.triangle_id != MISS).all()
     assert (hits.triangle_id != faces).all()

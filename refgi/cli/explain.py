@@ -28,11 +28,11 @@ ROWS = {  # SII Table 1
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
-@shadows("map")
+@shadows("auto")
 @speech
 @click.pass_obj
-def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int, shadows: str,
-            threads: int | None, seed: int | None, **options: Any) -> None:
+def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
+            shadows: str | None, threads: int | None, seed: int | None, **options: Any) -> None:
     """Show what a method runs, skips and reuses, and where light goes.
 
     The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving.

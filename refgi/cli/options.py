@@ -161,12 +161,15 @@ def shadows(default: str) -> Callable[[F], F]:
     Parameters
     ----------
     default : str
-        "map" where nothing else needs rays, "exact" where rays are traced anyway.
+        "exact" where rays are traced in any case; "auto", which gives the verb None, where the method decides.
 
     Returns
     -------
     callable
         Adds the option to a verb.
     """
-    return click.option("--shadows", type=click.Choice(["map", "exact"]), default=default, show_default=True,
-                        help="Direct light's shadows: from the shadow map as published, or by rays.")
+    names = ["auto", "map", "exact"] if default == "auto" else ["map", "exact"]
+    auto = "; auto: by rays where the method traces some anyway" if default == "auto" else ""
+    return click.option("--shadows", type=click.Choice(names), default=default, show_default=True,
+                        callback=lambda _, __, value: None if value == "auto" else value,
+                        help=f"Direct light's shadows: from the shadow map as published, or by rays{auto}.")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
-@shadows("map")
+@shadows("auto")
 @click.option("--again", metavar="FILE.exr", help="Make this picture again, and say whether it is the same to the bit.")
 @click.option("--scene", "scene_path", metavar="PATH", help="Where the scene of --again is now, if it was moved.")
 @click.option("--exposure", type=float, help="Factor before the sRGB curve of a PNG; the scene's where absent.")

@@ -30,7 +30,7 @@ KINDS = {"both": (".exr", ".png"), "exr": (".exr",), "png": (".png",)}
               help="A setting of the temporal filter, such as weight=0.8; repeatable.")
 @click.option("--no-temporal", "unfiltered", is_flag=True, help="Each frame by itself.")
 @machine
-@shadows("map")
+@shadows("auto")
 @click.option("--exposure", type=float, help="Factor before the sRGB curve of a PNG; the scene's where absent.")
 @click.option("--format", "kind", type=click.Choice(list(KINDS)), default="both", show_default=True,
               help="EXR (linear), PNG (tone-mapped), or both.")
@@ -53,7 +53,7 @@ def _sequence(session: Session, /, **options: Any) -> int:
     from refgi.cli.progress import progress
     from refgi.cli.settings import read_settings
     from refgi.cli.threads import on_threads
-    from refgi.methods import find_method
+    from refgi.methods import find_method, usual_shadows
     from refgi.provenance import method_record, scene_record
     from refgi.provenance.frames import frame_record, path_record
     from refgi.scene.files import text_of
@@ -68,6 +68,7 @@ def _sequence(session: Session, /, **options: Any) -> int:
     settings = read_settings(settings_class, pairs, seed, method)
     temporal = _temporal(method, *_taken(options, "filtering", "unfiltered"))
     frame_options = dict(zip(FRAME, _taken(options, *FRAME), strict=True))
+    frame_options["shadows"] = frame_options["shadows"] or usual_shadows(settings)
     path, frames = _taken(options, "path", "frames")
     scene, way, frames = _scene_and_way(path, frames, options)
     require_memory(scene, frame_options["dtype"], frame_options["rsm_resolution"], traced=method == "truth",

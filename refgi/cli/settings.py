@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any, get_args, get_type_hints
 
-from refgi.errors import InputError
+from refgi.errors import InputError, first_faults
 from refgi.scene.files import did_you_mean
 from refgi.scene.values import is_number
 
@@ -52,7 +52,8 @@ def read_settings(wanted: type, pairs: Iterable[str], seed: int | None = None, o
     made, refused = _make(wanted, values)
     if errors := errors + refused:
         keys = dict.fromkeys(error.key for error in errors if error.key)
-        raise InputError(f"{'; '.join(map(str, errors))} (settings: {', '.join(known)})", key=", ".join(keys))
+        texts = first_faults([str(error) for error in errors], "; ")
+        raise InputError(f"{texts} (settings: {', '.join(known)})", key=", ".join(keys))
     return made
 
 
@@ -88,7 +89,7 @@ def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[st
         else:
             sorted_pairs[name].append(rest)
     if errors:
-        raise InputError("; ".join(errors), key="--set")
+        raise InputError(first_faults(errors, "; "), key="--set")
     return sorted_pairs
 
 

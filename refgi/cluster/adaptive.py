@@ -20,6 +20,7 @@ from refgi.cluster.grouping import grouped
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import member_visibility, reference_visibility
+from refgi.draws import AREA_LIGHT_SAMPLES, draws
 from refgi.errors import RefgiWarning, expect
 from refgi.jit import threads
 from refgi.lights.selection import footprints
@@ -164,7 +165,7 @@ def _samples(frame: "Frame", lights: "PixelLights", settings: "ValSettings") -> 
     surface = np.flatnonzero(covered)
     drawn = np.arange(min(SAMPLES, len(surface)))
     if len(drawn) < len(surface):
-        spread = (drawn + np.random.default_rng(settings.seed).random(len(drawn))) * (len(surface) / len(drawn))
+        spread = (drawn + draws(settings.seed, AREA_LIGHT_SAMPLES, len(drawn))) * (len(surface) / len(drawn))
         drawn = np.minimum(spread.astype(np.int64), len(surface) - 1)
     at = surface[drawn]
     points, normals = (np.ascontiguousarray(plane.reshape(3, -1)[:, None, at]) for plane in (position, normal))
@@ -181,7 +182,7 @@ def _by_rays(
 ) -> Array:
     """Return the light of all lights with a ray for each: every light is its own cluster."""
     alone = cluster(lights.position, lights.normal, max(1, lights.position.shape[1]),
-                    diagonal=frame.scene.geometry.diagonal)
+                    diagonal=frame.lit_extent.diagonal)
     areas = area_lights(lights, alone, dataclasses.replace(settings, single_light="point"))
     with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
         light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,

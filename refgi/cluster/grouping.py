@@ -7,6 +7,7 @@ import numpy.typing as npt
 from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.stages import skip
 
@@ -45,13 +46,12 @@ def grouped(
     ShadowMaps or None
         What each sees; None where the kind of visibility does not ask.
     """
-    geometry = frame.scene.geometry
     clusters = cluster(lights.position, lights.normal, count, distance=settings.distance,
-                       weights=(settings.position_weight, settings.normal_weight), diagonal=geometry.diagonal,
+                       weights=(settings.position_weight, settings.normal_weight), diagonal=frame.lit_extent.diagonal,
                        rounds=settings.rounds)
     areas = area_lights(lights, clusters, settings, footprint)
     if settings.visibility in WITHOUT_MAPS:
         skip("cluster.shadow_maps", f"visibility {settings.visibility!r} looks at none")
         return areas, None
     tracer = frame.tracer if settings.maps == "rays" else None
-    return areas, shadow_maps(geometry, areas, settings, frame.dtype, tracer)
+    return areas, shadow_maps(frame.scene.geometry, areas, settings, frame.dtype, tracer, ends_of(frame, lights))

@@ -19,12 +19,13 @@ Behind = Literal["visible", "dual_paraboloid", "raytrace"]
 NearGeometry = Literal["keep", "planes", "ball"]
 Dealing = Literal["index", "cluster"]
 Blur = Literal["none", "box", "geometry"]
+Depths = Literal["log_map", "map", "scene"]
 
 CHOICES: dict[str, Any] = {
     "distance": Distance, "axes": Axes, "extent": Extent, "visibility": Visibility, "prefilter": Prefilter,
     "rescale": Rescale, "behind": Behind, "near_geometry": NearGeometry, "dealing": Dealing, "blur": Blur,
     "single_light": Literal["point", "footprint"], "maps": Literal["raster", "rays"],
-    "quantisation": Literal["none", "published"]}
+    "quantisation": Literal["none", "published"], "depth_scale": Depths}
 PUBLISHED_AREA_LIGHTS = 30
 MOST_TERMS = 64
 MOST_BLOCK = 64  # pixels
@@ -61,9 +62,11 @@ class ValSettings(LightSettings):
 
     Visibility: "series" of `terms` terms with the filter `prefilter`, the exact "step", one "hard" test towards the
     centre, or by reference: the map projected back ("back_projection"), rays to the "rectangle", rays to the
-    "members"; or "none". A receiver is moved by `bias` (share of the depth range; none: where the series is 1 for
-    the first time); `attenuation` is that of the series' terms and `rescale` what becomes of it; `quantisation` is
-    that of the published textures. The step counts what lies before the `receiver_plane` and within the `cone`.
+    "members"; or "none". The series compares depths on a `depth_scale` from the nearest to the farthest of what a map
+    holds, by their logarithm ("log_map") or in metres ("map"), or from 0 to the far end of the scene's extent
+    ("scene"). A receiver is moved by `bias` (share of the depth range; none: where the series is 1 for the first
+    time); `attenuation` is that of the series' terms and `rescale` what becomes of it; `quantisation` is that of the
+    published textures. The step counts what lies before the `receiver_plane` and within the `cone`.
 
     `interleaving` n sums one light of n^2 at each pixel of n x n (8 as published; 1: all; none: all where that is no
     more than 2^30 pairs, else 8), and `blur` joins them, within `blur_extent` of the scene's diagonal and above
@@ -85,11 +88,12 @@ class ValSettings(LightSettings):
     map_resolution: int = 256
     maps: Literal["raster", "rays"] = "raster"
     near_geometry: NearGeometry = "ball"
-    near_distance: float = 0.5
+    near_distance: float = 0.6
     occluders_alone: bool = True
     behind: Behind = "visible"
     visibility: Visibility = "series"
     terms: int = 4
+    depth_scale: Depths = "log_map"
     prefilter: Prefilter = "mip"
     bias: float | None = None
     attenuation: float = 0.0
@@ -125,6 +129,12 @@ class ValSettings(LightSettings):
         expect(self.single_light == "point" or self.source == "rsm", "single_light", "'point' with the source 'walk'",
                self.single_light)
         self._expect_heeded()
+
+    @property
+    def traces_rays(self) -> bool:
+        """Whether the method traces rays."""
+        return super().traces_rays or self.maps == "rays" or self.behind == "raytrace" or self.visibility in (
+            "rectangle", "members")
 
     def _expect_heeded(self) -> None:
         """Refuse what a target for the error would not heed."""

@@ -14,6 +14,7 @@ from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.lights.selection import choose_lights, footprints, light_footprints, light_maps
 from refgi.pairs.irradiance import Receivers
+from refgi.pairs.loss import warn_of_clamp
 from refgi.rsm import facing_normals
 from refgi.stages import skip
 
@@ -49,7 +50,7 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     if block == 1 or settings.blur == "none":
         skip("cluster.blur", "every pixel sums all lights" if block == 1 else "left out by the settings")
         return light
-    return blur(light, surface(frame), block, settings, frame.scene.geometry.diagonal)  # Sec. 6, geometry-aware blur
+    return blur(light, surface(frame), block, settings, frame.seen_extent.diagonal)  # Sec. 6, geometry-aware blur
 
 
 def lit(
@@ -77,8 +78,10 @@ def lit(
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, not blurred.
     """
+    footprint = footprints(frame, settings)
+    warn_of_clamp(surface(frame), lights, settings, footprint, "val")
     return clustered_irradiance(
-        surface(frame), facing(frame), lights, areas, maps, settings, footprint=footprints(frame, settings),
+        surface(frame), facing(frame), lights, areas, maps, settings, footprint=footprint,
         given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
         rays=frame.tracer if settings.behind == "raytrace" else None)
 

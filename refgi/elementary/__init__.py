@@ -81,7 +81,7 @@ def pow(x: Any, y: Any) -> Any:
     Returns
     -------
     float
-        Within 2 (float64: 12) units in the last place, however large y is. x^0 = 1 for every number x >= 0; NaN for
+        Within 2.5 (float64: 15) units in the last place, however large y is. x^0 = 1 for every number x >= 0; NaN for
         x < 0 and for NaN.
     """
     return np.power(x, y)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.draws import ROULETTE, draws
 from refgi.errors import expect
 from refgi.stages import stage
 
@@ -47,7 +48,7 @@ def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Ar
     scaled = lights._replace(flux=lights.flux * kept)
     if lights.lobe_flux is not None:
         scaled = scaled._replace(lobe_flux=lights.lobe_flux * kept)
-    return scaled, _power(lights) - _power(scaled)
+    return scaled, power(lights) - power(scaled)
 
 
 @stage("splat.roulette")
@@ -77,9 +78,8 @@ def roulette(lights: "PixelLights", openness: Array, floor: float, seed: int) ->
     """
     _check(lights, openness)
     expect(0 < floor <= 1, "floor", "above 0, up to 1", floor)
-    expect(seed >= 0, "seed", "a whole number >= 0", seed)
     chance = np.maximum(1 - np.asarray(openness, np.float64), floor)
-    kept = np.random.default_rng(seed).random(len(chance)) < chance
+    kept = draws(seed, ROULETTE, len(chance)) < chance
     gain = (1 / chance[kept]).astype(lights.flux.dtype)
     taken: dict[str, Any] = {name: part[..., kept] for name, part in lights._asdict().items()
                              if isinstance(part, np.ndarray)}
@@ -96,7 +96,18 @@ def _check(lights: "PixelLights", openness: Array) -> None:
     expect(bool(((openness >= 0) & (openness <= 1)).all()), "openness", "numbers from 0 to 1", "others")
 
 
-def _power(lights: "PixelLights") -> Array:
-    """Return the flux of all lights, (3,) W."""
-    power: Array = lights.flux.sum(axis=1, dtype=np.float64)
-    return power if lights.lobe_flux is None else power + lights.lobe_flux.sum(axis=1, dtype=np.float64)
+def power(lights: "PixelLights") -> Array:
+    """Return the flux of all lights.
+
+    Parameters
+    ----------
+    lights : PixelLights
+        N' lights.
+
+    Returns
+    -------
+    (3,) ndarray of float64
+        W, diffuse and lobe together.
+    """
+    flux: Array = lights.flux.sum(axis=1, dtype=np.float64)
+    return flux if lights.lobe_flux is None else flux + lights.lobe_flux.sum(axis=1, dtype=np.float64)

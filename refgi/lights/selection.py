@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.lights.footprint_area import texel_areas
 from refgi.lights.solid_angle import with_equal_solid_angles
 from refgi.pairs.settings import FOOTPRINT_CLAMPS
 from refgi.stages import skip
@@ -118,13 +119,16 @@ def thinned(frame: "Frame", lights: "PixelLights", settings: "LightSettings") ->
     PixelLights
         What is left of them.
     """
-    from refgi.lights.openness_flux import roulette, scale_flux
+    from refgi.lights.openness_flux import power, roulette, scale_flux
+    from refgi.pairs.loss import lost_share, warn_of_loss
 
     if settings.openness_flux == "none":
         return lights
     free = _openness(frame, lights.position, lights.normal, settings)
     if settings.openness_flux == "scale":
-        return scale_flux(lights, free)[0]
+        scaled = scale_flux(lights, free)[0]
+        warn_of_loss(lost_share(power(lights).sum(), power(scaled).sum()), "openness_flux 'scale'")
+        return scaled
     return roulette(lights, free, settings.openness_floor, settings.seed)
 
 
@@ -133,7 +137,7 @@ def _openness(
 ) -> Array:
     from refgi.rays import openness
 
-    radius = settings.openness_radius or frame.scene.geometry.diagonal / 10
+    radius = settings.openness_radius or frame.lit_extent.diagonal / 10
     return openness(frame.tracer, position, normal, covered, radius=radius, rays=settings.openness_rays,
                     seed=settings.seed)
 
@@ -175,13 +179,31 @@ def pixel_lights(
                                renormalise=settings.renormalise_weights)
 
 
+def drawn_from_maps(rsms: "Sequence[Rsm]", settings: "LightSettings") -> list[int]:
+    """Return N, how many texels the settings draw from each map.
+
+    Parameters
+    ----------
+    rsms : sequence of Rsm
+        Reflective shadow maps, one a light.
+    settings : LightSettings
+        Number and pattern.
+
+    Returns
+    -------
+    list of int
+        One number a map.
+    """
+    from refgi.rsm.pixel_lights import map_shares
+
+    return map_shares(rsms, None if settings.pattern == "all" else settings.lights, settings.pattern)
+
+
 def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: "LightSettings") -> "PixelLights":
     """Return lights as the paper has them: each with its texel's flux, T/N left out."""
-    from refgi.rsm.pixel_lights import equal_shares
-
     if settings.pattern == "all" or lights.map_index is None:
         return lights
-    drawn = equal_shares(settings.lights, len(rsms))
+    drawn = drawn_from_maps(rsms, settings)
     share = np.array([n / rsm.texels for n, rsm in zip(drawn, rsms, strict=True)], lights.flux.dtype)
     factor = share[lights.map_index]
     lobe = None if lights.lobe_flux is None else lights.lobe_flux * factor
@@ -203,7 +225,7 @@ def footprints(frame: "Frame", settings: "LightSettings") -> Array | None:
     (N,) ndarray or None
         Area, m^2.
     """
-    if settings.clamp not in FOOTPRINT_CLAMPS:
+    if settings.effective_clamp not in FOOTPRINT_CLAMPS:
         return None
     rsms = light_maps(frame, settings)
     return light_footprints(rsms, settings, importance_maps(frame, rsms, settings))
@@ -237,18 +259,7 @@ def light_footprints(
 
 
 def _with_area_as_flux(rsm: "Rsm") -> "Rsm":
-    from refgi.scene import DirectionalLight
-
-    light = rsm.light
-    if isinstance(light, DirectionalLight):
-        towards: Array = -np.asarray(light.direction, np.float64)[:, None, None]
-        distance: Any = 1.0
-    else:
-        towards = np.asarray(light.position, np.float64)[:, None, None] - rsm.position
-        distance = np.sqrt((towards**2).sum(axis=0))
-    length = np.sqrt((towards**2).sum(axis=0))
-    cosine = np.abs((rsm.normal * towards).sum(axis=0)) / np.where(length > 0, length, 1)
-    area = np.where(_lit(rsm), rsm.solid_angle * distance**2 / np.maximum(cosine, 1e-3), 0).astype(rsm.flux.dtype)
+    area = texel_areas(rsm)
     return rsm._replace(flux=np.broadcast_to(area, rsm.flux.shape), lobe_flux=None, lobe_axis=None, lobe_exponent=None)
 
 

@@ -69,8 +69,8 @@ class LightSettings(PairSettings):
             expect(is_count(count) and least <= count <= most, key, f"a whole number, {least} to {most:,}", count)
         expect_choices(self, CHOICES)
         self._expect_source()
-        expect(self.clamp not in FOOTPRINT_CLAMPS or self.openness_flux != "roulette", "openness_flux",
-               f"'none' or 'scale' with the clamp {self.clamp!r}", self.openness_flux)
+        expect(self.effective_clamp not in FOOTPRINT_CLAMPS or self.openness_flux != "roulette", "openness_flux",
+               f"'none' or 'scale' with the clamp {self.effective_clamp!r}", self.openness_flux)
         expect(self.warp == "none" or self.pattern != "all", "warp", "'none' with the pattern 'all'", self.warp)
         expect(0 <= self.openness_radius <= LARGEST, "openness_radius", f"0 to {LARGEST:g} m", self.openness_radius)
         for key in ("defensive", "openness_floor"):
@@ -80,8 +80,14 @@ class LightSettings(PairSettings):
         expect(0 <= self.refraction_exponent <= SHARPEST, "refraction_exponent", f"0 to {SHARPEST:g}",
                self.refraction_exponent)
 
+    @property
+    def traces_rays(self) -> bool:
+        """Whether lights are found by rays."""
+        warped_by_rays = self.warp != "none" and self.importance == "openness"
+        return self.source == "walk" or self.openness_flux != "none" or warped_by_rays
+
     def _expect_source(self) -> None:
-        expect(self.clamp not in FOOTPRINT_CLAMPS or self.source == "rsm", "clamp",
+        expect(self.effective_clamp not in FOOTPRINT_CLAMPS or self.source == "rsm", "clamp",
                "one without footprints with the source 'walk'", self.clamp)
         expect(self.bounces == 1 or self.source == "walk", "bounces", "1 with the source 'rsm'", self.bounces)
         if self.source == "walk":

@@ -45,7 +45,7 @@ def with_equal_solid_angles(rsm: "Rsm") -> "Rsm":
     return rsm._replace(solid_angle=equal, flux=rsm.flux * factor, lobe_flux=lobe)
 
 
-def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]") -> Array:
+def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]", shares: "Sequence[int]") -> Array:
     """Return the disc that each light stands for in the authors' demo: pi L^2 / (1.5 N).
 
     Parameters
@@ -54,6 +54,8 @@ def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]") -> Array:
         Of maps.
     sources : sequence of Light
         The light of each map.
+    shares : sequence of int
+        N: how many texels were drawn from each map.
 
     Returns
     -------
@@ -65,13 +67,11 @@ def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]") -> Array:
     InputError
         If a light is directional and so has no distance L.
     """
-    from refgi.rsm.pixel_lights import equal_shares
-
     area = np.zeros(lights.position.shape[1])
-    for index, (source, count) in enumerate(zip(sources, equal_shares(lights.drawn, len(sources)), strict=True)):
+    for index, (source, count) in enumerate(zip(sources, shares, strict=True)):
         place = getattr(source, "position", None)
         expect(place is not None, "as_published", "no 'ams_disc' under a directional light", "ams_disc")
         mine = lights.map_index == index
         away = lights.position[:, mine] - np.asarray(place, np.float64)[:, None]
-        area[mine] = np.pi / (DEMO_CONSTANT * max(1, count)) * (away**2).sum(axis=0)
+        area[mine] = np.pi / (DEMO_CONSTANT * count) * (away**2).sum(axis=0)
     return area

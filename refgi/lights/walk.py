@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.draws import LIGHT_PATHS, draws
 from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.radiometry import DIRECTIONAL, POINT, orthonormal_basis, radiant_intensity
 from refgi.sampling import cosine_hemisphere, halton
+from refgi.scene.cone import CAP
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -93,12 +95,13 @@ def walk_lights(
     expect(paths >= count, "lights", f"at least one path for each of {count} lights", paths)
     expect(1 <= bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", bounces)
     used = 2 + 2 * bounces
-    shift = np.random.default_rng(seed).random(used).tolist() if seed else None
+    shift = draws(seed, LIGHT_PATHS, used).tolist() if seed else None
     left: list[Left] = []
     for k, share in enumerate(equal_shares(paths, count)):
         numbers = halton(share, BASES[:used], shift, start=1)
         rays = _emit(lights, k, numbers, geometry)
-        rays = rays._replace(origin=rays.origin + tracer.offset * rays.direction)  # a lamp may lie in a surface
+        # a lamp may lie in a surface
+        rays = rays._replace(origin=rays.origin + tracer.offsets(rays.origin)[:, None] * rays.direction)
         left += _paths(tracer, geometry, materials, rays, bounces)
     return _pixel_lights(left, paths * bounces)
 
@@ -119,7 +122,8 @@ def _paths(
         left.append(Left(position, normal, power * materials.diffuse[material], power * materials.specular[material],
                          mirror, materials.exponent[material]))
         u, v = rays.numbers[:, 2 + 2 * bounce], rays.numbers[:, 3 + 2 * bounce]
-        rays = Rays(position + tracer.offset * normal, _cosine_directions(normal, u, v), left[-1].flux, rays.numbers)
+        start = position + tracer.offsets(position)[:, None] * normal
+        rays = Rays(start, _cosine_directions(normal, u, v), left[-1].flux, rays.numbers)
     return left
 
 
@@ -142,14 +146,14 @@ def _emit(lights: "LightTable", k: int, numbers: Array, geometry: "Geometry") ->
 
 @kernel
 def _emit_from_point(lights: Any, k: int, numbers: Array, direction: Array, power: Array) -> None:
-    cos_outer = -1.0 if lights.kind[k] == POINT else lights.cos_outer[k]
+    cap = 2.0 if lights.kind[k] == POINT else lights.cone[k, CAP]  # 1 - cosine of its half-angle
     ax, ay, az = (0.0, 0.0, 1.0) if lights.kind[k] == POINT else (
         lights.direction[k, 0], lights.direction[k, 1], lights.direction[k, 2])
     tx, ty, tz, bx, by, bz = orthonormal_basis(ax, ay, az)
-    weight = 2.0 * math.pi * (1.0 - cos_outer) / len(numbers)
+    weight = 2.0 * math.pi * cap / len(numbers)
     for i in range(len(numbers)):
-        z = 1.0 - numbers[i, 0] * (1.0 - cos_outer)  # uniform over the cone
-        radius, phi = math.sqrt(max(0.0, 1.0 - z * z)), 2.0 * math.pi * numbers[i, 1]
+        height = numbers[i, 0] * cap  # 1 - cosine, uniform over the cone
+        z, radius, phi = 1.0 - height, math.sqrt(height * (2.0 - height)), 2.0 * math.pi * numbers[i, 1]
         x, y = radius * math.cos(phi), radius * math.sin(phi)
         wx, wy, wz = tx * x + bx * y + ax * z, ty * x + by * y + ay * z, tz * x + bz * y + az * z
         direction[i, 0], direction[i, 1], direction[i, 2] = wx, wy, wz

@@ -178,10 +178,11 @@ def _check(
         if values is not None:
             expect(values.shape == (3, count), f"lights.{key}", f"shape (3, {count})", values.shape)
             expect(bool(np.isfinite(values).all()), f"lights.{key}", "finite numbers", "NaN or infinity")
-    if settings.clamp in FOOTPRINT_CLAMPS:
+    clamp = settings.effective_clamp
+    if clamp in FOOTPRINT_CLAMPS:
         expect(footprint is not None and footprint.shape == (count,), "footprint",
-               f"the area of each of {count} lights for the clamp {settings.clamp!r}", None if footprint is None else
+               f"the area of each of {count} lights for the clamp {clamp!r}", None if footprint is None else
                footprint.shape)
-    if settings.clamp == "sphere":
+    if clamp == "sphere":
         expect(lights.lobe_flux is None or not lights.lobe_flux.any(), "clamp",
-               "another one for glossy materials ('sphere' knows diffuse lights alone)", settings.clamp)
+               "another one for glossy materials ('sphere' knows diffuse lights alone)", clamp)

@@ -10,12 +10,11 @@ from typing import Any, NamedTuple
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.radiometry import lobe_fraction
+from refgi.lobes import lobe_norm
 
 Array = npt.NDArray[Any]
 
 NO_NORM, FULL_LOBE, CLAMPED = 0, 1, 2  # lobe_norm as a kernel sees it
-LEAST_FRACTION = 1e-12  # of a lobe above the surface; less is rounding, of lobes that point into it
 CORRECTED, LITERAL = 0, 1  # slope of the widened exponent: P min(1, r / a), or min(P, P / (r a)) as printed
 
 
@@ -49,11 +48,9 @@ def lobe_norm_factor(cos_theta: Any, exponent: Any, norm: int) -> Any:
     real = type(cos_theta)
     if norm == NO_NORM:
         return real(1.0)
-    factor = (exponent + real(1.0)) * real(1.0 / (2.0 * math.pi))
     if norm == FULL_LOBE:
-        return factor
-    fraction = lobe_fraction(cos_theta, exponent)
-    return factor / fraction if fraction > real(LEAST_FRACTION) else real(0.0)
+        return (exponent + real(1.0)) * real(1.0 / (2.0 * math.pi))
+    return lobe_norm(cos_theta, exponent)
 
 
 @kernel

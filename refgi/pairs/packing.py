@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 NORMS = {"none": NO_NORM, "full_lobe": FULL_LOBE, "clamped": CLAMPED}
+HEADROOM = 1e8  # of the largest number to the largest that is packed: what kernels multiply it by comes on top
 
 
 class PackedLobes(NamedTuple):
@@ -64,9 +65,10 @@ def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None,
     shines: Array = (lights.flux != 0).any(axis=0)
     glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
     diffuse = pack_diffuse(lights, settings, dtype, shines)
-    clamp = None if settings.clamp == "none" else pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
-    spheres = None
-    if settings.clamp == "sphere" and footprint is not None:
+    clamp, spheres = None, None
+    if settings.effective_clamp != "none":
+        clamp = pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
+    if settings.effective_clamp == "sphere" and footprint is not None:
         spheres = pack_spheres(settings, footprint, shines, dtype)
     lobes = None
     if glossy.any():
@@ -129,7 +131,7 @@ def pack_lobes(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLi
     cos_theta = (np.asarray(lights.normal[:, chosen], np.float64) * axis).sum(axis=0)
     norm = np.empty_like(exponent)
     _fill_norms(cos_theta, exponent, NORMS[settings.lobe_norm], norm)
-    packed = np.concatenate([*_place(lights, settings, chosen), -axis, exponent[None], flux * norm])
+    packed = np.concatenate([*_place(lights, settings, chosen), -axis, exponent[None], _finite(flux * norm, dtype)])
     return packed.astype(dtype, order="C")
 
 
@@ -147,7 +149,7 @@ def _lobes(lights: "PixelLights", chosen: Array) -> tuple[Array, Array, Array]:
         parts.append(np.asarray(values[..., chosen], np.float64))
     flux, axis, exponent = parts
     expect(bool((np.isfinite(exponent) & (exponent >= 0)).all()), "lights.lobe_exponent", "finite numbers >= 0",
-           exponent.min())
+           exponent.min(initial=0.0))
     return flux, axis, exponent
 
 
@@ -173,10 +175,10 @@ def pack_clamp(settings: PairSettings, footprint: Array | None, chosen: Array, c
         With neutral values for the modes not in use.
     """
     softness = np.zeros(count, dtype)
-    if settings.clamp == "disc" and footprint is not None:
+    if settings.effective_clamp == "disc" and footprint is not None:
         softness[: np.count_nonzero(chosen)] = footprint[chosen] / math.pi
-    least = settings.clamp_value**2 if settings.clamp == "distance" else 0.0
-    bound = settings.clamp_value if settings.clamp == "geometry" else math.inf
+    least = settings.clamp_value**2 if settings.effective_clamp == "distance" else 0.0
+    bound = settings.clamp_value if settings.effective_clamp == "geometry" else math.inf
     return Clamp(np.dtype(dtype).type(least), softness, np.dtype(dtype).type(bound))
 
 
@@ -200,7 +202,12 @@ def pack_spheres(settings: PairSettings, footprint: Array, chosen: Array, dtype:
         r^2 of the M chosen lights, m^2.
     """
     square: Array = footprint[chosen] * ((settings.clamp_value or 1.0) / math.pi)
-    return square.astype(dtype)
+    return _finite(square, dtype).astype(dtype)
+
+
+def _finite(values: Array, dtype: npt.DTypeLike) -> Array:
+    """Return values that stay finite in a dtype: a lobe's peak grows with its exponent beyond any flux."""
+    return np.minimum(values, float(np.finfo(dtype).max) / HEADROOM)
 
 
 def pack_widening(lights: "PixelLights", settings: PairSettings, dtype: Any, chosen: Array) -> Widening | None:

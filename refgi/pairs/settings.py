@@ -1,12 +1,12 @@
 """How one pixel light lights one receiver: what sums over pairs can be set to."""
 
 import dataclasses
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 from refgi.errors import expect
 from refgi.scene.values import LARGEST
 
-ClampMode = Literal["none", "distance", "geometry", "disc", "sphere"]
+ClampMode = Literal["auto", "none", "distance", "geometry", "disc", "sphere"]
 LobeNorm = Literal["none", "full_lobe", "clamped"]
 
 FOOTPRINT_CLAMPS = ("disc", "sphere")  # need the surface area that each light stands for
@@ -20,9 +20,10 @@ class PairSettings:
 
     `clamp` keeps near pairs finite: not at all, by a minimum `distance` of `clamp_value` m, by a `geometry` term of
     at most `clamp_value` 1/m^2, by the form factor of a `disc` of the light's footprint A, or by a virtual `sphere`
-    light of radius r, pi r^2 = `clamp_value` A (0: 1 A), for diffuse lights alone. `offset` moves lights back along
-    their normals (m). `lobe_norm` is the norm of Phong lobes and `widening` the distance a (m) within
-    which their exponents fall (0: nowhere). `as_published` names forms to use as printed; see docs/methods/sii.
+    light of radius r, pi r^2 = `clamp_value` A (0: 1 A), for diffuse lights alone; "auto" leaves it to the method.
+    `offset` moves lights back along their normals (m). `lobe_norm` is the norm of Phong lobes and `widening` the
+    distance a (m) within which their exponents fall (0: nowhere). `as_published` names forms to use as printed; see
+    docs/methods/sii.
     """
 
     clamp: ClampMode = "none"
@@ -35,8 +36,7 @@ class PairSettings:
     SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_no_pi", "sii_widening", "sii_widening_unnorm"})
 
     def __post_init__(self) -> None:
-        expect(self.clamp in ("none", "distance", "geometry", "disc", "sphere"), "clamp",
-               "'none', 'distance', 'geometry', 'disc' or 'sphere'", self.clamp)
+        expect(self.clamp in get_args(ClampMode), "clamp", " or ".join(map(repr, get_args(ClampMode))), self.clamp)
         needed = self.clamp in ("distance", "geometry")
         expect(0 <= self.clamp_value <= STRONGEST_CLAMP and (self.clamp_value > 0 or not needed), "clamp_value",
                f"{f'a number > 0 for the clamp {self.clamp!r},' if needed else '0'} up to {STRONGEST_CLAMP:g}",
@@ -48,3 +48,8 @@ class PairSettings:
         object.__setattr__(self, "as_published", frozenset(self.as_published))
         expect(self.as_published <= self.SWITCHES, "as_published", f"names out of {sorted(self.SWITCHES)}",
                sorted(self.as_published))
+
+    @property
+    def effective_clamp(self) -> ClampMode:
+        """The clamp in use: "auto" is none, unless a method has one of its own."""
+        return "none" if self.clamp == "auto" else self.clamp

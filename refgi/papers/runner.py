@@ -5,11 +5,12 @@ everything up to there.
 """
 
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from refgi.compare.environment import environment
-from refgi.errors import InputError, RefgiError
+from refgi.errors import InputError, RefgiError, RefgiWarning
 from refgi.papers.catalogue import Entry, Paper, choose, find_paper
 from refgi.papers.outcome import Outcome, Reproduction
 from refgi.papers.workbench import FULL, Scale, Workbench
@@ -70,7 +71,9 @@ def reproduce(
 def _outcome(entry: Entry, bench: Workbench) -> Outcome:
     started = time.perf_counter()
     try:
-        figure = entry.make(bench)
+        with warnings.catch_warnings():  # a figure says itself what the settings of its paper cost
+            warnings.filterwarnings("ignore", ".* of the indirect light", RefgiWarning)
+            figure = entry.make(bench)
     except RefgiError as error:
         return Outcome(entry, None, str(error), time.perf_counter() - started)
     except Exception as error:  # a fault of one figure is not one of the others

@@ -1,6 +1,7 @@
 """Rays against a scene's triangles: closest hits, occlusion, openness. The only importer of Embree.
 
-`Tracer` copies the triangles into Embree once and answers batches of rays. Embree works in float32 and, although its
+`Tracer` copies the triangles into Embree once, huge ones in pieces, and answers batches of rays; `ray_offset` says how
+far off a surface rays must start and end. Embree works in float32 and, although its
 robust mode closes the seams between triangles, lets a few rays aimed exactly at vertices through; `Tracer` finds
 those misses and decides them in float64. Two ways lead to Embree with the same answers, to the bit: its C functions
 called by address from compiled kernels, and the `run` method of embreex (`REFGI_EMBREE=run`, or wherever the
@@ -8,7 +9,8 @@ library of the wheel cannot be found).
 """
 
 from refgi.rays.embree import MISS
+from refgi.rays.offsets import STEPS, far_offset, ray_offset
 from refgi.rays.openness import openness
 from refgi.rays.tracer import Hits, Tracer
 
-__all__ = ["MISS", "Hits", "Tracer", "openness"]
+__all__ = ["MISS", "STEPS", "Hits", "Tracer", "far_offset", "openness", "ray_offset"]

@@ -28,6 +28,7 @@ MISS = -1  # triangle id of a ray that hits nothing
 _TRIANGLES, _INDICES, _VERTICES = 0, 0, 1
 _UINT3, _FLOAT3 = 0x5003, 0x9003
 _ROBUST = 4
+_OUT_OF_MEMORY = 4  # of RTCError
 _RUN_CHUNK = 1 << 18  # rays per call of `run`: its temporary arrays stay in cache
 
 
@@ -91,6 +92,9 @@ class AddressDoor:
 class RunDoor:
     """embreex's `run`, which releases the GIL, on as many Python threads as Numba uses.
 
+    Where memory runs out embreex traces what Embree has not built and the process may end; only calls by address are
+    asked for their errors.
+
     Parameters
     ----------
     vertices : (n, 3) float32 ndarray
@@ -146,23 +150,56 @@ class _Built(NamedTuple):
 
 
 def _build(library: ctypes.CDLL, vertices: Array, faces: Array, vertex_count: int, face_count: int) -> _Built:
-    device = library.rtcNewDevice(None)
-    scene = library.rtcNewScene(device)
-    library.rtcSetSceneFlags(scene, _ROBUST)
-    geometry = library.rtcNewGeometry(device, _TRIANGLES)
-    for kind, form, array, count in ((_VERTICES, _FLOAT3, vertices, vertex_count),
-                                     (_INDICES, _UINT3, faces, face_count)):
-        library.rtcSetSharedGeometryBuffer(geometry, kind, 0, form, array.ctypes.data, 0, 12, count)
-    library.rtcCommitGeometry(geometry)
-    library.rtcAttachGeometry(scene, geometry)
-    library.rtcReleaseGeometry(geometry)
-    library.rtcCommitScene(scene)
+    """Build the tree. Embree says only when asked that a call failed; what it then left must not be traced."""
+    device, scene, geometry = library.rtcNewDevice(None), None, None
+    try:
+        _check(library, device, face_count)
+        scene = _made(library, device, face_count, library.rtcNewScene(device))
+        library.rtcSetSceneFlags(scene, _ROBUST)
+        geometry = _made(library, device, face_count, library.rtcNewGeometry(device, _TRIANGLES))
+        for kind, form, array, count in ((_VERTICES, _FLOAT3, vertices, vertex_count),
+                                         (_INDICES, _UINT3, faces, face_count)):
+            library.rtcSetSharedGeometryBuffer(geometry, kind, 0, form, array.ctypes.data, 0, 12, count)
+            _check(library, device, face_count)
+        for call, arguments in ((library.rtcCommitGeometry, (geometry,)),
+                                (library.rtcAttachGeometry, (scene, geometry)), (library.rtcCommitScene, (scene,))):
+            call(*arguments)
+            _check(library, device, face_count)
+    except BaseException:
+        _release(library, device, scene)
+        raise
+    finally:
+        if geometry:
+            library.rtcReleaseGeometry(geometry)
     return _Built(device, scene)
 
 
-def _release(library: ctypes.CDLL, device: int, scene: int) -> None:
-    library.rtcReleaseScene(scene)
-    library.rtcReleaseDevice(device)
+def _made(library: ctypes.CDLL, device: int | None, face_count: int, handle: int | None) -> int:
+    """Return a handle that Embree has made."""
+    _check(library, device, face_count)
+    if not handle:
+        raise MemoryError(_out_of_memory(face_count))
+    return handle
+
+
+def _check(library: ctypes.CDLL, device: int | None, face_count: int) -> None:
+    """Raise if the call before failed."""
+    error = library.rtcGetDeviceError(device)
+    if error == _OUT_OF_MEMORY or (not device and not error):
+        raise MemoryError(_out_of_memory(face_count))
+    if error:
+        raise RuntimeError(f"Embree cannot build a tree over {face_count:,} triangles (its error {error})")
+
+
+def _out_of_memory(face_count: int) -> str:
+    return f"Embree's tree over {face_count:,} triangles does not fit"
+
+
+def _release(library: ctypes.CDLL, device: int | None, scene: int | None) -> None:
+    if scene:
+        library.rtcReleaseScene(scene)
+    if device:
+        library.rtcReleaseDevice(device)
 
 
 def _padded(array: Array, dtype: npt.DTypeLike) -> Array:
@@ -195,6 +232,7 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL:
     pointer, unsigned, size = ctypes.c_void_p, ctypes.c_uint, ctypes.c_size_t
     for name, result, arguments in (
         ("rtcNewDevice", pointer, [ctypes.c_char_p]),
+        ("rtcGetDeviceError", ctypes.c_int, [pointer]),
         ("rtcNewScene", pointer, [pointer]),
         ("rtcSetSceneFlags", None, [pointer, ctypes.c_int]),
         ("rtcNewGeometry", pointer, [pointer, ctypes.c_int]),

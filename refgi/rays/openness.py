@@ -16,6 +16,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.radiometry import orthonormal_basis
+from refgi.rays.offsets import ray_offset
 from refgi.rays.tracer import Tracer
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.stages import report_progress, stage
@@ -89,7 +90,7 @@ def _open_shares(tracer: Tracer, at: Array, up: Array, index: Array, radius: flo
     for first in range(0, len(at), step):
         part = slice(first, min(first + step, len(at)))
         count = (part.stop - first) * rays
-        _aim(at[part], up[part], index[part], tracer.offset, directions, seed, origin, direction)
+        _aim(at[part], up[part], index[part], tracer.grain, directions, seed, origin, direction)
         tracer.fill_occluded(origin[:count], direction[:count], reach[:count], blocked[:count])
         shares[part] = 1 - blocked[:count].reshape(-1, rays).sum(axis=1) / rays
         report_progress(part.stop / len(at))
@@ -108,22 +109,22 @@ def _directions(rays: int, seed: int) -> Array:
 
 
 @kernel(parallel=True)
-def _aim(at: Array, up: Array, index: Array, offset: float, directions: Array, seed: int, origin: Array,
+def _aim(at: Array, up: Array, index: Array, grain: float, directions: Array, seed: int, origin: Array,
          direction: Array) -> None:
     for chunk in prange((len(at) + CHUNK - 1) // CHUNK):
         for i in range(chunk * CHUNK, min(len(at), chunk * CHUNK + CHUNK)):
-            _aim_one(at, up, i, index[i], offset, directions, seed, origin, direction)
+            _aim_one(at, up, i, index[i], grain, directions, seed, origin, direction)
 
 
 @kernel
-def _aim_one(at: Array, up: Array, i: int, index: int, offset: float, directions: Array, seed: int, origin: Array,
+def _aim_one(at: Array, up: Array, i: int, index: int, grain: float, directions: Array, seed: int, origin: Array,
              direction: Array) -> None:
     """Write the rays of point i: its own turn about the normal and shift in sin^2."""
     word = hash_bits(np.uint32(index) ^ hash_bits(np.uint32(seed) + np.uint32(0x9E3779B9)))
     shift, turn = word * 2.0**-32, 2 * math.pi * (hash_bits(word + np.uint32(1)) * 2.0**-32)
     c, s = math.cos(turn), math.sin(turn)
     tx, ty, tz, bx, by, bz = orthonormal_basis(up[i, 0], up[i, 1], up[i, 2])
-    ray = i * len(directions)
+    ray, offset = i * len(directions), ray_offset(at[i, 0], at[i, 1], at[i, 2], grain)
     for k in range(len(directions)):
         sin2 = directions[k, 0] + shift
         sin2 -= 1.0 if sin2 >= 1 else 0.0

@@ -9,14 +9,13 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rays.embree import MISS, Door, open_door
+from refgi.rays.offsets import GRAIN, STEPS, grain_of
+from refgi.rays.pieces import Pieces, cut
 from refgi.rays.watertight import Corners, closest_around, corners
 from refgi.scene import DirectionalLight, Geometry, Light
 
 Array = npt.NDArray[Any]
 
-# Offset of ray ends from surfaces, in units of the largest coordinate. float32 positions are off by 1e-7 of it; a
-# larger offset than 2e-5 shows in the picture.
-RELATIVE_OFFSET = 2e-6
 # Sideways shift that tells a slip between triangles from a miss: many float32 steps, far below any detail.
 RELATIVE_SHIFT = 4e-6
 
@@ -46,14 +45,23 @@ class Tracer:
     def __init__(self, geometry: Geometry) -> None:
         self._vertices = np.array(geometry.vertices, np.float32).reshape(-1, 3)
         self._faces = np.array(geometry.faces, np.int32).reshape(-1, 3)
-        used = self._vertices[self._faces.reshape(-1)]
-        self._scale = float(np.abs(used).max(initial=0.0)) or 1.0
+        self.grain = grain_of(self._vertices, self._faces)  # m, of `ray_offset`
         self._lock = threading.Lock()
 
-    @property
-    def offset(self) -> float:
-        """How far ray ends must stay from a surface not to hit it, m."""
-        return RELATIVE_OFFSET * self._scale
+    def offsets(self, points: Array) -> Array:
+        """Return how far ray ends must stay from a surface not to hit it.
+
+        Parameters
+        ----------
+        points : (..., 3) array_like
+            Where the ends are, world space, m.
+
+        Returns
+        -------
+        (...) ndarray of float64
+            Lengths, m.
+        """
+        return np.asarray(STEPS * (np.abs(points).sum(axis=-1, dtype=np.float64) + self.grain))
 
     def closest(self, origins: Array, directions: Array, reach: Array | float = np.inf) -> Hits:
         """Find the nearest triangle along each ray.
@@ -123,8 +131,8 @@ class Tracer:
         starts, ends : (n, 3) array_like
             Ends of the segments, world space, m.
         start_normals, end_normals : (n, 3) array_like, optional
-            Unit normals on the side the segment leaves to: that end is lifted by `offset` along it. Without, the
-            segment is cut short by `offset` at that end.
+            Unit normals on the side the segment leaves to: that end is lifted by its offset along it. Without, the
+            segment is cut short by as much at that end.
 
         Returns
         -------
@@ -135,10 +143,11 @@ class Tracer:
         expect(a.shape == b.shape, "ends", f"shape {a.shape} as starts", b.shape)
         length = np.linalg.norm(b - a, axis=1, keepdims=True)
         along = np.divide(b - a, length, out=np.zeros_like(a), where=length > 0)
-        a += self.offset * (along if start_normals is None else np.asarray(start_normals, np.float64))
-        b += self.offset * (-along if end_normals is None else np.asarray(end_normals, np.float64))
+        off_a, off_b = self.offsets(a)[:, None], self.offsets(b)[:, None] + STEPS * length
+        a += off_a * (along if start_normals is None else np.asarray(start_normals, np.float64))
+        b += off_b * (-along if end_normals is None else np.asarray(end_normals, np.float64))
         blocked = np.zeros(len(a), np.bool_)
-        traced = length[:, 0] > 2 * self.offset
+        traced = (length > off_a + off_b)[:, 0]
         blocked[traced] = self.occluded(a[traced], (b - a)[traced], 1.0)
         return blocked
 
@@ -160,11 +169,15 @@ class Tracer:
             True where nothing blocks; False without surface and where the light is behind the normal.
         """
         at, up = position[:, covered].T.astype(np.float64), normal[:, covered].T.astype(np.float64)
-        origins = at + self.offset * up
+        origins = at + self.offsets(at)[:, None] * up
+        reach: Array | float = np.inf
         if isinstance(light, DirectionalLight):
-            toward, reach = np.broadcast_to(-np.asarray(light.direction, np.float64), at.shape), np.inf
+            toward = np.broadcast_to(-np.asarray(light.direction, np.float64), at.shape)
         else:
-            toward, reach = np.asarray(light.position, np.float64) - origins, 1 - RELATIVE_OFFSET
+            lamp = np.asarray(light.position, np.float64)
+            toward = lamp - origins
+            away = np.linalg.norm(toward, axis=1)
+            reach = 1 - STEPS - self.offsets(lamp) / np.where(away > 0, away, 1)  # the lamp may lie in a surface
         far = np.where((toward * up).sum(axis=1) > 0, reach, 0).astype(np.float32)
         blocked = np.zeros(len(at), np.bool_)
         self.fill_occluded(origins.astype(np.float32), np.ascontiguousarray(toward, np.float32), far, blocked)
@@ -191,6 +204,9 @@ class Tracer:
             triangle_id[:], distance[:] = MISS, np.inf
         else:
             self._door.closest(origins, directions, reach, triangle_id, distance)
+            if self._pieces.face is not None:
+                hit = triangle_id != MISS
+                triangle_id[hit] = self._pieces.face[triangle_id[hit]]
 
     def fill_occluded(self, origins: Array, directions: Array, reach: Array, blocked: Array) -> None:
         """Fill whether rays are blocked, unchecked and in float32 alone.
@@ -216,7 +232,11 @@ class Tracer:
 
     @cached_property
     def _opened(self) -> Door | None:
-        return open_door(self._vertices, self._faces) if len(self._faces) else None
+        return open_door(self._pieces.vertices, self._pieces.faces) if len(self._faces) else None
+
+    @cached_property
+    def _pieces(self) -> Pieces:
+        return cut(self._vertices, self._faces, self.grain)
 
     @cached_property
     def _corners(self) -> Corners:
@@ -228,7 +248,8 @@ class Tracer:
         missed = missed[reach[missed] > 0]
         if self._door is None or not len(missed):
             return []
-        shifted = (origins[missed] + _sideways(directions[missed], RELATIVE_SHIFT * self._scale)).astype(np.float32)
+        shift = RELATIVE_SHIFT * (np.abs(origins[missed]).max(axis=1, keepdims=True) + self.grain / GRAIN)
+        shifted = (origins[missed] + shift * _sideways(directions[missed])).astype(np.float32)
         doubtful = np.zeros(len(missed), np.bool_)
         self.fill_occluded(shifted, directions[missed], reach[missed], doubtful)
         missed, shifted = missed[doubtful], shifted[doubtful]
@@ -243,15 +264,15 @@ class Tracer:
         return found
 
 
-def _sideways(directions: Array, length: float) -> Array:
-    """Return a shift of `length` across each direction, along no axis of common models."""
+def _sideways(directions: Array) -> Array:
+    """Return a unit vector across each direction, along no axis of common models."""
     d = directions / np.abs(directions).max(axis=1, keepdims=True).astype(np.float64)
     u = np.cross(d, (0.3713906763541037, 0.5570860145311556, 0.7427813527082074))
     size = np.linalg.norm(u, axis=1, keepdims=True)
     along = size[:, 0] < 1e-3
     u[along] = np.cross(d[along], (1.0, 0.0, 0.0))
     size[along] = np.linalg.norm(u[along], axis=1, keepdims=True)
-    return np.asarray(u * (length / size))
+    return np.asarray(u / size)
 
 
 def _checked(origins: Array, directions: Array, reach: Array | float) -> tuple[Array, Array, Array]:

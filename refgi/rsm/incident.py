@@ -1,6 +1,5 @@
 """What arrives from a light through each texel of its maps, whatever is met there."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -36,13 +35,13 @@ def texel_shares(
         the area perpendicular to the light, m^2.
     """
     if isinstance(light, SpotLight):
-        cosines = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
+        angles = light.inner_half_angle, light.outer_half_angle
         if maps.maps == 1:
-            return spot_power(maps, *cosines) if texel is None else spot_power_at(maps, *cosines, texel)
+            return spot_power(maps, *angles) if texel is None else spot_power_at(maps, *angles, texel)
     share = texel_solid_angles(maps) if solid_angle is None else solid_angle
     if isinstance(light, SpotLight):
         axis = np.asarray(light.direction) / np.linalg.norm(light.direction)
-        share = share * sampled_spot_share(maps, axis, *cosines)
+        share = share * sampled_spot_share(maps, axis, *angles)
     return share if texel is None else share.reshape(-1)[texel]
 
 

@@ -15,7 +15,7 @@ from refgi.rsm.projection import (
     paraboloid_projection,
     spot_projection,
 )
-from refgi.scene.model import DirectionalLight, Geometry, Light, PointLight
+from refgi.scene.model import DirectionalLight, Geometry, Light, PointLight, SpotLight
 
 MapShape = Literal["auto", "perspective", "cube", "paraboloid", "orthographic"]
 
@@ -62,11 +62,22 @@ def light_projection(light: Light, geometry: Geometry, resolution: int, shape: M
     else:
         half = math.tan(light.outer_half_angle / 2)
         usual = "perspective" if light.outer_half_angle <= WIDEST_PERSPECTIVE else "paraboloid"
+        flat = {"perspective": lambda: spot_projection(light, resolution)} if _has_plane(light) else {}
         makers = {
-            "perspective": lambda: spot_projection(light, resolution),
+            **flat,
             "cube": lambda: cube_projection(light.position, resolution),
             "paraboloid": lambda: paraboloid_projection([light.position], [light.direction], resolution, half),
         }
     name = usual if shape == "auto" else shape
-    expect(name in makers, "projection", f"one that suits a {type(light).__name__}: {', '.join(makers)}", shape)
+    expect(name in makers, "projection", f"one that suits {_described(light)}: {', '.join(makers)}", shape)
     return makers[name]()
+
+
+def _has_plane(light: SpotLight) -> bool:
+    """Return whether a plane before the spot meets all of its cone: a half-angle of 90 degrees has none."""
+    return light.outer_half_angle < math.pi / 2
+
+
+def _described(light: Light) -> str:
+    wide = isinstance(light, SpotLight) and not _has_plane(light)
+    return f"a {type(light).__name__}{' of 90 degrees' if wide else ''}"

@@ -5,7 +5,9 @@ without flux count in N but are dropped from the list. With a `warp` texels are 
 light's flux is T/N w Phi_t with the weight w of `refgi.rsm.warp`. `filtered` replaces T/N times one texel's flux by the
 sum over the texel's cell (SII's filtered flux look-up); the cells partition the map, so the flux sum is the map's.
 
-With several maps each gets an equal share of the count, the first ones one more where it does not divide.
+With several maps each gets an equal share of the count, the first ones one more where it does not divide. Under the
+grid pattern a map draws the k n^2 texels nearest to its share, n x n on each of its k maps (6 for a cube), never none;
+its lights carry T over that number, so rounding moves no light from one map to another.
 """
 
 import math
@@ -15,6 +17,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
+from refgi.draws import PIXEL_LIGHTS, draws
 from refgi.errors import expect
 from refgi.rsm.cells import cell_sums, cells_of_grid, cells_of_nearest, lit_texels
 from refgi.rsm.gbuffer import taken
@@ -22,7 +25,7 @@ from refgi.rsm.importance import importance as importance_of
 from refgi.rsm.reflective import Rsm
 from refgi.rsm.warp import Warp, texel_of, warp_stacked
 from refgi.sampling import grid, halton
-from refgi.stages import stage
+from refgi.stages import skip, stage
 
 Array = npt.NDArray[Any]
 Pattern = Literal["grid", "halton", "all", "random"]
@@ -61,7 +64,7 @@ def choose_pixel_lights(
     rsms : sequence of Rsm
         One map a light.
     count : int or None
-        N, over all maps; None with pattern "all".
+        How many are asked for, over all maps; None with pattern "all". `map_shares` says how many each map draws.
     pattern : {"grid", "halton", "all", "random"}
         Where the texels lie: the centres of n x n equal cells on each map (on each of a cube's faces); the Halton set
         in bases 2, 3 over the stacked maps; every texel; independently random.
@@ -99,7 +102,7 @@ def choose_pixel_lights(
     expect(importance is None or len(importance) == len(rsms), "importance", f"one for each of {len(rsms)} maps",
            None if importance is None else len(importance))
     parts = []
-    for index, (rsm, share) in enumerate(zip(rsms, _shares(rsms, count, pattern), strict=True)):
+    for index, (rsm, share) in enumerate(zip(rsms, map_shares(rsms, count, pattern), strict=True)):
         if warp is None:
             texel, weight = _choose(rsm, share, pattern, seed, index), None
         else:
@@ -114,8 +117,29 @@ def choose_pixel_lights(
     return parts[0] if len(parts) == 1 else _joined(parts)
 
 
-def _shares(rsms: Sequence[Rsm], count: int | None, pattern: Pattern) -> list[int]:
-    """Return how many texels to draw from each map."""
+def map_shares(rsms: Sequence[Rsm], count: int | None, pattern: Pattern) -> list[int]:
+    """Return how many texels are drawn from each map.
+
+    Parameters
+    ----------
+    rsms : sequence of Rsm
+        One map a light.
+    count : int or None
+        How many are asked for, over all maps; None with pattern "all".
+    pattern : {"grid", "halton", "all", "random"}
+        As for `choose_pixel_lights`.
+
+    Returns
+    -------
+    list of int
+        One number a map, at least 1. They sum to the count, but for the grid, whose n x n cells on each of a map's
+        faces come as near to the map's share as they can.
+
+    Raises
+    ------
+    InputError
+        If the count does not suit the pattern.
+    """
     if pattern == "all":
         total = sum(rsm.texels for rsm in rsms)
         expect(count is None or count == total, "count", f"None or {total} with pattern 'all'", count)
@@ -123,12 +147,13 @@ def _shares(rsms: Sequence[Rsm], count: int | None, pattern: Pattern) -> list[in
     if not isinstance(count, int | np.integer) or count < len(rsms):
         expect(False, "count", f"an integer, at least one for each of {len(rsms)} lights", count)
         raise AssertionError
-    if pattern == "grid" and not _is_grid(rsms, count):
-        below = next((n for n in range(count - 1, 0, -1) if _is_grid(rsms, n)), None)
-        above = next((n for n in range(count + 1, 4 * count + 64 * len(rsms)) if _is_grid(rsms, n)), None)
-        near = " or ".join(str(n) for n in (below, above) if n is not None)
-        expect(False, "count", f"n x n cells on each map for pattern 'grid', nearest {near or 'none'}", count)
-    return equal_shares(count, len(rsms))
+    shares = equal_shares(int(count), len(rsms))
+    if pattern != "grid":
+        return shares
+    cells = [_nearest_grid(share, rsm.projection.maps) for share, rsm in zip(shares, rsms, strict=True)]
+    if cells != shares:
+        skip("rsm.grid_cells", f"{sum(cells)} texels for {count}: n x n on each map of {len(rsms)} lights")
+    return cells
 
 
 def equal_shares(count: int, parts: int) -> list[int]:
@@ -147,13 +172,10 @@ def equal_shares(count: int, parts: int) -> list[int]:
     return [count // parts + (index < count % parts) for index in range(parts)]
 
 
-def _is_grid(rsms: Sequence[Rsm], count: int) -> bool:
-    """Tell whether each map's share is n x n cells on each of its stacked maps."""
-    for share, rsm in zip(equal_shares(count, len(rsms)), rsms, strict=True):
-        cells, rest = divmod(share, rsm.projection.maps)
-        if rest or cells == 0 or math.isqrt(cells) ** 2 != cells:
-            return False
-    return True
+def _nearest_grid(share: int, maps: int) -> int:
+    """Return the number of cells nearest to a share that puts n x n on each of some maps; of two the smaller."""
+    below = max(1, math.isqrt(share // maps))
+    return min((maps * n * n for n in (below, below + 1)), key=lambda cells: abs(cells - share))
 
 
 def _choose(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Array:
@@ -176,10 +198,9 @@ def _points(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Ar
         maps = rsm.projection.maps
         one = grid(math.isqrt(share // maps))
         return np.concatenate([np.stack([one[:, 0], (k + one[:, 1]) / maps], axis=1) for k in range(maps)])
-    generator = np.random.default_rng([seed, index])
     if pattern == "random":
-        return generator.random((share, 2))
-    shift = None if seed == 0 and index == 0 else (generator.random(), generator.random())
+        return draws(seed, PIXEL_LIGHTS, 2 * share, index).reshape(share, 2)
+    shift = None if seed == 0 and index == 0 else draws(seed, PIXEL_LIGHTS, 2, index).tolist()
     return halton(share, shift=shift)
 
 

@@ -35,9 +35,8 @@ Mode = Literal["back_face", "two_interface"]
 class Rays(Protocol):
     """What finds the nearest triangle along rays, such as `refgi.rays.Tracer`."""
 
-    @property
-    def offset(self) -> float:
-        """How far a ray must start from a surface not to hit it, m."""
+    def offsets(self, points: Array) -> Array:
+        """Return how far a ray must start from a surface not to hit it at points (n, 3), m."""
 
     def closest(self, origins: Array, directions: Array) -> Any:
         """Return `triangle_id` (-1: none) and `distance` of the nearest hits of rays given as (n, 3)."""
@@ -151,7 +150,7 @@ def _straight_exits(rsm: Rsm, behind: Geometry, materials: MaterialTable, front:
 def _bent_exits(geometry: Geometry, materials: MaterialTable, front: Exits, enters: Array, tracer: Rays) -> Exits:
     """Refract at the front and trace to the next glass face from within."""
     bent, share = refract(front.direction, front.normal, 1 / front.eta)
-    start = front.position + tracer.offset * bent
+    start = front.position + tracer.offsets(front.position.T) * bent
     hits = tracer.closest(start.T, bent.T)
     triangle = np.maximum(hits.triangle_id, 0)
     position = start + np.where(hits.triangle_id >= 0, hits.distance, 0) * bent
@@ -191,7 +190,7 @@ def _light_direction(rsm: Rsm, position: Array) -> Array:
         along = np.broadcast_to(np.reshape(rsm.light.direction, (3, 1)), position.shape)
     else:
         along = position - np.reshape(rsm.light.position, (3, 1))
-    return np.asarray(along / np.linalg.norm(along, axis=0))
+    return _unit(along)
 
 
 def _face_cross(geometry: Geometry, triangle: Array) -> Array:
@@ -210,7 +209,13 @@ def _outward_normals(geometry: Geometry, triangle: Array, position: Array) -> Ar
         part = [(np.cross(spoke[:, a], spoke[:, b]) * normal.T).sum(axis=1) for a, b in ((1, 2), (2, 0), (0, 1))]
         smooth = np.einsum("cn,nca->an", np.stack(part), geometry.vertex_normals[faces])
         normal = np.where((smooth * normal).sum(axis=0) > 0, smooth, normal)
-    return np.asarray(normal / np.linalg.norm(normal, axis=0))
+    return _unit(normal)
+
+
+def _unit(vectors: Array) -> Array:
+    """Return vectors (3, n) at unit length; a light on the surface that it lights, and a flat triangle, give zero."""
+    length = np.linalg.norm(vectors, axis=0)
+    return np.divide(vectors, length, out=np.zeros(vectors.shape), where=length > 0)
 
 
 def _with_lobes(rsm: Rsm, exits: Exits, axis: Array, share: Array, exponent: float) -> Rsm:

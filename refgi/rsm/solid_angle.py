@@ -11,14 +11,21 @@ are symmetric about both axes; one quadrant is computed and mirrored.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.radiometry import corner_solid_angle_paraboloid, corner_solid_angle_perspective, spot_falloff
-from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, PERSPECTIVE, Projection
+from refgi.radiometry import (
+    FOR_FLOAT32,
+    corner_solid_angle_paraboloid,
+    corner_solid_angle_perspective,
+    smooth_edge,
+    spot_falloff,
+)
+from refgi.rsm.projection import ORTHOGRAPHIC, PARABOLOID, Projection
+from refgi.scene.cone import cone_row
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
@@ -31,6 +38,14 @@ NODES = (0.019855071751231912, 0.10166676129318664, 0.2372337950418355, 0.408282
 WEIGHTS = (0.05061426814518853, 0.11119051722668721, 0.15685332293894344, 0.18134189168918083,
            0.18134189168918083, 0.15685332293894344, 0.11119051722668721, 0.05061426814518853)
 SUBSAMPLES = 4  # per side of a texel that a spot's cone crosses askew
+
+
+class Circles(NamedTuple):
+    """A spot's cone on the image plane."""
+
+    inner: float  # radius of full intensity
+    outer: float  # radius beyond which there is none
+    span: float  # cosine of the inner half-angle minus that of the outer
 
 
 def texel_solid_angles(projection: Projection) -> Array:
@@ -54,37 +69,38 @@ def texel_solid_angles(projection: Projection) -> Array:
     if projection.kind == ORTHOGRAPHIC:
         area = 4.0 * projection.half[0] * projection.half[1] / (projection.height * projection.width)
         return np.full(projection.shape, area)
-    return _stacked(projection, _texel_integrals(_intrinsics(projection), 1.0, 1.0, 1.0))
+    radius = 1.0 if projection.kind == PARABOLOID else math.inf
+    return _stacked(projection, _texel_integrals(_intrinsics(projection), Circles(radius, radius, 0.0)))
 
 
-def spot_power(projection: Projection, cos_inner: float, cos_outer: float) -> Array:
+def spot_power(projection: Projection, inner: float, outer: float) -> Array:
     """Return the integral of a spot's falloff over every texel of one map that looks along the spot's axis.
 
     Parameters
     ----------
     projection : Projection
         A perspective or paraboloid map.
-    cos_inner, cos_outer : float
-        Cosines of the spot's half-angles.
+    inner, outer : float
+        The spot's half-angles, rad.
 
     Returns
     -------
     (H, W) ndarray
         Sr, float64: the texel's power is this times the on-axis intensity. Sums to
-        2 pi (1 - (cos_inner + cos_outer)/2) when the map encloses the cone.
+        2 pi (1 - (cos inner + cos outer)/2) when the map encloses the cone.
     """
-    return _stacked(projection, _texel_integrals(_intrinsics(projection), cos_inner, cos_outer, 0.0))
+    return _stacked(projection, _texel_integrals(_intrinsics(projection), _circles(projection.kind, inner, outer)))
 
 
-def spot_power_at(projection: Projection, cos_inner: float, cos_outer: float, texel: Array) -> Array:
+def spot_power_at(projection: Projection, inner: float, outer: float, texel: Array) -> Array:
     """Return what `spot_power` gives at some texels.
 
     Parameters
     ----------
     projection : Projection
         A perspective or paraboloid map.
-    cos_inner, cos_outer : float
-        Cosines of the spot's half-angles.
+    inner, outer : float
+        The spot's half-angles, rad.
     texel : (n,) ndarray of int
         Texels of the flattened map.
 
@@ -94,9 +110,9 @@ def spot_power_at(projection: Projection, cos_inner: float, cos_outer: float, te
         Sr, float64.
     """
     if projection.kind == PARABOLOID:  # whose rim texels hold what their neighbours give them
-        return spot_power(projection, cos_inner, cos_outer).reshape(-1)[texel]
+        return spot_power(projection, inner, outer).reshape(-1)[texel]
     power = np.empty(len(texel))
-    _fill_texels(_intrinsics(projection), np.array([cos_inner, cos_outer, 0.0]), texel, power)
+    _fill_texels(_intrinsics(projection), _circles(projection.kind, inner, outer), texel, power)
     return power
 
 
@@ -105,15 +121,21 @@ def _intrinsics(projection: Projection) -> Projection:
     return projection._replace(origin=np.zeros((1, 3)), frame=np.eye(3)[None], reach=math.inf)
 
 
+def _circles(kind: int, inner: float, outer: float) -> Circles:
+    part = 0.5 if kind == PARABOLOID else 1.0
+    span = 2.0 * math.sin((outer + inner) / 2) * math.sin((outer - inner) / 2)
+    return Circles(math.tan(part * inner), math.tan(part * outer), span)
+
+
 def _stacked(projection: Projection, one: Array) -> Array:
     return one if projection.maps == 1 else np.tile(one, (projection.maps, 1))
 
 
 @stage("rsm.solid_angles")
-def _texel_integrals(projection: Projection, cos_inner: float, cos_outer: float, everywhere: float) -> Array:
+def _texel_integrals(projection: Projection, spot: Circles) -> Array:
     height, width = projection.height, projection.width
     quadrant = np.zeros(((height + 1) // 2, (width + 1) // 2))
-    _fill_quadrant(projection, np.array([cos_inner, cos_outer, everywhere]), quadrant)
+    _fill_quadrant(projection, spot, quadrant)
     if projection.kind == PARABOLOID:
         _give_rim_inwards(projection, quadrant)
     # row 0 of the quadrant touches the axis; the middle row of an odd height is half a row on either side
@@ -127,14 +149,14 @@ def _texel_integrals(projection: Projection, cos_inner: float, cos_outer: float,
 
 
 @kernel(parallel=True)
-def _fill_quadrant(projection: Projection, spot: Array, quadrant: Array) -> None:
+def _fill_quadrant(projection: Projection, spot: Circles, quadrant: Array) -> None:
     for i in prange(quadrant.shape[0]):
         for j in range(quadrant.shape[1]):
             quadrant[i, j] = _integral(projection, spot, i, j)
 
 
 @kernel
-def _fill_texels(projection: Projection, spot: Array, texel: Array, power: Array) -> None:
+def _fill_texels(projection: Projection, spot: Circles, texel: Array, power: Array) -> None:
     height, width = projection.height, projection.width
     for k in range(len(texel)):
         row, column = texel[k] // width, texel[k] % width
@@ -152,18 +174,14 @@ def _from_axis(place: int, size: int) -> int:
 
 
 @kernel
-def _integral(projection: Projection, spot: Array, i: int, j: int) -> Any:
+def _integral(projection: Projection, spot: Circles, i: int, j: int) -> Any:
     """Return the integral over one texel of the quadrant."""
     kind, (hx, hy) = projection.kind, (projection.half[0], projection.half[1])
     dx, dy = 2.0 * hx / projection.width, 2.0 * hy / projection.height
     shift_x, shift_y = 0.5 * (projection.width % 2), 0.5 * (projection.height % 2)
     y0, y1 = max((i - shift_y) * dy, 0.0), (i + 1 - shift_y) * dy
     x0, x1 = max((j - shift_x) * dx, 0.0), (j + 1 - shift_x) * dx
-    if spot[2] > 0.0 and (kind == PERSPECTIVE or x1 * x1 + y1 * y1 <= 1.0):
-        return _rectangle(kind, x0, x1, y0, y1)
-    if spot[2] > 0.0:
-        return _power(kind, x0, x1, y0, y1, 0.0, 0.0)
-    return _power(kind, x0, x1, y0, y1, spot[0], spot[1])
+    return _power(kind, x0, x1, y0, y1, spot)
 
 
 @kernel
@@ -184,16 +202,16 @@ def _rectangle(kind: int, x0: float, x1: float, y0: float, y1: float) -> Any:
 
 
 @kernel
-def _power(kind: int, x0: float, x1: float, y0: float, y1: float, cos_inner: float, cos_outer: float) -> Any:
+def _power(kind: int, x0: float, x1: float, y0: float, y1: float, spot: Circles) -> Any:
     """Integrate the falloff over a rectangle of the first quadrant."""
-    inner, outer = _radius(kind, cos_inner), _radius(kind, cos_outer)
+    inner, outer = spot.inner, spot.outer
     farthest = math.sqrt(x1 * x1 + y1 * y1)
     if farthest <= inner:
         return _rectangle(kind, x0, x1, y0, y1)
     if math.sqrt(x0 * x0 + y0 * y0) >= outer:
         return 0.0
     if math.sqrt(x0 * x0 + y0 * y0) >= inner and farthest <= outer:
-        return _smooth_power(kind, x0, x1, y0, y1, cos_inner, cos_outer)
+        return _smooth_power(kind, x0, x1, y0, y1, spot)
     # between these abscissae no circle enters or leaves through the top or bottom side
     enters, leaves = _meets(inner, y0, x0, x1), _meets(outer, y1, x0, x1)
     cuts = (x0, _meets(inner, y1, x0, x1), min(enters, leaves), max(enters, leaves), _meets(outer, y0, x0, x1), x1)
@@ -208,16 +226,16 @@ def _power(kind: int, x0: float, x1: float, y0: float, y1: float, cos_inner: flo
                 middle = min(max(math.sqrt(max(inner * inner - x * x, 0.0)), y0), y1)
                 top = min(max(math.sqrt(max(outer * outer - x * x, 0.0)), y0), y1)
                 constant = _strip(kind, x, middle) - _strip(kind, x, y0)
-                total += step * (constant + _falloff_strip(kind, x, middle, top, cos_inner, cos_outer))
+                total += step * (constant + _falloff_strip(kind, x, middle, top, spot))
     return total
 
 
 @kernel
-def _smooth_power(kind: int, x0: float, x1: float, y0: float, y1: float, cos_inner: float, cos_outer: float) -> float:
+def _smooth_power(kind: int, x0: float, x1: float, y0: float, y1: float, spot: Circles) -> float:
     total = 0.0
     for node in range(4):
         x = x0 + FEW_NODES[node] * (x1 - x0)
-        total += FEW_WEIGHTS[node] * _falloff_strip(kind, x, y0, y1, cos_inner, cos_outer)
+        total += FEW_WEIGHTS[node] * _falloff_strip(kind, x, y0, y1, spot)
     return total * (x1 - x0)
 
 
@@ -225,12 +243,6 @@ def _smooth_power(kind: int, x0: float, x1: float, y0: float, y1: float, cos_inn
 def _meets(radius: float, y: float, x0: float, x1: float) -> float:
     """Return the abscissa where a circle meets the horizontal through y, moved into [x0, x1]."""
     return min(max(math.sqrt(max(radius * radius - y * y, 0.0)), x0), x1)
-
-
-@kernel
-def _radius(kind: int, cosine: float) -> float:
-    tangent = math.sqrt(max(1.0 - cosine * cosine, 0.0))
-    return tangent / (1.0 + cosine) if kind == PARABOLOID else tangent / cosine
 
 
 @kernel
@@ -244,18 +256,22 @@ def _strip(kind: int, x: float, y: float) -> float:
 
 
 @kernel
-def _falloff_strip(kind: int, x: float, y0: float, y1: float, cos_inner: float, cos_outer: float) -> float:
+def _falloff_strip(kind: int, x: float, y0: float, y1: float, spot: Circles) -> float:
     total = 0.0
+    edge = 1.0 + spot.outer * spot.outer
+    root_edge = math.sqrt(edge)
     if y1 > y0:
         for node in range(4):
             y = y0 + FEW_NODES[node] * (y1 - y0)
             square = 1.0 + x * x + y * y
+            inside = spot.outer * spot.outer - (x * x + y * y)
+            # cos a - cos outer: the radius is tan(a/2), or tan a, of which 1 / root is the cosine
             if kind == PARABOLOID:
-                cosine, density = (2.0 - square) / square, 4.0 / (square * square)
+                density, above = 4.0 / (square * square), 2.0 * inside / (square * edge)
             else:
-                cosine = 1.0 / math.sqrt(square)
-                density = cosine / square
-            total += FEW_WEIGHTS[node] * density * spot_falloff(cosine, cos_inner, cos_outer)
+                root = math.sqrt(square)
+                density, above = 1.0 / (root * square), inside / (root * root_edge * (root + root_edge))
+            total += FEW_WEIGHTS[node] * density * smooth_edge(above, spot.span)
     return total * (y1 - y0)
 
 
@@ -280,7 +296,7 @@ def _beyond(i: int, j: int, shift: float, step: float) -> bool:
     return x * x + y * y > 1.0
 
 
-def sampled_spot_share(projection: Projection, axis: Array, cos_inner: float, cos_outer: float) -> Array:
+def sampled_spot_share(projection: Projection, axis: Array, inner: float, outer: float) -> Array:
     """Return the mean falloff of a spot over each texel of maps that do not look along its axis.
 
     Parameters
@@ -289,8 +305,8 @@ def sampled_spot_share(projection: Projection, axis: Array, cos_inner: float, co
         Perspective maps, such as the faces of a cube.
     axis : (3,) ndarray
         Unit vector along the spot.
-    cos_inner, cos_outer : float
-        Cosines of the spot's half-angles.
+    inner, outer : float
+        The spot's half-angles, rad.
 
     Returns
     -------
@@ -298,12 +314,12 @@ def sampled_spot_share(projection: Projection, axis: Array, cos_inner: float, co
         0 to 1, float64, from 4 x 4 samples a texel.
     """
     share = np.empty(projection.shape)
-    _sample_spot(projection, np.asarray(axis, np.float64), np.array([cos_inner, cos_outer]), share)
+    _sample_spot(projection, np.asarray(axis, np.float64), cone_row(inner, outer), share)
     return share
 
 
 @kernel(parallel=True)
-def _sample_spot(projection: Projection, axis: Array, cosines: Array, share: Array) -> None:
+def _sample_spot(projection: Projection, axis: Array, cone: Array, share: Array) -> None:
     height, width, frame = projection.height, projection.width, projection.frame
     for row in prange(share.shape[0]):
         m = row // height
@@ -318,6 +334,6 @@ def _sample_spot(projection: Projection, axis: Array, cosines: Array, share: Arr
                 y *= projection.half[1]
                 scale = 1.0 / math.sqrt(1.0 + x * x + y * y)
                 density = scale * scale * scale
-                total += density * spot_falloff((ax * x + ay * y + az) * scale, cosines[0], cosines[1])
+                total += density * spot_falloff((x, y, 1.0), (ax, ay, az), cone, FOR_FLOAT32)
                 whole += density
             share[row, column] = total / whole

@@ -1,6 +1,7 @@
 """Files on disk as bytes, and the one shape in which every mesh format hands over what it holds."""
 
 import difflib
+import itertools
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -8,6 +9,8 @@ from typing import NamedTuple
 from refgi.errors import InputError
 from refgi.scene.model import Camera, Light, Mesh
 from refgi.scene.source import was_read
+
+LONGEST_WORD, MOST_CANDIDATES = 200, 1000  # comparing words takes the square of their length, for each candidate
 
 
 class Contents(NamedTuple):
@@ -102,14 +105,16 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     word : str
         What was given.
     known : iterable of str
-        What would have been right.
+        What would have been right; the first `MOST_CANDIDATES` are looked at.
 
     Returns
     -------
     str
         Ready to follow an error's sentence.
     """
-    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    if len(word) > LONGEST_WORD:
+        return ""
+    near = difflib.get_close_matches(word, list(itertools.islice(known, MOST_CANDIDATES)), n=1, cutoff=0.5)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 

@@ -7,14 +7,67 @@ of its faces' normals.
 
 import dataclasses
 import warnings
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from refgi.errors import RefgiWarning, expect
-from refgi.scene.model import Array, Mesh
+from refgi.errors import InputError, RefgiWarning, expect
+from refgi.scene.mesh import Batch, Mesh, batches, missing_normals
+from refgi.scene.model import Geometry
+from refgi.scene.values import Array
 
 # A face counts as flat when twice its area is lost in the rounding of the cross product that gives it.
 FLAT = 16 * float(np.finfo(np.float64).eps)
+SMALLEST_USUAL, LARGEST_USUAL = 0.01, 1000.0  # m across
+
+
+def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list[str]) -> tuple[list[Mesh], int]:
+    """Return the meshes of a file as `mended` returns each, the sound small ones looked at together.
+
+    Parameters
+    ----------
+    meshes : sequence of Mesh
+        Meshes as read.
+    where : callable
+        Returns file and object of the mesh of some number, for the error's text.
+    faults : list of str
+        Gets the text of the error for each mesh that `mended` refuses.
+
+    Returns
+    -------
+    list of Mesh
+        As many; those that are refused stay as they were.
+    int
+        Number of faces dropped.
+    """
+    kept, done, dropped = list(meshes), np.zeros(len(meshes), np.bool_), 0
+    for batch in batches(meshes):
+        good = _needs_no_mending(batch)
+        done[batch.members] = good
+        if batch.normals is not None:
+            usable = np.repeat(good, np.diff(batch.first_vertex))[:, None]
+            normals = np.where(usable, batch.normals, 1.0)
+            normals /= np.linalg.norm(normals, axis=1)[:, None]
+            for k in np.flatnonzero(good).tolist():
+                number, part = batch.members[k], slice(batch.first_vertex[k], batch.first_vertex[k + 1])
+                kept[number] = dataclasses.replace(meshes[number], normals=normals[part])
+    for number in np.flatnonzero(~done).tolist():
+        try:
+            kept[number], flat = mended(meshes[number], where(number))
+            dropped += flat
+        except InputError as error:
+            faults.append(str(error))
+    return kept, dropped
+
+
+def _needs_no_mending(batch: Batch) -> Array:
+    """Return (k,) which meshes are sound and have neither flat faces nor missing normals."""
+    good = batch.sound()
+    if not good.all():
+        return np.zeros(len(good), np.bool_)  # an index may lead out of the batch
+    faces = batch.faces + np.repeat(batch.first_vertex[:-1], np.diff(batch.first_face))[:, None]
+    good &= ~batch.any_face(zero_area(batch.vertices, faces))
+    return good if batch.normals is None else good & ~batch.any_vertex(missing_normals(batch.normals))
 
 
 def mended(mesh: Mesh, where: str) -> tuple[Mesh, int]:
@@ -65,6 +118,23 @@ def warn_of_flat_faces(count: int, where: str) -> None:
         warnings.warn(RefgiWarning(f"{where}: {count} {noun} of zero area skipped"), stacklevel=3)
 
 
+def warn_of_unit(geometry: Geometry, where: str) -> None:
+    """Say that a file's unit may not be the metre, if its size is no usual one.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        All triangles.
+    where : str
+        The file they came from.
+    """
+    if not SMALLEST_USUAL <= geometry.diagonal <= LARGEST_USUAL:
+        text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are taken as metres. If the file has another unit "
+                "of s metres, scale its objects in a scene file: \"transform\": "
+                "[s, 0, 0, 0,  0, s, 0, 0,  0, 0, s, 0,  0, 0, 0, 1], such as s = 0.001 for millimetres")
+        warnings.warn(RefgiWarning(text), stacklevel=4)
+
+
 def zero_area(vertices: Array, faces: Array) -> Array:
     """Return which faces have no area beyond rounding.
 
@@ -99,12 +169,10 @@ def unit_normals(mesh: Mesh) -> Array:
         Unit vectors; (0, 1, 0) at a vertex that no face with an area uses.
     """
     normals = np.asarray(mesh.normals, np.float64)
-    length = np.linalg.norm(normals, axis=1)
-    missing = ~(np.isfinite(length) & (length > 0))
+    missing = missing_normals(normals)
     if missing.any():
         normals = np.where(missing[:, None], mean_face_normals(mesh.vertices, mesh.faces), normals)
-        length = np.linalg.norm(normals, axis=1)
-    return np.asarray(normals / length[:, None])
+    return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
 
 
 def mean_face_normals(vertices: Array, faces: Array) -> Array:

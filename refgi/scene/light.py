@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.scene.cone import cone_row
 from refgi.scene.values import (
     BRIGHTEST,
     LARGEST,
@@ -24,7 +24,7 @@ from refgi.scene.values import (
 )
 
 SPOT, POINT, DIRECTIONAL = 0, 1, 2  # kinds of light in a LightTable
-NARROWEST = math.radians(1e-5)  # half-angle; the cosine of a smaller one is 1 but for rounding, and its light is lost
+NARROWEST = math.radians(1e-5)  # half-angle; rays in float32 tell directions apart down to a third of it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,10 +43,10 @@ class SpotLight:
 
     def __post_init__(self) -> None:
         expect(is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
-        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero",
+        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero, up to 1e+100 long",
                self.direction)
-        fits = is_number(self.outer_half_angle) and NARROWEST <= self.outer_half_angle < math.pi / 2
-        expect(fits, "light: outer_half_angle_deg", f"{degrees(NARROWEST):g} or more and less than 90",
+        fits = is_number(self.outer_half_angle) and NARROWEST <= self.outer_half_angle <= math.pi / 2
+        expect(fits, "light: outer_half_angle_deg", f"{degrees(NARROWEST):g} to 90",
                math.degrees(self.outer_half_angle) if is_number(self.outer_half_angle) else self.outer_half_angle)
         expect(0 <= self.inner_half_angle <= self.outer_half_angle, "light: inner_half_angle_deg",
                "0 to outer_half_angle_deg", degrees(self.inner_half_angle))
@@ -75,7 +75,7 @@ class DirectionalLight:
     irradiance: Rgb
 
     def __post_init__(self) -> None:
-        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero",
+        expect(is_direction(self.direction), "light: direction", "a finite vector, not zero, up to 1e+100 long",
                self.direction)
         _expect_power(self.irradiance, "irradiance_w_per_m2")
         settle(self, "direction", "irradiance")
@@ -85,25 +85,22 @@ Light = SpotLight | PointLight | DirectionalLight
 
 
 class LightTable(NamedTuple):
-    """The lights as arrays for kernels: one row a light."""
+    """The lights as arrays for kernels: one row a light, float64."""
 
     kind: Array  # (k,) int32: 0 spot, 1 point, 2 directional
     position: Array  # (k, 3) m; zero for a directional light
     direction: Array  # (k, 3) unit vector the light travels along; zero for a point light
-    cos_inner: Array  # (k,) cosine of the inner half-angle
-    cos_outer: Array  # (k,) cosine of the outer half-angle
+    cone: Array  # (k, 6) `cone_row` of a spot; zero for others
     intensity: Array  # (k, 3) W/sr on the axis; perpendicular irradiance W/m^2 for a directional light
 
 
-def light_table(lights: Sequence[Light], dtype: npt.DTypeLike = np.float64) -> LightTable:
+def light_table(lights: Sequence[Light]) -> LightTable:
     """Gather lights into arrays for kernels.
 
     Parameters
     ----------
     lights : sequence of Light
         The scene's lights.
-    dtype : dtype
-        Element type of the arrays.
 
     Returns
     -------
@@ -111,8 +108,8 @@ def light_table(lights: Sequence[Light], dtype: npt.DTypeLike = np.float64) -> L
         One row a light.
     """
     count = len(lights)
-    table = LightTable(np.zeros(count, np.int32), np.zeros((count, 3), dtype), np.zeros((count, 3), dtype),
-                       np.zeros(count, dtype), np.zeros(count, dtype), np.zeros((count, 3), dtype))
+    table = LightTable(np.zeros(count, np.int32), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 6)),
+                       np.zeros((count, 3)))
     for row, light in enumerate(lights):
         if isinstance(light, DirectionalLight):
             table.kind[row] = DIRECTIONAL
@@ -124,8 +121,7 @@ def light_table(lights: Sequence[Light], dtype: npt.DTypeLike = np.float64) -> L
         if not isinstance(light, PointLight):
             table.direction[row] = np.asarray(light.direction) / np.linalg.norm(light.direction)
         if isinstance(light, SpotLight):
-            table.cos_inner[row] = math.cos(light.inner_half_angle)
-            table.cos_outer[row] = math.cos(light.outer_half_angle)
+            table.cone[row] = cone_row(light.inner_half_angle, light.outer_half_angle)
     return table
 
 

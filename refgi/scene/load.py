@@ -5,11 +5,11 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from refgi.errors import InputError, RefgiWarning, blame
+from refgi.errors import InputError, RefgiWarning, blame, first_faults
 from refgi.scene.builtin import SCENES, build_named
 from refgi.scene.files import did_you_mean, is_there, text_of
 from refgi.scene.framing import framed, lit
-from refgi.scene.health import mended, warn_of_flat_faces
+from refgi.scene.health import mended_all, warn_of_flat_faces, warn_of_unit
 from refgi.scene.meshfile import READERS, read_mesh_file
 from refgi.scene.model import Camera, Light, Scene, merge
 from refgi.scene.power import shining
@@ -87,9 +87,13 @@ def _with(scene: Scene, camera: Camera | None, lights: Sequence[Light] | None) -
 
 def _of_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
     found = read_mesh_file(path)
-    mends = [mended(mesh, f"{path}: {mesh.name}") for mesh in found.meshes]
-    warn_of_flat_faces(sum(dropped for _, dropped in mends), str(path))
-    geometry, materials = merge([mesh for mesh, _ in mends], smooth=True)
+    faults: list[str] = []
+    meshes, dropped = mended_all(found.meshes, lambda number: f"{path}: {found.meshes[number].name}", faults)
+    if faults:
+        raise InputError(first_faults(faults))
+    warn_of_flat_faces(dropped, str(path))
+    geometry, materials = merge(meshes, smooth=True)
+    warn_of_unit(geometry, str(path))
     lacking = []
     if camera is None:
         camera = found.cameras[0] if found.cameras else framed(geometry)

@@ -12,6 +12,7 @@ from refgi.scene.values import BLACK, BRIGHTEST, Array, Rgb, is_number, is_vecto
 
 SHARPEST = 1e20  # Phong exponent; far within float32
 DENSEST = 1e3  # index of refraction
+ROUNDING = 1e-6  # of a sum of two reflectances that are float32 numbers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,6 +36,8 @@ class Material:
             value = getattr(self, key)
             expect(is_vector(value) and all(0 <= c <= 1 for c in value), f"material {self.name!r}: {key}",
                    "three numbers from 0 to 1", value)
+        expect(not reflects_too_much(self.diffuse, self.specular), f"material {self.name!r}: diffuse + specular",
+               "at most 1 in each channel", [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
         expect(is_vector(self.emission) and min(self.emission) >= 0 and max(self.emission) <= BRIGHTEST,
                f"material {self.name!r}: emission", f"three numbers from 0 to {BRIGHTEST:g}", self.emission)
         expect(is_number(self.exponent) and 0 <= self.exponent <= SHARPEST, f"material {self.name!r}: exponent",
@@ -52,6 +55,22 @@ class Material:
     def is_dielectric(self) -> bool:
         """Whether the material is clear glass."""
         return self.ior > 0
+
+
+def reflects_too_much(diffuse: Rgb, specular: Rgb) -> bool:
+    """Return whether a surface would reflect more than arrives in any channel.
+
+    Parameters
+    ----------
+    diffuse, specular : tuple of 3 floats
+        Reflectances.
+
+    Returns
+    -------
+    bool
+        False where the sum is over 1 by rounding alone.
+    """
+    return any(d + s > 1 + ROUNDING for d, s in zip(diffuse, specular, strict=True))
 
 
 UNPAINTED = Material()  # of a mesh that names none

@@ -26,7 +26,8 @@ from refgi.scene.light import (
     SpotLight,
     light_table,
 )
-from refgi.scene.material import UNPAINTED, Material, MaterialTable, material_table
+from refgi.scene.material import Material, MaterialTable, material_table
+from refgi.scene.mesh import Mesh, expect_all_sound
 from refgi.scene.room import expect_room
 from refgi.scene.source import Source
 from refgi.scene.values import (
@@ -67,36 +68,6 @@ __all__ = [
     "material_table",
     "merge",
 ]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Mesh:
-    """Triangles of one material in world space: vertices (n, 3) m, faces (m, 3), optional vertex normals (n, 3)."""
-
-    vertices: Array
-    faces: Array
-    normals: Array | None = None
-    material: Material = UNPAINTED
-    name: str = "mesh"
-
-    def expect_sound(self, where: str) -> None:
-        """Raise `InputError` naming `where` unless shapes, coordinates and indices make a mesh."""
-        vertices, faces = np.asarray(self.vertices), np.asarray(self.faces)
-        expect(vertices.ndim == 2 and vertices.shape[1] == 3 and vertices.dtype.kind in "fiu",
-               f"{where}: vertices", "numbers in an (n, 3) array", f"{vertices.dtype} {vertices.shape}")
-        expect(faces.ndim == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu",
-               f"{where}: faces", "integers in an (m, 3) array", f"{faces.dtype} {faces.shape}")
-        expect(len(faces) > 0, f"{where}: faces", "at least one triangle", 0)
-        expect(len(vertices) > 0, f"{where}: vertices", "at least one", 0)
-        if not (abs(vertices.min()) <= LARGEST and abs(vertices.max()) <= LARGEST):  # so that NaN fails as well
-            row = int(np.argmin((np.abs(vertices) <= LARGEST).all(axis=1)))
-            expect(False, f"{where}: vertex {row}", f"finite coordinates up to {LARGEST:g} m", vertices[row].tolist())
-        if faces.min() < 0 or faces.max() >= len(vertices):
-            row = int(np.argmax(((faces < 0) | (faces >= len(vertices))).any(axis=1)))
-            expect(False, f"{where}: face {row}", f"vertex indices from 0 to {len(vertices) - 1}", faces[row].tolist())
-        if self.normals is not None:
-            expect(np.shape(self.normals) == vertices.shape, f"{where}: normals", f"shape {vertices.shape}",
-                   np.shape(self.normals))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -155,7 +126,7 @@ class Camera:
         for key in ("eye", "target"):
             expect(is_place(getattr(self, key)), f"camera: {key}", f"three finite numbers up to {LARGEST:g} m",
                    getattr(self, key))
-        expect(is_direction(self.up), "camera: up", "a finite vector, not zero", self.up)
+        expect(is_direction(self.up), "camera: up", "a finite vector, not zero, up to 1e+100 long", self.up)
         settle(self, "eye", "target", "up")
         view = np.subtract(self.target, self.eye)
         expect(bool(np.linalg.norm(view) > 1e-9), "camera: target", "a point away from eye", self.target)
@@ -224,23 +195,22 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
     InputError
         If a mesh has a coordinate that is not finite or an index out of range, or all do not fit in memory.
     """
-    for number, mesh in enumerate(meshes):
-        mesh.expect_sound(f"mesh {number} ({mesh.name})")
+    expect_all_sound(meshes, lambda number: f"mesh {number} ({meshes[number].name})")
     expect_room(sum(len(mesh.vertices) for mesh in meshes), sum(len(mesh.faces) for mesh in meshes), "meshes")
-    materials = tuple(dict.fromkeys(mesh.material for mesh in meshes))
+    index_of: dict[Material, int] = {}
+    index = [index_of.setdefault(mesh.material, len(index_of)) for mesh in meshes]
     smooth = smooth and any(mesh.normals is not None for mesh in meshes)
     if smooth:
         meshes = [mesh if mesh.normals is not None else _with_face_normals(mesh) for mesh in meshes]
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     vertices = [np.asarray(mesh.vertices, np.float64).reshape(-1, 3) for mesh in meshes]
     faces = [np.asarray(m.faces, np.int32).reshape(-1, 3) + np.int32(o) for m, o in zip(meshes, offsets, strict=False)]
-    material_of_face = [np.full(len(m.faces), materials.index(m.material), np.int32) for m in meshes]
     return Geometry(
         np.concatenate(vertices) if vertices else np.zeros((0, 3)),
         np.concatenate(faces) if faces else np.zeros((0, 3), np.int32),
-        np.concatenate(material_of_face) if material_of_face else np.zeros(0, np.int32),
+        np.repeat(np.array(index, np.int32), np.array([len(part) for part in faces], np.int64)),
         np.concatenate([np.asarray(m.normals, np.float64) for m in meshes]) if smooth else None,
-    ), materials
+    ), tuple(index_of)
 
 
 def _with_face_normals(mesh: Mesh) -> Mesh:

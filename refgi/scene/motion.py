@@ -134,7 +134,7 @@ def rotation_about(axis: Vector, angle: float) -> Array:
     >>> np.round(rotation_about((0, 0, 2), math.pi / 2) @ (1, 0, 0), 12).tolist()
     [0.0, 1.0, 0.0]
     """
-    expect(is_direction(axis), "axis", "a finite vector, not zero", axis)
+    expect(is_direction(axis), "axis", "a finite vector, not zero, up to 1e+100 long", axis)
     x, y, z = np.asarray(axis, np.float64) / math.hypot(*axis)
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     # 1 - cos without its rounding

@@ -4,17 +4,20 @@ Read line by line here, because trimesh counts a negative index from the end of 
 it stands on, takes index 0 for 1, hands groups back in reverse order and rounds colours to eight bits.
 """
 
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from refgi.errors import InputError, expect
-from refgi.scene.files import Contents, read_bytes
-from refgi.scene.model import Material, Mesh, Rgb
+from refgi.errors import InputError, RefgiWarning, expect, first_faults, shortened
+from refgi.scene.files import Contents, is_there, read_bytes
+from refgi.scene.material import reflects_too_much
+from refgi.scene.model import Array, Material, Mesh, Rgb
 
 Corner = tuple[int, int]  # position and normal (-1: none), counted from 0
+TEXTURES = ("bump", "disp", "decal", "norm", "refl")  # and all that starts with map_
 
 
 def read_obj(path: Path) -> Contents:
@@ -49,6 +52,8 @@ class _Reader:
         self.positions: list[tuple[float, ...]] = []
         self.normals: list[tuple[float, ...]] = []
         self.materials: dict[str, Material] = {}
+        self.libraries: set[str] = set()
+        self.coloured = 0  # vertices with a colour
         self.triangles: dict[str, list[Corner]] = {}
         self.current = "default"
 
@@ -56,6 +61,7 @@ class _Reader:
         key, values = words[0], words[1:]
         if key == "v":
             self.positions.append(_numbers(values[:3], where))
+            self.coloured += len(values) >= 6
         elif key == "vn":
             self.normals.append(_numbers(values[:3], where))
         elif key == "f":
@@ -63,11 +69,19 @@ class _Reader:
         elif key == "usemtl" and values:
             self.current = " ".join(values)
         elif key == "mtllib" and values:
-            self.materials |= read_mtl(self.path.parent / " ".join(values))
+            self._read_library(" ".join(values))
 
     def contents(self) -> Contents:
         expect(bool(self.triangles), f"{self.path}: f", "at least one polygon", 0)
-        return Contents(tuple(self._mesh(name) for name in self.triangles))
+        if self.coloured:
+            warnings.warn(RefgiWarning(f"{self.path}: colours of {self.coloured:,} vertices passed over"), stacklevel=4)
+        positions, normals = np.array(self.positions), np.array(self.normals)
+        return Contents(tuple(self._mesh(name, positions, normals) for name in self.triangles))
+
+    def _read_library(self, name: str) -> None:
+        if name not in self.libraries:
+            self.libraries.add(name)
+            self.materials |= read_mtl(self.path.parent / name)
 
     def _polygon(self, values: list[str], where: str) -> None:
         expect(len(values) >= 3, where, "three or more corners", len(values))
@@ -81,7 +95,7 @@ class _Reader:
         position = _index(parts[0], len(self.positions), where)
         return position, _index(parts[2], len(self.normals), where) if len(parts) > 2 and parts[2] else -1
 
-    def _mesh(self, name: str) -> Mesh:
+    def _mesh(self, name: str, positions: Array, all_normals: Array) -> Mesh:
         corners = np.array(self.triangles[name], np.int64)
         material = self.materials.get(name, Material(name))
         if (corners[:, 1] < 0).any():
@@ -89,8 +103,8 @@ class _Reader:
             normals = None
         else:
             pairs, faces = np.unique(corners, axis=0, return_inverse=True)
-            used, normals = pairs[:, 0], np.array(self.normals)[pairs[:, 1]]
-        mesh = Mesh(np.array(self.positions)[used], faces.reshape(-1, 3), normals, material, name)
+            used, normals = pairs[:, 0], all_normals[pairs[:, 1]]
+        mesh = Mesh(positions[used], faces.reshape(-1, 3), normals, material, name)
         mesh.expect_sound(f"{self.path}: material {name!r}")
         return mesh
 
@@ -112,7 +126,13 @@ def read_mtl(path: Path) -> dict[str, Material]:
     ------
     InputError
         If the file is missing or a value is out of range.
+
+    Warns
+    -----
+    RefgiWarning
+        If lobes are left out, or textures are named.
     """
+    textures: list[tuple[str, ...]] = []
     values: dict[str, dict[str, tuple[float, ...]]] = {}
     current: dict[str, tuple[float, ...]] = {}
     for number, words in _lines(path):
@@ -122,16 +142,44 @@ def read_mtl(path: Path) -> dict[str, Material]:
             current[words[0]] = _numbers(words[1:4], f"{path}: line {number}")
         elif words[0] == "Ns":
             current["Ns"] = _numbers(words[1:2], f"{path}: line {number}", 1)
+        elif words[0].lower().startswith("map_") or words[0].lower() in TEXTURES:
+            textures.append(tuple(words))
+    _warn_of_textures(textures, path)
+    too_bright = [name for name, found in values.items() if _is_lobed(found) and reflects_too_much(*_reflectances(found))]
+    if too_bright:
+        warnings.warn(RefgiWarning(f"{path}: {len(too_bright):,} of {len(values):,} materials with diffuse + specular "
+                                   f"(Kd + Ks) over 1 in a channel: specular left out"), stacklevel=5)
     return {name: _material(name, found, path) for name, found in values.items()}
 
 
+def _warn_of_textures(textures: Sequence[tuple[str, ...]], path: Path) -> None:
+    """Say how many textures a file names, and which of them are not there."""
+    if not textures:
+        return
+    kinds = ", ".join(sorted({shortened(words[0], 40) for words in textures})[:10])
+    # options come before the name, which may hold spaces
+    missing = [" ".join(words[1:]) for words in textures
+               if not any(is_there(path.parent / " ".join(words[k:])) for k in range(1, min(len(words), 20)))]
+    absent = f"; {len(missing):,} of them name no file: {first_faults([shortened(m, 80) for m in missing], ', ')}"
+    warnings.warn(RefgiWarning(f"{path}: {len(textures):,} texture(s) ({kinds}) passed over{absent if missing else ''}"),
+                  stacklevel=6)
+
+
+def _is_lobed(found: dict[str, tuple[float, ...]]) -> bool:
+    return found.get("Ns", (0.0,))[0] > 0
+
+
+def _reflectances(found: dict[str, tuple[float, ...]]) -> tuple[Rgb, Rgb]:
+    return _rgb(found.get("Kd", (0.5, 0.5, 0.5))), _rgb(found.get("Ks", (0.0, 0.0, 0.0)))
+
+
 def _material(name: str, found: dict[str, tuple[float, ...]], path: Path) -> Material:
-    diffuse, specular = found.get("Kd", (0.5, 0.5, 0.5)), found.get("Ks", (0.0, 0.0, 0.0))
+    diffuse, specular = _reflectances(found)
     exponent = found.get("Ns", (0.0,))[0]
-    if exponent <= 0 or max(d + s for d, s in zip(diffuse, specular, strict=True)) > 1:
+    if not _is_lobed(found) or reflects_too_much(diffuse, specular):
         specular, exponent = (0.0, 0.0, 0.0), 0.0
     try:
-        return Material(name, _rgb(diffuse), _rgb(specular), exponent, emission=_rgb(found.get("Ke", (0.0, 0.0, 0.0))))
+        return Material(name, diffuse, specular, exponent, emission=_rgb(found.get("Ke", (0.0, 0.0, 0.0))))
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 

@@ -38,13 +38,20 @@ class Motion(NamedTuple):
 class Path:
     """Which of a scene's values change along a sequence, and how; times are shares of its length.
 
-    `camera` and `lights` (by number) name fields of `Camera` and of the light.
+    `camera` and `lights` (by number) name fields of `Camera` and of the light. `source` is the file that it comes from,
+    for the text of an error.
     """
 
     curve: Curve = "catmull_rom"
     camera: Mapping[str, Track] = dataclasses.field(default_factory=dict)
     lights: Mapping[int, Mapping[str, Track]] = dataclasses.field(default_factory=dict)
     objects: tuple[Motion, ...] = ()
+    source: str = ""
+
+    def place(self, frame: int, frames: int) -> str:
+        """Return where a fault of a frame lies: file, frame and time."""
+        file = f"{self.source}: " if self.source else ""
+        return f"{file}frame {frame} of {frames} (at = {frame_time(frame, frames):.6g})"
 
 
 def value_at(track: Track, time: float, curve: Curve) -> Array:
@@ -137,13 +144,16 @@ def camera_and_lights(scene: Scene, path: Path, frame: int, frames: int) -> tupl
         If they are not usable; names the frame.
     """
     time = frame_time(frame, frames)
+    name = ""
     try:
-        camera = _changed(scene.camera, path.camera, time, path.curve)
-        lights = tuple(_changed(light, path.lights.get(number, {}), time, path.curve)
-                       for number, light in enumerate(scene.lights))
+        camera = changed(scene.camera, path.camera, time, path.curve)
+        lights = []
+        for number, light in enumerate(scene.lights):
+            name = f"lights[{number}] of the scene: "
+            lights.append(changed(light, path.lights.get(number, {}), time, path.curve))
     except InputError as error:
-        raise InputError(f"frame {frame} of {frames}: {error}") from error
-    return camera, lights
+        raise InputError(f"{path.place(frame, frames)}: {name}{error}") from error
+    return camera, tuple(lights)
 
 
 def frame_time(frame: int, frames: int) -> float:
@@ -162,8 +172,30 @@ def frame_time(frame: int, frames: int) -> float:
     return frame / max(1, frames - 1)
 
 
-def _changed(given: Any, tracks: Mapping[str, Track], time: float, curve: Curve) -> Any:
-    """Return a camera or a light with the values that it has at a time."""
+def changed(given: Any, tracks: Mapping[str, Track], time: float, curve: Curve) -> Any:
+    """Return a camera or a light with the values that it has at a time.
+
+    Parameters
+    ----------
+    given : Camera or Light
+        As the scene has it.
+    tracks : mapping of str to Track
+        By field.
+    time : float
+        0 to 1.
+    curve : {"linear", "catmull_rom"}
+        As in `value_at`.
+
+    Returns
+    -------
+    Camera or Light
+        The same object where there is no track.
+
+    Raises
+    ------
+    InputError
+        If a value is not usable.
+    """
     values = {key: value_at(track, time, curve).tolist() for key, track in tracks.items()}
     changes = {key: value[0] if len(value) == 1 else tuple(value) for key, value in values.items()}
     return dataclasses.replace(given, **changes) if changes else given
@@ -178,7 +210,7 @@ def _placed(geometry: Geometry, path: Path, frame: int, frames: int) -> Geometry
         try:
             geometry = moved(geometry, motion.faces, rotation_about(motion.axis, angle), motion.center, (x, y, z))
         except InputError as error:
-            raise InputError(f"frame {frame} of {frames}: {error}") from error
+            raise InputError(f"{path.place(frame, frames)}: {error}") from error
     return geometry
 
 

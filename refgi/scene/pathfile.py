@@ -28,13 +28,13 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from refgi.errors import InputError, expect
+from refgi.errors import InputError, expect, first_faults, shortened
 from refgi.scene.files import read_bytes
 from refgi.scene.light import DirectionalLight, PointLight, SpotLight
 from refgi.scene.model import Scene
 from refgi.scene.motion import faces_of
-from refgi.scene.path import Array, Curve, Motion, Path, Track
-from refgi.scene.values import is_direction
+from refgi.scene.path import Array, Curve, Motion, Path, Track, changed
+from refgi.scene.values import LARGEST, is_direction, is_place
 
 MOST_FRAMES = 100_000
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -115,7 +115,7 @@ class ObjectEntry(Entry):
         if (self.material is None) == (self.faces is None):
             raise ValueError("expected either material or faces")
         if not is_direction(self.axis):
-            raise ValueError("axis: expected a finite vector, not zero")
+            raise ValueError("axis: expected a finite vector, not zero, up to 1e+100 long")
         return self
 
 
@@ -155,11 +155,12 @@ def read_path(file: str | FilePath, scene: Scene) -> tuple[Path, int | None]:
     entry = _validated(file)
     faults: list[str] = []
     camera = _tracks(entry.camera, CAMERA, "camera", faults)
+    faults += _unusable(scene.camera, entry.camera, camera, "camera", entry.curve)
     lights = dict(_lights(entry, scene, faults))
     objects = tuple(_objects(entry, scene, faults))
     if faults:
-        raise InputError("\n".join(f"{file}: {fault}" for fault in faults))
-    return Path(entry.curve, camera, lights, objects), entry.frames
+        raise InputError(first_faults([f"{file}: {fault}" for fault in faults]))
+    return Path(entry.curve, camera, lights, objects, str(file)), entry.frames
 
 
 def _validated(file: FilePath) -> PathFile:
@@ -172,18 +173,18 @@ def _validated(file: FilePath) -> PathFile:
     try:
         return PathFile.model_validate_json(json.dumps(tree, default=str))  # as JSON, a list may be a tuple
     except ValidationError as error:
-        faults = [_fault(detail) for detail in error.errors(include_url=False)]
-        raise InputError("\n".join(f"{file}: {fault}" for fault in faults)) from error
+        faults = [f"{file}: {_fault(detail)}" for detail in error.errors(include_url=False)]
+        raise InputError(first_faults(faults)) from error
 
 
 def _fault(detail: Any) -> str:
     """Return "key: what was expected, got value" of one pydantic error."""
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in detail["loc"]).removeprefix(".")
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{shortened(part)}" for part in detail["loc"])
     text = str(detail["msg"]).removeprefix("Value error, ").replace("Input should be", "expected")
     if detail["type"] == "extra_forbidden":
         text = "unknown key"
     shown = repr(detail["input"]) if detail["type"] not in ("value_error", "missing") else ""
-    return f"{key}: {text}{f', got {shown[:80]}' if shown else ''}"
+    return f"{key.removeprefix('.') or 'file'}: {text}{f', got {shortened(shown, 80)}' if shown else ''}"
 
 
 def _tracks(keys: Sequence[Any], fields: Mapping[str, str], where: str, faults: list[str]) -> dict[str, Track]:
@@ -202,6 +203,17 @@ def _tracks(keys: Sequence[Any], fields: Mapping[str, str], where: str, faults: 
     return tracks
 
 
+def _unusable(
+    given: Any, keys: Sequence[Any], tracks: Mapping[str, Track], where: str, curve: Curve
+) -> Iterator[str]:
+    """Tell of the keys at whose times a camera or a light is not usable."""
+    for number, key in enumerate(keys):
+        try:
+            changed(given, tracks, key.at, curve)
+        except InputError as error:
+            yield f"{where}[{number}]: {str(error).removeprefix('camera: ').removeprefix('light: ')}"
+
+
 def _lights(entry: PathFile, scene: Scene, faults: list[str]) -> Iterator[tuple[int, dict[str, Track]]]:
     seen = set()
     for number, given in enumerate(entry.lights):
@@ -214,7 +226,9 @@ def _lights(entry: PathFile, scene: Scene, faults: list[str]) -> Iterator[tuple[
         named = {name for key in given.keys for name in key.model_fields_set} - {"at"}
         faults += [f"{where}.keys: {name}: light {given.light} has none, but {', '.join(known)}"
                    for name in sorted(named - set(known))]
-        yield given.light, _tracks(given.keys, known, f"{where}.keys", faults)
+        tracks = _tracks(given.keys, known, f"{where}.keys", faults)
+        faults += _unusable(scene.lights[given.light], given.keys, tracks, f"{where}.keys", entry.curve)
+        yield given.light, tracks
 
 
 def _objects(entry: PathFile, scene: Scene, faults: list[str]) -> Iterator[Motion]:
@@ -228,6 +242,10 @@ def _objects(entry: PathFile, scene: Scene, faults: list[str]) -> Iterator[Motio
         corners = scene.geometry.vertices[scene.geometry.faces[faces]].reshape(-1, 3)
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
         tracks = _tracks(given.keys, {"turn_deg": "turn", "move": "move"}, f"{where}.keys", faults)
+        far = {f"{where}.center": given.center or (0.0, 0.0, 0.0)}
+        far |= {f"{where}.keys[{k}].move": key.move for k, key in enumerate(given.keys)}
+        faults += [f"{key}: expected three lengths up to {LARGEST:g} m, got {place}" for key, place in far.items()
+                   if not is_place(place)]
         x, y, z = middle.tolist() if given.center is None else given.center
         yield Motion(faces, given.axis, (x, y, z), tracks.get("turn"), tracks.get("move"))
 

@@ -12,13 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from refgi.errors import InputError, expect
+from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.files import Contents, read_bytes
 from refgi.scene.model import Array, Mesh
 
 SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2, "int": 4,
          "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4, "double": 8, "float64": 8}
 LONGEST_HEADER = 65536  # bytes
+COLOURS = {"red", "green", "blue", "r", "g", "b"}
 
 
 class _Element(NamedTuple):
@@ -51,6 +52,7 @@ def read_ply(path: Path) -> Contents:
     _expect_complete(elements, encoding, content, start, path)
     parsed = _parsed(content, path)
     vertices, faces = np.asarray(parsed.get("vertices", ())), parsed.get("faces", ())
+    _warn_of_colours(elements, path)
     expect(len(vertices) == elements["vertex"].length, f"{path}: element vertex",
            f"{elements['vertex'].length} entries", len(vertices))
     expect(len(faces) > 0, f"{path}: face", "at least one", 0)
@@ -61,6 +63,15 @@ def read_ply(path: Path) -> Contents:
                 name=path.stem)
     mesh.expect_sound(f"{path}")
     return Contents((mesh,))
+
+
+def _warn_of_colours(elements: dict[str, _Element], path: Path) -> None:
+    """Say what a renderer of constant reflectances does not read."""
+    for name, what in (("vertex", "vertices"), ("face", "faces")):
+        found = [key for key in elements[name].properties if key.removeprefix("diffuse_") in COLOURS]
+        if found:
+            text = f"{path}: colours of {elements[name].length:,} {what} ({', '.join(found[:8])}) passed over"
+            warnings.warn(RefgiWarning(text), stacklevel=4)
 
 
 def _header(content: bytes, path: Path) -> tuple[dict[str, _Element], str, int]:
@@ -78,7 +89,7 @@ def _header(content: bytes, path: Path) -> tuple[dict[str, _Element], str, int]:
     for line in lines:
         if line[:1] == ["element"]:
             expect(len(line) == 3 and line[2].isdecimal() and len(line[2]) < 16, f"{path}: element",
-                   "a name and a count", " ".join(line))
+                   "a name and a count of at most 15 digits", " ".join(line))
             current = _Element(line[1], int(line[2]), [], 0)
             elements[line[1]] = current
         elif line[:1] == ["property"]:

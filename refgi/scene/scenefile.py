@@ -1,20 +1,23 @@
 """Scene files: JSON that names meshes, materials, camera and lights (docs/scenes.md has the keys)."""
 
 import codecs
+import collections
 import dataclasses
 import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from refgi.errors import InputError
-from refgi.scene.files import Contents, read_bytes
-from refgi.scene.health import mended, warn_of_flat_faces
+import numpy as np
+
+from refgi.errors import MOST_FAULTS, InputError, expect, first_faults, shortened
+from refgi.scene.files import Contents, is_there, read_bytes
+from refgi.scene.health import mended_all, warn_of_flat_faces, warn_of_unit
 from refgi.scene.meshfile import read_mesh_file
 from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
 from refgi.scene.power import shining
 from refgi.scene.room import expect_room
-from refgi.scene.transform import affine, placed
+from refgi.scene.transform import placed_all
 
 PLAINER = {"missing": "expected a value, nothing given", "extra_forbidden": "unknown key",
            "union_tag_invalid": "type: expected one of {expected_tags}",
@@ -52,6 +55,7 @@ def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
     materials = {name: given.built(name) for name, given in entry.materials.items()}
     meshes = _meshes(entry, materials, path)
     geometry, used = merge(meshes, smooth=any(mesh.normals is not None for mesh in meshes))
+    warn_of_unit(geometry, str(path))
     if camera is None and entry.camera is not None:
         camera = entry.camera.built("")
     given = tuple(light.built("") for light in entry.lights) if lights is None else tuple(lights)
@@ -64,21 +68,20 @@ def _validated(content: bytes, path: Path, *, need_camera: bool, need_lights: bo
     """Return the parsed file, or raise one error that lists all faults."""
     from pydantic import ValidationError
 
-    from refgi.scene.schema import SceneFile
+    from refgi.scene.schema import Names, SceneFile
 
     tree = _parsed(content, path)
-    named = tree.get("materials")
     faults = [f"{key}: expected {what}, nothing given" for key, what, needed in (
         ("camera", "an object", need_camera), ("lights", "at least one light", need_lights)
     ) if needed and tree.get(key) in (None, [])]
     try:
-        entry = SceneFile.model_validate_json(content, context=set(named) if isinstance(named, dict) else set())
+        entry = SceneFile.model_validate_json(content, context=Names(tree.get("materials")))
     except ValidationError as error:
         faults = [_fault(detail, tree) for detail in error.errors(include_url=False)] + faults
     except (ValueError, RecursionError) as error:
         faults = [str(error)]
     if faults:
-        raise InputError("\n".join(f"{path}: {fault}" for fault in faults))
+        raise InputError(first_faults([f"{path}: {fault}" for fault in faults]))
     return entry
 
 
@@ -86,9 +89,9 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
     def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         tree = dict(pairs)
         if len(tree) < len(pairs):
-            keys = [key for key, _ in pairs]
-            repeated = sorted({key for key in keys if keys.count(key) > 1})
-            raise InputError(f"{path}: {', '.join(repeated)}: expected each key once in an object")
+            times = collections.Counter(key for key, _ in pairs)
+            repeated = sorted(shortened(key, 80) for key, count in times.items() if count > 1)
+            raise InputError(f"{path}: {first_faults(repeated, ', ')}: expected each key once in an object")
         return tree
 
     try:
@@ -111,7 +114,7 @@ def _fault(detail: Any, tree: Any) -> str:
     if kind in PLAINER:
         text = PLAINER[kind].format(**detail.get("ctx", {}))
     shown = repr(given) if kind != "value_error" and not (kind == "missing" and isinstance(given, dict)) else ""
-    got = f", got {shown if len(shown) < 80 else shown[:77] + '...'}" if shown else ""
+    got = f", got {shortened(shown, 80)}" if shown else ""
     return f"{_key(detail['loc'], tree, kind) or 'file'}: {text}{got}"
 
 
@@ -123,42 +126,66 @@ def _key(place: Sequence[str | int], tree: Any, kind: str) -> str:
         found = part in node if isinstance(node, dict) else isinstance(node, list) and part in range(len(node))
         if (last and kind == "value_error" and part in KINDS) or not (found or (last and kind == "missing")):
             continue
-        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else part
+        name = f"[{part}]" if isinstance(part, int) else shortened(part)
+        key += f".{name}" if key and isinstance(part, str) else name
         node = node[part] if found else None
     return key
 
 
 def _meshes(entry: "SceneFile", materials: dict[str, Material], path: Path) -> list[Mesh]:
     """Return the placed meshes of all objects, or raise one error with what is wrong with any of them."""
-    contents: dict[str, Contents | InputError] = {}
-    meshes: list[Mesh] = []
     faults: list[str] = []
-    dropped = vertices = faces = 0
-    for number, given in enumerate(entry.objects):
-        try:
-            found = _read_once(contents, given.mesh, path.parent)
-            vertices += sum(len(mesh.vertices) for mesh in found.meshes)
-            faces += sum(len(mesh.faces) for mesh in found.meshes)
-            expect_room(vertices, faces, "all objects so far")
-            for mesh in found.meshes:
-                sound, flat = mended(_dressed(mesh, given, materials, entry.smooth_normals), f"{given.mesh}")
-                if given.transform:
-                    moved = placed(sound, affine(given.transform, "transform"))
-                    sound, lost = mended(moved, f"{given.mesh}: after its transform")
-                    flat += lost
-                dropped += flat
-                meshes.append(sound)
-        except InputError as error:
-            faults.append(f"{path}: objects[{number}].mesh: {error}")
-    if faults:
-        raise InputError("\n".join(faults))
-    warn_of_flat_faces(dropped, str(path))
+    dressed, owner = _dressed_meshes(entry, materials, path, faults)
+
+    def name(number: int) -> str:
+        return f"{path}: objects[{owner[number]}].mesh: {entry.objects[owner[number]].mesh}"
+
+    meshes, dropped = mended_all(dressed, name, faults)
+    _raise_if_any(faults)
+    matrix_of = {k: given for k, given in enumerate(entry.objects[number].transform for number in owner) if given}
+    moving = list(matrix_of)
+    matrices = np.array(list(matrix_of.values()), np.float64).reshape(-1, 4, 4)
+    moved, lost = mended_all(placed_all([meshes[k] for k in moving], matrices),
+                             lambda k: f"{name(moving[k])}: after its transform", faults)
+    _raise_if_any(faults)
+    for k, mesh in zip(moving, moved, strict=True):
+        meshes[k] = mesh
+    warn_of_flat_faces(dropped + lost, str(path))
     return meshes
 
 
-def _read_once(contents: dict[str, Contents | InputError], name: str, folder: Path) -> Contents:
+def _raise_if_any(faults: list[str]) -> None:
+    if faults:
+        raise InputError(first_faults(faults))
+
+
+def _dressed_meshes(
+    entry: "SceneFile", materials: dict[str, Material], path: Path, faults: list[str]
+) -> tuple[list[Mesh], list[int]]:
+    """Return the meshes of all objects where their files have them, and the number of each one's object."""
+    contents: dict[str, Contents | InputError] = {}
+    dressed: list[Mesh] = []
+    owner: list[int] = []
+    vertices = faces = 0
+    for number, given in enumerate(entry.objects):
+        try:
+            found = _read_once(contents, given.mesh, path.parent, suggest=len(faults) < MOST_FAULTS)
+            vertices += sum(len(mesh.vertices) for mesh in found.meshes)
+            faces += sum(len(mesh.faces) for mesh in found.meshes)
+            expect_room(vertices, faces, "all objects so far")
+        except InputError as error:
+            faults.append(f"{path}: objects[{number}].mesh: {error}")
+            continue
+        dressed += [_dressed(mesh, given, materials, entry.smooth_normals) for mesh in found.meshes]
+        owner += [number] * len(found.meshes)
+    return dressed, owner
+
+
+def _read_once(contents: dict[str, Contents | InputError], name: str, folder: Path, *, suggest: bool) -> Contents:
     if name not in contents:
         try:
+            # what is like a missing name takes long to find, and is not shown after so many faults
+            expect(suggest or is_there(folder / name), f"{folder / name}", "a file", "none")
             contents[name] = read_mesh_file(folder / name)
         except InputError as error:
             contents[name] = error

@@ -10,9 +10,23 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
+from refgi.errors import MOST_FAULTS, shortened
 from refgi.scene import model
 from refgi.scene.files import did_you_mean
 from refgi.scene.transform import affine
+
+class Names:
+    """The file's materials by name, and how many names without one were met."""
+
+    def __init__(self, materials: Any) -> None:
+        self.known = set(materials) if isinstance(materials, dict) else set()
+        self.unknown = 0
+
+    def suggestion(self, name: str) -> str:
+        """Return the known name nearest to an unknown one; nothing once more were met than an error shows."""
+        self.unknown += 1
+        return did_you_mean(name, self.known) if self.unknown <= MOST_FAULTS else ""
+
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Triple = tuple[Number, Number, Number]
@@ -103,9 +117,10 @@ class Object(Entry):
     @classmethod
     def known(cls, material: Any, info: ValidationInfo) -> Any:
         """Refuse a name that `materials` does not have."""
-        names: set[str] = info.context or set()
-        if isinstance(material, str) and material not in names:
-            raise ValueError(f"expected a key of materials, got {material!r}{did_you_mean(material, names)}")
+        names: Names = info.context
+        if isinstance(material, str) and material not in names.known:
+            suggestion = names.suggestion(material)
+            raise ValueError(f"expected a key of materials, got {shortened(repr(material), 80)}{suggestion}")
         return material
 
 

@@ -1,12 +1,13 @@
 """Placing a mesh in the world by a 4x4 matrix that acts on column vectors, p' = M p."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from refgi.errors import expect
-from refgi.scene.model import Array, Mesh
+from refgi.scene.mesh import Mesh, missing_normals
+from refgi.scene.values import Array
 
 IDENTITY = np.eye(4)
 # Rank is judged on the matrix scaled to its largest entry; below this a direction has collapsed to rounding noise.
@@ -35,12 +36,60 @@ def affine(numbers: Sequence[float], where: str) -> Array:
     """
     expect(len(numbers) == 16, where, "16 numbers, row by row", list(numbers))
     matrix = np.asarray(numbers, np.float64).reshape(4, 4)
-    expect(bool(np.isfinite(matrix).all()), where, "16 finite numbers", list(numbers))
-    expect(bool((matrix[3] == IDENTITY[3]).all()), where, "a last row of 0 0 0 1", matrix[3].tolist())
-    largest = np.abs(matrix[:3, :3]).max()
-    singular = largest == 0 or np.linalg.svd(matrix[:3, :3] / largest, compute_uv=False)[-1] < COLLAPSED
-    expect(not singular, where, "an invertible matrix", list(numbers))
+    expect_affine(matrix[None], lambda _: where)
     return matrix
+
+
+def expect_affine(matrices: Array, where: Callable[[int], str]) -> None:
+    """Raise `InputError` for the first of many matrices that is not finite, affine and invertible.
+
+    Parameters
+    ----------
+    matrices : (k, 4, 4) ndarray of float64
+        World from object.
+    where : callable
+        Returns file and key of the matrix of some number, for the error's text.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, the last row is not 0 0 0 1, or the matrix is singular.
+    """
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    straight = (matrices[:, 3] == IDENTITY[3]).all(axis=1)
+    for number in np.flatnonzero(~(finite & straight))[:1].tolist():
+        expect(bool(finite[number]), where(number), "16 finite numbers", matrices[number].ravel().tolist())
+        expect(False, where(number), "a last row of 0 0 0 1", matrices[number, 3].tolist())
+    linear = matrices[:, :3, :3]
+    largest = np.abs(linear).max(axis=(1, 2))
+    scaled = linear / np.where(largest > 0, largest, 1)[:, None, None]
+    singular = np.linalg.svd(scaled, compute_uv=False)[:, -1] < COLLAPSED
+    for number in np.flatnonzero(singular)[:1].tolist():
+        expect(False, where(number), "an invertible matrix", matrices[number].ravel().tolist())
+
+
+def invertible(matrices: Array) -> Array:
+    """Return which matrices are finite and have an inverse.
+
+    Parameters
+    ----------
+    matrices : (k, 4, 4) ndarray of float64
+        Affine.
+
+    Returns
+    -------
+    (k,) ndarray of bool
+        Products of good matrices may have overflowed or vanished.
+    """
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    linear = _near_one(np.where(finite[:, None, None], matrices[:, :3, :3], 0))
+    return np.asarray(np.linalg.det(linear) != 0)
+
+
+def _near_one(linear: Array) -> Array:
+    """Return matrices scaled by powers of 2, to the bit otherwise, so that determinants and inverses stay finite."""
+    _, exponent = np.frexp(np.abs(linear).max(axis=(1, 2)))
+    return np.asarray(np.ldexp(linear, -exponent[:, None, None]))
 
 
 def placed(mesh: Mesh, matrix: Array) -> Mesh:
@@ -56,16 +105,41 @@ def placed(mesh: Mesh, matrix: Array) -> Mesh:
     Returns
     -------
     Mesh
-        The same object where the matrix is the identity.
+        The same object where the matrix is the identity; else normals are unit vectors, or zero where they are missing.
     """
-    if np.array_equal(matrix, IDENTITY):
-        return mesh
-    linear = matrix[:3, :3]
-    vertices = np.asarray(mesh.vertices, np.float64) @ linear.T + matrix[:3, 3]
+    return placed_all([mesh], matrix[None])[0]
+
+
+def placed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
+    """Return each mesh moved by its own matrix, as `placed` does.
+
+    Parameters
+    ----------
+    meshes : sequence of k Mesh
+        Sound meshes.
+    matrices : (k, 4, 4) ndarray
+        World from object, affine and invertible.
+
+    Returns
+    -------
+    list of Mesh
+        The same object where a matrix is the identity.
+    """
+    linear = _near_one(matrices[:, :3, :3])
+    rest = (matrices == IDENTITY).all(axis=(1, 2))
+    mirrors = np.linalg.det(linear) < 0
+    inverse = np.linalg.inv(linear)  # its scale is lost again where normals are made unit vectors
+    return [mesh if rest[k] else _moved(mesh, matrices[k], inverse[k], bool(mirrors[k]))
+            for k, mesh in enumerate(meshes)]
+
+
+def _moved(mesh: Mesh, matrix: Array, inverse: Array, mirrors: bool) -> Mesh:
+    with np.errstate(over="ignore", invalid="ignore"):  # whoever reads a file looks at coordinates once they are final
+        vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     normals = mesh.normals
     if normals is not None:
-        normals = np.asarray(normals, np.float64) @ np.linalg.inv(linear)
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    mirrors = np.linalg.det(linear / np.abs(linear).max()) < 0
+        normals = np.where(missing_normals(normals)[:, None], 0.0, np.asarray(normals, np.float64)) @ inverse
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
     faces = mesh.faces[:, ::-1] if mirrors else mesh.faces
     return dataclasses.replace(mesh, vertices=vertices, faces=faces, normals=normals)

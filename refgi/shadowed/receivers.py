@@ -5,9 +5,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.rays import STEPS
 from refgi.scene import Geometry
 
 Array = npt.NDArray[Any]
+
+ROUNDED = 2.0**-14  # of a point's coordinates: it is off its face by that at most, or not meant to lie on it
 
 
 class Receivers(NamedTuple):
@@ -20,7 +23,7 @@ class Receivers(NamedTuple):
     origin: Array  # (3, r) float32: where rays start, lifted off the face, m
 
 
-def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: Array, offset: float) -> Receivers:
+def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: Array, grain: float) -> Receivers:
     """Take the covered pixels of a G-buffer, or any choice of them, as receivers.
 
     Parameters
@@ -31,8 +34,8 @@ def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: A
         The G-buffer's, world space.
     triangle_id : (h, w) or (n,) int ndarray
         Which triangle each pixel sees; -1 for none.
-    offset : float
-        How far rays start above the face, m.
+    grain : float
+        The tracer's: rays start above the face by `ray_offset`, m.
 
     Returns
     -------
@@ -45,4 +48,8 @@ def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: A
     corner = geometry.vertices[geometry.faces[triangle_id.reshape(-1)[pixel]]]
     face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]).T
     face *= np.where((face * up).sum(axis=0) < 0, -1.0, 1.0) / np.linalg.norm(face, axis=0)
-    return Receivers(pixel, *(np.ascontiguousarray(a, np.float32) for a in (at, up, face, at + offset * face)))
+    # what the rasterizer's rounding moved off the face is taken back
+    size = np.abs(at).sum(axis=0) + grain
+    height = ((at - corner[:, 0].T) * face).sum(axis=0)
+    lift = STEPS * size - np.where(np.abs(height) < ROUNDED * size, height, 0)
+    return Receivers(pixel, *(np.ascontiguousarray(a, np.float32) for a in (at, up, face, at + lift * face)))

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.radiometry import lobe_fraction
-from refgi.rays import Tracer
+from refgi.lobes import lobe_gap, lobe_norm, lobe_power
+from refgi.rays import Tracer, far_offset, ray_offset
 from refgi.shadowed.receivers import Receivers
 from refgi.stages import report_progress, stage
 
@@ -26,7 +26,7 @@ BATCH = 1 << 18  # pairs held at a time
 
 
 class Senders(NamedTuple):
-    """Pixel lights for the kernel, in float64; without lobes the last three have no columns."""
+    """Pixel lights for the kernel, in float64; without lobes the last four have no columns."""
 
     position: Array  # (3, n), m
     normal: Array  # (3, n)
@@ -34,6 +34,7 @@ class Senders(NamedTuple):
     lobe_flux: Array  # (3, n or 0), W
     lobe_axis: Array  # (3, n or 0)
     lobe_exponent: Array  # (n or 0,)
+    lobe_norm: Array  # (n or 0,) 1/sr
 
 
 @stage("shadowed.sum")
@@ -77,7 +78,7 @@ def _add_lights(tracer: Tracer, to: Receivers, receivers: tuple[int, int], sende
     pairs = (receivers[1] - receivers[0]) * count
     origin, direction, worth = (np.empty((pairs, 3), np.float32) for _ in range(3))
     reach, blocked = np.empty(pairs, np.float32), np.empty(pairs, np.bool_)
-    aim(to, receivers, senders, lights, tracer.offset, (origin, direction, reach, worth))
+    aim(to, receivers, senders, lights, tracer.grain, (origin, direction, reach, worth))
     if visibility:
         tracer.fill_occluded(origin, direction, reach, blocked)
     else:
@@ -86,7 +87,7 @@ def _add_lights(tracer: Tracer, to: Receivers, receivers: tuple[int, int], sende
 
 
 @kernel(parallel=True)
-def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int], offset: float,
+def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int], grain: float,
         rays: tuple[Array, Array, Array, Array]) -> None:
     """Write the shadow ray of each pair of a block, and what the pair is worth.
 
@@ -100,29 +101,32 @@ def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tup
         Pixel lights.
     lights : tuple of 2 ints
         First sender of the block and one past the last.
-    offset : float
-        How far segments end above the sender, m.
+    grain : float
+        The tracer's: segments end above the sender by `ray_offset` and `far_offset`, m.
     rays : tuple of 4 arrays
         Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2, float32, light by light for each receiver;
         the reach is 0 where a pair has nothing to give.
     """
     count = lights[1] - lights[0]
     for i in prange(receivers[1] - receivers[0]):
-        _aim_all(to, receivers[0] + i, senders, lights, offset, rays, i * count)
+        _aim_all(to, receivers[0] + i, senders, lights, grain, rays, i * count)
 
 
 @kernel
-def _aim_all(to: Receivers, r: int, senders: Senders, lights: tuple[int, int], offset: float,
+def _aim_all(to: Receivers, r: int, senders: Senders, lights: tuple[int, int], grain: float,
              rays: tuple[Array, Array, Array, Array], ray: int) -> None:
     for k in range(lights[0], lights[1]):
-        _aim(to, r, senders, k, offset, rays, ray + k - lights[0])
+        _aim(to, r, senders, k, grain, rays, ray + k - lights[0])
 
 
 @kernel
-def _aim(to: Receivers, r: int, senders: Senders, j: int, offset: float, rays: tuple[Array, Array, Array, Array],
+def _aim(to: Receivers, r: int, senders: Senders, j: int, grain: float, rays: tuple[Array, Array, Array, Array],
          ray: int) -> None:
     origins, directions, reach, worth = rays
     reach[ray] = 0
+    dx, dy = senders.position[0, j] - to.position[0, r], senders.position[1, j] - to.position[1, r]
+    offset = (ray_offset(senders.position[0, j], senders.position[1, j], senders.position[2, j], grain)
+              + far_offset(dx, dy, senders.position[2, j] - to.position[2, r]))
     r2, cos_x, cos_y, above = 0.0, 0.0, 0.0, 0.0
     for c in range(3):
         d = senders.position[c, j] - to.position[c, r]
@@ -147,26 +151,31 @@ def _aim(to: Receivers, r: int, senders: Senders, j: int, offset: float, rays: t
 
 @kernel
 def _lobe(to: Receivers, r: int, senders: Senders, j: int) -> Any:
-    """Return (P + 1) / (2 pi K) <r.w>^P for the direction from sender j to receiver r."""
-    # Eq. (3), normalised
-    r2, along, cos_theta = 0.0, 0.0, 0.0
-    for c in range(3):
-        d = to.position[c, r] - senders.position[c, j]
-        r2 += d * d
-        along += senders.lobe_axis[c, j] * d
-        cos_theta += senders.lobe_axis[c, j] * senders.normal[c, j]
-    if along <= 0:
-        return 0.0
-    exponent = senders.lobe_exponent[j]
-    norm = (exponent + 1) / (2 * np.pi * lobe_fraction(cos_theta, exponent))
-    return norm * (along / math.sqrt(r2)) ** exponent
+    """Return c(P) <r.w>^P for the direction from sender j to receiver r (Eq. 3, normalised)."""
+    dx, dy = to.position[0, r] - senders.position[0, j], to.position[1, r] - senders.position[1, j]
+    dz = to.position[2, r] - senders.position[2, j]
+    gap = lobe_gap(senders.lobe_axis[0, j], senders.lobe_axis[1, j], senders.lobe_axis[2, j], dx, dy, dz)
+    return senders.lobe_norm[j] * lobe_power(gap, senders.lobe_exponent[j])
 
 
 def _senders(lights: "PixelLights") -> Senders:
-    none = (np.zeros((3, 0)), np.zeros((3, 0)), np.zeros(0))
-    lobes = none if lights.lobe_flux is None else (lights.lobe_flux, lights.lobe_axis, lights.lobe_exponent)
-    arrays = (lights.position, lights.normal, lights.flux, *lobes)
-    return Senders(*(np.ascontiguousarray(array, np.float64) for array in arrays))
+    arrays = (lights.position, lights.normal, lights.flux)
+    position, normal, flux = (np.ascontiguousarray(array, np.float64) for array in arrays)
+    if lights.lobe_flux is None or lights.lobe_axis is None or lights.lobe_exponent is None:
+        return Senders(position, normal, flux, np.zeros((3, 0)), np.zeros((3, 0)), np.zeros(0), np.zeros(0))
+    axis = np.array(lights.lobe_axis, np.float64, order="C")
+    exponent = np.ascontiguousarray(lights.lobe_exponent, np.float64)
+    length = np.sqrt((axis * axis).sum(axis=0))
+    axis /= np.where(length > 0, length, 1.0)  # lights without a lobe have no axis
+    norm = np.empty_like(exponent)
+    _fill_norms((normal * axis).sum(axis=0), exponent, norm)
+    return Senders(position, normal, flux, np.ascontiguousarray(lights.lobe_flux, np.float64), axis, exponent, norm)
+
+
+@kernel
+def _fill_norms(cos_theta: Array, exponent: Array, norm: Array) -> None:
+    for k in range(len(norm)):
+        norm[k] = lobe_norm(cos_theta[k], exponent[k])
 
 
 @kernel(parallel=True)

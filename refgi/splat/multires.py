@@ -8,10 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.selection import choose_lights, drawn_from_maps, footprints
 from refgi.lights.settings import LightSettings, Pattern, expect_choices
 from refgi.lights.solid_angle import demo_footprints
-from refgi.pairs.settings import PairSettings
+from refgi.pairs.irradiance import Receivers
+from refgi.pairs.loss import warn_of_clamp
+from refgi.pairs.settings import ClampMode, PairSettings
 from refgi.scene.values import BRIGHTEST, is_count
 from refgi.splat.error_target.error_driven import error_driven
 from refgi.splat.light_lists.per_light import per_light
@@ -43,7 +45,7 @@ LEAST_TARGET = 1e-6  # about what rounding to float32 leaves of the full sum
 THRESHOLDS = ("depth_threshold", "derivative_threshold", "normal_threshold", "curvature_threshold", "light_threshold")
 # settings and printed forms that a mode would not heed: pairs with rays are those of `vpl`, an error sets its own cells
 UNHEEDED = {
-    "visibility": (("clamp", "offset", "lobe_norm", "widening", "representative", "per_light", "target_error"),
+    "visibility": (("offset", "lobe_norm", "widening", "representative", "per_light", "target_error"),
                    PairSettings.SWITCHES),
     "target_error": (("finest", "criteria", *THRESHOLDS, "normal_components", "curvature", "rim", "diagonal",
                       "refinement", "per_light", "threshold_form", "representative", "upsampling"),
@@ -55,6 +57,9 @@ UNHEEDED = {
 @dataclasses.dataclass(frozen=True)
 class MultiresSettings(LightSettings):
     """What `multires` can be set to; the defaults are the paper's, the authors' demo's where the paper is silent.
+
+    `clamp` "auto" is the form factor of a disc: the paper clamps as well (Sec. 5), at a value that it does not give. It
+    is none for lights that have no footprints (`source` "walk", `openness_flux` "roulette") and with `visibility`.
 
     Subsplats: from `coarsest` cells along the longer side down to cells of 2^`finest` pixels. A cell is refined where
     one of the `criteria` says so: "depth", (max - min) / min over `depth_threshold`; "derivative", its change a pixel
@@ -75,6 +80,7 @@ class MultiresSettings(LightSettings):
 
     lights: int = 256
     pattern: Pattern = "grid"
+    clamp: ClampMode = "auto"
     coarsest: int = 16
     finest: int = 0
     criteria: frozenset[str] = frozenset({"depth", "normal"})
@@ -126,10 +132,25 @@ class MultiresSettings(LightSettings):
                        getattr(self, key))
             expect(self.as_published.isdisjoint(switches), "as_published",
                    f"none of {sorted(switches)} with {mode} {chosen!r}", sorted(self.as_published))
+        expect(self.effective_clamp == "none" or self.visibility == "none", "clamp",
+               f"'none' with visibility {self.visibility!r}", self.clamp)
         expect(self.clamp != "sphere" or self.target_error is None, "clamp",
                "another one with target_error, which takes peaks of points alone apart", self.clamp)
-        expect(self.clamp == "disc" or "ams_disc" not in self.as_published, "as_published",
+        expect(self.effective_clamp == "disc" or "ams_disc" not in self.as_published, "as_published",
                "'ams_disc' with the clamp 'disc' alone", sorted(self.as_published))
+
+    @property
+    def traces_rays(self) -> bool:
+        """Whether the method traces rays."""
+        return super().traces_rays or self.visibility == "rays"
+
+    @property
+    def effective_clamp(self) -> ClampMode:
+        """The clamp in use: "auto" is "disc", and none where lights have no footprints or pairs are those of `vpl`."""
+        if self.clamp != "auto":
+            return self.clamp
+        bare = self.source == "walk" or self.openness_flux == "roulette" or self.visibility == "rays"
+        return "none" if bare else "disc"
 
 
 def multires(frame: "Frame", settings: MultiresSettings) -> Array:
@@ -160,6 +181,7 @@ def _indirect(
 ) -> Array:
     """Light the pixels of one buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
     _resolve(buffer, settings)
+    warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), lights, settings, footprint, "multires")
     if settings.target_error is not None:
         light = error_driven(buffer, lights, settings, footprint).irradiance
     elif settings.per_light == "light":
@@ -225,7 +247,7 @@ def _footprints(frame: "Frame", lights: "PixelLights", settings: MultiresSetting
     """Return the area of each light: exact, or as the authors' demo has it."""
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings)
-    return demo_footprints(lights, frame.scene.lights)
+    return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings))
 
 
 def _doubled(frame: "Frame") -> "GBuffer":

@@ -17,15 +17,16 @@ MESHES = (8, 20, 80, 320, 1280)  # faces of an octahedron and of icosahedra, sub
 class SplatSettings(PairSettings):
     """How far a pixel light reaches (SII Sec. 3.4 and appendix), besides how it lights a receiver.
 
-    A pair counts where B = I_0 cos^n / r^2 is at least I_low, one irradiance for all lights: `i_low` (the paper's
-    x %; 0: no cut) of the largest peak intensity I_0 over the square of `reference_length` (m), or `irradiance_low`
-    (W/m^2) where that is given. `bound` says which geometry finds the pixels that come into question; it changes no
+    A pair counts where B = I_0 cos^n / r^2 is at least I_low, one irradiance for all lights: `i_low` (0: no cut; the
+    paper's is 0.05) of the largest peak intensity I_0 over the square of `reference_length` (m; none: under which 0.05
+    leave as large a share of the pairs as in the paper, see `with_reference_length`), or `irradiance_low` (W/m^2) where
+    that is given. `bound` says which geometry finds the pixels that come into question; it changes no
     bit of the picture but for a "mesh" of `mesh_faces` faces that is not made to enclose its ellipsoid (`inflate`).
     `stochastic_range` cuts at a random share of I_low instead, drawn by `seed`, and weighs what is left: no bias.
     """
 
-    i_low: float = 0.05
-    reference_length: float = 1.0
+    i_low: float = 0.0
+    reference_length: float | None = None
     irradiance_low: float | None = None
     bound: Bound = "tangent"
     mesh_faces: int = 80
@@ -37,9 +38,10 @@ class SplatSettings(PairSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        expect(0 <= self.i_low <= LARGEST, "i_low", "a share of the brightest light's intensity, 0 or more", self.i_low)
-        expect(1 / LARGEST <= self.reference_length <= LARGEST, "reference_length",
-               f"{1 / LARGEST:g} to {LARGEST:g} m", self.reference_length)
+        expect(0 <= self.i_low <= LARGEST, "i_low", f"a share of the brightest light's intensity, 0 to {LARGEST:g}",
+               self.i_low)
+        expect(self.reference_length is None or 1 / LARGEST <= self.reference_length <= LARGEST, "reference_length",
+               f"none or {1 / LARGEST:g} to {LARGEST:g} m", self.reference_length)
         expect(self.irradiance_low is None or (math.isfinite(self.irradiance_low) and self.irradiance_low >= 0),
                "irradiance_low", "none or an irradiance of 0 or more, W/m^2", self.irradiance_low)
         expect(self.bound in get_args(Bound), "bound", " or ".join(map(repr, get_args(Bound))), self.bound)

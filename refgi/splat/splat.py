@@ -15,6 +15,7 @@ from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.ranged_sum import sum_pairs_in_range, sum_weighed_pairs
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.splat.reach.lists import Lists
+from refgi.splat.reach.reference_length import with_reference_length
 from refgi.splat.settings import SplatSettings
 from refgi.stages import skip, stage
 
@@ -101,6 +102,7 @@ def _sum_in_range(
     projection: "Projection | None", *, outside: bool,
 ) -> Array:
     packed = checked(receivers, lights, settings, footprint)
+    settings = with_reference_length(receivers, lights, settings)
     lists = Lists(packed, settings, outside, receivers.covered.shape[1], projection)
     weighed = outside or settings.stochastic_range
 

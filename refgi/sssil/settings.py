@@ -107,6 +107,11 @@ class HssilSettings:
                sorted(self.as_published))
 
     @property
+    def traces_rays(self) -> bool:
+        """Whether the method traces rays."""
+        return self.visibility == "rays"
+
+    @property
     def first_level(self) -> int:
         """Level of the pyramid that light is gathered at first: 0 is full resolution."""
         return FIRST_LEVEL[self.start]

@@ -14,19 +14,21 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.radiometry import lobe_fraction, radiant_intensity
-from refgi.rays import MISS, Tracer
+from refgi.lobes import inverse_fraction, lobe_direction
+from refgi.radiometry import radiant_intensity
+from refgi.rays import MISS, Tracer, ray_offset
 from refgi.rsm.projection import camera_projection, project
 from refgi.rsm.solid_angle import texel_solid_angles
 from refgi.sampling import hash_bits
 from refgi.scene import DirectionalLight, LightTable, Scene, material_table
 from refgi.truth.light_grid import light_rays
 from refgi.truth.paths import CHUNK
-from refgi.truth.surfaces import Surfaces, around, face_cross, face_normal, shading_normal, surfaces
+from refgi.truth.surfaces import Surfaces, around, face_cross, face_normal, height_above, shading_normal, surfaces
 
 Array = npt.NDArray[Any]
 
 MIRROR_EXPONENT = 100.0  # lobes from here on count as mirror-like: half of their flux lies within 7 degrees
+SHARP_LOBE = 1e3  # half of its flux lies within 2.1 degrees: chance meets it too rarely, though its error does not show
 LONGEST_CHAIN = 16
 
 
@@ -38,6 +40,7 @@ class Film(NamedTuple):
     solid_angle: Array  # (h, w) of each pixel, sr
     mirrors: Surfaces  # with only the mirror-like lobes
     ior: Array  # (k,) by material; 0: opaque
+    longest: int  # surfaces that a photon meets
 
 
 class Photons(NamedTuple):
@@ -53,7 +56,8 @@ class Photons(NamedTuple):
     towards: Array  # (n, 3) float64: face normal there, on the side it came from
 
 
-def film(scene: Scene, shape: tuple[int, int]) -> Film | None:
+def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EXPONENT, *,
+         longest: int = LONGEST_CHAIN) -> Film | None:
     """Prepare the counting of photons, or return None for a scene without mirror or glass.
 
     Parameters
@@ -62,6 +66,10 @@ def film(scene: Scene, shape: tuple[int, int]) -> Film | None:
         The scene.
     shape : tuple of 2 ints
         Rows and columns of the picture.
+    least_exponent : float
+        Lobes from here on count as mirrors.
+    longest : int
+        Surfaces that a photon meets at most; at 2, one bounce, glass is opaque.
 
     Returns
     -------
@@ -71,11 +79,13 @@ def film(scene: Scene, shape: tuple[int, int]) -> Film | None:
     table = material_table(scene.materials)
     mirrors = surfaces(scene)
     mirrors.diffuse[:] = 0
-    mirrors.specular[table.exponent < MIRROR_EXPONENT] = 0
+    mirrors.specular[table.exponent < least_exponent] = 0
+    if longest == 2:
+        table.ior[:] = 0
     if not (mirrors.specular.any() or table.ior.any()):
         return None
     solid_angle = texel_solid_angles(camera_projection(scene.camera, shape[1], shape[0]))
-    return Film(scene, shape, solid_angle, mirrors, table.ior)
+    return Film(scene, shape, solid_angle, mirrors, table.ior, longest)
 
 
 def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, random: np.random.Generator) -> Array:
@@ -103,14 +113,14 @@ def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, ra
     side = math.isqrt(photons)
     for k, light in enumerate(film.scene.lights):
         rays = light_rays(light, film.scene.geometry, random.random((side * side, 2)))
-        batch = _photons(rays.origins + tracer.offset * rays.directions, rays.directions)
+        batch = _photons(rays.origins + tracer.offsets(rays.origins)[:, None] * rays.directions, rays.directions)
         _power(lights, k, isinstance(light, DirectionalLight), rays.measure, rays.directions, batch.flux)
-        for bounce in range(LONGEST_CHAIN):
+        for bounce in range(film.longest):
             tracer.fill_closest(batch.origin, batch.direction, batch.reach, batch.triangle_id, batch.distance)
             words = random.integers(2**32, size=len(batch.reach), dtype=np.uint32)
             landing = (batch.triangle_id != MISS) & (bounce > 0)
             arriving = batch.flux[landing]
-            reflect(film.mirrors, film.ior, tracer.offset, words, batch)
+            reflect(film.mirrors, film.ior, tracer.grain, words, batch)
             _count(film, tracer, batch.landed[landing], batch.towards[landing], arriving, irradiance)
             if not (batch.reach > 0).any():
                 break
@@ -142,7 +152,7 @@ def _count(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Arra
     row, column, _ = project(camera_projection(camera, film.shape[1], film.shape[0]), landed.T)
     cosine = (view * normals).sum(axis=1) / np.linalg.norm(view, axis=1)
     seen = ~np.isnan(row) & (cosine > 0)
-    starts = landed[seen] + tracer.offset * normals[seen]
+    starts = landed[seen] + tracer.offsets(landed[seen])[:, None] * normals[seen]
     reach, blocked = np.ones(len(starts), np.float32), np.empty(len(starts), np.bool_)
     tracer.fill_occluded(starts.astype(np.float32), (camera.eye - starts).astype(np.float32), reach, blocked)
     seen[np.flatnonzero(seen)[blocked]] = False
@@ -154,7 +164,7 @@ def _count(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Arra
 
 
 @kernel(parallel=True)
-def reflect(mirrors: Surfaces, ior: Array, offset: float, words: Array, photons: Photons) -> None:
+def reflect(mirrors: Surfaces, ior: Array, grain: float, words: Array, photons: Photons) -> None:
     """Note where photons landed and send on those that met a mirror-like lobe or glass.
 
     Parameters
@@ -163,8 +173,8 @@ def reflect(mirrors: Surfaces, ior: Array, offset: float, words: Array, photons:
         The scene with only its mirror-like lobes.
     ior : (k,) ndarray
         Index of refraction by material, 0 where opaque.
-    offset : float
-        How far rays start above faces, m.
+    grain : float
+        The tracer's: how far rays start above faces, m.
     words : (n,) ndarray of uint32
         Random numbers.
     photons : Photons
@@ -172,11 +182,11 @@ def reflect(mirrors: Surfaces, ior: Array, offset: float, words: Array, photons:
     """
     count = len(photons.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _reflect(mirrors, ior, offset, words, photons, chunk * CHUNK, min(count, chunk * CHUNK + CHUNK))
+        _reflect(mirrors, ior, grain, words, photons, chunk * CHUNK, min(count, chunk * CHUNK + CHUNK))
 
 
 @kernel
-def _reflect(mirrors: Surfaces, ior: Array, offset: float, words: Array, photons: Photons, low: int,
+def _reflect(mirrors: Surfaces, ior: Array, grain: float, words: Array, photons: Photons, low: int,
              high: int) -> None:
     for i in range(low, high):
         triangle = photons.triangle_id[i]
@@ -188,6 +198,8 @@ def _reflect(mirrors: Surfaces, ior: Array, offset: float, words: Array, photons
              np.float64(photons.direction[i, 2]))
         y = (photons.origin[i, 0] + t * d[0], photons.origin[i, 1] + t * d[1], photons.origin[i, 2] + t * d[2])
         g = face_normal(mirrors, triangle, d[0], d[1], d[2])
+        height = height_above(mirrors, triangle, y, g)
+        y = (y[0] - height * g[0], y[1] - height * g[1], y[2] - height * g[2])
         for c in range(3):
             photons.landed[i, c] = y[c]
             photons.towards[i, c] = g[c]
@@ -201,7 +213,7 @@ def _reflect(mirrors: Surfaces, ior: Array, offset: float, words: Array, photons
                 continue
             w, share = _off_lobe(n, g, d, mirrors.exponent[material], words[i])
         length = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-        side = math.copysign(offset, w[0] * g[0] + w[1] * g[1] + w[2] * g[2])
+        side = math.copysign(ray_offset(y[0], y[1], y[2], grain), w[0] * g[0] + w[1] * g[1] + w[2] * g[2])
         for c in range(3):
             if ior[material] == 0:
                 photons.flux[i, c] *= share * mirrors.specular[material, c]
@@ -238,10 +250,9 @@ def _off_lobe(n: tuple[float, float, float], g: tuple[float, float, float], d: t
               exponent: float, word: Any) -> tuple[tuple[float, float, float], float]:
     """Return a direction of a lobe and 1 / K, or 0 where it points below the surface."""
     u, v = (hash_bits(word) + 0.5) * 2.0**-32, (hash_bits(word ^ np.uint32(0xB5297A4D)) + 0.5) * 2.0**-32
-    z = u ** (1 / (exponent + 1))
-    across, phi = math.sqrt(max(0.0, 1 - z * z)), 2 * np.pi * v
     cos_in = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
     mirror = (d[0] + 2 * cos_in * n[0], d[1] + 2 * cos_in * n[1], d[2] + 2 * cos_in * n[2])
-    w = around(mirror, across * math.cos(phi), across * math.sin(phi), z)
+    x, y, z = lobe_direction(u, v, exponent)
+    w = around(mirror, x, y, z)
     above = min(w[0] * g[0] + w[1] * g[1] + w[2] * g[2], w[0] * n[0] + w[1] * n[1] + w[2] * n[2])
-    return w, 1 / lobe_fraction(cos_in, exponent) if above > 0 else 0.0
+    return w, inverse_fraction(cos_in, exponent) if above > 0 else 0.0

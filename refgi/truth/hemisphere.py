@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.radiometry import DIRECTIONAL, incident_light
-from refgi.rays import MISS
+from refgi.rays import MISS, STEPS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
 from refgi.shadowed import Receivers
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, found, row
-from refgi.truth.surfaces import Surfaces, around, face_cross, lobe_pattern, shading_normal
+from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
 
 Array = npt.NDArray[Any]
 
@@ -140,8 +140,8 @@ def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, 
     k : int
         Which light.
     limits : tuple of 3 floats
-        Bound on G in units of 1 / footprint (0: none), measure of one light direction (sr or m^2), and how far rays
-        start above faces (m).
+        Bound on G in units of 1 / footprint (0: none), measure of one light direction (sr or m^2), and the
+        tracer's grain: how far rays start above faces (m).
     paths : Paths
         What was found.
     shadows : Shadows
@@ -155,7 +155,7 @@ def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, 
 @kernel
 def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], paths: Paths,
             shadows: Shadows, span: tuple[int, int]) -> None:
-    bound, measure, offset = limits
+    bound, measure, grain = limits
     directional = lights.kind[k] == DIRECTIONAL
     for ray in range(span[0], span[1]):
         triangle = paths.triangle_id[ray]
@@ -192,7 +192,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         diffuse, lobe = max(0.0, dot(n, w) - least), 0.0
         if has_lobe:
             lobe = max(0.0, lobe_pattern(surfaces, material, n, light, w) - least)
-        most = 0.0
+        most, offset = 0.0, lift(surfaces, triangle, y, g, grain)
         for c in range(3):
             worth = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
             most = max(most, worth)
@@ -200,8 +200,14 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
             shadows.origin[ray, c] = y[c] + offset * g[c]
             shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
         if most > 0:
-            # short of the light by the same offset: a lamp may lie in a surface itself
-            shadows.reach[ray] = np.inf if directional else max(0.0, 1.0 - offset / far)
+            shadows.reach[ray] = np.inf if directional else _short_of(lights, k, far, grain)
+
+
+@kernel
+def _short_of(lights: LightTable, k: int, far: float, grain: float) -> Any:
+    """Return the share of the way to a light up to which things block: a lamp may lie in a surface itself."""
+    offset = ray_offset(lights.position[k, 0], lights.position[k, 1], lights.position[k, 2], grain)
+    return max(0.0, 1.0 - STEPS - offset / far)
 
 
 @kernel

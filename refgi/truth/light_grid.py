@@ -49,7 +49,7 @@ def light_rays(light: Light, geometry: Geometry, jitter: Array) -> LightRays:
         return _parallel(light, geometry, square)
     if isinstance(light, SpotLight):
         axis = np.asarray(light.direction, np.float64) / np.linalg.norm(light.direction)
-        local, measure = _cap(square, math.cos(light.outer_half_angle))
+        local, measure = _cap(square, 2 * math.sin(light.outer_half_angle / 2) ** 2)
         directions = local @ _frame(axis)
     else:
         directions, measure = _sphere(square), 4 * math.pi
@@ -97,12 +97,12 @@ def _disc(square: Array) -> tuple[Array, Array]:
     return radius, np.where(wide, math.pi / 4 * ratio, math.pi / 2 - math.pi / 4 * ratio)
 
 
-def _cap(square: Array, cos_angle: float) -> tuple[Array, float]:
-    """Map the unit square to the cap of directions around z, solid angles in proportion (Lambert's map)."""
+def _cap(square: Array, most: float) -> tuple[Array, float]:
+    """Map the unit square to the cap of 1 - cos theta <= most around z, solid angles in proportion (Lambert's map)."""
     radius, phi = _disc(square)
-    height = radius * radius * (1 - cos_angle)  # 1 - cos theta
+    height = radius * radius * most  # 1 - cos theta
     across = np.sqrt(height * (2 - height)) * np.sign(radius)
-    return np.stack([across * np.cos(phi), across * np.sin(phi), 1 - height], axis=1), 2 * math.pi * (1 - cos_angle)
+    return np.stack([across * np.cos(phi), across * np.sin(phi), 1 - height], axis=1), 2 * math.pi * most
 
 
 def _sphere(square: Array) -> Array:

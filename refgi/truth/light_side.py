@@ -12,6 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.lobes import lobe_gap, lobe_power
+from refgi.rays import far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.shadowed import Receivers
 from refgi.truth.lit_points import BLOCK, LitPoints
@@ -42,12 +44,17 @@ def _glossy(points: LitPoints, j: int, dx: Any, dy: Any, dz: Any, nx: Any, ny: A
     zero = np.float32(0)
     r2 = max(dx * dx + dy * dy + dz * dz, TINY)
     cos_x = nx * dx + ny * dy + nz * dz
-    along = -(points.axis[0, j] * dx + points.axis[1, j] * dy + points.axis[2, j] * dz)
     above = -(points.normal[0, j] * dx + points.normal[1, j] * dy + points.normal[2, j] * dz)
-    if along <= zero or above <= zero or cos_x <= zero:
+    if above <= zero or cos_x <= zero:
         return zero
     r = np.sqrt(r2)
-    pattern = points.peak[j] * np.float32((along / r) ** points.exponent[j])
+    if points.exponent[j] == np.float32(1):
+        along = -(points.axis[0, j] * dx + points.axis[1, j] * dy + points.axis[2, j] * dz)
+        power = (along if along > zero else zero) / r
+    else:
+        power = lobe_power(lobe_gap(points.axis[0, j], points.axis[1, j], points.axis[2, j], -dx, -dy, -dz),
+                           points.exponent[j])
+    pattern = points.peak[j] * power
     return min(pattern * (cos_x / r) / r2, points.bound[j])
 
 
@@ -89,11 +96,14 @@ def _term(points: LitPoints, j: int, tile: Array, i: int, glossy: bool) -> Any:
 
 
 @kernel
-def _aim(points: LitPoints, j: int, to: Receivers, r: int, offset: Any, origins: Array, directions: Array,
+def _aim(points: LitPoints, j: int, to: Receivers, r: int, grain: Any, origins: Array, directions: Array,
          ray: int) -> Any:
     """Write the shadow segment to a picked point and return its reach: 1, or 0 where a face is seen from behind."""
     real = np.float32
     from_x, from_y = real(0), real(0)
+    x, y, z = points.position[0, j], points.position[1, j], points.position[2, j]
+    offset = ray_offset(x, y, z, grain)
+    offset += far_offset(x - to.position[0, r], y - to.position[1, r], z - to.position[2, r])
     for c in range(3):
         origins[ray, c] = to.origin[c, r]
         directions[ray, c] = points.position[c, j] + offset * points.facing[c, j] - to.origin[c, r]
@@ -104,7 +114,7 @@ def _aim(points: LitPoints, j: int, to: Receivers, r: int, offset: Any, origins:
 
 
 @kernel(parallel=True)
-def pick(points: LitPoints, to: Receivers, span: tuple[int, int], picks: int, seed: int, glossy: bool, offset: Any,
+def pick(points: LitPoints, to: Receivers, span: tuple[int, int], picks: int, seed: int, glossy: bool, grain: Any,
          rays: tuple[Array, Array, Array, Array]) -> None:
     """Let each receiver of a span pick lit points, and write the shadow rays and what they are worth.
 
@@ -122,8 +132,8 @@ def pick(points: LitPoints, to: Receivers, span: tuple[int, int], picks: int, se
         Random shift: a hash of it and the receiver's pixel.
     glossy : bool
         Whether any sender has a lobe.
-    offset : float32
-        How far segments end above the sender's face, m.
+    grain : float32
+        The tracer's: segments end above the sender's face by `ray_offset` and `far_offset`, m.
     rays : tuple of 4 arrays
         Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2; n = picks x receivers, float32.
     """
@@ -141,7 +151,7 @@ def pick(points: LitPoints, to: Receivers, span: tuple[int, int], picks: int, se
         for p in range(parts.shape[0]):
             for i in range(TILE):
                 blocks[p * PART // BLOCK, i] += parts[p, i]
-        _pick_all(points, to, low, count, tile, (picks, seed, glossy, offset), (blocks, parts), first, rays)
+        _pick_all(points, to, low, count, tile, (picks, seed, glossy, grain), (blocks, parts), first, rays)
 
 
 @kernel
@@ -149,7 +159,7 @@ def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Arra
               sums: tuple[Array, Array], first: int, rays: tuple[Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
     origins, directions, reach, worth = rays
-    picks, seed, glossy, offset = how
+    picks, seed, glossy, grain = how
     blocks, parts = sums
     real = np.float32
     for i in range(count):
@@ -178,6 +188,6 @@ def _pick_all(points: LitPoints, to: Receivers, low: int, count: int, tile: Arra
                 j += 1
                 term = _term(points, j, tile, i, glossy)
             if term > real(0):
-                reach[ray] = _aim(points, j, to, low + i, offset, origins, directions, ray)
+                reach[ray] = _aim(points, j, to, low + i, grain, origins, directions, ray)
                 for c in range(3):
                     worth[ray, c] = share * points.colour[c, j]

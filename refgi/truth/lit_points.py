@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.radiometry import DIRECTIONAL, lobe_fraction, radiant_intensity
+from refgi.lobes import lobe_norm
+from refgi.radiometry import DIRECTIONAL, radiant_intensity
 from refgi.rays import MISS, Tracer
 from refgi.scene import LightTable
 from refgi.truth.light_grid import LightRays
-from refgi.truth.surfaces import Surfaces, face_normal, shading_normal
+from refgi.truth.surfaces import Surfaces, face_normal, height_above, shading_normal
 
 Array = npt.NDArray[Any]
 
@@ -60,12 +61,13 @@ def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: 
         In the order of the rays, without dark points, not padded.
     """
     # a lamp may lie in a surface: look from just beyond it
-    origins = (rays.origins + tracer.offset * rays.directions).astype(np.float32)
+    beyond = tracer.offsets(rays.origins)
+    origins = (rays.origins + beyond[:, None] * rays.directions).astype(np.float32)
     directions = rays.directions.astype(np.float32)
     count = len(origins)
     triangle_id, distance = np.empty(count, np.int32), np.empty(count, np.float32)
     tracer.fill_closest(origins, directions, np.full(count, np.inf, np.float32), triangle_id, distance)
-    distance += np.float32(tracer.offset)
+    distance += beyond.astype(np.float32)
     points = _empty(2 * count)
     used = _fill(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance),
                  (rays.measure, bound), points)
@@ -111,6 +113,8 @@ def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Arr
         t = np.float64(distances[i])
         y = (origins[i, 0] + t * d[0], origins[i, 1] + t * d[1], origins[i, 2] + t * d[2])
         g = face_normal(surfaces, triangle, d[0], d[1], d[2])
+        height = height_above(surfaces, triangle, y, g)
+        y = (y[0] - height * g[0], y[1] - height * g[1], y[2] - height * g[2])
         n = shading_normal(surfaces, triangle, y, g)
         cos_in = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
         mirrored = (d[0] + 2 * cos_in * n[0], d[1] + 2 * cos_in * n[1], d[2] + 2 * cos_in * n[2])
@@ -128,7 +132,7 @@ def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Arr
             exponent = 1.0 if part == 0 else surfaces.exponent[material]
             points.power[used] = power
             points.exponent[used] = exponent
-            points.peak[used] = 1.0 if part == 0 else (exponent + 1) / (2 * lobe_fraction(cos_in, exponent))
+            points.peak[used] = 1.0 if part == 0 else np.pi * lobe_norm(cos_in, exponent)
             points.bound[used] = bound / area
             for c in range(3):
                 points.position[c, used] = y[c]

@@ -2,7 +2,8 @@
 
 Passes are independent, so the spread of their values gives the variance of the mean, whatever correlation there is
 between the samples inside a pass or between pixels. The picture's own mean is followed as one more value: pixels
-share lit points, so its error does not follow from theirs.
+share lit points, so its error does not follow from theirs. A value that is not a finite number is left out of both
+and counted.
 """
 
 import os
@@ -26,12 +27,13 @@ class Moments(NamedTuple):
     passes: Array  # () int64
     mean: Array  # (3, r + 1) float64; the last column is the mean over receivers
     squares: Array  # (3, r + 1) float64, sums of squared deviations from the mean
+    lost: Array  # (r + 1,) int64: passes whose value was not a finite number
 
     @property
     def variance_of_mean(self) -> Array:
         """Estimated variance of each mean, (3, r + 1); inf before the second pass."""
-        n = int(self.passes)
-        return self.squares / (n * (n - 1)) if n > 1 else np.full_like(self.squares, np.inf)
+        n = np.float64(self.passes) - self.lost
+        return np.where(n > 1, self.squares / np.maximum(n * (n - 1), 1), np.inf)
 
 
 def no_passes(receivers: int) -> Moments:
@@ -47,7 +49,8 @@ def no_passes(receivers: int) -> Moments:
     Moments
         All zero.
     """
-    return Moments(np.zeros((), np.int64), np.zeros((3, receivers + 1)), np.zeros((3, receivers + 1)))
+    return Moments(np.zeros((), np.int64), np.zeros((3, receivers + 1)), np.zeros((3, receivers + 1)),
+                   np.zeros(receivers + 1, np.int64))
 
 
 def add_pass(moments: Moments, values: Array) -> None:
@@ -61,18 +64,24 @@ def add_pass(moments: Moments, values: Array) -> None:
         The pass's irradiance, W/m^2.
     """
     moments.passes[...] += 1
-    picture = values.sum(axis=1) / max(1, values.shape[1])
-    _add(moments.mean, moments.squares, values, picture, int(moments.passes))
+    finite: Array = np.isfinite(values.sum(axis=0))
+    kept = values if finite.all() else values[:, finite]
+    picture = kept.sum(axis=1) / max(1, kept.shape[1])
+    moments.lost[:-1] += ~finite
+    moments.lost[-1] += bool(len(finite)) and not finite.any()
+    _add(moments.mean, moments.squares, values, picture, int(moments.passes), moments.lost)
 
 
 @kernel(parallel=True)
-def _add(mean: Array, squares: Array, values: Array, picture: Array, count: int) -> None:
+def _add(mean: Array, squares: Array, values: Array, picture: Array, passes: int, lost: Array) -> None:
     last = values.shape[1]
     for i in prange(last + 1):
+        if not np.isfinite(values[0, i] + values[1, i] + values[2, i] if i < last else picture[0]) or lost[i] == passes:
+            continue
         for c in range(3):
             value = values[c, i] if i < last else picture[c]
             delta = value - mean[c, i]
-            mean[c, i] += delta / count
+            mean[c, i] += delta / (passes - lost[i])
             squares[c, i] += delta * (value - mean[c, i])
 
 

@@ -23,6 +23,10 @@ from refgi.truth.surfaces import Surfaces
 Array = npt.NDArray[Any]
 
 
+# A lobe may point below an interpolated horizon: K is 1/2 no more, but <r.w>^P / K stays below 18 for K >= 1e-12.
+BELOW_HORIZON = 9.0
+
+
 class Task(NamedTuple):
     """Everything a pass works on."""
 
@@ -73,7 +77,7 @@ def _light_side(task: Task, words: Array, sums: Array) -> None:
     picks, glossy = task.settings.picks, bool((points.exponent > 1).any() or (points.peak > 1).any())
     for first, last in _spans(task, picks):
         rays = _shadows((last - first) * picks)
-        pick(points, task.to, (first, last), picks, int(words[2]), glossy, np.float32(task.tracer.offset),
+        pick(points, task.to, (first, last), picks, int(words[2]), glossy, np.float32(task.tracer.grain),
              (rays.origin, rays.direction, rays.reach, rays.worth))
         _settle(task, rays, first, picks, sums, task.settings.visibility)
 
@@ -109,7 +113,7 @@ def _hemisphere(task: Task, words: Array, sums: Array) -> None:
         send(task.to, (first, last), points, int(words[3]), reach, paths)
         for bounce in range(task.settings.bounces):
             if bounce:
-                scatter(task.surfaces, task.tracer.offset, int(words[3 + bounce]), task.to, first, count, paths)
+                scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.to, first, count, paths)
             _follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums)
 
 
@@ -121,13 +125,13 @@ def _follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums
         for k, light in enumerate(task.scene.lights):
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = _shadows(len(paths.reach))
-            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.offset), paths, shadows)
+            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), paths, shadows)
             if unseen is not None:
                 shadows.reach[unseen] = 0
             _settle(task, shadows, first, count, sums, True)
         if task.settings.visibility:
             return
-        pass_through(task.surfaces, task.tracer.offset, paths)
+        pass_through(task.surfaces, task.tracer.grain, paths)
         if not (paths.reach > 0).any():
             return
 
@@ -137,7 +141,7 @@ def _unseen(task: Task, paths: Paths) -> Array | None:
     if task.view is None:
         return None
     rays = _shadows(len(paths.reach))
-    aim_paths(task.view, task.surfaces, task.tracer.offset, paths, rays)
+    aim_paths(task.view, task.surfaces, task.tracer.grain, paths, rays)
     task.tracer.fill_occluded(rays.origin, rays.direction, rays.reach, rays.blocked)
     return rays.blocked
 
@@ -158,7 +162,9 @@ def _reach(task: Task) -> float:
         return np.inf
     most = max((footprint(light, task.scene.geometry, task.settings.light_grid)[1] for light in task.scene.lights),
                default=0.0)
-    peak = float((surfaces.exponent + 1)[surfaces.specular.any(axis=1)].max(initial=1.0))  # K is at least 1/2
+    peak = float((surfaces.exponent + 1)[surfaces.specular.any(axis=1)].max(initial=1.0))  # of (P + 1) / (2 K)
+    if len(surfaces.normals):
+        peak *= BELOW_HORIZON
     return float(np.sqrt(peak * most / bound))
 
 

@@ -1,47 +1,47 @@
 """Where a path goes after it found a surface: through it, where nothing blocks, or on by the surface's reflection."""
 
-import math
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.radiometry import lobe_fraction
+from refgi.lobes import inverse_fraction, lobe_direction
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
 from refgi.shadowed import Receivers
 from refgi.truth.hemisphere import cosine_direction
 from refgi.truth.paths import Paths, dot, found, row
-from refgi.truth.surfaces import Surfaces, around, face_normal, shading_normal
+from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
 
 Array = npt.NDArray[Any]
 
 
 @kernel(parallel=True)
-def pass_through(surfaces: Surfaces, offset: float, paths: Paths) -> None:
+def pass_through(surfaces: Surfaces, grain: float, paths: Paths) -> None:
     """Move each ray to the far side of what it found, with the same direction.
 
     Parameters
     ----------
     surfaces : Surfaces
         The scene.
-    offset : float
-        How far rays start above faces, m.
+    grain : float
+        The tracer's: how far rays start above faces, m.
     paths : Paths
         Origins, reach and lengths are moved on; rays that found nothing end.
     """
     for ray in prange(len(paths.reach)):
-        _pass_through(surfaces, offset, paths, ray)
+        _pass_through(surfaces, grain, paths, ray)
 
 
 @kernel
-def _pass_through(surfaces: Surfaces, offset: float, paths: Paths, ray: int) -> None:
+def _pass_through(surfaces: Surfaces, grain: float, paths: Paths, ray: int) -> None:
     if paths.triangle_id[ray] == MISS:
         paths.reach[ray] = 0
         return
     w, y = found(paths, ray)
     g = face_normal(surfaces, paths.triangle_id[ray], w[0], w[1], w[2])  # on the side the ray leaves to
+    offset = lift(surfaces, paths.triangle_id[ray], y, g, grain)
     for c in range(3):
         paths.origin[ray, c] = y[c] + offset * g[c]
     paths.travelled[ray] += paths.distance[ray]
@@ -49,7 +49,7 @@ def _pass_through(surfaces: Surfaces, offset: float, paths: Paths, ray: int) -> 
 
 
 @kernel(parallel=True)
-def scatter(surfaces: Surfaces, offset: float, seed: int, to: Receivers, first: int, per_receiver: int,
+def scatter(surfaces: Surfaces, grain: float, seed: int, to: Receivers, first: int, per_receiver: int,
             paths: Paths) -> None:
     """Send each path on from the surface it found, by that surface's reflection.
 
@@ -57,8 +57,8 @@ def scatter(surfaces: Surfaces, offset: float, seed: int, to: Receivers, first: 
     ----------
     surfaces : Surfaces
         The scene.
-    offset : float
-        How far rays start above faces, m.
+    grain : float
+        The tracer's: how far rays start above faces, m.
     seed : int
         Random numbers: a hash of it, the receiver's pixel and the path's number there.
     to : Receivers
@@ -80,11 +80,11 @@ def scatter(surfaces: Surfaces, offset: float, seed: int, to: Receivers, first: 
     for ray in prange(len(paths.reach)):
         pixel = to.pixel[first + ray // per_receiver]
         word = hash_bits(hash_bits(np.uint32(pixel) ^ np.uint32(seed)) + np.uint32(ray % per_receiver))
-        _scatter(surfaces, offset, word, paths, ray)
+        _scatter(surfaces, grain, word, paths, ray)
 
 
 @kernel
-def _scatter(surfaces: Surfaces, offset: float, word: Any, paths: Paths, ray: int) -> None:
+def _scatter(surfaces: Surfaces, grain: float, word: Any, paths: Paths, ray: int) -> None:
     triangle = paths.triangle_id[ray]
     paths.reach[ray] = 0
     if triangle == MISS:
@@ -108,14 +108,14 @@ def _scatter(surfaces: Surfaces, offset: float, word: Any, paths: Paths, ray: in
         part, factor = rho, cos_n / (cos_g * chance)
     else:
         exponent = surfaces.exponent[material]
-        z = u ** (1 / (exponent + 1))
-        across, phi = math.sqrt(max(0.0, 1 - z * z)), 2 * np.pi * v
         mirror = (2 * cos_n * n[0] - back[0], 2 * cos_n * n[1] - back[1], 2 * cos_n * n[2] - back[2])
-        w = around(mirror, across * math.cos(phi), across * math.sin(phi), z)
-        part, factor = glossy, dot(g, w) / (lobe_fraction(dot(n, w), exponent) * cos_g * (1 - chance))
-    if dot(g, w) <= 0:
+        x0, x1, x2 = lobe_direction(u, v, exponent)
+        w = around(mirror, x0, x1, x2)
+        part, factor = glossy, dot(g, w) * inverse_fraction(dot(n, w), exponent) / (cos_g * (1 - chance))
+    if dot(g, w) <= 0 or factor <= 0:
         return
     paths.reach[ray] = np.inf
+    offset = lift(surfaces, triangle, y, g, grain)
     for c in range(3):
         paths.origin[ray, c] = y[c] + offset * g[c]
         paths.direction[ray, c] = w[c]

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rays import MISS, Tracer
+from refgi.rays import MISS, Tracer, ray_offset
 from refgi.rsm.projection import Projection, texel_of
 from refgi.truth.lit_points import LitPoints
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, found
-from refgi.truth.surfaces import Surfaces, face_normal
+from refgi.truth.surfaces import Surfaces, face_normal, lift
 
 Array = npt.NDArray[Any]
 
@@ -29,7 +29,7 @@ def aim_at_eye(view: Projection, offset: float, y: tuple[float, float, float], g
     view : Projection
         The camera's map.
     offset : float
-        How far rays start above faces, m.
+        How far along g the ray starts, m.
     y : tuple of 3 floats
         The point, m.
     g : tuple of 3 floats
@@ -70,22 +70,22 @@ def seen_points(tracer: Tracer, view: Projection, points: LitPoints) -> LitPoint
     count = len(points.power)
     origins, directions = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     reach, blocked = np.empty(count, np.float32), np.empty(count, np.bool_)
-    _aim_points(view, tracer.offset, points.position, points.facing, (origins, directions, reach))
+    _aim_points(view, tracer.grain, points.position, points.facing, (origins, directions, reach))
     tracer.fill_occluded(origins, directions, reach, blocked)
     return LitPoints(*(part[..., ~blocked] for part in points))
 
 
 @kernel
-def _aim_points(view: Projection, offset: float, position: Array, facing: Array,
+def _aim_points(view: Projection, grain: float, position: Array, facing: Array,
                 rays: tuple[Array, Array, Array]) -> None:
     for i in range(position.shape[1]):
         y = (np.float64(position[0, i]), np.float64(position[1, i]), np.float64(position[2, i]))
         g = (np.float64(facing[0, i]), np.float64(facing[1, i]), np.float64(facing[2, i]))
-        aim_at_eye(view, offset, y, g, rays, i)
+        aim_at_eye(view, ray_offset(y[0], y[1], y[2], grain), y, g, rays, i)
 
 
 @kernel(parallel=True)
-def aim_paths(view: Projection, surfaces: Surfaces, offset: float, paths: Paths, rays: Shadows) -> None:
+def aim_paths(view: Projection, surfaces: Surfaces, grain: float, paths: Paths, rays: Shadows) -> None:
     """Write a ray to the eye from each surface that paths found.
 
     Parameters
@@ -94,8 +94,8 @@ def aim_paths(view: Projection, surfaces: Surfaces, offset: float, paths: Paths,
         The camera's map.
     surfaces : Surfaces
         The scene.
-    offset : float
-        How far rays start above faces, m.
+    grain : float
+        The tracer's: how far rays start above faces, m.
     paths : Paths
         What was found.
     rays : Shadows
@@ -103,11 +103,11 @@ def aim_paths(view: Projection, surfaces: Surfaces, offset: float, paths: Paths,
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _aim_paths(view, surfaces, offset, paths, rays, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
+        _aim_paths(view, surfaces, grain, paths, rays, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
 
 
 @kernel
-def _aim_paths(view: Projection, surfaces: Surfaces, offset: float, paths: Paths, rays: Shadows,
+def _aim_paths(view: Projection, surfaces: Surfaces, grain: float, paths: Paths, rays: Shadows,
                span: tuple[int, int]) -> None:
     written = (rays.origin, rays.direction, rays.reach)
     for ray in range(span[0], span[1]):
@@ -115,4 +115,4 @@ def _aim_paths(view: Projection, surfaces: Surfaces, offset: float, paths: Paths
         if paths.triangle_id[ray] != MISS:
             w, y = found(paths, ray)
             g = face_normal(surfaces, paths.triangle_id[ray], -w[0], -w[1], -w[2])  # where light leaves to the path
-            aim_at_eye(view, offset, y, g, written, ray)
+            aim_at_eye(view, lift(surfaces, paths.triangle_id[ray], y, g, grain), y, g, written, ray)

@@ -73,6 +73,11 @@ class TruthSettings:
                "'all' for caustics or more than one bounce", self.emitters)
 
     @property
+    def traces_rays(self) -> bool:
+        """Whether the method traces rays."""
+        return True
+
+    @property
     def picks_per_pass(self) -> int:
         """Lit points that each receiver picks in a pass."""
         return 0 if self.estimator == "hemisphere" else self.picks

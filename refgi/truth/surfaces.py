@@ -17,7 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.radiometry import lobe_fraction, orthonormal_basis
+from refgi.lobes import lobe_gap, lobe_norm, lobe_power
+from refgi.radiometry import orthonormal_basis
+from refgi.rays import ray_offset
 from refgi.scene import LightTable, Scene, light_table, material_table
 
 Array = npt.NDArray[Any]
@@ -166,6 +168,57 @@ def shading_normal(surfaces: Surfaces, triangle: int, y: tuple[float, float, flo
 
 
 @kernel
+def height_above(surfaces: Surfaces, triangle: int, y: tuple[float, float, float],
+                 g: tuple[float, float, float]) -> Any:
+    """Return how far the rounding of a ray's distance moved a found point off its face.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    triangle : int
+        Which triangle was found.
+    y : tuple of 3 floats
+        Where, m.
+    g : tuple of 3 floats
+        Unit face normal.
+
+    Returns
+    -------
+    float
+        Length along g, m.
+    """
+    v, i = surfaces.vertices, surfaces.faces[triangle, 0]
+    return (y[0] - v[i, 0]) * g[0] + (y[1] - v[i, 1]) * g[1] + (y[2] - v[i, 2]) * g[2]
+
+
+@kernel
+def lift(surfaces: Surfaces, triangle: int, y: tuple[float, float, float], g: tuple[float, float, float],
+         grain: float) -> Any:
+    """Return how far along the face normal from a found point a ray must start.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    triangle : int
+        Which triangle was found.
+    y : tuple of 3 floats
+        Where, as the ray's rounded distance has it, m.
+    g : tuple of 3 floats
+        Unit face normal on the side to start on.
+    grain : float
+        The tracer's, m.
+
+    Returns
+    -------
+    float
+        Length, m: the offset from the face.
+    """
+    return ray_offset(y[0], y[1], y[2], grain) - height_above(surfaces, triangle, y, g)
+
+
+@kernel
 def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float], light: tuple[float, float, float],
                  w: tuple[float, float, float]) -> Any:
     """Return (P + 1) / (2 K) <r.w>^P [n.w > 0], the lobe's emission relative to diffuse rho F / pi.
@@ -177,7 +230,7 @@ def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float
     material : int
         Which material.
     n, light, w : tuple of 3 floats
-        Unit vectors: shading normal, towards the light, away from the point.
+        Shading normal, towards the light, away from the point; unit vectors, but for w, whose length may be rounded.
 
     Returns
     -------
@@ -187,10 +240,11 @@ def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float
     exponent = surfaces.exponent[material]
     cos_in = n[0] * light[0] + n[1] * light[1] + n[2] * light[2]
     cos_out = n[0] * w[0] + n[1] * w[1] + n[2] * w[2]
-    r_w = 2 * cos_in * cos_out - (light[0] * w[0] + light[1] * w[1] + light[2] * w[2])  # r = 2 (n.l) n - l
-    if r_w <= 0 or cos_out <= 0:
+    if cos_out <= 0:
         return 0.0
-    return (exponent + 1) / (2 * lobe_fraction(cos_in, exponent)) * r_w**exponent
+    twice = 2 * cos_in  # r = 2 (n.l) n - l
+    gap = lobe_gap(twice * n[0] - light[0], twice * n[1] - light[1], twice * n[2] - light[2], w[0], w[1], w[2])
+    return np.pi * lobe_norm(cos_in, exponent) * lobe_power(gap, exponent) if gap < 1 else 0.0
 
 
 @kernel

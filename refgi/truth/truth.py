@@ -1,7 +1,6 @@
 """The ground truth: one-bounce irradiance at the G-buffer's points, with its standard error."""
 
 import hashlib
-import math
 import time
 import warnings
 from pathlib import Path
@@ -15,7 +14,7 @@ from refgi.rsm.projection import camera_projection
 from refgi.scene import Scene
 from refgi.shadowed import Receivers, receivers
 from refgi.stages import report_progress, stage
-from refgi.truth.caustics import MIRROR_EXPONENT, film
+from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.moments import Moments, add_pass, load, no_passes, save
 from refgi.truth.passes import Task, one_pass
 from refgi.truth.settings import TruthSettings
@@ -36,6 +35,7 @@ class TruthResult(NamedTuple):
     picture_mean: Array  # (3,) float64: mean over all pixels that see a surface
     picture_variance: Array  # (3,) float64: variance of that mean, with the correlation between pixels
     passes: int
+    lost: int = 0  # values of a pixel in a pass that were not finite numbers and are left out
 
     @property
     def standard_error(self) -> Array:
@@ -118,9 +118,9 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
         If the checkpoint file is damaged or of another computation.
     """
     started = time.perf_counter()
-    to = receivers(scene.geometry, position, normal, triangle_id, tracer.offset)
-    caustics = film(scene, triangle_id.shape) if settings.caustics else None
-    found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else math.inf)
+    to = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
+    caustics = film(scene, triangle_id.shape) if settings.caustics else _sharp_lobes(scene, triangle_id.shape, settings)
+    found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else SHARP_LOBE)
     view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None
     task = Task(scene, settings, tracer, found, lights_of(scene), to, caustics, view)
     file = Path(settings.checkpoint) if settings.checkpoint else None
@@ -131,7 +131,24 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
         if file:
             save(file, moments, name)
         report_progress(min(1.0, int(moments.passes) / settings.passes))
-    return _result(moments, to, settings, triangle_id.shape)
+    result = _result(moments, to, settings, triangle_id.shape)
+    if result.lost:
+        warnings.warn(RefgiWarning(f"scene {scene.name!r}: {result.lost} of {int(moments.passes) * len(to.pixel)} "
+                                   "values of a pixel in a pass are not finite numbers and left out"), stacklevel=3)
+    return result
+
+
+def _sharp_lobes(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> Film | None:
+    """Return where photons off sharp lobes are counted; warn where the settings ask for more than photons know."""
+    sharp = [m.name for m in scene.materials if m.is_glossy and not m.is_dielectric and m.exponent >= SHARP_LOBE]
+    if sharp and (settings.bounces > 1 or not settings.visibility or settings.emitters == "seen"):
+        kept = "beyond the first bounce" if settings.visibility and settings.emitters == "all" else "here"
+        warnings.warn(RefgiWarning(f"scene {scene.name!r}: the lobes of {len(sharp)} material(s), {sharp[0]!r} first, "
+                                   f"are too sharp to sample (exponent {SHARP_LOBE:g} or more) and left out {kept}"),
+                      stacklevel=4)
+        if kept == "here":
+            return None
+    return film(scene, (shape[0], shape[1]), SHARP_LOBE, longest=2) if sharp else None
 
 
 def _enough(moments: Moments, settings: TruthSettings, seconds: float) -> bool:
@@ -153,9 +170,9 @@ def _result(moments: Moments, to: Receivers, settings: TruthSettings, shape: tup
     mean.reshape(3, -1)[:, to.pixel] = moments.mean[:, :-1]
     variance.reshape(3, -1)[:, to.pixel] = variance_of_mean[:, :-1]
     per_pass = settings.picks_per_pass + settings.directions_per_pass
-    samples.reshape(-1)[to.pixel] = int(moments.passes) * per_pass
+    samples.reshape(-1)[to.pixel] = (int(moments.passes) - moments.lost[:-1]) * per_pass
     return TruthResult(mean, variance, samples, moments.mean[:, -1].copy(), variance_of_mean[:, -1],
-                       int(moments.passes))
+                       int(moments.passes), int(moments.lost[:-1].sum()))
 
 
 def _fingerprint(task: Task) -> str:

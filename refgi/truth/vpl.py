@@ -42,7 +42,12 @@ class VplSettings:
         expect(self.pattern in ("grid", "halton", "all", "random"), "pattern",
                "'grid', 'halton', 'all' or 'random'", self.pattern)
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
-        expect(1 <= self.batch <= 2**30, "batch", "1 or more pairs", self.batch)
+        expect(1 <= self.batch <= 2**30, "batch", f"1 to {2**30:,} pairs", self.batch)
+
+    @property
+    def traces_rays(self) -> bool:
+        """Whether the method traces rays: without visibility it takes from their tracer how far receivers are moved."""
+        return True
 
 
 def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
@@ -66,7 +71,7 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     lights = choose_pixel_lights(frame.rsms, count=None if settings.pattern == "all" else settings.lights,
                                  pattern=settings.pattern, seed=settings.seed, filtered=settings.filtered)
     buffer = frame.gbuffer
-    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
+    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
     irradiance = np.zeros((3, frame.height, frame.width), frame.dtype)
     irradiance.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, lights, visibility=settings.visibility,
                                                            batch=settings.batch)

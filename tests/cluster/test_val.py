@@ -14,6 +14,8 @@ from refgi.scene import load_scene
 from refgi.splat import SiiSettings, sii
 from refgi.stages import observe
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 SMALL = {"lights": 64, "area_lights": 6, "map_resolution": 32}
 TO_AN_ERROR = {"area_lights": 30, "target_error": 0.3}  # the number is left as it is where an error finds it
 SUM = {np.float32: 2e-6, np.float64: 1e-12}  # another order of summation, relative to the brightest pixel

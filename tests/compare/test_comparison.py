@@ -21,6 +21,8 @@ from refgi.scene import Camera, Geometry, Material, Scene, SpotLight, load_scene
 from refgi.stages import stage
 from refgi.truth import TruthSettings
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 SIZE = {"width": 20, "height": 16, "rsm_resolution": 32}
 
 

@@ -19,6 +19,8 @@ from refgi.compare.results import as_json, file_names, signed_error, write_resul
 from refgi.image import is_from_refgi, read_exr, read_png_attributes
 from refgi.provenance import plain
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 
 class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)

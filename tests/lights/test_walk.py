@@ -12,6 +12,8 @@ from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Material, PointLight, light_table, load_scene, material_table
 from refgi.splat import SiiSettings, sii, walk_lights
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 
 def lights_of(scene, **settings):
     return walk_lights(Tracer(scene.geometry), scene.geometry, material_table(scene.materials),

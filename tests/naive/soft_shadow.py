@@ -79,7 +79,22 @@ def map_near(depth):
     return min(min(row) for row in depth)
 
 
-def series_shadow(depth, point, delta, far, terms, bias=None):
+def scales(depth, kind, scene_far, first, bias):
+    """(to, back): metres to the series' depths and back, on the scale of what a map holds or of the scene."""
+    end = 1 - first - max(first, bias)
+    top = max(end - first - max(first, bias), end / 2)
+    held = [z for row in depth for z in row if z < math.inf]
+    near = min(held)
+    far = max(*held, 1.05 * near)
+    if kind == "scene":
+        return lambda z: min(z * end / scene_far, end), lambda t: t * scene_far / end
+    if kind == "map":
+        return lambda z: min((z - near) * top / (far - near), end), lambda t: near + t / top * (far - near)
+    octaves = math.log2(far / near)
+    return (lambda z: min(math.log2(z / near) * top / octaves, end)), lambda t: near * 2 ** (t / top * octaves)
+
+
+def series_shadow(depth, point, delta, far, terms, bias=None, kind="log_map"):
     """(V, z_avg) by the series: each texel's own f_M, averaged; z_avg is None without blockers."""
     x, y, z = point
     d = math.sqrt(x * x + y * y + z * z)
@@ -88,11 +103,11 @@ def series_shadow(depth, point, delta, far, terms, bias=None):
         return 1.0, None
     first = first_one(terms)
     b = first if bias is None else bias
-    scale = (1 - first - max(first, b)) / far
+    to, back = scales(depth, kind, far, first, b)
 
     def lit(texel):
-        stored = min(depth[texel[0]][texel[1]], far) * scale
-        return step_series(d * scale - b, stored, terms), stored
+        stored = to(depth[texel[0]][texel[1]])
+        return step_series(to(d) - b, stored, terms), stored
 
     texels = texels_in(n, *cone_disc(x, y, z, search_angle(delta, d, near)))
     blocked = total = 0.0
@@ -102,7 +117,7 @@ def series_shadow(depth, point, delta, far, terms, bias=None):
         total += (1 - share) * stored / len(texels)
     if blocked < NOTHING:
         return 1.0, None
-    mean = min(max(total / blocked / scale, near), d)
+    mean = min(max(back(total / blocked), near), d)
     texels = texels_in(n, *cone_disc(x, y, z, search_angle(delta, d, mean)))
     value = sum(lit(texel)[0] for texel in texels) / len(texels)
     return min(max(value, 0.0), 1.0), mean

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 STEEPEST = math.radians(80)  # half-angle of the widest cone in which blockers are searched
 LIFT = 4e-6  # of map centres off their lights, as a share of the largest coordinate
-NEAR = 0.5  # share of a cluster's radius within which nothing blocks
+NEAR = 0.6  # share of a cluster's radius within which nothing blocks
+LEAST_RATIO = 1.05  # farthest over nearest of what a map holds, on the scale of its depths
 SLACK = 1e-3  # share of its distance by which a blocker lies before a receiver
 NO_BLOCKER = 0.02  # share of the search disc below which the series has found none
 
@@ -31,8 +32,9 @@ class Map(NamedTuple):
     """Radial depths around one area light; nothing seen: infinity."""
 
     depth: list  # n rows of n
-    near: float
+    near: float  # nearest and farthest of what it holds
     far: float
+    scene_far: float  # farthest corner of what takes part
 
 
 # vectors
@@ -151,10 +153,10 @@ def place_to_direction(area, s, t):
     return plus(plus(along, area.right, 2 * s / k), area.down, 2 * t / k)
 
 
-def is_between(triangle, vertices, tolerance):
-    """Tell whether a triangle may lie between two points of the scene: vertices lie on both sides of its plane."""
+def is_between(triangle, points, tolerance):
+    """Tell whether a triangle may lie between two of some points: they lie on both sides of its plane."""
     normal = unit(cross(minus(triangle[1], triangle[0]), minus(triangle[2], triangle[0])))
-    heights = [dot(normal, minus(v, triangle[0])) for v in vertices]
+    heights = [dot(normal, minus(v, triangle[0])) for v in points]
     return max(heights) > tolerance and min(heights) < -tolerance
 
 
@@ -171,16 +173,24 @@ def hit_distance(triangle, origin, direction, least):
     return tau if u >= 0 and v >= 0 and u + v <= 1 and tau > 0 and tau >= least else math.inf
 
 
-def lifted(area, triangles):
-    """Return the area light with its centre where its map looks from."""
-    largest = max(abs(x) for triangle in triangles for v in triangle for x in v)
+def box_of(points):
+    """Return the least and the greatest of each coordinate."""
+    return [min(p[axis] for p in points) for axis in range(3)], [max(p[axis] for p in points) for axis in range(3)]
+
+
+def diagonal_of(box):
+    return length(minus(box[1], box[0]))
+
+
+def lifted(area, box):
+    """Return the area light with its centre where its map looks from; `box` is that of what takes part."""
+    largest = max(abs(x) for corner in box for x in corner)
     return area._replace(center=plus(area.center, area.normal, LIFT * largest))
 
 
-def depth_map(area, triangles, n, tolerance):
-    """Cast a ray for each texel inside the unit disc, past what cannot block or is too near."""
-    vertices = [v for triangle in triangles for v in triangle]
-    kept = [t for t in triangles if is_between(t, vertices, tolerance)]
+def depth_map(area, triangles, n, ends, box, tolerance):
+    """Cast a ray for each texel inside the unit disc, past what lies between none of `ends` or is too near."""
+    kept = [t for t in triangles if is_between(t, ends, tolerance)]
     depth = [[math.inf] * n for _ in range(n)]
     for row in range(n):
         for column in range(n):
@@ -189,10 +199,10 @@ def depth_map(area, triangles, n, tolerance):
                 w = place_to_direction(area, s, t)
                 hits = [hit_distance(k, area.center, w, NEAR * area.radius) for k in kept]
                 depth[row][column] = min(hits, default=math.inf)
-    low = [min(v[axis] for v in vertices) for axis in range(3)]
-    high = [max(v[axis] for v in vertices) for axis in range(3)]
-    far = math.sqrt(sum(max(abs(low[a] - area.center[a]), abs(high[a] - area.center[a])) ** 2 for a in range(3)))
-    return Map(depth, min(min(line) for line in depth), far)
+    low, high = box
+    corner = math.sqrt(sum(max(abs(low[a] - area.center[a]), abs(high[a] - area.center[a])) ** 2 for a in range(3)))
+    held = [z for line in depth for z in line if z < math.inf]
+    return Map(depth, min(held, default=math.inf), max(held, default=0.0), corner)
 
 
 # Sec. 4.1, visibility
@@ -301,34 +311,58 @@ def first_crossing(terms):
     return (low + high) / 2
 
 
-def series(area, seen, x, terms):
-    """Return V by M terms of the Fourier series of the step, prefiltered over discs."""
+def on_scale(z, seen, kind, bias):
+    """Return the depth of a distance: 0 to `top` for what the map holds, up to 1 - 2 b* for all beyond.
+
+    `top` is 2 b* below the end, so that the farthest blocker still hides what lies beyond wholly, or half of the end
+    where so few terms leave no room for that. "scene": a share of the farthest distance of what takes part.
+    """
+    end = 1 - 2 * bias
+    if z == math.inf:
+        return end
+    if kind == "scene":
+        return min(end * z / seen.scene_far, end)
+    top, far = max(end - 2 * bias, end / 2), max(seen.far, LEAST_RATIO * seen.near)
+    if kind == "log_map":
+        return min(top * math.log(z / seen.near) / math.log(far / seen.near), end)
+    return min(top * (z - seen.near) / (far - seen.near), end)
+
+
+def off_scale(t, seen, kind, bias):
+    """Return the distance of a depth."""
+    end = 1 - 2 * bias
+    if kind == "scene":
+        return t * seen.scene_far / end
+    top, far = max(end - 2 * bias, end / 2), max(seen.far, LEAST_RATIO * seen.near)
+    if kind == "log_map":
+        return seen.near * (far / seen.near) ** (t / top)
+    return seen.near + t / top * (far - seen.near)
+
+
+def series(area, seen, x, terms, kind="log_map"):
+    """Return V by M terms of the Fourier series of the step, prefiltered over discs, depths on a scale of some kind."""
     d = length(minus(x, area.center))
     if is_behind(area, x) or seen.near >= d:
         return 1.0
     n, bias = len(seen.depth), first_crossing(terms)
-    scale = (1 - 2 * bias) / seen.far
-    shifted = d * scale - bias
+    shifted = on_scale(d, seen, kind, bias) - bias
+    stored = [[on_scale(z, seen, kind, bias) for z in line] for line in seen.depth]
     search = texels_in_disc(n, *disc_of_cone(area, x, min(half_angle(area.delta, d, seen.near), STEEPEST)))
-    lit = mean_of_series(seen, search, scale, shifted, terms, weighted=False)
+    lit = mean_of_series(stored, search, shifted, terms, weighted=False)
     if 1 - lit < NO_BLOCKER:
         return 1.0
-    mean_depth = sum(stored(seen, row, column, scale) for row, column in search) / len(search)
-    blocked_depth = mean_depth - mean_of_series(seen, search, scale, shifted, terms, weighted=True)
-    z_avg = min(max(blocked_depth / (1 - lit) / scale, seen.near), d)
+    mean_depth = sum(stored[row][column] for row, column in search) / len(search)
+    blocked_depth = mean_depth - mean_of_series(stored, search, shifted, terms, weighted=True)
+    z_avg = min(max(off_scale(blocked_depth / (1 - lit), seen, kind, bias), seen.near), d)
     final = texels_in_disc(n, *disc_of_cone(area, x, half_angle(area.delta, d, z_avg)))
-    return min(max(mean_of_series(seen, final, scale, shifted, terms, weighted=False), 0.0), 1.0)
+    return min(max(mean_of_series(stored, final, shifted, terms, weighted=False), 0.0), 1.0)
 
 
-def stored(seen, row, column, scale):
-    return min(seen.depth[row][column], seen.far) * scale
-
-
-def mean_of_series(seen, texels, scale, shifted, terms, weighted):
+def mean_of_series(stored, texels, shifted, terms, weighted):
     """Return the mean of f_M over texels, or that of z f_M."""
     total = 0.0
     for row, column in texels:
-        z = stored(seen, row, column, scale)
+        z = stored[row][column]
         total += series_value(z - shifted, terms) * (z if weighted else 1.0)
     return total / len(texels)
 

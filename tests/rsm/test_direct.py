@@ -48,7 +48,7 @@ def test_irradiance_equals_its_definition(name, dtype):
                 t = min(max((axis @ away - cosines[1]) / (cosines[0] - cosines[1]), 0.0), 1.0)
                 share = t * t * (3 - 2 * t)
             expected = np.array(light.intensity) * share * (-n @ away) / square
-        rounding = 1e-12 if dtype == np.float64 else 1e-5  # the falloff magnifies the rounding of its cosine
+        rounding = 1e-12 if dtype == np.float64 else FLOAT32
         np.testing.assert_allclose(out[:, row, column], expected, rtol=rounding, atol=rounding * 1e-2)
     assert (out[:, ~seen.covered] == 0).all()
     assert out.dtype == dtype

@@ -1,5 +1,6 @@
 """Light through glass: exits, directions and fluxes of single rays, what ends them, and what costs nothing."""
 
+import dataclasses
 import math
 from functools import cache
 
@@ -11,7 +12,7 @@ from refgi.rays import Tracer
 from refgi.rsm import reflective_shadow_map
 from refgi.rsm.refraction import refracted
 from refgi.rsm.snell import refract
-from refgi.scene import DirectionalLight, Geometry, Material, PointLight, SpotLight, material_table, merge
+from refgi.scene import DirectionalLight, Geometry, Material, Mesh, PointLight, SpotLight, material_table, merge
 from refgi.scene.builtin.surfaces import rectangle, sphere
 from refgi.stages import observe
 from tests.naive.refraction import bend, mean_transmittance, through_ball
@@ -232,3 +233,22 @@ def test_turned_vertex_order_turns_inside_and_outside():
     rsm = reflective_shadow_map(turned, table, DOWN, 64, np.float64)
     glass = refracted(rsm, turned, table)
     assert (glass.position[1][sent(glass)] > CENTRE[1]).all()  # leaves "glass" at the first face it meets
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("power", [1e-30, 1e20])
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("back", [True, False])
+def test_a_light_on_the_glass_and_glass_without_a_back_give_finite_lobes(mode, power, scale, back):
+    ball = sphere((0.0, 0.0, 0.0), scale, 200, GLASS, "ball")
+    if not back:
+        ball = dataclasses.replace(ball, faces=ball.faces[ball.vertices[ball.faces].mean(axis=1)[:, 1] > 0])
+    flat = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]), None, WHITE)  # the triangle that rays which miss ask about
+    for light in (PointLight(tuple(ball.vertices[ball.faces[0, 0]]), (power,) * 3), PointLight((0, 0, 0), (power,) * 3),
+                  PointLight((0, 3 * scale, 0), (power,) * 3), DirectionalLight((0, -1e90, 0), (power,) * 3)):
+        for pieces in ([ball], [flat, ball]):
+            rsm, glass = through(merge(pieces, smooth=True), light, mode, resolution=8)
+            for part in (glass.position, glass.normal, glass.lobe_flux, glass.lobe_axis):
+                assert part is None or np.isfinite(part).all()
+            if glass.lobe_flux is not None:
+                assert glass.lobe_flux.sum() <= rsm.solid_angle.sum() * power * 3 * (1 + 1e-9)

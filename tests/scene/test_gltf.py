@@ -142,6 +142,48 @@ def test_what_has_no_triangles_is_passed_over_with_a_count(tmp_path: Path) -> No
     assert len(said) == 2
 
 
+@pytest.mark.parametrize("key", ["normalTexture", "occlusionTexture", "emissiveTexture"])
+def test_any_texture_and_vertex_colours_are_passed_over_with_a_count(tmp_path: Path, key: str) -> None:
+    def edit(tree: dict[str, Any]) -> None:
+        tree["materials"][0][key] = {"index": 0}
+        tree["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0
+
+    with pytest.warns(RefgiWarning) as said:
+        load_scene(written(tmp_path, edit))
+    assert {str(warning.message).partition(": ")[2] for warning in said} == {
+        "1 material(s)' textures passed over", "1 primitive(s)' vertex colours passed over"}
+
+
+def chained(scale: list[float], depth: int = 3) -> Edit:
+    def edit(tree: dict[str, Any]) -> None:
+        tree["nodes"] += [{"scale": scale, "children": [4 + k]} for k in range(depth)]
+        tree["nodes"].append({"mesh": 0})
+        tree["scenes"][0]["nodes"] = [1, 2, 3]
+
+    return edit
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1e200])
+def test_a_product_of_matrices_that_is_no_placement_names_its_node(tmp_path: Path, scale: float) -> None:
+    path = written(tmp_path, chained([scale] * 3))
+    with pytest.raises(InputError, match=r"square\.glb: nodes\[4\]: expected a finite, invertible product"):
+        load_scene(path)
+
+
+def test_nested_nodes_multiply_and_zero_normals_are_mended(tmp_path: Path) -> None:
+    def edit(tree: dict[str, Any]) -> None:
+        chained([2, 3, 4], 2)(tree)
+        tree["bufferViews"].append({"buffer": 0, "byteOffset": 60, "byteLength": 48})
+        tree["accessors"].append({"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC3"})
+        tree["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = 2
+        tree["buffers"][0]["byteLength"] = 108
+
+    normals = np.array([[0, 0, 0], [0, 0, 1], [np.inf, 0, 0], [0, 0, 3]], np.float32)
+    scene = load_scene(written(tmp_path, edit, BUFFER + normals.tobytes()))
+    assert np.array_equal(scene.geometry.vertices, TRIANGLES.astype(np.float64) * (4, 9, 16))
+    assert scene.geometry.vertex_normals.tolist() == [[0, 0, 1]] * 4
+
+
 def setter(*path: str | int, value: Any) -> Edit:
     def edit(tree: Any) -> None:
         for key in path[:-1]:

@@ -128,14 +128,13 @@ def test_a_mesh_of_any_size_is_framed_and_lit(size: float) -> None:
 
 def test_tables() -> None:
     spot = SpotLight((1, 2, 3), (0, -3, 0), 0.2, 0.4, (4, 5, 6))
-    table = light_table([spot, PointLight((7, 8, 9), (1, 1, 1)), DirectionalLight((2, 0, 0), (3, 2, 1))], np.float32)
+    table = light_table([spot, PointLight((7, 8, 9), (1, 1, 1)), DirectionalLight((2, 0, 0), (3, 2, 1))])
     assert table.kind.tolist() == [0, 1, 2]
     assert table.direction.tolist() == [[0, -1, 0], [0, 0, 0], [1, 0, 0]]
     assert table.position.tolist() == [[1, 2, 3], [7, 8, 9], [0, 0, 0]]
     assert table.intensity.tolist() == [[4, 5, 6], [1, 1, 1], [3, 2, 1]]
-    assert table.cos_inner[0] == np.float32(math.cos(0.2))
-    assert table.cos_outer[0] == np.float32(math.cos(0.4))
-    assert table.cos_outer.dtype == np.float32
+    np.testing.assert_allclose(table.cone[0, ::2], [math.sin(0.4), math.cos(0.4), math.cos(0.2) - math.cos(0.4)])
+    assert not table.cone[1:].any()
     materials = material_table([Material(), Material("b", (0, 0, 0), (1, 1, 1), 7.0, 1.5)])
     assert materials.exponent.tolist() == [0, 7]
     assert materials.ior.tolist() == [0, 1.5]

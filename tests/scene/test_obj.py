@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from refgi.errors import InputError
+from refgi.errors import InputError, RefgiWarning
 from refgi.scene.obj import read_obj
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -50,7 +50,8 @@ def test_materials_are_floats_in_order_of_use(tmp_path: Path) -> None:
         "newmtl too_bright\nKd 0.8 0.8 0.8\nKs 0.5 0.5 0.5\nNs 40\n")
     text = ("mtllib colours.mtl\n" + SQUARE + "usemtl shiny\nf 1 2 3\nusemtl matt\nf 1 3 4\n"
             "usemtl too_bright\nf 1 2 4\nusemtl unheard\nf 2 3 4\nusemtl shiny\nf 2 3 4\n")
-    meshes = read_obj(written(tmp_path, text)).meshes
+    with pytest.warns(RefgiWarning, match=r"colours.mtl: 1 of 3 materials with diffuse \+ specular .* over 1"):
+        meshes = read_obj(written(tmp_path, text)).meshes
     shiny, matt, bright, unheard = (mesh.material for mesh in meshes)
     assert matt.diffuse == (0.1, 0.2, 0.0001)
     assert (shiny.specular, shiny.exponent, shiny.emission) == ((0.5, 0.5, 0.5), 40, (1, 2, 3))
@@ -77,3 +78,38 @@ def test_albedo_over_one_in_a_material_file(tmp_path: Path) -> None:
     (tmp_path / "m.mtl").write_text("newmtl a\nKd 1.5 0 0\n")
     with pytest.raises(InputError, match=r"m\.mtl: material 'a': diffuse"):
         read_obj(written(tmp_path, "mtllib m.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n"))
+
+
+def test_textures_are_passed_over_with_a_count_and_those_that_are_missing_named(tmp_path: Path) -> None:
+    (tmp_path / "the wood.png").write_bytes(b"")
+    (tmp_path / "m.mtl").write_text("newmtl a\nKd 0.5 0.5 0.5\nmap_Kd -s 1 1 1 the wood.png\nbump absent bump.png\n"
+                                    "newmtl b\nmap_Ks gone.png\n")
+    with pytest.warns(RefgiWarning) as said:
+        read_obj(written(tmp_path, "mtllib m.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nmtllib m.mtl\n"))
+    assert [str(warning.message) for warning in said] == [
+        f"{tmp_path / 'm.mtl'}: 3 texture(s) (bump, map_Kd, map_Ks) passed over; "
+        "2 of them name no file: absent bump.png, gone.png"]
+
+
+def test_textures_that_are_there_are_passed_over_with_a_count(tmp_path: Path) -> None:
+    (tmp_path / "wood.png").write_bytes(b"")
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd wood.png\n")
+    with pytest.warns(RefgiWarning, match=r"m\.mtl: 1 texture\(s\) \(map_Kd\) passed over$"):
+        read_obj(written(tmp_path, "mtllib m.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n"))
+
+
+def test_vertex_colours_are_passed_over_once_with_a_count(tmp_path: Path) -> None:
+    with pytest.warns(RefgiWarning, match="colours of 2 vertices passed over") as said:
+        read_obj(written(tmp_path, SQUARE + "v 0 0 1 0.5 0.5 0.5\nv 0 1 1 0.5 0.5 0.5\nf 1 2 3\nf 4 5 6\n"))
+    assert len(said) == 1
+
+
+def test_normals_belong_to_their_corners_in_every_material(tmp_path: Path) -> None:
+    text = SQUARE + ("vn 1 0 0\nvn 0 1 0\nvn 0 0 1\nusemtl a\nf 1//1 2//2 3//3\nusemtl b\nf 1//3 3//2 4//1\n"
+                     "vn 0 0 -1\nusemtl a\nf 1//4 2//4 4//4\n")
+    a, b = read_obj(written(tmp_path, text)).meshes
+    assert a.normals is not None
+    assert b.normals is not None
+    assert a.normals[a.faces].tolist() == [[[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 0, -1]] * 3]
+    assert b.normals[b.faces].tolist() == [[[0, 0, 1], [0, 1, 0], [1, 0, 0]]]
+    assert b.vertices[b.faces].tolist() == [[[0, 0, 0], [1, 1, 0], [0, 1, 0]]]

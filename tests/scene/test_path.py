@@ -164,17 +164,55 @@ def test_damaged_files_are_refused(room, written, content, words):
 
 
 def test_a_frame_whose_camera_is_not_usable_is_named(room, written):
-    text = f'camera = [{{at = 0.0, eye = {list(room.camera.eye)}}}, {{at = 1.0, eye = {list(room.camera.target)}}}]'
+    # each key is good, but halfway between them the eye passes through the target
+    (x, y, z), (ex, ey, ez) = room.camera.target, room.camera.eye
+    beyond = [2 * x - ex, 2 * y - ey, 2 * z - ez]
+    text = f'curve = "linear"\ncamera = [{{at = 0.0, eye = {[ex, ey, ez]}}}, {{at = 1.0, eye = {beyond}}}]'
     path, _ = read_path(written(text), room)
-    with pytest.raises(InputError, match="frame 2 of 3: camera: target"):
+    with pytest.raises(InputError, match=r"way\.toml: frame 1 of 3 \(at = 0\.5\): camera: target"):
         list(scenes_along(room, path, 3))
+
+
+def test_a_frame_whose_light_is_not_usable_is_named(room, written):
+    # the cubic undershoots: keys 0, 0, 1 dip below 0 between the first two
+    keys = ", ".join(f"{{at = {at}, intensity_w_per_sr = [{v}, {v}, {v}]}}" for at, v in ((0.0, 0), (0.5, 0), (1.0, 1)))
+    path, _ = read_path(written(f"lights = [{{light = 0, keys = [{keys}]}}]"), room)
+    with pytest.raises(InputError, match=r"way\.toml: frame 1 of 5 .*: lights\[0\] of the scene: light: intensity"):
+        list(scenes_along(room, path, 5))
 
 
 def test_a_frame_whose_object_is_not_usable_is_named(room, written):
-    text = "objects = [{faces = [0, 1], keys = [{at = 0.0}, {at = 1.0, move = [1e30, 0.0, 0.0]}]}]"
+    text = "objects = [{faces = [0, 1], keys = [{at = 0.0}, {at = 1.0, move = [1e9, 0.0, 0.0]}]}]"
     path, _ = read_path(written(text), room)
-    with pytest.raises(InputError, match="frame 1 of 3: geometry: vertex"):
-        list(scenes_along(room, path, 3))
+    with pytest.raises(InputError, match=r"way\.toml: frame 1 of 2 .*: geometry: vertex"):
+        list(scenes_along(room, path, 2))
+
+
+def test_keys_whose_values_no_frame_could_use_are_named_with_the_file(room, written):
+    text = f"""
+camera = [{{at = 0.0, vfov_deg = 40.0, eye = {list(room.camera.eye)}}}, {{at = 0.3, vfov_deg = 200.0}},
+          {{at = 0.7, eye = {list(room.camera.target)}}}]
+lights = [{{light = 0, keys = [
+    {{at = 0.0, intensity_w_per_sr = [-1.0, 0.0, 0.0], direction = [0.0, 1.0, 0.0]}},
+    {{at = 0.5, intensity_w_per_sr = [1.0, 0.0, 0.0], direction = [0.0, 0.0, 0.0]}}]}}]
+objects = [{{material = "red", center = [0.0, 1e10, 0.0], keys = [{{at = 0.0}}, {{at = 1.0, move = [1e30, 0.0, 0.0]}}]}}]
+"""
+    with pytest.raises(InputError) as caught:
+        read_path(written(text), room)
+    lines = str(caught.value).splitlines()
+    for words in ("way.toml: camera[1]: vfov_deg: expected", "way.toml: camera[2]: target: expected a point away",
+                  "way.toml: lights[0].keys[0]: intensity_w_per_sr: expected",
+                  "way.toml: lights[0].keys[1]: direction: expected",
+                  "way.toml: objects[0].center: expected", "way.toml: objects[0].keys[1].move: expected"):
+        assert any(words in line for line in lines), (words, lines)
+
+
+def test_many_faults_of_a_path_are_counted(room, written):
+    with pytest.raises(InputError) as caught:
+        read_path(written("\n".join(f"key{number} = 1" for number in range(500))), room)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 21
+    assert lines[-1] == "... and 480 more"
 
 
 def test_each_kind_of_light_has_its_own_keys(room, written):

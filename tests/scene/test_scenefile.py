@@ -3,6 +3,8 @@
 import copy
 import json
 import math
+import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from hypothesis import strategies as st
 
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import Camera, DirectionalLight, PointLight, SpotLight, load_scene
-from tests.scene.samples import SCENE, glb_bytes, ply_bytes, write_scene
+from tests.scene.samples import SCENE, TRIANGLES, glb_bytes, ply_bytes, write_scene
 
 
 def changed(*path: str | int, value: Any) -> dict[str, Any]:
@@ -86,12 +88,16 @@ def test_normals_only_where_asked_for(tmp_path: Path) -> None:
     (changed("camera", "target", value=[0, 0, 3]), "target", "(0.0, 0.0, 3.0)"),
     (changed("camera", "up", value=[0, 0, 1]), "up", "(0.0, 0.0, 1.0)"),
     (changed("lights", 0, "outer_half_angle_deg", value=0), "outer_half_angle_deg", "0"),
-    (changed("lights", 0, "outer_half_angle_deg", value=90), "lights[0]: outer_half_angle_deg", "90"),
+    (changed("lights", 0, "outer_half_angle_deg", value=90.001), "lights[0]: outer_half_angle_deg", "90.001"),
     (changed("lights", 0, "inner_half_angle_deg", value=31), "inner_half_angle_deg", "31"),
     (changed("lights", 0, "direction", value=[0, 0, 0]), "direction", "(0.0, 0.0, 0.0)"),
     (changed("lights", 0, "intensity_w_per_sr", value=[1, -1, 1]), "intensity_w_per_sr", "-1"),
     (changed("lights", 0, "type", value="lamp"), "lights[0]", "lamp"),
     (changed("materials", "paint", "diffuse", value=[0.1, 1.2, 0.3]), "materials.paint: diffuse", "1.2"),
+    (changed("materials", "paint", value={"type": "phong", "diffuse": [0.1, 0.5, 0.3], "specular": [0.9, 0.500002, 0.7],
+                                          "exponent": 9}), "materials.paint: diffuse + specular", "1.000002"),
+    (changed("objects", 0, "material", value={"type": "phong", "diffuse": [0, 0, 0.3], "specular": [0, 0, 0.8],
+                                              "exponent": 9}), "objects[0].material: diffuse + specular", "1.1"),
     (changed("materials", "paint", "diffuse", value=[0.1, 0.3]), "materials.paint.diffuse", "0.3"),
     (changed("materials", "paint", "type", value="velvet"), "materials.paint", "velvet"),
     (changed("materials", "paint", value={"type": "dielectric", "ior": 0.5}), "ior", "0.5"),
@@ -136,6 +142,54 @@ def test_all_missing_meshes_come_at_once(tmp_path: Path) -> None:
     path = write_scene(tmp_path, objects=[{"mesh": "a.ply"}, {"mesh": "b.obj"}])
     with pytest.raises(InputError, match=r"objects\[0\].*\n.*objects\[1\]"):
         load_scene(path)
+
+
+def test_of_very_many_faults_the_first_are_shown_and_the_others_counted(tmp_path: Path) -> None:
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(SCENE | {f"unknown{number}": 0 for number in range(50_000)}))
+    with pytest.raises(InputError) as error:
+        load_scene(path)
+    lines = str(error.value).splitlines()
+    assert len(lines) == 21
+    assert all(line == f"{path}: unknown{number}: unknown key, got 0" for number, line in enumerate(lines[:20]))
+    assert lines[20] == "... and 49,980 more"
+
+
+def test_very_long_keys_and_values_are_shortened(tmp_path: Path) -> None:
+    path = write_scene(tmp_path, **{"x" * 100_000: ["y" * 100_000] * 3})
+    with pytest.raises(InputError, match="xxx.*unknown key, got .*yyy") as error:
+        load_scene(path)
+    assert len(str(error.value)) < 2000
+
+
+def test_of_repeated_keys_the_first_are_shown_and_the_others_counted(tmp_path: Path) -> None:
+    path = tmp_path / "scene.json"
+    keys = ", ".join(f'"key{number:05}": 0' for number in range(60_000))
+    path.write_text(f"{{{keys}, {keys}}}")
+    with pytest.raises(InputError, match=r"key00019, \.\.\. and 59,980 more: expected each key once") as error:
+        load_scene(path)
+    assert "key00020" not in str(error.value)
+
+
+def test_many_missing_meshes_and_materials_are_counted(tmp_path: Path) -> None:
+    for objects in ([{"mesh": f"{number}.ply"} for number in range(200)],
+                    [{"mesh": "square.ply", "material": f"paint{number}"} for number in range(200)]):
+        with pytest.raises(InputError) as error:
+            load_scene(write_scene(tmp_path, objects=objects))
+        lines = str(error.value).splitlines()
+        assert len(lines) == 21
+        assert lines[20] == "... and 180 more"
+
+
+def test_a_flat_and_a_missing_object_come_at_once(tmp_path: Path) -> None:
+    (tmp_path / "flat.ply").write_bytes(ply_bytes(faces=np.array([[0, 1, 1]])))
+    objects = [{"mesh": "flat.ply"}, {"mesh": "square.ply"}, {"mesh": "absent.ply"}, {"mesh": "flat.ply"}]
+    with pytest.raises(InputError) as error:
+        load_scene(write_scene(tmp_path, objects=objects))
+    text = str(error.value)
+    assert len(text.splitlines()) == 3
+    for number, words in ((0, "of zero area"), (2, "no such file"), (3, "of zero area")):
+        assert any(f"objects[{number}].mesh" in line and words in line for line in text.splitlines())
 
 
 @pytest.mark.parametrize(("text", "said"), [
@@ -203,7 +257,7 @@ def test_more_instances_than_memory_holds(tmp_path: Path, monkeypatch: pytest.Mo
 def test_any_cone_is_taken_or_refused(tmp_path_factory: pytest.TempPathFactory, angle: float) -> None:
     folder = tmp_path_factory.mktemp("cone", numbered=True)
     path = write_scene(folder, **changed("lights", 0, "outer_half_angle_deg", value=angle))
-    if 20 <= angle < 90:
+    if 20 <= angle <= 90:
         assert load_scene(path).lights[0].outer_half_angle == math.radians(angle)
     else:
         with pytest.raises(InputError, match="half_angle_deg"):
@@ -228,3 +282,39 @@ def test_any_value_under_any_key_is_taken_or_refused(
         refusal = str(error)
     assert not refusal or str(path) in refusal
 
+
+
+def test_reflectances_that_add_up_to_one_are_taken(tmp_path: Path) -> None:
+    for diffuse in np.linspace(0, 1, 101).round(2).tolist():
+        specular = round(1 - diffuse, 2)
+        paint = {"type": "phong", "diffuse": [diffuse] * 3, "specular": [specular] * 3, "exponent": 9}
+        assert load_scene(write_scene(tmp_path, materials={"paint": paint})).materials[0].specular[0] == specular
+    exact = {"type": "phong", "diffuse": [float(np.float32(0.7))] * 3, "specular": [float(np.float32(0.3))] * 3,
+             "exponent": 9}
+    assert load_scene(write_scene(tmp_path, materials={"paint": exact})).face_count == 2
+
+
+@pytest.mark.parametrize(("scale", "said"), [
+    (0.005, "0.00707 m across"), (800, "1.13e\\+03 m across"), (0.0072, ""), (700, "")])
+@pytest.mark.parametrize("form", ["json", "ply"])
+def test_a_size_of_another_unit_is_hinted_at(tmp_path: Path, scale: float, said: str, form: str) -> None:
+    path = write_scene(tmp_path, objects=[{"mesh": "square.ply"}])
+    (tmp_path / "square.ply").write_bytes(ply_bytes(TRIANGLES * scale))
+    path = path if form == "json" else tmp_path / "square.ply"
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load_scene(path)
+    hints = [str(warning.message) for warning in caught if "across" in str(warning.message)]
+    assert len(hints) == bool(said)
+    for hint in hints:
+        assert re.search(f"{path.name}: {said}; lengths are taken as metres.*\"transform\"", hint)
+
+
+def test_loading_writes_nothing(tmp_path: Path) -> None:
+    write_scene(tmp_path)
+    (tmp_path / "bad.json").write_text(json.dumps(SCENE | {"colour": 1}))
+    before = sorted(tmp_path.rglob("*"))
+    load_scene(tmp_path / "sample.json")
+    with pytest.raises(InputError):
+        load_scene(tmp_path / "bad.json")
+    assert sorted(tmp_path.rglob("*")) == before

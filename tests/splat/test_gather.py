@@ -15,6 +15,8 @@ from refgi.splat.gathering.gather_sum import disc_pattern
 from refgi.splat.gathering.interpolation import Agreement, coarse_pixels, interpolate
 from tests.naive import eq2
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 WHOLE_MAP = 1.5  # a disc around any texel with this radius holds the map
 
 

@@ -11,6 +11,8 @@ from refgi.scene import load_scene
 from refgi.splat import Receivers, SiiSettings
 from refgi.splat.half_resolution import half_resolution
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 QUARTER = 0.26  # of the pixels: blocks on the edge of the picture and of surfaces are not whole
 
 

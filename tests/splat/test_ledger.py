@@ -18,6 +18,8 @@ from refgi.stages import observe
 from tests.naive import ledger as naive
 from tests.naive.radiometry import lobe_fraction
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 WHOLE = 1e-5  # of emitted: what a float32 account may be off by (REF-04)
 FACETS = 4e-4  # of the lights' flux: 20,000 facets have 3.6e-4 less area than their sphere
 RIM = 2e-4  # of a plate some 150 pixels wide: those on its rim count wholly or not

@@ -17,6 +17,8 @@ from refgi.splat.multires import _halved
 from refgi.splat.refinement.grid import representatives
 from refgi.stages import observe
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 DEMO_CLAMP = {"clamp": "distance", "clamp_value": math.sqrt(0.2)}  # r^2 >= 0.2 in the demo's unit
 # relative RMSE that each mode keeps below at 61 x 45: geometry does not say where light bends, and cells of 4 pixels of
 # 61 miss its bends near the corners; naive modes add blocks, and halos of the size of the light itself

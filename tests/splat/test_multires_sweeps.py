@@ -16,6 +16,8 @@ from refgi.scene import PointLight, SpotLight, load_scene
 from refgi.splat.multires import MultiresSettings, multires, shared_subsplats
 from refgi.stages import observe
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 THRESHOLDS = (0.0, 0.25, 0.5, 1.0, 1.4, 2.0)
 EVERY_PIXEL = 1 << 16  # cells along a side: more than pixels
 TEXEL = 0.02  # of the ratio at the rim: a texel there spans about a hundredth of the cone

@@ -13,6 +13,8 @@ from refgi.scene import SpotLight, load_scene
 from refgi.splat import SiiSettings, sii
 from refgi.stages import observe
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 ALL = SiiSettings(pattern="all", i_low=0)  # the sum without a cut
 
 
@@ -173,7 +175,7 @@ def test_lobe_code_is_skipped_without_glossy_materials(box):
 def test_settings_work_together_and_again(box, change, lamps):
     light = box.scene.lights[0]
     frame = Frame(box.scene.with_lights(*[light] * lamps), width=13, height=9, rsm_resolution=32)
-    settings = SiiSettings(lights=50, reference_length=0.3, **change)
+    settings = SiiSettings(lights=50, i_low=0.05, reference_length=0.3, **change)
     picture = sii(frame, settings)
     assert np.isfinite(picture).all()
     assert picture.any()
@@ -182,7 +184,7 @@ def test_settings_work_together_and_again(box, change, lamps):
 
 
 def test_bounds_change_no_bit_of_the_picture(box):
-    pictures = [sii(box, SiiSettings(lights=100, reference_length=0.2, bound=bound))
+    pictures = [sii(box, SiiSettings(lights=100, i_low=0.05, reference_length=0.2, bound=bound))
                 for bound in ("full", "quad", "ellipsoid", "tangent", "mesh")]
     for picture in pictures[1:]:
         np.testing.assert_array_equal(picture, pictures[0])

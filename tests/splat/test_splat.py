@@ -96,7 +96,7 @@ def test_without_a_threshold_nothing_changes(corner, real):
 def test_every_bound_gives_the_same_picture(corner, real, glossy, evidence):
     receivers, lights, view = corner
     receivers = Receivers(receivers.position.astype(real), receivers.normal.astype(real), receivers.covered)
-    cases = [SplatSettings(irradiance_low=low_irradiance(lights, SplatSettings(reference_length=0.15)))]
+    cases = [SplatSettings(irradiance_low=low_irradiance(lights, SplatSettings(i_low=0.05, reference_length=0.15)))]
     if glossy:
         rng = np.random.default_rng(2)
         axis = sets.unit(lights.normal + 0.5 * sets.random_directions(rng, lights.flux.shape[1]))
@@ -125,7 +125,7 @@ def test_every_bound_gives_the_same_picture(corner, real, glossy, evidence):
 def test_fewer_pixels_are_drawn_by_tighter_bounds(corner, evidence):
     """Fragments that hardware would shade: the whole screen, quads, meshes of the ellipsoids, and those needed."""
     receivers, lights, view = corner
-    settings = SplatSettings(reference_length=0.1)
+    settings = SplatSettings(i_low=0.05, reference_length=0.1)
     square = lights.flux.max(axis=0) / math.pi / low_irradiance(lights, settings)
     top, bottom, left, right = screen_quads(view, lights.position, np.sqrt(square))
     row, column = np.mgrid[: view.height, : view.width][..., None] + 0.5
@@ -142,7 +142,7 @@ def test_fewer_pixels_are_drawn_by_tighter_bounds(corner, evidence):
 
 def test_meshes_that_are_not_inflated_lose_pixels(corner):
     receivers, lights, view = corner
-    how = SplatSettings(reference_length=0.02, bound="mesh", mesh_faces=8, inflate=False)
+    how = SplatSettings(i_low=0.05, reference_length=0.02, bound="mesh", mesh_faces=8, inflate=False)
     kept = splat(receivers, lights, how, None, view)
     whole = splat(receivers, lights, dataclasses.replace(how, inflate=True), None, view)
     assert (kept <= whole).all()
@@ -192,7 +192,7 @@ def test_threshold_is_one_irradiance_for_all_lights():
 
 
 @pytest.mark.parametrize("how", [{"irradiance_low": 1e-320}, {"i_low": 1e-320, "reference_length": 1e9},
-                                 {"i_low": 1e-320, "as_published": {"per_light_ilow"}}])
+                                 {"i_low": 1e-320, "reference_length": 1.0, "as_published": {"per_light_ilow"}}])
 def test_thresholds_near_0_cut_nothing(how):
     receivers, lights = sets.room(np.random.default_rng(31), 50)
     settings = SplatSettings(**how)
@@ -206,7 +206,7 @@ def test_range_of_a_light_is_that_of_its_flux():
     receivers = sets.receivers(np.stack([0 * z, 0 * z, z]), np.stack([0 * z, 0 * z, -1 + 0 * z]))
     two = sets.lights(np.zeros((3, 2)), np.array([[0.0, 0], [0, 0], [1, 1]]), [[1.0, 0.25], [0, 0], [0, 0]])
     for published, expected in ((set(), (4, 2)), ({"per_light_ilow"}, (4, 4))):
-        settings = SplatSettings(i_low=1 / 16, as_published=published)
+        settings = SplatSettings(i_low=1 / 16, reference_length=1.0, as_published=published)
         overdraw = fragments(receivers, two, settings).overdraw[0]
         reach = [z[overdraw >= least].max() for least in (1, 2)]
         np.testing.assert_allclose(reach, expected, atol=2e-3)
@@ -232,7 +232,7 @@ def test_loss_follows_the_closed_form(evidence):
         for i, x in enumerate((0.01, 0.05, 0.07, 0.10)):
             for distance in (1.0, 0.5):
                 receivers, area = plane(distance)
-                settings = SplatSettings(i_low=x)
+                settings = SplatSettings(i_low=x, reference_length=1.0)
                 full = (row(irradiance(receivers, light, settings))[0] * area).sum()
                 lost = (row(cut_irradiance(receivers, light, settings))[0] * area).sum() / full
                 expected = (distance * math.sqrt(x)) ** (2 * (exponent + 1) / (exponent + 2))
@@ -254,7 +254,8 @@ def test_fragments_grow_as_one_over_the_threshold_until_the_screen_is_full(corne
     receivers = sets.receivers(np.stack([x, 0 * x + 1e-3, z]), np.stack([0 * x, 0 * x - 1, 0 * x]))
     light = sets.lights(np.zeros((3, 1)), np.array([[0.0], [0], [1]]), 1.0)
     lows = np.array([8.0, 4, 2, 1])
-    counts = np.array([fragments(receivers, light, SplatSettings(i_low=low)).total for low in lows])
+    cuts = [SplatSettings(i_low=low, reference_length=1.0) for low in lows]
+    counts = np.array([fragments(receivers, light, cut).total for cut in cuts])
     np.testing.assert_allclose(counts * lows / (counts * lows)[-1], 1, rtol=0.02)
     room, lights, _ = corner
     shares = (0.1, 0.07, 0.05, 0.01, 1e-3, 1e-5, 1e-6)
@@ -275,7 +276,7 @@ def test_fragments_grow_as_one_over_the_threshold_until_the_screen_is_full(corne
 @pytest.mark.feature("SII-23", "SII-24")
 def test_counts_and_traffic(corner, evidence):
     receivers, lights, view = corner
-    counted = fragments(receivers, lights, SplatSettings(reference_length=0.1), None, view)
+    counted = fragments(receivers, lights, SplatSettings(i_low=0.05, reference_length=0.1), None, view)
     assert counted.overdraw.sum() == counted.of_light.sum() == counted.total
     assert not counted.overdraw[~receivers.covered].any()
     assert counted.bits == 72 * counted.total
@@ -318,7 +319,7 @@ def test_tiles_keep_to_the_fragments(data_dir, scene, length, evidence):
     frame = Frame(load_scene(data_dir / f"{scene}.json"), width=512, height=512)
     lights = choose_pixel_lights(frame.rsms, count=768, pattern="halton")
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
-    counted = fragments(receivers, lights, SplatSettings(reference_length=length))
+    counted = fragments(receivers, lights, SplatSettings(i_low=0.05, reference_length=length))
     mean = counted.overdraw[receivers.covered].mean()
     assert 100 < mean < 200
     assert counted.evaluated < FRAGMENTS * counted.total
@@ -370,14 +371,14 @@ def test_factor_of_a_pair():
 def test_bounds_on_the_screen_need_its_map(corner, bound):
     receivers, lights, _ = corner
     with pytest.raises(InputError, match=f"projection: expected the receivers' map for the bound '{bound}'"):
-        splat(receivers, lights, SplatSettings(bound=bound))
+        splat(receivers, lights, SplatSettings(i_low=0.05, bound=bound))
 
 
 def test_nothing_to_light_or_to_light_with():
     receivers, lights = sets.room(np.random.default_rng(8), 5)
     none = sets.PixelLights(*(part[:, :0] for part in lights[:3]), None, None, None, 0)
     dark = receivers._replace(covered=np.zeros((1, 5), bool))
-    for how in (CUT, SplatSettings(), SplatSettings(stochastic_range=True)):
+    for how in (CUT, SplatSettings(), SplatSettings(i_low=0.05, stochastic_range=True)):
         assert not splat(receivers, none, how).any()
         assert not splat(dark, lights, how).any()
         assert fragments(receivers, none, how).total == 0

@@ -138,7 +138,7 @@ def pixel_means(room, tracer, position, normal, ids, options, passes=24):
     from refgi.truth.passes import Task, one_pass
     from refgi.truth.surfaces import lights_of, surfaces
 
-    to = receivers(room.geometry, position, normal, ids, tracer.offset)
+    to = receivers(room.geometry, position, normal, ids, tracer.grain)
     task = Task(room, options, tracer, surfaces(room), lights_of(room), to)
     rows = np.stack([one_pass(task, k).reshape(3, *ids.shape).mean(axis=2) for k in range(passes)])
     return rows.mean(axis=0), rows.var(axis=0, ddof=1) / passes

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.filters.depth_scale import DepthScale, series_depths
 from refgi.cluster.filters.quantise import eight_bits, half_precision
 from refgi.jit import kernel
 
@@ -26,26 +27,20 @@ COSINE = tuple((-1) ** k * math.pi ** (2 * k) / math.factorial(2 * k) for k in r
 
 
 @kernel
-def normalise(depth: Array, scale: float, most: float, out: Array) -> None:
-    """Turn distances into depths of the series.
+def normalise(depth: Array, scale: DepthScale, out: Array) -> None:
+    """Turn the distances of a map into depths of the series.
 
     Parameters
     ----------
     depth : (n, n) ndarray
         Radial distance, m; inf where nothing is seen.
-    scale : float
-        Depth of the series per metre, `most` over the distance of the farthest point.
-    most : float
-        The far end of the range, less than 1.
+    scale : DepthScale
+        What depth a distance is.
     out : (n, n) ndarray
-        Filled with min(depth * scale, most).
+        Filled with t; `scale.most` where nothing is seen.
     """
-    real = depth.dtype.type
-    factor, far = real(scale), real(most)
     for i in range(depth.shape[0]):
-        for j in range(depth.shape[1]):
-            t = depth[i, j] * factor
-            out[i, j] = t if t < far else far
+        series_depths(scale, depth[i], out[i], depth.shape[1])
 
 
 @kernel
@@ -55,12 +50,12 @@ def sine_cosine(t: Any) -> tuple[Any, Any]:
     Parameters
     ----------
     t : float
-        0 to 1, float32 or float64.
+        -1/4 (a depth less the largest bias) to 1, float32 or float64.
 
     Returns
     -------
     tuple of 2 floats
-        Within 2e-7 or 4e-16.
+        Within 2.4e-7 (float64: 4e-16) from 0 on, 4.5e-7 (8e-16) below.
     """
     real = type(t)
     u = t - real(0.5)

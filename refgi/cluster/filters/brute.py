@@ -14,6 +14,7 @@ from numba import types
 
 from refgi.cluster.filters.basis import fill_basis, normalise
 from refgi.cluster.filters.beyond import beyond_disc, fill_beyond
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.eight import room_of
 from refgi.cluster.settings import MOST_TERMS
 from refgi.jit import kernel
@@ -64,19 +65,19 @@ def brutes(
 
 
 @kernel
-def build_brute(depth: Array, scale: float, most: float, brute: Brute) -> None:
+def build_brute(depth: Array, scale: DepthScale, brute: Brute) -> None:
     """Fill the channels of one map.
 
     Parameters
     ----------
     depth : (n, n) ndarray
         Radial distance, m; inf where nothing is seen.
-    scale, most : float
+    scale : DepthScale
         As in `basis.normalise`.
     brute : Brute
         Filled.
     """
-    normalise(depth, scale, most, brute.depth)
+    normalise(depth, scale, brute.depth)
     fill_beyond(brute.beyond, brute.depth)
     fill_basis(brute.depth, brute.basis.shape[2] // 2, brute.quantised, brute.basis, brute.basis_z)
 

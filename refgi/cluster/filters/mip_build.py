@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from refgi.cluster.filters.basis import fill_basis, normalise, sine_cosine, turned
 from refgi.cluster.filters.beyond import fill_beyond
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store
 from refgi.cluster.filters.pyramid import Mip, mip_of
 from refgi.cluster.filters.quantise import eight_bits, half_precision
@@ -24,38 +25,37 @@ MEANS = room_of(4, CHUNK)
 
 
 @kernel(parallel=True)
-def build_mips(depth: Array, per_metre: Array, most: float, several: Mip) -> None:
+def build_mips(depth: Array, scales: DepthScale, several: Mip) -> None:
     """Fill the pyramids of several maps.
 
     Parameters
     ----------
     depth : (K, n, n) ndarray
         Radial distances, m; inf where nothing is seen.
-    per_metre : (K,) ndarray
-        As in `basis.normalise`.
-    most : float
-        The same.
+    scales : DepthScale
+        As in `basis.normalise`; `origin` and `slope` are (K,) ndarrays.
     several : Mip
         Filled; with a leading axis of K at least.
     """
     for k in prange(len(depth)):
-        build_mip(depth[k], per_metre[k], most, mip_of(several, np.int64(k)))
+        scale = DepthScale(scales.logarithmic, scales.origin[k], scales.slope[k], scales.most)
+        build_mip(depth[k], scale, mip_of(several, np.int64(k)))
 
 
 @kernel
-def build_mip(depth: Array, per_metre: float, most: float, mip: Mip) -> None:
+def build_mip(depth: Array, scale: DepthScale, mip: Mip) -> None:
     """Fill one pyramid.
 
     Parameters
     ----------
     depth : (n, n) ndarray
         Radial distance, m; inf where nothing is seen.
-    per_metre, most : float
+    scale : DepthScale
         As in `basis.normalise`.
     mip : Mip
         Filled.
     """
-    normalise(depth, per_metre, most, mip.depth)
+    normalise(depth, scale, mip.depth)
     fill_beyond(mip.beyond, mip.depth)
     if len(depth) == 1:
         return

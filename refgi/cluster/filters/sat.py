@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from refgi.cluster.filters.basis import fill_basis, normalise
 from refgi.cluster.filters.beyond import beyond_disc, fill_beyond
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
@@ -53,19 +54,19 @@ def sats(size: int, terms: int, dtype: npt.DTypeLike, *, quantised: bool = False
 
 
 @kernel
-def build_sat(depth: Array, scale: float, most: float, sat: Sat) -> None:
+def build_sat(depth: Array, scale: DepthScale, sat: Sat) -> None:
     """Fill the table of one map.
 
     Parameters
     ----------
     depth : (n, n) ndarray
         Radial distance, m; inf where nothing is seen.
-    scale, most : float
+    scale : DepthScale
         As in `basis.normalise`.
     sat : Sat
         Filled.
     """
-    normalise(depth, scale, most, sat.depth)
+    normalise(depth, scale, sat.depth)
     fill_beyond(sat.beyond, sat.depth)
     n, terms = len(depth), sat.sums.shape[2] // 4
     basis, basis_z = np.empty((1, n, 2 * terms), depth.dtype), np.empty((1, n, 2 * terms + 1), depth.dtype)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.lighting.interleave import FIRST, SIZE, SUBSET
 from refgi.cluster.maps.hard import hard_tile
 from refgi.cluster.visibility.look import ROOM_ROWS, Choices
@@ -121,7 +122,7 @@ def add_hard(
 @kernel(parallel=True)
 def add_soft(
     receivers: Tiles, lights: Array, clamp: Clamp | None, start: Array, numbers: Array, sizes: Choices,
-    weight: Array, filters: Any, irradiance: Array,
+    scale: DepthScale, weight: Array, filters: Any, irradiance: Array,
 ) -> None:
     """Add the diffuse lights of one area light under its soft shadow (`visibility.soft`).
 
@@ -139,6 +140,8 @@ def add_soft(
         The area light, of `numbers_of`.
     sizes : Choices
         How filters are sized.
+    scale : DepthScale
+        That of the filtered map.
     weight : (M,) ndarray
         Of the series' terms.
     filters : Mip, Sat or Brute
@@ -159,10 +162,10 @@ def add_soft(
             size = receivers.tiles[SIZE, t]
             count = _lit(tile, size, lit, places)
             if count >= FULL * size:
-                soft_tile(numbers, sizes, weight, filters, tile, size, lit, todo, visible, room, means)
+                soft_tile(numbers, sizes, scale, weight, filters, tile, size, lit, todo, visible, room, means)
             else:
                 _gather(tile, places, count, points)
-                soft_tile(numbers, sizes, weight, filters, points, count, all_lit, todo, some, room, means)
+                soft_tile(numbers, sizes, scale, weight, filters, points, count, all_lit, todo, some, room, means)
                 _scatter(some, places, count, visible)
             _add(tile, receivers.tiles, t, visible, irradiance)
 

@@ -18,7 +18,7 @@ from refgi.cluster.lighting.area_sum import Tiles, add_hard, add_soft, add_unsha
 from refgi.cluster.lighting.interleave import SUBSET, Subsets, dealt, put, subsets, take
 from refgi.cluster.lighting.member_lights import MemberLights, add_members, member_lights
 from refgi.cluster.visibility.filtered import build, room_for
-from refgi.cluster.visibility.look import choices, numbers_of
+from refgi.cluster.visibility.look import choices, numbers_of, scale_of
 from refgi.cluster.visibility.series import series
 from refgi.cluster.visibility.visible import visibility
 from refgi.errors import expect
@@ -154,8 +154,8 @@ def _add_by_tiles(
         elif hard[m]:
             add_hard(lit, lights, clamp, start, maps.depth[k], maps.center[k], maps.frame[k], sums)
         else:
-            numbers = numbers_of(maps, k, float(areas.delta[m]), settings)
-            add_soft(lit, lights, clamp, start, numbers, sizes, weight, next(filters), sums)
+            numbers, scale = numbers_of(maps, k, float(areas.delta[m]), settings), scale_of(maps, k, settings)
+            add_soft(lit, lights, clamp, start, numbers, sizes, scale, weight, next(filters), sums)
         report_progress((done + 1) / len(shining))
 
 
@@ -168,7 +168,7 @@ def _filtered(maps: "ShadowMaps | None", wanted: Array, settings: "ValSettings")
     rooms = [room_for(known.depth.shape[1], known.depth.dtype, settings) for _ in range(min(workers, len(wanted)))]
 
     def filtered(k: int, room: Any) -> Any:
-        return build(known.depth[k], float(known.far[k]), settings, room)
+        return build(known.depth[k], scale_of(known, k, settings), settings, room)
 
     with ThreadPoolExecutor(workers) as pool:
         for first in range(0, len(wanted), workers):  # what is filtered before is in use no more

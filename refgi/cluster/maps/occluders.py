@@ -1,23 +1,29 @@
-"""Which triangles can block anything: those on the hull of the scene cannot.
+"""Which triangles can block anything: those on the hull of what takes part cannot.
 
-A triangle whose plane has the whole scene on one side meets a segment between two points of the scene at an end of it
-at most. Floors, walls and ceilings of a closed room are of this kind, and often make up most of what a map shows.
+Light goes from pixel lights to what the camera sees. A triangle whose plane has all of both on one side meets a segment
+between them at an end of it at most. Floors, walls and ceilings of a closed room are of this kind, and often make up
+most of what a map shows; so is whatever lies outside of the room.
 """
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.chunks import Chunks, chunks
+from refgi.rsm.extent import Extent
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+    from refgi.rsm import PixelLights
+
 Array = npt.NDArray[Any]
 
-# Share of the scene's diagonal by which points may lie beyond a plane that still counts as the scene's border; below
-# what ends of rays are kept from surfaces.
+# Share of the extent's diagonal by which points may lie beyond a plane that still counts as the border; below what ends
+# of rays are kept from surfaces.
 TOLERANCE = 1e-6
 FEW_PAIRS = 1 << 24  # triangles times points that are tried without asking for the hull, which takes about as long
 DIRECTIONS = 128  # along which extreme points are found before the hull: enough to tell most triangles from it
@@ -33,27 +39,77 @@ class Blockers(NamedTuple):
     laid: Chunks  # the same, as maps are drawn from
 
 
+class Ends(NamedTuple):
+    """Where segments of light end: all of them lie within the convex hull of `points`."""
+
+    points: Array  # (n, 3) float64, m
+    extent: Extent  # the box of what takes part
+
+
+def ends_of(frame: "Frame", lights: "PixelLights") -> Ends:
+    """Return where the light of pixel lights begins and ends.
+
+    Parameters
+    ----------
+    frame : Frame
+        What is seen.
+    lights : PixelLights
+        N lights.
+
+    Returns
+    -------
+    Ends
+        Vertices of the triangles that the camera sees, places of the lights, and the scene's extent.
+    """
+    geometry, seen = frame.scene.geometry, np.zeros(frame.scene.face_count + 1, np.bool_)
+    seen[frame.gbuffer.triangle_id] = True  # -1, no triangle, is the last place
+    used = _used(len(geometry.vertices), geometry.faces[seen[:-1]])
+    places = np.asarray(lights.position, np.float64).T
+    return Ends(np.ascontiguousarray(np.concatenate([geometry.vertices[used], places])), frame.extent)
+
+
+def everywhere(geometry: Geometry) -> Ends:
+    """Return ends at any two points of the scene.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The scene's triangles.
+
+    Returns
+    -------
+    Ends
+        All vertices that triangles use, and their box.
+    """
+    vertices = np.ascontiguousarray(geometry.vertices, np.float64)
+    return Ends(vertices[_used(len(vertices), geometry.faces)], Extent(*geometry.bounds))
+
+
 @stage("cluster.occluders")
-def occluders(geometry: Geometry) -> Array:
-    """Tell which triangles may lie between two points of the scene.
+def occluders(geometry: Geometry, ends: Ends | None = None, touching: bool = False) -> Array:
+    """Tell which triangles may lie between two points.
 
     Parameters
     ----------
     geometry : Geometry
         The triangles.
+    ends : Ends, optional
+        What the points lie within; absent: anywhere in the scene.
+    touching : bool
+        Count those on the hull of the points as well.
 
     Returns
     -------
     (m,) bool ndarray
-        False for triangles on the scene's convex hull: a segment between two points of the scene meets them only
-        where one of its ends lies in their plane, to 1e-6 of the scene's diagonal. Triangles without area are False.
+        False for triangles on or outside of the convex hull: a segment between two points meets them only
+        where one of its ends lies in their plane, to 1e-6 of the extent's diagonal. Triangles without area are False.
     """
     faces = np.ascontiguousarray(geometry.faces)
     border = np.zeros(len(faces), np.bool_)
     if len(faces):
-        tolerance = TOLERANCE * geometry.diagonal
+        used, extent = ends or everywhere(geometry)
+        tolerance = TOLERANCE * extent.diagonal * (-1.0 if touching else 1.0)
         vertices = np.ascontiguousarray(geometry.vertices, np.float64)
-        used = vertices[_used(len(vertices), faces)]
         sketch = _extreme(np.ascontiguousarray(used[:: 1 + len(used) // SKETCHED]))
         _on_border(vertices, faces, sketch, tolerance, border)
         doubtful = np.flatnonzero(border)
@@ -62,7 +118,7 @@ def occluders(geometry: Geometry) -> Array:
 
 
 @stage("cluster.blockers")
-def blockers(geometry: Geometry, alone: bool) -> Blockers:
+def blockers(geometry: Geometry, alone: bool, ends: Ends | None = None) -> Blockers:
     """Return the triangles that maps are drawn from.
 
     Parameters
@@ -70,17 +126,16 @@ def blockers(geometry: Geometry, alone: bool) -> Blockers:
     geometry : Geometry
         The triangles.
     alone : bool
-        Leave out those that cannot block anything.
+        Leave out those that cannot block anything, the walls of a room; else those alone that lie outside of it.
+    ends : Ends, optional
+        As in `occluders`.
 
     Returns
     -------
     Blockers
         The triangles, in mesh order.
     """
-    if not alone:
-        vertices = np.ascontiguousarray(geometry.vertices, np.float64)
-        return Blockers(vertices, geometry.faces, chunks(vertices, geometry.faces))
-    kept = geometry.faces[occluders(geometry)]
+    kept = geometry.faces[occluders(geometry, ends, not alone)]
     used = _used(len(geometry.vertices), kept)
     vertices = np.ascontiguousarray(geometry.vertices[used], np.float64)
     faces = np.ascontiguousarray((np.cumsum(used) - 1)[kept], np.int32)

@@ -11,11 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.area_lights import AreaLights
-from refgi.cluster.maps.occluders import Blockers, blockers
+from refgi.cluster.maps.occluders import Blockers, Ends, blockers
 from refgi.cluster.maps.traced import traced_maps
 from refgi.cluster.settings import ValSettings
 from refgi.errors import expect
+from refgi.jit import kernel, prange
 from refgi.rsm.depth_maps import distance_maps
+from refgi.rsm.extent import Extent
 from refgi.rsm.paraboloid import Ignored
 from refgi.rsm.projection import PARABOLOID, Projection
 from refgi.scene.model import Geometry
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-LIFT = 4e-6  # share of the largest coordinate: twice what ends of rays are lifted, above the rounding of float32
+LIFT = 4e-6  # share of the extent's largest coordinate: twice what ends of rays are lifted, above float32's rounding
 BACKWARD = np.diag([-1.0, 1.0, -1.0])  # the frame of the hemisphere behind: right and forward turned round
 
 
@@ -38,15 +40,18 @@ class ShadowMaps(NamedTuple):
     center: Array  # (K, 3) float64, m
     frame: Array  # (K, 3, 3) float64: rows right, down, forward, unit vectors
     near: Array  # (K,) float64, m: smallest distance in `depth`, inf if there is none
-    far: Array  # (K,) float64, m: to the farthest corner of the scene's bounding box
+    far: Array  # (K,) float64, m: largest finite distance in `depth`, 0 if there is none
+    scene_far: Array  # (K,) float64, m: to the farthest corner of the scene's extent
     behind: Array | None = None  # (K, n, n): the hemisphere behind, its frame with right and forward turned round
     near_behind: Array | None = None  # (K,) float64, m: smallest distance in `behind`
+    far_behind: Array | None = None  # (K,) float64, m: largest finite one
     left_out: int = 0  # triangles left out because they are near a centre, summed over all maps
 
 
 @stage("cluster.shadow_maps")
 def shadow_maps(
-    geometry: Geometry, areas: AreaLights, settings: ValSettings, dtype: npt.DTypeLike, tracer: "Tracer | None" = None
+    geometry: Geometry, areas: AreaLights, settings: ValSettings, dtype: npt.DTypeLike, tracer: "Tracer | None" = None,
+    ends: Ends | None = None,
 ) -> ShadowMaps:
     """Draw a paraboloid map of distances for every area light that something may occlude.
 
@@ -62,6 +67,8 @@ def shadow_maps(
         Float32 or float64.
     tracer : Tracer, optional
         Rays against `geometry`, for ``maps == "rays"``; made where it is needed and absent.
+    ends : Ends, optional
+        Where light begins and ends; absent: anywhere in the scene.
 
     Returns
     -------
@@ -74,9 +81,10 @@ def shadow_maps(
         If the type is not float32 or float64.
     """
     expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
-    drawn, both = blockers(geometry, settings.occluders_alone), settings.behind == "dual_paraboloid"
+    extent = Extent(*geometry.bounds) if ends is None else ends.extent
+    drawn, both = blockers(geometry, settings.occluders_alone, ends), settings.behind == "dual_paraboloid"
     lit = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
-    center = np.ascontiguousarray((areas.center + _lift(geometry) * areas.normal)[:, lit].T)
+    center = np.ascontiguousarray((areas.center + LIFT * extent.largest * areas.normal)[:, lit].T)
     frame, radius = areas.frame[lit], settings.near_distance * areas.radius[lit]
     rays = tracer if len(drawn.faces) == len(geometry.faces) else None
     depth, near, left_out = _draw(drawn, center, frame, radius, settings, dtype, rays)
@@ -89,29 +97,40 @@ def shadow_maps(
     map_of[lit[needed]] = np.arange(needed.sum())
     if (map_of < 0).any():
         skip("cluster.depth_maps", f"nothing occludes {(map_of < 0).sum()} of {len(map_of)} area lights")
-    maps = ShadowMaps(depth, map_of, center, frame, near, _farthest(geometry, center), behind, near_behind,
-                      int(left_out.sum()))  # fmt: skip
+    maps = ShadowMaps(depth, map_of, center, frame, near, _farthest(depth), _farthest_corner(extent, center), behind,
+                      near_behind, None if behind is None else _farthest(behind), int(left_out.sum()))
     return maps if needed.all() else _without(maps, needed)
 
 
-def _lift(geometry: Geometry) -> float:
-    """Return how far centres are moved off the surface, m."""
-    return LIFT * max(float(np.abs(corner).max()) for corner in geometry.bounds)
-
-
-def _farthest(geometry: Geometry, center: Array) -> Array:
-    """Return distances to the farthest corner of the scene's bounding box, m."""
-    low, high = geometry.bounds
+def _farthest_corner(extent: Extent, center: Array) -> Array:
+    """Return distances to the farthest corner of the scene's extent, m."""
+    low, high = extent
     return np.asarray(np.linalg.norm(np.maximum(np.abs(low - center), np.abs(high - center)), axis=1))
+
+
+def _farthest(depth: Array) -> Array:
+    """Return the largest finite distance on each map, 0 where there is none, m."""
+    columns = np.empty((depth.shape[0], depth.shape[2]), depth.dtype)
+    _farthest_in_columns(depth, columns)
+    return np.asarray(columns.max(axis=1, initial=0.0), np.float64)
+
+
+@kernel(parallel=True)
+def _farthest_in_columns(depth: Array, columns: Array) -> None:
+    for k in prange(len(depth)):
+        for j in range(depth.shape[2]):
+            columns[k, j] = 0
+        for i in range(depth.shape[1]):
+            for j in range(depth.shape[2]):
+                z = depth[k, i, j]
+                columns[k, j] = z if (z > columns[k, j]) & (z < np.inf) else columns[k, j]
 
 
 def _without(maps: ShadowMaps, needed: Array) -> ShadowMaps:
     """Drop the maps on which there is nothing."""
-    behind, near_behind = maps.behind, maps.near_behind
-    return maps._replace(
-        depth=maps.depth[needed], center=maps.center[needed], frame=maps.frame[needed], near=maps.near[needed],
-        far=maps.far[needed], behind=None if behind is None else behind[needed],
-        near_behind=None if near_behind is None else near_behind[needed])  # fmt: skip
+    kept: dict[str, Any] = {name: values[needed] for name, values in maps._asdict().items()
+                            if name not in ("map_of", "left_out") and values is not None}
+    return maps._replace(**kept)
 
 
 def _draw(

@@ -23,7 +23,7 @@ Array = npt.NDArray[Any]
 
 CELLS = 32  # of the grid along each side of the rectangle
 AT_ONCE = 32  # receivers that share scratch
-LEAST_SIDE = 1e-9  # of a rectangle, as a share of the far distance: a point light has none
+LEAST_SIDE = 1e-9  # of a rectangle, as a share of the farthest place: a point light has none
 
 
 class Patches(NamedTuple):
@@ -105,7 +105,7 @@ def _direction(row: Array, column: Array, n: int) -> Array:
 
 def _grid(areas: AreaLights, maps: ShadowMaps, m: int, k: int) -> tuple[Array, Array]:
     """Return where the rectangle begins and how large its cells are, (3,) and (2,), m."""
-    side = np.maximum(areas.side[:, m], LEAST_SIDE * maps.far[k])
+    side = np.maximum(areas.side[:, m], LEAST_SIDE * maps.scene_far[k])
     lift = float(areas.normal[:, m] @ (areas.center[:, m] - maps.center[k]))
     return np.array([*(areas.offset[:, m] - side / 2), lift]), side / CELLS
 

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from refgi.cluster.area_lights import AreaLights, Given
+from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.reference.back_projection import back_projected_visibility
 from refgi.cluster.reference.members import member_visibility
 from refgi.cluster.reference.rectangle import rectangle_visibility
@@ -40,9 +41,8 @@ def reference_visibility(
     """
     if settings.visibility == "members":
         return member_visibility(frame, lights, areas)
-    if settings.visibility == "rectangle":
-        return rectangle_visibility(frame, areas, settings)
-    if settings.visibility == "back_projection" and maps is not None:
-        behind = rectangle_visibility(frame, areas, settings) if settings.behind == "raytrace" else None
-        return back_projected_visibility(areas, maps, behind)
-    return None
+    projected = maps if settings.visibility == "back_projection" else None
+    rectangle = None
+    if settings.visibility == "rectangle" or (projected is not None and settings.behind == "raytrace"):
+        rectangle = rectangle_visibility(frame, areas, settings, ends=ends_of(frame, lights))
+    return rectangle if projected is None else back_projected_visibility(areas, projected, rectangle)

@@ -69,6 +69,6 @@ def member_visibility(
             given_light: Array = np.divide(flux[of] * away * above, square**2, out=np.zeros_like(square), where=faced)
             return given_light
 
-        return free_share(frame.tracer, points, facing, position[:, of], normal[:, of], worth, frame.tracer.offset)
+        return free_share(frame.tracer, points, facing, position[:, of], normal[:, of], worth, frame.tracer.grain)
 
     return given

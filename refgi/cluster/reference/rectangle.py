@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.area_lights import AreaLights, Given
-from refgi.cluster.maps.occluders import Blockers, blockers
+from refgi.cluster.maps.occluders import Blockers, Ends, blockers
 from refgi.cluster.reference.unobstructed import Ball, free_share
 from refgi.cluster.settings import ValSettings
 from refgi.rays import Tracer
@@ -22,7 +22,9 @@ Array = npt.NDArray[Any]
 POINTS = 256  # on each rectangle: at most 1/256 off for an edge along a side, about 1/60 for others
 
 
-def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSettings, points: int = POINTS) -> Given:
+def rectangle_visibility(
+    frame: "Frame", areas: AreaLights, settings: ValSettings, points: int = POINTS, ends: Ends | None = None
+) -> Given:
     """Return V of an area light as the share of its rectangle that a receiver sees.
 
     Parameters
@@ -35,6 +37,8 @@ def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSetting
         What blocks near an area light, and what is seen from behind it.
     points : int
         Points on each rectangle, spread evenly.
+    ends : Ends, optional
+        Where light begins and ends; absent: anywhere in the scene.
 
     Returns
     -------
@@ -48,7 +52,7 @@ def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSetting
     there (`near_geometry`). Points below the receiver's surface do not count; where none is left V is 1. Behind the
     area light V is 1 ("visible"), or what rays say in all other modes of `behind`.
     """
-    drawn = blockers(frame.scene.geometry, settings.occluders_alone)
+    drawn = blockers(frame.scene.geometry, settings.occluders_alone, ends)
     on_square = _even(points)
 
     @lru_cache(maxsize=1)
@@ -64,7 +68,7 @@ def rectangle_visibility(frame: "Frame", areas: AreaLights, settings: ValSetting
         for side in (1.0, -1.0):
             on = within & (height * side > 0)
             visible[on] = free_share(tracer, points[:, on], facing[:, on], rectangle_points(areas, m, on_square),
-                                     side * areas.normal[:, m, None], None, frame.tracer.offset, ball)
+                                     side * areas.normal[:, m, None], None, frame.tracer.grain, ball)
         return visible
 
     return given

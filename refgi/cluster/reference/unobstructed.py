@@ -24,7 +24,7 @@ class Ball(NamedTuple):
 
 def free_share(
     tracer: "Tracer", points: Array, facing: Array, targets: Array, upward: Array,
-    worth: Callable[[Array, Array], Array] | None, offset: float, ball: Ball | None = None,
+    worth: Callable[[Array, Array], Array] | None, grain: float, ball: Ball | None = None,
 ) -> Array:
     """Return the share of each receiver's rays that arrives, each ray after its worth.
 
@@ -42,8 +42,8 @@ def free_share(
         Given vectors (n, k, 3) from some receivers to the targets and their normals (n, 3), the weight (n, k) of each
         ray, 0 or more; None: all the same. Rays of no worth, and those to targets below a receiver's surface, are
         not traced.
-    offset : float
-        How far above their surfaces rays start and end, m.
+    grain : float
+        The scene tracer's: how far above their surfaces rays start and end, as `ray_offset` has it, m.
     ball : Ball, optional
         Rays end where they enter it.
 
@@ -52,8 +52,10 @@ def free_share(
     (n,) ndarray
         In the dtype of the points, 0 to 1; 1 where no ray is of any worth.
     """
+    from refgi.rays import STEPS
+
     visible = np.ones(points.shape[1], points.dtype)
-    ends, step = (targets + offset * upward).T, max(1, RAYS_AT_ONCE // max(1, targets.shape[1]))
+    step = max(1, RAYS_AT_ONCE // max(1, targets.shape[1]))
     for first in range(0, len(visible), step):
         part = slice(first, first + step)
         at, up = points[:, part].T.astype(np.float64), facing[:, part].T.astype(np.float64)
@@ -61,7 +63,9 @@ def free_share(
         above = np.einsum("nkc,nc->nk", toward, up) > 0
         weight = np.where(above, 1.0 if worth is None else worth(toward, up), 0.0)
         reach = np.where(weight > 0, _way_to(ball, at, toward), 0.0)
-        arrives = ~_blocked(tracer, at + offset * up, ends, reach)
+        starts = at + STEPS * (np.abs(at).sum(axis=1, keepdims=True) + grain) * up
+        lift = STEPS * (np.abs(targets).sum(axis=0) + grain + np.abs(toward).sum(axis=2))
+        arrives = ~_blocked(tracer, starts, targets.T + lift[..., None] * upward.T, reach)
         whole = weight.sum(axis=1)
         share = np.divide((weight * arrives).sum(axis=1), whole, out=np.ones_like(whole), where=whole > 0)
         visible[part] = np.minimum(share, 1.0)
@@ -69,10 +73,10 @@ def free_share(
 
 
 def _blocked(tracer: "Tracer", origins: Array, ends: Array, reach: Array) -> Array:
-    """Return which of the rays from each origin (n, 3) to each end (k, 3) are blocked, (n, k) bool."""
+    """Return which of the rays from each origin (n, 3) to its ends (n, k, 3) are blocked, (n, k) bool."""
     shape = (*reach.shape, 3)
     starts = np.broadcast_to(origins[:, None], shape)
-    directions = (ends[None] - starts).astype(np.float32).reshape(-1, 3)
+    directions = (ends - starts).astype(np.float32).reshape(-1, 3)
     blocked = np.zeros(reach.size, np.bool_)
     tracer.fill_occluded(np.ascontiguousarray(starts, np.float32).reshape(-1, 3), directions,
                          reach.reshape(-1).astype(np.float32), blocked)

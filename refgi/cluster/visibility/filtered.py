@@ -6,10 +6,10 @@ import numpy.typing as npt
 from numba.extending import overload
 
 from refgi.cluster.filters.brute import Brute, brute_means, brutes, build_brute
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.mip import Mip, build_mip, mip_means, mip_of, mips
 from refgi.cluster.filters.sat import Sat, build_sat, sat_means, sats
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.series import series
 
 Array = npt.NDArray[Any]
 
@@ -56,15 +56,15 @@ def _by_type(
     return call
 
 
-def build(depth: Array, far: float, settings: ValSettings, room: Any = None) -> Any:
+def build(depth: Array, scale: DepthScale, settings: ValSettings, room: Any = None) -> Any:
     """Filter one map as settings ask for.
 
     Parameters
     ----------
     depth : (n, n) ndarray
         Radial distance, m; inf where nothing is seen.
-    far : float
-        Depth at the far end, m.
+    scale : DepthScale
+        From metres to the series' scale.
     settings : ValSettings
         `prefilter`, `terms` and `quantisation` count.
     room : Mip, Sat or Brute, optional
@@ -76,8 +76,7 @@ def build(depth: Array, far: float, settings: ValSettings, room: Any = None) -> 
         In the dtype of `depth`.
     """
     room = room_for(len(depth), depth.dtype, settings) if room is None else room
-    most = series(settings).range
-    FILL[type(room)](depth, most / far, most, room)
+    FILL[type(room)](depth, scale, room)
     return room
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.filters.depth_scale import DepthScale, depth_scale
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.kernel_size import (
@@ -27,10 +28,11 @@ X, Y, Z, D, EXTENT = 0, 1, 2, 3, 4  # receiver in the map's frame, its distance,
 S, T, RADIUS = 5, 6, 7  # where it looks, in [-1, 1] units
 SINE, COSINE, STEP_SINE, STEP_COSINE = 8, 9, 10, 11  # of c_k d' for the current k, of 2 pi d'
 SHADE, DEPTH = 12, 13  # sums over k; the latter becomes z_avg, m
-ROOM_ROWS = 14
+ON_SERIES = 14  # t(d), the receiver's distance on the series' scale
+ROOM_ROWS = 15
 # places in the numbers of an area light
-CENTER, FRAME, DELTA, NEAREST, SCALE, SEARCH_BIAS, BIAS, GAIN = 0, 3, 12, 13, 14, 15, 16, 17
-NUMBERS = 18
+CENTER, FRAME, DELTA, NEAREST, SEARCH_BIAS, BIAS, GAIN = 0, 3, 12, 13, 14, 15, 16
+NUMBERS = 17
 
 
 class Choices(NamedTuple):
@@ -85,9 +87,35 @@ def numbers_of(maps: ShadowMaps, k: int, delta: float, settings: ValSettings, be
     near = maps.near if maps.near_behind is None or not behind else maps.near_behind
     numbers[CENTER : CENTER + 3] = maps.center[k]
     numbers[FRAME : FRAME + 9] = (BACKWARD @ maps.frame[k] if behind else maps.frame[k]).ravel()
-    numbers[DELTA], numbers[NEAREST], numbers[SCALE] = delta, near[k], chain.range / maps.far[k]
+    numbers[DELTA], numbers[NEAREST] = delta, near[k]
     numbers[SEARCH_BIAS], numbers[BIAS], numbers[GAIN] = chain.search_bias, chain.bias, chain.gain
     return numbers
+
+
+def scale_of(maps: ShadowMaps, k: int, settings: ValSettings, behind: bool = False) -> DepthScale:
+    """Return the scale on which depths of one map are compared.
+
+    Parameters
+    ----------
+    maps : ShadowMaps
+        The maps.
+    k : int
+        Which one; it holds something.
+    settings : ValSettings
+        Series and `depth_scale`.
+    behind : bool
+        Of the map of the hemisphere behind.
+
+    Returns
+    -------
+    DepthScale
+        From metres to the series' scale.
+    """
+    near, far = (maps.near_behind, maps.far_behind) if behind else (maps.near, maps.far)
+    assert near is not None
+    assert far is not None
+    chain = series(settings)
+    return depth_scale(settings.depth_scale, float(near[k]), float(far[k]), float(maps.scene_far[k]), chain.range)
 
 
 @kernel

@@ -12,6 +12,7 @@ from typing import Any
 import numpy.typing as npt
 
 from refgi.cluster.filters.basis import sine_cosine
+from refgi.cluster.filters.depth_scale import DepthScale, series_depths, series_distance
 from refgi.cluster.visibility.filtered import filtered
 from refgi.cluster.visibility.kernel_size import cone_tangent, published_tangent
 from refgi.cluster.visibility.look import (
@@ -21,8 +22,8 @@ from refgi.cluster.visibility.look import (
     EXTENT,
     GAIN,
     NEAREST,
+    ON_SERIES,
     RADIUS,
-    SCALE,
     SEARCH_BIAS,
     SHADE,
     SINE,
@@ -47,7 +48,8 @@ NOTHING = 0.02  # of the search disc blocked: less is the series' ripple, not a 
 
 @kernel
 def find_penumbra(
-    numbers: Array, choices: Choices, weight: Array, means: Array, size: int, todo: Array, room: Array
+    numbers: Array, choices: Choices, scale: DepthScale, weight: Array, means: Array, size: int, todo: Array,
+    room: Array,
 ) -> int:
     """Find the mean depth of blockers, and the filter whose size follows from it.
 
@@ -57,6 +59,8 @@ def find_penumbra(
         The area light.
     choices : Choices
         How filters are sized.
+    scale : DepthScale
+        From metres to the series' scale.
     weight : (M,) ndarray
         w_k, in the dtype of `room`.
     means : (>= 4 M + 1, >= size) ndarray
@@ -66,7 +70,7 @@ def find_penumbra(
     todo : (>= size,) ndarray of bool
         Which of them; those without a blocker are taken out.
     room : (ROOM_ROWS, >= size) ndarray
-        Filled in rows S to RADIUS and DEPTH, the latter with z_avg, m: d where there is no blocker.
+        Filled in rows S to RADIUS and DEPTH, the latter with z_avg, m: d where there is no blocker; t(d) in ON_SERIES.
 
     Returns
     -------
@@ -75,12 +79,14 @@ def find_penumbra(
 
     Notes
     -----
-    z_avg = (Z/2 - sum_k w_k (cos(c_k d') SZ_k - sin(c_k d') CZ_k)) / (1 - V), where V is that of the search disc.
+    z_avg is the distance at (Z/2 - sum_k w_k (cos(c_k d') SZ_k - sin(c_k d') CZ_k)) / (1 - V) of the series' scale,
+    where V is that of the search disc: on a logarithmic scale, the blockers' geometric mean.
     """
     real = room.dtype.type
-    half, near, scale = real(0.5), numbers[NEAREST], numbers[SCALE]
+    half, near = real(0.5), numbers[NEAREST]
     terms = len(weight)
-    start(numbers[SEARCH_BIAS], scale, size, room)
+    series_depths(scale, room[D], room[ON_SERIES], size)
+    start(numbers[SEARCH_BIAS], size, room)
     for k in range(terms):
         w = weight[k]
         for i in range(size):
@@ -94,8 +100,8 @@ def find_penumbra(
         found = todo[i] & (blocked >= real(NOTHING))
         todo[i] = found
         d = room[D, i]
-        depth = (half * means[4 * terms, i] - room[DEPTH, i]) / (blocked * scale) if found else d
-        depth = min(max(depth, near), d) if found else d
+        depth = (half * means[4 * terms, i] - room[DEPTH, i]) / blocked if found else room[ON_SERIES, i]
+        depth = min(max(series_distance(scale, depth), near), d) if found else d
         room[DEPTH, i] = depth
         extent = room[EXTENT, i]
         # Sec. 4.2: alpha = arctan(p cos(beta) / d)
@@ -125,11 +131,11 @@ def compare(
     visible : (>= size,) ndarray
         Filled where `todo`: V = 1/2 + sum_k w_k (cos(c_k d') S_k - sin(c_k d') C_k), in [0, 1].
     room : (ROOM_ROWS, >= size) ndarray
-        Distances; sums are kept there.
+        Row ON_SERIES counts; sums are kept there.
     """
     real = room.dtype.type
     zero, one, half, gain, terms = real(0.0), real(1.0), real(0.5), numbers[GAIN], len(weight)
-    start(numbers[BIAS], numbers[SCALE], size, room)
+    start(numbers[BIAS], size, room)
     for k in range(terms):
         w = weight[k]
         for i in range(size):
@@ -144,24 +150,21 @@ def compare(
 
 
 @kernel
-def start(bias: Any, scale: Any, size: int, room: Array) -> None:
+def start(bias: Any, size: int, room: Array) -> None:
     """Set out on a series: sin(pi d'), cos(pi d'), their step of 2 pi d' and empty sums.
 
     Parameters
     ----------
     bias : float
         b, on the series' scale.
-    scale : float
-        Of depths, 1/m.
     size : int
         How many receivers.
     room : (ROOM_ROWS, >= size) ndarray
-        Distances in row D; filled in rows SINE to DEPTH.
+        t(d) in row ON_SERIES; filled in rows SINE to DEPTH.
     """
     zero, one, two = room.dtype.type(0.0), room.dtype.type(1.0), room.dtype.type(2.0)
     for i in range(size):
-        t = room[D, i] * scale
-        sine, cosine = sine_cosine((t if t < one else one) - bias)
+        sine, cosine = sine_cosine(room[ON_SERIES, i] - bias)
         room[SINE, i], room[COSINE, i] = sine, cosine
         room[STEP_SINE, i], room[STEP_COSINE, i] = two * sine * cosine, one - two * sine * sine
         room[SHADE, i], room[DEPTH, i] = zero, zero
@@ -169,8 +172,8 @@ def start(bias: Any, scale: Any, size: int, room: Array) -> None:
 
 @kernel
 def soft_tile(
-    numbers: Array, choices: Choices, weight: Array, filters: Any, points: Array, size: int, wanted: Array,
-    todo: Array, visible: Array, room: Array, means: Array,
+    numbers: Array, choices: Choices, scale: DepthScale, weight: Array, filters: Any, points: Array, size: int,
+    wanted: Array, todo: Array, visible: Array, room: Array, means: Array,
 ) -> None:
     """Find how much of one area light each receiver of a tile sees.
 
@@ -180,6 +183,8 @@ def soft_tile(
         The area light, from `numbers_of`.
     choices : Choices
         How filters are sized.
+    scale : DepthScale
+        That of the filtered map.
     weight : (M,) ndarray
         w_k, in the dtype of `points`.
     filters : Mip, Sat or Brute
@@ -207,7 +212,7 @@ def soft_tile(
     if look(numbers, choices, points, size, wanted, todo, visible, room) == 0:
         return
     filtered(filters, room[S], room[T], room[RADIUS], todo, size, True, means)
-    count = find_penumbra(numbers, choices, weight, means, size, todo, room)
+    count = find_penumbra(numbers, choices, scale, weight, means, size, todo, room)
     if count >= FULL * size:
         filtered(filters, room[S], room[T], room[RADIUS], todo, size, False, means)
         compare(numbers, weight, means, size, todo, visible, room)
@@ -223,7 +228,7 @@ def _move_together(size: int, todo: Array, first: Array, room: Array) -> None:
     """Move the receivers left to do to the first lanes, in place, and flag these."""
     count = 0
     for i in range(size):
-        room[D, count], room[RADIUS, count] = room[D, i], room[RADIUS, i]
+        room[ON_SERIES, count], room[RADIUS, count] = room[ON_SERIES, i], room[RADIUS, i]
         room[S, count], room[T, count] = room[S, i], room[T, i]
         first[count] = True
         count += todo[i]

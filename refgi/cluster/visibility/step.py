@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.maps.hard import SLACK
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.kernel_size import cone_tangent, disc, published_square, published_tangent
@@ -28,25 +29,28 @@ class Rules(NamedTuple):
 
     receiver_plane: bool  # before the receiver's tangent plane; else nearer than the receiver by a bias
     cone: bool  # within the cone from the receiver to the light, in the search
-    bias: Any  # m; without `receiver_plane` alone
+    share: Any  # of its distance that a receiver keeps, and
+    bias: Any  # m that it loses; without `receiver_plane` alone
 
 
-def rules(settings: ValSettings, unit: float) -> Rules:
+def rules(settings: ValSettings, scale: DepthScale) -> Rules:
     """Return what counts as a blocker by settings.
 
     Parameters
     ----------
     settings : ValSettings
         `receiver_plane`, `cone` and, where the receiver's plane does not count, `bias` do.
-    unit : float
-        Metres per unit of the series' scale, on which a bias is given.
+    scale : DepthScale
+        The series' scale, on which a bias is given.
 
     Returns
     -------
     Rules
-        Two flags and the bias; 0 where none is given, as the step needs none.
+        Two flags and the bias, on a logarithmic scale a factor; none where none is given, as the step needs none.
     """
-    return Rules(settings.receiver_plane, settings.cone, (settings.bias or 0.0) * unit)
+    along = (settings.bias or 0.0) / scale.slope
+    moved = (2.0**-along, 0.0) if scale.logarithmic else (1.0, along)
+    return Rules(settings.receiver_plane, settings.cone, *moved)
 
 
 @kernel
@@ -233,7 +237,7 @@ def hides(z: Any, w: Any, rule: Rules, receiver: Any, normal: Any) -> Any:
         z < d_plane(w) (1 - slack); where the plane is not met, the receiver's own distance stands in.
     """
     x, y, depth, d = receiver
-    limit = d - type(d)(rule.bias)
+    limit = d * type(d)(rule.share) - type(d)(rule.bias)
     if rule.receiver_plane:
         a, b, c = normal
         height, slope = a * x + b * y + c * depth, a * w[0] + b * w[1] + c * w[2]

@@ -6,13 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.maps.hard import hard_visibility
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference.rectangle import rectangle_points
 from refgi.cluster.reference.unobstructed import Ball, free_share
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.filtered import build
-from refgi.cluster.visibility.look import ROOM_ROWS, Choices, choices, look, numbers_of
+from refgi.cluster.visibility.look import ROOM_ROWS, Choices, choices, look, numbers_of, scale_of
 from refgi.cluster.visibility.series import series
 from refgi.cluster.visibility.soft import soft_tile
 from refgi.cluster.visibility.step import Rules, rules, step_lanes
@@ -94,30 +95,29 @@ def _soft(
 ) -> Array:
     """Return V by the map ahead and, where there is one, the map behind: each sees its own hemisphere alone."""
     visible = np.ones(points.shape[1], points.dtype)
-    chain, chosen, far = series(settings), choices(settings), float(maps.far[k])
-    for depth, behind in ((maps.depth, False), (maps.behind, True)):
-        if depth is None:
+    chosen = choices(settings)
+    for depth, near, behind in ((maps.depth, maps.near, False), (maps.behind, maps.near_behind, True)):
+        if depth is None or near is None or not np.isfinite(near[k]):
             continue
-        numbers = numbers_of(maps, k, delta, settings, behind)
+        numbers, scale = numbers_of(maps, k, delta, settings, behind), scale_of(maps, k, settings, behind)
         if settings.visibility == "step":
-            rule = rules(settings, far / chain.range)
-            _step_tiles(numbers, chosen, rule, depth[k], points, facing, visible)
+            _step_tiles(numbers, chosen, rules(settings, scale), depth[k], points, facing, visible)
         else:
-            weight = chain.weight.astype(points.dtype)
-            _series_tiles(numbers, chosen, weight, build(depth[k], far, settings), points, visible)
+            weight = series(settings).weight.astype(points.dtype)
+            _series_tiles(numbers, chosen, scale, weight, build(depth[k], scale, settings), points, visible)
     return visible
 
 
 def _traced(tracer: "Tracer", areas: AreaLights, m: int, near: float, points: Array, facing: Array) -> Array:
     targets = rectangle_points(areas, m, np.array(np.meshgrid(BESIDE, BESIDE)).reshape(2, -1))
     ball = Ball(areas.center[:, m], near)
-    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], None, tracer.offset, ball)
+    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], None, tracer.grain, ball)
 
 
 
 @kernel(parallel=True)
 def _series_tiles(
-    numbers: Array, chosen: Choices, weight: Array, filters: Any, points: Array, visible: Array
+    numbers: Array, chosen: Choices, scale: DepthScale, weight: Array, filters: Any, points: Array, visible: Array
 ) -> None:
     count, terms, real = points.shape[1], len(weight), points.dtype
     for tile in prange((count + TILE - 1) // TILE):
@@ -126,7 +126,7 @@ def _series_tiles(
         wanted, todo = np.ones(TILE, np.bool_), np.empty(TILE, np.bool_)
         room, means = np.empty((ROOM_ROWS, TILE), real), np.empty((4 * terms + 1, TILE), real)
         part, here = points[:, first : first + size], np.empty(TILE, real)
-        soft_tile(numbers, chosen, weight, filters, part, size, wanted, todo, here, room, means)
+        soft_tile(numbers, chosen, scale, weight, filters, part, size, wanted, todo, here, room, means)
         for i in range(size):
             visible[first + i] = min(visible[first + i], here[i])
 

@@ -78,6 +78,6 @@ def _instant_radiosity(frame: "Frame", settings: SiiSettings) -> Array:
     from refgi.shadowed import receivers, shadowed_sum
 
     buffer, light = frame.gbuffer, np.zeros((3, frame.height, frame.width), frame.dtype)
-    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
+    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
     light.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, choose_lights(frame, settings))
     return light

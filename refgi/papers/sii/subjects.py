@@ -2,11 +2,10 @@
 
 The paper's I_low is "x % of I_0", an irradiance of an intensity: its unit of length is missing, and with it how far
 splats reach. The reference length of a scene is chosen so that splats of 5 % have the overdraw of Figure 8, 125 of 768
-lights a pixel.
+lights a pixel, from a picture of one size so that all figures of a scene share it.
 """
 
 import dataclasses
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
@@ -14,6 +13,8 @@ import numpy.typing as npt
 from refgi.lights.selection import choose_lights
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.reach.fragments import Fragments, fragments
+from refgi.splat.reach.reference_length import PAPER_CUT, PAPER_LIGHTS
+from refgi.splat.reach.reference_length import reference_length as reference_length_of
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -22,11 +23,10 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 BOX = "cornell_sphere:faces=17000"  # as many faces as the scenes of a game in 2006
-CAUSTIC = SiiSettings(lights=4096, warp="B", warp_levels=3, importance="peak")  # Figure 4, Table 1
+CAUSTIC = SiiSettings(lights=4096, warp="B", warp_levels=3, importance="peak", i_low=PAPER_CUT,
+                      reference_length=1.0)  # Figure 4, Table 1
 UNCUT = SiiSettings(i_low=0.0)
-PAPER_OVERDRAW, PAPER_LIGHTS = 125.0, 768  # Figure 8
-COARSE = 64  # pixels along a side while the reference length is sought
-STEPS = 12  # of bisection: to a part in 1000
+COARSE = 64  # pixels along a side of the picture that the reference length is chosen by
 
 
 def full_sum(bench: "Workbench", scene: str) -> Array:
@@ -79,14 +79,14 @@ def splats(bench: "Workbench", scene: str, **changes: Any) -> SiiSettings:
     scene : str
         Name of the scene.
     **changes : object
-        What differs from the defaults: 768 lights, 5 %.
+        What differs from 768 lights and 5 %.
 
     Returns
     -------
     SiiSettings
         The settings.
     """
-    return SiiSettings(reference_length=reference_length(bench, scene), **changes)
+    return SiiSettings(**{"i_low": PAPER_CUT, "reference_length": reference_length(bench, scene)} | changes)
 
 
 def reference_length(bench: "Workbench", scene: str) -> float:
@@ -104,20 +104,13 @@ def reference_length(bench: "Workbench", scene: str) -> float:
     float
         Length, m.
     """
-    return bench.once(("reference length", scene), lambda: _sought(bench.frame(scene, width=COARSE, height=COARSE)))
+    return bench.once(("reference length", scene), lambda: _length(bench.frame(scene, width=COARSE, height=COARSE)))
 
 
-def _sought(frame: "Frame") -> float:
-    covered = frame.gbuffer.covered
-    low, high = 1e-3 * frame.scene.geometry.diagonal, 10 * frame.scene.geometry.diagonal
-    for _ in range(STEPS):
-        middle = math.sqrt(low * high)
-        drawn = fragments_of(frame, SiiSettings(lights=PAPER_LIGHTS, reference_length=middle))
-        if drawn.overdraw[covered].mean() < PAPER_OVERDRAW:
-            low = middle
-        else:
-            high = middle
-    return math.sqrt(low * high)
+def _length(frame: "Frame") -> float:
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    settings = SiiSettings(lights=PAPER_LIGHTS)
+    return reference_length_of(receivers, choose_lights(frame, settings), settings)
 
 
 def counted(bench: "Workbench", scene: str, settings: SiiSettings) -> Fragments:

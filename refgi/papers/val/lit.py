@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.lighting.clustered import clustered_irradiance
+from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import ValSettings
@@ -38,7 +39,7 @@ def maps_of(frame: "Frame", found: Clustered, settings: ValSettings) -> ShadowMa
         One for each area light that may be occluded.
     """
     tracer = frame.tracer if settings.maps == "rays" else None
-    return shadow_maps(frame.scene.geometry, found.areas, settings, frame.dtype, tracer)
+    return shadow_maps(frame.scene.geometry, found.areas, settings, frame.dtype, tracer, ends_of(frame, found.lights))
 
 
 def lit(frame: "Frame", found: Clustered, settings: ValSettings, maps: ShadowMaps | None = None) -> Array:

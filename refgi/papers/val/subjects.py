@@ -134,7 +134,7 @@ def clustered(frame: Frame, settings: ValSettings, start: Clusters | None = None
     lights = choose_lights(frame, settings)
     found = cluster(lights.position, lights.normal, settings.area_lights, distance=settings.distance,
                     weights=(settings.position_weight, settings.normal_weight),
-                    diagonal=frame.scene.geometry.diagonal, rounds=settings.rounds, start=start)
+                    diagonal=frame.lit_extent.diagonal, rounds=settings.rounds, start=start)
     return Clustered(lights, found, area_lights(lights, found, settings))
 
 
@@ -237,7 +237,7 @@ def rays_to(frame: Frame, lights: "PixelLights") -> Array:
     chosen = lights._replace(position=lights.position[:, shines], normal=lights.normal[:, shines],
                              flux=lights.flux[:, shines], lobe_flux=None, texel=None, map_index=None)
     buffer = frame.gbuffer
-    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
+    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
     total = np.zeros((3, frame.height, frame.width))
     total.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, chosen)
     return total

@@ -17,6 +17,7 @@ from refgi.scene.model import Array, Camera, DirectionalLight, Light, PointLight
 
 LUMEN_PER_WATT = 683.0
 EXTENSION = "KHR_lights_punctual"
+ROUNDING = 1e-6  # rad; a float32 near pi / 2 is within 6e-8, and written with 7 digits within 5e-7
 PICTURE_HEIGHT = 512  # pixels; a glTF camera has an aspect ratio only
 
 
@@ -73,7 +74,12 @@ def _light(document: Document, entry: dict[str, Any], matrix: Array, where: str)
     cone = document.member(entry, "spot", where)
     inner = document.number(cone, "innerConeAngle", f"{where}.spot", 0.0)
     outer = document.number(cone, "outerConeAngle", f"{where}.spot", math.pi / 4)
-    return SpotLight(position, direction, inner, outer, intensity)
+    return SpotLight(position, direction, _not_over_flat(inner), _not_over_flat(outer), intensity)
+
+
+def _not_over_flat(angle: float) -> float:
+    """Return an angle, or 90 degrees for one that is more by rounding: a float32 exporter writes 1.5707964."""
+    return math.pi / 2 if math.pi / 2 < angle < math.pi / 2 + ROUNDING else angle
 
 
 def node_camera(document: Document, node: dict[str, Any], matrix: Array, where: str) -> Camera | None:

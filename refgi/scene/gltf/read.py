@@ -10,10 +10,11 @@ from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.files import Contents
 from refgi.scene.gltf.accessors import accessor
 from refgi.scene.gltf.container import Document
+from refgi.scene.gltf.nodes import scene_nodes
 from refgi.scene.gltf.punctual import node_camera, node_light
 from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
 from refgi.scene.room import expect_room
-from refgi.scene.transform import affine, placed
+from refgi.scene.transform import placed_all
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
@@ -41,12 +42,11 @@ def read_gltf(path: Path) -> Contents:
 
 
 class _Reader:
-    """Walks the node tree of one document once."""
+    """Meshes, materials, cameras and lights of one document, each read once."""
 
     def __init__(self, document: Document) -> None:
         self.document = document
         self.path = document.path
-        self.meshes: list[Mesh] = []
         self.vertices = self.faces = 0
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
@@ -55,27 +55,31 @@ class _Reader:
         self._shapes: dict[int, list[Mesh]] = {}
 
     def contents(self) -> Contents:
-        visited: set[int] = set()
-        pending = [(index, np.eye(4)) for index in reversed(self._roots())]
-        while pending:
-            index, parent = pending.pop()
-            node = self.document.item("nodes", index, "a node reference")
-            expect(index not in visited, f"{self.path}: nodes[{index}]", "one parent", "several, or a cycle")
-            visited.add(index)
-            matrix = parent @ self._local_matrix(node, f"nodes[{index}]")
-            self._collect(node, matrix, f"nodes[{index}]")
-            pending += [(child, matrix) for child in reversed(self._indices(node, "children", f"nodes[{index}]"))]
+        nodes = scene_nodes(self.document)
+        shapes: list[Mesh] = []
+        placed_by: list[int] = []
+        for k, index in enumerate(nodes.index):
+            node, where = self.document.items("nodes")[index], f"nodes[{index}]"
+            found = self._shapes_of(node, where)
+            shapes += found
+            placed_by += [k] * len(found)
+            self._view_and_light(node, nodes.world[k], where)
         for what, count in self.passed_over.items():
             warnings.warn(RefgiWarning(f"{self.path}: {count} {what} passed over"), stacklevel=4)
-        return Contents(tuple(self.meshes), tuple(self.cameras), tuple(self.lights))
+        meshes = placed_all(shapes, nodes.world[placed_by]) if shapes else []
+        return Contents(tuple(meshes), tuple(self.cameras), tuple(self.lights))
 
-    def _collect(self, node: dict[str, Any], matrix: Array, where: str) -> None:
-        if "mesh" in node:
-            for mesh in self._mesh(node["mesh"], f"{where}.mesh"):
-                self.vertices += len(mesh.vertices)
-                self.faces += len(mesh.faces)
-                expect_room(self.vertices, self.faces, f"{self.path}: {where}.mesh")
-                self.meshes.append(placed(mesh, matrix))
+    def _shapes_of(self, node: dict[str, Any], where: str) -> list[Mesh]:
+        """Return the meshes of a node, not yet in the world."""
+        if "mesh" not in node:
+            return []
+        found = self._mesh(node["mesh"], f"{where}.mesh")
+        self.vertices += sum(len(mesh.vertices) for mesh in found)
+        self.faces += sum(len(mesh.faces) for mesh in found)
+        expect_room(self.vertices, self.faces, f"{self.path}: {where}.mesh")
+        return found
+
+    def _view_and_light(self, node: dict[str, Any], matrix: Array, where: str) -> None:
         if camera := node_camera(self.document, node, matrix, where):
             self.cameras.append(camera)
         elif "camera" in node:
@@ -83,42 +87,11 @@ class _Reader:
         if light := node_light(self.document, node, matrix, where):
             self.lights.append(light)
 
-    def _roots(self) -> list[int]:
-        scenes = self.document.items("scenes")
-        if scenes:
-            index = self.document.tree.get("scene", 0)
-            return self._indices(self.document.item("scenes", index, "scene"), "nodes", f"scenes[{index}]")
-        nodes = self.document.items("nodes")
-        children = {c for i, node in enumerate(nodes) for c in self._indices(node, "children", f"nodes[{i}]")}
-        return [index for index in range(len(nodes)) if index not in children]
-
-    def _indices(self, owner: dict[str, Any], key: str, where: str) -> list[int]:
-        found = owner.get(key, [])
-        good = isinstance(found, list) and all(type(index) is int for index in found)
-        expect(good, f"{self.path}: {where}.{key}", "a list of indices", found)
-        return list(found)
-
-    def _local_matrix(self, node: dict[str, Any], where: str) -> Array:
-        if "matrix" in node:
-            columns = self.document.numbers(node, "matrix", where, tuple(np.eye(4).ravel().tolist()))
-            return affine(np.reshape(columns, (4, 4)).T.ravel().tolist(), f"{self.path}: {where}.matrix")
-        if not {"translation", "rotation", "scale"} & node.keys():
-            return np.eye(4)
-        translation = self.document.numbers(node, "translation", where, (0.0, 0.0, 0.0))
-        scale = self.document.numbers(node, "scale", where, (1.0, 1.0, 1.0))
-        rotation = self.document.numbers(node, "rotation", where, (0.0, 0.0, 0.0, 1.0))
-        matrix = np.eye(4)
-        matrix[:3, :3] = _rotation(rotation, f"{self.path}: {where}.rotation") * scale
-        matrix[:3, 3] = translation
-        return affine(matrix.ravel().tolist(), f"{self.path}: {where} (translation, rotation, scale)")
-
     def _mesh(self, index: Any, referrer: str) -> list[Mesh]:
         entry = self.document.item("meshes", index, referrer)
         if index not in self._shapes:
             name = self.document.name(entry, f"meshes[{index}]")
-            primitives = entry.get("primitives", [])
-            good = isinstance(primitives, list) and all(isinstance(p, dict) for p in primitives)
-            expect(good, f"{self.path}: meshes[{index}].primitives", "a list of objects", primitives)
+            primitives = self.document.objects(entry, "primitives", f"meshes[{index}]")
             read = (self._primitive(p, f"meshes[{index}].primitives[{k}]", name) for k, p in enumerate(primitives))
             self._shapes[index] = [mesh for mesh in read if mesh is not None]
         return self._shapes[index]
@@ -131,6 +104,8 @@ class _Reader:
         attributes = self.document.member(entry, "attributes", where)
         expect("POSITION" in attributes, f"{self.path}: {where}.attributes", "a POSITION", sorted(attributes))
         vertices = accessor(self.document, attributes["POSITION"], "VEC3", f"{where}.attributes.POSITION")
+        if any(key.startswith("COLOR_") for key in attributes):
+            self._pass_over("primitive(s)' vertex colours")
         normals = None
         if "NORMAL" in attributes:
             normals = accessor(self.document, attributes["NORMAL"], "VEC3", f"{where}.attributes.NORMAL")
@@ -155,7 +130,7 @@ class _Reader:
     def _material(self, index: int) -> Material:
         entry, where = self.document.items("materials")[index], f"materials[{index}]"
         surface = self.document.member(entry, "pbrMetallicRoughness", where)
-        if "baseColorTexture" in surface or "emissiveTexture" in entry:
+        if any(key.endswith("Texture") for key in (*surface, *entry)):
             self._pass_over("material(s)' textures")
         base = self.document.numbers(surface, "baseColorFactor", f"{where}.pbrMetallicRoughness", (1.0,) * 4)
         emissive = self.document.numbers(entry, "emissiveFactor", where, (0.0, 0.0, 0.0))
@@ -170,16 +145,6 @@ class _Reader:
 
     def _pass_over(self, what: str) -> None:
         self.passed_over[what] = self.passed_over.get(what, 0) + 1
-
-
-def _rotation(quaternion: tuple[float, ...], where: str) -> Array:
-    """Return the (3, 3) rotation of a quaternion (x, y, z, w) of any length but zero."""
-    length = float(np.linalg.norm(quaternion))
-    expect(length > 0, where, "a quaternion that is not zero", quaternion)
-    x, y, z, w = (c / length for c in quaternion)
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
 
 
 def _triangles(corners: Array, mode: int, where: str) -> Array:

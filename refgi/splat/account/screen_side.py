@@ -56,7 +56,7 @@ def screen_side(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") 
     printed, clamped, interpolated = none, none, none
     if settings.widening > 0 and settings.as_published & PRINTED_WIDENINGS:
         printed = full - screen.pairs(widening=True)
-    if settings.clamp != "none":
+    if settings.effective_clamp != "none":
         clamped = screen.pairs(widening=True) - screen.pairs(widening=True, clamp=True)
     arrived = screen.picture()
     if settings.half_resolution:

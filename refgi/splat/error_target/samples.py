@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.draws import ERROR_SAMPLES, draws
 from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
@@ -49,7 +50,7 @@ def stratified(covered: Array, seed: int) -> Samples:
     side = min(max(math.isqrt(covered.size) // STRATA, 1), LARGEST)
     rows, columns = -(-covered.shape[0] // side), -(-covered.shape[1] // side)
     pixel, count = np.full(rows * columns, -1, np.int64), np.zeros(rows * columns)
-    _draw(covered, side, np.random.default_rng(seed).random((rows, columns)), pixel, count)
+    _draw(covered, side, draws(seed, ERROR_SAMPLES, rows * columns).reshape(rows, columns), pixel, count)
     drawn = pixel >= 0
     return Samples(pixel[drawn], count[drawn] / max(1.0, count.sum()))
 

@@ -15,9 +15,12 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.pairs.irradiance import Receivers
+from refgi.pairs.loss import warn_of_loss
 from refgi.scene.values import LARGEST
 from refgi.splat.gathering.gather_sum import GatherMap, disc_pattern, gather_discs
 from refgi.splat.gathering.interpolation import Agreement, coarse_pixels, interpolate
+from refgi.splat.gathering.loss import disc_loss
+from refgi.splat.gathering.place import centers
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
@@ -49,7 +52,7 @@ class GatherSettings:
     as_published: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        expect(1 <= self.samples <= 1 << 28, "samples", "1 or more", self.samples)
+        expect(1 <= self.samples <= 1 << 28, "samples", f"1 to {1 << 28:,}", self.samples)
         expect(0 < self.radius <= WIDEST, "radius", f"a share of the map above 0, up to {WIDEST}", self.radius)
         expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
         expect(self.grid >= 0, "grid", "coarse pixels along a side, or 0", self.grid)
@@ -84,7 +87,11 @@ def gather(frame: "Frame", settings: GatherSettings) -> Array:
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, linear RGB, without visibility.
     """
-    return gather_counted(frame, settings).irradiance
+    light = gather_counted(frame, settings).irradiance
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    warn_of_loss(disc_loss(receivers, frame.rsms, settings.radius, settings.offset),
+                 f"gather: radius {settings.radius:g} of a map's width")
+    return light
 
 
 def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
@@ -112,7 +119,7 @@ def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
     first = np.zeros_like(buffer.covered)
     first[np.ix_(*coarse)] = True
     known = gather_irradiance(receivers._replace(covered=buffer.covered & first), frame.rsms, settings)
-    agreement = Agreement(settings.least_cosine, settings.reach * frame.scene.geometry.diagonal)
+    agreement = Agreement(settings.least_cosine, settings.reach * frame.seen_extent.diagonal)
     smooth, done = interpolate(receivers, known, coarse, agreement)
     rest = receivers._replace(covered=buffer.covered & ~done)
     total = smooth + gather_irradiance(rest, frame.rsms, settings)
@@ -165,22 +172,4 @@ def _gather_one(points: Array, normals: Array, rsm: "Rsm", settings: GatherSetti
     pattern *= (settings.radius * height, settings.radius * width, 1.0)
     texels = (rsm.position - settings.offset * rsm.normal, rsm.normal, rsm.flux)
     source = GatherMap(*(np.ascontiguousarray(part, dtype) for part in texels))
-    gather_discs(points, normals, _centers(rsm, points), source, pattern, dtype.type(scale), total)
-
-
-def _centers(rsm: "Rsm", points: Array) -> Array:
-    """Return row and column of each point in the map; of points outside, the nearest place towards them."""
-    row, column, _ = rsm.project(points)
-    center = np.stack([row, column]).astype(np.float64)
-    outside = np.isnan(center[0])
-    if outside.any():
-        from refgi.rsm.projection import ORTHOGRAPHIC
-
-        maps = rsm.projection
-        right, down, ahead = maps.frame[0] @ (points[:, outside] - maps.origin[0][:, None])
-        plane = np.stack([down / maps.half[1], right / maps.half[0]])
-        if maps.kind != ORTHOGRAPHIC:
-            plane /= np.where(ahead > 0, ahead, 1e-30)  # behind the light: as far out as can be
-        plane /= np.maximum(np.abs(plane).max(axis=0), 1)
-        center[:, outside] = (plane + 1) / 2 * np.array([[maps.height], [maps.width]])
-    return center
+    gather_discs(points, normals, centers(rsm, points), source, pattern, dtype.type(scale), total)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.draws import GATHERING, draws
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import geometry_term
 from refgi.sampling import halton
@@ -48,7 +49,7 @@ def disc_pattern(samples: int, seed: int, weight_squared: bool = False) -> Array
     >>> round(float(pattern[:, 2].mean()), 2)  # the disc's area, pi
     3.14
     """
-    shift = np.random.default_rng(seed).random(2).tolist() if seed else None
+    shift = draws(seed, GATHERING, 2).tolist() if seed else None
     xi, turn = halton(samples, shift=shift, start=1).T
     # density 1 / (2 pi xi): the weight is 2 pi xi; with xi^2 the mean weight is kept, 2 pi * 3/2 xi^2
     weight = 2 * math.pi * (1.5 * xi * xi if weight_squared else xi)

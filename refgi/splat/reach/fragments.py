@@ -12,11 +12,13 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, checked, over_receivers
-from refgi.pairs.lobe_shape import CORRECTED, Widening, lobe_norm_factor
+from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.range import Range
 from refgi.pairs.ranged_sum import LANES, reached
 from refgi.splat.reach.lists import Lists
+from refgi.splat.reach.reference_length import with_reference_length
+from refgi.splat.reach.strength import lobe_strength
 from refgi.splat.settings import SplatSettings
 
 if TYPE_CHECKING:
@@ -99,6 +101,7 @@ def fragments(
         overdraw[receivers.covered] = count
         pixels = int(np.count_nonzero(receivers.covered))
         return Fragments(overdraw, pixels * (packed.shines.astype(int) + packed.glossy), pixels * count)
+    settings = with_reference_length(receivers, lights, settings)
     lists = Lists(packed, settings, False, receivers.covered.shape[1], projection)
 
     def add(here: Array, facing: Array, places: Array, _: Array) -> None:
@@ -171,28 +174,7 @@ def _count_lobe(
 ) -> int:
     count = 0
     for i in range(first, last):
-        above, along, r2 = 0.0, 0.0, 0.0
-        for axis in range(3):
-            d = float(lights[axis, k]) - float(position[axis, i])
-            above += d * lights[3 + axis, k]
-            along += d * lights[6 + axis, k]
-            r2 += d * d
-        r = np.sqrt(r2)
-        if above > 0.0 and along > 0.0 and square * _shape(along / r, r, float(lights[9, k]), widening, k) >= r2:
-            total[i] += 1
-            count += 1
+        counts = square * lobe_strength(position, i, lights, widening, k) >= 1.0
+        total[i] += counts
+        count += counts
     return count
-
-
-@kernel
-def _shape(cosine: float, r: float, exponent: float, widening: Widening | None, k: int) -> float:
-    """Return I(w) / I_0 of a lobe."""
-    if widening is None:
-        return float(cosine**exponent)
-    share = r / widening.distance if widening.slope == CORRECTED else 1.0 / (r * widening.distance)
-    here = exponent * min(share, 1.0)
-    theta = float(widening.cos_theta[k])
-    norm = 1.0
-    if widening.norm >= 0:
-        norm = lobe_norm_factor(theta, here, widening.norm) / lobe_norm_factor(theta, exponent, widening.norm)
-    return float(cosine**here * norm)

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.draws import RANGE, draws
+from refgi.errors import expect
 from refgi.pairs.packing import Packed, pack
 from refgi.pairs.range import Range
 from refgi.splat.settings import SplatSettings
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 LEAST_THRESHOLD = 1e-200  # W/m^2: any light over it is a number
-DIFFUSE, GLOSSY = 0, 1  # streams of random numbers: the two parts of a light have each their own xi
+DIFFUSE, GLOSSY = 0, 1  # parts of a light, which have each their own xi
 
 
 def low_irradiance(lights: "PixelLights", settings: SplatSettings) -> float:
@@ -41,6 +43,7 @@ def low_irradiance(lights: "PixelLights", settings: SplatSettings) -> float:
 
     Notes
     -----
+    Settings without a reference length get one from `with_reference_length`.
     With `per_light_ilow` this is the I_low of the brightest light.
     """
     packed = pack(lights, settings, np.zeros(lights.flux.shape[1]), np.float64)
@@ -83,11 +86,18 @@ def threshold(peak: Array, settings: SplatSettings) -> float:
     """
     if settings.irradiance_low is not None:
         return settings.irradiance_low
-    return settings.i_low * float(peak.max(initial=0.0)) / settings.reference_length**2
+    return settings.i_low * float(peak.max(initial=0.0)) / _length(settings) ** 2
+
+
+def _length(settings: SplatSettings) -> float:
+    length = settings.reference_length if settings.i_low > 0 else 1.0
+    expect(length is not None, "reference_length", "a length for lights without receivers, m", length)
+    assert length is not None
+    return length
 
 
 def light_range(
-    peak: Array, low: float, settings: SplatSettings, stream: int, dtype: npt.DTypeLike, outside: bool = False
+    peak: Array, low: float, settings: SplatSettings, part: int, dtype: npt.DTypeLike, outside: bool = False
 ) -> Range:
     """Return how far lights reach.
 
@@ -99,7 +109,7 @@ def light_range(
         I_low, W/m^2; counts as at least `LEAST_THRESHOLD`.
     settings : SplatSettings
         Whether the range is random, and the seed.
-    stream : int
+    part : int
         DIFFUSE or GLOSSY.
     dtype : dtype
         Of the kernels.
@@ -114,10 +124,11 @@ def light_range(
     square = peak / max(low, LEAST_THRESHOLD)
     if "per_light_ilow" in settings.as_published and settings.irradiance_low is None:
         # I_low = x I_0 of the light itself
-        square = np.where(peak > 0, settings.reference_length**2 / settings.i_low, 0.0)
+        own = _length(settings) ** 2 / settings.i_low if settings.i_low > 0 else math.inf  # 0: nothing is cut
+        square = np.where(peak > 0, own, 0.0)
     scale = np.ones(len(peak))
     if settings.stochastic_range:
-        scale = 1.0 - np.random.default_rng([settings.seed, stream]).random(len(peak))  # (0, 1]
+        scale = 1.0 - draws(settings.seed, RANGE, len(peak), part)  # (0, 1]
     # far from the largest numbers, whose squares are taken, and from 0, which xi must not round to
     square = np.minimum(square, math.sqrt(float(np.finfo(dtype).max)))
     return Range(square.astype(dtype), np.maximum(scale, 1e-30).astype(dtype), outside)

@@ -55,5 +55,5 @@ def evaluate_visible(
     """
     position, normal, triangle_id = buffer.resolve("position", "normal", "triangle_id")
     seen = triangle_id.reshape(-1)[subsplats.pixel]
-    to = receivers(geometry, taken(position, subsplats.pixel), taken(normal, subsplats.pixel), seen, tracer.offset)
+    to = receivers(geometry, taken(position, subsplats.pixel), taken(normal, subsplats.pixel), seen, tracer.grain)
     return shadowed_sum(tracer, to, lights).astype(np.asarray(position).dtype)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.frame import Frame
-from refgi.rays import Tracer
+from refgi.rays import STEPS, Tracer
 from refgi.rsm import choose_pixel_lights, reflective_shadow_map
 
 Array = npt.NDArray[Any]
@@ -104,8 +104,7 @@ def transport(tracer: Tracer, to: Points, lit: Points, flux: float, nearest: flo
     cosines = np.maximum((way * to.normal[:, None]).sum(axis=2), 0) * np.maximum(-(way * lit.normal).sum(axis=2), 0)
     passed = np.divide(cosines, square * np.maximum(square, nearest**2), out=np.zeros_like(square), where=square > 0)
     i, j = np.nonzero(passed)
-    passed[i, j] *= free(tracer, to.position[i] + tracer.offset * to.normal[i],
-                         lit.position[j] + tracer.offset * lit.normal[j])
+    passed[i, j] *= free(tracer, _lifted(tracer, to, i), _lifted(tracer, lit, j, way[i, j]))
     return np.asarray(flux / math.pi * passed)
 
 
@@ -146,8 +145,15 @@ def sight(tracer: Tracer, views: Views, points: Points, coarsest: float) -> Arra
     facing, depth = facing[c, n] / np.linalg.norm(way[c, n], axis=1), depth[c, n]
     good = np.zeros(inside.shape)
     good[c, n] = 1 / (1 + (views.pixel * depth / (coarsest * facing)) ** 2)
-    good[c, n] *= free(tracer, views.eye[c], points.position[n] + tracer.offset * points.normal[n])
+    good[c, n] *= free(tracer, views.eye[c], _lifted(tracer, points, n, way[c, n]))
     return good
+
+
+def _lifted(tracer: Tracer, points: Points, chosen: Array, way: Array | None = None) -> Array:
+    """Return places off the surfaces of points, for rays that start there, or end there after a way."""
+    position = points.position[chosen]
+    offset = tracer.offsets(position) + (0 if way is None else STEPS * np.abs(way).sum(axis=1))
+    return np.asarray(position + offset[:, None] * points.normal[chosen])
 
 
 def free(tracer: Tracer, starts: Array, ends: Array) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.rays import far_offset
 from refgi.shadowed.receivers import receivers
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.pattern import (
@@ -104,7 +105,7 @@ def _surfels(level: Level, frame: "Frame") -> Surfels:
     seen = np.flatnonzero(level.pixel.reshape(-1) >= 0)
     pixel = level.pixel.reshape(-1)[seen]
     position, normal, triangle = frame.gbuffer.at(pixel, "position", "normal", "triangle_id")
-    here = receivers(frame.scene.geometry, position, normal, triangle, frame.tracer.offset)
+    here = receivers(frame.scene.geometry, position, normal, triangle, frame.tracer.grain)
     facing, origin = np.zeros((3, level.pixel.size)), np.zeros((3, level.pixel.size), np.float32)
     facing[:, seen], origin[:, seen] = here.facing, here.origin
     position, normal = (plane.reshape(3, -1).astype(np.float64) for plane in (level.position, level.normal))
@@ -152,9 +153,13 @@ def _aim_one(surfels: Surfels, samples: Samples, shape: tuple[int, int], receive
             sender[ray + j] = other
             worth[ray + j] = _pair(surfels, receiver, other, samples.weight[j], disc)
             reach[ray + j] = 1.0 if worth[ray + j] > 0.0 else 0.0
+            far = far_offset(surfels.origin[0, other] - surfels.origin[0, receiver],
+                             surfels.origin[1, other] - surfels.origin[1, receiver],
+                             surfels.origin[2, other] - surfels.origin[2, receiver])
             for c in range(3):
                 origins[ray + j, c] = surfels.origin[c, receiver]
-                directions[ray + j, c] = surfels.origin[c, other] - surfels.origin[c, receiver]
+                directions[ray + j, c] = (surfels.origin[c, other] - surfels.origin[c, receiver]
+                                          + far * surfels.facing[c, other])
 
 
 @kernel

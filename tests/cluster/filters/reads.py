@@ -3,10 +3,16 @@
 import numpy as np
 
 from refgi.cluster.filters.brute import brute_means, brutes, build_brute
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.mip import build_mip, mip_means, mip_of, mips
 from refgi.cluster.filters.sat import build_sat, sat_means, sats
 
 MOST = 0.85  # far end of the range of depths
+
+
+def linear(per_metre):
+    """A scale of depths that starts at 0 m."""
+    return DepthScale(False, 0.0, per_metre, MOST)
 
 
 def random_map(n, dtype, seed=1):
@@ -27,21 +33,21 @@ def random_discs(count, dtype, seed=2):
 def mip(depth, terms, per_metre=MOST / 4, **options):
     """Build the pyramid of one map."""
     filled = mip_of.py_func(mips(1, len(depth), terms, depth.dtype, **options), 0)
-    build_mip(depth, per_metre, MOST, filled)
+    build_mip(depth, linear(per_metre), filled)
     return filled
 
 
 def sat(depth, terms, per_metre=MOST / 4, **options):
     """Build the summed areas of one map."""
     filled = sats(len(depth), terms, depth.dtype, **options)
-    build_sat(depth, per_metre, MOST, filled)
+    build_sat(depth, linear(per_metre), filled)
     return filled
 
 
 def brute(depth, terms, per_metre=MOST / 4, **options):
     """Build the basis of one map."""
     filled = brutes(len(depth), terms, depth.dtype, **options)
-    build_brute(depth, per_metre, MOST, filled)
+    build_brute(depth, linear(per_metre), filled)
     return filled
 
 

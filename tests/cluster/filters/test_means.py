@@ -94,7 +94,7 @@ def test_discs_without_end_or_number_read_within_the_map(kind):
 def test_several_maps_at_once_are_those_of_each():
     depth = np.stack([reads.random_map(17, np.float32, seed) for seed in range(3)])
     several = mips(3, 17, 4, np.float32)
-    build_mips(depth, np.full(3, reads.MOST / 4), reads.MOST, several)
+    build_mips(depth, reads.linear(0)._replace(origin=np.zeros(3), slope=np.full(3, reads.MOST / 4)), several)
     for k in range(3):
         one = reads.mip(depth[k], 4)
         for name in ("depth", "basis", "basis_z", "mean_depth"):

@@ -127,7 +127,7 @@ def test_behind_an_area_light_all_is_visible_unless_there_is_a_map():
 
 def test_no_receivers_and_no_such_light():
     none = ShadowMaps(np.zeros((0, 4, 4)), np.array([-1], np.int32), np.zeros((0, 3)), np.zeros((0, 3, 3)),
-                      np.zeros(0), np.zeros(0))
+                      np.zeros(0), np.zeros(0), np.zeros(0))
     lights = area_lights([[0, 0, 0]], [[0, 1, 0]])
     assert hard_visibility(none, lights, 0, np.zeros((3, 0)), np.zeros((3, 0))).shape == (0,)
     with pytest.raises(InputError, match="m: expected an area light, 0 to 0, got 1"):

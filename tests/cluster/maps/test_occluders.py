@@ -7,7 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from refgi.cluster.maps import blockers, occluders
+from refgi.cluster.maps.occluders import Ends, blockers, ends_of, everywhere, occluders
+from refgi.cluster.settings import ValSettings
+from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
+from refgi.rsm.extent import Extent
 from refgi.scene import load_scene
 from refgi.stages import Memory, observe
 from tests.cluster.maps.lights import surface_points
@@ -135,3 +139,39 @@ def test_an_animation_finds_them_once():
             blockers(shape, True)
     assert log.status("cluster.blockers") == ["reused"]
     assert log.status("cluster.occluders") == []
+
+
+def within(shape, *more):
+    """Ends of light anywhere on a mesh and at some more places."""
+    ends = everywhere(shape)
+    points = np.concatenate([ends.points, np.reshape(more, (-1, 3))])
+    return Ends(points, Extent(points.min(axis=0), points.max(axis=0)))
+
+
+@pytest.mark.parametrize("half", [1e1, 1e4, 1e8])
+def test_what_lies_outside_of_all_that_takes_part_blocks_nothing(half):
+    """A plane below a room: neither it nor the floor, which is on the hull of the room but not of the scene."""
+    room = together(box(), box((0.3, 0.2, 0.3), (0.6, 0.5, 0.7)))
+    plane = geometry(half * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]) - [0, 0.1, 0],
+                     [[0, 1, 2], [0, 2, 3]])
+    shape, alone = together(room, plane), occluders(room)
+    assert alone[12:].all()
+    np.testing.assert_array_equal(occluders(shape, within(room)), [*alone, False, False])
+    np.testing.assert_array_equal(occluders(shape, within(room), touching=True), [True] * 24 + [False] * 2)
+    for alone_drawn in (True, False):
+        drawn, plain = blockers(shape, alone_drawn, within(room)), blockers(room, alone_drawn)
+        np.testing.assert_array_equal(drawn.vertices[drawn.faces], plain.vertices[plain.faces])
+    light_below = within(room, (0.5, -0.2, 0.5))
+    assert occluders(shape, light_below)[-2:].any()  # light comes through the plane
+
+
+def test_light_ends_where_the_camera_looks_and_where_it_begins():
+    scene = load_scene("cornell_box")
+    frame = Frame(scene, width=16, height=16, rsm_resolution=32)
+    lights = choose_lights(frame, ValSettings(lights=20))
+    seen = np.unique(frame.gbuffer.triangle_id[frame.gbuffer.covered])
+    assert 0 < len(seen) < scene.face_count
+    corners = scene.geometry.vertices[np.unique(scene.geometry.faces[seen])]
+    ends = ends_of(frame, lights)
+    np.testing.assert_array_equal(ends.points, np.concatenate([corners, lights.position.T.astype(float)]))
+    assert ends.extent is frame.extent

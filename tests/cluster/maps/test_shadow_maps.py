@@ -66,9 +66,9 @@ def test_what_a_map_says_of_itself():
         assert maps.near[k] == maps.depth[k].min()
         assert maps.near_behind[k] == maps.behind[k].min()
         corners = np.array(np.meshgrid(*np.stack([low, high], axis=1))).reshape(3, -1).T
-        assert maps.far[k] == pytest.approx(np.linalg.norm(corners - maps.center[k], axis=1).max(), rel=1e-14)
-        assert np.isfinite(maps.depth[k]).any()
-        assert maps.depth[k][np.isfinite(maps.depth[k])].max() <= maps.far[k]
+        assert maps.scene_far[k] == pytest.approx(np.linalg.norm(corners - maps.center[k], axis=1).max(), rel=1e-14)
+        assert maps.far[k] == maps.depth[k][np.isfinite(maps.depth[k])].max() <= maps.scene_far[k]
+        assert maps.far_behind[k] == maps.behind[k][np.isfinite(maps.behind[k])].max() != maps.far[k]
     np.testing.assert_allclose(maps.center, LIGHTS.center.T, atol=1e-5 * SCENE.diagonal)
     assert (((maps.center - LIGHTS.center.T) * LIGHTS.normal.T).sum(axis=1) > 0).all()
     np.testing.assert_array_equal(maps.frame, LIGHTS.frame)

@@ -35,26 +35,37 @@ def pixels_of(frame):
             for i, j in np.argwhere(buffer.covered).tolist()}
 
 
+def lit_points(frame):
+    """Return the places that lights reach, at all texels."""
+    return [place for rsm in frame.rsms for place in rsm.position[:, rsm.flux.any(axis=0)].T.astype(float).tolist()]
+
+
 def twin(frame, settings, block=1):
     """Return the picture by loops, (3, h, w)."""
     lights, geometry = choose_lights(frame, settings), frame.scene.geometry
     positions, normals, fluxes = (a.T.astype(float).tolist() for a in (lights.position, lights.normal, lights.flux))
     triangles = geometry.vertices[geometry.faces].tolist()
-    areas = naive.area_lights(positions, *naive.k_means(positions, normals, settings.area_lights, geometry.diagonal))
-    above = [naive.lifted(area, triangles) for area in areas]
-    maps = [naive.depth_map(area, triangles, MAP, HULL * geometry.diagonal) for area in above]
+    pixels, corners = pixels_of(frame), geometry.vertices[geometry.faces]
+    lit, seen = lit_points(frame), [place for place, _, _ in pixels.values()]
+    across = naive.diagonal_of(naive.box_of(lit))
+    areas = naive.area_lights(positions, *naive.k_means(positions, normals, settings.area_lights, across))
+    box = naive.box_of(lit + seen)
+    above = [naive.lifted(area, box) for area in areas]
+    ends = corners[np.unique(frame.gbuffer.triangle_id[frame.gbuffer.covered])].reshape(-1, 3).tolist() + positions
+    maps = [naive.depth_map(area, triangles, MAP, ends, box, HULL * naive.diagonal_of(box)) for area in above]
 
     def visible(m, x, facing):
         if settings.visibility == "hard" or areas[m].delta == 0:
             return naive.hard(above[m], maps[m], x, facing)
         if settings.visibility == "step":
             return naive.step(above[m], maps[m], x, facing)
-        return naive.series(above[m], maps[m], x, settings.terms) if settings.visibility == "series" else 1.0
+        if settings.visibility == "none":
+            return 1.0
+        return naive.series(above[m], maps[m], x, settings.terms, settings.depth_scale)
 
-    pixels = pixels_of(frame)
     light = naive.irradiance(pixels, (positions, normals, fluxes), areas, visible, block)
     if block > 1:
-        extent = settings.blur_extent * geometry.diagonal
+        extent = settings.blur_extent * naive.diagonal_of(naive.box_of(seen))
         light = naive.blurred(light, pixels, block, SIDE, extent, settings.blur_cosine)
     picture = np.zeros((3, SIDE, SIDE))
     for (row, column), value in light.items():
@@ -71,6 +82,18 @@ def test_every_pixel_is_that_of_the_loops(box, mode, evidence):
     shadows = 1 - expected.sum() / twin(box, dataclasses.replace(settings, visibility="none")).sum()
     evidence(f"{mode}, {box.dtype}: {off:.1e} of the maximum off a picture by plain loops; shadows take {shadows:.0%}")
     assert (shadows > 0.03) == (mode != "none")
+    assert off < (ROUNDING if box.dtype == np.float64 else SINGLE)
+
+
+@pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("scale", ["map", "scene"])
+def test_other_scales_of_depth_as_well(box, scale, evidence):
+    settings = dataclasses.replace(SETTINGS, depth_scale=scale)
+    expected, got = twin(box, settings), val(box, settings)
+    off, other = (np.abs(got - picture).max() / expected.max() for picture in (expected, val(box, SETTINGS)))
+    evidence(f"depths on the scale {scale!r}, {box.dtype}: {off:.1e} of the maximum off a picture by plain loops, "
+             f"{other:.2f} off the default")
+    assert other > 0.01
     assert off < (ROUNDING if box.dtype == np.float64 else SINGLE)
 
 

@@ -25,7 +25,7 @@ def box():
     lights = choose_lights(frame, SETTINGS)
     lights = lights._replace(flux=np.broadcast_to(lights.flux.mean(axis=0), lights.flux.shape))  # all of one colour
     buffer = frame.gbuffer
-    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.offset)
+    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
     return frame, lights, to, shadowed_sum(frame.tracer, to, lights)
 
 

@@ -14,6 +14,8 @@ from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 # near pairs clamped at a twentieth of the scene's metre: else the error of sampling is that of a pixel beside a light
 SETTINGS = ValSettings(lights=128, area_lights=12, map_resolution=64, clamp="distance", clamp_value=0.1)
 ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones

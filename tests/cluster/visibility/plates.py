@@ -31,12 +31,13 @@ def map_of_plates(n, plates, plane=None, normal=(0, 0, 1), dtype=np.float64):
 
 
 def lit_by(depth, delta, far):
-    """One square area light and its map."""
+    """One square area light and its map, in a scene that ends `far` from it."""
     areas = AreaLights(np.zeros((3, 1)), np.array([[0.0], [0.0], [1.0]]), np.eye(3)[None], np.full((2, 1), delta),
                        np.eye(3)[None, :2], np.zeros((2, 1)), np.array([delta]), np.array([delta * 0.7]), np.array([4]),
                        np.zeros(4, np.int32))
     maps = ShadowMaps(depth[None], np.zeros(1, np.int32), np.zeros((1, 3)), np.eye(3)[None],
-                      np.array([float(depth.min())]), np.array([far]))
+                      np.array([float(depth.min())]), np.array([float(np.max(depth, where=depth < np.inf, initial=0))]),
+                      np.array([far]))
     return areas, maps
 
 

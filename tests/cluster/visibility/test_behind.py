@@ -55,7 +55,7 @@ def test_no_light_leaks_in_over_the_rim(evidence):
     areas = areas._replace(frame=np.array([[[half, half, 0.0], [-half, half, 0.0], [0.0, 0.0, 1.0]]]))
     seen = {}
     for prefilter, dtype in (("brute", np.float64), ("sat", np.float32), ("mip", np.float32)):
-        settings = ValSettings(behind="dual_paraboloid", prefilter=prefilter, map_resolution=128)
+        settings = ValSettings(behind="dual_paraboloid", prefilter=prefilter, map_resolution=128, depth_scale="scene")
         maps = shadow_maps(scene, areas, settings, np.float64)
         maps = maps._replace(depth=maps.depth.astype(dtype), behind=maps.behind.astype(dtype))
         seen[prefilter] = float(visibility(maps, areas, 0, points, -points, settings)[0])

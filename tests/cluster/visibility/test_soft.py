@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.look import (
     BIAS,
@@ -12,7 +13,7 @@ from refgi.cluster.visibility.look import (
     FRAME,
     GAIN,
     NEAREST,
-    SCALE,
+    ON_SERIES,
     SEARCH_BIAS,
     Choices,
     D,
@@ -29,6 +30,7 @@ ROUNDING = 1e-10  # float64 sums over discs of some hundred texels, in another o
 PLATES = [(-0.6, -0.1, -0.3, 0.3, 1.0), (0.1, 0.6, -0.3, 0.3, 1.0)]
 FAR = 6.4
 AS_WRITTEN = Choices(False, False, False, False)
+METRES = DepthScale(False, 0.0, 1.0, 1.0)  # depths of the series are metres
 
 
 def rmse(a, b):
@@ -36,21 +38,23 @@ def rmse(a, b):
 
 
 def shadow(areas, maps, points, normals, **settings):
-    return visibility(maps, areas, 0, points, normals, ValSettings(**settings))
+    """V; on the scene's scale, whose bias is a known length, where the settings name none."""
+    return visibility(maps, areas, 0, points, normals, ValSettings(**{"depth_scale": "scene", **settings}))
 
 
 @pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("scale", ["log_map", "map", "scene"])
 @pytest.mark.parametrize("terms", [1, 4, 9])
-def test_chain_is_its_literal_twin(terms):
+def test_chain_is_its_literal_twin(terms, scale):
     depth = map_of_plates(24, PLATES, 3.0)
     points, normals = on_plane(3.0, 2.2, 7)
     for delta in (0.2, 1.0):
         areas, maps = lit_by(depth, delta, FAR)
-        got = shadow(areas, maps, points, normals, prefilter="brute", terms=terms)
-        expected = [naive.series_shadow(depth.tolist(), p, delta, FAR, terms)[0] for p in points.T]
+        got = shadow(areas, maps, points, normals, prefilter="brute", terms=terms, depth_scale=scale)
+        expected = [naive.series_shadow(depth.tolist(), p, delta, FAR, terms, kind=scale)[0] for p in points.T]
         assert np.abs(got - expected).max() < ROUNDING
-    got = shadow(areas, maps, points, normals, prefilter="brute", terms=terms, bias=0.2)
-    expected = [naive.series_shadow(depth.tolist(), p, 1.0, FAR, terms, 0.2)[0] for p in points.T]
+    got = shadow(areas, maps, points, normals, prefilter="brute", terms=terms, bias=0.2, depth_scale=scale)
+    expected = [naive.series_shadow(depth.tolist(), p, 1.0, FAR, terms, 0.2, scale)[0] for p in points.T]
     assert np.abs(got - expected).max() < ROUNDING
 
 
@@ -64,9 +68,9 @@ def mixture(terms, *parts):
 def mean_depth(bias, d=0.7, parts=((0.1, 0.3), (0.9, 0.7))):
     """z_avg of a search kernel that a blocker covers by a tenth; the receiver's own distance is d."""
     numbers, room, means, todo, _ = rooms(1, 4)
-    numbers[[NEAREST, SCALE, SEARCH_BIAS]] = 1e-9, 1.0, bias
+    numbers[[NEAREST, SEARCH_BIAS]] = 1e-9, bias
     room[D], room[Z], means[:] = d, d, mixture(4, *parts)
-    count = find_penumbra(numbers, AS_WRITTEN, weights(4), means, 1, todo, room)
+    count = find_penumbra(numbers, AS_WRITTEN, METRES, weights(4), means, 1, todo, room)
     return float(room[DEPTH, 0]), count
 
 
@@ -104,8 +108,8 @@ def test_comparison_is_the_series(rescale):
     chain = series(ValSettings(attenuation=1.0, rescale=rescale))
     for blocker in (0.1, 0.45, 0.5, 0.55, 0.7):
         numbers, room, means, todo, visible = rooms(1, 4)
-        numbers[[SCALE, BIAS, GAIN]] = 1.0, chain.bias, chain.gain
-        room[D], means[:] = 0.6, mixture(4, (1.0, blocker))
+        numbers[[BIAS, GAIN]] = chain.bias, chain.gain
+        room[ON_SERIES], means[:] = 0.6, mixture(4, (1.0, blocker))
         compare(numbers, chain.weight, means, 1, todo, visible, room)
         value = chain.gain * (0.5 + above_half(blocker - 0.6 + chain.bias, chain.weight))
         assert visible[0] == pytest.approx(np.clip(value, 0, 1), abs=1e-13)
@@ -200,7 +204,8 @@ def test_mip_levels_show_as_steps(evidence):
 
 @pytest.mark.parametrize(("dtype", "prefilter"), [(np.float32, "mip"), (np.float64, "brute"), (np.float32, "sat")])
 @pytest.mark.parametrize("terms", [1, 4, 64])
-def test_any_receiver_sees_a_share(dtype, prefilter, terms):
+@pytest.mark.parametrize("scale", ["log_map", "map", "scene"])
+def test_any_receiver_sees_a_share(dtype, prefilter, terms, scale):
     rng = np.random.default_rng(5)
     extreme = np.array([[0, 0, 0], [0, 0, 1e-20], [1, 0, 0], [1, 1, -1e-9], [0, 0, -2], [0, 0, 100], [4, 5, 1e-12],
                         [1e-8, 0, 1e-8], [0, 0, 3], [3, 0, 1e-6]]).T
@@ -214,7 +219,8 @@ def test_any_receiver_sees_a_share(dtype, prefilter, terms):
                           {"rescale": "scale2", "foreshortened": True},
                           {"bias": 0.25, "as_published": frozenset({"val_alpha", "val_alpha_over_pi"})},
                           {"bias": 0.0, "as_published": frozenset({"val_search_solid_angle"})}):
-                got = shadow(areas, maps, points, normals, prefilter=prefilter, terms=terms, **extra)
+                got = shadow(areas, maps, points, normals, prefilter=prefilter, terms=terms, depth_scale=scale,
+                             **extra)
                 assert are_shares(got, dtype)
                 assert (got[points[2] <= 0] == 1).all()
 
@@ -233,7 +239,7 @@ def test_each_receiver_is_on_its_own():
 def test_a_light_seen_aslant_is_smaller():
     for foreshortened, share in ((False, 1.0), (True, np.sqrt(0.6))):
         numbers, room, _, todo, visible = rooms(1, 4)
-        numbers[[DELTA, NEAREST, SCALE]] = 0.7, 0.5, 0.1
+        numbers[[DELTA, NEAREST]] = 0.7, 0.5
         numbers[FRAME : FRAME + 9] = np.eye(3).ravel()
         chosen = AS_WRITTEN._replace(foreshortened=foreshortened)
         assert look(numbers, chosen, np.array([[4.0], [0.0], [3.0]]), 1, todo, todo.copy(), visible, room) == 1

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.look import DEPTH, NEAREST, RADIUS, choices, look, numbers_of
 from refgi.cluster.visibility.step import rules, step_lanes
@@ -17,8 +18,12 @@ SEARCH = frozenset({"val_search_solid_angle"})
 PUBLISHED = SEARCH | {"val_alpha_over_pi"}
 
 
+METRES = DepthScale(False, 0.0, 1.0, 1.0)  # depths of the series are metres
+
+
 def shadow(areas, maps, points, normals, **settings):
-    return visibility(maps, areas, 0, points, normals, ValSettings(**settings))
+    """V; on the scene's scale, whose bias is a known length, where the settings name none."""
+    return visibility(maps, areas, 0, points, normals, ValSettings(**{"depth_scale": "scene", **settings}))
 
 
 @pytest.mark.feature("VAL-12")
@@ -47,7 +52,7 @@ def test_mean_depth_is_that_of_the_blockers(evidence):
     _, maps = lit_by(depth, 0.3, 2.0)
     settings = ValSettings(visibility="step", cone=False)
     numbers, (_, room, _, todo, visible) = numbers_of(maps, 0, 0.3, settings), rooms(25, 1)
-    chosen, rule = choices(settings), rules(settings, 1.0)
+    chosen, rule = choices(settings), rules(settings, METRES)
     count = look(numbers, chosen, points, 25, np.ones(25, np.bool_), todo, visible, room)
     step_lanes(numbers, chosen, rule, depth, normals, 25, todo, visible, room)
     expected = [naive.step_shadow(depth.tolist(), p, (0, 0, -1), 0.3, cone=False) for p in points.T]
@@ -110,7 +115,7 @@ def test_blockers_near_the_light_escape_the_published_search(evidence):
         numbers[NEAREST] = near
         look(numbers, choices(settings), point, 1, np.ones(1, np.bool_), todo, visible, room)
         covers[name] = 0.2 * np.tan(2 * np.arctan(room[RADIUS, 0]))
-        step_lanes(numbers, choices(settings), rules(settings, 1.0), maps.depth[0], normal, 1, todo, visible, room)
+        step_lanes(numbers, choices(settings), rules(settings, METRES), maps.depth[0], normal, 1, todo, visible, room)
         found[name] = bool(room[DEPTH, 0] > 0)
     assert covers["published"] == pytest.approx(0.025, abs=1e-6)
     assert not found["published"]

@@ -1,6 +1,7 @@
 """Refinement to an error: the promise on several scenes, what it costs, and each part against closed forms."""
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,8 @@ from refgi.splat.error_target.near import near_light
 from refgi.splat.error_target.samples import estimate, mean_of, stratified
 from refgi.splat.multires import MultiresSettings
 from refgi.stages import observe
+
+unclamped = partial(MultiresSettings, clamp="none")  # near pairs as they are: what these tests sum pair by pair
 
 ROUNDING = 1e-5  # float32 sums of 64 terms, the largest many times the rest
 LINEAR = 1e-5  # of values up to 10: float32 means of four
@@ -70,10 +73,10 @@ def test_every_promise_is_kept_against_the_full_sum(name):
     frame = seen(name)
     covered = frame.gbuffer.covered
     for clamp in ("none", "disc") if name == "cornell_box" else ("none",):
-        lights, area, full = full_sum(frame, MultiresSettings(lights=64, clamp=clamp))
+        lights, area, full = full_sum(frame, unclamped(lights=64, clamp=clamp))
         for target in TARGETS:
             for seed in (0, 1):
-                settings = MultiresSettings(lights=64, clamp=clamp, target_error=target, seed=seed)
+                settings = unclamped(lights=64, clamp=clamp, target_error=target, seed=seed)
                 found = error_driven(frame.gbuffer, lights, settings, area)
                 assert relative_error(found.irradiance, full, covered) <= target
                 assert found.low <= found.error <= found.high <= target
@@ -82,7 +85,7 @@ def test_every_promise_is_kept_against_the_full_sum(name):
 
 def test_pairs_are_saved_and_all_counted(monkeypatch):
     frame = seen("cornell_box", 300, 300)
-    settings = MultiresSettings(lights=64, target_error=0.05)
+    settings = unclamped(lights=64, target_error=0.05)
     lights, area, full = full_sum(frame, settings)
     lit, near, add_lights, near_light = [], [], trial_module.add_lights, module.near_light
     monkeypatch.setattr(trial_module, "add_lights", lambda p, *how: lit.append(p.T) or add_lights(p, *how))
@@ -101,7 +104,7 @@ def test_pairs_are_saved_and_all_counted(monkeypatch):
 
 
 def test_subsplats_are_the_pictures(box):
-    settings = MultiresSettings(lights=64, target_error=0.05)
+    settings = unclamped(lights=64, target_error=0.05)
     lights, area, full = full_sum(box, settings)
     found = error_driven(box.gbuffer, lights, settings, area)
     times = sum(np.kron(leaf, np.ones((1 << level, 1 << level)))[:90, :120]
@@ -110,13 +113,13 @@ def test_subsplats_are_the_pictures(box):
     pixels = found.subsplats.leaf[0]
     assert pixels.any()
     np.testing.assert_array_equal(found.irradiance[:, pixels], full[:, pixels])
-    finer = error_driven(box.gbuffer, lights, MultiresSettings(lights=64, target_error=0.02), area)
+    finer = error_driven(box.gbuffer, lights, unclamped(lights=64, target_error=0.02), area)
     assert len(finer.subsplats.level) > len(found.subsplats.level)
     assert finer.pairs > found.pairs
 
 
 def test_no_error_at_all_is_the_full_sum_to_the_bit(box):
-    settings = MultiresSettings(lights=64, target_error=1e-6)
+    settings = unclamped(lights=64, target_error=1e-6)
     lights, area, full = full_sum(box, settings)
     found = error_driven(box.gbuffer, lights, settings, area)
     np.testing.assert_array_equal(found.irradiance, full)
@@ -125,7 +128,7 @@ def test_no_error_at_all_is_the_full_sum_to_the_bit(box):
 
 
 def test_threads_change_no_bit(box):
-    settings = MultiresSettings(lights=64, target_error=0.05)
+    settings = unclamped(lights=64, target_error=0.05)
     lights, area, _ = full_sum(box, settings)
     found = error_driven(box.gbuffer, lights, settings, area)
     with threads(1):
@@ -137,7 +140,7 @@ def test_threads_change_no_bit(box):
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 40), (33, 1), (17, 40)])
 def test_small_pictures(width, height):
     frame = seen("metaballs", width, height)
-    settings = MultiresSettings(lights=64, target_error=0.1, coarsest=4)
+    settings = unclamped(lights=64, target_error=0.1, coarsest=4)
     lights, area, full = full_sum(frame, settings)
     found = error_driven(frame.gbuffer, lights, settings, area)
     assert np.isfinite(found.irradiance).all()
@@ -145,7 +148,7 @@ def test_small_pictures(width, height):
 
 
 def test_nothing_to_see_and_no_light(box):
-    settings = MultiresSettings(lights=64, target_error=0.1)
+    settings = unclamped(lights=64, target_error=0.1)
     lights, area, _ = full_sum(box, settings)
     dark = error_driven(box.gbuffer, lights._replace(flux=np.zeros_like(lights.flux)), settings, area)
     assert (dark.irradiance == 0).all()
@@ -157,9 +160,9 @@ def test_nothing_to_see_and_no_light(box):
 
 
 def test_a_target_is_needed(box):
-    lights = choose_lights(box, MultiresSettings(lights=16))
+    lights = choose_lights(box, unclamped(lights=16))
     with pytest.raises(InputError, match="target_error"):
-        error_driven(box.gbuffer, lights, MultiresSettings())
+        error_driven(box.gbuffer, lights, unclamped())
 
 
 def plane(height, width, turn=None):
@@ -246,7 +249,7 @@ def test_near_light_is_what_exceeds_the_bound(clamp):
     at = rng.uniform((0, 0.01, 0), (3.7, 0.3, 2.3), (64, 3)).T
     lights = PixelLights(at, np.tile([[0.0], [-1.0], [0.0]], 64), rng.uniform(0.1, 1, (3, 64)), *(None,) * 3, 64)
     covered = rng.random((23, 37)) < 0.9
-    most, settings = 2.0, MultiresSettings(**clamp)
+    most, settings = 2.0, unclamped(**clamp)
     receivers = Receivers(position, normal, covered)
     near = near_light(receivers, checked(receivers, lights, settings, None), most)
     got = np.where(np.kron(near.touched, np.ones((16, 16), bool))[:23, :37], near.light, np.float32(0))

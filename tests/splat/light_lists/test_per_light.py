@@ -1,6 +1,7 @@
 """Subsplats that each light refines for itself: the published lists, Table 1, Fig. 6, and the full sum at the limit."""
 
 import dataclasses
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,6 +24,8 @@ from tests.naive import eq2
 from tests.naive import per_light as naive
 from tests.naive import upsample as naive_upsample
 from tests.pairs import sets
+
+unclamped = partial(MultiresSettings, clamp="none")  # near pairs as they are: what these tests sum pair by pair
 
 TWIN = 1e-12  # float64 against unit vectors and printed terms; a lobe of exponent 20 takes 20 roundings to its power
 ROUNDING = 2.0**-24  # float32; a compensated sum of terms >= 0 is off by 2 of these, lobes are added to it at last
@@ -105,7 +108,7 @@ def brightest_sum(seen, lights, top):
     places = [naive.representative(seen.covered, top, i, j) for i in range(rows) for j in range(columns)]
     at = tuple(np.array([place for place in places if place]).T)
     points = sets.receivers(seen.position[:, *at], seen.normal[:, *at])
-    return float(irradiance(points, lights, MultiresSettings(widening=WIDENING)).max())
+    return float(irradiance(points, lights, unclamped(widening=WIDENING)).max())
 
 
 @pytest.mark.parametrize("finest", [0, 1])
@@ -114,7 +117,7 @@ def test_lists_are_the_published_ones(form, finest):
     """Oracle: the paper's pseudo-code in float64, for each form of the threshold (E-AMS-07)."""
     seen, lights = wall(21, 30, holes=0.15, bumps=0.1), lamps(5)
     given = {"absolute": 0.02, "relative": 0.15, "brightest": 0.3}[form]
-    settings = MultiresSettings(coarsest=4, finest=finest, light_threshold=given, threshold_form=form,
+    settings = unclamped(coarsest=4, finest=finest, light_threshold=given, threshold_form=form,
                                 widening=WIDENING)
     fixed = given if form == "absolute" else given * brightest_sum(seen, lights, 3) / 5
     expected, counts = by_hand(seen, lights, settings, lambda most: given * most if form == "relative" else fixed)
@@ -126,7 +129,7 @@ def test_lists_are_the_published_ones(form, finest):
 def test_lists_go_on_from_the_shared_one():
     """Oracle: the pseudo-code that is told which cells the shared list refines."""
     seen, lights = wall(21, 30, holes=0.15), lamps(5)
-    settings = MultiresSettings(coarsest=4, light_threshold=0.4, diagonal="off", widening=WIDENING)
+    settings = unclamped(coarsest=4, light_threshold=0.4, diagonal="off", widening=WIDENING)
     rng = np.random.default_rng(11)
     need = tuple(rng.random(level_shape(21, 30, level)) < 0.5 * (level > 0) for level in range(4))
     start = refine(need, seen.covered, settings)
@@ -143,7 +146,7 @@ def test_lists_go_on_from_the_shared_one():
 def test_lights_that_split_nothing_stay_with_the_shared_list():
     """Oracle: the shared list lit by all lights at once."""
     seen, lights = wall(40, 64, np.float32, bumps=0.2), lamps(7, np.float32)
-    settings = MultiresSettings(coarsest=4, light_threshold=10.0, normal_threshold=1.0)
+    settings = unclamped(coarsest=4, light_threshold=10.0, normal_threshold=1.0)
     start = shared_list(seen, settings)
     expected = upsample(evaluate(*at_subsplats(seen, start), lights, settings), start, seen.covered)
     np.testing.assert_array_equal(per_light_counts(seen, lights, settings, None, start), 7 * start.counts)
@@ -159,7 +162,7 @@ def test_threshold_0_is_the_full_sum(shape):
     """Limit: every cell is split, so every pixel is lit by itself; a light alone to the bit."""
     seen, lights = wall(*shape, np.float32, holes=0.2, bumps=0.3), lamps(40, np.float32)
     seen.covered[0, 0] = True
-    settings = MultiresSettings(coarsest=2, light_threshold=0.0)
+    settings = unclamped(coarsest=2, light_threshold=0.0)
     np.testing.assert_array_equal(per_light_counts(seen, lights, settings)[1:], 0)
     np.testing.assert_allclose(per_light(seen, lights, settings), full_sum(seen, lights, settings), rtol=5 * ROUNDING)
     one = alone(lights, 1)
@@ -176,14 +179,14 @@ def test_pairs_are_those_of_the_full_sum(change):
     one = alone(lights, 1)
     if change["clamp"] == "sphere":
         one = one._replace(lobe_flux=None)
-    settings, area = MultiresSettings(coarsest=2, light_threshold=0.0, **change), np.array([0.05], np.float32)
+    settings, area = unclamped(coarsest=2, light_threshold=0.0, **change), np.array([0.05], np.float32)
     np.testing.assert_array_equal(per_light(seen, one, settings, area), full_sum(seen, one, settings, area))
-    assert not np.array_equal(per_light(seen, one, settings, area), full_sum(seen, one, MultiresSettings()))
+    assert not np.array_equal(per_light(seen, one, settings, area), full_sum(seen, one, unclamped()))
 
 
 def test_bits_do_not_depend_on_threads_and_batches(monkeypatch):
     seen, lights = wall(50, 70, np.float32, holes=0.1, bumps=0.1), lamps(9, np.float32)
-    settings = MultiresSettings(coarsest=8)
+    settings = unclamped(coarsest=8)
     whole = per_light(seen, lights, settings)
     monkeypatch.setattr(module, "ROOM", 1)  # a light a thread
     np.testing.assert_array_equal(per_light(seen, lights, settings), whole)
@@ -203,7 +206,7 @@ def test_room_is_bounded_whatever_the_number_of_lights(monkeypatch):
 def test_nothing_seen_nothing_lit():
     """Stability: no surface, no lights, a light in a receiver, lights behind the wall."""
     seen, lights = wall(9, 12, np.float32), lamps(3, np.float32)
-    settings = MultiresSettings(coarsest=4)
+    settings = unclamped(coarsest=4)
     for start in (None, shared_list(seen, settings)):
         behind = lights._replace(position=-lights.position)
         assert not per_light(seen, behind, settings, None, start).any()
@@ -211,7 +214,7 @@ def test_nothing_seen_nothing_lit():
     assert np.isfinite(per_light(seen, lights, settings)).all()
     none = lights._replace(**{key: getattr(lights, key)[..., :0] for key in lights._fields[:6]})
     for form in ("relative", "brightest"):
-        assert not per_light(seen, none, MultiresSettings(coarsest=4, threshold_form=form)).any()
+        assert not per_light(seen, none, unclamped(coarsest=4, threshold_form=form)).any()
     seen.covered[:] = False
     assert not per_light(seen, lights, settings).any()
     assert not per_light_counts(seen, lights, settings).any()
@@ -221,7 +224,7 @@ def test_levels_of_two_lights_cannot_be_added_before_upsampling():
     """Property: where one light's subsplats are finer, copying them (as upsampling does) drops the other's light."""
     seen, lights = wall(32, 32), lamps(4)
     both = lights._replace(**{key: getattr(lights, key)[..., 1::2] for key in lights._fields[:6]})
-    settings = MultiresSettings(coarsest=4, light_threshold=0.2, widening=WIDENING)
+    settings = unclamped(coarsest=4, light_threshold=0.2, widening=WIDENING)
     together, merged = per_light(seen, both, settings), {}
     for k in range(2):
         tree, lists = module._lists(seen, alone(both, k), settings, None, None)
@@ -249,7 +252,7 @@ def test_counts_are_those_of_table_1(buddha, evidence):
     printed = np.array([0.46, 0.21, 0.10])
     for count in (64, 144, 256):
         lights = choose_pixel_lights(buddha.rsms, count=count, pattern="grid")
-        rows = [int(per_light_counts(buddha.gbuffer, lights, MultiresSettings(
+        rows = [int(per_light_counts(buddha.gbuffer, lights, unclamped(
             clamp="geometry", clamp_value=25.0, light_threshold=0.02, finest=finest)).sum()) for finest in (3, 2, 1, 0)]
         number = lights.position.shape[1]
         assert rows[0] == 256 * number
@@ -265,7 +268,7 @@ def test_counts_are_those_of_table_1(buddha, evidence):
 def test_narrow_highlights_are_missed_between_samples(evidence):
     """Property, as the paper warns: a lobe narrower than the samples' spacing is not seen; a wide one is."""
     seen = wall(128, 128, np.float32)
-    settings = MultiresSettings(coarsest=8, light_threshold=0.1, threshold_form="absolute")
+    settings = unclamped(coarsest=8, light_threshold=0.1, threshold_form="absolute")
     for exponent, missed in ((3000.0, True), (50.0, False)):
         aim = np.array([[seen.position[0, 0, 64]], [seen.position[1, 64, 0]], [0.0]])
         place = np.array([[0.1], [0.2], [1.0]])
@@ -283,7 +286,7 @@ def test_narrow_highlights_are_missed_between_samples(evidence):
 def test_highlights_of_phong_emitters_are_found(buddha, evidence):
     """Picture: of Fig. 6; the shared list blurs highlights, per-light lists find them, both together cost far less."""
     buffer, lights = buddha.gbuffer, choose_pixel_lights(buddha.rsms, count=64, pattern="grid")
-    settings = MultiresSettings(coarsest=8, clamp="geometry", clamp_value=25.0, light_threshold=0.05)
+    settings = unclamped(coarsest=8, clamp="geometry", clamp_value=25.0, light_threshold=0.05)
     full, start = full_sum(buffer, lights, settings), shared_list(buffer, settings)
     shared = upsample(evaluate(*at_subsplats(buffer, start), lights, settings), start, buffer.covered)
     tight = dataclasses.replace(settings, light_threshold=0.003)
@@ -304,7 +307,7 @@ def test_a_highlight_on_a_flat_wall(evidence):
     """Picture: nothing but light tells that a flat wall needs refinement."""
     seen, lights = wall(128, 128, np.float32), lamps(6, np.float32, exponent=50.0)
     lights = lights._replace(flux=np.zeros_like(lights.flux))
-    settings = MultiresSettings(coarsest=8, light_threshold=0.05)
+    settings = unclamped(coarsest=8, light_threshold=0.05)
     full, start = full_sum(seen, lights, settings), shared_list(seen, settings)
     assert len(start.level) == 64
     shared = upsample(evaluate(*at_subsplats(seen, start), lights, settings), start, seen.covered)

@@ -45,7 +45,8 @@ def test_the_camera_placed_first_faces_the_side_that_the_picture_misses(evidence
 def test_eyes_are_in_free_space(name):
     """Property: each sees a place that the picture shows as well, from the side that the picture shows."""
     frame = small(load_scene(name))
-    points, offset = seen_points(frame), frame.tracer.offset
+    points = seen_points(frame)
+    offset = frame.tracer.offsets(points.position)[:, None]
     cameras = placed_cameras(frame, 4)
     assert len(cameras) > 1
     for camera in cameras:

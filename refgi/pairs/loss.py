@@ -1,0 +1,220 @@
+"""How much light a setting takes from a picture, told from some of its pixels.
+
+A clamp or a cut is a bias that no picture shows. The share it takes is that of two sums over the same lights, with the
+setting and without, at pixels that are the same in every run. Without a clamp a few near pairs hold much of the sum, so
+the share is as good as the sample: within 3 of 100 in the tests.
+"""
+
+import warnings
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import RefgiWarning
+from refgi.pairs.blocks import block_by_block, taken
+from refgi.pairs.irradiance import Receivers, add_lights
+from refgi.pairs.packing import pack
+from refgi.pairs.settings import PairSettings
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.rsm import PixelLights
+
+Array = npt.NDArray[Any]
+
+PAIRS = 1 << 20  # about as many are summed: a millisecond's work
+LEAST_SAMPLED = 2048  # pixels, however many lights there are
+LEAST_LOSS = 0.02  # share of the light below which a loss is not worth a warning
+
+
+class Sample(NamedTuple):
+    """Some pixels of a picture."""
+
+    place: Array  # (n,) int64, flat indices
+    position: Array  # (3, n) m
+    normal: Array  # (3, n)
+
+
+def sample_pixels(receivers: Receivers, count: int) -> Sample:
+    """Take pixels with a surface from all over a picture, the same ones in every run.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    count : int
+        How many; all where there are fewer.
+
+    Returns
+    -------
+    Sample
+        One pixel out of each of `count` equal stretches of the picture's blocks, at van der Corput's place in it.
+    """
+    places = block_by_block(np.asarray(receivers.covered, np.bool_))
+    count = min(count, len(places))
+    ends = np.arange(count + 1) * len(places) // max(1, count)
+    chosen = places[ends[:-1] + (_van_der_corput(count) * np.diff(ends)).astype(np.int64)]
+    return Sample(chosen, *(taken(np.asarray(plane), chosen) for plane in (receivers.position, receivers.normal)))
+
+
+def _van_der_corput(count: int) -> Array:
+    index, value, digit = np.arange(count), np.zeros(count), 0.5
+    while index.any():
+        value, index, digit = value + digit * (index & 1), index >> 1, digit / 2
+    return value
+
+
+def sample_for(receivers: Receivers, lights: "PixelLights", *, least: int = LEAST_SAMPLED) -> Sample:
+    """Take as many pixels of a picture as some lights allow: few lights cost little and leave a sum with high peaks.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    lights : PixelLights
+        The lights that are summed there.
+    least : int
+        Pixels to take in any case.
+
+    Returns
+    -------
+    Sample
+        Of about PAIRS pairs.
+    """
+    return sample_pixels(receivers, max(least, PAIRS // max(1, lights.flux.shape[1])))
+
+
+def light_at(
+    sample: Sample, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
+) -> float:
+    """Return the mean over pixels and channels of the irradiance of all lights, uncut.
+
+    Parameters
+    ----------
+    sample : Sample
+        The pixels.
+    lights : PixelLights
+        Lights to sum.
+    settings : PairSettings
+        How one light lights one receiver.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+
+    Returns
+    -------
+    float
+        W/m^2; 0 for no pixels.
+    """
+    sums = np.zeros_like(sample.position)
+    add_lights(sample.position, sample.normal, pack(lights, settings, footprint, sums.dtype), sums)
+    return float(sums.mean(dtype=np.float64)) if sums.size else 0.0
+
+
+@stage("pairs.clamp_loss")
+def clamp_loss(
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
+) -> float:
+    """Return the share of the light that a clamp takes from a picture; below 0 where it adds some.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    lights : PixelLights
+        Lights to sum.
+    settings : PairSettings
+        The clamp.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+
+    Returns
+    -------
+    float
+        Of the light without visibility.
+    """
+    sample = sample_for(receivers, lights)
+    clamped = light_at(sample, lights, settings, footprint)
+    return lost_share(light_at(sample, lights, without_clamp(settings)), clamped)
+
+
+def without_clamp(settings: PairSettings) -> PairSettings:
+    """Return how one light lights one receiver but for the clamp.
+
+    Parameters
+    ----------
+    settings : PairSettings
+        Those of any method.
+
+    Returns
+    -------
+    PairSettings
+        With what sums over all pairs heed.
+    """
+    switches = settings.as_published & PairSettings.SWITCHES
+    return PairSettings(offset=settings.offset, lobe_norm=settings.lobe_norm, widening=settings.widening,
+                        as_published=switches)
+
+
+def lost_share(whole: float, left: float) -> float:
+    """Return the share of some light that is lost.
+
+    Parameters
+    ----------
+    whole, left : float
+        The light without the setting and with it, in one unit.
+
+    Returns
+    -------
+    float
+        0 where there is no light.
+    """
+    return 1 - left / whole if whole > 0 else 0.0
+
+
+def warn_of_clamp(
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None, method: str
+) -> None:
+    """Warn where the clamp takes more than `LEAST_LOSS` of the light.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    lights : PixelLights
+        Lights to sum.
+    settings : PairSettings
+        The clamp.
+    footprint : (N,) ndarray or None
+        Surface area each light stands for, m^2.
+    method : str
+        Whose setting it is.
+
+    Warns
+    -----
+    RefgiWarning
+        With setting and share.
+    """
+    if settings.effective_clamp != "none":
+        value = f" of {settings.clamp_value:g}" if settings.clamp_value > 0 else ""
+        warn_of_loss(clamp_loss(receivers, lights, settings, footprint),
+                     f"{method}: clamp {settings.effective_clamp!r}{value}")
+
+
+def warn_of_loss(share: float, setting: str) -> None:
+    """Warn where a setting takes more than `LEAST_LOSS` of the light.
+
+    Parameters
+    ----------
+    share : float
+        What it takes.
+    setting : str
+        Method, key and value.
+
+    Warns
+    -----
+    RefgiWarning
+        With setting and share.
+    """
+    if share > LEAST_LOSS:
+        warnings.warn(RefgiWarning(f"{setting} takes {100 * share:.0f} % of the indirect light"), stacklevel=3)

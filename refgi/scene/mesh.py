@@ -1,0 +1,171 @@
+"""One piece of a scene on its way in, and what makes it usable: asked of one mesh, or of very many small ones at once.
+
+A file may hold a hundred thousand meshes of a few triangles each. NumPy asked about them one by one takes longer than
+everything else that is done with them, so small ones are joined into batches first.
+"""
+
+import dataclasses
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from refgi.errors import expect
+from refgi.scene.material import UNPAINTED, Material
+from refgi.scene.values import LARGEST, Array
+
+SMALL = 1 << 12  # vertices and faces of a mesh that goes into a batch; a larger one is worth a look of its own
+BATCH = 1 << 18  # vertices and faces in a batch: some megabytes
+
+SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes nor overflows
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles of one material in world space: vertices (n, 3) m, faces (m, 3), optional vertex normals (n, 3)."""
+
+    vertices: Array
+    faces: Array
+    normals: Array | None = None
+    material: Material = UNPAINTED
+    name: str = "mesh"
+
+    def expect_sound(self, where: str) -> None:
+        """Raise `InputError` naming `where` unless shapes, coordinates and indices make a mesh."""
+        vertices, faces = np.asarray(self.vertices), np.asarray(self.faces)
+        if not _rows_of_three(vertices, "fiu"):
+            expect(False, f"{where}: vertices", "numbers in an (n, 3) array", f"{vertices.dtype} {vertices.shape}")
+        if not _rows_of_three(faces, "iu"):
+            expect(False, f"{where}: faces", "integers in an (m, 3) array", f"{faces.dtype} {faces.shape}")
+        expect(len(faces) > 0, f"{where}: faces", "at least one triangle", 0)
+        expect(len(vertices) > 0, f"{where}: vertices", "at least one", 0)
+        if not (abs(vertices.min()) <= LARGEST and abs(vertices.max()) <= LARGEST):  # so that NaN fails as well
+            row = int(np.argmin((np.abs(vertices) <= LARGEST).all(axis=1)))
+            expect(False, f"{where}: vertex {row}", f"finite coordinates up to {LARGEST:g} m", vertices[row].tolist())
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            row = int(np.argmax(((faces < 0) | (faces >= len(vertices))).any(axis=1)))
+            expect(False, f"{where}: face {row}", f"vertex indices from 0 to {len(vertices) - 1}", faces[row].tolist())
+        if self.normals is not None:
+            expect(np.shape(self.normals) == vertices.shape, f"{where}: normals", f"shape {vertices.shape}",
+                   np.shape(self.normals))
+
+
+class Batch(NamedTuple):
+    """Small meshes joined: each entry of `members` is one mesh's number among all."""
+
+    members: Array  # (k,)
+    vertices: Array  # (n, 3) float64
+    faces: Array  # (m, 3) int64, within each mesh's own vertices
+    normals: Array | None  # (n, 3) float64 where all members have normals, None where none has
+    first_vertex: Array  # (k + 1,)
+    first_face: Array  # (k + 1,)
+
+    def any_vertex(self, flags: Array) -> Array:
+        """Return (k,) whether any of a mesh's vertices is flagged."""
+        return np.logical_or.reduceat(flags, self.first_vertex[:-1])
+
+    def any_face(self, flags: Array) -> Array:
+        """Return (k,) whether any of a mesh's faces is flagged."""
+        return np.logical_or.reduceat(flags, self.first_face[:-1])
+
+    def sound(self) -> Array:
+        """Return (k,) whether a mesh's coordinates and indices are what `Mesh.expect_sound` asks for."""
+        count = np.repeat(np.diff(self.first_vertex), np.diff(self.first_face))[:, None]
+        far = ~(np.abs(self.vertices) <= LARGEST).all(axis=1)
+        wrong = ((self.faces < 0) | (self.faces >= count)).any(axis=1)
+        return np.asarray(~(self.any_vertex(far) | self.any_face(wrong)))
+
+
+def batches(meshes: Sequence[Mesh]) -> Iterator[Batch]:
+    """Join the small meshes, some thousand at a time.
+
+    Parameters
+    ----------
+    meshes : sequence of Mesh
+        Any; those that are large, or whose arrays have no usable form, are in no batch.
+
+    Yields
+    ------
+    Batch
+        Meshes in ascending order, all of them with normals or all without.
+    """
+    members: dict[bool, list[int]] = {False: [], True: []}
+    size = {False: 0, True: 0}
+    for number, mesh in enumerate(meshes):
+        if _is_regular(mesh):
+            has_normals = mesh.normals is not None
+            members[has_normals].append(number)
+            size[has_normals] += len(mesh.vertices) + len(mesh.faces)
+            if size[has_normals] >= BATCH:
+                yield _joined(meshes, members[has_normals])
+                members[has_normals], size[has_normals] = [], 0
+    for chosen in members.values():
+        if chosen:
+            yield _joined(meshes, chosen)
+
+
+def expect_all_sound(meshes: Sequence[Mesh], name: Callable[[int], str]) -> None:
+    """Raise `InputError` for the first mesh that is not sound.
+
+    Parameters
+    ----------
+    meshes : sequence of Mesh
+        Any.
+    name : callable
+        Returns what a mesh of some number is called in the error.
+
+    Raises
+    ------
+    InputError
+        As `Mesh.expect_sound`.
+    """
+    sound = np.zeros(len(meshes), np.bool_)
+    for batch in batches(meshes):
+        sound[batch.members] = batch.sound()
+    for number in np.flatnonzero(~sound).tolist():
+        meshes[number].expect_sound(name(number))
+
+
+def missing_normals(normals: Array) -> Array:
+    """Return which normals give no direction.
+
+    Parameters
+    ----------
+    normals : (n, 3) ndarray
+        Vectors of any length.
+
+    Returns
+    -------
+    (n,) ndarray of bool
+        True where one is zero, not finite, or so short or long that its square is.
+    """
+    longest = np.abs(np.asarray(normals, np.float64)).max(axis=1, initial=0.0)
+    return np.asarray(~((longest > SHORTEST) & (longest < LONGEST)))
+
+
+def _is_regular(mesh: Mesh) -> bool:
+    """Return whether a mesh is small, its arrays arrays and of the form that `Mesh.expect_sound` asks for."""
+    vertices, faces, normals = mesh.vertices, mesh.faces, mesh.normals
+    return (isinstance(vertices, np.ndarray) and isinstance(faces, np.ndarray)
+            and _rows_of_three(vertices, "fiu") and _rows_of_three(faces, "iu")
+            and 0 < len(vertices) <= SMALL and 0 < len(faces) <= SMALL
+            and (normals is None or (isinstance(normals, np.ndarray) and normals.dtype.kind in "fiu"
+                                     and normals.shape == vertices.shape)))
+
+
+def _joined(meshes: Sequence[Mesh], members: list[int]) -> Batch:
+    chosen = [meshes[number] for number in members]
+    vertices, faces = [mesh.vertices for mesh in chosen], [mesh.faces for mesh in chosen]
+    normals = [mesh.normals for mesh in chosen if mesh.normals is not None]
+    return Batch(np.array(members), np.concatenate(vertices, dtype=np.float64),
+                 np.concatenate(faces, dtype=np.int64, casting="unsafe"),
+                 np.concatenate(normals, dtype=np.float64) if normals else None,
+                 _starts([len(part) for part in vertices]), _starts([len(part) for part in faces]))
+
+
+def _starts(counts: list[int]) -> Array:
+    return np.concatenate([[0], np.cumsum(counts)])
+
+
+def _rows_of_three(array: Array, kinds: str) -> bool:
+    return array.ndim == 2 and array.shape[1] == 3 and array.dtype.kind in kinds

@@ -1,0 +1,98 @@
+"""Every method at its defaults: on every number and kind of lights, and where direct light's shadows come from."""
+
+import dataclasses
+import functools
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+
+from refgi.cluster import ValSettings
+from refgi.errors import RefgiWarning
+from refgi.frame import Frame
+from refgi.methods import METHODS, find_method, render, usual_shadows
+from refgi.scene import DirectionalLight, PointLight, load_scene
+from refgi.splat import GatherSettings, MultiresSettings, SiiSettings
+from refgi.sssil import HssilSettings
+from refgi.truth import TruthSettings, VplSettings
+
+BOX = load_scene("cornell_box")
+KINDS = (BOX.lights[0], PointLight((0.3, 0.4, 0.3), (0.1, 0.1, 0.1)),
+         DirectionalLight((0.3, -0.2, 0.9), (1.0, 1.0, 1.0)))
+TINY = {"width": 16, "height": 14, "rsm_resolution": 16}
+FEW = {"truth": TruthSettings(samples=16), "val": ValSettings(map_resolution=16)}  # else at its defaults
+
+
+def mixed(count):
+    return BOX.with_lights(*(KINDS[index % len(KINDS)] for index in range(count)))
+
+
+@functools.cache
+def mean_light(method, count):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)  # what the defaults of a method lose is tested elsewhere
+        picture = render(mixed(count), method, FEW.get(method), **TINY)
+    assert np.isfinite(picture.radiance).all()
+    return float(picture.irradiance[:, picture.frame.gbuffer.covered].mean())
+
+
+@pytest.mark.parametrize("count", range(1, 9))
+@pytest.mark.parametrize("method", list(METHODS))
+def test_every_method_runs_on_one_to_eight_lights_of_all_kinds(method, count):
+    """Property: and with more than one lamp there is more light."""
+    assert mean_light(method, count) > (0 if count == 1 else 1.2 * mean_light(method, 1))
+
+
+RAYS = [
+    (TruthSettings(), True), (TruthSettings(visibility=False), True), (VplSettings(), True),
+    (VplSettings(visibility=False), True), (SiiSettings(), False), (SiiSettings(source="walk"), True),
+    (SiiSettings(openness_flux="scale"), True), (SiiSettings(warp="A", importance="openness"), True),
+    (SiiSettings(warp="A"), False), (SiiSettings(importance="openness"), False), (GatherSettings(), False),
+    (MultiresSettings(), False), (MultiresSettings(visibility="rays"), True), (MultiresSettings(source="walk"), True),
+    (ValSettings(), False), (ValSettings(maps="rays"), True), (ValSettings(behind="raytrace"), True),
+    (ValSettings(visibility="rectangle"), True), (ValSettings(visibility="members"), True),
+    (ValSettings(source="walk"), True), (ValSettings(visibility="back_projection"), False), (HssilSettings(), False),
+    (HssilSettings(visibility="rays"), True), (HssilSettings(visibility="bitmask"), False), (object(), False)]
+
+
+@pytest.mark.parametrize(("settings", "rays"), RAYS)
+def test_shadows_are_exact_where_the_method_traces_rays_anyway(settings, rays):
+    assert usual_shadows(settings) == ("exact" if rays else "map")
+
+
+@pytest.mark.parametrize("method", ["truth", "vpl", "sii"])
+def test_a_picture_has_the_shadows_of_its_method(method):
+    settings = FEW.get(method, find_method(method).load()[1](**({} if method in FEW else {"lights": 16})))
+    frames = {shadows: Frame(BOX, shadows=shadows, **TINY) for shadows in ("map", "exact")}
+    assert (frames["map"].direct != frames["exact"].direct).any()
+    usual = "map" if method == "sii" else "exact"
+    for asked, used in ((None, usual), ("map", "map"), ("exact", "exact")):
+        picture = render(BOX, method, settings, shadows=asked, **TINY)
+        assert picture.frame.shadows == used
+        np.testing.assert_array_equal(picture.frame.direct, frames[used].direct)
+    assert render(BOX, method, settings, **TINY).frame.shadows == usual
+
+
+def test_a_frame_alone_takes_the_map():
+    assert Frame(BOX, **TINY).shadows == Frame(BOX, shadows=None, **TINY).shadows == "map"
+
+
+@pytest.mark.parametrize("method", ["sii", "multires", "val", "hssil", "gather"])
+def test_methods_without_rays_load_none(method):
+    code = (f"import sys, warnings; warnings.simplefilter('ignore'); from refgi import render\n"
+            f"render('cornell_box', {method!r}, width=12, height=12, rsm_resolution=16)\n"
+            "assert not any(name.startswith('embreex') for name in sys.modules), 'Embree is loaded'")
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_settings_of_multires_change_one_by_one_without_its_clamp_in_the_way():
+    for change in ({"source": "walk"}, {"openness_flux": "roulette"}, {"visibility": "rays"}):
+        for settings in (MultiresSettings(**change), dataclasses.replace(MultiresSettings(), **change)):
+            assert settings.effective_clamp == "none"
+            assert dataclasses.replace(settings, clamp="none").effective_clamp == "none"
+    assert MultiresSettings().effective_clamp == "disc"
+    assert MultiresSettings(openness_flux="scale").effective_clamp == "disc"
+    assert MultiresSettings(target_error=0.1).effective_clamp == "disc"
+    assert SiiSettings(clamp="auto").effective_clamp == ValSettings().effective_clamp == "none"

@@ -140,7 +140,7 @@ class _Runner:
         radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype))
         return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
                          radiance, seconds, runs,
-                         estimate_record(result.passes, result.picture_mean, result.picture_variance))
+                         estimate=estimate_record(result.passes, result.picture_mean, result.picture_variance))
 
     def method(
         self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool

@@ -9,7 +9,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
 demo: $(VENV)/run.stamp
 	$(BIN)/refgi compare cornell_box --out out/
-	@echo "open out/index.html"
+	@echo "open out/index.html; then try: $(BIN)/refgi render docs/examples/room.json --method sii --out out/"
 
 test: $(VENV)/dev.stamp
 	$(PYTEST)
@@ -44,7 +44,7 @@ $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/run.stamp: $(VENV)/bin/python pyproject.toml
-	$(BIN)/pip install --quiet -e .
+	$(BIN)/pip install --quiet -e '.[flip]'
 	touch $@
 
 $(VENV)/dev.stamp: $(VENV)/bin/python pyproject.toml

@@ -5,7 +5,8 @@ command line prints it as one line. What a renderer sensibly passes over (zero-a
 that says how many.
 """
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 
 MOST_FAULTS = 20  # told of one file; more say no more, and a generated file can have as many as it has keys
 LONGEST_VALUE = 400  # characters of a value in an error
@@ -16,7 +17,21 @@ class RefgiError(Exception):
 
 
 class InputError(RefgiError, ValueError):
-    """A scene, setting, file or array that cannot be used; the message says what, where and why."""
+    """A scene, setting, file or array that cannot be used; the message says what, where and why.
+
+    Parameters
+    ----------
+    message : str
+        What, where and why.
+    key : str, optional
+        The setting, option or key of a file that is to blame, for programs that read errors.
+    file : str, optional
+        The file that is to blame.
+    """
+
+    def __init__(self, message: str = "", *, key: str | None = None, file: str | None = None) -> None:
+        super().__init__(message)
+        self.key, self.file = key, file
 
 
 class RefgiWarning(UserWarning):
@@ -38,7 +53,25 @@ def expect(condition: bool, parameter: str, expected: str, got: object) -> None:
         What was given; only the start of a long value is shown.
     """
     if not condition:
-        raise InputError(f"{parameter}: expected {expected}, got {shortened(repr(got))}")
+        raise InputError(f"{parameter}: expected {expected}, got {shortened(repr(got))}", key=parameter)
+
+
+@contextlib.contextmanager
+def blame(*, key: str | None = None, file: str | None = None) -> Iterator[None]:
+    """Say which file or key an `InputError` from inside the block is about, unless it says so itself.
+
+    Parameters
+    ----------
+    key : str, optional
+        The setting, option or key.
+    file : str, optional
+        The file.
+    """
+    try:
+        yield
+    except InputError as error:
+        error.key, error.file = error.key or key, error.file or file
+        raise
 
 
 def shortened(text: str, most: int = LONGEST_VALUE) -> str:

@@ -25,6 +25,7 @@ class Method(NamedTuple):
     visibility: bool  # whether it knows what blocks indirect light
     summary: str
     ledger: str = ""  # module and function that accounts for the power of the lights; empty: the method keeps none
+    estimate: str = ""  # module and function that gives the picture with its own error; empty: the method knows none
     memory: str = ""  # module and function that says what settings add to a picture's memory; empty: next to nothing
 
     def load(self) -> tuple[Callable[["Frame", Any], Array], type]:
@@ -32,6 +33,14 @@ class Method(NamedTuple):
         module, _, function = self.home.partition(":")
         loaded = import_module(module)
         return getattr(loaded, function), getattr(loaded, self.settings)
+
+    def compute(self, frame: "Frame", settings: Any) -> tuple[Array, Any]:
+        """Return the indirect irradiance in the frame's dtype, and the estimate it is the mean of, if it is one."""
+        if not self.estimate:
+            return self.load()[0](frame, settings), None
+        module, _, function = self.estimate.partition(":")
+        estimate = getattr(import_module(module), function)(frame, settings)
+        return estimate.mean.astype(frame.dtype), estimate
 
     def extra_bytes(self, settings: Any, size: tuple[int, int], float_bytes: int) -> int:
         """Return what settings add to the memory of a picture of some width and height and floats of 4 or 8 bytes."""
@@ -59,7 +68,8 @@ METHODS = {
         Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,
                "the same pixel lights with ray-traced visibility"),
         Method("truth", "refgi.truth.truth:truth", "TruthSettings", True,
-               "one-bounce path tracing with a standard error for every pixel"),
+               "one-bounce path tracing with a standard error for every pixel",
+               estimate="refgi.truth.truth:trace_truth"),
     )
 }
 
@@ -70,6 +80,7 @@ class Picture(NamedTuple):
     frame: "Frame"
     irradiance: Array  # (3, h, w) indirect, W/m^2
     radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
+    estimate: Any = None  # a `TruthResult`, of a method that states its own error
 
 
 def find_method(name: str) -> Method:
@@ -138,12 +149,12 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
     from refgi.frame import Frame
     from refgi.scene import load_scene
 
-    function, settings_class = find_method(method).load()
+    settings_class = find_method(method).load()[1]
     if settings is not None and not isinstance(settings, settings_class):
         raise InputError(f"settings: expected {settings_class.__name__}, got {type(settings).__name__}")
     settings = settings_class() if settings is None else settings
     if frame_options.get("shadows") is None:
         frame_options["shadows"] = usual_shadows(settings)
     frame = Frame(load_scene(scene) if isinstance(scene, str | Path) else scene, **frame_options)
-    irradiance = function(frame, settings)
-    return Picture(frame, irradiance, frame.radiance(irradiance))
+    irradiance, estimate = METHODS[method].compute(frame, settings)
+    return Picture(frame, irradiance, frame.radiance(irradiance), estimate)

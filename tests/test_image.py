@@ -15,7 +15,16 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from refgi.errors import InputError, RefgiWarning
-from refgi.image import canonical_json, read_exr, tone_map, whole_file, write_exr, write_png, write_text
+from refgi.image import (
+    canonical_json,
+    read_exr,
+    read_png_attributes,
+    tone_map,
+    whole_file,
+    write_exr,
+    write_png,
+    write_text,
+)
 
 
 def bits(plane):
@@ -138,7 +147,7 @@ def test_flipped_bits_are_found_or_harmless(planes, tmp_path, capfd):
 
 
 def test_a_write_that_reads_back_different_is_an_error_and_leaves_nothing(planes, tmp_path, monkeypatch):
-    monkeypatch.setattr("refgi.image.read_exr", lambda _: ({"R": planes["R"] + 1}, {}))
+    monkeypatch.setattr("refgi.image.exr.read_exr", lambda _: ({"R": planes["R"] + 1}, {}))
     with pytest.raises(InputError, match="reads back different"):
         write_exr(tmp_path / "a.exr", planes, {})
     assert not list(tmp_path.iterdir())
@@ -225,6 +234,27 @@ def test_a_file_is_replaced_and_never_written_over(tmp_path):
         write_text(tmp_path / "a.json", "newer")
         assert reader.read() == "old"
     assert (tmp_path / "a.json").read_text() == "newer"
+
+
+def test_a_png_says_what_it_was_told_and_shows_the_same(tmp_path):
+    """Against Pillow, which reads the text and would refuse a chunk of a wrong length or checksum."""
+    from PIL import Image
+
+    rgb = np.random.default_rng(1).random((5, 7, 3), np.float32)
+    write_png(tmp_path / "a.png", rgb, attributes={"b": [1, None], "a": "größe"})
+    with Image.open(tmp_path / "a.png") as picture:
+        picture.verify()
+        assert picture.info == {"refgi": '{"a":"gr\\u00f6\\u00dfe","b":[1,null]}'}
+    assert read_png_attributes(tmp_path / "a.png") == {"a": "größe", "b": [1, None]}
+    assert np.array_equal(imageio.v3.imread(tmp_path / "a.png"), tone_map(rgb))
+
+
+def test_a_damaged_exr_is_refused_without_a_word_on_stdout(tmp_path, capsys):
+    write_exr(tmp_path / "a.exr", {"R": np.ones((2, 2), np.float32)})
+    (tmp_path / "a.exr").write_bytes((tmp_path / "a.exr").read_bytes()[:-20])
+    with pytest.raises(InputError, match=r"a\.exr"):
+        read_exr(tmp_path / "a.exr")
+    assert capsys.readouterr().out == ""
 
 
 def test_canonical_json_does_not_depend_on_the_order_of_keys():

@@ -1,10 +1,11 @@
 """`refgi bench`: a paper's figures and tables, made again beside the printed numbers."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from refgi.cli.options import speech
+from refgi.cli.options import speech, writing
 from refgi.cli.session import FAILED, Session, say
 
 if TYPE_CHECKING:
@@ -17,16 +18,18 @@ if TYPE_CHECKING:
 @click.option("--only", metavar="KEY,KEY", help="Figures and tables to make, such as fig8,table1; all where absent.")
 @click.option("--threads", type=click.IntRange(1), help="Threads of compiled kernels; all where absent.")
 @click.option("--out", required=True, help="Folder for pictures, results.json and index.html.")
+@writing
 @speech
 @click.pass_obj
-def _bench(session: Session, /, paper: str, quick: bool, only: str | None, threads: int | None, out: str) -> int:
+def _bench(session: Session, /, paper: str, quick: bool, only: str | None, threads: int | None, out: str,
+           parents: bool, force: bool) -> int:
     """Make a paper's figures and tables again.
 
     Writes index.html with every figure beside the paper's own numbers, results.json, and each picture as PNG and EXR.
 
     Times are medians of interleaved runs and are compared as ratios. A figure that fails leaves the others standing.
     """
-    from refgi.cli.destination import folder
+    from refgi.cli.destination import Permission, folder
     from refgi.cli.progress import progress
     from refgi.cli.threads import on_threads
     from refgi.papers.catalogue import choose, find_paper
@@ -34,8 +37,9 @@ def _bench(session: Session, /, paper: str, quick: bool, only: str | None, threa
     from refgi.papers.workbench import FULL, QUICK
 
     keys = None if only is None else [key.strip() for key in only.split(",") if key.strip()]
-    choose(find_paper(paper), keys)
-    folder(out)
+    chosen = choose(find_paper(paper), keys)
+    there = (file.name for entry in chosen for file in Path(out).glob(f"{entry.key}_*"))
+    folder(out, Permission(parents, force), ["results.json", "index.html", *there])
     with on_threads(threads), progress() as tell:
         made = reproduce(paper, scale=QUICK if quick else FULL, only=keys, out=out, progress=tell)
     _report(session, made, out)

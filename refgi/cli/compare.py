@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.options import machine, shadows, speech, view
+from refgi.cli.options import machine, shadows, speech, view, writing
 from refgi.cli.session import FAILED, Session, say, table
 
 if TYPE_CHECKING:
@@ -21,27 +21,30 @@ SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ss
 @machine
 @shadows("exact")
 @click.option("--out", help="Folder for EXR, PNG, error maps, results.json and index.html.")
+@writing
 @speech
 @click.pass_obj
 def _compare(session: Session, /, methods: str | None, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
-            shadows: str, threads: int | None, seed: int | None, out: str | None, **options: Any) -> int:
+            shadows: str, threads: int | None, seed: int | None, out: str | None, parents: bool, force: bool,
+            **options: Any) -> int:
     """Judge methods on SCENE by path tracing: errors, times, a page.
 
     Writes pictures, error maps, results.json and index.html to --out.
 
     A method that knows no visibility is also compared with the truth without visibility, to which it converges.
     """
-    from refgi.cli.destination import folder
+    from refgi.cli.destination import Permission, folder
     from refgi.cli.memory import require_memory
     from refgi.cli.progress import progress
     from refgi.cli.threads import on_threads
     from refgi.cli.view import View
     from refgi.compare import compare
+    from refgi.compare.results import file_names
 
     names, settings = _asked(methods, pairs, seed)
-    if out is not None:
-        folder(out)
     scene = View(**options).load()
+    if out is not None:
+        folder(out, Permission(parents, force), file_names(names))
     require_memory(scene, dtype, rsm_resolution, traced=True, compared=len(names) + 2, settings=settings)
     with on_threads(threads), progress() as tell:
         comparison = compare(scene, names, truth_settings=settings.pop("truth"), method_settings=settings, out=out,

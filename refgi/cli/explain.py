@@ -172,7 +172,7 @@ def _ledger_text(ledger: Any) -> str:
 
 
 def _text(content: dict[str, Any]) -> str:
-    from refgi.compare.results import plain
+    from refgi.provenance import plain
 
     settings = ", ".join(f"{key}={value}" for key, value in plain(content["settings"]).items())
     head = f"{content['method']} on {content['scene']}\n{settings}"

@@ -1,6 +1,6 @@
 """Frames of a sequence as files, from which an interrupted sequence can go on."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -8,10 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cli.destination import write_light
+from refgi.cli.destination import make
+from refgi.compare.pictures import linear_planes, write_preview
 from refgi.errors import InputError, expect
 from refgi.frame import Frame
-from refgi.image import read_exr, write_png
+from refgi.image import read_exr, write_exr
+from refgi.provenance import Record
+from refgi.provenance.frames import same_sequence
 from refgi.scene.model import Scene
 from refgi.sssil.temporal.filter import History, remember
 from refgi.sssil.temporal.sequence import Sequence, Step, seeded
@@ -27,19 +30,25 @@ class FrameFiles(NamedTuple):
     folder: Path
     stem: str
     suffixes: tuple[str, ...]
-    said: Mapping[str, Any]  # attributes of every EXR: settings, versions; finite JSON values
+    record: Record  # what all frames share
+    moving: Callable[[int], Record]  # what a frame adds, by number
 
     def of(self, number: int) -> list[Path]:
         """Return the files of a frame."""
         return [self.folder / f"{self.stem}_{number:05d}{suffix}" for suffix in self.suffixes]
 
-    def write(self, step: Step, number: int, exposure: float) -> None:
+    def record_of(self, number: int) -> Record:
+        """Return the record of a frame."""
+        return {**self.record, **self.moving(number)}
+
+    def write(self, step: Step, number: int) -> None:
         """Write a frame, each file whole or not at all, the EXR last: where it is, so are the others."""
+        make(self.folder)
         for file in sorted(self.of(number), reverse=True):
             if file.suffix == PNG:
-                write_png(file, np.moveaxis(step.radiance, 0, -1), exposure)
+                write_preview(file, step.radiance, self.record_of(number))
             else:
-                write_light(file, step.radiance, step.irradiance, {**self.said, "frame": number})
+                write_exr(file, linear_planes(step.radiance, step.irradiance), self.record_of(number))
 
     def done(self, frames: int) -> int:
         """Return how many frames, from the first on, are there.
@@ -65,8 +74,10 @@ class FrameFiles(NamedTuple):
                 said = read_exr(file)[1]
             except InputError:
                 return number
-            expect(said == {**self.said, "frame": number}, str(file), "a frame of this sequence, to go on after it",
-                   "one of other settings")
+            other = same_sequence(said, self.record_of(number))
+            if other:
+                raise InputError(f"{file}: expected a frame of this sequence, to go on after it; got one of other "
+                                 f"settings ({', '.join(other)})", file=str(file), key=", ".join(other))
             if not all(other.exists() for other in self.of(number)):
                 return number
         return frames

@@ -12,8 +12,7 @@ from typing import Any, NoReturn
 import click
 
 from refgi import __version__
-from refgi.cli.session import DONE, FAILED, INTERRUPTED, USAGE, Session, say
-from refgi.errors import RefgiError
+from refgi.cli.session import DONE, FAILED, USAGE, Session
 
 VERBS = ("scenes", "render", "sequence", "compare", "bench", "explain", "info")
 HELP = """Indirect light by four published methods on the CPU, judged by path tracing.
@@ -61,9 +60,8 @@ class VerbGroup(click.Group):
         """Run a verb; an interrupt and a reader that left end it here, before click has its own word on them."""
         try:
             return super().invoke(ctx)
-        except KeyboardInterrupt:
-            say("interrupted")
-            return INTERRUPTED
+        except KeyboardInterrupt as error:
+            return _explained(error, ctx.ensure_object(Session))
         except BrokenPipeError:  # whoever read stdout has had enough: refgi scenes | head -1
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return DONE
@@ -72,47 +70,30 @@ class VerbGroup(click.Group):
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any
     ) -> NoReturn:
         """Run and exit with the code that tells what became of it."""
-        session = Session(debug=bool(os.environ.get("REFGI_DEBUG")))
+        args = sys.argv[1:] if args is None else list(args)
+        session = Session(debug=bool(os.environ.get("REFGI_DEBUG")), as_json="--json" in args)  # usage errors as well
         extra |= {"standalone_mode": False, "obj": session}
         with warnings.catch_warnings():
             warnings.simplefilter("default")
             warnings.showwarning = session.warn
             try:
                 code = super().main(args, prog_name, **extra)
-            except (click.exceptions.Abort, KeyboardInterrupt):
-                code = INTERRUPTED
             except BaseException as error:
                 code = _explained(error, session)
         sys.exit(code if isinstance(code, int) else DONE)
 
 
 def _explained(error: BaseException, session: Session) -> int:
-    """Say what went wrong in one line and return the exit code."""
+    """Say what went wrong and return the exit code."""
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else FAILED
-    if session.debug:
+    if session.debug and not isinstance(error, click.exceptions.Abort | KeyboardInterrupt):
         traceback.print_exception(error)
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         click.echo(error.format_message(), file=sys.stderr)
         return USAGE
-    if isinstance(error, click.UsageError):
-        asked = error.ctx.command_path if error.ctx else "refgi"
-        say(f"{_one_line(error.format_message())} (see {asked} --help)")
-        return USAGE
-    if isinstance(error, click.ClickException):
-        say(_one_line(error.format_message()))
-        return USAGE
-    if isinstance(error, RefgiError):
-        for line in str(error).splitlines():  # a scene file's errors come all at once
-            say(line)
-        return USAGE
-    if isinstance(error, MemoryError):
-        say(f"out of memory: {_one_line(str(error)) or 'try a smaller --size'}")
-        return USAGE
-    hint = "" if session.debug else " (a fault of refgi; --debug shows where)"
-    say(f"unexpected {type(error).__name__}: {_one_line(str(error))}{hint}")
-    return FAILED
+    from refgi.cli.fault import fault_of
 
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
+    fault = fault_of(error, debug=session.debug)
+    session.fault(fault)
+    return fault.code

@@ -45,7 +45,7 @@ def _read(text: str) -> Light:
             raise InputError(f"expected one of {', '.join(KEYS)}, got {kind!r}" + did_you_mean(kind, KEYS))
         return _build(kind, _values(kind, rest))
     except InputError as error:
-        raise InputError(f"--light {text!r}: {error}") from error
+        raise InputError(f"--light {text!r}: {error}", key="--light") from error
 
 
 def _values(kind: str, rest: str) -> dict[str, Any]:

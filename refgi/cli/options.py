@@ -68,8 +68,42 @@ def speech(function: F) -> F:
     return click.option("--json", help="Put one JSON object on stdout.", callback=keep("as_json"), **flag)(function)
 
 
+def writing(function: F) -> F:
+    """Add what may be done to put results where --out says, as the parameters of a `Permission`.
+
+    Parameters
+    ----------
+    function : callable
+        A verb.
+
+    Returns
+    -------
+    callable
+        The same, with the options.
+    """
+    function = click.option("--force", is_flag=True, help="Overwrite files that are not from refgi.")(function)
+    return click.option("--parents", is_flag=True, help="Make every missing folder of --out, not the last alone."
+                        )(function)
+
+
 def view(function: F) -> F:
     """Add the scene and what is seen of it: size, camera, lights.
+
+    Parameters
+    ----------
+    function : callable
+        A verb.
+
+    Returns
+    -------
+    callable
+        The same, with the argument and the options.
+    """
+    return click.argument("scene")(seen(function))
+
+
+def seen(function: F) -> F:
+    """Add what is seen of a scene: size, camera, lights.
 
     Parameters
     ----------
@@ -82,7 +116,6 @@ def view(function: F) -> F:
         The same, with the options.
     """
     for decorate in reversed((
-        click.argument("scene"),
         click.option("--size", type=Size(), help="Picture size in pixels; the scene's own where absent."),
         click.option("--eye", type=Triple(), help="Where the camera is, m."),
         click.option("--target", type=Triple(), help="What it looks at, m."),

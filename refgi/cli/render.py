@@ -1,4 +1,4 @@
-"""`refgi render`: one scene by one method."""
+"""`refgi render`: one scene by one method, or a picture made again from what its file says."""
 
 import time
 from pathlib import Path
@@ -6,93 +6,138 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.options import machine, shadows, speech, view
-from refgi.cli.session import FAILED, Session, say
+from refgi.cli.options import machine, seen, shadows, speech, writing
+from refgi.cli.session import DONE, FAILED, Session, say
 
 if TYPE_CHECKING:
     from refgi.cli.destination import Pictures
     from refgi.methods import Picture
+    from refgi.provenance import Job, Record
 
 
 @click.command("render")
-@view
+@click.argument("scene", required=False)
+@seen
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
 @shadows("auto")
+@click.option("--again", metavar="FILE.exr", help="Make this picture again, and say whether it is the same to the bit.")
+@click.option("--scene", "scene_path", metavar="PATH", help="Where the scene of --again is now, if it was moved.")
 @click.option("--exposure", type=float, help="Factor before the sRGB curve of a PNG; the scene's where absent.")
-@click.option("--out", required=True, help="out.exr (linear), out.png (tone-mapped), or a folder for both.")
+@click.option("--allow-empty", is_flag=True, help="Write a black picture where the camera sees no surface.")
+@click.option("--out", help="out.exr (linear), out.png (tone-mapped), or a folder for both.")
+@writing
 @speech
-@click.pass_obj
-def _render(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
-            shadows: str | None, threads: int | None, seed: int | None, exposure: float | None, out: str,
-            **options: Any) -> int:
+@click.pass_context
+def _render(ctx: click.Context, /, **options: Any) -> int:
     """Render SCENE by one method.
 
     An EXR holds the radiance that the camera receives (R, G, B; W/m^2/sr) and the indirect irradiance
-    (irradiance.R, .G, .B; W/m^2) with the settings and versions; a PNG the radiance, tone-mapped.
+    (irradiance.R, .G, .B; W/m^2), of `truth` its variance too, and all that is needed to make it again; a PNG the
+    radiance, tone-mapped.
     """
-    from refgi import stages
-    from refgi.cli.destination import picture_files
+    from refgi.cli.destination import Permission, Pictures, picture_files
+    from refgi.cli.job import asked, recorded, require_either, stem
     from refgi.cli.memory import require_memory
-    from refgi.cli.progress import progress
-    from refgi.cli.settings import read_settings
-    from refgi.cli.threads import on_threads
-    from refgi.cli.view import View
     from refgi.errors import expect
-    from refgi.methods import find_method, render
 
+    require_either(ctx)
+    exposure, again, out = options["exposure"], options["again"], options["out"]
     expect(exposure is None or 0 < exposure < float("inf"), "--exposure", "a finite number > 0", exposure)
-    settings = read_settings(find_method(method).load()[1], pairs, seed, method)
-    files = picture_files(out, f"{_stem(options['scene'])}_{method}")
-    scene = View(**options).load()
-    require_memory(scene, dtype, rsm_resolution, traced=method == "truth", settings={method: settings})
-    started = time.perf_counter()
-    with on_threads(threads), progress() as tell, stages.observe(progress=tell) as log:
-        picture = render(scene, method, settings, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)
-    seconds = time.perf_counter() - started
-    content = _content(picture, method, settings, seconds) | {"stages": [_run(run) for run in log.runs]}
-    _write(picture, files, content, scene.exposure if exposure is None else exposure)
-    _say_aloud(content)
-    content["files"] = [str(file) for file in files if file]
-    size = "x".join(map(str, content["size"]))
-    session.result(f"{scene.name} by {method}: {size} in {seconds:.2f} s -> {', '.join(content['files'])}", content)
-    return FAILED if content["non_finite_pixels"] else 0
+    job = asked(options) if again is None else recorded(again, options["scene_path"])
+    job = job if exposure is None else job._replace(exposure=exposure)
+    permission = Permission(options["parents"], options["force"])
+    name = stem(options["scene"] if job.scene.source is None else job.scene.source.name)
+    files = Pictures() if out is None else picture_files(out, f"{name}_{job.method}", permission)
+    require_memory(job.scene, job.options["dtype"], job.options["rsm_resolution"], traced=job.method == "truth",
+                   settings={job.method: job.settings})
+    return _rendered(ctx.ensure_object(Session), job, files, again, options)
 
 
 command = _render
 
 
-def _content(picture: "Picture", method: str, settings: Any, seconds: float) -> dict[str, Any]:
+def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None, options: dict[str, Any]) -> int:
+    from refgi import stages
+    from refgi.cli.job import differences, require_view
+    from refgi.cli.progress import progress
+    from refgi.cli.threads import on_threads
+    from refgi.methods import render
+
+    started = time.perf_counter()
+    with on_threads(options["threads"]), progress() as tell, stages.observe(progress=tell) as log:
+        if job.frame is None:
+            picture = render(job.scene, job.method, job.repeatable, **job.options)
+        else:
+            from refgi.provenance.frames import render_frame
+
+            picture = render_frame(job.scene, job.method, job.settings, job.frame, job.options)
+    seconds = time.perf_counter() - started
+    require_view(bool(picture.frame.gbuffer.covered.any()), job.scene.name, options["allow_empty"] or again is not None)
+    record = _record(job, picture)
+    content = _content(picture, job, seconds, record) | {"stages": [_run(run) for run in log.runs]}
+    planes = _write(picture, files, record)
+    _say_aloud(content)
+    content["files"] = [str(file) for file in files.files]
+    size = "x".join(map(str, content["size"]))
+    text = f"{job.scene.name} by {job.method}: {size} in {seconds:.2f} s"
+    text += f" -> {', '.join(content['files'])}" if files.files else ""
+    if again is not None:
+        other = differences(Path(again), planes)
+        content["again"] = {"file": again, "same": not other, "differs": other}
+        text += f"\n{again}: {'other: ' + '; '.join(other) if other else 'the same to the bit'}"
+    session.result(text, content)
+    return FAILED if content["non_finite_pixels"] or not content.get("again", {}).get("same", True) else DONE
+
+
+def _record(job: "Job", picture: "Picture") -> "Record":
+    from refgi.provenance import estimate_record, method_record, scene_record
+
+    frame, estimate = picture.frame, picture.estimate
+    options = {"dtype": frame.dtype.name, "rsm_resolution": frame.rsm_resolution, "shadows": frame.shadows}
+    record = {**scene_record(job.scene, options, exposure=job.exposure), **method_record(job.method, job.settings)}
+    if job.frame is not None:
+        from refgi.provenance.frames import whole_record
+
+        record |= whole_record(job.scene, job.frame)
+    if estimate is not None:
+        record |= estimate_record(estimate)
+    return record
+
+
+def _content(picture: "Picture", job: "Job", seconds: float, record: "Record") -> dict[str, Any]:
     import numpy as np
 
-    from refgi.compare.environment import versions
     from refgi.compare.metrics import count_non_finite
 
     frame, covered = picture.frame, picture.frame.gbuffer.covered
     with np.errstate(invalid="ignore"):
         mean = picture.irradiance[:, covered].mean(dtype=np.float64) if covered.any() else 0.0
         return {
-            "scene": frame.scene.name, "method": method, "settings": settings, "size": [frame.width, frame.height],
-            "dtype": frame.dtype.name, "seconds": seconds, "covered_pixels": int(covered.sum()),
-            "mean_indirect_irradiance": float(mean), "brightest_radiance": float(picture.radiance.max()),
-            "non_finite_pixels": count_non_finite(picture.radiance), "versions": versions(),
+            "scene": job.scene.name, "method": job.method, "settings": job.settings,
+            "size": [frame.width, frame.height], **record["options"], "seconds": seconds,
+            "covered_pixels": int(covered.sum()), "mean_indirect_irradiance": float(mean),
+            "brightest_radiance": float(picture.radiance.max()),
+            "non_finite_pixels": count_non_finite(picture.radiance), "versions": record["versions"],
+            "provenance": record, **{key: record[key] for key in ("estimate",) if key in record},
         }
 
 
-def _write(picture: "Picture", files: "Pictures", content: dict[str, Any], exposure: float) -> None:
-    import numpy as np
+def _write(picture: "Picture", files: "Pictures", record: "Record") -> dict[str, Any]:
+    """Write the files there are to be, and return the planes of the EXR, written or not."""
+    from refgi.compare.pictures import linear_planes, write_preview
+    from refgi.image import write_exr
 
-    from refgi.cli.destination import write_light
-    from refgi.compare.results import CONTENT, UNITS, plain
-    from refgi.image import write_png
-
+    estimate = picture.estimate
+    spread = (None, None) if estimate is None else (estimate.variance_of_mean, estimate.samples)
+    planes = linear_planes(picture.radiance, picture.irradiance, *spread)
+    files.make_folder()
     if files.exr is not None:
-        said = {key: content[key] for key in ("scene", "method", "settings", "dtype", "versions")}
-        write_light(files.exr, picture.radiance, picture.irradiance,
-                    plain({**said, "units": UNITS, "content": CONTENT}))
+        write_exr(files.exr, planes, record)
     if files.png is not None:
-        write_png(files.png, np.moveaxis(picture.radiance, 0, -1), exposure)
+        write_preview(files.png, picture.radiance, record)
+    return planes
 
 
 def _say_aloud(content: dict[str, Any]) -> None:
@@ -107,11 +152,3 @@ def _say_aloud(content: dict[str, Any]) -> None:
 
 def _run(run: Any) -> dict[str, Any]:
     return {"name": run.name, "status": run.status, "seconds": run.seconds, "depth": run.depth, "reason": run.reason}
-
-
-def _stem(scene: str) -> str:
-    from refgi.scene import builtin_scenes
-    from refgi.scene.files import text_of
-
-    base = scene.partition(":")[0]
-    return base if base in builtin_scenes() else text_of(Path(scene).stem)

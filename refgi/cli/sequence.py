@@ -1,20 +1,19 @@
 """`refgi sequence`: the frames of a path through one scene."""
 
-import hashlib
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.options import machine, shadows, speech, view
+from refgi.cli.options import machine, shadows, speech, view, writing
 from refgi.cli.session import DONE, FAILED, Session, say
 
 if TYPE_CHECKING:
     from refgi.cli.frame_files import FrameFiles
     from refgi.cli.progress import Tell
     from refgi.scene import Scene
+    from refgi.scene.path import Path as Way
     from refgi.sssil.temporal import Sequence, TemporalSettings
 
 FRAME = ("dtype", "rsm_resolution", "shadows")
@@ -37,6 +36,7 @@ KINDS = {"both": (".exr", ".png"), "exr": (".exr",), "png": (".png",)}
               help="EXR (linear), PNG (tone-mapped), or both.")
 @click.option("--resume", is_flag=True, help="Go on after the frames that are there as EXR.")
 @click.option("--out", required=True, help="Folder for the frames.")
+@writing
 @speech
 @click.pass_obj
 def _sequence(session: Session, /, **options: Any) -> int:
@@ -47,14 +47,21 @@ def _sequence(session: Session, /, **options: Any) -> int:
     `hssil` blends each frame's light with that of the frame before; another method does where --temporal is given.
     Each frame is written whole as soon as it is done, as PATH's name and a number.
     """
+    from refgi.cli.destination import Permission, folder
+    from refgi.cli.frame_files import FrameFiles
     from refgi.cli.memory import require_memory
     from refgi.cli.progress import progress
     from refgi.cli.settings import read_settings
     from refgi.cli.threads import on_threads
     from refgi.methods import find_method, usual_shadows
+    from refgi.provenance import method_record, scene_record
+    from refgi.provenance.frames import frame_record, path_record
+    from refgi.scene.files import text_of
+    from refgi.scene.path import scenes_along
     from refgi.sssil.temporal import Sequence
 
     kind, resume, exposure, out, threads = _taken(options, "kind", "resume", "exposure", "out", "threads")
+    permission = Permission(*_taken(options, "parents", "force"))
     _expect_usable(exposure, kind, resume)
     method, pairs, seed = _taken(options, "method", "pairs", "seed")
     light, settings_class = find_method(method).load()
@@ -63,16 +70,20 @@ def _sequence(session: Session, /, **options: Any) -> int:
     frame_options = dict(zip(FRAME, _taken(options, *FRAME), strict=True))
     frame_options["shadows"] = frame_options["shadows"] or usual_shadows(settings)
     path, frames = _taken(options, "path", "frames")
-    scene, scenes, frames = _scenes(path, frames, options)
+    scene, way, frames = _scene_and_way(path, frames, options)
     require_memory(scene, frame_options["dtype"], frame_options["rsm_resolution"], traced=method == "truth",
                    settings={method: settings})
-    said = {"method": method, "settings": settings, "temporal": temporal, **frame_options}
-    files = _files(out, path, KINDS[kind], scene, frames, said)
-    sequence = Sequence(scenes, settings, temporal, method=light, **frame_options)
+    record = {**scene_record(scene, frame_options, exposure=exposure), **method_record(method, settings),
+              **path_record(path, frames, temporal)}
+    files = FrameFiles(Path(out), text_of(Path(path).stem), KINDS[kind], record,
+                       lambda number: frame_record(scene, way, number, frames))
+    folder(out, permission, (file.name for number in range(frames) for file in files.of(number)))
+    sequence = Sequence(scenes_along(scene, way, frames), settings, temporal, method=light, **frame_options)
     with on_threads(threads), progress() as tell:
         done = files.done(frames) if resume else 0
-        rendered = _render(sequence, files, (done, frames), scene.exposure if exposure is None else exposure, tell)
-    content = {"scene": scene.name, **said, "out": out, "first": done, "frames": rendered}
+        rendered = _render(sequence, files, (done, frames), tell)
+    content = {"scene": scene.name, "method": method, "settings": settings, "temporal": temporal, **frame_options,
+               "out": out, "first": done, "frames": rendered, "provenance": record}
     session.result(f"{scene.name} by {method}: {len(rendered)} of {frames} frames rendered -> {out}", content)
     return FAILED if any(frame["non_finite_pixels"] for frame in rendered) else DONE
 
@@ -103,49 +114,26 @@ def _temporal(method: str, pairs: tuple[str, ...], unfiltered: bool) -> "Tempora
     return settings
 
 
-def _scenes(path: str, frames: int | None, options: dict[str, Any]) -> "tuple[Scene, Iterator[Scene], int]":
-    """Return the scene as it is without the path, that of every frame, and how many; all of them are usable."""
+def _scene_and_way(path: str, frames: int | None, options: dict[str, Any]) -> "tuple[Scene, Way, int]":
+    """Return the scene as it is without the path, the path, and how many frames; all of them are usable."""
     from refgi.cli.view import View
-    from refgi.errors import expect
-    from refgi.scene.path import camera_and_lights, scenes_along
+    from refgi.errors import blame, expect
+    from refgi.scene.path import camera_and_lights
     from refgi.scene.pathfile import read_path
 
     scene = View(**options).load()
-    way, own = read_path(path, scene)
+    with blame(file=path):
+        way, own = read_path(path, scene)
     count = own if frames is None else frames
     expect(count is not None, "--frames", f"how many, as {path} does not say", "nothing")
     assert count is not None
     for frame in range(count):
         camera_and_lights(scene, way, frame, count)
-    return scene, scenes_along(scene, way, count), count
-
-
-def _files(
-    out: str, path: str, suffixes: tuple[str, ...], scene: "Scene", frames: int, said: dict[str, Any]
-) -> "FrameFiles":
-    from refgi.cli.destination import folder
-    from refgi.cli.frame_files import FrameFiles
-    from refgi.compare.environment import versions
-    from refgi.compare.results import CONTENT, UNITS, plain
-    from refgi.scene.files import read_bytes, text_of
-
-    made = {"scene": scene.name, "faces": scene.face_count, "surfaces": _digest(scene), "camera": scene.camera,
-            "lights": scene.lights, "path": hashlib.sha256(read_bytes(Path(path))).hexdigest(), "of": frames,
-            "versions": versions(), "units": UNITS, "content": CONTENT}
-    return FrameFiles(folder(out), text_of(Path(path).stem), suffixes, plain({**said, **made}))
-
-
-def _digest(scene: "Scene") -> str:
-    """Return a name for triangles and materials: frames of others are frames of another sequence."""
-    shape = scene.geometry
-    digest = hashlib.sha256(repr(scene.materials).encode())
-    for array in (shape.vertices, shape.faces, shape.material_of_face, shape.vertex_normals):
-        digest.update(b"" if array is None else array.tobytes())
-    return digest.hexdigest()
+    return scene, way, count
 
 
 def _render(
-    sequence: "Sequence", files: "FrameFiles", span: tuple[int, int], exposure: float, tell: "Tell"
+    sequence: "Sequence", files: "FrameFiles", span: tuple[int, int], tell: "Tell"
 ) -> list[dict[str, Any]]:
     """Render and write the frames from one number up to another; return what is to be said of each."""
     from refgi.cli.frame_files import resumed
@@ -158,7 +146,7 @@ def _render(
     started = time.perf_counter()
     for number, step in enumerate(resumed(sequence, sequence.scenes, files, done), done):
         seconds = time.perf_counter() - started
-        files.write(step, number, exposure)
+        files.write(step, number)
         bad = count_non_finite(step.radiance)
         if bad:
             say(f"frame {number}: {bad} pixels are NaN or infinite")

@@ -5,7 +5,7 @@ import dataclasses
 import json
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
@@ -31,9 +31,9 @@ class Session:
     def result(self, text: str, content: dict[str, Any]) -> None:
         """Print the result to stdout: the text, or with --json one object that also has the warnings."""
         if self.as_json:
-            from refgi.compare.results import plain
+            from refgi.provenance import plain
 
-            text = json.dumps(plain({**content, "warnings": self.warnings}), indent=2, allow_nan=False)
+            text = self._object(plain(content))
         try:
             click.echo(text)
         except BrokenPipeError:  # whoever read has had enough
@@ -42,6 +42,26 @@ class Session:
             from refgi.errors import InputError
 
             raise InputError(f"stdout: cannot be written: {error.strerror or error}") from error
+
+    def fault(self, fault: "Fault") -> None:
+        """Print an error to stderr, and with --json one object to stdout, where somebody can still read it."""
+        for line in fault.message.splitlines():  # a scene file's errors come all at once
+            say(line)
+        if self.as_json:
+            with contextlib.suppress(OSError):
+                click.echo(self._object({"error": fault._asdict()}))
+
+    def _object(self, content: dict[str, Any]) -> str:
+        return json.dumps({**content, "warnings": self.warnings}, indent=2, allow_nan=False)
+
+
+class Fault(NamedTuple):
+    """What ended a run before its result."""
+
+    code: int  # exit code
+    message: str
+    file: str | None = None
+    key: str | None = None  # setting, option or key of the file
 
 
 def say(text: str) -> None:

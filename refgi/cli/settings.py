@@ -40,18 +40,20 @@ def read_settings(wanted: type, pairs: Iterable[str], seed: int | None = None, o
     hints = get_type_hints(wanted)
     known = [field.name for field in fields(wanted)]
     values: dict[str, Any] = {}
-    errors: list[str] = []
+    errors: list[InputError] = []
     for pair in [*pairs, *([] if seed is None else [f"seed={seed}"])]:
         key, equals, text = pair.partition("=")
         if not equals:
-            errors.append(f"{pair!r} is not key=value")
+            errors.append(InputError(f"{pair!r} is not key=value", key="--set"))
         elif key not in known:
-            errors.append(_unknown(key, known, owner))
+            errors.append(InputError(_unknown(key, known, owner), key=key))
         elif (problem := _read(values, key, text, hints[key])) is not None:
-            errors.append(problem)
+            errors.append(InputError(problem, key=key))
     made, refused = _make(wanted, values)
-    if errors + refused:
-        raise InputError(f"{first_faults(errors + refused, '; ')} (settings: {', '.join(known)})")
+    if errors := errors + refused:
+        keys = dict.fromkeys(error.key for error in errors if error.key)
+        texts = first_faults([str(error) for error in errors], "; ")
+        raise InputError(f"{texts} (settings: {', '.join(known)})", key=", ".join(keys))
     return made
 
 
@@ -87,7 +89,7 @@ def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[st
         else:
             sorted_pairs[name].append(rest)
     if errors:
-        raise InputError(first_faults(errors, "; "))
+        raise InputError(first_faults(errors, "; "), key="--set")
     return sorted_pairs
 
 
@@ -136,14 +138,14 @@ def _in_radians(entry: dict[str, Any]) -> dict[str, Any]:
             for key, value in entry.items()}
 
 
-def _make(wanted: type, values: Mapping[str, Any]) -> tuple[Any, list[str]]:
+def _make(wanted: type, values: Mapping[str, Any]) -> tuple[Any, list[InputError]]:
     try:
         return wanted(**values), []
     except InputError as error:
-        alone = []
+        alone = {}
         for key, value in values.items():
             try:
                 wanted(**{key: value})
             except InputError as other:
-                alone.append(str(other))
-        return None, list(dict.fromkeys(alone or [str(error)]))
+                alone[str(other)] = other
+        return None, list(alone.values()) or [error]

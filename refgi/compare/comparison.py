@@ -27,6 +27,7 @@ from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, R
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS, Method, find_method
+from refgi.provenance import estimate_record
 from refgi.scene import Scene, load_scene
 
 Progress = Callable[[str, float], None]
@@ -138,7 +139,7 @@ class _Runner:
         result, seconds, runs = self._timed(name, lambda frame: trace_truth(frame, settings))
         radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype))
         return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
-                         radiance, seconds, runs, result.errors)
+                         radiance, seconds, runs, estimate_record(result))
 
     def method(
         self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool

@@ -1,23 +1,11 @@
 """What a result was made with: versions, processor, threads."""
 
 import platform
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "trimesh", "OpenEXR", "imageio", "matplotlib",
-            "click", "rich", "pydantic", "jinja2", "flip-evaluator")
+from refgi.provenance import versions
+
 SIMD = ("sse2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
-
-
-def versions() -> dict[str, str | None]:
-    """Return the versions of Python, refgi and what it stands on.
-
-    Returns
-    -------
-    dict of str to str
-        None for a package that is not installed.
-    """
-    return {"python": platform.python_version()} | {name: _version(name) for name in PACKAGES}
 
 
 def environment() -> dict[str, Any]:
@@ -39,10 +27,3 @@ def environment() -> dict[str, Any]:
         "simd": [name for name in SIMD if features.get(name)],
         "threads": numba.get_num_threads(),
     }
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None

@@ -1,6 +1,7 @@
 """What a comparison found: references, methods judged against them, and how it was made."""
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy.typing as npt
 from refgi import stages
 from refgi.compare.flip import Flip
 from refgi.compare.measurement import Measurement
+from refgi.provenance import Record, scene_record
 from refgi.scene import Scene
 
 Array = npt.NDArray[Any]
@@ -29,7 +31,7 @@ class Reference:
     radiance: Array  # (3, h, w) W/m^2/sr
     seconds: float
     runs: tuple[stages.Run, ...]
-    errors: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # `TruthResult.errors`
+    estimate: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # what the record of its files adds of it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,6 +63,11 @@ class Comparison:
     results: Mapping[str, MethodResult]
     failures: Mapping[str, str]  # method: why it gave no picture
     environment: Mapping[str, Any]
+
+    @functools.cached_property
+    def record(self) -> Record:
+        """What all pictures share of the record of how they were made."""
+        return scene_record(self.scene, self.options, size=(self.width, self.height))
 
     @property
     def truth(self) -> Reference:

@@ -13,8 +13,10 @@ from refgi.compare import maps
 from refgi.compare.measurement import Figure, Measurement
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
 from refgi.compare.plot import Point, time_against_error
-from refgi.compare.results import error_scale, plain, signed_error
+from refgi.compare.provenance import provenance_rows
+from refgi.compare.results import error_scale, signed_error
 from refgi.image import png_bytes, write_text
+from refgi.provenance import plain
 
 if TYPE_CHECKING:
     import jinja2
@@ -95,6 +97,7 @@ def page(comparison: Comparison) -> str:
         columns=[{"label": label, "about": about} for label, about in (*COLUMNS.values(), ("FLIP", "of the picture"))],
         rows=_rows(comparison), notes=_notes(comparison), plot=Markup(_plot(comparison)), made=_made(comparison),
         ledgers=[_ledger(result) for result in comparison.results.values() if result.ledger is not None],
+        provenance=provenance_rows(comparison.record),
         versions=comparison.environment["versions"], machine=_machine(comparison.environment),
     )
 

@@ -5,7 +5,7 @@ known, not defined) or the words "inf" and "-inf".
 """
 
 import dataclasses
-import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +16,14 @@ from refgi import stages
 from refgi.compare import maps
 from refgi.compare.flip import Flip
 from refgi.compare.measurement import Measurement
-from refgi.compare.outcome import TRUTH, Comparison, MethodResult, Reference
-from refgi.image import canonical_json, whole_file, write_exr, write_png, write_text
+from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
+from refgi.compare.pictures import linear_planes, write_preview
+from refgi.image import canonical_json, write_encoded, write_exr, write_text
+from refgi.provenance import UNITS, Record, method_record, plain
 
 Array = npt.NDArray[Any]
 
 SCHEMA = 1
-UNITS = {"irradiance": "W/m^2", "radiance": "W/m^2/sr", "variance": "(W/m^2)^2", "seconds": "s", "ledger": "W"}
-CONTENT = "irradiance.*: indirect, without albedo/pi; R, G, B: emission + albedo/pi (direct + indirect)"
 
 
 def write_results(comparison: Comparison, folder: Path) -> None:
@@ -42,19 +42,38 @@ def write_results(comparison: Comparison, folder: Path) -> None:
         If a file cannot be written.
     """
     for reference in comparison.references.values():
-        channels = _planes("irradiance", reference.irradiance) | _planes("variance", reference.variance)
-        channels["samples"] = np.asarray(reference.samples, np.float32)
-        _write_picture(comparison, folder, reference, channels)
+        _write_picture(comparison, folder, reference)
     scale = error_scale(comparison)
     brightness = maps.luminance_scale(comparison.truth.irradiance, comparison.covered)
     for result in comparison.results.values():
-        _write_picture(comparison, folder, result, _planes("irradiance", result.irradiance))
+        record = _write_picture(comparison, folder, result)
         for judge in result.against:
             painted = maps.paint(signed_error(comparison, result, judge), comparison.covered, scale)
-            _write_map(folder / _error_name(result.name, judge), painted, scale, f"{result.name} - {judge}")
+            title = f"{result.name} - {judge}"
+            write_encoded(folder / _error_name(result.name, judge), maps.with_legend(painted, scale, title), record)
         painted = maps.paint(maps.luminance(result.irradiance), comparison.covered, brightness)
-        _write_map(folder / f"{result.name}_false_colour.png", painted, brightness, result.name)
+        encoded = maps.with_legend(painted, brightness, result.name)
+        write_encoded(folder / _false_colour_name(result.name), encoded, record)
     write_text(folder / "results.json", canonical_json(as_json(comparison)) + "\n")
+
+
+def file_names(methods: Sequence[str]) -> list[str]:
+    """Return the names of all files that a comparison may write.
+
+    Parameters
+    ----------
+    methods : sequence of str
+        The methods compared.
+
+    Returns
+    -------
+    list of str
+        Without folder.
+    """
+    pictures = [f"{name}{suffix}" for name in (*methods, TRUTH, UNOCCLUDED) for suffix in (".exr", ".png")]
+    maps_of = [name for method in methods
+               for name in (_false_colour_name(method), *(_error_name(method, j) for j in (TRUTH, UNOCCLUDED)))]
+    return [*pictures, *maps_of, "results.json", "index.html"]
 
 
 def as_json(comparison: Comparison) -> dict[str, Any]:
@@ -73,6 +92,8 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     scene = comparison.scene
     content: dict[str, Any] = plain({
         "schema": SCHEMA,
+        "refgi": comparison.record["refgi"],
+        "provenance": comparison.record,
         "scene": {"name": scene.name, "description": scene.description, "faces": scene.face_count,
                   "lights": len(scene.lights), "exposure": scene.exposure, "camera": scene.camera},
         "size": [comparison.width, comparison.height],
@@ -88,32 +109,24 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     return content
 
 
-def plain(value: Any) -> Any:
-    """Turn settings and figures into finite JSON values.
+def record_of(comparison: Comparison, made: Reference | MethodResult) -> Record:
+    """Return the record of one picture of a comparison.
 
     Parameters
     ----------
-    value : object
-        Dataclasses, mappings, sequences, sets, numbers, text, types.
+    comparison : Comparison
+        What `compare` gave.
+    made : Reference or MethodResult
+        One of its pictures.
 
     Returns
     -------
-    object
-        The same as dict, list, str, int, float, bool and None.
+    dict
+        All that is needed to make it again.
     """
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if isinstance(value, dict) or hasattr(value, "items"):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, set | frozenset):
-        return sorted(map(plain, value))
-    if isinstance(value, list | tuple | np.ndarray):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
-    return value if value is None or isinstance(value, bool | int | float | str) else str(value)
+    if isinstance(made, Reference):
+        return {**comparison.record, **method_record(TRUTH, made.settings), **made.estimate}
+    return {**comparison.record, **method_record(made.name, made.settings)}
 
 
 def ledger_json(ledger: Any) -> dict[str, Any]:
@@ -170,27 +183,21 @@ def error_scale(comparison: Comparison) -> maps.Scale:
     return maps.error_scale(errors, comparison.covered)
 
 
-def _write_picture(comparison: Comparison, folder: Path, made: Reference | MethodResult,
-                   channels: dict[str, Array]) -> None:
-    channels |= {name: np.asarray(plane, np.float32) for name, plane in zip("RGB", made.radiance, strict=True)}
-    attributes = {"method": made.name, "settings": plain(made.settings), "scene": comparison.scene.name,
-                  "options": plain(comparison.options), "units": UNITS, "content": CONTENT,
-                  "versions": comparison.environment.get("versions", {})}
-    write_exr(folder / f"{made.name}.exr", channels, attributes)
-    write_png(folder / f"{made.name}.png", np.moveaxis(made.radiance, 0, -1), comparison.scene.exposure)
+def _write_picture(comparison: Comparison, folder: Path, made: Reference | MethodResult) -> Record:
+    """Write EXR and PNG, and return the record that they hold."""
+    record = record_of(comparison, made)
+    spread = (made.variance, made.samples) if isinstance(made, Reference) else (None, None)
+    write_exr(folder / f"{made.name}.exr", linear_planes(made.radiance, made.irradiance, *spread), record)
+    write_preview(folder / f"{made.name}.png", made.radiance, record)
+    return record
 
 
-def _write_map(path: Path, painted: maps.Pixels, scale: maps.Scale, title: str) -> None:
-    with whole_file(path) as temporary:
-        temporary.write_bytes(maps.with_legend(painted, scale, title))
+def _false_colour_name(method: str) -> str:
+    return f"{method}_false_colour.png"
 
 
 def _error_name(method: str, judge: str) -> str:
     return f"{method}_error.png" if judge == TRUTH else f"{method}_error_{judge}.png"
-
-
-def _planes(name: str, rgb: Array) -> dict[str, Array]:
-    return {f"{name}.{channel}": np.asarray(plane, np.float32) for channel, plane in zip("RGB", rgb, strict=True)}
 
 
 def _reference(reference: Reference, covered: Array) -> dict[str, Any]:
@@ -201,7 +208,7 @@ def _reference(reference: Reference, covered: Array) -> dict[str, Any]:
         "mean_irradiance": float(values.mean()),
         "standard_error_of_a_pixel": float(np.sqrt(reference.variance[:, covered]).mean()),
         "standard_error_of_the_mean": float(np.sqrt(reference.mean_variance).mean()),
-        "errors": reference.errors,
+        **reference.estimate,
         "files": [f"{reference.name}.exr", f"{reference.name}.png"],
     }
 
@@ -213,7 +220,7 @@ def _method(result: MethodResult) -> dict[str, Any]:
         "against": {judge: _measurement(m) for judge, m in result.against.items()},
         "flip": _flip(result.flip),
         "ledger": None if result.ledger is None else ledger_json(result.ledger),
-        "files": [f"{result.name}.exr", f"{result.name}.png", f"{result.name}_false_colour.png",
+        "files": [f"{result.name}.exr", f"{result.name}.png", _false_colour_name(result.name),
                   *(_error_name(result.name, judge) for judge in result.against)],
     }
 

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from refgi.compare.results import plain
 from refgi.image import canonical_json, write_exr, write_png, write_text
 from refgi.papers.outcome import Outcome, Reproduction
 from refgi.papers.records import Picture, Ratios, Table
+from refgi.provenance import plain, program
 
 SCHEMA = 1
 
@@ -72,6 +72,7 @@ def as_json(made: Reproduction) -> dict[str, Any]:
     """
     content: dict[str, Any] = plain({
         "schema": SCHEMA,
+        "refgi": program(),
         "paper": {"name": made.paper.name, "title": made.paper.title, "citation": made.paper.citation},
         "scale": made.scale,
         "asked": made.asked,

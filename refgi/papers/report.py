@@ -6,10 +6,10 @@ from typing import Any
 
 from refgi.compare.report import PAGE as COMMON
 from refgi.compare.report import TIMES, number, templates
-from refgi.compare.results import plain
 from refgi.image import png_bytes, write_text
 from refgi.papers.outcome import Outcome, Reproduction
 from refgi.papers.records import Cell, Figure, Picture, Ratios, Table
+from refgi.provenance import plain
 
 PAGE = Path(__file__).with_name("page")
 

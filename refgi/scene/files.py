@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from refgi.errors import InputError
 from refgi.scene.model import Camera, Light, Mesh
+from refgi.scene.source import was_read
 
 LONGEST_WORD, MOST_CANDIDATES = 200, 1000  # comparing words takes the square of their length, for each candidate
 
@@ -52,6 +53,7 @@ def read_bytes(path: Path) -> bytes:
         raise InputError(f"{path}: cannot be read: {error}") from error
     if not content:
         raise InputError(f"{path}: the file is empty")
+    was_read(path, content)
     return content
 
 

@@ -1,10 +1,11 @@
 """`load_scene`: a built-in name, a scene file or a mesh file in, a `Scene` out."""
 
+import dataclasses
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from refgi.errors import InputError, RefgiWarning, first_faults
+from refgi.errors import InputError, RefgiWarning, blame, first_faults
 from refgi.scene.builtin import SCENES, build_named
 from refgi.scene.files import did_you_mean, is_there, text_of
 from refgi.scene.framing import framed, lit
@@ -13,6 +14,7 @@ from refgi.scene.meshfile import READERS, read_mesh_file
 from refgi.scene.model import Camera, Light, Scene, merge
 from refgi.scene.power import shining
 from refgi.scene.scenefile import read_scene_file
+from refgi.scene.source import reading, source_of
 from refgi.stages import stage
 
 
@@ -51,21 +53,29 @@ def load_scene(
     >>> load_scene("cornell_box").face_count
     30
     """
+    with reading() as files:
+        scene = _found(source, camera, lights)
+    return dataclasses.replace(scene, source=source_of(str(source), files))
+
+
+def _found(source: str | Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
     name = str(source)
     base = name.partition(":")[0]
     if isinstance(source, str) and base in SCENES:
         return _with(build_named(name), camera, lights)
     path = Path(source)
     suffix = path.suffix.lower()
-    if suffix == ".json":
-        return read_scene_file(path, camera, lights)
-    if suffix in READERS:
-        return _of_mesh_file(path, camera, lights)
+    with blame(file=str(path)):
+        if suffix == ".json":
+            return read_scene_file(path, camera, lights)
+        if suffix in READERS:
+            return _of_mesh_file(path, camera, lights)
     if suffix or is_there(path):
         what = "a folder" if path.is_dir() else f"the suffix {suffix!r}"
         raise InputError(f"{path}: expected a scene name or a file named .json, {', '.join(READERS)}; got {what}"
-                         f"{did_you_mean(base, SCENES)}")
-    raise InputError(f"scene: expected one of {', '.join(SCENES)}, or a file; got {name!r}{did_you_mean(base, SCENES)}")
+                         f"{did_you_mean(base, SCENES)}", file=str(path))
+    raise InputError(f"scene: expected one of {', '.join(SCENES)}, or a file; got {name!r}{did_you_mean(base, SCENES)}",
+                     key="scene")
 
 
 def _with(scene: Scene, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
@@ -93,5 +103,5 @@ def _of_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] | N
         lacking += [] if found.lights else ["light"]
     if lacking:
         text = f"{path}: the file has no {' and no '.join(lacking)}; one was placed to fit the mesh"
-        warnings.warn(RefgiWarning(text), stacklevel=4)
+        warnings.warn(RefgiWarning(text), stacklevel=5)
     return Scene(text_of(path.stem), geometry, materials, camera, shining(lights, f"{path}: lights"))

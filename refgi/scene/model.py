@@ -29,6 +29,7 @@ from refgi.scene.light import (
 from refgi.scene.material import Material, MaterialTable, material_table
 from refgi.scene.mesh import Mesh, expect_all_sound
 from refgi.scene.room import expect_room
+from refgi.scene.source import Source
 from refgi.scene.values import (
     BLACK,
     LARGEST,
@@ -149,6 +150,7 @@ class Scene:
     lights: tuple[Light, ...]
     description: str = ""
     exposure: float = 1.0  # factor before the sRGB curve in PNG pictures; of no other meaning
+    source: Source | None = None  # where `load_scene` had it from; None: it was made in Python
 
     def __post_init__(self) -> None:
         expect(is_number(self.exposure) and self.exposure > 0, "exposure", "a finite number > 0", self.exposure)

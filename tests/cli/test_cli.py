@@ -229,7 +229,7 @@ def test_explain_tells_where_the_power_goes(evidence):
 
 def test_compare_writes_everything_and_prints_a_table(tmp_path):
     result = run("compare", "cornell_box", *TINY, "--methods", "sii", "--set", "sii.lights=16", "--set",
-                 "truth.samples=24", "--out", tmp_path / "new" / "out")
+                 "truth.samples=24", "--parents", "--out", tmp_path / "new" / "out")
     assert result.exit_code == 0, result.stderr
     folder = tmp_path / "new" / "out"
     assert {"index.html", "results.json", "sii.exr", "sii.png", "sii_error.png", "truth.exr"} <= {

@@ -242,10 +242,16 @@ def test_a_bare_mesh_with_camera_and_light_needs_no_warning(plate, tmp_path):
     assert "warning" not in result.stderr
 
 
-def test_a_wholly_black_picture_is_said_aloud(tmp_path):
-    result = run("cornell_box", *TINY, "--out", tmp_path / "a.png", "--eye", "0,0,50", "--target", "0,0,100")
+def test_a_camera_that_sees_nothing_is_refused_unless_one_wants_it(tmp_path):
+    """A batch may have empty views; else it is a wrong camera, and a black picture would hide that."""
+    away = ["cornell_box", *TINY, "--eye", "0,0,50", "--target", "0,0,100", "--out", tmp_path / "new"]
+    assert refused(run(*away), "camera: expected a view of some surface", "--allow-empty")
+    assert not list(tmp_path.iterdir())
+    result = run(*away, "--allow-empty")
     assert result.exit_code == 0
     assert "wholly black: the camera sees no surface" in result.stderr
+    assert not any(plane.any() for plane in read_exr(tmp_path / "new" / "cornell_box_sii.exr")[0].values())
+    assert run("--again", tmp_path / "new" / "cornell_box_sii.exr").exit_code == 0
 
 
 def test_a_picture_without_indirect_light_is_said_aloud(plate, tmp_path):

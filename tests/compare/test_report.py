@@ -14,7 +14,8 @@ import pytest
 from refgi.compare.plot import Point, time_against_error
 from refgi.compare.report import PAGE, ledger_cells, number, page, write_report
 from refgi.errors import RefgiWarning
-from refgi.image import tone_map
+from refgi.image import is_from_refgi, tone_map
+from refgi.scene.source import Source
 
 VOID = {"meta", "img", "input", "br", "link", "hr"}
 
@@ -100,6 +101,26 @@ def test_stages_settings_and_reasons_are_told(html):
         assert said in text
 
 
+def test_the_page_says_what_its_pictures_were_made_of(html, comparison):
+    """By hand: triangle, spot and camera of the comparison made by hand."""
+    section = re.search(r'<details id="provenance">.*?</details>', html, re.DOTALL)[0]
+    rows = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", section))
+    assert rows["scene"] == "made in Python"
+    assert rows["geometry"] == f"1 faces, SHA-256 {comparison.record['scene']['geometry_sha256']}"
+    assert rows["camera"] == "eye 0, 0, 5; target 0, 0, 0; up 0, 1, 0; vfov 40°; width 48; height 36"
+    assert rows["light 0"] == ("spot; position 0, 2, 0; direction 0, -1, 0; inner half angle 17.1887°; "
+                               "outer half angle 28.6479°; intensity 9, 9, 9")
+    assert rows["rsm resolution"] == "512"
+    assert rows["refgi"].startswith("0.1.0, commit ")
+    assert "refgi render --again sii.exr" in section
+
+
+def test_files_of_a_scene_are_on_the_page(comparison):
+    scene = dataclasses.replace(comparison.scene, source=Source("room<1>.json", (("room<1>.json", "ab" * 32),)))
+    assert f"<dt>file room&lt;1&gt;.json</dt><dd>SHA-256 {'ab' * 32}</dd>" in page(
+        dataclasses.replace(comparison, scene=scene))
+
+
 def test_ledgers_are_shown_of_methods_that_have_one(html):
     ledger = re.search(r'<table class="ledger">.*?</table>', html, re.DOTALL)[0]
     assert html.count("<table class=\"ledger\">") == 1
@@ -140,6 +161,7 @@ def test_without_methods_that_worked_there_is_still_a_page(comparison):
 def test_equal_comparisons_give_equal_pages(comparison, tmp_path):
     write_report(comparison, tmp_path)
     assert (tmp_path / "index.html").read_text("utf-8") == page(comparison)
+    assert is_from_refgi(tmp_path / "index.html")
 
 
 def test_the_viewer_stays_small():

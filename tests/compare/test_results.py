@@ -1,5 +1,6 @@
 """A comparison's files: all there, whole, and equal to what was compared."""
 
+import dataclasses
 import json
 import math
 import os
@@ -14,8 +15,9 @@ import pytest
 from pydantic import BaseModel, ConfigDict
 
 from refgi.compare import maps
-from refgi.compare.results import as_json, plain, signed_error, write_results
-from refgi.image import read_exr
+from refgi.compare.results import as_json, file_names, signed_error, write_results
+from refgi.image import is_from_refgi, read_exr, read_png_attributes
+from refgi.provenance import plain
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
@@ -95,12 +97,41 @@ class SceneJson(Strict):
     camera: dict
 
 
+class ProgramJson(Strict):
+    version: str
+    git: str = ""
+
+
+class SceneRecord(Strict):
+    source: str | None
+    files: dict[str, str]
+    name: str
+    faces: int
+    geometry_sha256: str
+    materials_sha256: str
+    camera: dict
+    lights: list[dict]
+
+
+class RecordJson(Strict):
+    provenance: int
+    refgi: ProgramJson
+    versions: dict[str, str | None]
+    scene: SceneRecord
+    options: dict
+    exposure: float
+    units: dict[str, str]
+    content: str
+
+
 class Results(BaseModel):
     """The schema of results.json."""
 
     model_config = ConfigDict(extra="forbid", strict=False)
 
     schema_: int
+    refgi: ProgramJson
+    provenance: RecordJson
     scene: SceneJson
     size: tuple[int, int]
     covered_pixels: int
@@ -156,6 +187,23 @@ def test_the_pixels_are_kept_to_the_bit(comparison, tmp_path):
     assert attributes["units"]["irradiance"] == "W/m^2"
     truth, _ = read_exr(tmp_path / "truth.exr")
     assert np.array_equal(truth["variance.G"], comparison.truth.variance[1].astype(np.float32))
+
+
+def test_every_file_says_how_it_was_made(comparison, tmp_path):
+    """A PNG says what the EXR of the same picture says; a reference adds what its estimate came to."""
+    references = {name: dataclasses.replace(reference, estimate={"estimate": {"passes": 7}})
+                  for name, reference in comparison.references.items()}
+    comparison = dataclasses.replace(comparison, references=references)
+    write_results(comparison, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} < set(file_names(comparison.results))
+    for name, method in (("sii", "sii"), ("vpl", "vpl"), ("truth", "truth"), ("unoccluded", "truth")):
+        record = read_exr(tmp_path / f"{name}.exr")[1]
+        assert record["method"] == method
+        assert record["scene"]["camera"]["width"] == 48
+        assert record.get("estimate") == ({"passes": 7} if method == "truth" else None)
+        for path in tmp_path.glob(f"{name}*.png"):
+            assert read_png_attributes(path) == record
+    assert all(map(is_from_refgi, tmp_path.iterdir()))
 
 
 def test_equal_comparisons_give_equal_files(comparison, tmp_path):

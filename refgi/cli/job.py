@@ -1,0 +1,173 @@
+"""What `refgi render` is asked to render: by its options, or by the record of a picture that is to be made again."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from refgi.errors import InputError
+
+if TYPE_CHECKING:
+    from refgi.provenance import Job
+
+BESIDE = frozenset({"again", "scene_path", "exposure", "out", "threads", "parents", "force", "allow_empty",
+                    "json", "debug"})
+
+
+def asked(options: dict[str, Any]) -> "Job":
+    """Return what the options say, with the scene loaded.
+
+    Parameters
+    ----------
+    options : dict
+        Those of the verb, by parameter.
+
+    Returns
+    -------
+    Job
+        What to render.
+
+    Raises
+    ------
+    InputError
+        If a setting, the scene, the camera or a light is not usable.
+    """
+    import dataclasses
+
+    from refgi.cli.settings import read_settings
+    from refgi.cli.view import View
+    from refgi.methods import find_method
+    from refgi.provenance import Job
+
+    method = options["method"]
+    settings = read_settings(find_method(method).load()[1], options["pairs"], options["seed"], method)
+    scene = View(**{field.name: options[field.name] for field in dataclasses.fields(View)}).load()
+    frame = {key: options[key] for key in ("dtype", "rsm_resolution", "shadows")}
+    return Job(scene, method, settings, frame, scene.exposure)
+
+
+def recorded(file: str, scene: str | None) -> "Job":
+    """Return what the record of a picture says, with the scene loaded and found to be the same.
+
+    Parameters
+    ----------
+    file : str
+        An EXR that refgi wrote.
+    scene : str or None
+        Where its scene is now.
+
+    Returns
+    -------
+    Job
+        What to render.
+
+    Raises
+    ------
+    InputError
+        If the file has no record or the scene is not the same any more.
+    """
+    from refgi.provenance import job_of, read_record
+
+    path = Path(file)
+    return job_of(read_record(path), path, scene)
+
+
+def require_either(ctx: click.Context) -> None:
+    """Refuse a run without a scene, and one that is to make a picture again but otherwise.
+
+    Parameters
+    ----------
+    ctx : click.Context
+        Of the verb.
+
+    Raises
+    ------
+    click.UsageError
+        If an argument or option is missing or too many.
+    """
+    given = {parameter.name: parameter for parameter in ctx.command.params
+             if parameter.name and ctx.get_parameter_source(parameter.name) is ParameterSource.COMMANDLINE}
+    by_name = {parameter.name: parameter for parameter in ctx.command.params}
+    if "again" in given:
+        more = [name for name in given if name not in BESIDE]
+        if more:
+            names = ", ".join(given[name].opts[-1] if name != "scene" else "SCENE" for name in more)
+            raise click.UsageError(f"--again makes a picture as it was; it takes no {names}", ctx)
+        return
+    if "scene_path" in given:
+        raise click.UsageError("--scene says where the scene of --again is now; without it name the SCENE alone", ctx)
+    for name in ("scene", "out"):
+        if name not in given:
+            raise click.MissingParameter(ctx=ctx, param=by_name[name])
+
+
+def differences(file: Path, planes: dict[str, Any]) -> list[str]:
+    """Return in what a picture made again differs from the one in a file.
+
+    Parameters
+    ----------
+    file : Path
+        An EXR that refgi wrote.
+    planes : dict of str to (h, w) ndarray
+        Planes by channel, as they would be written.
+
+    Returns
+    -------
+    list of str
+        One text a channel that is not the same to the bit; none where all are.
+    """
+    import numpy as np
+
+    from refgi.image import read_exr
+
+    found = []
+    for name, plane in read_exr(file)[0].items():
+        made = planes.get(name)
+        if made is None or made.shape != plane.shape:
+            found.append(f"{name} is missing or of another size")
+        elif count := int((made.view(np.uint32) != plane.view(np.uint32)).sum()):
+            found.append(f"{name} in {count} of {plane.size} pixels")
+    return found
+
+
+def stem(scene: str) -> str:
+    """Return how files are named after a scene.
+
+    Parameters
+    ----------
+    scene : str
+        A built-in name with or without parameters, or a file.
+
+    Returns
+    -------
+    str
+        Name without folder, suffix and parameters.
+    """
+    from refgi.scene import builtin_scenes
+    from refgi.scene.files import text_of
+
+    base = scene.partition(":")[0]
+    return base if base in builtin_scenes() else text_of(Path(scene).stem)
+
+
+def require_view(covered: bool, scene: str, allowed: bool) -> None:
+    """Refuse a picture on which there is nothing, which nobody wants by intention.
+
+    Parameters
+    ----------
+    covered : bool
+        Whether the camera sees any surface.
+    scene : str
+        The scene's name.
+    allowed : bool
+        Whether an empty picture is as good as another.
+
+    Raises
+    ------
+    InputError
+        If it is empty and must not be.
+    """
+    if not (covered or allowed):
+        raise InputError(f"scene {scene!r}: camera: expected a view of some surface, got one past all of it; "
+                         "--allow-empty writes the black picture", key="camera")

@@ -1,0 +1,64 @@
+"""A picture's files, the same from every command: the planes of its EXR, and its PNG."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.image import write_png
+from refgi.provenance import Record
+
+Array = npt.NDArray[Any]
+
+
+def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = None,
+                  samples: Array | None = None) -> dict[str, Array]:
+    """Return the float32 planes of a picture's EXR.
+
+    Parameters
+    ----------
+    radiance : (3, h, w) ndarray
+        What the camera receives, W/m^2/sr: R, G, B.
+    irradiance : (3, h, w) ndarray
+        Indirect irradiance, W/m^2: irradiance.R, .G, .B.
+    variance : (3, h, w) ndarray, optional
+        Of the irradiance where it is the mean of an estimate, (W/m^2)^2: variance.R, .G, .B.
+    samples : (h, w) ndarray, optional
+        How many of them each pixel has.
+
+    Returns
+    -------
+    dict of str to (h, w) ndarray
+        Planes by channel.
+    """
+    planes = _planes("", radiance) | _planes("irradiance.", irradiance)
+    if variance is not None:
+        planes |= _planes("variance.", variance)
+    if samples is not None:
+        planes["samples"] = np.asarray(samples, np.float32)
+    return planes
+
+
+def write_preview(path: Path, radiance: Array, record: Record) -> None:
+    """Write a picture as a PNG, tone-mapped at the exposure of its record, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        Where to.
+    radiance : (3, h, w) ndarray
+        What the camera receives, W/m^2/sr.
+    record : dict
+        How it was made.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    write_png(path, np.moveaxis(radiance, 0, -1), record["exposure"], record)
+
+
+def _planes(prefix: str, rgb: Array) -> dict[str, Array]:
+    return {f"{prefix}{channel}": np.asarray(plane, np.float32) for channel, plane in zip("RGB", rgb, strict=True)}

@@ -1,0 +1,138 @@
+"""EXR in and out: every bit kept, and checked.
+
+An EXR written here holds contiguous float32 planes (ids as uint32), ZIP compressed, and one string attribute: a
+canonical JSON object with whatever the caller says (settings, units, versions) and a SHA-256 of everything. The file
+is read back and compared to the bit before it gets its name, because OpenEXR can write wrong pixels and read damaged
+ones without an error.
+"""
+
+import contextlib
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import InputError, expect
+from refgi.image.mark import MARK, canonical_json
+from refgi.image.whole import is_text, whole_file
+
+Array = npt.NDArray[Any]
+Channels = dict[str, Array]
+
+DIGEST = "sha256"  # reserved key of the attribute: over the other keys and all planes
+
+
+def write_exr(path: str | Path, channels: Mapping[str, Array], attributes: Mapping[str, Any] | None = None) -> None:
+    """Write planes as one multi-channel EXR, verified after writing.
+
+    Parameters
+    ----------
+    path : str or Path
+        A name that ends in ``.exr``.
+    channels : mapping of str to (h, w) ndarray
+        Planes of one size, float32 or uint32. Every bit is kept, NaN and infinity included.
+    attributes : mapping, optional
+        Settings, units, versions: finite JSON values.
+
+    Raises
+    ------
+    InputError
+        If a plane or attribute is not usable or the file cannot be written, or reads back different.
+    """
+    path = Path(path)
+    expect(path.suffix.lower() == ".exr", "path", "a name that ends in .exr", str(path))
+    expect(is_text(str(path)), "path", "a name in UTF-8, which is all that OpenEXR opens", str(path))
+    planes = _planes(channels)
+    text = _signed(attributes or {}, planes)
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, MARK: text}
+    with whole_file(path) as temporary:
+        try:
+            OpenEXR.File(header, dict(planes)).write(str(temporary))
+        except RuntimeError as error:
+            raise InputError(f"{path}: cannot be written: {error}") from error
+        if not _same_planes(planes, read_exr(temporary)[0]):
+            raise InputError(f"{path}: reads back different from what was written")
+
+
+def read_exr(path: str | Path) -> tuple[Channels, dict[str, Any]]:
+    """Read the planes and attributes of an EXR.
+
+    Parameters
+    ----------
+    path : str or Path
+        A single-part EXR, ours or another program's.
+
+    Returns
+    -------
+    channels : dict of str to (h, w) ndarray
+        One contiguous plane a channel: float32, uint32 or (never ours) float16.
+    attributes : dict
+        What `write_exr` was given; empty for another program's file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not an EXR, was cut short or differs from what was written.
+    """
+    path = Path(path)
+    expect(path.is_file(), "path", "a file", str(path))
+    import OpenEXR
+
+    try:  # it prints what it finds damaged, where somebody may want to read JSON
+        with contextlib.redirect_stdout(io.StringIO()), OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = {name: np.ascontiguousarray(channel.pixels) for name, channel in file.channels().items()}
+            text = file.header().get(MARK)
+    except Exception as error:  # OpenEXR raises RuntimeError, but also IndexError or TypeError on damaged headers
+        raise InputError(f"{path}: not a readable EXR: {error}") from error
+    expect(bool(channels), str(path), "an EXR with whole pixel data", "none: cut short or damaged")
+    return channels, _verified(text, channels, path)
+
+
+def _planes(channels: Mapping[str, Array]) -> Channels:
+    expect(len(channels) > 0, "channels", "at least one plane", "none")
+    shape = next(iter(channels.values())).shape
+    for name, plane in channels.items():
+        expect(plane.ndim == 2 and plane.size > 0 and plane.shape == shape, f"channel {name!r}",
+               f"a plane of shape {shape}, (h, w)", plane.shape)
+        expect(plane.dtype in (np.float32, np.uint32), f"channel {name!r}", "float32 or uint32", plane.dtype.name)
+    return {name: np.ascontiguousarray(plane) for name, plane in sorted(channels.items())}
+
+
+def _signed(attributes: Mapping[str, Any], planes: Channels) -> str:
+    expect(DIGEST not in attributes, "attributes", f"no key {DIGEST!r}, which is reserved", list(attributes))
+    return canonical_json({**attributes, DIGEST: _digest(attributes, planes)})
+
+
+def _verified(text: Any, channels: Channels, path: Path) -> dict[str, Any]:
+    if text is None:
+        return {}
+    try:
+        attributes = json.loads(text)
+        told = attributes.pop(DIGEST)
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(f"{path}: damaged: its {MARK!r} attribute is not what refgi writes") from error
+    if told != _digest(attributes, channels):
+        raise InputError(f"{path}: damaged: the pixels or attributes differ from what was written ({DIGEST})")
+    return dict(attributes)
+
+
+def _digest(attributes: Mapping[str, Any], planes: Channels) -> str:
+    digest = hashlib.sha256(canonical_json(attributes).encode())
+    for name, plane in sorted(planes.items()):
+        digest.update(f"\0{name} {plane.dtype.name} {plane.shape[0]}x{plane.shape[1]}\0".encode())
+        digest.update(plane.astype(plane.dtype.newbyteorder("<"), copy=False).data)
+    return digest.hexdigest()
+
+
+def _same_planes(a: Channels, b: Channels) -> bool:
+    return a.keys() == b.keys() and all(
+        a[name].dtype == b[name].dtype and np.array_equal(a[name].view(np.uint32), b[name].view(np.uint32))
+        for name in a
+    )

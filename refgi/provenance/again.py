@@ -1,0 +1,181 @@
+"""A picture made again from its record: the same scene, looked for where it may lie now, and the same settings."""
+
+import dataclasses
+import warnings
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
+
+from refgi.errors import InputError, RefgiWarning, blame, expect
+from refgi.image import read_exr
+from refgi.methods import find_method
+from refgi.provenance.content import camera_from, geometry_digest, light_from, materials_digest
+from refgi.provenance.program import program, versions
+from refgi.provenance.record import VERSION, Record
+from refgi.scene import Scene, builtin_scenes, load_scene
+from refgi.scene.files import is_there
+
+if TYPE_CHECKING:
+    from refgi.provenance.frames import SequenceFrame
+
+COMPUTES = ("numpy", "numba", "llvmlite", "scipy", "embreex")  # what may change a bit of a picture
+PARTS = {"geometry": geometry_digest, "materials": materials_digest}
+
+
+class Job(NamedTuple):
+    """What is to be rendered, and by what."""
+
+    scene: Scene
+    method: str
+    settings: Any  # as they were asked for
+    options: dict[str, Any]  # of the frame: dtype, rsm_resolution, shadows
+    exposure: float
+    passes: int | None = None  # that an estimate bounded by time or error came to
+    frame: "SequenceFrame | None" = None  # where it is one of a sequence
+
+    @property
+    def repeatable(self) -> Any:
+        """Settings that end after the recorded passes, and not by the clock or in some earlier run's checkpoint."""
+        if self.passes is None:
+            return self.settings
+        samples = self.passes * (self.settings.picks_per_pass + self.settings.directions_per_pass)
+        return dataclasses.replace(self.settings, samples=samples, seconds=None, target_error=None, checkpoint=None)
+
+
+def read_record(path: Path) -> Record:
+    """Read the record of a picture.
+
+    Parameters
+    ----------
+    path : Path
+        An EXR that refgi wrote.
+
+    Returns
+    -------
+    dict
+        Whole and of a known version.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, not from refgi, or holds no record of a picture.
+    """
+    with blame(file=str(path)):
+        record = read_exr(path)[1]
+        expect(bool(record), str(path), "an EXR that refgi wrote", "another program's")
+        expect("provenance" in record and "method" in record, str(path), "the record of how a picture was made",
+               "an EXR of refgi without one")
+        expect(record["provenance"] == VERSION, f"{path}: provenance", f"version {VERSION} of the record",
+               record["provenance"])
+    return record
+
+
+def job_of(record: Mapping[str, Any], path: Path, scene: str | None = None) -> Job:
+    """Return what a record says was rendered, with the scene loaded and found to be the same.
+
+    Parameters
+    ----------
+    record : mapping
+        What `read_record` gave.
+    path : Path
+        The picture, for messages and as a place from where its scene is looked for.
+    scene : str, optional
+        Where the scene is now; looked for where absent.
+
+    Returns
+    -------
+    Job
+        Ready to be rendered.
+
+    Raises
+    ------
+    InputError
+        If the scene is not found or not the same any more, or a setting is not known to this version.
+
+    Warns
+    -----
+    RefgiWarning
+        If the picture was made by another version.
+    """
+    with blame(file=str(path)):
+        _warn_of_other_versions(record, path)
+        try:
+            wanted = find_method(record["method"]).load()[1]
+            return Job(_same_scene(record["scene"], path, scene), record["method"],
+                       _settings(wanted, record["settings"], path), dict(record["options"]), record["exposure"],
+                       record.get("estimate", {}).get("passes"), _frame(record, path))
+        except (KeyError, TypeError, AttributeError) as error:
+            raise InputError(f"{path}: expected a whole record, got one without {error}") from error
+
+
+def _same_scene(record: Mapping[str, Any], path: Path, moved: str | None) -> Scene:
+    camera, lights = camera_from(record["camera"]), [light_from(light) for light in record["lights"]]
+    name = moved if moved is not None else _found(record["source"], path)
+    scene = load_scene(name, camera=camera, lights=lights)
+    changed = [part for part, digest in PARTS.items() if digest(scene) != record[f"{part}_sha256"]]
+    if changed:
+        now = dict(scene.source.files) if scene.source else {}
+        files = [file for file, digest in record["files"].items() if now.get(file) != digest]
+        raise InputError(f"{path}: scene {name}: expected the scene of the picture, got other "
+                         f"{' and '.join(changed)}" + (f" (changed: {', '.join(files)})" if files else ""),
+                         key="scene")
+    return scene
+
+
+def _found(source: str | None, path: Path) -> str:
+    """Return where a scene or path lies: from the current folder, or from a folder above the picture."""
+    if source is None:
+        raise InputError(f"{path}: the scene was made in Python; --scene names one in a file", key="scene")
+    if source.partition(":")[0] in builtin_scenes():
+        return source
+    for place in _places(source, path):
+        if is_there(place):
+            return str(place)
+    raise InputError(f"{path}: {source}: not there, neither from the current folder nor from one above the "
+                     "picture (--scene says where a scene is)", key="scene")
+
+
+def _places(source: str, path: Path) -> Iterator[Path]:
+    yield Path(source)
+    for folder in path.resolve().parents:
+        yield folder / source
+
+
+def _settings(wanted: type[Any], values: Mapping[str, Any], path: Path) -> Any:
+    from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+    hints, names = get_type_hints(wanted), [field.name for field in dataclasses.fields(wanted)]
+    if set(values) != set(names):
+        raise InputError(f"{path}: {wanted.__name__}: expected {', '.join(names)}; got {', '.join(values)}",
+                         key="settings")
+    try:
+        read = {key: TypeAdapter(hints[key], config=ConfigDict(extra="forbid")).validate_python(value)
+                for key, value in values.items()}
+    except ValidationError as error:
+        raise InputError(f"{path}: {wanted.__name__}: {error.errors()[0]['msg']}", key="settings") from error
+    return wanted(**read)
+
+
+def _frame(record: Mapping[str, Any], path: Path) -> "SequenceFrame | None":
+    if "frame" not in record:
+        return None
+    from refgi.provenance.frames import SequenceFrame, require_same_path
+    from refgi.sssil.temporal import TemporalSettings
+
+    found, temporal = _found(record["path"]["source"], path), record["temporal"]
+    require_same_path(record["path"], found)
+    return SequenceFrame(record["frame"], record["of"], found,
+                         None if temporal is None else _settings(TemporalSettings, temporal, path))
+
+
+def _warn_of_other_versions(record: Mapping[str, Any], path: Path) -> None:
+    then, now = _identity(record), _identity({"refgi": program(), "versions": versions()})
+    other = [name for name in now if then.get(name) != now[name]]
+    if other:
+        text = ", ".join(f"{name} {then.get(name) or 'unknown'} (here {now[name] or 'unknown'})" for name in other)
+        warnings.warn(RefgiWarning(f"{path}: made by {text}: bits may differ"), stacklevel=3)
+
+
+def _identity(record: Mapping[str, Any]) -> dict[str, str | None]:
+    program, versions = record["refgi"], record["versions"]
+    return {"refgi": program["version"], "git": program.get("git")} | {name: versions.get(name) for name in COMPUTES}

@@ -1,0 +1,124 @@
+"""What a scene consists of, as JSON values and back: digests of its surfaces, its camera and lights in full."""
+
+import dataclasses
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from refgi.errors import InputError
+from refgi.image import canonical_json
+from refgi.provenance.plain import plain
+from refgi.scene import Camera, DirectionalLight, Light, PointLight, Scene, SpotLight
+
+LIGHTS: dict[str, type[SpotLight] | type[PointLight] | type[DirectionalLight]] = {
+    "spot": SpotLight, "point": PointLight, "directional": DirectionalLight}
+
+
+def geometry_digest(scene: Scene) -> str:
+    """Return SHA-256 over all triangles, their normals and which material each has.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any scene.
+
+    Returns
+    -------
+    str
+        Equal on every machine.
+    """
+    shape, digest = scene.geometry, hashlib.sha256()
+    for array, kind in ((shape.vertices, "<f8"), (shape.faces, "<i4"), (shape.material_of_face, "<i4"),
+                        (shape.vertex_normals, "<f8")):
+        plane = np.zeros(0, kind) if array is None else np.ascontiguousarray(array, kind)
+        digest.update(f"{plane.shape}\0".encode() + plane.tobytes())
+    return digest.hexdigest()
+
+
+def materials_digest(scene: Scene) -> str:
+    """Return SHA-256 over all materials, their names and their order.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any scene.
+
+    Returns
+    -------
+    str
+        Equal on every machine.
+    """
+    return hashlib.sha256(canonical_json(plain(scene.materials)).encode()).hexdigest()
+
+
+def light_json(light: Light) -> dict[str, Any]:
+    """Return a light as JSON values.
+
+    Parameters
+    ----------
+    light : Light
+        Any light.
+
+    Returns
+    -------
+    dict
+        Its type and all its fields; angles in rad, so that no bit is lost.
+    """
+    kind = next(name for name, one in LIGHTS.items() if isinstance(light, one))
+    fields: dict[str, Any] = plain(light)
+    return {"type": kind} | fields
+
+
+def light_from(content: Mapping[str, Any]) -> Light:
+    """Return the light that `light_json` wrote.
+
+    Parameters
+    ----------
+    content : mapping
+        What it gave.
+
+    Returns
+    -------
+    Light
+        Equal to the bit.
+
+    Raises
+    ------
+    InputError
+        If the content is not a light's.
+    """
+    made: Light = _made(LIGHTS.get(str(content.get("type")), PointLight),
+                        {key: value for key, value in content.items() if key != "type"}, "light")
+    return made
+
+
+def camera_from(content: Mapping[str, Any]) -> Camera:
+    """Return the camera whose fields are given.
+
+    Parameters
+    ----------
+    content : mapping
+        What `plain` made of a camera.
+
+    Returns
+    -------
+    Camera
+        Equal to the bit.
+
+    Raises
+    ------
+    InputError
+        If the content is not a camera's.
+    """
+    camera: Camera = _made(Camera, content, "camera")
+    return camera
+
+
+def _made(kind: type[Any], content: Mapping[str, Any], key: str) -> Any:
+    known = {field.name for field in dataclasses.fields(kind)}
+    if set(content) != known:
+        raise InputError(f"{key}: expected the keys {', '.join(sorted(known))}, got {', '.join(sorted(content))}",
+                         key=key)
+    return kind(**content)

@@ -1,0 +1,173 @@
+"""One frame of a sequence: its record, and the frame made again with those before it that its light is blended with."""
+
+import hashlib
+from collections.abc import Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from refgi.errors import InputError, expect
+from refgi.methods import Picture, find_method
+from refgi.provenance.content import light_json
+from refgi.provenance.plain import plain
+from refgi.provenance.record import Record
+from refgi.scene import Scene
+from refgi.scene.files import read_bytes
+from refgi.scene.path import Path as Way
+from refgi.scene.path import camera_and_lights, scenes_along
+from refgi.scene.pathfile import read_path
+from refgi.sssil.temporal import Sequence, TemporalSettings
+
+
+class SequenceFrame(NamedTuple):
+    """Which frame of which sequence."""
+
+    number: int
+    of: int
+    path: str  # TOML file of the path
+    temporal: TemporalSettings | None
+
+
+def path_record(path: str, of: int, temporal: TemporalSettings | None) -> Record:
+    """Return what all frames of a sequence share beyond scene and method.
+
+    Parameters
+    ----------
+    path : str
+        TOML file of the path.
+    of : int
+        How many frames there are.
+    temporal : TemporalSettings or None
+        The temporal filter.
+
+    Returns
+    -------
+    dict
+        JSON values.
+    """
+    return {"path": {"source": path, "sha256": _digest(path)}, "of": of, "temporal": plain(temporal)}
+
+
+def frame_record(scene: Scene, way: Way, number: int, of: int) -> Record:
+    """Return what one frame adds: its number, its camera and its lights in full.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without the path.
+    way : Path
+        The path.
+    number, of : int
+        Which frame of how many.
+
+    Returns
+    -------
+    dict
+        JSON values.
+    """
+    camera, lights = camera_and_lights(scene, way, number, of)
+    return {"frame": number, "at_frame": {"camera": plain(camera), "lights": [light_json(light) for light in lights]}}
+
+
+def whole_record(scene: Scene, frame: SequenceFrame) -> Record:
+    """Return what a frame adds to the record of scene and method.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without the path.
+    frame : SequenceFrame
+        Which frame.
+
+    Returns
+    -------
+    dict
+        JSON values of `path_record` and `frame_record`.
+    """
+    way, _ = read_path(frame.path, scene)
+    return {**path_record(frame.path, frame.of, frame.temporal), **frame_record(scene, way, frame.number, frame.of)}
+
+
+def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
+    """Return in what two records of frames are not of one sequence; how scene and path were named does not count.
+
+    Parameters
+    ----------
+    a, b : mapping
+        Records.
+
+    Returns
+    -------
+    list of str
+        Keys, those of objects after a dot; none where nothing differs.
+    """
+    left, right = (_flat({**one, **{key: {**one.get(key, {}), "source": None} for key in ("scene", "path")}})
+                   for one in (a, b))
+    return sorted(key for key in left.keys() | right.keys() if left.get(key) != right.get(key))
+
+
+def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame, options: Mapping[str, Any]) -> Picture:
+    """Render one frame of a sequence, after those before it where the temporal filter needs them.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without the path.
+    method : str
+        Short name of a method.
+    settings : dataclass
+        Its settings in the first frame.
+    frame : SequenceFrame
+        Which frame.
+    options : mapping
+        Of every `Frame`.
+
+    Returns
+    -------
+    Picture
+        The same to the bit as in the whole sequence.
+
+    Raises
+    ------
+    InputError
+        If the path is not usable, or the frames before end by the clock.
+    """
+    expect(getattr(settings, "seconds", None) is None, "seconds", "none for a frame of a sequence that is made again",
+           getattr(settings, "seconds", None))
+    way, _ = read_path(frame.path, scene)
+    first = frame.number if frame.temporal is None else 0
+    scenes = islice(scenes_along(scene, way, frame.of), first, frame.number + 1)
+    sequence = Sequence(scenes, settings, frame.temporal, method=find_method(method).load()[0], **options)
+    for step in sequence.over(scenes, first):
+        made = step
+    return Picture(made.frame, made.irradiance, made.radiance)
+
+
+def require_same_path(record: Mapping[str, Any], found: str) -> None:
+    """Refuse a path that is not the one of a record.
+
+    Parameters
+    ----------
+    record : mapping
+        What `path_record` gave under `path`.
+    found : str
+        Where the path lies now.
+
+    Raises
+    ------
+    InputError
+        If its content is another.
+    """
+    if _digest(found) != record["sha256"]:
+        raise InputError(f"{found}: expected the path of the sequence, got another (SHA-256)", file=found, key="path")
+
+
+def _digest(path: str) -> str:
+    return hashlib.sha256(read_bytes(Path(path))).hexdigest()
+
+
+def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in content.items():
+        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
+    return flat

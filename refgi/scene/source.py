@@ -1,0 +1,70 @@
+"""Where a scene came from: how it was named, and the files that were read for it."""
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Iterator
+from contextvars import ContextVar
+from pathlib import Path
+from typing import NamedTuple
+
+_reading: ContextVar[dict[Path, str] | None] = ContextVar("_reading", default=None)
+
+
+class Source(NamedTuple):
+    """How a scene was named, and SHA-256 of every file read for it, named relative to the folder of the first."""
+
+    name: str
+    files: tuple[tuple[str, str], ...] = ()
+
+
+@contextlib.contextmanager
+def reading() -> Iterator[dict[Path, str]]:
+    """Gather the files that are read inside the block.
+
+    Yields
+    ------
+    dict of Path to str
+        SHA-256 by path, in the order of reading; complete when the block ends.
+    """
+    files: dict[Path, str] = {}
+    token = _reading.set(files)
+    try:
+        yield files
+    finally:
+        _reading.reset(token)
+
+
+def was_read(path: Path, content: bytes) -> None:
+    """Take note of a file's content where somebody asked by `reading`.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    content : bytes
+        All of it.
+    """
+    files = _reading.get()
+    if files is not None:
+        files[path] = hashlib.sha256(content).hexdigest()
+
+
+def source_of(name: str, files: dict[Path, str]) -> Source:
+    """Return the source of a scene.
+
+    Parameters
+    ----------
+    name : str
+        What `load_scene` was given.
+    files : dict of Path to str
+        What `reading` gathered.
+
+    Returns
+    -------
+    Source
+        With each file's path as seen from the first one's folder, so that it stays the same when all are moved.
+    """
+    folder = next(iter(files), Path()).parent
+    return Source(name, tuple((Path(os.path.relpath(path, folder)).as_posix(), digest)
+                              for path, digest in files.items()))

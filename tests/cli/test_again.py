@@ -1,0 +1,304 @@
+"""`refgi render --again`: a picture made again to the bit from what its file says, and what stands in the way of it."""
+
+import dataclasses
+import json
+import math
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from refgi.cli.group import VerbGroup
+from refgi.image import read_exr, read_png_attributes, write_exr
+from refgi.methods import METHODS
+
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+TINY = ["--size", "12x10", "--rsm-resolution", "16"]
+VIEW = ["--eye", "0.278,0.3,-0.7", "--vfov-deg", "43.7", "--light",
+        "spot:position=0.278,0.5,-0.2796:target=0.1,0,-0.3:outer_deg=37:intensity=5,4,3",
+        "--light", "point:position=0.4,0.3,-0.1:intensity=0.7"]
+SETTINGS = {
+    "sii": ["lights=24", "pattern=halton", "seed=3"],
+    "multires": ["lights=49", "coarsest=8", "normal_threshold=0.3"],
+    "val": ["lights=32", "area_lights=3", "map_resolution=16", "near_distance=0.35"],
+    "hssil": ["samples=8", "levels=3", "radius=none", "depth_sigma=0.03"],
+    "gather": ["samples=24", "radius=0.2", "seed=5"],
+    "vpl": ["lights=8", "seed=2"],
+    "truth": ["samples=72", "light_grid=8", "bound=0.2", "seed=9"],
+}
+SII = ["--set", "lights=16"]
+
+
+def run(*arguments, verb="render"):
+    return CliRunner().invoke(VerbGroup.refgi(), [verb, *(str(a) for a in arguments)])
+
+
+def pairs(method):
+    return [text for pair in SETTINGS[method] for text in ("--set", pair)]
+
+
+def made_again(file, *arguments):
+    """The file made again under another name, whole: every channel and the record."""
+    again = file.with_name(f"again_{file.name}")
+    result = run("--again", file, "--out", again, "--json", *arguments)
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["again"] == {"file": str(file), "same": True, "differs": []}
+    return again.read_bytes()
+
+
+def refused(result, *words):
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    for word in words:
+        assert word in result.stderr, result.stderr
+    return True
+
+
+@pytest.fixture
+def room(tmp_path):
+    """The example's scene file and mesh in a folder of their own."""
+    folder = tmp_path / "room"
+    shutil.copytree(EXAMPLES, folder)
+    return folder
+
+
+def test_the_cases_are_all_methods():
+    assert set(SETTINGS) == set(METHODS)
+
+
+@pytest.mark.parametrize("method", SETTINGS)
+def test_every_method_is_made_again_to_the_bit(method, tmp_path):
+    file = tmp_path / "a.exr"
+    result = run("cornell_box", *TINY, *VIEW, "--method", method, *pairs(method), "--exposure", "2.5", "--out", file)
+    assert result.exit_code == 0, result.output
+    record = read_exr(file)[1]
+    assert set(record["settings"]) == {field.name for field in dataclasses.fields(METHODS[method].load()[1])}
+    assert read_exr(file)[0]["irradiance.R"].any()
+    assert made_again(file) == file.read_bytes()
+
+
+@pytest.mark.parametrize("options", [["--dtype", "float64"], ["--shadows", "exact"], ["--rsm-resolution", "24"]],
+                         ids=str)
+def test_options_of_the_frame_are_made_again(options, tmp_path):
+    run("cornell_box", *TINY, *SII, "--out", tmp_path / "plain.exr")
+    file = tmp_path / "a.exr"
+    assert run("cornell_box", *TINY, *SII, *options, "--out", file).exit_code == 0
+    assert any(not np.array_equal(a, b) for a, b in
+               zip(read_exr(file)[0].values(), read_exr(tmp_path / "plain.exr")[0].values(), strict=True))
+    assert made_again(file) == file.read_bytes()
+
+
+@pytest.mark.parametrize("bound", [["seconds=0.2", "samples=1000000"], ["target_error=0.6", "samples=1000000"]],
+                         ids=lambda pair: pair[0])
+def test_a_truth_that_ended_by_time_or_error_is_made_again_by_its_passes(bound, tmp_path):
+    file = tmp_path / "a.exr"
+    sets = [text for pair in (*bound, "light_grid=8") for text in ("--set", pair)]
+    assert run("cornell_box", *TINY, "--method", "truth", *sets, "--out", file).exit_code == 0
+    record = read_exr(file)[1]
+    key, value = bound[0].split("=")
+    assert record["settings"][key] == float(value)
+    assert record["estimate"]["passes"] >= 2
+    assert made_again(file) == file.read_bytes()
+
+
+def test_a_checkpoint_is_not_gone_on_from(tmp_path):
+    file = tmp_path / "a.exr"
+    truth = ["cornell_box", *TINY, "--method", "truth", "--set", "light_grid=8", "--set",
+             f"checkpoint={tmp_path / 'passes.npz'}"]
+    assert run(*truth, "--set", "samples=48", "--out", file).exit_code == 0
+    assert run(*truth, "--set", "samples=96", "--out", tmp_path / "more.exr").exit_code == 0
+    assert made_again(file) == file.read_bytes()
+
+
+@pytest.mark.parametrize("scene", ["cornell_sphere:faces=300", "room.json", "room.obj"])
+def test_built_in_scenes_scene_files_and_meshes_with_options(scene, room, monkeypatch):
+    monkeypatch.chdir(room)
+    view = ["--eye", "0.1,0.5,2", "--target", "0,0.4,0.1", "--light", "point:position=0.2,0.45,0.3:intensity=1,2,3"]
+    assert run(scene, *TINY, *SII, *view, "--out", room / "a.exr").exit_code == 0
+    record = read_exr(room / "a.exr")[1]["scene"]
+    assert record["source"] == scene
+    assert set(record["files"]) == {"room.json": {"room.json", "room.obj"}, "room.obj": {"room.obj"}}.get(scene, set())
+    assert record["camera"]["eye"] == [0.1, 0.5, 2.0]
+    assert record["lights"] == [{"type": "point", "position": [0.2, 0.45, 0.3], "intensity": [1.0, 2.0, 3.0]}]
+    assert made_again(room / "a.exr") == (room / "a.exr").read_bytes()
+
+
+def test_a_mesh_that_got_its_camera_and_light_keeps_them(room, monkeypatch):
+    monkeypatch.chdir(room)
+    assert "was placed to fit" in run("room.obj", *TINY, *SII, "--out", "a.exr").stderr
+    result = run("--again", "a.exr")
+    assert result.exit_code == 0
+    assert "was placed" not in result.stderr
+    assert "the same to the bit" in result.stdout
+
+
+def test_a_scene_is_found_from_here_above_the_picture_or_where_one_says(room, tmp_path, monkeypatch):
+    monkeypatch.chdir(room)
+    assert run("room.json", *TINY, *SII, "--out", "out/a.exr").exit_code == 0
+    shutil.move(room, tmp_path / "elsewhere")
+    monkeypatch.chdir(tmp_path)
+    picture = tmp_path / "elsewhere" / "out" / "a.exr"
+    assert run("--again", picture).exit_code == 0
+    shutil.move(picture, tmp_path / "a.exr")
+    assert refused(run("--again", "a.exr"), "a.exr: room.json: not there", "--scene")
+    assert run("--again", "a.exr", "--scene", "elsewhere/room.json").exit_code == 0
+
+
+def test_camera_and_lights_of_a_changed_scene_file_do_not_matter(room, monkeypatch):
+    monkeypatch.chdir(room)
+    run("room.json", *TINY, *SII, "--out", "a.exr")
+    scene = json.loads(Path("room.json").read_text())
+    scene["camera"]["vfov_deg"] = 20
+    scene["lights"][0]["intensity_w_per_sr"] = [1, 1, 1]
+    Path("room.json").write_text(json.dumps(scene))
+    assert run("--again", "a.exr").exit_code == 0
+
+
+def test_a_scene_of_other_content_is_refused_by_what_changed(room, monkeypatch):
+    monkeypatch.chdir(room)
+    run("room.json", *TINY, *SII, "--out", "a.exr")
+    text = Path("room.json").read_text()
+    Path("room.json").write_text(text.replace("[0.6, 0.06, 0.05]", "[0.6, 0.06, 0.06]"))
+    assert refused(run("--again", "a.exr"), "got other materials (changed: room.json)")
+    Path("room.json").write_text(text)
+    mesh = Path("room.obj").read_text()
+    Path("room.obj").write_text(mesh.replace("v -2 0 2", "v -2 0 2.001", 1))
+    result = run("--again", "a.exr", "--json")
+    told = json.loads(result.stdout)["error"]
+    assert "got other geometry (changed: room.obj)" in told["message"]
+    assert (told["file"], told["key"]) == ("a.exr", "scene")
+
+
+def test_what_is_no_picture_of_refgi_is_refused_by_name(tmp_path):
+    import OpenEXR
+
+    plane = np.ones((2, 2), np.float32)
+    foreign, bare, damaged, newer = (tmp_path / f"{name}.exr" for name in ("foreign", "bare", "damaged", "newer"))
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, {"R": plane}).write(str(foreign))
+    write_exr(bare, {"R": plane}, {"n": 1})
+    write_exr(newer, {"R": plane}, {"provenance": 2, "method": "sii"})
+    damaged.write_bytes(newer.read_bytes()[:-20])
+    assert refused(run("--again", foreign), "foreign.exr", "refgi wrote", "another program's")
+    assert refused(run("--again", bare), "bare.exr", "the record of how a picture was made")
+    assert refused(run("--again", damaged), "damaged.exr")
+    assert refused(run("--again", newer), "newer.exr: provenance", "version 1", "2")
+    assert refused(run("--again", tmp_path / "none.exr"), "none.exr")
+
+
+def rewritten(file, **changes):
+    planes, record = read_exr(file)
+    write_exr(file, planes, record | changes)
+
+
+def test_another_version_is_warned_of_and_a_setting_it_does_not_know_refused(tmp_path):
+    file = tmp_path / "a.exr"
+    run("cornell_box", *TINY, *SII, "--out", file)
+    record = read_exr(file)[1]
+    rewritten(file, refgi={"version": "0.0.1", "git": "abc"}, versions=record["versions"] | {"numpy": "1.9"})
+    result = run("--again", file)
+    assert result.exit_code == 0
+    for word in ("made by refgi 0.0.1", "git abc", "numpy 1.9", "bits may differ"):
+        assert word in result.stderr
+    rewritten(file, settings=record["settings"] | {"sparkle": 1})
+    assert refused(run("--again", file), "SiiSettings", "sparkle")
+    rewritten(file, settings=record["settings"] | {"lights": "many"})
+    assert refused(run("--again", file), "SiiSettings")
+    rewritten(file, settings=record["settings"], options={})
+    assert run("--again", file).exit_code in (1, 2)
+    rewritten(file, scene={})
+    assert refused(run("--again", file), "a whole record")
+
+
+def test_pixels_that_are_not_the_same_are_told_and_fail(tmp_path):
+    file = tmp_path / "a.exr"
+    run("cornell_box", *TINY, *SII, "--out", file)
+    planes, record = read_exr(file)
+    planes["G"][3, 4] = np.nextafter(planes["G"][3, 4], np.float32(9))
+    write_exr(file, planes, record)
+    result = run("--again", file, "--json")
+    assert result.exit_code == 1
+    assert json.loads(result.stdout)["again"]["differs"] == ["G in 1 of 120 pixels"]
+    assert "other: G in 1 of 120 pixels" in run("--again", file).stdout
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["cornell_box", "--again", "a.exr"], ["takes no SCENE"]),
+    (["--again", "a.exr", "--set", "lights=3", "--method", "val"], ["--set", "--method"]),
+    (["--again", "a.exr", "--size", "3"], ["--size"]), (["cornell_box", "--scene", "x", "--out", "a.exr"], ["--scene"]),
+])
+def test_a_picture_is_made_again_as_it_was(arguments, words):
+    assert refused(run(*arguments), *words)
+
+
+def test_pictures_of_a_comparison_are_made_again(tmp_path):
+    out = tmp_path / "out"
+    result = run("cornell_box", *TINY, "--methods", "sii,vpl", "--set", "sii.lights=16", "--set", "vpl.lights=8",
+                 "--set", "truth.samples=48", "--out", out, verb="compare")
+    assert result.exit_code == 0, result.output
+    for name in ("sii", "vpl", "truth", "unoccluded"):
+        assert made_again(out / f"{name}.exr") == (out / f"{name}.exr").read_bytes()
+    record, content = read_exr(out / "sii.exr")[1], json.loads((out / "results.json").read_text())
+    shared = content["provenance"]
+    assert {key: record[key] for key in shared} == shared
+    assert record["settings"] == content["methods"]["sii"]["settings"]
+    assert read_png_attributes(out / "sii.png") == record
+    assert content["refgi"] == record["refgi"]
+
+
+@pytest.mark.parametrize("temporal", [["--temporal", "weight=0.5"], ["--no-temporal"]], ids=str)
+def test_a_frame_of_a_sequence_is_made_again(temporal, room, monkeypatch):
+    monkeypatch.chdir(room)
+    result = run("room.json", "path.toml", *TINY, "--method", "sii", *SII, *temporal, "--frames", "3", "--format",
+                 "exr", "--out", "frames", verb="sequence")
+    assert result.exit_code == 0, result.output
+    last = room / "frames" / "path_00002.exr"
+    record = read_exr(last)[1]
+    assert record["at_frame"]["camera"]["eye"] == [0.6, 1.5, 5.5]
+    assert record["at_frame"]["lights"][0]["direction"] == [2.4, -1.8, -1.0]
+    assert record["path"]["source"] == "path.toml"
+    assert made_again(last) == last.read_bytes()
+    Path("path.toml").write_text("frames = 3\ncamera = [{at = 0.0, vfov_deg = 30.0}]")
+    assert refused(run("--again", last), "path.toml: expected the path of the sequence")
+
+
+def test_the_record_says_everything(tmp_path):
+    """By hand: the light and camera of the options, in rad, and the settings that nobody gave."""
+    file = tmp_path / "a.exr"
+    run("cornell_box", *TINY, *SII, *VIEW, "--seed", "7", "--exposure", "0.5", "--out", file)
+    record = read_exr(file)[1]
+    assert (record["provenance"], record["method"], record["exposure"]) == (1, "sii", 0.5)
+    assert record["options"] == {"dtype": "float32", "rsm_resolution": 16, "shadows": "map"}
+    assert (record["settings"]["lights"], record["settings"]["seed"]) == (16, 7)
+    scene = record["scene"]
+    assert (scene["source"], scene["faces"], scene["files"]) == ("cornell_box", 30, {})
+    assert (scene["camera"]["width"], scene["camera"]["height"]) == (12, 10)
+    assert scene["camera"]["vfov"] == math.radians(43.7)
+    spot, point = scene["lights"]
+    assert spot["type"] == "spot"
+    assert (spot["outer_half_angle"], spot["intensity"]) == (math.radians(37), [5.0, 4.0, 3.0])
+    assert point == {"type": "point", "position": [0.4, 0.3, -0.1], "intensity": [0.7, 0.7, 0.7]}
+    assert {len(scene["geometry_sha256"]), len(scene["materials_sha256"])} == {64}
+
+
+def test_a_truth_writes_its_variance_and_the_error_of_the_picture(tmp_path):
+    """Against `trace_truth`: the variance of the mean, and the picture's own mean and standard error."""
+    from refgi.frame import Frame
+    from refgi.scene import load_scene
+    from refgi.truth import TruthSettings, trace_truth
+
+    file = tmp_path / "a.exr"
+    result = run("cornell_box", *TINY, "--method", "truth", "--set", "samples=48", "--set", "light_grid=8", "--json",
+                 "--out", file)
+    channels, record = read_exr(file)
+    scene = load_scene("cornell_box").with_camera(width=12, height=10)
+    own = trace_truth(Frame(scene, rsm_resolution=16), TruthSettings(samples=48, light_grid=8))
+    for index, name in enumerate("RGB"):
+        assert np.array_equal(channels[f"variance.{name}"], own.variance_of_mean[index].astype(np.float32))
+    assert np.array_equal(channels["samples"], own.samples.astype(np.float32))
+    estimate = json.loads(result.stdout)["estimate"]
+    assert estimate == record["estimate"]
+    assert estimate["passes"] == own.passes
+    assert estimate["picture_mean"] == own.picture_mean.tolist()
+    assert estimate["picture_standard_error"] == np.sqrt(own.picture_variance).tolist()

@@ -241,6 +241,7 @@ def test_settings_are_checked():
                    {"target_error": 0.1, "criteria": {"depth"}}, {"target_error": 0.1, "normal_threshold": 1},
                    {"target_error": 0.1, "as_published": {"ams_filter_all"}},
                    {"per_light": "light", "target_error": 0.1}, {"as_published": {"ams_luck"}},
-                   {"as_published": {"ams_disc"}}, {"as_published": {"ams_rho_in_splat"}, "per_light": "light"}):
+                   {"as_published": {"ams_disc"}, "clamp": "none"},
+                   {"as_published": {"ams_rho_in_splat"}, "per_light": "light"}):
         with pytest.raises(InputError, match=next(iter(change))):
             MultiresSettings(**change)

@@ -47,6 +47,44 @@ def smooth_edge(above: Any, span: Any) -> Any:
 
 
 @kernel
+def falloff_in_float64(d: Any, axis: Any, cone: Any, plain: float) -> tuple[float, bool]:
+    """Return the share of a spot's on-axis intensity in one direction, and whether float64 alone suffices for it.
+
+    Parameters
+    ----------
+    d : tuple of 3 floats
+        Direction away from the spot, of any length above 0; float64.
+    axis : tuple of 3 floats
+        Direction the spot shines in, of any length; float64.
+    cone : (6,) ndarray of float64
+        Of `refgi.scene.cone.cone_row`.
+    plain : float
+        Sine of the angle inside the cone from which on float64 alone will do: `FOR_FLOAT32`, or inf for nowhere.
+
+    Returns
+    -------
+    tuple of float and bool
+        0 to 1, float64; free of branches.
+
+    Notes
+    -----
+    cos a - cos b = sin(b - a) sin(b + a) / (cos a + cos b) with the angle a off the axis and the outer half-angle b,
+    and sin a, cos a from the lengths of d x axis and d . axis.
+    """
+    along = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
+    x, y, z = d[1] * axis[2] - d[2] * axis[1], d[2] * axis[0] - d[0] * axis[2], d[0] * axis[1] - d[1] * axis[0]
+    square = x * x + y * y + z * z
+    across, length = math.sqrt(square), math.sqrt(square + along * along)
+    edge, slack = cone[0] * along - cone[2] * across, UNCERTAIN * length
+    above = edge * (cone[0] * along + cone[2] * across) / (length * (along + length * cone[2]))
+    t = above / cone[4]
+    t = t if t < 1.0 else 1.0
+    t = t if edge > slack else 0.0
+    whole = (edge > slack) & (above * (edge - slack) > cone[4] * edge)
+    return t * t * (3.0 - t - t), (edge < -slack) | whole | (edge > plain * length)
+
+
+@kernel
 def spot_falloff(d: Any, axis: Any, cone: Any, plain: float) -> Any:
     """Return the share of a spot's on-axis intensity in one direction.
 
@@ -68,23 +106,10 @@ def spot_falloff(d: Any, axis: Any, cone: Any, plain: float) -> Any:
 
     Notes
     -----
-    cos a - cos b = sin(b - a) sin(b + a) / (cos a + cos b) with the angle a off the axis and the outer half-angle b,
-    and sin a, cos a from the lengths of d x axis and d . axis. What sin(b - a) cancels is known to twice
-    the precision where it matters.
+    What sin(b - a) cancels is known to twice the precision where it matters.
     """
-    along = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
-    x, y, z = d[1] * axis[2] - d[2] * axis[1], d[2] * axis[0] - d[0] * axis[2], d[0] * axis[1] - d[1] * axis[0]
-    square = x * x + y * y + z * z
-    across, length = math.sqrt(square), math.sqrt(square + along * along)
-    edge, slack = cone[0] * along - cone[2] * across, UNCERTAIN * length
-    if edge < -slack:
-        return 0.0
-    above = edge * (cone[0] * along + cone[2] * across) / (length * (along + length * cone[2]))
-    if edge > slack and above * (edge - slack) > cone[4] * edge:
-        return 1.0
-    if not edge > plain * length:
-        above = _above_the_edge(d, axis, cone)
-    return smooth_edge(above, cone[4])
+    share, certain = falloff_in_float64(d, axis, cone, plain)
+    return share if certain else smooth_edge(_above_the_edge(d, axis, cone), cone[4])
 
 
 @kernel

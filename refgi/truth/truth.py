@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import math
 import sys
 import time
 import warnings
@@ -132,17 +133,24 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
     return result
 
 
-def _sharp_lobes(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> Film | None:
-    """Return where photons off sharp lobes are counted; warn where the settings ask for more than photons know."""
+def _photons(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> tuple[Film | None, float]:
+    """Return where photons are counted, and the exponent from which on lobes are left to them; warn where none can be.
+
+    Photons follow lobes without `visibility` or for what the camera sees as little as beyond the first bounce.
+    """
+    picture = shape[0], shape[1]
+    if settings.caustics:
+        return film(scene, picture), MIRROR_EXPONENT
     sharp = [m.name for m in scene.materials if m.is_glossy and not m.is_dielectric and m.exponent >= SHARP_LOBE]
-    if sharp and (settings.bounces > 1 or not settings.visibility or settings.emitters == "seen"):
-        kept = "beyond the first bounce" if settings.visibility and settings.emitters == "all" else "here"
+    alone = settings.visibility and settings.emitters == "all"
+    if sharp and not (alone and settings.bounces == 1):
+        what = ("left out beyond the first bounce" if alone else
+                "sampled by chance, which may miss them: standard errors do not show what was never met")
         warnings.warn(RefgiWarning(f"scene {scene.name!r}: the lobes of {len(sharp)} material(s), {sharp[0]!r} first, "
-                                   f"are too sharp to sample (exponent {SHARP_LOBE:g} or more) and left out {kept}"),
-                      stacklevel=4)
-        if kept == "here":
-            return None
-    return film(scene, (shape[0], shape[1]), SHARP_LOBE, longest=2) if sharp else None
+                                   f"are sharp (exponent {SHARP_LOBE:g} or more) and {what}"), stacklevel=4)
+    if not sharp or not alone:
+        return None, math.inf
+    return film(scene, picture, SHARP_LOBE, longest=2), SHARP_LOBE
 
 
 def _warm_up(scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array], settings: TruthSettings) -> None:
@@ -178,8 +186,8 @@ def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_
     """
     to = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
     set_of = sets_of(to.pixel, triangle_id.shape[1], settings.interleave)
-    caustics = film(scene, triangle_id.shape) if settings.caustics else _sharp_lobes(scene, triangle_id.shape, settings)
-    found = surfaces(scene, MIRROR_EXPONENT if settings.caustics else SHARP_LOBE)
+    caustics, left_to_photons = _photons(scene, triangle_id.shape, settings)
+    found = surfaces(scene, left_to_photons)
     view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None
     task = Task(scene, settings, tracer, found, lights_of(scene), to, set_of, caustics, view)
     return task._replace(densities=pilot(task))

@@ -103,6 +103,17 @@ def test_a_truth_that_ended_by_time_or_error_is_made_again_by_its_passes(bound, 
     assert made_again(file) == file.read_bytes()
 
 
+def test_only_passes_end_a_picture_that_is_made_again():
+    """7 passes of 16 picks and 8 directions, and neither clock nor target that could end it before."""
+    from refgi.provenance import Job
+    from refgi.truth import TruthSettings
+
+    asked = TruthSettings(seconds=1.0, target_error=0.1, checkpoint="passes.npz", picks=16, directions=8, seed=4)
+    again = TruthSettings(samples=7 * 24, picks=16, directions=8, seed=4)
+    assert Job(None, "truth", asked, {}, 1.0, passes=7).repeatable == again
+    assert Job(None, "sii", asked, {}, 1.0).repeatable is asked
+
+
 def test_a_checkpoint_is_not_gone_on_from(tmp_path):
     file = tmp_path / "a.exr"
     truth = ["cornell_box", *TINY, "--method", "truth", "--set", "light_grid=8", "--set",

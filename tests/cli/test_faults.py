@@ -72,6 +72,7 @@ def test_every_error_is_one_object_on_stdout(arguments, file, key):
         assert result.exit_code == 2, result.output
         told = fault(result)
         assert told["file"] == file
+        assert file is None or not (told["key"] or "").startswith(file)
         if key is not None:
             assert told["key"] == key
     assert sorted(path.name for path in Path().iterdir()) == ["bad.json", "bad.toml", "cut.json", "flat.obj"]

@@ -103,4 +103,6 @@ def _table(comparison: "Comparison") -> str:
                          *(number(f.value) + ("*" if f.is_noise else " ") for f in figures),
                          number(result.flip.mean) if first else ""))
     text = table(rows, right=frozenset(range(2, len(rows[0]))))
-    return text + "\n* within the noise of the truth" if "*" in text else text
+    text += "\n* within the noise of the truth" if "*" in text else ""
+    estimate = comparison.truth.estimate.get("estimate")
+    return text + (f"\n\ntruth: {estimate['statement']}" if estimate else "")

@@ -83,6 +83,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     size = "x".join(map(str, content["size"]))
     text = f"{job.scene.name} by {job.method}: {size} in {seconds:.2f} s"
     text += f" -> {', '.join(content['files'])}" if files.files else ""
+    text += f"\n{record['estimate']['statement']}" if "estimate" in record else ""
     if again is not None:
         other = differences(Path(again), planes)
         content["again"] = {"file": again, "same": not other, "differs": other}

@@ -313,3 +313,6 @@ def test_a_truth_writes_its_variance_and_the_error_of_the_picture(tmp_path):
     assert estimate["passes"] == own.passes
     assert estimate["picture_mean"] == own.picture_mean.tolist()
     assert estimate["picture_standard_error"] == np.sqrt(own.picture_variance).tolist()
+    assert {name: estimate[name] for name in own.errors} == own.errors
+    again = run("--again", file)
+    assert again.stdout.splitlines()[1] == own.error_statement

@@ -1,6 +1,8 @@
 """`refgi sequence`: the frames of a path through one scene."""
 
 import time
+import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +37,7 @@ KINDS = {"both": (".exr", ".png"), "exr": (".exr",), "png": (".png",)}
 @click.option("--format", "kind", type=click.Choice(list(KINDS)), default="both", show_default=True,
               help="EXR (linear), PNG (tone-mapped), or both.")
 @click.option("--resume", is_flag=True, help="Go on after the frames that are there as EXR.")
+@click.option("--allow-empty", is_flag=True, help="Write black frames where the camera sees no surface in any of them.")
 @click.option("--out", required=True, help="Folder for the frames.")
 @writing
 @speech
@@ -49,6 +52,7 @@ def _sequence(session: Session, /, **options: Any) -> int:
     """
     from refgi.cli.destination import Permission, folder
     from refgi.cli.frame_files import FrameFiles
+    from refgi.cli.job import require_view
     from refgi.cli.memory import require_memory
     from refgi.cli.progress import progress
     from refgi.cli.settings import read_settings
@@ -62,6 +66,7 @@ def _sequence(session: Session, /, **options: Any) -> int:
 
     kind, resume, exposure, out, threads = _taken(options, "kind", "resume", "exposure", "out", "threads")
     permission = Permission(*_taken(options, "parents", "force"))
+    (allow_empty,) = _taken(options, "allow_empty")
     _expect_usable(exposure, kind, resume)
     method, pairs, seed = _taken(options, "method", "pairs", "seed")
     light, settings_class = find_method(method).load()
@@ -81,7 +86,10 @@ def _sequence(session: Session, /, **options: Any) -> int:
     sequence = Sequence(scenes_along(scene, way, frames), settings, temporal, method=light, **frame_options)
     with on_threads(threads), progress() as tell:
         done = files.done(frames) if resume else 0
+        sees = allow_empty or _sees_surface(scenes_along(scene, way, frames), frame_options)
+        require_view(sees, scene.name, allow_empty)
         rendered = _render(sequence, files, (done, frames), tell)
+    _warn_of_empty([frame["frame"] for frame in rendered if not frame["covered_pixels"]], frames)
     content = {"scene": scene.name, "method": method, "settings": settings, "temporal": temporal, **frame_options,
                "out": out, "first": done, "frames": rendered, "provenance": record}
     session.result(f"{scene.name} by {method}: {len(rendered)} of {frames} frames rendered -> {out}", content)
@@ -132,6 +140,26 @@ def _scene_and_way(path: str, frames: int | None, options: dict[str, Any]) -> "t
     return scene, way, count
 
 
+def _sees_surface(scenes: Iterable["Scene"], frame_options: dict[str, Any]) -> bool:
+    """Return whether any frame sees a surface; the frames after the first that does are not looked at."""
+    from refgi.frame import Frame
+
+    return any(Frame(scene, **frame_options).gbuffer.covered.any() for scene in scenes)
+
+
+def _warn_of_empty(empty: list[int], frames: int) -> None:
+    """Warn of frames, by number in ascending order, that see no surface."""
+    from refgi.errors import RefgiWarning
+
+    if not empty:
+        return
+    numbers = set(empty)
+    starts = [number for number in empty if number - 1 not in numbers]
+    ends = [number for number in empty if number + 1 not in numbers]
+    spans = ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in zip(starts, ends, strict=True))
+    warnings.warn(RefgiWarning(f"frames {spans} of {frames} see no surface"), stacklevel=2)
+
+
 def _render(
     sequence: "Sequence", files: "FrameFiles", span: tuple[int, int], tell: "Tell"
 ) -> list[dict[str, Any]]:
@@ -151,6 +179,7 @@ def _render(
         if bad:
             say(f"frame {number}: {bad} pixels are NaN or infinite")
         rendered.append({"frame": number, "seconds": seconds, "reused": step.reused, "non_finite_pixels": bad,
+                         "covered_pixels": int(step.frame.gbuffer.covered.sum()),
                          "mean_indirect_irradiance": float(step.irradiance.mean(dtype="float64"))})
         tell(f"frame {number + 1} of {frames}", 1.0)
         del step  # its buffers serve the next

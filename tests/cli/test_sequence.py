@@ -166,3 +166,30 @@ def test_hssil_renders_and_filters(way, tmp_path):
     assert told["temporal"]["weight"] == 0.9
     assert told["frames"][1]["reused"] > 0.8
     assert told["frames"][1]["mean_indirect_irradiance"] > 0
+
+
+def test_a_sequence_that_sees_nothing_is_refused_unless_one_wants_it(way, tmp_path):
+    way.write_text("frames = 4\ncamera = [{at = 0.0, target = [0.0, 0.0, -99.0]}]")
+    arguments = ["cornell_box", way, *TINY, *SII, "--format", "exr", "--out", tmp_path / "out"]
+    assert refused(run(*arguments), "camera: expected a view of some surface", "--allow-empty")
+    assert not (tmp_path / "out").exists()
+    result = run(*arguments, "--allow-empty", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert told["warnings"] == ["frames 0-3 of 4 see no surface"]
+    assert [frame["covered_pixels"] for frame in told["frames"]] == [0] * 4
+    assert not any(light.any() for light in lights(tmp_path / "out", range(4)))
+
+
+def test_frames_that_see_nothing_are_told_in_one_warning(way, tmp_path):
+    """The camera looks at the box in the second frame alone."""
+    way.write_text("""frames = 5
+camera = [{at = 0.0, eye = [0.0, 0.0, 50.0], target = [0.0, 0.0, 100.0]},
+          {at = 0.25, eye = [0.278, 0.273, -0.8], target = [0.278, 0.273, 0.0]},
+          {at = 0.5, eye = [0.0, 0.0, 50.0], target = [0.0, 0.0, 100.0]},
+          {at = 1.0, eye = [0.0, 0.0, 50.0], target = [0.0, 0.0, 100.0]}]
+""")
+    result = run("cornell_box", way, *TINY, *SII, "--format", "exr", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    warned = [line for line in result.stderr.splitlines() if "no surface" in line]
+    assert warned == ["refgi: warning: frames 0, 2-4 of 5 see no surface"]

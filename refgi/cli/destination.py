@@ -94,6 +94,7 @@ def folder(out: str, permission: Permission, names: Iterable[str] = ()) -> Path:
     InputError
         If it cannot be made or written, or a file in it is another program's.
     """
+    expect(out != "", "--out", "a name", out)
     path = Path(out)
     with blame(key="--out"):
         _require(path, path, permission)

@@ -118,3 +118,10 @@ def test_a_folder_is_made_when_there_is_something_to_write():
     files.make_folder()
     make(Path("new"))
     assert Path("new").is_dir()
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_an_empty_name_is_refused(verb):
+    arguments, _ = VERBS[verb]
+    assert refused(run(verb, *arguments, "--out", ""), "--out: expected a name, got ''")
+    assert [path.name for path in Path().iterdir()] == ["way.toml"]

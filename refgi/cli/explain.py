@@ -4,6 +4,7 @@ The method runs at a small size and is watched; nothing here knows what any meth
 """
 
 import dataclasses
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -43,6 +44,7 @@ def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: st
     from refgi.cli.threads import on_threads
     from refgi.cli.view import View
     from refgi.compare.results import ledger_json
+    from refgi.errors import RefgiWarning
     from refgi.methods import find_method
 
     settings = read_settings(find_method(method).load()[1], pairs, seed, method)
@@ -53,9 +55,11 @@ def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: st
         first = _watch(scene, method, settings, frame_options, None)
         tell(method, 0.2)
         animation = {}
-        for row, (light, camera) in ROWS.items():
-            animation[row] = _second_frame(scene, method, settings, frame_options, light, camera)
-            tell(method, 0.2 + 0.2 * len(animation))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RefgiWarning)  # of views and lights that nobody asked for
+            for row, (light, camera) in ROWS.items():
+                animation[row] = _second_frame(scene, method, settings, frame_options, light, camera)
+                tell(method, 0.2 + 0.2 * len(animation))
         ledger = _ledger(scene, method, settings, frame_options)
     content = {"scene": scene.name, "method": method, "settings": settings,
                "stages": [dataclasses.asdict(line) for line in summed(first)],

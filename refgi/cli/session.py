@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import json
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 import click
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
+PERCENTAGE = re.compile(r"\d+(?= %)")
 
 
 @dataclasses.dataclass
@@ -18,18 +20,31 @@ class Session:
 
     debug: bool = False
     as_json: bool = False
-    warnings: list[str] = dataclasses.field(default_factory=list)
+    _warned: dict[str, list[str]] = dataclasses.field(default_factory=dict)  # by text without percentages
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings so far; those that differ only in percentages are one, with their range."""
+        return [_with_range(texts) for texts in self._warned.values()]
 
     def warn(self, message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
-        """Print a warning as one line, each text once; takes what `warnings.showwarning` gives."""
+        """Print a warning as one line unless one like it has been; takes what `warnings.showwarning` gives."""
         kind = "" if category.__name__ == "RefgiWarning" else f"{category.__name__}: "
         text = kind + " ".join(str(message).split())
-        if text not in self.warnings:
-            self.warnings.append(text)
+        alike = self._warned.setdefault(PERCENTAGE.sub("", text), [])
+        if not alike:
             say(f"warning: {text}")
+        if text not in alike:
+            alike.append(text)
 
     def result(self, text: str, content: dict[str, Any]) -> None:
-        """Print the result to stdout: the text, or with --json one object that also has the warnings."""
+        """Print the result to stdout: the text, or with --json one object that also has the warnings.
+
+        A warning that came with several percentages is said once more, with their range.
+        """
+        for texts in self._warned.values():
+            if len(texts) > 1:
+                say(f"warning, over the whole run: {_with_range(texts)}")
         if self.as_json:
             from refgi.provenance import plain
 
@@ -53,6 +68,13 @@ class Session:
 
     def _object(self, content: dict[str, Any]) -> str:
         return json.dumps({**content, "warnings": self.warnings}, indent=2, allow_nan=False)
+
+
+def _with_range(texts: list[str]) -> str:
+    """Return the first of texts that differ only in percentages, with the range of each."""
+    columns = zip(*(map(int, PERCENTAGE.findall(text)) for text in texts), strict=True)
+    ranges = iter([f"{min(column)} to {max(column)}" if len(set(column)) > 1 else str(column[0]) for column in columns])
+    return PERCENTAGE.sub(lambda _: next(ranges), texts[0])
 
 
 class Fault(NamedTuple):

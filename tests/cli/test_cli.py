@@ -206,6 +206,16 @@ def test_explain_says_what_is_skipped_and_why():
     assert "SII Table 1" in text
 
 
+def test_explain_warns_of_the_frame_asked_for_alone(tmp_path):
+    """The camera and light that it moves take other shares of the light by the gathering radius."""
+    options = ["cornell_box", "--size", "16x12", "--rsm-resolution", "64", "--method", "gather"]
+    result = run("explain", *options)
+    assert result.exit_code == 0, result.output
+    rendered = run("render", *options, "--out", tmp_path / "a.exr")
+    assert "takes" in rendered.stderr
+    assert result.stderr == rendered.stderr
+
+
 def test_explain_refuses_maps_that_do_not_fit(monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
     told = run("explain", "cornell_box", *TINY, "--method", "val", "--set", "map_resolution=4096")

@@ -12,6 +12,7 @@ from refgi.cli import memory
 from refgi.cli.group import VerbGroup
 from refgi.cli.lights import read_lights
 from refgi.cluster import ValSettings
+from refgi.errors import RefgiWarning
 from refgi.image import read_exr
 from refgi.methods import Picture, find_method, render
 from refgi.scene import Camera, PointLight, SpotLight, load_scene
@@ -282,3 +283,17 @@ def test_a_warning_is_one_line_and_said_once():
     for _ in range(2):
         session.warn("two\nlines", UserWarning, "file", 1)
     assert session.warnings == ["UserWarning: two lines"]
+
+
+def test_warnings_that_differ_in_percentages_are_one_with_their_range(capsys):
+    from refgi.cli.session import Session
+
+    session = Session()
+    for share, other in ((5, 40), (12, 40), (9, 40), (12, 40)):
+        session.warn(f"radius 3 takes {share} % of {other} %", RefgiWarning)
+    session.warn("radius 4 takes 7 % of 40 %", RefgiWarning)
+    assert session.warnings == ["radius 3 takes 5 to 12 % of 40 %", "radius 4 takes 7 % of 40 %"]
+    session.result("done", {})
+    assert capsys.readouterr().err.splitlines() == [
+        "refgi: warning: radius 3 takes 5 % of 40 %", "refgi: warning: radius 4 takes 7 % of 40 %",
+        "refgi: warning, over the whole run: radius 3 takes 5 to 12 % of 40 %"]

@@ -1,6 +1,7 @@
 """`refgi sequence`: the frames it writes, how it goes on after an interruption, what it refuses before computing."""
 
 import json
+import re
 
 import imageio.v3
 import numpy as np
@@ -193,3 +194,15 @@ camera = [{at = 0.0, eye = [0.0, 0.0, 50.0], target = [0.0, 0.0, 100.0]},
     assert result.exit_code == 0, result.output
     warned = [line for line in result.stderr.splitlines() if "no surface" in line]
     assert warned == ["refgi: warning: frames 0, 2-4 of 5 see no surface"]
+
+
+def test_a_loss_that_changes_along_the_path_is_warned_of_once(way, tmp_path):
+    """The gathering radius takes another share in each of these views."""
+    way.write_text(PATH.replace("[0.3, 0.28, -0.8]", "[0.4, 0.28, -0.8]"))
+    result = run("cornell_box", way, "--size", "16x12", "--rsm-resolution", "64", "--method", "gather", "--format",
+                 "exr", "--out", tmp_path / "out", "--json")
+    assert result.exit_code == 0, result.output
+    (warning,) = json.loads(result.stdout)["warnings"]
+    assert re.fullmatch(r"gather: radius .* takes \d+ to \d+ % of the indirect light", warning)
+    assert result.stderr.count("refgi: warning: ") == 1
+    assert result.stderr.count("refgi: warning, over the whole run: ") == 1

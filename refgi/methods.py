@@ -83,6 +83,25 @@ class Picture(NamedTuple):
     estimate: Any = None  # a `TruthResult`, of a method that states its own error
 
 
+class KeepingEstimate:
+    """A method as a function of frame and settings, which keeps the estimate of its last frame.
+
+    Parameters
+    ----------
+    method : Method
+        A row of `METHODS`.
+    """
+
+    def __init__(self, method: Method) -> None:
+        self._method = method
+        self.estimate: Any = None
+
+    def __call__(self, frame: "Frame", settings: Any) -> Array:
+        """Return the indirect irradiance, (3, h, w), W/m^2."""
+        light, self.estimate = self._method.compute(frame, settings)
+        return light
+
+
 def find_method(name: str) -> Method:
     """Return a method of the table.
 

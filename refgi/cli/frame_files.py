@@ -13,7 +13,7 @@ from refgi.compare.pictures import linear_planes, write_preview
 from refgi.errors import InputError, expect
 from refgi.frame import Frame
 from refgi.image import read_exr, write_exr
-from refgi.provenance import Record
+from refgi.provenance import Record, estimate_record
 from refgi.provenance.frames import same_sequence
 from refgi.scene.model import Scene
 from refgi.sssil.temporal.filter import History, remember
@@ -41,14 +41,19 @@ class FrameFiles(NamedTuple):
         """Return the record of a frame."""
         return {**self.record, **self.moving(number)}
 
-    def write(self, step: Step, number: int) -> None:
+    def write(self, step: Step, number: int, estimate: Any = None) -> None:
         """Write a frame, each file whole or not at all, the EXR last: where it is, so are the others."""
+        record = self.record_of(number)
+        spread: tuple[Any, ...] = ()
+        if estimate is not None:
+            record |= estimate_record(estimate)
+            spread = estimate.variance_of_mean, estimate.samples
         make(self.folder)
         for file in sorted(self.of(number), reverse=True):
             if file.suffix == PNG:
-                write_preview(file, step.radiance, self.record_of(number))
+                write_preview(file, step.radiance, record)
             else:
-                write_exr(file, linear_planes(step.radiance, step.irradiance), self.record_of(number))
+                write_exr(file, linear_planes(step.radiance, step.irradiance, *spread), record)
 
     def done(self, frames: int) -> int:
         """Return how many frames, from the first on, are there.

@@ -14,6 +14,7 @@ from refgi.cli.session import DONE, FAILED, Session, say
 if TYPE_CHECKING:
     from refgi.cli.frame_files import FrameFiles
     from refgi.cli.progress import Tell
+    from refgi.methods import KeepingEstimate
     from refgi.scene import Scene
     from refgi.scene.path import Path as Way
     from refgi.sssil.temporal import Sequence, TemporalSettings
@@ -57,9 +58,9 @@ def _sequence(session: Session, /, **options: Any) -> int:
     from refgi.cli.progress import progress
     from refgi.cli.settings import read_settings
     from refgi.cli.threads import on_threads
-    from refgi.methods import find_method, usual_shadows
+    from refgi.methods import KeepingEstimate, find_method, usual_shadows
     from refgi.provenance import method_record, scene_record
-    from refgi.provenance.frames import frame_record, path_record
+    from refgi.provenance.frames import frame_record, path_record, require_repeatable
     from refgi.scene.files import text_of
     from refgi.scene.path import scenes_along
     from refgi.sssil.temporal import Sequence
@@ -69,8 +70,9 @@ def _sequence(session: Session, /, **options: Any) -> int:
     (allow_empty,) = _taken(options, "allow_empty")
     _expect_usable(exposure, kind, resume)
     method, pairs, seed = _taken(options, "method", "pairs", "seed")
-    light, settings_class = find_method(method).load()
-    settings = read_settings(settings_class, pairs, seed, method)
+    light = KeepingEstimate(find_method(method))
+    settings = read_settings(find_method(method).load()[1], pairs, seed, method)
+    require_repeatable(settings)
     temporal = _temporal(method, *_taken(options, "filtering", "unfiltered"))
     frame_options = dict(zip(FRAME, _taken(options, *FRAME), strict=True))
     frame_options["shadows"] = frame_options["shadows"] or usual_shadows(settings)
@@ -88,7 +90,7 @@ def _sequence(session: Session, /, **options: Any) -> int:
         done = files.done(frames) if resume else 0
         sees = allow_empty or _sees_surface(scenes_along(scene, way, frames), frame_options)
         require_view(sees, scene.name, allow_empty)
-        rendered = _render(sequence, files, (done, frames), tell)
+        rendered = _render(sequence, light, files, (done, frames), tell)
     _warn_of_empty([frame["frame"] for frame in rendered if not frame["covered_pixels"]], frames)
     content = {"scene": scene.name, "method": method, "settings": settings, "temporal": temporal, **frame_options,
                "out": out, "first": done, "frames": rendered, "provenance": record}
@@ -161,7 +163,7 @@ def _warn_of_empty(empty: list[int], frames: int) -> None:
 
 
 def _render(
-    sequence: "Sequence", files: "FrameFiles", span: tuple[int, int], tell: "Tell"
+    sequence: "Sequence", light: "KeepingEstimate", files: "FrameFiles", span: tuple[int, int], tell: "Tell"
 ) -> list[dict[str, Any]]:
     """Render and write the frames from one number up to another; return what is to be said of each."""
     from refgi.cli.frame_files import resumed
@@ -174,7 +176,7 @@ def _render(
     started = time.perf_counter()
     for number, step in enumerate(resumed(sequence, sequence.scenes, files, done), done):
         seconds = time.perf_counter() - started
-        files.write(step, number)
+        files.write(step, number, None if sequence.temporal else light.estimate)
         bad = count_non_finite(step.radiance)
         if bad:
             say(f"frame {number}: {bad} pixels are NaN or infinite")

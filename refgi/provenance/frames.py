@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from refgi.errors import InputError, expect
-from refgi.methods import Picture, find_method
+from refgi.methods import KeepingEstimate, Picture, find_method
 from refgi.provenance.content import light_json
 from refgi.provenance.plain import plain
 from refgi.provenance.record import Record
@@ -89,7 +89,9 @@ def whole_record(scene: Scene, frame: SequenceFrame) -> Record:
 
 
 def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
-    """Return in what two records of frames are not of one sequence; how scene and path were named does not count.
+    """Return in what two records of frames are not of one sequence.
+
+    How scene and path were named, and what an estimate came to, does not count.
 
     Parameters
     ----------
@@ -101,9 +103,29 @@ def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
     list of str
         Keys, those of objects after a dot; none where nothing differs.
     """
-    left, right = (_flat({**one, **{key: {**one.get(key, {}), "source": None} for key in ("scene", "path")}})
+    same = {"estimate": None}
+    left, right = (_flat({**one, **same, **{key: {**one.get(key, {}), "source": None} for key in ("scene", "path")}})
                    for one in (a, b))
     return sorted(key for key in left.keys() | right.keys() if left.get(key) != right.get(key))
+
+
+def require_repeatable(settings: Any) -> None:
+    """Refuse settings by which frames of a sequence would not be the same when they are made again.
+
+    Parameters
+    ----------
+    settings : dataclass
+        Those of a method.
+
+    Raises
+    ------
+    InputError
+        If frames end by the clock, or would share a checkpoint.
+    """
+    for key, why in (("seconds", "as the clock ends no frame of a sequence twice alike: say samples"),
+                     ("checkpoint", "as a file holds the passes of one frame alone")):
+        value = getattr(settings, key, None)
+        expect(value is None, key, f"none, {why}", value)
 
 
 def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame, options: Mapping[str, Any]) -> Picture:
@@ -132,15 +154,15 @@ def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame,
     InputError
         If the path is not usable, or the frames before end by the clock.
     """
-    expect(getattr(settings, "seconds", None) is None, "seconds", "none for a frame of a sequence that is made again",
-           getattr(settings, "seconds", None))
+    require_repeatable(settings)
     way, _ = read_path(frame.path, scene)
     first = frame.number if frame.temporal is None else 0
     scenes = islice(scenes_along(scene, way, frame.of), first, frame.number + 1)
-    sequence = Sequence(scenes, settings, frame.temporal, method=find_method(method).load()[0], **options)
+    light = KeepingEstimate(find_method(method))
+    sequence = Sequence(scenes, settings, frame.temporal, method=light, **options)
     for step in sequence.over(scenes, first):
         made = step
-    return Picture(made.frame, made.irradiance, made.radiance)
+    return Picture(made.frame, made.irradiance, made.radiance, None if frame.temporal else light.estimate)
 
 
 def require_same_path(record: Mapping[str, Any], found: str) -> None:

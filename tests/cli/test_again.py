@@ -258,6 +258,32 @@ def test_pictures_of_a_comparison_are_made_again(tmp_path):
     assert content["refgi"] == record["refgi"]
 
 
+@pytest.mark.parametrize("temporal", [False, True])
+def test_frames_of_truth_hold_how_sure_they_are_unless_blended(temporal, room, monkeypatch):
+    """Seed 9 + 1 in the second frame: what `render` gives of the frame's camera by that seed."""
+    monkeypatch.chdir(room)
+    Path("still.toml").write_text("frames = 2\ncamera = [{at = 0.0, vfov_deg = 30.0}]")
+    sets = ["--method", "truth", "--set", "samples=72", "--set", "light_grid=8", "--seed"]
+    filtered = ["--temporal", "weight=0.5"] if temporal else []
+    result = run("room.json", "still.toml", *TINY, *sets, 9, *filtered, "--out", "frames", verb="sequence")
+    assert result.exit_code == 0, result.output
+    assert run("room.json", *TINY, "--vfov-deg", 30, *sets, 10, "--out", "alone.exr").exit_code == 0
+    frame, alone = Path("frames", "still_00001.exr"), Path("alone.exr")
+    planes, record = read_exr(frame)
+    expected, its = read_exr(alone)
+    if temporal:
+        assert planes.keys() == expected.keys() - {"variance.R", "variance.G", "variance.B", "samples"}
+        assert "estimate" not in record
+    else:
+        assert planes.keys() == expected.keys()
+        assert all(np.array_equal(planes[name], expected[name]) for name in planes)
+        assert planes["variance.R"].any()
+        assert record["estimate"] == its["estimate"] == read_png_attributes(frame.with_suffix(".png"))["estimate"]
+    assert made_again(frame) == frame.read_bytes()
+    resumed = run("room.json", "still.toml", *TINY, *sets, 9, *filtered, "--out", "frames", "--resume", verb="sequence")
+    assert "0 of 2 frames rendered" in resumed.stdout, resumed.output
+
+
 @pytest.mark.parametrize("temporal", [["--temporal", "weight=0.5"], ["--no-temporal"]], ids=str)
 def test_a_frame_of_a_sequence_is_made_again(temporal, room, monkeypatch):
     monkeypatch.chdir(room)

@@ -139,6 +139,8 @@ def test_another_method_is_not_filtered_unless_asked(way, tmp_path):
     (["--temporal", "weight=0.5", "--no-temporal"], ["--no-temporal"]),
     (["--set", "samplse=3"], ["samples"]),
     (["--resume", "--format", "png"], ["--resume"]),
+    (["--method", "truth", "--set", "seconds=0.7"], ["seconds: expected none", "say samples", "got 0.7"]),
+    (["--method", "truth", "--set", "checkpoint=ck"], ["checkpoint: expected none", "got 'ck'"]),
     (["--exposure", "0"], ["--exposure"]),
     (["--method", "nothing"], ["method: expected one of"]),
 ])

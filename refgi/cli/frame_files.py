@@ -12,7 +12,7 @@ from refgi.cli.destination import make
 from refgi.compare.pictures import linear_planes, write_preview
 from refgi.errors import InputError, expect
 from refgi.frame import Frame
-from refgi.image import read_exr, write_exr
+from refgi.image import is_from_refgi, read_exr, write_exr
 from refgi.provenance import Record, estimate_record
 from refgi.provenance.frames import same_sequence
 from refgi.scene.model import Scene
@@ -36,6 +36,10 @@ class FrameFiles(NamedTuple):
     def of(self, number: int) -> list[Path]:
         """Return the files of a frame."""
         return [self.folder / f"{self.stem}_{number:05d}{suffix}" for suffix in self.suffixes]
+
+    def kept(self, frames: int, *, resume: bool) -> Iterator[str]:
+        """Return the files that must be refgi's own: all but EXRs that a resumed sequence finds damaged."""
+        return (file.name for number in range(frames) for file in self.of(number) if not (resume and _is_damaged(file)))
 
     def record_of(self, number: int) -> Record:
         """Return the record of a frame."""
@@ -94,6 +98,16 @@ class FrameFiles(NamedTuple):
 
     def _exr(self, number: int) -> Path:
         return self.folder / f"{self.stem}_{number:05d}{EXR}"
+
+
+def _is_damaged(file: Path) -> bool:
+    if file.suffix != EXR or not file.is_file() or is_from_refgi(file):
+        return False
+    try:
+        read_exr(file)
+    except InputError:
+        return True
+    return False  # another program's
 
 
 def resumed(sequence: Sequence, scenes: Iterable[Scene], files: FrameFiles, done: int) -> Iterator[Step]:

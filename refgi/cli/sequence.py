@@ -84,7 +84,7 @@ def _sequence(session: Session, /, **options: Any) -> int:
               **path_record(path, frames, temporal)}
     files = FrameFiles(Path(out), text_of(Path(path).stem), KINDS[kind], record,
                        lambda number: frame_record(scene, way, number, frames))
-    folder(out, permission, (file.name for number in range(frames) for file in files.of(number)))
+    folder(out, permission, files.kept(frames, resume=resume))
     sequence = Sequence(scenes_along(scene, way, frames), settings, temporal, method=light, **frame_options)
     with on_threads(threads), progress() as tell:
         done = files.done(frames) if resume else 0

@@ -5,6 +5,7 @@ import re
 
 import imageio.v3
 import numpy as np
+import OpenEXR
 import pytest
 from click.testing import CliRunner
 
@@ -101,6 +102,34 @@ def test_an_interrupted_sequence_goes_on_to_the_bit(way, tmp_path, form):
     assert "0 of 4 frames rendered" in run(*arguments, "--resume").stdout
     assert refused(run(*arguments, "--resume", "--set", "lights=32"), "way_00000.exr", "one of other settings",
                    "(settings.lights)")
+
+
+@pytest.mark.parametrize("left", [b"", b"\x76\x2f\x31\x01", bytes(500)], ids=["empty", "cut", "zeros"])
+def test_a_frame_whose_header_is_damaged_is_rendered_again_on_resuming(way, tmp_path, left):
+    arguments = ["cornell_box", way, *TINY, *SII, "--out", tmp_path / "out"]
+    assert run(*arguments).exit_code == 0
+    whole = lights(tmp_path / "out", range(4))
+    damaged = tmp_path / "out" / "way_00002.exr"
+    damaged.write_bytes(left)
+    assert refused(run(*arguments), "way_00002.exr is there and not from refgi", "--force")
+    assert damaged.read_bytes() == left
+    result = run(*arguments, "--resume")
+    assert result.exit_code == 0, result.output
+    assert "2 of 4 frames rendered" in result.stdout
+    assert all(map(np.array_equal, whole, lights(tmp_path / "out", range(4))))
+
+
+def test_files_of_other_programs_are_not_taken_for_damaged_frames(way, tmp_path):
+    arguments = ["cornell_box", way, *TINY, *SII, "--out", tmp_path / "out", "--resume"]
+    (tmp_path / "out").mkdir()
+    foreign = tmp_path / "out" / "way_00001.exr"
+    with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage},
+                      {"Y": np.ones((10, 12), np.float32)}) as file:
+        file.write(str(foreign))
+    assert refused(run(*arguments), "way_00001.exr is there and not from refgi")
+    foreign.unlink()
+    (tmp_path / "out" / "way_00001.png").write_text("precious")
+    assert refused(run(*arguments), "way_00001.png is there and not from refgi")
 
 
 def test_frames_without_their_png_are_rendered_again(way, tmp_path):

@@ -48,10 +48,11 @@ class Checkpoint:
 
     def __init__(self, path: Path, computation: bytes, values: int) -> None:
         self._path, self._computation, self._warned = path, computation, False
+        with _clear_errors(path, "a file in a folder that is there"):
+            expect(path.parent.is_dir(), f"checkpoint {path}", "a file in a folder that is there", str(path.parent))
         self.moments = _load(path, computation, values) if os.path.lexists(path) else no_passes(values)
         self._saved = int(self.moments.passes)
         with _clear_errors(path, "a place for a file of its size"):
-            path.parent.mkdir(parents=True, exist_ok=True)
             with _temporary(path, self._content()):
                 pass
         self._due = time.monotonic() + SECONDS_BETWEEN

@@ -216,3 +216,15 @@ def test_saves_are_ten_seconds_apart_and_at_the_end(tmp_path, monkeypatch):
     made.save()  # nothing new
     assert replaced == [10.0, 20.0, 24.0]
     assert passes_in(tmp_path / "c") == 25
+
+
+def test_a_folder_that_is_not_there_is_not_made(tmp_path):
+    file = tmp_path / "missing" / "deep" / "ck"
+    with pytest.raises(InputError, match="expected a file in a folder that is there") as caught:
+        Checkpoint(file, NAME, VALUES)
+    assert str(file.parent) in str(caught.value)
+    assert not list(tmp_path.iterdir())
+    below = tmp_path / "file" / "ck"
+    below.parent.write_text("no folder")
+    with pytest.raises(InputError, match="expected a file in a folder that is there"):
+        Checkpoint(below, NAME, VALUES)

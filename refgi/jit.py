@@ -108,7 +108,13 @@ def threads(count: int | None) -> Iterator[None]:
 
 
 class KeyedFolder(_CacheLocator):
-    """Where Numba keeps a kernel: in the folder of its module's key, whatever the source's own folder and time."""
+    """Where Numba keeps a kernel: in the folder of its module's key, whatever the source's own folder and time.
+
+    Parameters
+    ----------
+    function : callable
+        The kernel before it is compiled.
+    """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         config: Any = numba.config

@@ -12,6 +12,8 @@ from refgi.scene.model import Camera, Scene
 from refgi.splat.sii import SiiSettings
 from refgi.stages import observe
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
 CHANGE = 1e-5  # of the mean: what a plane that nobody sees may change of any pixel
 HALVES = (1e1, 1e3, 1e5, 1e8)  # m
 SIZE = {"width": 24, "height": 24, "rsm_resolution": 64}

@@ -123,7 +123,7 @@ def test_float64_and_threads(tmp_path):
     (["cornell_box", "--light", "point:position=0,1,0"], ["intensity", "none"]),
     (["cornell_box", "--light", "point:postion=0,1,0:intensity=1"], ["did you mean 'position'"]),
     (["cornell_box", "--light", "spot:position=0,1,0:target=0,1,0:intensity=1"], ["direction"]),
-    (["cornell_box", "--light", "spot:position=0,1,0:target=0,0,0:outer_deg=90:intensity=1"], ["outer_half_angle"]),
+    (["cornell_box", "--light", "spot:position=0,1,0:target=0,0,0:outer_deg=91:intensity=1"], ["outer_half_angle"]),
     (["cornell_box", "--light", "point:position=0,1,0:intensity=many"], ["many"]),
     (["cornell_box", "--set", "lights"], ["key=value"]),
 ])

@@ -63,7 +63,8 @@ def make_comparison(scene, height=36, width=48):
     runs = (Run("rsm", "ran", 0.012, 0), Run("splat.irradiance", "ran", 0.2, 1),
             Run("splat.lobes", "skipped", reason="no glossy material"))
     samples = np.full((height, width), 64)
-    references = {name: Reference(name, Knobs(), mean, variance, np.full(3, 4e-6), samples, mean / 4, 2.5, runs)
+    references = {name: Reference(name, Knobs(), mean, variance, np.full(3, 4e-6), samples, mean / 4, 2.5, runs,
+                                  estimate={"estimate": {"passes": 2}})
                   for name, mean in (("truth", noisy), ("unoccluded", brighter))}
 
     def result(name, irradiance, judges, seconds, flip):

@@ -84,7 +84,7 @@ class Reference(Strict):
     mean_irradiance: float
     standard_error_of_a_pixel: float
     standard_error_of_the_mean: float
-    errors: dict
+    estimate: dict
     files: list[str]
 
 

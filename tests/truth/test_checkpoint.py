@@ -83,7 +83,7 @@ def test_what_is_read_is_what_was_saved(tmp_path):
     assert again.mean.dtype == np.float64
     assert again.mean.flags.writeable
     assert again.mean.flags.c_contiguous
-    assert file.stat().st_size == HEAD + 8 * (1 + 6 * VALUES)
+    assert file.stat().st_size == HEAD + 8 * (1 + 7 * VALUES)
 
 
 @pytest.mark.parametrize("change", [{"seed": 3}, {"interleave": 2}, {"uniform_share": 1.0}, {"light_grid": 16},
@@ -138,20 +138,22 @@ def test_every_damage_is_one_clear_error(tmp_path, evidence):
     evidence(f"{tried} damaged files, one InputError each")
 
 
-@pytest.mark.parametrize("fault", ["passes", "nan", "inf", "negative squares", "shape"])
+@pytest.mark.parametrize("fault", ["passes", "nan", "inf", "negative squares", "lost", "shape"])
 def test_wrong_content_with_a_right_digest(tmp_path, fault):
     file = tmp_path / "c"
     moments = saved(file)
-    passes, mean, squares = (np.array(field) for field in moments)
+    passes, mean, squares, lost = (np.array(field) for field in moments)
     if fault == "passes":
         passes[...] = -1
     elif fault == "negative squares":
         squares[0, 0] = -1
+    elif fault == "lost":
+        lost[0] = passes + 1
     elif fault == "shape":
         mean = mean[:, :-1]
     else:
         mean[0, 0] = {"nan": np.nan, "inf": np.inf}[fault]
-    content = passes.tobytes() + mean.tobytes() + squares.tobytes()
+    content = passes.tobytes() + mean.tobytes() + squares.tobytes() + lost.tobytes()
     file.write_bytes(FIRST_LINE + NAME + _digest(NAME, content) + content)
     with pytest.raises(InputError, match="checkpoint"):
         Checkpoint(file, NAME, VALUES)

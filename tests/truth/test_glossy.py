@@ -91,7 +91,7 @@ def test_below_the_shading_horizon_a_lobe_sends_nothing():
     for w in ((0.6, 0.0, 0.8), (-math.sqrt(0.75), 0.0, 1e-9), (1.0, 0.0, 0.0)):
         assert lobe_pattern(tables, 0, n, light, w) == 0
     rays = light_rays(scene.lights[0], scene.geometry, np.full((64 * 64, 2), 0.5))
-    points = join([trace_lit_points(Tracer(scene.geometry), tables, lights_of(scene), 0, rays, 0.1)])
+    points = join([trace_lit_points(Tracer(scene.geometry), tables, lights_of(scene), 0, rays, 0.1)], 1, 64 * 64).points
     assert np.isfinite(points.peak).all()
     below = (points.peak == 0) & (points.power > 0)
     assert below.any()  # the scene holds such points

@@ -17,7 +17,9 @@ from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 # near pairs clamped at a twentieth of the scene's metre: else the error of sampling is that of a pixel beside a light
-SETTINGS = ValSettings(lights=128, area_lights=12, map_resolution=64, clamp="distance", clamp_value=0.1)
+# the scale of depths that the limits below were measured with
+SETTINGS = ValSettings(lights=128, area_lights=12, map_resolution=64, clamp="distance", clamp_value=0.1,
+                       depth_scale="scene", near_distance=0.5)
 ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
 # the root of summed squares over the error of all seven steps of visibility: 1 for independent ones, 7^-1/2 where all
 # are alike (Cauchy and Schwarz), without bound where they cancel: 3.1 on cornell_horse, whose rectangle darkens what

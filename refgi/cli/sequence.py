@@ -88,8 +88,8 @@ def _sequence(session: Session, /, **options: Any) -> int:
     sequence = Sequence(scenes_along(scene, way, frames), settings, temporal, method=light, **frame_options)
     with on_threads(threads), progress() as tell:
         done = files.done(frames) if resume else 0
-        sees = allow_empty or _sees_surface(scenes_along(scene, way, frames), frame_options)
-        require_view(sees, scene.name, allow_empty)
+        if not allow_empty:
+            require_view(_sees_surface(scenes_along(scene, way, frames), frame_options), scene.name, allowed=False)
         rendered = _render(sequence, light, files, (done, frames), tell)
     _warn_of_empty([frame["frame"] for frame in rendered if not frame["covered_pixels"]], frames)
     content = {"scene": scene.name, "method": method, "settings": settings, "temporal": temporal, **frame_options,

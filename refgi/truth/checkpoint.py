@@ -52,9 +52,8 @@ class Checkpoint:
             expect(path.parent.is_dir(), f"checkpoint {path}", "a file in a folder that is there", str(path.parent))
         self.moments = _load(path, computation, values) if os.path.lexists(path) else no_passes(values)
         self._saved = int(self.moments.passes)
-        with _clear_errors(path, "a place for a file of its size"):
-            with _temporary(path, self._content()):
-                pass
+        with _clear_errors(path, "a place for a file of its size"), _temporary(path, self._content()):
+            pass
         self._due = time.monotonic() + SECONDS_BETWEEN
 
     def save_when_due(self) -> None:

@@ -258,6 +258,20 @@ def test_pictures_of_a_comparison_are_made_again(tmp_path):
     assert content["refgi"] == record["refgi"]
 
 
+@pytest.mark.parametrize("settings", [{"seconds": 0.5}, {"checkpoint": "passes"}], ids=lambda pair: next(iter(pair)))
+def test_a_frame_that_would_not_repeat_is_not_made_again(settings):
+    """Frames of earlier versions may say so."""
+    from refgi.errors import InputError
+    from refgi.provenance.frames import SequenceFrame, render_frame
+    from refgi.scene import load_scene
+    from refgi.truth import TruthSettings
+
+    with pytest.raises(InputError, match="expected none, as") as caught:
+        render_frame(load_scene("cornell_box"), "truth", TruthSettings(**settings),
+                     SequenceFrame(0, 1, "no_such.toml", None), {})
+    assert caught.value.key in settings
+
+
 @pytest.mark.parametrize("temporal", [False, True])
 def test_frames_of_truth_hold_how_sure_they_are_unless_blended(temporal, room, monkeypatch):
     """Seed 9 + 1 in the second frame: what `render` gives of the frame's camera by that seed."""

@@ -9,6 +9,7 @@ import pytest
 from refgi.radiometry import FOR_FLOAT32, incident_light, radiant_intensity, spot_falloff
 from refgi.rays import Tracer
 from refgi.rsm import direct_irradiance, gbuffer, reflective_shadow_map
+from refgi.rsm.direct import NO_SHADOW, _irradiance
 from refgi.rsm.projection import paraboloid_projection, spot_projection
 from refgi.rsm.solid_angle import spot_power
 from refgi.scene import Camera, Material, SpotLight, light_table, material_table
@@ -86,6 +87,24 @@ def test_irradiance_of_points_as_they_are_given(real, limit, degrees):
         share = exact_falloff(away, table.direction[0], light.inner_half_angle, light.outer_half_angle)
         got = real(incident_light(table, 0, *point)[4])
         assert got == pytest.approx(3.0 * float(share) / (away @ away), rel=limit, abs=1e-30)
+
+
+@pytest.mark.parametrize(("real", "limit"), [(np.float64, 1e-12), (np.float32, 1e-6)])
+@pytest.mark.parametrize("degrees", [0.02, 0.3, 20.0])
+def test_direct_light_is_exact_up_to_the_edge_of_the_cone(real, limit, degrees):
+    """Receivers in a row, whose falloff float64 alone leaves in doubt near the edge."""
+    rng, light = np.random.default_rng(4), narrow(degrees, axis=(0.2, -1.0, 0.4))
+    table = light_table([light])
+    directions = directions_about(table.direction[0], light.outer_half_angle, light.inner_half_angle, 100, rng)
+    points = np.stack([np.array(light.position) + d / np.linalg.norm(d) for d in directions]).astype(real)
+    normal = np.broadcast_to(np.array([0, 1, 0], real)[:, None, None], (3, 1, len(points))).copy()
+    out = np.empty((3, 1, len(points)), real)
+    _irradiance(table, np.ascontiguousarray(points.T[:, None]), normal, np.ones((1, len(points)), bool), NO_SHADOW, out)
+    for point, got in zip(points, out[0, 0], strict=True):
+        away = point.astype(float) - light.position
+        share = float(exact_falloff(away, table.direction[0], light.inner_half_angle, light.outer_half_angle))
+        r2 = away @ away
+        assert got == pytest.approx(3.0 * share * -away[1] / (r2 * math.sqrt(r2)), rel=limit, abs=1e-30)
 
 
 def seen_from_the_light(degrees, dtype, size=96):

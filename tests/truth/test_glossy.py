@@ -13,6 +13,7 @@ from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.scene import SpotLight
 from refgi.truth import TruthSettings, trace_truth
+from refgi.truth.caustics import SHARP_LOBE
 from refgi.truth.light_grid import light_rays
 from refgi.truth.lit_points import join, trace_lit_points
 from refgi.truth.moments import add_pass, no_passes, with_means
@@ -151,3 +152,14 @@ def test_sharp_lobes_that_photons_cannot_serve_are_announced():
     with pytest.warns(RefgiWarning, match="left out beyond the first bounce"):
         result = trace_truth(frame, TruthSettings(samples=24, bounces=2, photons=1 << 12))
     assert np.isfinite(result.mean).all()
+
+
+@pytest.mark.filterwarnings("ignore:.*sampled by chance")  # that it is told: the test above
+def test_sharp_lobes_stay_with_the_samples_where_nothing_blocks(evidence):
+    """Without visibility lobes of exponent 1000 and 999 send nearly the same light: none is left out at the limit."""
+    settings = TruthSettings(samples=24 * 16, visibility=False)
+    results = [trace_truth(Frame(glossy("cornell_box", exponent), width=24, height=24), settings)
+               for exponent in (SHARP_LOBE, SHARP_LOBE - 1)]
+    means = [result.picture_mean.mean() for result in results]
+    evidence(f"exponent 1000: {means[0]:.4f}, 999: {means[1]:.4f} W/m^2")
+    assert means[0] == pytest.approx(means[1], rel=0.05)  # equal seeds, exponents apart by 0.1 %; the lobes are a third

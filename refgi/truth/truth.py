@@ -155,6 +155,7 @@ def _photons(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> t
 
 def _warm_up(scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array], settings: TruthSettings) -> None:
     """Run a pass of one pixel that nobody waits for: kernels are compiled or loaded before the clock starts."""
+    settings = dataclasses.replace(settings, photons=1)
     covered = np.flatnonzero(buffer[2].reshape(-1) >= 0)[:1]
     position, normal = (field.reshape(3, 1, -1)[..., covered] for field in buffer[:2])
     task = task_of(scene, tracer, position, normal, buffer[2].reshape(1, -1)[:, covered], settings)

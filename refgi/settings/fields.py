@@ -70,8 +70,7 @@ class Settings:
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__.removesuffix("Settings")).lower()
 
 
-@cache
-def hints(kind: Any) -> dict[str, Any]:
+def hints(kind: type[Settings]) -> dict[str, Any]:
     """Return the types of a class's fields.
 
     Parameters
@@ -84,7 +83,11 @@ def hints(kind: Any) -> dict[str, Any]:
     dict
         By name.
     """
-    return get_type_hints(kind)
+    found: dict[str, Any] = _hints(kind)
+    return found
+
+
+_hints: Any = cache(get_type_hints)
 
 
 def members(hint: Any) -> tuple[Any, ...]:

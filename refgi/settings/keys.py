@@ -62,7 +62,7 @@ def replaced(settings: S, values: Mapping[str, Any]) -> S:
             found[find_key(settings, key).key] = value
         except InputError as error:
             errors.append(error)
-    made = _rebuilt(settings, _nested(found), "", errors)
+    made: S = _rebuilt(settings, _nested(found), "", errors)
     raise_all(errors, type(settings))
     return made
 

@@ -19,7 +19,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.jit import threads
 from refgi.rays import Tracer
 from refgi.rsm import paraboloid_depth_maps
-from refgi.rsm.projection import paraboloid_projection
+from refgi.rsm.raster.projection import paraboloid_projection
 from refgi.scene import Geometry, load_scene
 from refgi.stages import Memory, observe
 

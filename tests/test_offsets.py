@@ -9,11 +9,11 @@ import pytest
 
 from refgi import load_scene
 from refgi.frame import Frame
+from refgi.pairs.shadow_rays import receivers
 from refgi.rays import MISS, Tracer, openness
 from refgi.rays.offsets import GRAIN, STEPS, far_offset, grain_of, ray_offset
 from refgi.rays.pieces import REACH, cut
 from refgi.scene import Camera, Geometry, Material, Mesh, SpotLight, light_table, material_table
-from refgi.shadowed import receivers
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 from refgi.truth.surfaces import height_above, lift, surfaces
 from tests.truth.scenes import rectangle, scene

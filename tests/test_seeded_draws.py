@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.lights import choose_pixel_lights
 from refgi.lights.openness_flux import roulette
 from refgi.rays import Tracer
 from refgi.rays.openness import openness
-from refgi.rsm import choose_pixel_lights, reflective_shadow_map
+from refgi.rsm import reflective_shadow_map
 from refgi.sampling import halton, sobol_owen
 from refgi.scene import PointLight, load_scene
 from refgi.splat.error_target.samples import stratified

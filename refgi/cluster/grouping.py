@@ -14,7 +14,7 @@ from refgi.stages import skip
 if TYPE_CHECKING:
     from refgi.cluster.settings import ValSettings
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -20,7 +20,7 @@ from refgi.stages import skip
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 

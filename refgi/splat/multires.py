@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.lights.footprints import demo_footprints
 from refgi.lights.selection import choose_lights, drawn_from_maps, footprints
 from refgi.lights.settings import LightSettings, Pattern, expect_choices
-from refgi.lights.solid_angle import demo_footprints
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
 from refgi.pairs.settings import ClampMode, PairSettings
@@ -27,7 +27,8 @@ from refgi.splat.subsplats.visible import evaluate_visible
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import GBuffer, PixelLights
+    from refgi.lights import PixelLights
+    from refgi.rsm import GBuffer
 
 Array = npt.NDArray[Any]
 Refinement = Literal["single_pass", "list"]

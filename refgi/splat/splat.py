@@ -20,7 +20,8 @@ from refgi.splat.settings import SplatSettings
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights, Projection
+    from refgi.lights import PixelLights
+    from refgi.rsm import Projection
 
 Array = npt.NDArray[Any]
 

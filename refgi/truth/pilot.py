@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.shadowed import Receivers
+from refgi.pairs.shadow_rays import Receivers
 from refgi.truth.density import Density, density_of
 from refgi.truth.light_grid import cell_centres
 from refgi.truth.light_pass import lit_points, pick_points

@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.lobes import inverse_fraction, lobe_direction
+from refgi.pairs.shadow_rays import Receivers
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
-from refgi.shadowed import Receivers
 from refgi.truth.hemisphere import cosine_direction
 from refgi.truth.paths import Paths, dot, found, row
 from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal

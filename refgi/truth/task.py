@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.pairs.shadow_rays import Receivers, add_free
 from refgi.rays import Tracer
-from refgi.rsm.projection import Projection
+from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
-from refgi.shadowed import Receivers, add_free
 from refgi.truth.caustics import Film
 from refgi.truth.density import Density
 from refgi.truth.paths import Shadows

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
-from refgi.rsm.projection import camera_projection
+from refgi.pairs.shadow_rays import receivers
+from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene
-from refgi.shadowed import receivers
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.checkpoint import Checkpoint

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.pairs.packing import HEADROOM, pack
-from refgi.rsm.pixel_lights import PixelLights
+from refgi.pairs.pixel_lights import PixelLights
 from refgi.splat.reach.threshold import all_peaks, light_range, low_irradiance
 from refgi.splat.settings import SplatSettings
 

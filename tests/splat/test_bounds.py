@@ -9,9 +9,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from refgi.errors import InputError
-from refgi.pairs.blocks import block_by_block
 from refgi.pairs.ranged_sum import LANES, reached
-from refgi.rsm.projection import camera_projection, cube_projection
+from refgi.pairs.tiles import block_by_block
+from refgi.rsm.raster.projection import camera_projection, cube_projection
 from refgi.scene import Camera
 from refgi.splat.reach.bins import list_lights, pack_solids
 from refgi.splat.reach.bounds import (

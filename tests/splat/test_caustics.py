@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from refgi.rsm import choose_pixel_lights, reflective_shadow_map
+from refgi.lights import choose_pixel_lights
+from refgi.rsm import reflective_shadow_map
 from refgi.scene import Camera, DirectionalLight, Material, Scene, material_table, merge
 from refgi.scene.builtin.surfaces import patch, rectangle
 from tests.naive import nephroid

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.lights import choose_pixel_lights
+from refgi.lights.refraction import refracted
 from refgi.rays import Tracer
-from refgi.rsm import choose_pixel_lights, reflective_shadow_map
-from refgi.rsm.refraction import refracted
+from refgi.rsm import reflective_shadow_map
 from refgi.scene import DirectionalLight, Material, load_scene, material_table, merge
 from refgi.scene.builtin.surfaces import sphere
 from tests.naive.refraction import through_ball

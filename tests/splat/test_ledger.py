@@ -9,7 +9,7 @@ import pytest
 from refgi.form_factors import polygon_form_factor
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
-from refgi.rsm.projection import CUBE_FORWARD, CUBE_UP
+from refgi.rsm.raster.projection import CUBE_FORWARD, CUBE_UP
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from refgi.splat import SiiSettings, sii
 from refgi.splat.account.ledger import energy_ledger

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.lights.footprints import with_equal_solid_angles
 from refgi.lights.selection import choose_lights
-from refgi.lights.solid_angle import with_equal_solid_angles
-from refgi.rsm.projection import PERSPECTIVE, Projection, spot_projection
-from refgi.rsm.solid_angle import texel_solid_angles
+from refgi.rsm.buffers.solid_angle import texel_solid_angles
+from refgi.rsm.raster.projection import PERSPECTIVE, Projection, spot_projection
 from refgi.scene import PointLight, SpotLight, load_scene
 from refgi.splat.multires import MultiresSettings, multires, shared_subsplats
 from refgi.stages import observe

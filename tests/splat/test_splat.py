@@ -10,8 +10,8 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights import choose_pixel_lights
 from refgi.pairs.ranged_sum import LANES, range_factor
-from refgi.rsm import choose_pixel_lights
 from refgi.scene import load_scene
 from refgi.splat import PairSettings, Receivers, irradiance
 from refgi.splat.reach.bounds import light_solids

@@ -14,7 +14,7 @@ from refgi.errors import expect
 from refgi.stages import stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 

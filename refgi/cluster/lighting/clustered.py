@@ -28,8 +28,8 @@ from refgi.stages import report_progress, stage
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
     from refgi.cluster.settings import ValSettings
+    from refgi.lights import PixelLights
     from refgi.rays import Tracer
-    from refgi.rsm import PixelLights
 
 Array = npt.NDArray[Any]
 

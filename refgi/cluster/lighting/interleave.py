@@ -12,8 +12,8 @@ import numpy.typing as npt
 from refgi.cluster.settings import MOST_BLOCK
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.pairs.blocks import BLOCK
 from refgi.pairs.pair_sum import TILE
+from refgi.pairs.tiles import BLOCK
 
 if TYPE_CHECKING:
     from refgi.cluster.settings import Dealing

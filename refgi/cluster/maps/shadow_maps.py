@@ -16,10 +16,10 @@ from refgi.cluster.maps.traced import traced_maps
 from refgi.cluster.settings import ValSettings
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.rsm.depth_maps import distance_maps
-from refgi.rsm.extent import Extent
-from refgi.rsm.paraboloid import Ignored
-from refgi.rsm.projection import PARABOLOID, Projection
+from refgi.rsm.buffers.extent import Extent
+from refgi.rsm.raster.depth_maps import distance_maps
+from refgi.rsm.raster.paraboloid import Ignored
+from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.scene.model import Geometry
 from refgi.stages import skip, stage
 

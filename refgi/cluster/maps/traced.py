@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.maps.occluders import Blockers
-from refgi.rsm.paraboloid import Ignored
-from refgi.rsm.projection import Projection
+from refgi.rsm.raster.paraboloid import Ignored
+from refgi.rsm.raster.projection import Projection
 
 if TYPE_CHECKING:
     from refgi.rays import Tracer

@@ -12,7 +12,7 @@ from refgi.cluster.settings import ValSettings
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 
 def reference_visibility(

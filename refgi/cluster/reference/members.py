@@ -14,7 +14,7 @@ from refgi.cluster.reference.unobstructed import free_share
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 Weights = Literal["even", "flux", "light"]

@@ -35,7 +35,7 @@ from refgi.lights.selection import choose_lights, footprints
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.compare.maps import DIVERGING, Scale, luminance
-from refgi.lights.solid_angle import with_equal_solid_angles
+from refgi.lights.footprints import with_equal_solid_angles
 from refgi.papers import pictures
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.multires.subjects import every_texel, frame_of, full_sum, settings_of, unclamped

@@ -47,7 +47,7 @@ from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
     from refgi.splat.sii import SiiSettings
 
 Array = npt.NDArray[Any]

@@ -32,7 +32,7 @@ def pixel_areas(buffer: "GBuffer", geometry: "Geometry") -> Array:
     The pixel's solid angle is exact; distance and cosine are those of its centre, so the areas add up to a face's own
     up to the pixels on its edge. The cosine is that of the triangle: a normal interpolated for shading has no area.
     """
-    from refgi.rsm.solid_angle import texel_solid_angles
+    from refgi.rsm.buffers.solid_angle import texel_solid_angles
 
     areas = np.zeros(buffer.covered.shape)
     seen = buffer.covered

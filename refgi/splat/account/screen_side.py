@@ -14,7 +14,7 @@ from refgi.splat.splat import cut_irradiance
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
     from refgi.splat.sii import SiiSettings
 
 Array = npt.NDArray[Any]

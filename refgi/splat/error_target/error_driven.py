@@ -30,7 +30,8 @@ from refgi.splat.refinement.refine import refine
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import GBuffer, PixelLights
+    from refgi.lights import PixelLights
+    from refgi.rsm import GBuffer
     from refgi.splat.multires import MultiresSettings
 
 Array = npt.NDArray[Any]

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange, threads
-from refgi.pairs.blocks import put, taken
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.packing import Packed
+from refgi.pairs.tiles import put, taken
 from refgi.rsm.memory import plane
 from refgi.splat.error_target.descent import assemble, begin, descend, misses
 from refgi.splat.error_target.interpolate import blends

@@ -59,7 +59,7 @@ def disc_loss(receivers: Receivers, rsms: "Sequence[Rsm]", radius: float, offset
 
 def _texels(rsm: "Rsm", offset: float) -> tuple[Array, Array]:
     """Return row and column of some texels, (2, N), and their position, reversed normal and flux, (7, N)."""
-    from refgi.rsm import choose_pixel_lights
+    from refgi.lights import choose_pixel_lights
 
     lights = choose_pixel_lights([rsm], count=TEXELS, pattern="halton")
     assert lights.texel is not None

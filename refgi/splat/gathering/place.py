@@ -30,7 +30,7 @@ def centers(rsm: "Rsm", points: Array) -> Array:
     center = np.stack([row, column]).astype(np.float64)
     outside = np.isnan(center[0])
     if outside.any():
-        from refgi.rsm.projection import ORTHOGRAPHIC
+        from refgi.rsm.raster.projection import ORTHOGRAPHIC
 
         maps = rsm.projection
         right, down, ahead = maps.frame[0] @ (points[:, outside] - maps.origin[0][:, None])

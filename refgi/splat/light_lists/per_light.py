@@ -23,7 +23,8 @@ from refgi.splat.subsplats.upsample import upsample
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import GBuffer, PixelLights
+    from refgi.lights import PixelLights
+    from refgi.rsm import GBuffer
     from refgi.splat.multires import MultiresSettings
 
 Array = npt.NDArray[Any]

@@ -14,7 +14,7 @@ from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, checked, over_receivers
 from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.pair_sum import TILE
-from refgi.pairs.range import Range
+from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES, reached
 from refgi.splat.reach.lists import Lists
 from refgi.splat.reach.reference_length import with_reference_length
@@ -22,7 +22,8 @@ from refgi.splat.reach.strength import lobe_strength
 from refgi.splat.settings import SplatSettings
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights, Projection
+    from refgi.lights import PixelLights
+    from refgi.rsm import Projection
 
 Array = npt.NDArray[Any]
 

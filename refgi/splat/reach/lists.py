@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.pairs.packing import Packed
-from refgi.pairs.range import Range
+from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES
 from refgi.splat.reach.bins import list_lights, of_whole_tiles, pack_solids
 from refgi.splat.reach.bounds import Solids, light_solids

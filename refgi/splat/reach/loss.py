@@ -11,7 +11,7 @@ from refgi.splat.settings import SplatSettings
 from refgi.stages import stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -24,7 +24,7 @@ from refgi.splat.settings import SplatSettings
 from refgi.stages import stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 S = TypeVar("S", bound=SplatSettings)

@@ -43,7 +43,7 @@ def screen_quads(projection: "Projection", position: Array, radius: Array) -> Ar
     InputError
         If the map is no single perspective one.
     """
-    from refgi.rsm.projection import PERSPECTIVE
+    from refgi.rsm.raster.projection import PERSPECTIVE
 
     expect(projection.kind == PERSPECTIVE and projection.maps == 1, "projection", "one perspective map",
            f"kind {projection.kind}, {projection.maps} maps")

@@ -14,11 +14,11 @@ import numpy.typing as npt
 from refgi.draws import RANGE, draws
 from refgi.errors import expect
 from refgi.pairs.packing import Packed, pack
-from refgi.pairs.range import Range
+from refgi.pairs.pixel_lights import Range
 from refgi.splat.settings import SplatSettings
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 

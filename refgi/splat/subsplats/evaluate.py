@@ -6,15 +6,16 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.blocks import taken
 from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.settings import PairSettings
+from refgi.pairs.tiles import taken
 from refgi.splat.refinement.grid import Subsplats
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import GBuffer, PixelLights
+    from refgi.lights import PixelLights
+    from refgi.rsm import GBuffer
 
 Array = npt.NDArray[Any]
 Representative = Literal["pixel", "mean"]

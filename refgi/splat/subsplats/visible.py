@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.pairs.blocks import taken
+from refgi.pairs.shadow_rays import receivers, shadowed_sum
+from refgi.pairs.tiles import taken
 from refgi.scene import Geometry
-from refgi.shadowed import receivers, shadowed_sum
 from refgi.splat.refinement.grid import Subsplats
 from refgi.stages import stage
 
 if TYPE_CHECKING:
+    from refgi.lights import PixelLights
     from refgi.rays import Tracer
-    from refgi.rsm import GBuffer, PixelLights
+    from refgi.rsm import GBuffer
 
 Array = npt.NDArray[Any]
 

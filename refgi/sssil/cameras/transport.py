@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.frame import Frame
+from refgi.lights import choose_pixel_lights
 from refgi.rays import STEPS, Tracer
-from refgi.rsm import choose_pixel_lights, reflective_shadow_map
+from refgi.rsm import reflective_shadow_map
 
 Array = npt.NDArray[Any]
 

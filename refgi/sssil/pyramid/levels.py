@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.memory import plane
-from refgi.rsm.projection import Projection
+from refgi.rsm.raster.projection import Projection
 from refgi.sssil.level import Level
 from refgi.sssil.pyramid.closest import BEYOND
 from refgi.sssil.pyramid.coarser import fill_coarser_level

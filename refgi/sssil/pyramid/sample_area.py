@@ -13,7 +13,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.memory import plane
-from refgi.rsm.projection import Projection
+from refgi.rsm.raster.projection import Projection
 from refgi.sssil.pyramid.view import View, centre, view_of
 
 Array = npt.NDArray[Any]

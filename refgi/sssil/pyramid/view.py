@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
-from refgi.rsm.projection import Projection
+from refgi.rsm.raster.projection import Projection
 
 Array = npt.NDArray[Any]
 

@@ -15,9 +15,10 @@ from refgi.cluster.visibility.visible import visibility
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights
 from refgi.pairs.irradiance import Receivers, irradiance
-from refgi.rsm import PixelLights, facing_normals
+from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from tests.naive import eq2
 from tests.naive.interleaving import lights_of

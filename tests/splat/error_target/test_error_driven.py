@@ -10,9 +10,9 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import checked
-from refgi.rsm import PixelLights
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.error_target import error_driven as module

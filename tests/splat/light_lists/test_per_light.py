@@ -9,7 +9,7 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.jit import threads
-from refgi.rsm import choose_pixel_lights
+from refgi.lights import choose_pixel_lights
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.light_lists import per_light as module

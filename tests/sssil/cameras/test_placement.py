@@ -8,7 +8,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.rays import Tracer
-from refgi.rsm.projection import camera_projection
+from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import BLACK, Camera, Material, Scene, SpotLight, merge

@@ -7,7 +7,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.frame import Frame
-from refgi.rsm.projection import camera_projection
+from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Camera, Material, PointLight, Scene, merge
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.sssil.pyramid.sample_area import GRAZING, sample_area

@@ -8,7 +8,7 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
-from refgi.rsm.projection import camera_projection, cube_projection
+from refgi.rsm.raster.projection import camera_projection, cube_projection
 from refgi.scene import Camera, load_scene
 from refgi.sssil.reprojection.look_up import Seen, look_up
 from tests.naive import reprojection as naive

@@ -16,7 +16,7 @@ from refgi.rsm import rasterize
 from refgi.sampling import halton
 from refgi.scene import Scene
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.reach.fragments import fragments
+from refgi.splat.sii.reach.fragments import fragments
 from refgi.stages import Memory, observe
 
 ROOM = "cornell_sphere:faces=17000"

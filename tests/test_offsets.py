@@ -73,7 +73,8 @@ def hssil_by_rays(frame):
 
 
 def multires_by_rays(frame):
-    from refgi.splat.multires import MultiresSettings, multires
+    from refgi.splat.multires.multires import multires
+    from refgi.splat.multires.settings import MultiresSettings
 
     return multires(frame, MultiresSettings(visibility="rays"))
 

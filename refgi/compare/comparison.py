@@ -114,7 +114,7 @@ def find_ledger(method: Method) -> Callable[[Frame, Any], Any] | None:
     -------
     callable or None
         Takes frame and settings; its result has `rows` and `difference` as those of
-        `refgi.splat.account.ledger.Ledger`. None for a method without one.
+        `refgi.splat.sii.ledger.Ledger`. None for a method without one.
     """
     module, _, function = method.ledger.partition(":")
     return getattr(import_module(module), function) if module else None

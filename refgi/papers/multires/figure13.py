@@ -13,8 +13,9 @@ from refgi.papers import pictures
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.multires.subjects import every_texel, frame_of, full_sum, settings_of, unclamped
 from refgi.papers.records import Figure, Picture, Table
-from refgi.splat.gathering.gather import GatherSettings, gather
-from refgi.splat.multires import MultiresSettings, multires
+from refgi.splat.gather.gather import GatherSettings, gather
+from refgi.splat.multires.multires import multires
+from refgi.splat.multires.settings import MultiresSettings
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

@@ -9,7 +9,7 @@ from refgi import Frame, load_scene, rays
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, Geometry, SpotLight
 from refgi.scene.model import Camera, Scene
-from refgi.splat.sii import SiiSettings
+from refgi.splat.sii.settings import SiiSettings
 from refgi.stages import observe
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.scene.model import LightTable, MaterialTable, Scene, light_table, material_table
-from refgi.scene.origin import near_origin
+from refgi.scene.motion import near_origin
 from refgi.scene.values import is_count
 from refgi.stages import stage
 

@@ -16,7 +16,7 @@ from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.radiometry import DIRECTIONAL, POINT, orthonormal_basis, radiant_intensity
 from refgi.sampling import cosine_hemisphere, halton
-from refgi.scene.cone import CAP
+from refgi.scene.light import CAP
 from refgi.stages import stage
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from refgi.radiometry import (
     spot_falloff,
 )
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
-from refgi.scene.cone import cone_row
+from refgi.scene.light import cone_row
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]

@@ -13,7 +13,7 @@ from refgi.rsm.buffers.direct import NO_SHADOW, _irradiance
 from refgi.rsm.buffers.solid_angle import spot_power
 from refgi.rsm.raster.projection import paraboloid_projection, spot_projection
 from refgi.scene import Camera, Material, SpotLight, light_table, material_table
-from refgi.scene.cone import cone_row
+from refgi.scene.light import cone_row
 from refgi.splat import walk_lights
 from refgi.truth.light_grid import light_rays
 from tests.rsm.shapes import geometry

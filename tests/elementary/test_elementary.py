@@ -166,7 +166,7 @@ def test_docstrings_and_docs_promise_these_limits():
         stated = [float(number) for number in re.findall(r"Within ([0-9.]+)", getattr(elementary, name).__doc__)]
         assert stated == [limit]
     assert f"float64: {ULP_POW_DOUBLE:g}" in elementary.pow.__doc__
-    table = (Path(__file__).parents[1] / "docs/methods/sii_sum.md").read_text(encoding="utf-8")
+    table = (Path(__file__).parents[2] / "docs/methods/sii_sum.md").read_text(encoding="utf-8")
     row = table.split("| `exp2` | `log2` | `log2p1` | `pow` |")[1].splitlines()[2]
     assert [float(cell) for cell in row.strip("|").split("|")] == list(ULP.values())
 

@@ -12,13 +12,13 @@ from refgi.frame import Frame
 from refgi.pairs.shadow_rays import receivers
 from refgi.rays import MISS, Tracer, openness
 from refgi.rays.offsets import GRAIN, STEPS, far_offset, grain_of, ray_offset
-from refgi.rays.pieces import REACH, cut
+from refgi.rays.watertight import REACH, cut
 from refgi.scene import Camera, Geometry, Material, Mesh, SpotLight, light_table, material_table
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 from refgi.truth.surfaces import height_above, lift, surfaces
 from tests.truth.scenes import rectangle, scene
 
-DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
+DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[3] / "shared" / "data"))
 UNCHANGED = 1e-5  # of the picture's mean, in any pixel
 SINGLE = 2.0**-24
 

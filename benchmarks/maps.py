@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.harness import Row, ratio, seconds
 from benchmarks.raster import _disc_rays, _tracer
-from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.maps import shadow_maps
 from refgi.cluster.settings import ValSettings
 from refgi.jit import threads

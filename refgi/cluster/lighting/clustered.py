@@ -13,10 +13,19 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights, Given
+from refgi.cluster.clustering.rectangle import AreaLights, Given
 from refgi.cluster.lighting.area_sum import Tiles, add_hard, add_soft, add_unshadowed, bound_tiles
-from refgi.cluster.lighting.interleave import SUBSET, Subsets, dealt, put, subsets, take
-from refgi.cluster.lighting.member_lights import MemberLights, add_members, member_lights
+from refgi.cluster.lighting.interleave import (
+    SUBSET,
+    MemberLights,
+    Subsets,
+    add_members,
+    dealt,
+    member_lights,
+    put,
+    subsets,
+    take,
+)
 from refgi.cluster.visibility.filtered import build, room_for
 from refgi.cluster.visibility.look import choices, numbers_of, scale_of
 from refgi.cluster.visibility.series import series

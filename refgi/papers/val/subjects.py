@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import Clusters, cluster
-from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.frame import Frame

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import cluster
-from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.lighting import clustered_irradiance
 from refgi.cluster.lighting.interleave import RUNS, dealt
 from refgi.cluster.maps.hard import hard_visibility

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.rsm.raster.projection import paraboloid_projection
 
 

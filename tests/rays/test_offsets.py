@@ -92,7 +92,7 @@ def shares_of_rays(frame):
 
 
 def cameras_sight(frame):
-    from refgi.sssil.cameras.transport import free
+    from refgi.sssil.camera_transport import free
 
     position, normal = (part[:, frame.gbuffer.covered].T.astype(float)
                         for part in (frame.gbuffer.position, frame.gbuffer.normal))

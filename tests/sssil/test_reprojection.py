@@ -10,7 +10,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.rsm.raster.projection import camera_projection, cube_projection
 from refgi.scene import Camera, load_scene
-from refgi.sssil.reprojection.look_up import Seen, look_up
+from refgi.sssil.reprojection import Seen, look_up
 from tests.naive import reprojection as naive
 
 TESTS = {"depth_tolerance": 0.02, "normal_cosine": 0.95}

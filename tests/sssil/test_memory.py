@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.sssil.pyramid.memory import level_bytes
+from refgi.sssil.memory import level_bytes
 from refgi.sssil.settings import HssilSettings
 from tests.sssil.pyramid.pictures import camera, made, random_picture
 

@@ -20,10 +20,9 @@ from typing import Any
 import numpy as np
 
 from refgi import stages
-from refgi.compare.environment import environment
 from refgi.compare.flip import flip
-from refgi.compare.measurement import measure
-from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
+from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference, measure
+from refgi.compare.provenance import environment
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS, Method, find_method

@@ -1,4 +1,4 @@
-"""Pixel lights splatted onto the picture, three methods that share no code but lights and pair sums.
+"""Pixel lights splatted onto the picture, three methods that do not import each other.
 
 `sii` (Dachsbacher and Stamminger 2006) adds the irradiance of each pixel light to the pixels where it is significant;
 `multires` (Nichols and Wyman 2009) evaluates them all at subsplats, large where nothing changes; `gather` (2005), which

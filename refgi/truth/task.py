@@ -10,7 +10,7 @@ from refgi.rays import Tracer
 from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
 from refgi.truth.caustics import Film
-from refgi.truth.density import Density
+from refgi.truth.light_grid import Density
 from refgi.truth.paths import Shadows
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import Surfaces

@@ -19,10 +19,9 @@ from refgi.scene import Scene
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.checkpoint import Checkpoint
-from refgi.truth.moments import Moments, add_pass, blocks_of, no_passes, with_means
+from refgi.truth.light_pass import pilot
 from refgi.truth.passes import one_pass
-from refgi.truth.pilot import pilot
-from refgi.truth.result import TruthResult, result_of
+from refgi.truth.result import Moments, TruthResult, add_pass, blocks_of, no_passes, result_of, with_means
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import lights_of, surfaces
 from refgi.truth.task import Task, sets_of

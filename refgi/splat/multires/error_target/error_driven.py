@@ -2,7 +2,7 @@
 
 Ranges of depth and normal cannot promise an error: light may vary where geometry does not and the reverse. Here a cell
 is split where stopping would cost most (`trial`). The threshold sinks from trial to trial until pixels lit in full
-(`samples`) say that the error, at its upper bound, is below the target.
+(`estimate`) say that the error, at its upper bound, is below the target.
 
 A trial stops short of the pixels: what would be lit there is exact, whatever it will be, and most of the cost. They are
 lit, and the picture put together, once the threshold is found. No pixel is lit twice; a picture that is lit in full,

@@ -1,6 +1,6 @@
 """The list of subsplats (Nichols and Wyman 2009, Sec. 3.3): cells are split until none needs it or the finest is met.
 
-The paper refines a list pass by pass (`published_list`). Visiting the cells of the coarsest level one by one, depth
+The paper refines a list pass by pass (`pass_by_pass`). Visiting the cells of the coarsest level one by one, depth
 first, and going down only where a cell is refined gives the same subsplats in one visit, whatever the criteria. To
 read a level off by itself ("own level enough, level above not", as the authors' demo does) gives them only where all
 cells around a refined one are refined too: true of ranges with thresholds that do not rise with the level and of the

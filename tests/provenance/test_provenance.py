@@ -13,7 +13,7 @@ from refgi.errors import InputError
 from refgi.provenance import plain, program, scene_record
 from refgi.provenance.content import camera_from, geometry_digest, light_from, light_json, materials_digest
 from refgi.provenance.frames import same_sequence
-from refgi.provenance.program import git_id
+from refgi.provenance.record import git_id
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from tests.scene.samples import write_scene
 

@@ -30,8 +30,8 @@ def _bench(session: Session, /, paper: str, quick: bool, only: str | None, threa
     Times are medians of interleaved runs and are compared as ratios. A figure that fails leaves the others standing.
     """
     from refgi.cli.destination import Permission, folder
-    from refgi.cli.progress import progress
-    from refgi.cli.threads import on_threads
+    from refgi.cli.options import on_threads
+    from refgi.cli.session import progress
     from refgi.papers.catalogue import choose, find_paper
     from refgi.papers.runner import reproduce
     from refgi.papers.workbench import FULL, QUICK

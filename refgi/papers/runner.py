@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from refgi.compare.environment import environment
+from refgi.compare.provenance import environment
 from refgi.errors import InputError, RefgiError, RefgiWarning
 from refgi.papers.catalogue import Entry, Paper, choose, find_paper
 from refgi.papers.outcome import Outcome, Reproduction

@@ -32,7 +32,7 @@ from refgi.papers.hssil.times import SETUPS
 from refgi.papers.subjects import seen_by
 from refgi.papers.workbench import FULL, Workbench
 from refgi.sssil import HssilSettings
-from refgi.sssil.temporal.settings import TemporalSettings
+from refgi.sssil.temporal.filter import TemporalSettings
 from tests.papers.conftest import SMALL
 
 PRINTED = {  # Figure 6: sampling, upsampling, compositing, total, on the 8800 GTS and the GTX 260, ms

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.lights import PixelLights
 from refgi.papers.subjects import seen_by
 from refgi.papers.val.figure8 import clustered_along, moved
 from refgi.papers.val.figure12 import pieces
@@ -19,7 +20,6 @@ from refgi.papers.val.sequence import EXACT, FEWER, INTERLEAVED, RESTARTED, WARM
 from refgi.papers.val.subjects import HORSE, Clustered, clustered, frame_of, settings_of
 from refgi.papers.val.table2 import STEPS, own_seconds
 from refgi.papers.workbench import Workbench
-from refgi.rsm import PixelLights
 from refgi.scene import Mesh
 from refgi.scene.model import merge
 from refgi.stages import Run

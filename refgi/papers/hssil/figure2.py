@@ -13,8 +13,8 @@ from refgi.papers.hssil.subjects import RADIUS, every_texel
 from refgi.papers.records import Cell, Figure, Picture, Plot, Table
 from refgi.papers.val.painting import palette
 from refgi.sssil import HssilSettings
-from refgi.sssil.crown.coverage import coverage
 from refgi.sssil.crown.pattern import offsets_at
+from refgi.sssil.crown.reach import coverage
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -15,8 +15,8 @@ from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Plot, Table
 from refgi.papers.val.motion import changes
 from refgi.sssil import HssilSettings
+from refgi.sssil.temporal.filter import TemporalSettings
 from refgi.sssil.temporal.sequence import Sequence
-from refgi.sssil.temporal.settings import TemporalSettings
 from refgi.stages import observe
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from refgi.papers.val.scenes import atrium, horse
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, load_scene
 from refgi.scene.builtin.atrium import LEAF
-from refgi.scene.builtin.atrium_cloth import shrub
+from refgi.scene.builtin.atrium_pieces import shrub
 from refgi.scene.builtin.surfaces import patch, rectangle
 from refgi.scene.health import mean_face_normals
 from refgi.scene.model import merge

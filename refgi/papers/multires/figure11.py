@@ -18,7 +18,7 @@ from refgi.papers.multires.subjects import (
 )
 from refgi.papers.records import Bar, Figure, Ratios, Table
 from refgi.papers.timing import interleaved
-from refgi.splat.multires import multires
+from refgi.splat.multires.multires import multires
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -8,13 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.compare.maps import DIVERGING, Scale, luminance
-from refgi.lights.solid_angle import with_equal_solid_angles
+from refgi.lights.footprints import with_equal_solid_angles
 from refgi.papers import pictures
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.multires.subjects import every_texel, frame_of, full_sum, settings_of, unclamped
 from refgi.papers.records import Figure, Picture, Table
-from refgi.splat.gathering.gather import GatherSettings, gather
-from refgi.splat.multires import MultiresSettings, multires
+from refgi.splat.gather.gather import GatherSettings, gather
+from refgi.splat.multires.multires import multires
+from refgi.splat.multires.settings import MultiresSettings
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

@@ -25,7 +25,8 @@ from refgi.papers.timing import interleaved
 from refgi.scene import Camera, Material, Scene, SpotLight
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import Mesh, merge
-from refgi.splat.multires import MultiresSettings, multires
+from refgi.splat.multires.multires import multires
+from refgi.splat.multires.settings import MultiresSettings
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -10,11 +10,11 @@ from refgi.lights.selection import choose_lights
 from refgi.papers import pictures
 from refgi.papers.multires.subjects import DRAGON, frame_of, full_sum, settings_of, share_lit, subsplats_of
 from refgi.papers.records import Cell, Figure, Picture, Table
-from refgi.splat.multires import MultiresSettings, multires
-from refgi.splat.refinement.grid import Subsplats
-from refgi.splat.refinement.picture import level_picture
-from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
-from refgi.splat.subsplats.upsample import upsample
+from refgi.splat.multires.multires import multires
+from refgi.splat.multires.refinement.grid import Subsplats, level_picture
+from refgi.splat.multires.settings import MultiresSettings
+from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.upsample import upsample
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

@@ -10,9 +10,10 @@ from refgi.papers.judging import Errors, errors_of
 from refgi.papers.multires.subjects import DRAGON, LARGE, frame_of, full_sum, settings_of, subsplats_of, unclamped
 from refgi.papers.records import Figure, Table
 from refgi.papers.timing import interleaved
-from refgi.splat.multires import MultiresSettings, Upsampling, multires
-from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
-from refgi.splat.subsplats.upsample import upsample
+from refgi.splat.multires.multires import multires
+from refgi.splat.multires.settings import MultiresSettings, Upsampling
+from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.upsample import upsample
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -14,8 +14,9 @@ from refgi.papers.judging import errors_of
 from refgi.papers.multires.subjects import LARGE, frame_of, full_sum, settings_of, share_lit, subsplats_of, unclamped
 from refgi.papers.records import Cell, Figure, Picture, Plot, Table
 from refgi.papers.timing import interleaved
-from refgi.splat.error_target.error_driven import error_driven
-from refgi.splat.multires import MultiresSettings, multires
+from refgi.splat.multires.error_target.error_driven import error_driven
+from refgi.splat.multires.multires import multires
+from refgi.splat.multires.settings import MultiresSettings
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

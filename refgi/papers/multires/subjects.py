@@ -17,8 +17,9 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.papers.multires.scenes import BUILDERS
 from refgi.papers.subjects import Subjects, seen_by
-from refgi.splat.multires import MultiresSettings, multires, shared_subsplats
-from refgi.splat.refinement.grid import Subsplats
+from refgi.splat.multires.multires import multires, shared_subsplats
+from refgi.splat.multires.refinement.grid import Subsplats
+from refgi.splat.multires.settings import MultiresSettings
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -21,8 +21,9 @@ from refgi.papers.multires.subjects import (
     subsplats_of,
 )
 from refgi.papers.records import Cell, Figure, Picture, Table
-from refgi.splat.light_lists.per_light import per_light_counts
-from refgi.splat.multires import MultiresSettings, multires
+from refgi.splat.multires.light_lists.per_light import per_light_counts
+from refgi.splat.multires.multires import multires
+from refgi.splat.multires.settings import MultiresSettings
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -24,7 +24,8 @@ from refgi.papers.multires.subjects import (
 )
 from refgi.papers.records import Bar, Cell, Figure, Picture, Ratios, Table
 from refgi.papers.timing import interleaved
-from refgi.splat.multires import MultiresSettings, multires
+from refgi.splat.multires.multires import multires
+from refgi.splat.multires.settings import MultiresSettings
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -75,7 +75,7 @@ def _notes(blocked: Errors, noise: dict[str, Errors]) -> tuple[str, ...]:
 
 
 def _instant_radiosity(frame: "Frame", settings: SiiSettings) -> Array:
-    from refgi.shadowed import receivers, shadowed_sum
+    from refgi.pairs.shadow_rays import receivers, shadowed_sum
 
     buffer, light = frame.gbuffer, np.zeros((3, frame.height, frame.width), frame.dtype)
     to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.lights.importance import importance_pyramid
 from refgi.lights.selection import importance_maps
+from refgi.lights.warp import warp_samples
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Table
 from refgi.papers.sii.subjects import full_sum
-from refgi.rsm.pyramid import importance_pyramid
-from refgi.rsm.warp import warp_samples
 from refgi.sampling import halton
 from refgi.splat import SiiSettings, sii
 

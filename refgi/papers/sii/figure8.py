@@ -7,8 +7,8 @@ from refgi.papers import pictures
 from refgi.papers.records import Cell, Figure, Table
 from refgi.papers.sii.subjects import BOX, counted, full_sum, reference_length, splats
 from refgi.splat import sii
-from refgi.splat.reach.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
-from refgi.splat.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW
+from refgi.splat.sii.reach.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
+from refgi.splat.sii.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

@@ -8,7 +8,7 @@ from refgi.papers.records import Figure, Table
 from refgi.papers.sii.subjects import BOX, full_sum, splats
 from refgi.papers.timing import interleaved
 from refgi.splat import sii
-from refgi.splat.reach.reference_length import PAPER_OVERDRAW
+from refgi.splat.sii.reach.reference_length import PAPER_OVERDRAW
 
 if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench

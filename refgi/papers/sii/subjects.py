@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from refgi.lights.selection import choose_lights
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.reach.fragments import Fragments, fragments
-from refgi.splat.reach.reference_length import PAPER_CUT, PAPER_LIGHTS
-from refgi.splat.reach.reference_length import reference_length as reference_length_of
+from refgi.splat.sii.reach.fragments import Fragments, fragments
+from refgi.splat.sii.reach.reference_length import PAPER_CUT, PAPER_LIGHTS
+from refgi.splat.sii.reach.reference_length import reference_length as reference_length_of
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -170,6 +170,6 @@ def low_irradiance_of(bench: "Workbench", scene: str, settings: SiiSettings) -> 
     float
         Irradiance, W/m^2.
     """
-    from refgi.splat.reach.threshold import low_irradiance
+    from refgi.splat.sii.reach.threshold import low_irradiance
 
     return low_irradiance(choose_lights(bench.frame(scene), settings), settings)

@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
+from refgi.lights.importance import importance, importance_pyramid
+from refgi.lights.warp import Method, warp_samples
 from refgi.papers.records import Bar, Cell, Figure, Ratios, Table
 from refgi.papers.timing import interleaved
-from refgi.rsm.importance import importance
-from refgi.rsm.pyramid import importance_pyramid
-from refgi.rsm.warp import Method, warp_samples
 from refgi.sampling import halton
 
 if TYPE_CHECKING:

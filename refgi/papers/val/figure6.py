@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.clustering.measures import mean_angle
+from refgi.cluster.clustering.kmeans import mean_angle
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.papers.judging import errors_of

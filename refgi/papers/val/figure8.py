@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from refgi.cluster.clustering.measures import in_use
+from refgi.cluster.clustering.kmeans import in_use
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.papers.curves import Axes, Curve, drawn

@@ -13,9 +13,9 @@ from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
+from refgi.lights import PixelLights
 from refgi.papers.val.scenes import body, placed
 from refgi.papers.val.subjects import Clustered
-from refgi.rsm import PixelLights
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import merge

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
+    from refgi.lights import PixelLights
     from refgi.papers.val.subjects import Clustered
-    from refgi.rsm import PixelLights
 
 Array = npt.NDArray[Any]
 

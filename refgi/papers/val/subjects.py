@@ -14,21 +14,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import Clusters, cluster
-from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
+from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.papers.subjects import Subjects, seen_by
 from refgi.papers.val.scenes import BUILDERS
-from refgi.shadowed import receivers, shadowed_sum
 from refgi.truth.vpl import VplSettings, vpl
 
 if TYPE_CHECKING:
+    from refgi.lights import PixelLights
     from refgi.papers.workbench import Workbench
-    from refgi.rsm import PixelLights
     from refgi.scene import Scene
 
 Array = npt.NDArray[Any]

@@ -72,7 +72,7 @@ def test_an_exr_holds_what_python_computes(tmp_path):
         assert np.array_equal(channels[name], picture.radiance[index])
         assert np.array_equal(channels[f"irradiance.{name}"], picture.irradiance[index])
     assert attributes["method"] == "sii"
-    assert attributes["settings"]["lights"] == 16
+    assert attributes["settings"]["lights.count"] == 16
     assert attributes["versions"]["numpy"] == np.__version__
 
 
@@ -93,7 +93,7 @@ def test_files_in_a_folder_are_named_like_the_mesh(name, stem, plate, tmp_path):
 def test_json_is_the_only_thing_on_stdout(tmp_path):
     result = run("cornell_box", *TINY, "--out", tmp_path / "a.exr", "--json", "--seed", "7")
     content = json.loads(result.stdout)
-    assert content["settings"]["seed"] == 7
+    assert content["settings"]["lights.seed"] == 7
     assert content["files"] == [str(tmp_path / "a.exr")]
     assert content["non_finite_pixels"] == 0
     assert content["warnings"] == []

@@ -137,7 +137,7 @@ def _openness(
 ) -> Array:
     from refgi.rays import openness
 
-    radius = settings.openness_radius or frame.lit_extent.diagonal / 10
+    radius = settings.openness_radius or frame.illuminated_extent.diagonal / 10
     return openness(frame.tracer, position, normal, covered, radius=radius, rays=settings.openness_rays,
                     seed=settings.seed)
 

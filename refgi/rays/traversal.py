@@ -94,7 +94,7 @@ def closest_hits(calls: Calls, origins: Array, directions: Array, reach: Array, 
 
 @kernel(parallel=True)
 def occlusions(calls: Calls, origins: Array, directions: Array, reach: Array, blocked: Array) -> None:
-    """Tell whether any triangle lies on each ray before `reach`.
+    """Return whether any triangle lies on each ray before `reach`.
 
     Parameters
     ----------

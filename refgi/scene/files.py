@@ -1,4 +1,4 @@
-"""Files on disk as bytes, and the one shape in which every mesh format hands over what it holds."""
+"""File access of the readers, and `Contents`, the common result of all mesh formats."""
 
 import difflib
 import itertools
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from refgi.errors import InputError
 from refgi.scene.model import Camera, Light, Mesh
-from refgi.scene.source import was_read
+from refgi.scene.source import record_file
 
 LONGEST_WORD, MOST_CANDIDATES = 200, 1000  # comparing words takes the square of their length, for each candidate
 
@@ -53,7 +53,7 @@ def read_bytes(path: Path) -> bytes:
         raise InputError(f"{path}: cannot be read: {error}") from error
     if not content:
         raise InputError(f"{path}: the file is empty")
-    was_read(path, content)
+    record_file(path, content)
     return content
 
 
@@ -103,7 +103,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     Parameters
     ----------
     word : str
-        What was given.
+        The mistyped word.
     known : iterable of str
         What would have been right; the first `MOST_CANDIDATES` are looked at.
 

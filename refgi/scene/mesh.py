@@ -1,9 +1,8 @@
-"""One piece of a scene on its way in, and what makes it usable: asked of one mesh, or of very many small ones at once.
+"""Meshes as read, and their validation: one at a time, or very many small ones in a batch.
 
-A file may hold a hundred thousand meshes of a few triangles each. NumPy asked about them one by one takes longer than
-everything else that is done with them, so small ones are joined into batches first.
-
-Whether a scene of so many triangles can be held at all, asked before the memory is taken.
+A file may hold a hundred thousand meshes of a few triangles each. Checking them one by one with NumPy takes longer than
+everything else that is done with them, so small ones are joined into batches first. `expect_memory` checks that a scene
+fits before memory is allocated.
 """
 
 import dataclasses
@@ -17,7 +16,7 @@ from refgi.errors import expect
 from refgi.scene.material import UNPAINTED, Material
 from refgi.scene.values import LARGEST, Array
 
-SMALL = 1 << 12  # vertices and faces of a mesh that goes into a batch; a larger one is worth a look of its own
+SMALL = 1 << 12  # vertices and faces of a mesh that goes into a batch; a larger one is checked alone
 BATCH = 1 << 18  # vertices and faces in a batch: some megabytes
 
 SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes nor overflows
@@ -177,7 +176,7 @@ def _rows_of_three(array: Array, kinds: str) -> bool:
     return array.ndim == 2 and array.shape[1] == 3 and array.dtype.kind in kinds
 
 
-def expect_room(vertices: int, faces: int, where: str) -> None:
+def expect_memory(vertices: int, faces: int, where: str) -> None:
     """Raise `InputError` unless indices and memory suffice for a scene's geometry.
 
     Parameters
@@ -195,7 +194,7 @@ def expect_room(vertices: int, faces: int, where: str) -> None:
     expect(vertices <= MOST_VERTICES, where, f"at most {MOST_VERTICES} vertices in all", vertices)
     needed = vertices * BYTES_OF_VERTEX + faces * BYTES_OF_FACE
     present = physical_memory()
-    if needed > present:  # asked for every object of a file; the text is made once
+    if needed > present:  # called for every object of a file; the text is made once
         expect(False, where, f"a scene that fits in {present / 2**30:.1f} GiB of memory",
                f"{vertices} vertices and {faces} faces ({needed / 2**30:.1f} GiB)")
 

@@ -1,4 +1,4 @@
-"""Where a scene came from: how it was named, and the files that were read for it."""
+"""Provenance of a scene: its name, and the files that were read for it."""
 
 import contextlib
 import hashlib
@@ -35,8 +35,8 @@ def reading() -> Iterator[dict[Path, str]]:
         _reading.reset(token)
 
 
-def was_read(path: Path, content: bytes) -> None:
-    """Take note of a file's content where somebody asked by `reading`.
+def record_file(path: Path, content: bytes) -> None:
+    """Record a file's content inside a block of `reading`.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def source_of(name: str, files: dict[Path, str]) -> Source:
     Parameters
     ----------
     name : str
-        What `load_scene` was given.
+        The argument of `load_scene`.
     files : dict of Path to str
         What `reading` gathered.
 

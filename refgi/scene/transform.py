@@ -1,4 +1,4 @@
-"""Placing a mesh in the world by a 4x4 matrix that acts on column vectors, p' = M p."""
+"""Transform meshes to world space by a 4x4 matrix that acts on column vectors, p' = M p."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -92,7 +92,7 @@ def _near_one(linear: Array) -> Array:
     return np.asarray(np.ldexp(linear, -exponent[:, None, None]))
 
 
-def placed(mesh: Mesh, matrix: Array) -> Mesh:
+def transformed(mesh: Mesh, matrix: Array) -> Mesh:
     """Return the mesh moved into the world; a mirroring matrix also turns the faces' winding.
 
     Parameters
@@ -107,11 +107,11 @@ def placed(mesh: Mesh, matrix: Array) -> Mesh:
     Mesh
         The same object where the matrix is the identity; else normals are unit vectors, or zero where they are missing.
     """
-    return placed_all([mesh], matrix[None])[0]
+    return transformed_all([mesh], matrix[None])[0]
 
 
-def placed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
-    """Return each mesh moved by its own matrix, as `placed` does.
+def transformed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
+    """Return each mesh moved by its own matrix, as `transformed` does.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def placed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
 
 
 def _moved(mesh: Mesh, matrix: Array, inverse: Array, mirrors: bool) -> Mesh:
-    with np.errstate(over="ignore", invalid="ignore"):  # whoever reads a file looks at coordinates once they are final
+    with np.errstate(over="ignore", invalid="ignore"):  # final coordinates are checked by `repair`
         vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     normals = mesh.normals
     if normals is not None:

@@ -1,4 +1,4 @@
-"""The plain values a scene is made of: colours, vectors, arrays, and what makes one usable."""
+"""Colours, vectors and numbers of scenes, and their validation."""
 
 import math
 import numbers
@@ -69,8 +69,8 @@ def is_vector(value: Any) -> bool:
         return False
 
 
-def settle(owner: Any, *keys: str) -> None:
-    """Turn the vectors of a frozen dataclass into tuples of floats, so that it can be compared and hashed.
+def as_float_tuples(owner: Any, *keys: str) -> None:
+    """Convert the vectors of a frozen dataclass to tuples of floats, so that it can be compared and hashed.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ LONGEST_CHAIN = 16
 
 
 class Film(NamedTuple):
-    """Where photons are counted."""
+    """The pixels that photons are splatted to."""
 
     scene: Scene
     shape: tuple[int, int]  # rows and columns of the picture
@@ -58,7 +58,7 @@ class Photons(NamedTuple):
 
 def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EXPONENT, *,
          longest: int | None = None) -> Film | None:
-    """Prepare the counting of photons, or return None for a scene without mirror or glass.
+    """Prepare a film for photons, or return None for a scene without mirror or glass.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EX
     Returns
     -------
     Film or None
-        None where there is nothing to count.
+        None without caustics.
     """
     table = material_table(scene.materials)
     mirrors = surfaces(scene)
@@ -89,12 +89,12 @@ def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EX
 
 
 def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, random: np.random.Generator) -> Array:
-    """Count one pass of photons.
+    """Trace one pass of photons and splat them to pixels.
 
     Parameters
     ----------
     film : Film
-        Where they are counted.
+        Their pixels.
     tracer : Tracer
         The scene's rays.
     lights : LightTable
@@ -121,7 +121,7 @@ def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, ra
             landing = (batch.triangle_id != MISS) & (bounce > 0)
             arriving = batch.flux[landing]
             reflect(film.mirrors, film.ior, tracer.grain, words, batch)
-            _count(film, tracer, batch.landed[landing], batch.towards[landing], arriving, irradiance)
+            _splat(film, tracer, batch.landed[landing], batch.towards[landing], arriving, irradiance)
             if not (batch.reach > 0).any():
                 break
     return irradiance
@@ -145,27 +145,27 @@ def _power(lights: LightTable, k: int, directional: bool, measure: float, direct
                 flux[i, c] = power[c] * measure
 
 
-def _count(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Array, irradiance: Array) -> None:
-    """Add photons to the pixels that see where they landed, in their order."""
+def _splat(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Array, irradiance: Array) -> None:
+    """Splat photons to the pixels that see where they landed, in their order."""
     camera = film.scene.camera
     view = np.subtract(camera.eye, landed)
     row, column, _ = project(camera_projection(camera, film.shape[1], film.shape[0]), landed.T)
     cosine = (view * normals).sum(axis=1) / np.linalg.norm(view, axis=1)
-    seen = ~np.isnan(row) & (cosine > 0)
-    starts = landed[seen] + tracer.offsets(landed[seen])[:, None] * normals[seen]
+    visible = ~np.isnan(row) & (cosine > 0)
+    starts = landed[visible] + tracer.offsets(landed[visible])[:, None] * normals[visible]
     reach, blocked = np.ones(len(starts), np.float32), np.empty(len(starts), np.bool_)
     tracer.fill_occluded(starts.astype(np.float32), (camera.eye - starts).astype(np.float32), reach, blocked)
-    seen[np.flatnonzero(seen)[blocked]] = False
-    at = np.floor(row[seen]).astype(np.int64), np.floor(column[seen]).astype(np.int64)
-    density = cosine[seen] / ((view[seen] ** 2).sum(axis=1) * film.solid_angle[at])
+    visible[np.flatnonzero(visible)[blocked]] = False
+    at = np.floor(row[visible]).astype(np.int64), np.floor(column[visible]).astype(np.int64)
+    density = cosine[visible] / ((view[visible] ** 2).sum(axis=1) * film.solid_angle[at])
     pixel = at[0] * film.shape[1] + at[1]
     for c in range(3):
-        irradiance[c] += np.bincount(pixel, flux[seen, c] * density, irradiance.shape[1])
+        irradiance[c] += np.bincount(pixel, flux[visible, c] * density, irradiance.shape[1])
 
 
 @kernel(parallel=True)
 def reflect(mirrors: Surfaces, ior: Array, grain: float, words: Array, photons: Photons) -> None:
-    """Note where photons landed and send on those that met a mirror-like lobe or glass.
+    """Write where photons landed, and reflect or refract those on a mirror-like lobe or glass.
 
     Parameters
     ----------

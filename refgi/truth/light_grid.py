@@ -1,11 +1,11 @@
-"""Fresh directions over a light: n x n cells of equal probability, one jittered ray in each.
+"""Stratified directions of a light: n x n cells of equal probability, one jittered ray in each.
 
 Spots and points get equal-area maps of the square to the cap or the sphere; a directional light gets a rectangle across
 the scene's bounds. Without a density each ray stands for the same solid angle or area, exactly; with one, for that over
-the density at its place. The cells are taken along a Hilbert curve: neighbours in the list are neighbours on the
-surfaces they light, which is what makes systematic picks even.
+the density at its place. The cells are ordered along a Hilbert curve: neighbours in the list are neighbours on the
+surfaces they reach, which is what makes systematic picks even.
 
-Densities over the unit square, constant in cells: uniform points are moved to where the density is high.
+Piecewise constant densities over the unit square, for importance sampling: uniform points are warped to them.
 
 q_ij is the probability of cell (i, j) of an m x m grid. The first coordinate follows the marginal sum_j q_ij, the
 second q_ij / sum_j q_ij within row i; both are linear inside a cell, so a point stands for 1 / (m^2 q_ij) of a uniform

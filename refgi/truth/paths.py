@@ -1,7 +1,7 @@
 """Paths and shadow rays of a batch, as arrays, and the small vector algebra of their kernels.
 
-Parallel loops over paths only call a kernel for each chunk: Numba drops, without a word, what a parallel loop itself
-writes into arrays that it reached through a NamedTuple's attribute. Inside, scalars are taken one by one: a row taken
+Parallel loops over paths only call a kernel for each chunk: Numba silently drops what a parallel loop itself
+writes into arrays that it reached through a NamedTuple's attribute. Inside, scalars are loaded one by one: a row loaded
 as a view counts references, and over that count threads wait for each other.
 """
 
@@ -31,13 +31,13 @@ class Paths(NamedTuple):
 
 
 class Shadows(NamedTuple):
-    """Shadow rays of a batch, and what each is worth if it is free."""
+    """Shadow rays of a batch, and the contribution of each if it is unblocked."""
 
     origin: Array  # (n, 3) float32
     direction: Array  # (n, 3) float32
     reach: Array  # (n,) float32
     blocked: Array  # (n,) bool
-    worth: Array  # (n, 3) float32, W/m^2
+    contribution: Array  # (n, 3) float32, W/m^2
 
 
 @kernel
@@ -77,7 +77,7 @@ def row(rows: Array, i: int) -> tuple[float, float, float]:
 
 
 @kernel
-def found(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+def hit_point(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Return the direction back along a ray and the point it found.
 
     Parameters

@@ -19,7 +19,7 @@ class TruthSettings:
     """How the ground truth is computed and when it stops: at the first of `samples`, `seconds`, `target_error`.
 
     - `estimator`: "combined" (split at a bounded geometry term), "hemisphere" or "light" alone.
-    - `samples` per pixel (picks of lit points plus hemisphere directions; at least two passes are made), `seconds`
+    - `samples` per pixel (picks of light vertices plus hemisphere directions; at least two passes are made), `seconds`
       (checked after each pass), `target_error` (root mean square standard error of the picture over its mean).
     - `visibility=False`: nothing blocks between emitter and receiver; the emitter's direct light stays shadowed.
     - `emitters="seen"`: only what the camera sees lights anything (inside its picture, facing it, nothing between), as
@@ -28,9 +28,10 @@ class TruthSettings:
     - `caustics`: add light through mirror-like lobes and glass, by `photons` from each light in a pass; those lobes are
       then left out of the estimators.
     - `seed`: which random numbers.
-    - `interleave`^2 sets of lit points a pass: pixel (x, y) picks from set (x mod `interleave`, y mod `interleave`).
+    - `interleave`^2 sets of light vertices a pass: pixel (x, y) picks from set (x mod `interleave`, y mod
+    `interleave`).
     - `uniform_share` of each light's rays go out evenly, the rest where a pilot found that they light the picture.
-    - `light_grid` directions along one side of each light's grid, `picks` of lit points and `directions` over the
+    - `light_grid` directions along one side of each light's grid, `picks` of light vertices and `directions` over the
       hemisphere (8, or 16 for "hemisphere") of each receiver in a pass; `bound` is the largest geometry term left to
       the light side, in units of 1 / footprint of a light direction.
     - `checkpoint`: file that holds all passes so far; an existing one of the same computation is continued.

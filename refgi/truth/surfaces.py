@@ -1,13 +1,13 @@
-"""What rays find: the tables kernels read, and the light that a directly lit point sends on.
+"""Triangles and materials for kernels, and the radiance that a directly lit point reflects.
 
-Symbols: y a lit point, n its shading normal and g its face normal, both on the lit side, l the direction to the
-light, F = I(l) cos(g, l) / d^2 the incident flux per area, w a direction away from y.
+Symbols: y a lit point, n its shading normal and g its face normal, both on the side of the light, l the direction to
+the light, F = I(l) cos(g, l) / d^2 the incident flux per area, w a direction away from y.
 
 - Diffuse: intensity per area rho_d F / pi <n.w>, so that a whole texel sends Phi / pi <n.w>, the RSM's convention.
 - Lobe: rho_s F (P + 1) / (2 pi K) <r.w>^P [n.w > 0], r the mirror direction about n, K the part above the surface.
 
 Both are written rho F / pi * pattern(w), where pattern is <n.w>, or (P + 1) / (2 K) <r.w>^P. Light leaves only on the
-lit side of the face: g.w > 0.
+side of the light: g.w > 0.
 """
 
 import math
@@ -112,7 +112,7 @@ def face_normal(surfaces: Surfaces, triangle: int, dx: float, dy: float, dz: flo
     triangle : int
         Which one.
     dx, dy, dz : float
-        Direction in which the surface is seen or lit.
+        Direction of a ray or of light towards the surface.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What every pass of the ground truth works on, and batches of its rays."""
+"""Inputs of every pass of the ground truth, and batches of its shadow rays."""
 
 from typing import Any, NamedTuple
 
@@ -19,22 +19,22 @@ Array = npt.NDArray[Any]
 
 
 class Task(NamedTuple):
-    """Everything a pass works on."""
+    """Inputs of a pass."""
 
     scene: Scene
     settings: TruthSettings
     tracer: Tracer
     surfaces: Surfaces
     lights: LightTable
-    to: Receivers
-    set_of: Array  # (r,) which set of lit points each receiver picks from
+    receivers: Receivers
+    set_of: Array  # (r,) which set of light vertices each receiver picks from
     caustics: Film | None = None
-    view: Projection | None = None  # only what it sees emits; None: everything does
+    view: Projection | None = None  # only surfaces visible in it emit; None: all do
     densities: tuple[Density | None, ...] = ()  # of each light's rays; none: even ones
 
 
 def sets_of(pixel: Array, width: int, side: int) -> Array:
-    """Return which of side^2 sets of lit points each pixel picks from: neighbours take turns.
+    """Return which of side^2 sets of light vertices each pixel picks from, interleaved.
 
     Parameters
     ----------
@@ -68,12 +68,12 @@ def spans(task: Task, per_receiver: int) -> list[tuple[int, int]]:
     list of tuple of 2 ints
         First receiver of each span and one past its last.
     """
-    step, total = max(1, task.settings.batch // per_receiver), len(task.to.pixel)
+    step, total = max(1, task.settings.batch // per_receiver), len(task.receivers.pixel)
     return [(first, min(first + step, total)) for first in range(0, total, step)]
 
 
 def shadow_batch(count: int) -> Shadows:
-    """Make room for a batch of shadow rays.
+    """Allocate a batch of shadow rays.
 
     Parameters
     ----------
@@ -89,13 +89,13 @@ def shadow_batch(count: int) -> Shadows:
                    np.empty(count, np.bool_), np.empty((count, 3), np.float32))
 
 
-def settle(task: Task, rays: Shadows, first: int, per_receiver: int, sums: Array, visibility: bool) -> None:
-    """Trace shadow rays and add what the free ones are worth.
+def add_unblocked(task: Task, rays: Shadows, first: int, per_receiver: int, sums: Array, visibility: bool) -> None:
+    """Trace shadow rays and add the contributions of unblocked ones.
 
     Parameters
     ----------
     task : Task
-        Whose tracer is asked.
+        With the tracer.
     rays : Shadows
         The rays; `blocked` is filled.
     first : int
@@ -105,10 +105,10 @@ def settle(task: Task, rays: Shadows, first: int, per_receiver: int, sums: Array
     sums : (3, r) float64 ndarray
         Added to, W/m^2.
     visibility : bool
-        Without, every ray is free.
+        Without, no ray is blocked.
     """
     if visibility:
         task.tracer.fill_occluded(rays.origin, rays.direction, rays.reach, rays.blocked)
     else:
         np.less_equal(rays.reach, 0, out=rays.blocked)
-    add_free(sums, first, len(rays.reach) // per_receiver, per_receiver, rays.blocked, rays.worth)
+    add_free(sums, first, len(rays.reach) // per_receiver, per_receiver, rays.blocked, rays.contribution)

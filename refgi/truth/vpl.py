@@ -1,6 +1,6 @@
-"""Pixel lights with ray-traced visibility: what every method of pixel lights converges to.
+"""Pixel lights (VPLs) with ray-traced visibility, the limit of every method of pixel lights.
 
-E(x) = sum_i Phi_i / pi <n_i.w> <n_x.-w> / r^2 V(x, x_i), and the same with a lobe (papers' Eq. 2 and 3, calibrated).
+E(x) = sum_i Phi_i / pi <n_i.w> <n_x.-w> / r^2 V(x, x_i), and the same with a lobe (SII Eq. 2 and 3, calibrated).
 """
 
 import dataclasses
@@ -51,12 +51,12 @@ class VplSettings:
 
 
 def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
-    """Light every pixel by pixel lights with a shadow ray each.
+    """Sum pixel lights at every pixel, with a shadow ray for each pair.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The view of the scene.
     settings : VplSettings, optional
         Which lights; the defaults where absent.
 
@@ -71,8 +71,9 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     lights = choose_pixel_lights(frame.rsms, count=None if settings.pattern == "all" else settings.lights,
                                  pattern=settings.pattern, seed=settings.seed, filtered=settings.filtered)
     buffer = frame.gbuffer
-    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
+    points = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id,
+                       frame.tracer.grain)
     irradiance = np.zeros((3, frame.height, frame.width), frame.dtype)
-    irradiance.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, lights, visibility=settings.visibility,
-                                                           batch=settings.batch)
+    irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(frame.tracer, points, lights,
+                                                              visibility=settings.visibility, batch=settings.batch)
     return irradiance

@@ -182,7 +182,7 @@ def test_same_bits_for_threads_and_batches(frame, evidence):
 
 
 @pytest.mark.feature("REF-19")
-def test_both_doors_give_the_same_picture(frame, monkeypatch, evidence):
+def test_both_backends_give_the_same_picture(frame, monkeypatch, evidence):
     settings = TruthSettings(samples=48)
     monkeypatch.setenv("REFGI_EMBREE", "run")
     by_run = trace_truth(Frame(frame.scene, width=SIZE, height=SIZE), settings)

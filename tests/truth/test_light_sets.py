@@ -1,4 +1,4 @@
-"""Sets of lit points, densities from the pilot and lobes in blocks of their own: same expectation, same bits."""
+"""Sets of light vertices, densities from the pilot and lobes in blocks of their own: same expectation, same bits."""
 
 import dataclasses
 
@@ -13,7 +13,7 @@ from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.light_grid import cell_centres, density_of, light_rays, rays_through, stratified_sets, warp
 from refgi.truth.light_pass import fresh_points
 from refgi.truth.light_side import TILE, tiles
-from refgi.truth.lit_points import BLOCK
+from refgi.truth.light_vertices import BLOCK
 from refgi.truth.task import sets_of
 from refgi.truth.truth import accumulate, task_of
 from tests.truth.scenes import CAMERA, corner_room, receivers_in_corner, rectangle, scene

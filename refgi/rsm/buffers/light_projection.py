@@ -1,6 +1,7 @@
-"""The maps that enclose what a light shines on.
+"""Shadow-map projections of a light, and the flux that arrives through each texel.
 
-What arrives from a light through each texel of its maps, whatever is met there.
+A spot gets one perspective or paraboloid map, a point light a cube or two paraboloid maps, a directional light an
+orthographic map.
 """
 
 import math
@@ -92,7 +93,7 @@ def _described(light: Light) -> str:
 def texel_shares(
     light: Light, maps: Projection, solid_angle: Array | None = None, texel: Array | None = None
 ) -> Array:
-    """Return how much of a light each texel of its maps takes in.
+    """Return the integral of a light's falloff over each texel of its maps.
 
     Parameters
     ----------

@@ -1,7 +1,4 @@
-"""Runs: stretches of texels of a row that see the same triangle, which is looked up once for all of them.
-
-The ray of each texel: where it starts and where it goes.
-"""
+"""Rays of texels, and runs: stretches of a row's texels with the same triangle, whose data is loaded once a run."""
 
 import math
 from typing import Any, NamedTuple
@@ -102,13 +99,13 @@ class Surface(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """Stretches of texels that see one triangle, in some rows of texels; run 0 is all that sees nothing."""
+    """Stretches of texels with one triangle, in some rows of texels; run 0 is all texels without surface."""
 
     row: Array  # (rows,) int32: row on the maps
     column: Array  # (rows,) int32: column of the first texel
     slot: Array  # (rows, texels) uint32: run of each texel
     start: Array  # (n, 3) int32: triangle, row and first column of each run on the maps
-    fixed: Array  # (n, 12) float64: corner v_0, N, normal on the side that is seen, albedo
+    fixed: Array  # (n, 12) float64: corner v_0, N, normal on the visible side, albedo
     corner: Array  # (n, 4) int32: vertices, material
 
 
@@ -152,8 +149,8 @@ def towards(nx: float, ny: float, nz: float, tx: float, ty: float, tz: float) ->
 
 
 @kernel
-def room_for_runs(rows: int, texels: int) -> Any:
-    """Return room for the runs of some rows.
+def allocate_runs(rows: int, texels: int) -> Any:
+    """Allocate the runs of some rows.
 
     Parameters
     ----------
@@ -205,7 +202,7 @@ def find_runs(triangle_id: Array, rows: Rows, runs: Runs) -> int:
 
 
 @kernel
-def take_runs(triangle_id: Array, texel: Array, runs: Runs) -> int:
+def runs_at(triangle_id: Array, texel: Array, runs: Runs) -> int:
     """Find the runs that some texels belong to, one for each.
 
     Parameters

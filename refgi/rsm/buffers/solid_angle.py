@@ -137,7 +137,7 @@ def _texel_integrals(projection: Projection, spot: Circles) -> Array:
     quadrant = np.zeros(((height + 1) // 2, (width + 1) // 2))
     _fill_quadrant(projection, spot, quadrant)
     if projection.kind == PARABOLOID:
-        _give_rim_inwards(projection, quadrant)
+        _move_rim_inwards(projection, quadrant)
     # row 0 of the quadrant touches the axis; the middle row of an odd height is half a row on either side
     across = np.concatenate([quadrant[:, ::-1], quadrant[:, width % 2 :]], axis=1)
     whole = np.concatenate([across[::-1], across[height % 2 :]], axis=0)
@@ -276,7 +276,7 @@ def _falloff_strip(kind: int, x: float, y0: float, y1: float, spot: Circles) -> 
 
 
 @kernel
-def _give_rim_inwards(projection: Projection, quadrant: Array) -> None:
+def _move_rim_inwards(projection: Projection, quadrant: Array) -> None:
     """Move what texels with a centre beyond the hemisphere hold to the neighbour nearer to the axis."""
     step = 2.0 * projection.half[0] / projection.width
     shift = 0.5 - 0.5 * (projection.width % 2)

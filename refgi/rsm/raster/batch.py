@@ -1,4 +1,4 @@
-"""Triangles drawn in batches on a perspective or orthographic map: which texels each owns, and how near it is there.
+"""Batched triangle rasterization on perspective and orthographic maps, by edge functions with the top-left rule.
 
 With vertices v_i = (column w, row w, w) and the texel centre (x, y, 1):
 

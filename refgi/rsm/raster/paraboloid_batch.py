@@ -1,6 +1,6 @@
-"""A chunk of triangles made ready for one paraboloid map, in SIMD lanes: boxes, planes through the centre, nearness.
+"""Triangle set-up for paraboloid maps, a chunk at a time in SIMD lanes: boxes, planes through the centre, nearness.
 
-Where a triangle may be on a paraboloid map: the box of its corners, made wider for edges that are arcs.
+The box of a triangle's corners is widened, because straight edges are arcs on a paraboloid map.
 """
 
 import math
@@ -26,7 +26,7 @@ BOX = 18 * CHUNK  # first and last column, first and last row
 CORNERS = 22 * CHUNK  # x, y, z of the corners in the map's frame
 ROWS = 31
 # behind the plane z = 0; ahead of it; across it; ahead of it but between texels; within the ball that is cut away
-BEHIND, AHEAD, ACROSS, UNSEEN, NEAR = 0.0, 1.0, 2.0, 3.0, 4.0
+BEHIND, AHEAD, ACROSS, BETWEEN_TEXELS, NEAR = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @kernel
@@ -97,7 +97,7 @@ def box_across(x: Any, y: Any, z: Any) -> tuple[float, float, float, float]:
 
 @kernel
 def is_behind(box: Array, chunk: int, view: Any) -> bool:
-    """Tell whether a whole chunk lies behind a map's plane z = 0.
+    """Return whether a whole chunk lies behind a map's plane z = 0.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _longest(x: float, y: float, z: float) -> Any:
 
 
 @kernel
-def place(corners: Array, chunk: int, view: Any, half: float, size: int, ball: float, setup: Array) -> None:
+def transform_chunk(corners: Array, chunk: int, view: Any, half: float, size: int, ball: float, setup: Array) -> None:
     """Write where every triangle of a chunk lies on a map.
 
     Parameters
@@ -185,8 +185,8 @@ def place(corners: Array, chunk: int, view: Any, half: float, size: int, ball: f
         first_row = np.ceil(max((t_low - spare) * texels + low_offset, 0.0))
         last_row = np.floor(min((t_high + spare) * texels + high_offset, last))
         nearest, farthest = min(zi, min(zj, zk)), max(zi, max(zj, zk))
-        seen = (first_column <= last_column) & (first_row <= last_row)
-        state = ACROSS if nearest < 0.0 else (AHEAD if seen else UNSEEN)
+        has_texels = (first_column <= last_column) & (first_row <= last_row)
+        state = ACROSS if nearest < 0.0 else (AHEAD if has_texels else BETWEEN_TEXELS)
         state = NEAR if max(qi, max(qj, qk)) < within else state
         setup[STATE + b] = BEHIND if farthest < 0.0 else state
         at = BOX + b

@@ -1,4 +1,4 @@
-"""How maps see the world: perspective, orthographic and paraboloid projections, one or several maps at once.
+"""Perspective, orthographic and paraboloid projections of one or several maps at once.
 
 A `Projection` holds k maps of equal size, stacked along rows: one for a camera, six for a cube, two for a dual
 paraboloid, any number for a batch. Each map has an origin and a right-handed frame (right, down, forward). Texel
@@ -56,7 +56,7 @@ def camera_projection(camera: Camera, width: int | None = None, height: int | No
     Parameters
     ----------
     camera : Camera
-        Who looks.
+        The camera.
     width, height : int, optional
         Size in pixels; the camera's own where absent.
 
@@ -74,7 +74,7 @@ def camera_projection(camera: Camera, width: int | None = None, height: int | No
     height = camera.height if height is None else height
     _expect_size(height, width)
     half_v = math.tan(camera.vfov / 2)
-    frame = look_frame(np.subtract(camera.target, camera.eye), camera.up)
+    frame = view_frame(np.subtract(camera.target, camera.eye), camera.up)
     return _maps(PERSPECTIVE, height, width, [camera.eye], [frame], (half_v * width / height, half_v))
 
 
@@ -94,7 +94,7 @@ def spot_projection(light: SpotLight, n: int) -> Projection:
         One perspective map.
     """
     half = math.tan(light.outer_half_angle)
-    return _maps(PERSPECTIVE, n, n, [light.position], [look_frame(light.direction)], (half, half))
+    return _maps(PERSPECTIVE, n, n, [light.position], [view_frame(light.direction)], (half, half))
 
 
 def cube_projection(position: npt.ArrayLike, n: int) -> Projection:
@@ -112,7 +112,7 @@ def cube_projection(position: npt.ArrayLike, n: int) -> Projection:
     Projection
         Six perspective maps.
     """
-    frames = [look_frame(forward, up) for forward, up in zip(CUBE_FORWARD, CUBE_UP, strict=True)]
+    frames = [view_frame(forward, up) for forward, up in zip(CUBE_FORWARD, CUBE_UP, strict=True)]
     return _maps(PERSPECTIVE, n, n, [position] * 6, frames, (1.0, 1.0))
 
 
@@ -134,7 +134,7 @@ def paraboloid_projection(centers: npt.ArrayLike, axes: npt.ArrayLike, n: int, h
         k paraboloid maps.
     """
     axes = np.reshape(np.asarray(axes, np.float64), (-1, 3))
-    return _maps(PARABOLOID, n, n, centers, [look_frame(axis) for axis in axes], (half, half))
+    return _maps(PARABOLOID, n, n, centers, [view_frame(axis) for axis in axes], (half, half))
 
 
 def dual_paraboloid_projection(position: npt.ArrayLike, n: int) -> Projection:
@@ -172,7 +172,7 @@ def directional_projection(light: DirectionalLight, bounds: tuple[Array, Array],
     Projection
         One orthographic map; depth 0 lies just before the box.
     """
-    frame = look_frame(light.direction)
+    frame = view_frame(light.direction)
     corners = np.array(np.meshgrid(*np.stack(bounds, axis=1))).reshape(3, -1).T
     inside = corners @ frame.T
     low, high = inside.min(axis=0), inside.max(axis=0)
@@ -183,7 +183,7 @@ def directional_projection(light: DirectionalLight, bounds: tuple[Array, Array],
     return _maps(ORTHOGRAPHIC, n, n, [origin], [frame], half, reach)
 
 
-def look_frame(forward: npt.ArrayLike, up: npt.ArrayLike | None = None) -> Array:
+def view_frame(forward: npt.ArrayLike, up: npt.ArrayLike | None = None) -> Array:
     """Return the frame (right, down, forward) of a view.
 
     Parameters
@@ -358,5 +358,5 @@ def _expect_size(height: int, width: int) -> None:
 
 
 def _unit(vector: npt.ArrayLike) -> Array:
-    given = np.asarray(vector, np.float64)
-    return given / np.linalg.norm(given)
+    values = np.asarray(vector, np.float64)
+    return values / np.linalg.norm(values)

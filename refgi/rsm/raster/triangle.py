@@ -1,10 +1,10 @@
-"""Where a triangle may be on a perspective or orthographic map: its vertices there, and the texels it may cover.
+"""Triangle bounds on perspective and orthographic maps: projected vertices, and the texels a triangle may cover.
 
 A vertex is kept as (column, row, w, n): its continuous texel coordinates, w (axial depth; 1 when orthographic) and n
 (1; the nearness 1 - depth/reach when orthographic). Nothing is clipped: of a triangle that crosses the plane of the
 eye, the box is that of its forward part.
 
-Triangles in chunks of consecutive ones, their corners laid out for SIMD lanes, each chunk with its box.
+`chunks` groups consecutive triangles, corners in the order of SIMD lanes, each chunk with its bounding box.
 """
 
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
 
 Array = npt.NDArray[Any]
@@ -32,7 +32,7 @@ CHUNK = 64  # triangles
 def project_vertices(
     projection: Projection, m: int, vertices: Array, first: int, last: int, corners: Array, cells: Array
 ) -> None:
-    """Fill rows of `corners` and `cells` with vertices as seen on map `m`.
+    """Fill rows of `corners` and `cells` with vertices as projected on map `m`.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ class Chunks(NamedTuple):
 
 
 def chunks(vertices: Array, faces: Array) -> Chunks:
-    """Lay out triangles in chunks.
+    """Group triangles in chunks.
 
     Parameters
     ----------
@@ -188,13 +188,13 @@ def chunks(vertices: Array, faces: Array) -> Chunks:
         A copy of their corners.
     """
     number = (len(faces) + CHUNK - 1) // CHUNK
-    laid = Chunks(plane((number, 9, CHUNK), np.float64), np.empty((number, 6)))
-    _lay_out(vertices, faces, laid.corners, laid.box)
-    return laid
+    filled = Chunks(plane((number, 9, CHUNK), np.float64), np.empty((number, 6)))
+    _fill_chunks(vertices, faces, filled.corners, filled.box)
+    return filled
 
 
 @kernel(parallel=True)
-def _lay_out(vertices: Array, faces: Array, corners: Array, box: Array) -> None:
+def _fill_chunks(vertices: Array, faces: Array, corners: Array, box: Array) -> None:
     for chunk in prange(len(box)):
         first = np.int64(chunk) * CHUNK
         for axis in range(3):

@@ -7,8 +7,8 @@ import numpy as np
 
 from refgi.errors import expect
 from refgi.scene.builtin.surfaces import lathe, rectangle, ring_surface, sphere
-from refgi.scene.health import mean_face_normals
 from refgi.scene.model import Array, Camera, Material, Mesh, Scene, SpotLight, merge
+from refgi.scene.repair import mean_face_normals
 
 MOST_FACES = 50_000_000
 FLOOR = Material("stage_floor", (0.75, 0.73, 0.7))

@@ -31,7 +31,7 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 class Document:
     """The JSON of one glTF file with checked look-ups, and its buffers.
 
-    Look-ups are asked for by the hundred thousand: the text of an error is made where there is one.
+    There are hundreds of thousands of look-ups: the text of an error is made only where there is one.
 
     Parameters
     ----------

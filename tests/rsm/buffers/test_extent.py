@@ -93,7 +93,8 @@ def test_extents_are_the_boxes_of_what_is_seen_and_lit(half):
     frame = Frame(room(half), **SIZE)
     seen = frame.gbuffer.position[:, frame.gbuffer.covered].astype(float)
     lit = frame.rsms[0].position[:, frame.rsms[0].flux.any(axis=0)].astype(float)
-    for extent, places in ((frame.seen_extent, seen), (frame.lit_extent, lit), (frame.extent, np.hstack([seen, lit]))):
+    for extent, places in ((frame.visible_extent, seen), (frame.illuminated_extent, lit),
+                           (frame.extent, np.hstack([seen, lit]))):
         np.testing.assert_array_equal(extent.low, places.min(axis=1))
         np.testing.assert_array_equal(extent.high, places.max(axis=1))
         assert extent.diagonal == pytest.approx(np.linalg.norm(np.ptp(places, axis=1)), rel=ROUNDING)
@@ -103,7 +104,7 @@ def test_extents_are_the_boxes_of_what_is_seen_and_lit(half):
 
 def test_a_grid_of_texels_finds_the_box_of_a_fine_map(evidence):
     """What 96 texels a side miss of a map of 512: one in five at either end."""
-    coarse, fine = (Frame(room(), **{**SIZE, "rsm_resolution": n}).lit_extent for n in (96, 512))
+    coarse, fine = (Frame(room(), **{**SIZE, "rsm_resolution": n}).illuminated_extent for n in (96, 512))
     off = max(np.abs(coarse.low - fine.low).max(), np.abs(coarse.high - fine.high).max()) / fine.diagonal
     assert off < 0.01
     evidence(f"extent of the light by 96 of 512 texels a side: off by {off:.4f} of the diagonal")
@@ -111,20 +112,20 @@ def test_a_grid_of_texels_finds_the_box_of_a_fine_map(evidence):
 
 def test_a_lobe_alone_is_lit_as_well():
     scene = room()
-    shining = Frame(made_of(scene, diffuse=(0.0,) * 3, specular=(0.5,) * 3, exponent=20.0), **SIZE).lit_extent
-    np.testing.assert_array_equal(shining, Frame(scene, **SIZE).lit_extent)
+    shining = Frame(made_of(scene, diffuse=(0.0,) * 3, specular=(0.5,) * 3, exponent=20.0), **SIZE).illuminated_extent
+    np.testing.assert_array_equal(shining, Frame(scene, **SIZE).illuminated_extent)
 
 
 def test_without_light_or_view_the_extent_is_that_of_all_triangles():
     scene = room()
     black = made_of(scene, diffuse=(0.0,) * 3)
     away = scene.with_camera(eye=(0.0, 5.0, 0.0), target=(0.0, 9.0, 1.0))
-    for extent in (Frame(black, **SIZE).lit_extent, Frame(away, **SIZE).seen_extent):
+    for extent in (Frame(black, **SIZE).illuminated_extent, Frame(away, **SIZE).visible_extent):
         np.testing.assert_array_equal(extent, scene.geometry.bounds)
 
 
-@pytest.mark.parametrize(("which", "not_run"), [("seen_extent", "rsm.reflective_shadow_map"),
-                                                ("lit_extent", "rsm.gbuffer")])
+@pytest.mark.parametrize(("which", "not_run"), [("visible_extent", "rsm.reflective_shadow_map"),
+                                                ("illuminated_extent", "rsm.gbuffer")])
 def test_an_extent_asks_for_no_buffer_that_it_does_not_need(which, not_run):
     with observe() as log:
         getattr(Frame(room(), **SIZE), which)
@@ -149,10 +150,10 @@ def test_rays_of_openness_are_a_tenth_of_what_lights_reach(monkeypatch):
 
     monkeypatch.setattr(rays, "openness", noted)
     render(scene, "sii", SiiSettings(lights=16, openness_flux="scale"), **SIZE)
-    assert asked == [pytest.approx(Frame(scene, **SIZE).lit_extent.diagonal / 10)]
+    assert asked == [pytest.approx(Frame(scene, **SIZE).illuminated_extent.diagonal / 10)]
 
 
 def test_directional_light_reaches_the_plane():
     """A plane below a room is not hidden from a light from below: it takes part."""
     scene = room(1e3).with_lights(DirectionalLight((0.0, 1.0, 0.1), (1.0, 1.0, 1.0)))
-    assert Frame(scene, **SIZE).lit_extent.diagonal > 1e3
+    assert Frame(scene, **SIZE).illuminated_extent.diagonal > 1e3

@@ -1,10 +1,10 @@
-"""What a mesh must satisfy before anything else sees it, and what is quietly mended with a count.
+"""Validation and repair of meshes as read, and of lights.
 
-Errors: a shape that is not a mesh, a coordinate that is not finite, an index without a vertex. Mended: zero-area faces
-are dropped, vertex normals are brought to unit length, and a vertex whose normal is zero or not finite gets the mean
-of its faces' normals.
+Errors: a shape that is not a mesh, a coordinate that is not finite, an index without a vertex. Repaired: zero-area
+faces are dropped, vertex normals are brought to unit length, and a vertex whose normal is zero or not finite gets the
+mean of its faces' normals.
 
-Lights that shine: one without power is left out, with a count, and a scene needs at least one.
+Lights without power are left out, with a count; a scene needs at least one with power.
 """
 
 import dataclasses
@@ -23,8 +23,8 @@ FLAT = 16 * float(np.finfo(np.float64).eps)
 SMALLEST_USUAL, LARGEST_USUAL = 0.01, 1000.0  # m across
 
 
-def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list[str]) -> tuple[list[Mesh], int]:
-    """Return the meshes of a file as `mended` returns each, the sound small ones looked at together.
+def repaired_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list[str]) -> tuple[list[Mesh], int]:
+    """Return the meshes of a file as `repaired` returns each, the sound small ones looked at together.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list
     where : callable
         Returns file and object of the mesh of some number, for the error's text.
     faults : list of str
-        Gets the text of the error for each mesh that `mended` refuses.
+        Gets the text of the error for each mesh that `repaired` refuses.
 
     Returns
     -------
@@ -42,9 +42,9 @@ def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list
     int
         Number of faces dropped.
     """
-    kept, done, dropped = list(meshes), np.zeros(len(meshes), np.bool_), 0
+    remaining, done, dropped = list(meshes), np.zeros(len(meshes), np.bool_), 0
     for batch in batches(meshes):
-        good = _needs_no_mending(batch)
+        good = _needs_no_repair(batch)
         done[batch.members] = good
         if batch.normals is not None:
             usable = np.repeat(good, np.diff(batch.first_vertex))[:, None]
@@ -52,17 +52,17 @@ def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list
             normals /= np.linalg.norm(normals, axis=1)[:, None]
             for k in np.flatnonzero(good).tolist():
                 number, part = batch.members[k], slice(batch.first_vertex[k], batch.first_vertex[k + 1])
-                kept[number] = dataclasses.replace(meshes[number], normals=normals[part])
+                remaining[number] = dataclasses.replace(meshes[number], normals=normals[part])
     for number in np.flatnonzero(~done).tolist():
         try:
-            kept[number], flat = mended(meshes[number], where(number))
+            remaining[number], flat = repaired(meshes[number], where(number))
             dropped += flat
         except InputError as error:
             faults.append(str(error))
-    return kept, dropped
+    return remaining, dropped
 
 
-def _needs_no_mending(batch: Batch) -> Array:
+def _needs_no_repair(batch: Batch) -> Array:
     """Return (k,) which meshes are sound and have neither flat faces nor missing normals."""
     good = batch.sound()
     if not good.all():
@@ -72,7 +72,7 @@ def _needs_no_mending(batch: Batch) -> Array:
     return good if batch.normals is None else good & ~batch.any_vertex(missing_normals(batch.normals))
 
 
-def mended(mesh: Mesh, where: str) -> tuple[Mesh, int]:
+def repaired(mesh: Mesh, where: str) -> tuple[Mesh, int]:
     """Return the mesh without its zero-area faces and with unit vertex normals.
 
     Parameters
@@ -131,7 +131,7 @@ def warn_of_unit(geometry: Geometry, where: str) -> None:
         The file they came from.
     """
     if not SMALLEST_USUAL <= geometry.diagonal <= LARGEST_USUAL:
-        text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are taken as metres. If the file has another unit "
+        text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are read as metres. If the file has another unit "
                 "of s metres, scale its objects in a scene file: \"transform\": "
                 "[s, 0, 0, 0,  0, s, 0, 0,  0, 0, s, 0,  0, 0, 0, 1], such as s = 0.001 for millimetres")
         warnings.warn(RefgiWarning(text), stacklevel=4)
@@ -201,7 +201,7 @@ def mean_face_normals(vertices: Array, faces: Array) -> Array:
     return np.asarray(total / length[:, None])
 
 
-def shining(lights: Sequence[Light], where: str) -> tuple[Light, ...]:
+def lights_with_power(lights: Sequence[Light], where: str) -> tuple[Light, ...]:
     """Return the lights that have power.
 
     Parameters
@@ -221,12 +221,13 @@ def shining(lights: Sequence[Light], where: str) -> tuple[Light, ...]:
     InputError
         If none has power: the picture would be silently black.
     """
-    kept = tuple(light for light in lights if max(_power(light)) > 0)
-    expect(bool(kept), where, "at least one light of power above 0", f"{len(lights)} without" if lights else "none")
-    if dropped := len(lights) - len(kept):
+    remaining = tuple(light for light in lights if max(_power(light)) > 0)
+    without = f"{len(lights)} without" if lights else "none"
+    expect(bool(remaining), where, "at least one light of power above 0", without)
+    if dropped := len(lights) - len(remaining):
         noun = "light" if dropped == 1 else "lights"
         warnings.warn(RefgiWarning(f"{where}: {dropped} {noun} of zero power left out"), stacklevel=3)
-    return kept
+    return remaining
 
 
 def _power(light: Light) -> tuple[float, float, float]:

@@ -45,17 +45,8 @@ class Backend(Protocol):
 def open_backend(vertices: Array, faces: Array) -> Backend:
     """Build Embree's tree over triangles and return the fastest backend that works here.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float32 ndarray
-        Vertices, world space, m.
-    faces : (m, 3) int32 ndarray
-        Vertex indices; at least one face.
-
-    Returns
-    -------
-    Backend
-        By address, or by `run` where `REFGI_EMBREE=run` or the library is not found.
+    `vertices` (n, 3) float32: vertices, world space, m. `faces` (m, 3) int32: vertex indices; at least one face.
+    Result: by address, or by `run` where `REFGI_EMBREE=run` or the library is not found.
     """
     library = None if os.environ.get("REFGI_EMBREE") == "run" else _library()
     return RunBackend(vertices, faces) if library is None else AddressBackend(library, vertices, faces)

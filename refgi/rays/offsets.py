@@ -24,17 +24,8 @@ GRAIN = 8.0  # times the power of 2 above half of the triangles' largest coordin
 def grain_of(vertices: Array, faces: Array) -> float:
     """Return the size of details in a scene as its rays know it: a power of 2 that single triangles do not move.
 
-    Parameters
-    ----------
-    vertices : (n, 3) ndarray
-        Vertices, m.
-    faces : (m, 3) ndarray
-        Vertex indices.
-
-    Returns
-    -------
-    float
-        Length up to which triangles near the coordinates' origin stay whole, m.
+    `vertices` (n, 3): vertices, m. `faces` (m, 3): vertex indices. Result: length up to which triangles near the
+    coordinates' origin stay whole, m.
     """
     if not len(faces):
         return GRAIN

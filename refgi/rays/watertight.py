@@ -38,17 +38,8 @@ class Corners(NamedTuple):
 def corners(vertices: Array, faces: Array) -> Corners:
     """Weld equal positions and list the triangles around each.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float32 ndarray
-        Vertices as Embree has them.
-    faces : (m, 3) int32 ndarray
-        Vertex indices.
-
-    Returns
-    -------
-    Corners
-        The tables for `closest_around`.
+    `vertices` (n, 3) float32: vertices as Embree has them. `faces` (m, 3) int32: vertex indices. Result: the tables for
+    `closest_around`.
     """
     positions, welded = np.unique(vertices + np.float32(0), axis=0, return_inverse=True)  # + 0 makes -0 equal 0
     faces = welded.reshape(-1)[faces].astype(np.int64)
@@ -61,21 +52,9 @@ def corners(vertices: Array, faces: Array) -> Corners:
 def closest_around(tables: Corners, triangle: int, origin: Array, direction: Array, reach: float) -> tuple[int, float]:
     """Find the nearest hit among the triangles that share a corner with `triangle`, in float64.
 
-    Parameters
-    ----------
-    tables : Corners
-        The mesh by corners.
-    triangle : int
-        Where to look.
-    origin, direction : (3,) float64 ndarray
-        The ray; its distance counts in lengths of `direction`.
-    reach : float
-        How far to look.
-
-    Returns
-    -------
-    tuple of int and float
-        Triangle and distance; -1 and inf for a miss. Ties go to the lowest id.
+    `tables`: the mesh by corners. `origin`, `direction` (3,) float64: the ray; its distance counts in lengths of
+    `direction`. `reach`: how far to look. Result: triangle and distance; -1 and inf for a miss. Ties go to the lowest
+    id.
     """
     nearest, hit = np.inf, -1
     for corner in range(3):
@@ -129,19 +108,8 @@ class Pieces(NamedTuple):
 def cut(vertices: Array, faces: Array, grain: float) -> Pieces:
     """Cut huge triangles into pieces that grow with their distance.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float32 ndarray
-        Vertices, m.
-    faces : (m, 3) int32 ndarray
-        Vertex indices.
-    grain : float
-        Edges up to this length stay whole, m.
-
-    Returns
-    -------
-    Pieces
-        The same arrays where nothing is cut.
+    `vertices` (n, 3) float32: vertices, m. `faces` (m, 3) int32: vertex indices. `grain`: edges up to this length stay
+    whole, m. Result: the same arrays where nothing is cut.
     """
     if not _any_longer(vertices, faces, grain):
         return Pieces(vertices, faces, None)

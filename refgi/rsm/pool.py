@@ -60,17 +60,7 @@ _pool = _Pool()
 def plane(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
     """Allocate an uninitialised array from the pool.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Its shape.
-    dtype : dtype
-        Its type.
-
-    Returns
-    -------
-    ndarray
-        C-contiguous, of any content.
+    Result: C-contiguous, of any content.
     """
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < SMALL:

@@ -84,15 +84,8 @@ class Batch(NamedTuple):
 def batches(meshes: Sequence[Mesh]) -> Iterator[Batch]:
     """Join the small meshes, some thousand at a time.
 
-    Parameters
-    ----------
-    meshes : sequence of Mesh
-        Any; those that are large, or whose arrays have no usable form, are in no batch.
-
-    Yields
-    ------
-    Batch
-        Meshes in ascending order, all of them with normals or all without.
+    `meshes`: any; those that are large, or whose arrays have no usable form, are in no batch. Result: meshes in
+    ascending order, all of them with normals or all without.
     """
     members: dict[bool, list[int]] = {False: [], True: []}
     size = {False: 0, True: 0}
@@ -112,17 +105,7 @@ def batches(meshes: Sequence[Mesh]) -> Iterator[Batch]:
 def expect_all_sound(meshes: Sequence[Mesh], name: Callable[[int], str]) -> None:
     """Raise `InputError` for the first mesh that is not sound.
 
-    Parameters
-    ----------
-    meshes : sequence of Mesh
-        Any.
-    name : callable
-        Returns what a mesh of some number is called in the error.
-
-    Raises
-    ------
-    InputError
-        As `Mesh.expect_sound`.
+    `name`: returns what a mesh of some number is called in the error. Raises `InputError`: as `Mesh.expect_sound`.
     """
     sound = np.zeros(len(meshes), np.bool_)
     for batch in batches(meshes):
@@ -134,15 +117,8 @@ def expect_all_sound(meshes: Sequence[Mesh], name: Callable[[int], str]) -> None
 def missing_normals(normals: Array) -> Array:
     """Return which normals give no direction.
 
-    Parameters
-    ----------
-    normals : (n, 3) ndarray
-        Vectors of any length.
-
-    Returns
-    -------
-    (n,) ndarray of bool
-        True where one is zero, not finite, or so short or long that its square is.
+    `normals` (n, 3): vectors of any length. Returns (n,) bool: true where one is zero, not finite, or so short or long
+    that its square is.
     """
     longest = np.abs(np.asarray(normals, np.float64)).max(axis=1, initial=0.0)
     return np.asarray(~((longest > SHORTEST) & (longest < LONGEST)))
@@ -179,17 +155,8 @@ def _rows_of_three(array: Array, kinds: str) -> bool:
 def expect_memory(vertices: int, faces: int, where: str) -> None:
     """Raise `InputError` unless indices and memory suffice for a scene's geometry.
 
-    Parameters
-    ----------
-    vertices, faces : int
-        Of the whole scene, instances counted each.
-    where : str
-        File and key, for the error's text.
-
-    Raises
-    ------
-    InputError
-        If there are more vertices than an int32 can count, or more bytes than the machine has.
+    `vertices`, `faces`: of the whole scene, instances counted each. `where`: file and key, for the error's text. Raises
+    `InputError` if there are more vertices than an int32 can count, or more bytes than the machine has.
     """
     expect(vertices <= MOST_VERTICES, where, f"at most {MOST_VERTICES} vertices in all", vertices)
     needed = vertices * BYTES_OF_VERTEX + faces * BYTES_OF_FACE
@@ -200,13 +167,7 @@ def expect_memory(vertices: int, faces: int, where: str) -> None:
 
 
 def physical_memory() -> float:
-    """Return the machine's memory in bytes, infinity where the platform does not say.
-
-    Returns
-    -------
-    float
-        Bytes.
-    """
+    """Return the machine's memory in bytes, infinity where the platform does not say."""
     try:
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (AttributeError, OSError, ValueError):

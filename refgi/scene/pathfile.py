@@ -132,24 +132,8 @@ class PathFile(Entry):
 def read_path(file: str | FilePath, scene: Scene) -> tuple[Path, int | None]:
     """Read what moves through a scene, and how.
 
-    Parameters
-    ----------
-    file : str or Path
-        A TOML file.
-    scene : Scene
-        Its lights and materials are what the file's can be.
-
-    Returns
-    -------
-    path : Path
-        The way of camera, lights and objects.
-    frames : int or None
-        How many frames the file asks for.
-
-    Raises
-    ------
-    InputError
-        One error with all faults of the file, one a line.
+    `scene`: its lights and materials are what the file's can be. Returns `path`: the way of camera, lights and objects.
+    `frames`: how many frames the file asks for. Raises `InputError`: one error with all faults of the file, one a line.
     """
     file = FilePath(file)
     entry = _validated(file)

@@ -35,24 +35,8 @@ if TYPE_CHECKING:
 def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
     """Read a JSON scene file and the meshes it names.
 
-    Parameters
-    ----------
-    path : Path
-        The file; meshes are looked for beside it.
-    camera : Camera or None
-        Replaces the file's.
-    lights : sequence of Light or None
-        Replace the file's.
-
-    Returns
-    -------
-    Scene
-        The scene, in the order of the file's objects.
-
-    Raises
-    ------
-    InputError
-        One error with all faults of the file, else one with all faults of its meshes.
+    `path`: the file; meshes are looked for beside it. Result: the scene, in the order of the file's objects. Raises
+    `InputError`: one error with all faults of the file, else one with all faults of its meshes.
     """
     content = read_bytes(path).removeprefix(codecs.BOM_UTF8)
     entry = _validated(content, path, need_camera=camera is None, need_lights=lights is None)
@@ -215,20 +199,8 @@ def _with_material(mesh: Mesh, item: "Object", materials: dict[str, Material], s
 def read_mesh_file(path: Path) -> Contents:
     """Read a mesh file of any known format.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Contents
-        Its meshes, cameras and lights.
-
-    Raises
-    ------
-    InputError
-        If the suffix is unknown, the file is damaged or it holds no triangle.
+    Result: its meshes, cameras and lights. Raises `InputError` if the suffix is unknown, the file is damaged or it
+    holds no triangle.
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:

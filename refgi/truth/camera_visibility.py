@@ -24,21 +24,9 @@ def aim_at_eye(view: Projection, offset: float, y: tuple[float, float, float], g
                rays: tuple[Array, Array, Array], ray: int) -> None:
     """Write the ray from a point to the eye.
 
-    Parameters
-    ----------
-    view : Projection
-        The camera's map.
-    offset : float
-        How far along g the ray starts, m.
-    y : tuple of 3 floats
-        The point, m.
-    g : tuple of 3 floats
-        Unit face normal on the side that emits.
-    rays : tuple of 3 arrays
-        Origins and directions (n, 3) and reach (n,), float32: filled at `ray`; the reach is 1, or 0 where the point
-        lies outside the picture or that side faces away.
-    ray : int
-        Which ray.
+    `offset`: how far along g the ray starts, m. `y`: the point, m. `g`: unit face normal on the side that emits.
+    `rays`: origins and directions (n, 3) and reach (n,), float32: filled at `ray`; the reach is 1, or 0 where the point
+    lies outside the picture or that side faces away.
     """
     origins, directions, reach = rays
     eye = (view.origin[0, 0], view.origin[0, 1], view.origin[0, 2])
@@ -53,19 +41,7 @@ def aim_at_eye(view: Projection, offset: float, y: tuple[float, float, float], g
 def visible_vertices(tracer: Tracer, view: Projection, points: LightVertices) -> LightVertices:
     """Return the light vertices that are visible to a camera.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's rays.
-    view : Projection
-        The camera's map.
-    points : LightVertices
-        Light vertices.
-
-    Returns
-    -------
-    LightVertices
-        The visible ones, in their order.
+    Result: the visible ones, in their order.
     """
     count = len(points.power)
     origins, directions = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
@@ -88,18 +64,8 @@ def _aim_points(view: Projection, grain: float, position: Array, facing: Array,
 def aim_paths(view: Projection, surfaces: Surfaces, grain: float, paths: Paths, rays: Shadows) -> None:
     """Write a ray to the eye from each surface that paths found.
 
-    Parameters
-    ----------
-    view : Projection
-        The camera's map.
-    surfaces : Surfaces
-        The scene.
-    grain : float
-        The tracer's: how far rays start above faces, m.
-    paths : Paths
-        What was found.
-    rays : Shadows
-        Origins, directions and reach are filled; the reach is 0 where nothing was hit or it cannot be visible.
+    `grain`: the tracer's: how far rays start above faces, m. `rays`: origins, directions and reach are filled; the
+    reach is 0 where nothing was hit or it cannot be visible.
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):

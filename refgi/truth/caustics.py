@@ -60,21 +60,8 @@ def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EX
          longest: int | None = None) -> Film | None:
     """Prepare a film for photons, or return None for a scene without mirror or glass.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    shape : tuple of 2 ints
-        Rows and columns of the picture.
-    least_exponent : float
-        Lobes from here on count as mirrors.
-    longest : int, optional
-        Surfaces that a photon meets at most, `LONGEST_CHAIN` where absent; at 2, one bounce, glass is opaque.
-
-    Returns
-    -------
-    Film or None
-        None without caustics.
+    `shape`: rows and columns of the picture. `least_exponent`: lobes from here on count as mirrors. `longest`: surfaces
+    that a photon meets at most, `LONGEST_CHAIN` where absent; at 2, one bounce, glass is opaque.
     """
     table = material_table(scene.materials)
     mirrors = surfaces(scene)
@@ -91,23 +78,7 @@ def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EX
 def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, random: np.random.Generator) -> Array:
     """Trace one pass of photons and splat them to pixels.
 
-    Parameters
-    ----------
-    film : Film
-        Their pixels.
-    tracer : Tracer
-        The scene's rays.
-    lights : LightTable
-        The lights, float64.
-    photons : int
-        From each light; the largest square number up to it is sent.
-    random : numpy.random.Generator
-        Where they go.
-
-    Returns
-    -------
-    (3, h w) ndarray of float64
-        Irradiance, W/m^2.
+    `photons`: from each light; the largest square number up to it is sent. Returns (3, h w) float64: irradiance, W/m^2.
     """
     irradiance = np.zeros((3, film.solid_angle.size))
     side = math.isqrt(photons)
@@ -157,6 +128,7 @@ def _splat(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Arra
     tracer.fill_occluded(starts.astype(np.float32), (camera.eye - starts).astype(np.float32), reach, blocked)
     visible[np.flatnonzero(visible)[blocked]] = False
     at = np.floor(row[visible]).astype(np.int64), np.floor(column[visible]).astype(np.int64)
+    # E = dPhi <g.v> / (D^2 W)
     density = cosine[visible] / ((view[visible] ** 2).sum(axis=1) * film.solid_angle[at])
     pixel = at[0] * film.shape[1] + at[1]
     for c in range(3):
@@ -167,18 +139,9 @@ def _splat(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Arra
 def reflect(mirrors: Surfaces, ior: Array, grain: float, words: Array, photons: Photons) -> None:
     """Write where photons landed, and reflect or refract those on a mirror-like lobe or glass.
 
-    Parameters
-    ----------
-    mirrors : Surfaces
-        The scene with only its mirror-like lobes.
-    ior : (k,) ndarray
-        Index of refraction by material, 0 where opaque.
-    grain : float
-        The tracer's: how far rays start above faces, m.
-    words : (n,) ndarray of uint32
-        Random numbers.
-    photons : Photons
-        Moved on; glass keeps the flux, a lobe sends on its share.
+    `mirrors`: the scene with only its mirror-like lobes. `ior` (k,): index of refraction by material, 0 where opaque.
+    `grain`: the tracer's: how far rays start above faces, m. `words` (n,) uint32: random numbers. `photons`: moved on;
+    glass keeps the flux, a lobe sends on its share.
     """
     count = len(photons.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):

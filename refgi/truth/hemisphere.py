@@ -29,17 +29,7 @@ Array = npt.NDArray[Any]
 def scrambled_points(count: int, seed: int) -> Array:
     """Return scrambled low-discrepancy points of the square as 32-bit words.
 
-    Parameters
-    ----------
-    count : int
-        Points.
-    seed : int
-        Which scramble.
-
-    Returns
-    -------
-    (count, 2) ndarray of uint32
-        Coordinates times 2^32.
+    Returns (count, 2) uint32: coordinates times 2^32.
     """
     points = np.empty((count, 2), np.uint32)
     for i in range(count):
@@ -52,18 +42,8 @@ def scrambled_points(count: int, seed: int) -> Array:
 def cosine_direction(u: float, v: float) -> tuple[float, float, float]:
     """Return a direction of the upper hemisphere with density cos(theta) / pi, good to 1e-8 and alike everywhere.
 
-    Parameters
-    ----------
-    u, v : float
-        Point of the unit square; u = sin^2 theta, v the share of the turn.
+    `u`, `v`: point of the unit square; u = sin^2 theta, v the share of the turn. Result: unit vector, z up.
 
-    Returns
-    -------
-    tuple of 3 floats
-        Unit vector, z up.
-
-    Notes
-    -----
     The turn is split into quarters and the series of sine and cosine up to pi/4 cut at 2e-9 (rays are float32).
     """
     quarter = math.floor(4 * v + 0.5)
@@ -81,20 +61,9 @@ def cosine_direction(u: float, v: float) -> tuple[float, float, float]:
 def send(receivers: Receivers, span: tuple[int, int], points: Array, seed: int, reach: float, paths: Paths) -> None:
     """Send one ray for each point of the set from each receiver of a span.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Receivers.
-    span : tuple of 2 ints
-        First receiver and one past the last.
-    points : (s, 2) ndarray of uint32
-        The pass's point set.
-    seed : int
-        Random shift: a hash of it and the receiver's pixel.
-    reach : float
-        How far to look, m.
-    paths : Paths
-        Origins, directions, reach, lengths, cosines and weights are filled.
+    `span`: first receiver and one past the last. `points` (s, 2) uint32: the pass's point set. `seed`: random shift: a
+    hash of it and the receiver's pixel. `reach`: how far to look, m. `paths`: origins, directions, reach, lengths,
+    cosines and weights are filled.
     """
     count = span[1] - span[0]
     for chunk in prange((count + CHUNK - 1) // CHUNK):

@@ -29,14 +29,8 @@ RECEIVERS, PICKS = 2048, 1 << 15  # sampled receivers, at most; picks of all of 
 def add_light_side(task: Task, words: Array, sums: Array) -> None:
     """Add the irradiance from picked light vertices.
 
-    Parameters
-    ----------
-    task : Task
-        What to compute.
-    words : (3,) uint32 ndarray
-        The pass's random numbers: two for the light vertices, one for the picks.
-    sums : (3, r) float64 ndarray
-        Added to, W/m^2.
+    `words` (3,) uint32: the pass's random numbers: two for the light vertices, one for the picks. `sums` (3, r)
+    float64: added to, W/m^2.
     """
     sets, picks = fresh_points(task, np.random.default_rng(words[:2])), task.settings.picks
     if not len(sets.points.power):
@@ -49,17 +43,7 @@ def add_light_side(task: Task, words: Array, sums: Array) -> None:
 def fresh_points(task: Task, random: np.random.Generator) -> PointSets:
     """Trace fresh rays from every light to light vertices.
 
-    Parameters
-    ----------
-    task : Task
-        What to compute.
-    random : numpy.random.Generator
-        Places the rays in their cells.
-
-    Returns
-    -------
-    PointSets
-        Of all lights.
+    `random`: places the rays in their cells.
     """
     n, side = task.settings.light_grid, task.settings.interleave
     count = len(task.scene.lights)
@@ -70,19 +54,7 @@ def fresh_points(task: Task, random: np.random.Generator) -> PointSets:
 def trace_vertices(task: Task, squares: list[Array], densities: tuple[Any, ...]) -> PointSets:
     """Trace rays from every light, through points of its unit square, to light vertices.
 
-    Parameters
-    ----------
-    task : Task
-        What to compute.
-    squares : list of (sets, n, 2) ndarray
-        Points of each light, in sets.
-    densities : tuple of Density or None
-        Of each light.
-
-    Returns
-    -------
-    PointSets
-        Of all lights.
+    `squares`: points of each light, in sets.
     """
     settings, sets, per_set = task.settings, len(squares[0]) if squares else 1, squares[0].shape[1] if squares else 1
     parts = []
@@ -96,23 +68,8 @@ def trace_vertices(task: Task, squares: list[Array], densities: tuple[Any, ...])
 def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, seed: int) -> tuple[Shadows, Array]:
     """Pick light vertices for the receivers of a span.
 
-    Parameters
-    ----------
-    task : Task
-        Names the receivers.
-    sets : PointSets
-        Light vertices.
-    span : tuple of 2 ints
-        First receiver and one past the last.
-    picks : int
-        Picks of each receiver.
-    seed : int
-        Random shift of each receiver's picks.
-
-    Returns
-    -------
-    Shadows, (n,) int32 ndarray
-        Shadow rays, not traced, and which point each goes to.
+    `span`: first receiver and one past the last. `picks`: picks of each receiver. `seed`: random shift of each
+    receiver's picks. Result: shadow rays, not traced, and which point each goes to.
     """
     rays, picked = shadow_batch((span[1] - span[0]) * picks), np.empty((span[1] - span[0]) * picks, np.int32)
     pick(*sets, task.receivers, tiles(task.set_of, *span), (span[0], picks, seed, np.float32(task.tracer.grain)),
@@ -123,15 +80,7 @@ def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, 
 def pilot(task: Task) -> tuple[Density | None, ...]:
     """Estimate the density of each light's rays, in proportion to contributions.
 
-    Parameters
-    ----------
-    task : Task
-        What to compute.
-
-    Returns
-    -------
-    tuple of Density or None
-        One a light; empty for a uniform density.
+    Result: one a light; empty for a uniform density.
     """
     lights, share = len(task.scene.lights), task.settings.uniform_share
     if share == 1 or not task.settings.picks_per_pass or not lights or not len(task.receivers.pixel):

@@ -40,6 +40,7 @@ def _bounded_geometry(
     inverse = np.float32(1) / (r2 if r2 > TINY else TINY)
     cos_x = nx * dx + ny * dy + nz * dz
     cos_y = -(mx * dx + my * dy + mz * dz)
+    # G = <n_x.w> <n_y.-w> / r^2, the geometry term of SII Eq. (2)
     geometry = ((cos_x if cos_x > zero else zero) * inverse) * ((cos_y if cos_y > zero else zero) * inverse)
     return geometry if geometry < bound else bound  # MIS: the light side's weight is min(1, b / G)
 
@@ -148,17 +149,9 @@ def _aim(points: LightVertices, j: int, receivers: Receivers, r: int, grain: Any
 def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
     """Sort a span of receivers by their set and cut them into tiles.
 
-    Parameters
-    ----------
-    set_of : (r,) int ndarray
-        Which set of light vertices each receiver picks from.
-    first, last : int
-        First receiver of the span and one past the last.
-
-    Returns
-    -------
-    (last - first,) ndarray, (t, 3) ndarray, both int64
-        Receivers; and for each tile where it begins and ends among them, and its set.
+    `set_of` (r,) int: which set of light vertices each receiver picks from. `first`, `last`: first receiver of the span
+    and one past the last. Returns (last - first,), (t, 3), both int64: receivers; and for each tile where it begins and
+    ends among them, and its set.
     """
     order = np.argsort(set_of[first:last], kind="stable")
     sets = set_of[first:last][order]
@@ -172,22 +165,11 @@ def pick(points: LightVertices, starts: Array, receivers: Receivers, tiles: tupl
          sampling: tuple[int, int, int, Any], rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Pick light vertices for each receiver of some tiles; write shadow rays and their contributions.
 
-    Parameters
-    ----------
-    points : LightVertices
-        Senders, in sets.
-    starts : (sets, 3) int64 ndarray
-        First block of each set, its first of lobes and one past its last.
-    receivers : Receivers
-        Receivers.
-    tiles : tuple of 2 arrays
-        Receivers sorted by set, and the table of tiles.
-    sampling : tuple of 3 ints and a float32
-        First receiver of the span; picks of each; seed of the random shift, a hash of it and the receiver's pixel; the
-        tracer's grain: segments end above the sender's face by `ray_offset` and `far_offset`, m.
-    rays : tuple of 5 arrays
-        Filled: origins, directions (n, 3), reach (n,), contribution (n, 3) W/m^2, float32, and the point picked (n,)
-        int32; n = picks x receivers. The reach is 0 where there is nothing to gain.
+    `starts` (sets, 3) int64: first block of each set, its first of lobes and one past its last. `tiles`: receivers
+    sorted by set, and the table of tiles. `sampling`: first receiver of the span; picks of each; seed of the random
+    shift, a hash of it and the receiver's pixel; the tracer's grain: segments end above the sender's face by
+    `ray_offset` and `far_offset`, m. `rays`: filled: origins, directions (n, 3), reach (n,), contribution (n, 3) W/m^2,
+    float32, and the point picked (n,) int32; n = picks x receivers. The reach is 0 where there is nothing to gain.
     """
     members, table = tiles
     for number in prange(len(table)):

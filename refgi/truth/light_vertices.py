@@ -51,26 +51,9 @@ def trace_light_vertices(tracer: Tracer, surfaces: Surfaces, lights: LightTable,
                      bound: float) -> LightVertices:
     """Trace one light's rays to light vertices.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's rays.
-    surfaces : Surfaces
-        The scene's triangles and materials.
-    lights : LightTable
-        The lights, float64.
-    k : int
-        Which light.
-    rays : LightRays
-        Its rays.
-    bound : float
-        Largest geometry term in units of 1 / footprint; inf for no bound.
-
-    Returns
-    -------
-    LightVertices
-        Diffuse parts, then lobes if the scene has any, each in the order of the rays; power 0 where a ray finds nothing
-        that reflects.
+    `surfaces`: the scene's triangles and materials. `bound`: largest geometry term in units of 1 / footprint; inf for
+    no bound. Result: diffuse parts, then lobes if the scene has any, each in the order of the rays; power 0 where a ray
+    finds nothing that reflects.
     """
     # a lamp may lie in a surface: start just beyond it
     beyond = tracer.offsets(rays.origins)
@@ -92,19 +75,7 @@ def trace_light_vertices(tracer: Tracer, surfaces: Surfaces, lights: LightTable,
 def join(parts: list[LightVertices], sets: int, per_set: int) -> PointSets:
     """Sort the light vertices of several lights into their sets, each padded with dark points to whole blocks.
 
-    Parameters
-    ----------
-    parts : list of LightVertices
-        One a light.
-    sets : int
-        Sets of rays that each light has sent.
-    per_set : int
-        Rays in each.
-
-    Returns
-    -------
-    PointSets
-        C-contiguous arrays.
+    `sets`: sets of rays that each light has sent.
     """
     together = parts[0] if len(parts) == 1 else LightVertices(
         *(np.concatenate(fields, axis=-1) for fields in zip(_allocate(0), *parts, strict=True)))
@@ -174,6 +145,7 @@ def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array
             light, area = radiant_intensity(lights, k, d[0], d[1], d[2]), measure * t * t
         for part in range(len(points.power) // len(triangle_id)):
             rho = surfaces.diffuse[material] if part == 0 else surfaces.specular[material]
+            # Phi / pi, Phi = rho I(l) Omega
             share = measure * weights[i] / np.pi
             flux = (rho[0] * light[0] * share, rho[1] * light[1] * share, rho[2] * light[2] * share)
             power = max(flux[0], flux[1], flux[2])

@@ -31,14 +31,8 @@ BELOW_HORIZON = 9.0
 def pass_through(surfaces: Surfaces, grain: float, paths: Paths) -> None:
     """Move each ray to the far side of what it found, with the same direction.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    grain : float
-        The tracer's: how far rays start above faces, m.
-    paths : Paths
-        Origins, reach and lengths are moved on; rays that found nothing end.
+    `grain`: the tracer's: how far rays start above faces, m. `paths`: origins, reach and lengths are moved on; rays
+    that found nothing end.
     """
     for ray in prange(len(paths.reach)):
         _pass_through(surfaces, grain, paths, ray)
@@ -63,25 +57,10 @@ def scatter(surfaces: Surfaces, grain: float, seed: int, receivers: Receivers, f
             paths: Paths) -> None:
     """Send each path on from the surface it hit, by that surface's BRDF.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    grain : float
-        The tracer's: how far rays start above faces, m.
-    seed : int
-        Random numbers: a hash of it, the receiver's pixel and the path's number there.
-    receivers : Receivers
-        Receivers.
-    first : int
-        Receiver of the first path.
-    per_receiver : int
-        Paths of each receiver.
-    paths : Paths
-        Origins, directions, reach and weights are renewed; paths that found nothing or a black surface end.
+    `grain`: the tracer's: how far rays start above faces, m. `seed`: random numbers: a hash of it, the receiver's pixel
+    and the path's number there. `first`: receiver of the first path. `per_receiver`: paths of each receiver. `paths`:
+    origins, directions, reach and weights are renewed; paths that found nothing or a black surface end.
 
-    Notes
-    -----
     One of the two parts is chosen by its largest reflectance, with probability p. With v the way back, the diffuse
     part sends on a cosine-distributed direction around the face normal g with weight rho <n.v> / (<g.v> p), the lobe a
     direction around the mirror direction of v with density (P + 1) / (2 pi) cos^P and weight rho <g.w> / (K <g.v> p),
@@ -140,17 +119,8 @@ def _uniform(word: Any) -> Any:
 def one_pass(task: Task, number: int) -> Array:
     """Estimate every receiver's irradiance once.
 
-    Parameters
-    ----------
-    task : Task
-        What to compute.
-    number : int
-        Which pass: its random numbers depend on this and the settings' seed alone.
-
-    Returns
-    -------
-    (3, r) ndarray of float64
-        Irradiance, W/m^2.
+    `number`: which pass: its random numbers depend on this and the settings' seed alone. Returns (3, r) float64:
+    irradiance, W/m^2.
     """
     sums = np.zeros((3, len(task.receivers.pixel)))
     words = np.random.SeedSequence([task.settings.seed, number]).generate_state(4 + task.settings.bounces)

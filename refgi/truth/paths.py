@@ -42,18 +42,7 @@ class Shadows(NamedTuple):
 
 @kernel
 def dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
-    """Return the dot product of two vectors.
-
-    Parameters
-    ----------
-    a, b : tuple of 3 floats
-        The vectors.
-
-    Returns
-    -------
-    float
-        Their dot product.
-    """
+    """Return the dot product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -61,17 +50,7 @@ def dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
 def row(rows: Array, i: int) -> tuple[float, float, float]:
     """Return a row of three as float64 scalars.
 
-    Parameters
-    ----------
-    rows : (n, 3) ndarray
-        Vectors or colours.
-    i : int
-        Which.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Its values.
+    `rows` (n, 3): vectors or colours.
     """
     return np.float64(rows[i, 0]), np.float64(rows[i, 1]), np.float64(rows[i, 2])
 
@@ -80,17 +59,7 @@ def row(rows: Array, i: int) -> tuple[float, float, float]:
 def hit_point(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Return the direction back along a ray and the point it found.
 
-    Parameters
-    ----------
-    paths : Paths
-        The batch.
-    ray : int
-        Which, of those that found something.
-
-    Returns
-    -------
-    tuple of 2 tuples of 3 floats
-        Unit vector, and point (m).
+    `ray`: which, of those that found something. Result: unit vector, and point (m).
     """
     t = np.float64(paths.distance[ray])
     dx, dy, dz = row(paths.direction, ray)

@@ -74,6 +74,7 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     points = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id,
                        frame.tracer.grain)
     irradiance = np.zeros((3, frame.height, frame.width), frame.dtype)
+    # SII Eq. (2), (3) with visibility V(x, x_i)
     irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(frame.tracer, points, lights,
                                                               visibility=settings.visibility, batch=settings.batch)
     return irradiance

@@ -62,20 +62,8 @@ def resolve(
 ) -> None:
     """Fill the planes of the chosen channels.
 
-    Parameters
-    ----------
-    surface : Surface
-        The triangles.
-    projection : Projection
-        The maps that `triangle_id` was drawn on.
-    triangle_id : (H, W) ndarray
-        Triangle at each texel, -1 for none.
-    channels : ChannelMask
-        Which planes to fill.
-    planes : Planes
-        The result.
-    workers : int
-        Threads; strips of rows are assigned to them round-robin.
+    `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
+    `channels`: which planes to fill. `workers`: threads; strips of rows are assigned to them round-robin.
     """
     for worker in prange(workers):
         _resolve_rows(surface, projection, triangle_id, channels, planes, worker, workers)
@@ -104,20 +92,9 @@ def resolve_at(
 ) -> None:
     """Fill the planes of the chosen channels at some texels, with the bits that `resolve` gives there.
 
-    Parameters
-    ----------
-    surface : Surface
-        The triangles.
-    projection : Projection
-        The maps that `triangle_id` was drawn on.
-    triangle_id : (H, W) ndarray
-        Triangle at each texel, -1 for none.
-    texel : (n,) ndarray
-        Texels of the flattened maps.
-    channels : ChannelMask
-        Which planes to fill.
-    planes : Planes
-        The result, n rows of one texel.
+    `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
+    `texel` (n,): texels of the flattened maps. `channels`: which planes to fill. `planes`: the result, n rows of one
+    texel.
     """
     runs = allocate_runs(len(texel), 1)
     _fill_rows(surface, projection, runs_at(triangle_id, texel, runs), runs, (0, len(texel)), channels, planes)

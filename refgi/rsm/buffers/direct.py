@@ -224,6 +224,7 @@ def _irradiance_at(
         wx, wy, wz, _, er, eg, eb = incident_light(lights, 0, x, y, z)
         cosine = wx * normal[0, row, column] + wy * normal[1, row, column] + wz * normal[2, row, column]
         cosine = max(cosine, 0.0)
+        # E = I(w) cos / d^2
         out[0, row, column], out[1, row, column], out[2, row, column] = er * cosine, eg * cosine, eb * cosine
 
 
@@ -242,6 +243,7 @@ def _spot_row(lights: LightTable, receivers: SurfacePoints, visible: Array, row:
         cosine = -(dx * normal[0, row, x] + dy * normal[1, row, x] + dz * normal[2, row, x])
         share, certain = falloff_in_float64((dx, dy, dz), axis, cone, plain)
         illuminated = (visible.size == 0 or visible[row, x]) & covered[row, x] & (cosine > 0.0) & (square > 0.0)
+        # E = I(w) cos / d^2, with a cosine times d
         factor = share * cosine / (square * math.sqrt(square)) if illuminated else 0.0
         out[0, row, x], out[1, row, x], out[2, row, x] = red * factor, green * factor, blue * factor
         doubtful[x] = illuminated & (not certain)

@@ -89,15 +89,7 @@ def illuminated_extent(rsms: Sequence[Rsm]) -> Extent:
 def joined(one: Extent, other: Extent) -> Extent:
     """Return the box around two.
 
-    Parameters
-    ----------
-    one, other : Extent
-        Boxes.
-
-    Returns
-    -------
-    Extent
-        The smallest that holds both.
+    Result: the smallest that holds both.
     """
     return Extent(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
 

@@ -32,26 +32,8 @@ Array = npt.NDArray[Any]
 def light_projection(light: Light, geometry: Geometry, resolution: int, shape: MapShape = "auto") -> Projection:
     """Return the maps that enclose what a light shines on.
 
-    Parameters
-    ----------
-    light : Light
-        Whose view.
-    geometry : Geometry
-        What a directional light must enclose.
-    resolution : int
-        Texels along a side of one map.
-    shape : str
-        As in `reflective_shadow_map`.
-
-    Returns
-    -------
-    Projection
-        The maps.
-
-    Raises
-    ------
-    InputError
-        If the resolution or shape does not suit the light.
+    `geometry`: what a directional light must enclose. `resolution`: texels along a side of one map. Raises `InputError`
+    if the resolution or shape does not suit the light.
     """
     expect(isinstance(resolution, int | np.integer) and 1 <= resolution <= 16384, "resolution",
            "1 to 16384 texels", resolution)  # fmt: skip

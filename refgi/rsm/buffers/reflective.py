@@ -161,7 +161,7 @@ class Rsm:
         """Return what the diffuse part reflects of the incident flux, in its place."""
         if "material_id" in surface:
             incident *= (self._materials.ior == 0)[surface["material_id"]]
-        incident *= surface["albedo"]
+        incident *= surface["albedo"]  # Phi_t = albedo I(w) solid_angle_t (SII Sec. 3.1, calibrated)
         return incident
 
     def _whole(self, name: str) -> Array:
@@ -277,6 +277,7 @@ def _mirror(maps: Projection, normal: Array, has_lobe: Array, axis: Array) -> No
             if has_lobe[row, column]:
                 _, _, _, dx, dy, dz = texel_ray(maps, row, column)
                 nx, ny, nz = normal[0, row, column], normal[1, row, column], normal[2, row, column]
+                # r = d - 2 (n . d) n
                 twice = 2.0 * (dx * nx + dy * ny + dz * nz)
                 rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
                 scale = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)

@@ -34,22 +34,10 @@ def project_vertices(
 ) -> None:
     """Fill rows of `corners` and `cells` with vertices as projected on map `m`.
 
-    Parameters
-    ----------
-    projection : Projection
-        Perspective or orthographic maps.
-    m : int
-        Which map.
-    vertices : (n, 3) ndarray
-        World space, m.
-    first, last : int
-        First vertex and one past the last.
-    corners : (n, 4) ndarray
-        Column, row, w, n.
-    cells : (n, 4) ndarray of int
-        First column and row whose centre is not left of or above the vertex, and the negatives of the last ones whose
-        centre is not right of or below it, a little widened: the least of each bounds a triangle. `BEHIND` first where
-        the vertex is not in front of the eye.
+    `projection`: perspective or orthographic maps. `vertices` (n, 3): world space, m. `first`, `last`: first vertex and
+    one past the last. `corners` (n, 4): column, row, w, n. `cells` (n, 4) int: first column and row whose centre is not
+    left of or above the vertex, and the negatives of the last ones whose centre is not right of or below it, a little
+    widened: the least of each bounds a triangle. `BEHIND` first where the vertex is not in front of the eye.
     """
     width, height = projection.width, projection.height
     for i in range(first, last):
@@ -74,23 +62,11 @@ def bound_triangles(
 ) -> None:
     """Write the texels whose centres triangles may cover.
 
-    Parameters
-    ----------
-    corners : (n, 4) ndarray
-        Projected vertices.
-    cells : (n, 4) ndarray of int
-        The texels that each lies between.
-    faces : (m, 3) ndarray
-        Vertices of each triangle.
-    first, last : int
-        First triangle and one past the last.
-    size : tuple of 2 int
-        Columns and rows of the map.
-    boxes : (last - first, 4) ndarray
-        First and last column, first and last row; first > last where a triangle covers nothing.
+    `corners` (n, 4): projected vertices. `cells` (n, 4) int: the texels that each lies between. `faces` (m, 3):
+    vertices of each triangle. `first`, `last`: first triangle and one past the last. `size`: columns and rows of the
+    map. `boxes` (last - first, 4): first and last column, first and last row; first > last where a triangle covers
+    nothing.
 
-    Notes
-    -----
     The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
     """
     for block in range(first, last, BLOCK):
@@ -128,17 +104,8 @@ def _bound_crossing(corners: Array, faces: Array, first: int, last: int, size: t
 def centres_between(low: float, high: float, size: int) -> tuple[int, int]:
     """Return the first and last texel whose centre lies in an interval, or a little outside it.
 
-    Parameters
-    ----------
-    low, high : float
-        The interval, continuous texel coordinates.
-    size : int
-        Texels in all.
-
-    Returns
-    -------
-    tuple of 2 int
-        Within 0 to `size` - 1; first > last where there is none.
+    `low`, `high`: the interval, continuous texel coordinates. Result: within 0 to `size` - 1; first > last where there
+    is none.
     """
     first = np.ceil(min(max(low, 0.0), size + 1.0) - (0.5 + BOX_PAD))
     last = np.floor(min(max(high, -1.0), float(size)) + (BOX_PAD - 0.5))
@@ -175,17 +142,8 @@ class Chunks(NamedTuple):
 def chunks(vertices: Array, faces: Array) -> Chunks:
     """Group triangles in chunks.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float64 ndarray
-        World space, m.
-    faces : (m, 3) ndarray
-        Vertices of each triangle.
-
-    Returns
-    -------
-    Chunks
-        A copy of their corners.
+    `vertices` (n, 3) float64: world space, m. `faces` (m, 3): vertices of each triangle. Result: a copy of their
+    corners.
     """
     number = (len(faces) + CHUNK - 1) // CHUNK
     filled = Chunks(plane((number, 9, CHUNK), np.float64), np.empty((number, 6)))

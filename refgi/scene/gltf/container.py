@@ -181,26 +181,9 @@ def _are_finite(values: Sequence[Any]) -> bool:
 def accessor(document: Document, index: Any, kind: str, referrer: str) -> Array:
     """Return the elements of an accessor.
 
-    Parameters
-    ----------
-    document : Document
-        The file.
-    index : int
-        Which accessor; checked.
-    kind : str
-        ``"SCALAR"``, ``"VEC3"`` ...: what the referrer needs.
-    referrer : str
-        The key that names the accessor.
-
-    Returns
-    -------
-    (count,) or (count, width) ndarray
-        In the file's component type, or float64 where the accessor is normalised.
-
-    Raises
-    ------
-    InputError
-        If a key is missing or any byte lies outside its buffer.
+    `kind`: ``"SCALAR"``, ``"VEC3"`` ...: what the referrer needs. `referrer`: the key that names the accessor. Returns
+    (count,) or (count, width): in the file's component type, or float64 where the accessor is normalised. Raises
+    `InputError` if a key is missing or any byte lies outside its buffer.
     """
     entry = document.item("accessors", index, referrer)
     where = f"accessors[{index}]"

@@ -20,7 +20,8 @@ def is_stage(function):
 
 
 def exported(tree):
-    found = [node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"]
+    found = [node.value for node in tree.body
+             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"]
     return set(ast.literal_eval(found[0])) if found else set()
 
 

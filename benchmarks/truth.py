@@ -49,11 +49,11 @@ def rows(quick: bool) -> Iterator[Row]:
     for name in scenes:
         frame = Frame(load_scene(name), width=size, height=size)
         for estimator in ESTIMATORS:
-            task = _task(frame, TruthSettings(estimator))
+            task = _task(frame, TruthSettings(estimator=estimator))
             yield _ray_rate(frame, task, name, 3 if quick else 5)
     frame = Frame(load_scene("cornell_box"), width=size, height=size)
     for estimator in ESTIMATORS:
-        yield from _time_to_error(_task(frame, TruthSettings(estimator)), 4 if quick else 10)
+        yield from _time_to_error(_task(frame, TruthSettings(estimator=estimator)), 4 if quick else 10)
 
 
 def _task(frame: Frame, settings: TruthSettings) -> Task:

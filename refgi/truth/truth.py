@@ -188,7 +188,7 @@ def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_
     set_of = sets_of(points.pixel, triangle_id.shape[1], settings.interleave)
     caustics, left_to_photons = _photons(scene, triangle_id.shape, settings)
     reflecting = surfaces(scene, left_to_photons)
-    view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None
+    view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "visible" else None
     task = Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, caustics, view)
     return task._replace(densities=pilot(task))
 

@@ -147,7 +147,7 @@ def test_a_picture_tells_how_many_values_it_lost(monkeypatch):
 
 def test_sharp_lobes_that_photons_cannot_serve_are_announced():
     frame = Frame(glossy("cornell_box", 1e6), width=6, height=6)
-    for settings in (TruthSettings(samples=24, visibility=False), TruthSettings(samples=24, emitters="seen")):
+    for settings in (TruthSettings(samples=24, visibility=False), TruthSettings(samples=24, emitters="visible")):
         with pytest.warns(RefgiWarning, match=r"sharp \(exponent 1000 or more\) and sampled by chance"):
             trace_truth(frame, settings)
     with pytest.warns(RefgiWarning, match="left out beyond the first bounce"):

@@ -9,7 +9,8 @@ from refgi import Frame, load_scene, rays
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, Geometry, SpotLight
 from refgi.scene.model import Camera, Scene
-from refgi.settings import of
+from refgi.settings import Settings, flat, of, replaced
+from refgi.settings.keys import find_key
 from refgi.splat.sii.settings import SiiSettings
 from refgi.stages import observe
 
@@ -65,9 +66,14 @@ def made_of(scene, **changes):
     return dataclasses.replace(scene, materials=tuple(dataclasses.replace(m, **changes) for m in scene.materials))
 
 
+def settings_of(method, changes):
+    kind = find_method(method).load()[1]
+    return of(kind, **changes) if issubclass(kind, Settings) else kind(**changes)
+
+
 @pytest.mark.parametrize(("method", "changes"), CASES, ids=lambda value: str(value))
 def test_a_plane_that_nobody_sees_changes_no_pixel(method, changes, evidence):
-    settings = find_method(method).load()[1](**changes)
+    settings = settings_of(method, changes)
     plain, off = render(room(), method, settings, **SIZE).irradiance.astype(float), {}
     for half in HALVES:
         with_plane = render(room(half), method, settings, **SIZE).irradiance
@@ -83,8 +89,11 @@ def test_the_plane_is_not_what_the_settings_refer_to():
     for method, changes, key in (("val", {**VAL, "interleaving": 4, "blur_extent": 0.05}, "blur_extent"),
                                  ("hssil", {"visibility": "bitmask"}, "thickness"),
                                  ("gather", {"samples": 64, "grid": 6, "reach": 0.1}, "reach")):
-        settings = find_method(method).load()[1](**changes)
-        smaller = dataclasses.replace(settings, **{key: getattr(settings, key) / 10})
+        settings = settings_of(method, changes)
+        if isinstance(settings, Settings):
+            smaller = replaced(settings, {key: flat(settings)[find_key(settings, key).key] / 10})
+        else:
+            smaller = dataclasses.replace(settings, **{key: getattr(settings, key) / 10})
         one, other = (render(room(), method, s, **SIZE).irradiance for s in (settings, smaller))
         assert np.abs(one - other).max() > 1e3 * CHANGE * one.mean()
 

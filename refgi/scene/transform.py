@@ -61,20 +61,11 @@ def _near_one(linear: Array) -> Array:
     return np.asarray(np.ldexp(linear, -exponent[:, None, None]))
 
 
-def transformed(mesh: Mesh, matrix: Array) -> Mesh:
-    """Return the mesh moved into the world; a mirroring matrix also turns the faces' winding.
-
-    `matrix` (4, 4): world from object, affine and invertible. Result: the same object where the matrix is the identity;
-    else normals are unit vectors, or zero where they are missing.
-    """
-    return transformed_all([mesh], matrix[None])[0]
-
-
 def transformed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
-    """Return each mesh moved by its own matrix, as `transformed` does.
+    """Return each mesh in world space; a mirroring matrix also turns the winding of its faces.
 
     `matrices` (k, 4, 4): world from object, affine and invertible. Result: the same object where a matrix is the
-    identity.
+    identity; else normals are unit vectors, or zero where they are missing.
     """
     linear = _near_one(matrices[:, :3, :3])
     rest = (matrices == IDENTITY).all(axis=(1, 2))

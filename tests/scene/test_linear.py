@@ -16,7 +16,7 @@ from refgi.errors import InputError, RefgiWarning
 from refgi.scene import Material, Mesh, load_scene
 from refgi.scene.model import merge
 from refgi.scene.repair import repaired, repaired_all
-from refgi.scene.transform import transformed, transformed_all
+from refgi.scene.transform import transformed_all
 from tests.scene.samples import SCENE, glb_bytes, gltf_tree, ply_bytes
 
 FEW, MANY = 700, 2800
@@ -210,7 +210,7 @@ def test_meshes_placed_together_are_those_placed_alone() -> None:
     assert together[0] is meshes[0]
     mirrored = 0
     for mesh, matrix, found in zip(meshes[1:], matrices[1:], together[1:], strict=True):
-        assert same(found, transformed(mesh, matrix))
+        assert same(found, transformed_all([mesh], matrix[None])[0])
         for row, vertex in enumerate(mesh.vertices.astype(np.float64)):
             assert found.vertices[row] == pytest.approx(matrix[:3, :3] @ vertex + matrix[:3, 3], rel=1e-12, abs=1e-12)
         mirror = np.linalg.det(matrix[:3, :3]) < 0

@@ -25,7 +25,7 @@ from refgi.scene import (
 )
 from refgi.scene.load import default_camera, default_light
 from refgi.scene.repair import lights_with_power, repaired, zero_area
-from refgi.scene.transform import affine, transformed
+from refgi.scene.transform import affine, transformed_all
 
 VERTICES = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 FACES = np.array([[0, 1, 2]])
@@ -158,7 +158,7 @@ def test_placing_moves_points_normals_and_orientation_alike(numbers: list[float]
         return
     if np.linalg.cond(matrix[:3, :3]) > 1e4:
         return
-    moved = transformed(Mesh(VERTICES, FACES, np.array([[0.0, 0, 1]] * 3)), matrix)
+    moved, = transformed_all([Mesh(VERTICES, FACES, np.array([[0.0, 0, 1]] * 3))], matrix[None])
     assert np.allclose(sorted(map(tuple, moved.vertices)), sorted(tuple(matrix[:3, :3] @ v + matrix[:3, 3])
                                                                   for v in VERTICES), atol=1e-9)
     a, b, c = moved.vertices[moved.faces[0]]

@@ -15,7 +15,7 @@ VIEWS = {"cornell_side": Camera((0.5, 0.3, -0.6), (0.2, 0.2, 0.3)),
          "stage_side": Camera((0.9, 0.4, 0.9), (0.0, 0.1, 0.0))}
 # names of the ledger that are no short keys today, and values that have another name
 RENAMED: dict[str, dict[str, str]] = {}
-RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {}
+RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {("truth", "emitters"): {"seen": "visible"}}
 
 
 def settings_of(method: str, **named: Any) -> Any:

@@ -61,7 +61,7 @@ def placed_cameras(frame: Frame, count: int) -> tuple[Camera, ...]:
     placed to see what only shines through walls. Eyes lie on free lines from the middle of a free segment between a
     surface that the picture shows and a lit point: never inside a wall. Nothing is random.
     """
-    tracer, diagonal = frame.tracer, frame.seen_extent.diagonal
+    tracer, diagonal = frame.tracer, frame.visible_extent.diagonal
     to, (lit, flux) = seen_points(frame), lit_points(frame)
     passing = transport(tracer, to, lit, flux, NEAREST * diagonal)
     shown = sight(tracer, _own_view(frame), lit, COARSEST * diagonal) > 0

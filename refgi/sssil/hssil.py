@@ -96,7 +96,7 @@ def gathered(frame: "Frame", level: Level, index: int, settings: HssilSettings) 
     if settings.only_level not in (None, index):
         return np.zeros_like(level.radiance)
     if settings.visibility == "bitmask":
-        return bitmask_gather(level, index, settings, frame.seen_extent.diagonal)
+        return bitmask_gather(level, index, settings, frame.visible_extent.diagonal)
     if settings.visibility == "rays":
         return ray_gather(level, index, settings, frame)
     return gather(level, index, settings)

@@ -32,8 +32,8 @@ Array = npt.NDArray[Any]
 LINE = 0.83  # of the picture's height: across both blocks and near edges
 SEEN, OPEN, ALL = "seen", "open", "all"
 TRUTHS: dict[str, tuple[str, dict[str, Any]]] = {
-    OPEN: ("path tracing, v = 1", {"emitters": "seen", "visibility": False}),
-    SEEN: ("path tracing, seen emitters", {"emitters": "seen"}),
+    OPEN: ("path tracing, v = 1", {"emitters": "visible", "visibility": False}),
+    SEEN: ("path tracing, seen emitters", {"emitters": "visible"}),
     ALL: ("path tracing", {})}
 POINT, DISC, POINT_LIMIT, DISC_LIMIT = "point", "disc", "point_limit", "disc_limit"
 NAMES = {POINT: "Eq. 3, 64 samples", DISC: "Eq. 4, 64 samples", POINT_LIMIT: "Eq. 3, every texel",

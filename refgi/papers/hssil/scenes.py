@@ -12,8 +12,8 @@ from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, load_scene
 from refgi.scene.builtin.atrium import LEAF
 from refgi.scene.builtin.atrium_pieces import shrub
 from refgi.scene.builtin.surfaces import patch, rectangle
-from refgi.scene.health import mean_face_normals
 from refgi.scene.model import merge
+from refgi.scene.repair import mean_face_normals
 
 BASKET = Material("basket", (0.72, 0.3, 0.1))
 WALL = Material("wall", (0.72, 0.7, 0.66))

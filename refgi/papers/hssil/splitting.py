@@ -129,8 +129,8 @@ def chain(frame: "Frame") -> dict[str, HssilSettings]:
 def _split(bench: "Workbench", name: str) -> Split:
     frame = frame_of(bench, name, JUDGED)
     made = {"truth": traced(bench, frame, (name, JUDGED)),
-            "seen": traced(bench, frame, (name, JUDGED), emitters="seen"),
-            "open": traced(bench, frame, (name, JUDGED), emitters="seen", visibility=False)}
+            "seen": traced(bench, frame, (name, JUDGED), emitters="visible"),
+            "open": traced(bench, frame, (name, JUDGED), emitters="visible", visibility=False)}
     made |= {key: lit(frame, settings) for key, settings in chain(frame).items()}
     variants = {one.title: lit(frame, smaller(frame, **one.changes)) for one in VARIANTS if one.title != FRAMES}
     variants[FRAMES] = expected_light(frame, smaller(frame), 19)

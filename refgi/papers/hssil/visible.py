@@ -89,7 +89,7 @@ def _judged(bench: "Workbench", name: str) -> Judged:
     many = {key: dataclasses.replace(one, samples=MANY) for key, one in settings.items()}
     light = {key: lit(frame, one) for key, one in many.items()}
     usual = {key: lit(frame, one) for key, one in settings.items()}
-    exact = traced(bench, frame, (name, JUDGED), emitters="seen")
+    exact = traced(bench, frame, (name, JUDGED), emitters="visible")
     covered = frame.gbuffer.covered
     off, off_usual = ({key: errors_of(one, exact, covered) for key, one in made.items()} for made in (light, usual))
     taken = interleaved({key: partial(lit, frame, one) for key, one in settings.items()},
@@ -98,7 +98,7 @@ def _judged(bench: "Workbench", name: str) -> Judged:
     sweep = {share: errors_of(lit(frame, dataclasses.replace(many[BITMASK], thickness=share)), exact, covered).rmse
              for share in THICKNESS}
     return Judged(frame, settings, light, usual, exact, off, off_usual, seconds,
-                  doubt(bench, frame, (name, JUDGED), emitters="seen"), sweep)
+                  doubt(bench, frame, (name, JUDGED), emitters="visible"), sweep)
 
 
 def _rows(title: str, one: Judged) -> list[tuple[Cell, ...]]:

@@ -16,8 +16,8 @@ from refgi.scene import Scene, load_scene
 from refgi.scene.builtin.cornell import CAMERA, shell
 from refgi.scene.builtin.stage import GLAZE, VASE, walls
 from refgi.scene.builtin.surfaces import lathe, patch, sphere
-from refgi.scene.health import mean_face_normals
 from refgi.scene.model import Camera, Material, Mesh, SpotLight, merge
+from refgi.scene.repair import mean_face_normals
 
 Array = npt.NDArray[np.float64]
 

@@ -23,6 +23,7 @@ from refgi.lights.selection import choose_lights
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.papers.subjects import Subjects, seen_by
 from refgi.papers.val.scenes import BUILDERS
+from refgi.settings import of
 from refgi.truth.vpl import VplSettings, vpl
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ def clustered(frame: Frame, settings: ValSettings, start: Clusters | None = None
     lights = choose_lights(frame, settings)
     found = cluster(lights.position, lights.normal, settings.area_lights, distance=settings.distance,
                     weights=(settings.position_weight, settings.normal_weight),
-                    diagonal=frame.lit_extent.diagonal, rounds=settings.rounds, start=start)
+                    diagonal=frame.illuminated_extent.diagonal, rounds=settings.rounds, start=start)
     return Clustered(lights, found, area_lights(lights, found, settings))
 
 
@@ -156,7 +157,7 @@ def shadowed(bench: "Workbench", frame: Frame, settings: ValSettings, key: Any) 
     (3, h, w) ndarray
         Irradiance, W/m^2: what more and more area lights converge to.
     """
-    return bench.once(("shadowed", key, settings.lights), lambda: vpl(frame, VplSettings(lights=settings.lights)))
+    return bench.once(("shadowed", key, settings.lights), lambda: vpl(frame, of(VplSettings, lights=settings.lights)))
 
 
 def drawing(bench: "Workbench", scene: "Scene", settings: ValSettings) -> Callable[[], Array]:

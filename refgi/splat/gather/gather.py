@@ -117,7 +117,7 @@ def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
     first = np.zeros_like(buffer.covered)
     first[np.ix_(*coarse)] = True
     known = gather_irradiance(receivers._replace(covered=buffer.covered & first), frame.rsms, settings)
-    agreement = Agreement(settings.least_cosine, settings.reach * frame.seen_extent.diagonal)
+    agreement = Agreement(settings.least_cosine, settings.reach * frame.visible_extent.diagonal)
     smooth, done = interpolate(receivers, known, coarse, agreement)
     rest = receivers._replace(covered=buffer.covered & ~done)
     total = smooth + gather_irradiance(rest, frame.rsms, settings)

@@ -1,7 +1,7 @@
-"""Which emitters a camera sees: those inside its picture, on the side that faces the eye, with nothing between.
+"""Visibility of emitters to the camera: inside its picture, on the side that faces the eye, with nothing between.
 
-A method that gathers light from a picture knows no others. With only these as emitters the truth is what such a method
-can reach at best; with no visibility between emitter and receiver besides, what it converges to.
+A screen-space method knows no other emitters. With only these the truth is what such a method can reach at best; with
+no visibility between emitter and receiver besides, its limit.
 """
 
 from typing import Any
@@ -12,8 +12,8 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.rays import MISS, Tracer, ray_offset
 from refgi.rsm.raster.projection import Projection, texel_of
-from refgi.truth.lit_points import LitPoints
-from refgi.truth.paths import CHUNK, Paths, Shadows, dot, found
+from refgi.truth.light_vertices import LightVertices
+from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point
 from refgi.truth.surfaces import Surfaces, face_normal, lift
 
 Array = npt.NDArray[Any]
@@ -24,21 +24,9 @@ def aim_at_eye(view: Projection, offset: float, y: tuple[float, float, float], g
                rays: tuple[Array, Array, Array], ray: int) -> None:
     """Write the ray from a point to the eye.
 
-    Parameters
-    ----------
-    view : Projection
-        The camera's map.
-    offset : float
-        How far along g the ray starts, m.
-    y : tuple of 3 floats
-        The point, m.
-    g : tuple of 3 floats
-        Unit face normal on the side that emits.
-    rays : tuple of 3 arrays
-        Origins and directions (n, 3) and reach (n,), float32: filled at `ray`; the reach is 1, or 0 where the point
-        lies outside the picture or that side faces away.
-    ray : int
-        Which ray.
+    `offset`: how far along g the ray starts, m. `y`: the point, m. `g`: unit face normal on the side that emits.
+    `rays`: origins and directions (n, 3) and reach (n,), float32: filled at `ray`; the reach is 1, or 0 where the point
+    lies outside the picture or that side faces away.
     """
     origins, directions, reach = rays
     eye = (view.origin[0, 0], view.origin[0, 1], view.origin[0, 2])
@@ -50,29 +38,17 @@ def aim_at_eye(view: Projection, offset: float, y: tuple[float, float, float], g
     reach[ray] = 1 if dot(toward, g) > 0 and not np.isnan(row) else 0
 
 
-def seen_points(tracer: Tracer, view: Projection, points: LitPoints) -> LitPoints:
-    """Keep the lit points that a camera sees.
+def visible_vertices(tracer: Tracer, view: Projection, points: LightVertices) -> LightVertices:
+    """Return the light vertices that are visible to a camera.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's rays.
-    view : Projection
-        The camera's map.
-    points : LitPoints
-        Lit points.
-
-    Returns
-    -------
-    LitPoints
-        Those that are seen, in their order.
+    Result: the visible ones, in their order.
     """
     count = len(points.power)
     origins, directions = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     reach, blocked = np.empty(count, np.float32), np.empty(count, np.bool_)
     _aim_points(view, tracer.grain, points.position, points.facing, (origins, directions, reach))
     tracer.fill_occluded(origins, directions, reach, blocked)
-    return LitPoints(*(part[..., ~blocked] for part in points))
+    return LightVertices(*(part[..., ~blocked] for part in points))
 
 
 @kernel
@@ -88,18 +64,8 @@ def _aim_points(view: Projection, grain: float, position: Array, facing: Array,
 def aim_paths(view: Projection, surfaces: Surfaces, grain: float, paths: Paths, rays: Shadows) -> None:
     """Write a ray to the eye from each surface that paths found.
 
-    Parameters
-    ----------
-    view : Projection
-        The camera's map.
-    surfaces : Surfaces
-        The scene.
-    grain : float
-        The tracer's: how far rays start above faces, m.
-    paths : Paths
-        What was found.
-    rays : Shadows
-        Origins, directions and reach are filled; the reach is 0 where nothing was found or it cannot be seen.
+    `grain`: the tracer's: how far rays start above faces, m. `rays`: origins, directions and reach are filled; the
+    reach is 0 where nothing was hit or it cannot be visible.
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
@@ -113,6 +79,6 @@ def _aim_paths(view: Projection, surfaces: Surfaces, grain: float, paths: Paths,
     for ray in range(span[0], span[1]):
         rays.reach[ray] = 0
         if paths.triangle_id[ray] != MISS:
-            w, y = found(paths, ray)
+            w, y = hit_point(paths, ray)
             g = face_normal(surfaces, paths.triangle_id[ray], -w[0], -w[1], -w[2])  # where light leaves to the path
             aim_at_eye(view, lift(surfaces, paths.triangle_id[ray], y, g, grain), y, g, written, ray)

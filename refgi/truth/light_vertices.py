@@ -1,4 +1,4 @@
-"""Directly lit surface points, found by fresh rays from every light: the senders of the light side.
+"""Light vertices: directly lit surface points, found by fresh rays from every light; the senders of the light side.
 
 Phi = rho I(l) Omega for a spot or point light, rho E_perp A_perp for a directional one (papers' calibrated radiometry):
 no cosine and no distance. A point whose material has a lobe appears twice, once for each part. Points come in sets, one
@@ -24,13 +24,13 @@ Array = npt.NDArray[Any]
 BLOCK = 32  # points whose contributions are summed before a pick looks inside
 
 
-class LitPoints(NamedTuple):
+class LightVertices(NamedTuple):
     """Senders, as float32 arrays."""
 
     position: Array  # (3, n), m
     axis: Array  # (3, n) unit vector of the emission: shading normal, or mirror direction of a lobe
     normal: Array  # (3, n) shading normal
-    facing: Array  # (3, n) face normal on the lit side
+    facing: Array  # (3, n) face normal on the side of the light
     power: Array  # (n,) largest channel of Phi / pi, W/sr
     colour: Array  # (3, n) Phi / pi over `power`
     exponent: Array  # (n,) of cos around the axis: 1 for the diffuse part
@@ -41,37 +41,21 @@ class LitPoints(NamedTuple):
 
 
 class PointSets(NamedTuple):
-    """Sets of lit points, each padded with dark points to whole blocks."""
+    """Sets of light vertices, each padded with dark points to whole blocks."""
 
-    points: LitPoints
+    points: LightVertices
     starts: Array  # (sets, 3) int64, in blocks: first diffuse one, first of lobes, one past the last
 
 
-def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays,
-                     bound: float) -> LitPoints:
-    """Trace one light's rays to the surface points they light.
+def trace_light_vertices(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays,
+                     bound: float) -> LightVertices:
+    """Trace one light's rays to light vertices.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's rays.
-    surfaces : Surfaces
-        What they find.
-    lights : LightTable
-        The lights, float64.
-    k : int
-        Which light.
-    rays : LightRays
-        Its rays.
-    bound : float
-        Largest geometry term in units of 1 / footprint; inf for no bound.
-
-    Returns
-    -------
-    LitPoints
-        Diffuse parts, then lobes if the scene has any, each in the order of the rays; where nothing is lit, power 0.
+    `surfaces`: the scene's triangles and materials. `bound`: largest geometry term in units of 1 / footprint; inf for
+    no bound. Result: diffuse parts, then lobes if the scene has any, each in the order of the rays; power 0 where a ray
+    finds nothing that reflects.
     """
-    # a lamp may lie in a surface: look from just beyond it
+    # a lamp may lie in a surface: start just beyond it
     beyond = tracer.offsets(rays.origins)
     origins = (rays.origins + beyond[:, None] * rays.directions).astype(np.float32)
     directions = rays.directions.astype(np.float32)
@@ -80,68 +64,56 @@ def trace_lit_points(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: 
     tracer.fill_closest(origins, directions, np.full(count, np.inf, np.float32), triangle_id, distance)
     distance += beyond.astype(np.float32)
     kinds = 2 if surfaces.specular.any() else 1
-    points = _empty(kinds * count)
+    points = _allocate(kinds * count)
     points.ray[:] = np.tile(np.arange(k * count, (k + 1) * count), kinds)
     points.lobe[count:] = True
-    _fill(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance, rays.weight),
+    _fill_vertices(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance, rays.weight),
           (rays.measure, bound), points)
     return points
 
 
-def join(parts: list[LitPoints], sets: int, per_set: int) -> PointSets:
-    """Sort the lit points of several lights into their sets, each padded with dark points to whole blocks.
+def join(parts: list[LightVertices], sets: int, per_set: int) -> PointSets:
+    """Sort the light vertices of several lights into their sets, each padded with dark points to whole blocks.
 
-    Parameters
-    ----------
-    parts : list of LitPoints
-        One a light.
-    sets : int
-        Sets of rays that each light has sent.
-    per_set : int
-        Rays in each.
-
-    Returns
-    -------
-    PointSets
-        C-contiguous arrays.
+    `sets`: sets of rays that each light has sent.
     """
-    together = parts[0] if len(parts) == 1 else LitPoints(
-        *(np.concatenate(fields, axis=-1) for fields in zip(_empty(0), *parts, strict=True)))
-    lit = np.flatnonzero(together.power)
-    group = (2 * (together.ray // per_set % sets) + together.lobe)[lit]
+    together = parts[0] if len(parts) == 1 else LightVertices(
+        *(np.concatenate(fields, axis=-1) for fields in zip(_allocate(0), *parts, strict=True)))
+    bright = np.flatnonzero(together.power)
+    group = (2 * (together.ray // per_set % sets) + together.lobe)[bright]
     counts = np.bincount(group, minlength=2 * sets)
     blocks = np.concatenate([[0], np.cumsum(-(-counts // BLOCK))])
     order = np.argsort(group, kind="stable")
     place = np.arange(len(order)) + np.repeat(blocks[:-1] * BLOCK - (np.cumsum(counts) - counts), counts)
-    points = _empty(int(blocks[-1]) * BLOCK)
-    _copy(together, lit[order], place, points)
+    points = _allocate(int(blocks[-1]) * BLOCK)
+    _copy_vertices(together, bright[order], place, points)
     return PointSets(points, np.stack([blocks[:-2:2], blocks[1:-1:2], blocks[2::2]], axis=1))
 
 
-def _empty(count: int) -> LitPoints:
+def _allocate(count: int) -> LightVertices:
     position, axis, normal, facing, colour = (np.zeros((3, count), np.float32) for _ in range(5))
     power, exponent, peak, bound = (np.zeros(count, np.float32) for _ in range(4))
-    return LitPoints(position, axis, normal, facing, power, colour, exponent, peak, bound, np.zeros(count, np.int32),
-                     np.zeros(count, np.bool_))
+    return LightVertices(position, axis, normal, facing, power, colour, exponent, peak, bound,
+                         np.zeros(count, np.int32), np.zeros(count, np.bool_))
 
 
 @kernel
-def _copy(found: LitPoints, order: Array, place: Array, points: LitPoints) -> None:
+def _copy_vertices(source: LightVertices, order: Array, place: Array, points: LightVertices) -> None:
     for k in range(len(order)):
         i, j = order[k], place[k]
         for c in range(3):
-            points.position[c, j] = found.position[c, i]
-            points.axis[c, j] = found.axis[c, i]
-            points.normal[c, j] = found.normal[c, i]
-            points.facing[c, j] = found.facing[c, i]
-            points.colour[c, j] = found.colour[c, i]
-        points.power[j], points.exponent[j], points.peak[j] = found.power[i], found.exponent[i], found.peak[i]
-        points.bound[j], points.ray[j], points.lobe[j] = found.bound[i], found.ray[i], found.lobe[i]
+            points.position[c, j] = source.position[c, i]
+            points.axis[c, j] = source.axis[c, i]
+            points.normal[c, j] = source.normal[c, i]
+            points.facing[c, j] = source.facing[c, i]
+            points.colour[c, j] = source.colour[c, i]
+        points.power[j], points.exponent[j], points.peak[j] = source.power[i], source.exponent[i], source.peak[i]
+        points.bound[j], points.ray[j], points.lobe[j] = source.bound[i], source.ray[i], source.lobe[i]
 
 
 @kernel(parallel=True)
-def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
-          scale: tuple[float, float], points: LitPoints) -> None:
+def _fill_vertices(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
+          scale: tuple[float, float], points: LightVertices) -> None:
     """Fill the diffuse part of ray i at i and its lobe after all diffuse parts; dark ones keep a power of 0."""
     count = len(hits[2])
     for chunk in prange((count + CHUNK - 1) // CHUNK):
@@ -150,7 +122,7 @@ def _fill(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Arr
 
 @kernel
 def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
-               scale: tuple[float, float], points: LitPoints, span: tuple[int, int]) -> None:
+               scale: tuple[float, float], points: LightVertices, span: tuple[int, int]) -> None:
     origins, directions, triangle_id, distances, weights = hits
     measure, bound = scale
     for i in range(span[0], span[1]):
@@ -173,6 +145,7 @@ def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array
             light, area = radiant_intensity(lights, k, d[0], d[1], d[2]), measure * t * t
         for part in range(len(points.power) // len(triangle_id)):
             rho = surfaces.diffuse[material] if part == 0 else surfaces.specular[material]
+            # Phi / pi, Phi = rho I(l) Omega
             share = measure * weights[i] / np.pi
             flux = (rho[0] * light[0] * share, rho[1] * light[1] * share, rho[2] * light[2] * share)
             power = max(flux[0], flux[1], flux[2])

@@ -31,7 +31,7 @@ def irradiance(meshes, point, normal, camera=ABOVE, light=SUN, **settings):
     geometry, materials = merge([SPECK, *meshes])
     place, up = (np.broadcast_to(np.reshape(v, (3, 1, 1)), (3, *SHAPE)) for v in (point, normal))
     return accumulate(Scene("by hand", geometry, materials, camera, (light,)), Tracer(geometry), place, up,
-                      np.zeros(SHAPE, np.int32), TruthSettings(emitters="seen", **settings))
+                      np.zeros(SHAPE, np.int32), TruthSettings(emitters="visible", **settings))
 
 
 def form_factor(point, normal, x0, x1, z0=-0.5, z1=0.5):
@@ -110,7 +110,7 @@ def test_the_part_of_a_sphere_that_is_seen(estimator, evidence):
     points = flat.vertices[flat.faces[chosen]].mean(axis=2)
     up = -points / np.linalg.norm(points, axis=2, keepdims=True)
     result = accumulate(lit, Tracer(flat), np.moveaxis(points, 2, 0), np.moveaxis(up, 2, 0), chosen.astype(np.int32),
-                        TruthSettings(estimator, samples=2400, emitters="seen"))
+                        TruthSettings(estimator=estimator, samples=2400, emitters="visible"))
     solid_angle = 4 * math.asin(math.sin(half) ** 2)  # of a square pyramid
     expected = 0.5 * np.array(light.intensity) / math.pi * solid_angle / 4
     error = np.abs(result.picture_mean / expected - 1)
@@ -124,7 +124,8 @@ def frame():
 
 
 def test_estimators_agree_and_all_is_more(frame, evidence):
-    results = {kind: trace_truth(frame, TruthSettings(kind, emitters="seen", samples=24 * 40)) for kind in ESTIMATORS}
+    results = {kind: trace_truth(frame, TruthSettings(estimator=kind, emitters="visible", samples=24 * 40))
+               for kind in ESTIMATORS}
     everything = trace_truth(frame, TruthSettings(samples=24 * 40))
     a = results["combined"]
     for kind in ESTIMATORS[1:]:
@@ -145,13 +146,13 @@ def test_a_camera_that_sees_all_that_is_lit(visibility):
     camera = dataclasses.replace(ABOVE, vfov=2 * math.atan(0.3))
     frame = Frame(Scene("by hand", geometry, materials, camera, (SUN,)), width=24, height=24)
     settings = TruthSettings(samples=96, visibility=visibility)
-    result = trace_truth(frame, dataclasses.replace(settings, emitters="seen")).mean
+    result = trace_truth(frame, dataclasses.replace(settings, emitters="visible")).mean
     assert result.any()
     assert np.array_equal(result, trace_truth(frame, settings).mean)
 
 
 def test_same_bits_for_threads_and_batches(frame):
-    settings = TruthSettings(samples=72, emitters="seen")
+    settings = TruthSettings(samples=72, emitters="visible")
     first = trace_truth(frame, settings)
     with jit.threads(1):
         again = trace_truth(frame, dataclasses.replace(settings, batch=1001))
@@ -162,11 +163,11 @@ def test_a_checkpoint_with_other_emitters_is_refused(frame, tmp_path):
     settings = TruthSettings(samples=48, checkpoint=tmp_path / "truth.npz")
     trace_truth(frame, settings)
     with pytest.raises(InputError, match="another"):
-        trace_truth(frame, dataclasses.replace(settings, emitters="seen"))
+        trace_truth(frame, dataclasses.replace(settings, emitters="visible"))
 
 
-@pytest.mark.parametrize("others", [{"emitters": "some"}, {"emitters": "seen", "bounces": 2},
-                                    {"emitters": "seen", "caustics": True}])
+@pytest.mark.parametrize("others", [{"emitters": "some"}, {"emitters": "visible", "bounces": 2},
+                                    {"emitters": "visible", "caustics": True}])
 def test_unusable_settings_are_refused(others):
     with pytest.raises(InputError, match="emitters"):
         TruthSettings(**others)

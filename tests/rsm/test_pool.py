@@ -1,12 +1,12 @@
-"""Planes whose memory is lent out again: never while anything still looks at it."""
+"""Buffer pool: memory is reused, never while an array still refers to it."""
 
 import gc
 import threading
 
 import numpy as np
 
-from refgi.rsm import memory
-from refgi.rsm.memory import plane
+from refgi.rsm import pool
+from refgi.rsm.pool import plane
 
 SHAPE = (3, 256, 320)
 
@@ -15,7 +15,7 @@ def place(array):
     return array.__array_interface__["data"][0]
 
 
-def test_memory_is_lent_again_once_no_array_holds_it():
+def test_memory_is_reused_once_no_array_refers_to_it():
     first = plane(SHAPE, np.float32)
     where = place(first)
     row = first[1, 2:5].T  # a view keeps the whole block
@@ -30,7 +30,7 @@ def test_memory_is_lent_again_once_no_array_holds_it():
     assert place(plane(SHAPE, np.float32)) == where
 
 
-def test_planes_are_ordinary_arrays():
+def test_pooled_arrays_are_ordinary_arrays():
     for shape, dtype in ((SHAPE, np.float64), ((700, 900), np.bool_), ((1, 1), np.float32), ((3, 0, 0), np.float32)):
         one = plane(shape, dtype)
         assert (one.shape, one.dtype) == (shape, dtype)
@@ -39,13 +39,13 @@ def test_planes_are_ordinary_arrays():
         one[...] = 1
 
 
-def test_what_waits_is_bounded(monkeypatch):
-    monkeypatch.setattr(memory, "KEPT", 3 << 20)
-    lender = memory._Lender()
-    blocks = [lender.take(1 << 20) for _ in range(5)]
+def test_idle_memory_is_bounded(monkeypatch):
+    monkeypatch.setattr(pool, "MOST_IDLE", 3 << 20)
+    idle = pool._Pool()
+    blocks = [idle.acquire(1 << 20) for _ in range(5)]
     for count, block in enumerate(blocks, 1):
-        lender.give_back(block)
-        assert sum(len(waiting) for waiting in lender._idle.values()) == (count if count <= 3 else count - 3)
+        idle.release(block)
+        assert sum(len(waiting) for waiting in idle._idle.values()) == (count if count <= 3 else count - 3)
 
 
 def test_threads_never_get_the_same_memory():

@@ -1,10 +1,10 @@
-"""What a mesh must satisfy before anything else sees it, and what is quietly mended with a count.
+"""Validation and repair of meshes as read, and of lights.
 
-Errors: a shape that is not a mesh, a coordinate that is not finite, an index without a vertex. Mended: zero-area faces
-are dropped, vertex normals are brought to unit length, and a vertex whose normal is zero or not finite gets the mean
-of its faces' normals.
+Errors: a shape that is not a mesh, a coordinate that is not finite, an index without a vertex. Repaired: zero-area
+faces are dropped, vertex normals are brought to unit length, and a vertex whose normal is zero or not finite gets the
+mean of its faces' normals.
 
-Lights that shine: one without power is left out, with a count, and a scene needs at least one.
+Lights without power are left out, with a count; a scene needs at least one with power.
 """
 
 import dataclasses
@@ -23,28 +23,16 @@ FLAT = 16 * float(np.finfo(np.float64).eps)
 SMALLEST_USUAL, LARGEST_USUAL = 0.01, 1000.0  # m across
 
 
-def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list[str]) -> tuple[list[Mesh], int]:
-    """Return the meshes of a file as `mended` returns each, the sound small ones looked at together.
+def repaired_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list[str]) -> tuple[list[Mesh], int]:
+    """Return the meshes of a file as `repaired` returns each, the sound small ones looked at together.
 
-    Parameters
-    ----------
-    meshes : sequence of Mesh
-        Meshes as read.
-    where : callable
-        Returns file and object of the mesh of some number, for the error's text.
-    faults : list of str
-        Gets the text of the error for each mesh that `mended` refuses.
-
-    Returns
-    -------
-    list of Mesh
-        As many; those that are refused stay as they were.
-    int
-        Number of faces dropped.
+    `where`: returns file and object of the mesh of some number, for the error's text. `faults`: gets the text of the
+    error for each mesh that `repaired` refuses. Result: as many; those that are refused stay as they were. Result:
+    number of faces dropped.
     """
-    kept, done, dropped = list(meshes), np.zeros(len(meshes), np.bool_), 0
+    remaining, done, dropped = list(meshes), np.zeros(len(meshes), np.bool_), 0
     for batch in batches(meshes):
-        good = _needs_no_mending(batch)
+        good = _needs_no_repair(batch)
         done[batch.members] = good
         if batch.normals is not None:
             usable = np.repeat(good, np.diff(batch.first_vertex))[:, None]
@@ -52,17 +40,17 @@ def mended_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list
             normals /= np.linalg.norm(normals, axis=1)[:, None]
             for k in np.flatnonzero(good).tolist():
                 number, part = batch.members[k], slice(batch.first_vertex[k], batch.first_vertex[k + 1])
-                kept[number] = dataclasses.replace(meshes[number], normals=normals[part])
+                remaining[number] = dataclasses.replace(meshes[number], normals=normals[part])
     for number in np.flatnonzero(~done).tolist():
         try:
-            kept[number], flat = mended(meshes[number], where(number))
+            remaining[number], flat = repaired(meshes[number], where(number))
             dropped += flat
         except InputError as error:
             faults.append(str(error))
-    return kept, dropped
+    return remaining, dropped
 
 
-def _needs_no_mending(batch: Batch) -> Array:
+def _needs_no_repair(batch: Batch) -> Array:
     """Return (k,) which meshes are sound and have neither flat faces nor missing normals."""
     good = batch.sound()
     if not good.all():
@@ -72,27 +60,12 @@ def _needs_no_mending(batch: Batch) -> Array:
     return good if batch.normals is None else good & ~batch.any_vertex(missing_normals(batch.normals))
 
 
-def mended(mesh: Mesh, where: str) -> tuple[Mesh, int]:
+def repaired(mesh: Mesh, where: str) -> tuple[Mesh, int]:
     """Return the mesh without its zero-area faces and with unit vertex normals.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        A mesh as read.
-    where : str
-        File and object, for the error's text.
-
-    Returns
-    -------
-    Mesh
-        The same object where nothing had to change.
-    int
-        Number of faces dropped.
-
-    Raises
-    ------
-    InputError
-        If coordinates are not finite, indices out of range, or no face has an area.
+    `mesh`: a mesh as read. `where`: file and object, for the error's text. Result: the same object where nothing had to
+    change. Result: number of faces dropped. Raises `InputError` if coordinates are not finite, indices out of range, or
+    no face has an area.
     """
     mesh.expect_sound(where)
     flat = zero_area(mesh.vertices, mesh.faces)
@@ -108,12 +81,7 @@ def mended(mesh: Mesh, where: str) -> tuple[Mesh, int]:
 def warn_of_flat_faces(count: int, where: str) -> None:
     """Say how many zero-area faces were passed over, if any.
 
-    Parameters
-    ----------
-    count : int
-        Faces dropped.
-    where : str
-        The scene or file they came from.
+    `where`: the scene or file they came from.
     """
     if count:
         noun = "face" if count == 1 else "faces"
@@ -123,15 +91,10 @@ def warn_of_flat_faces(count: int, where: str) -> None:
 def warn_of_unit(geometry: Geometry, where: str) -> None:
     """Say that a file's unit may not be the metre, if its size is no usual one.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        All triangles.
-    where : str
-        The file they came from.
+    `where`: the file they came from.
     """
     if not SMALLEST_USUAL <= geometry.diagonal <= LARGEST_USUAL:
-        text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are taken as metres. If the file has another unit "
+        text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are read as metres. If the file has another unit "
                 "of s metres, scale its objects in a scene file: \"transform\": "
                 "[s, 0, 0, 0,  0, s, 0, 0,  0, 0, s, 0,  0, 0, 0, 1], such as s = 0.001 for millimetres")
         warnings.warn(RefgiWarning(text), stacklevel=4)
@@ -140,17 +103,8 @@ def warn_of_unit(geometry: Geometry, where: str) -> None:
 def zero_area(vertices: Array, faces: Array) -> Array:
     """Return which faces have no area beyond rounding.
 
-    Parameters
-    ----------
-    vertices : (n, 3) ndarray
-        Positions, m.
-    faces : (m, 3) ndarray
-        Vertex indices.
-
-    Returns
-    -------
-    (m,) ndarray of bool
-        True where the cross product of two edges vanishes against their lengths.
+    `vertices` (n, 3): positions, m. `faces` (m, 3): vertex indices. Returns (m,) bool: true where the cross product of
+    two edges vanishes against their lengths.
     """
     a, b, c = (np.asarray(vertices, np.float64)[faces[:, k]] for k in range(3))
     scale = np.abs(b - a).max(axis=1, initial=0.0) * np.abs(c - a).max(axis=1, initial=0.0)
@@ -160,15 +114,8 @@ def zero_area(vertices: Array, faces: Array) -> Array:
 def unit_normals(mesh: Mesh) -> Array:
     """Return the vertex normals at unit length, those that are missing filled in from the faces.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        A mesh with normals.
-
-    Returns
-    -------
-    (n, 3) ndarray of float64
-        Unit vectors; (0, 1, 0) at a vertex that no face with an area uses.
+    `mesh`: a mesh with normals. Returns (n, 3) float64: unit vectors; (0, 1, 0) at a vertex that no face with an area
+    uses.
     """
     normals = np.asarray(mesh.normals, np.float64)
     missing = missing_normals(normals)
@@ -180,17 +127,8 @@ def unit_normals(mesh: Mesh) -> Array:
 def mean_face_normals(vertices: Array, faces: Array) -> Array:
     """Return the area-weighted mean of the normals of the faces around each vertex.
 
-    Parameters
-    ----------
-    vertices : (n, 3) ndarray
-        Positions, m.
-    faces : (m, 3) ndarray
-        Vertex indices.
-
-    Returns
-    -------
-    (n, 3) ndarray of float64
-        Unit vectors; (0, 1, 0) where the mean vanishes.
+    `vertices` (n, 3): positions, m. `faces` (m, 3): vertex indices. Returns (n, 3) float64: unit vectors; (0, 1, 0)
+    where the mean vanishes.
     """
     a, b, c = (np.asarray(vertices, np.float64)[faces[:, k]] for k in range(3))
     cross = np.repeat(np.cross(b - a, c - a), 3, axis=0)
@@ -201,32 +139,19 @@ def mean_face_normals(vertices: Array, faces: Array) -> Array:
     return np.asarray(total / length[:, None])
 
 
-def shining(lights: Sequence[Light], where: str) -> tuple[Light, ...]:
+def lights_with_power(lights: Sequence[Light], where: str) -> tuple[Light, ...]:
     """Return the lights that have power.
 
-    Parameters
-    ----------
-    lights : sequence of Light
-        All lights of a scene.
-    where : str
-        File and key, for texts.
-
-    Returns
-    -------
-    tuple of Light
-        In the given order, at least one.
-
-    Raises
-    ------
-    InputError
-        If none has power: the picture would be silently black.
+    `lights`: all lights of a scene. `where`: file and key, for texts. Result: in the given order, at least one. Raises
+    `InputError` if none has power: the picture would be silently black.
     """
-    kept = tuple(light for light in lights if max(_power(light)) > 0)
-    expect(bool(kept), where, "at least one light of power above 0", f"{len(lights)} without" if lights else "none")
-    if dropped := len(lights) - len(kept):
+    remaining = tuple(light for light in lights if max(_power(light)) > 0)
+    without = f"{len(lights)} without" if lights else "none"
+    expect(bool(remaining), where, "at least one light of power above 0", without)
+    if dropped := len(lights) - len(remaining):
         noun = "light" if dropped == 1 else "lights"
         warnings.warn(RefgiWarning(f"{where}: {dropped} {noun} of zero power left out"), stacklevel=3)
-    return kept
+    return remaining
 
 
 def _power(light: Light) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS, STEPS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
@@ -77,13 +77,13 @@ def cosine_direction(u: float, v: float) -> tuple[float, float, float]:
 
 
 @kernel(parallel=True)
-def send(to: Receivers, span: tuple[int, int], points: Array, seed: int, reach: float, paths: Paths) -> None:
+def send(to: RayReceivers, span: tuple[int, int], points: Array, seed: int, reach: float, paths: Paths) -> None:
     """Send one ray for each point of the set from each receiver of a span.
 
     Parameters
     ----------
-    to : Receivers
-        Receivers.
+    to : RayReceivers
+        RayReceivers.
     span : tuple of 2 ints
         First receiver and one past the last.
     points : (s, 2) ndarray of uint32
@@ -101,7 +101,7 @@ def send(to: Receivers, span: tuple[int, int], points: Array, seed: int, reach: 
 
 
 @kernel
-def _send(to: Receivers, first: int, span: tuple[int, int], points: Array, seed: int, reach: float,
+def _send(to: RayReceivers, first: int, span: tuple[int, int], points: Array, seed: int, reach: float,
           paths: Paths) -> None:
     origins, directions, reaches, travelled, cosines, _, _, weights = paths
     pixel, _, normals, facing, starts = to

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.truth.light_grid import Density, cell_centres, density_of, rays_through, stratified_sets
 from refgi.truth.light_side import pick, tiles
 from refgi.truth.lit_points import PointSets, join, trace_lit_points
@@ -162,7 +162,7 @@ def _some(task: Task) -> Task:
     """Return the task for some of its receivers, which all pick from one set."""
     count = len(task.to.pixel)
     chosen = np.sort(np.random.default_rng(0).choice(count, min(count, RECEIVERS), replace=False))
-    to = Receivers(*(np.ascontiguousarray(field[..., chosen]) for field in task.to))
+    to = RayReceivers(*(np.ascontiguousarray(field[..., chosen]) for field in task.to))
     return task._replace(to=to, set_of=np.zeros(len(chosen), np.int64))
 
 

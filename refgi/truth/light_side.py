@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.truth.lit_points import BLOCK, LitPoints
@@ -126,7 +126,7 @@ def _lobe_term(points: LitPoints, j: int, tile: Array, i: int) -> Any:
 
 
 @kernel
-def _aim(points: LitPoints, j: int, to: Receivers, r: int, grain: Any, origins: Array, directions: Array,
+def _aim(points: LitPoints, j: int, to: RayReceivers, r: int, grain: Any, origins: Array, directions: Array,
          ray: int) -> Any:
     """Write the shadow segment to a picked point and return its reach: 1, or 0 where a face is seen from behind."""
     real = np.float32
@@ -156,7 +156,7 @@ def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
     Returns
     -------
     (last - first,) ndarray, (t, 3) ndarray, both int64
-        Receivers; and for each tile where it begins and ends among them, and its set.
+        RayReceivers; and for each tile where it begins and ends among them, and its set.
     """
     order = np.argsort(set_of[first:last], kind="stable")
     sets = set_of[first:last][order]
@@ -166,7 +166,7 @@ def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
 
 
 @kernel(parallel=True)
-def pick(points: LitPoints, starts: Array, to: Receivers, tiles: tuple[Array, Array], how: tuple[int, int, int, Any],
+def pick(points: LitPoints, starts: Array, to: RayReceivers, tiles: tuple[Array, Array], how: tuple[int, int, int, Any],
          rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let each receiver of some tiles pick lit points, and write the shadow rays and what they are worth.
 
@@ -176,10 +176,10 @@ def pick(points: LitPoints, starts: Array, to: Receivers, tiles: tuple[Array, Ar
         Senders, in sets.
     starts : (sets, 3) int64 ndarray
         First block of each set, its first of lobes and one past its last.
-    to : Receivers
-        Receivers.
+    to : RayReceivers
+        RayReceivers.
     tiles : tuple of 2 arrays
-        Receivers sorted by set, and the table of tiles.
+        RayReceivers sorted by set, and the table of tiles.
     how : tuple of 3 ints and a float32
         First receiver of the span; picks of each; seed of the random shift, a hash of it and the receiver's pixel; the
         tracer's grain: segments end above the sender's face by `ray_offset` and `far_offset`, m.
@@ -211,7 +211,7 @@ def pick(points: LitPoints, starts: Array, to: Receivers, tiles: tuple[Array, Ar
 
 
 @kernel
-def _pick_all(points: LitPoints, to: Receivers, members: Array, tile: Array, how: tuple[int, int, int, Any],
+def _pick_all(points: LitPoints, to: RayReceivers, members: Array, tile: Array, how: tuple[int, int, int, Any],
               sums: tuple[tuple[int, int], Array, Array], rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
     origins, directions, reach, worth, picked = rays

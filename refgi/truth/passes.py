@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.lobes import inverse_fraction, lobe_direction
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
 from refgi.truth.caustics import photon_pass
@@ -59,7 +59,7 @@ def _pass_through(surfaces: Surfaces, grain: float, paths: Paths, ray: int) -> N
 
 
 @kernel(parallel=True)
-def scatter(surfaces: Surfaces, grain: float, seed: int, to: Receivers, first: int, per_receiver: int,
+def scatter(surfaces: Surfaces, grain: float, seed: int, to: RayReceivers, first: int, per_receiver: int,
             paths: Paths) -> None:
     """Send each path on from the surface it found, by that surface's reflection.
 
@@ -71,8 +71,8 @@ def scatter(surfaces: Surfaces, grain: float, seed: int, to: Receivers, first: i
         The tracer's: how far rays start above faces, m.
     seed : int
         Random numbers: a hash of it, the receiver's pixel and the path's number there.
-    to : Receivers
-        Receivers.
+    to : RayReceivers
+        RayReceivers.
     first : int
         Receiver of the first path.
     per_receiver : int

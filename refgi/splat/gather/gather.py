@@ -1,8 +1,8 @@
 """Gathering from the reflective shadow map (Dachsbacher and Stamminger 2005), the baseline of SII Fig. 12.
 
-Each pixel looks at texels in a disc around its own place in the map. With `grid` the sum runs at a coarse grid of
-pixels first; a pixel whose coarse neighbours agree with it in place and normal takes their interpolated light, every
-other pixel runs the sum itself.
+Each pixel sums texels in a disc around its own place in the map. With `grid` the sum runs at a coarse grid of pixels
+first; a pixel whose coarse neighbours resemble it in place and normal gets their interpolated light, every other pixel
+runs the sum itself.
 """
 
 import dataclasses
@@ -18,7 +18,7 @@ from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_loss
 from refgi.scene.values import LARGEST
 from refgi.splat.gather.gather_sum import GatherMap, centers, disc_loss, disc_pattern, gather_discs
-from refgi.splat.gather.interpolation import Agreement, coarse_pixels, interpolate
+from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, interpolate
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class GatherSettings:
 
 
 class Gathered(NamedTuple):
-    """Light by gathering, and what it took."""
+    """Light by gathering, and how many pixels ran the sum."""
 
     irradiance: Array  # (3, h, w) W/m^2
     evaluated: int  # pixels that ran the sum
@@ -76,7 +76,7 @@ def gather(frame: "Frame", settings: GatherSettings) -> Array:
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The scene and its buffers.
     settings : GatherSettings
         Disc, samples and interpolation.
 
@@ -98,7 +98,7 @@ def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The scene and its buffers.
     settings : GatherSettings
         Disc, samples and interpolation.
 
@@ -116,11 +116,11 @@ def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
     coarse = coarse_pixels(frame.height, frame.width, settings.grid)
     first = np.zeros_like(buffer.covered)
     first[np.ix_(*coarse)] = True
-    known = gather_irradiance(receivers._replace(covered=buffer.covered & first), frame.rsms, settings)
-    agreement = Agreement(settings.least_cosine, settings.reach * frame.seen_extent.diagonal)
-    smooth, done = interpolate(receivers, known, coarse, agreement)
-    rest = receivers._replace(covered=buffer.covered & ~done)
-    total = smooth + gather_irradiance(rest, frame.rsms, settings)
+    coarse_light = gather_irradiance(receivers._replace(covered=buffer.covered & first), frame.rsms, settings)
+    limits = SimilarityLimits(settings.least_cosine, settings.reach * frame.seen_extent.diagonal)
+    result, interpolated = interpolate(receivers, coarse_light, coarse, limits)
+    rest = receivers._replace(covered=buffer.covered & ~interpolated)
+    total = result + gather_irradiance(rest, frame.rsms, settings)
     evaluated = np.count_nonzero(buffer.covered & first) + np.count_nonzero(rest.covered & ~first)
     return Gathered(total, int(evaluated), covered)
 
@@ -132,7 +132,7 @@ def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", settings: Gat
     Parameters
     ----------
     receivers : Receivers
-        Points that are lit.
+        Points to light.
     rsms : sequence of Rsm
         Reflective shadow maps, one a light; of glossy materials only the diffuse part is gathered.
     settings : GatherSettings
@@ -146,7 +146,7 @@ def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", settings: Gat
     Notes
     -----
     E = (2 pi r_max^2 T / S) sum xi_1 E_t with T the texels of one map and E_t the light of one texel (Eq. 2), which
-    has the mean of the full sum over the disc. The papers scale by hand. A receiver outside the map looks from the
+    has the mean of the full sum over the disc. The papers scale by hand. A receiver outside the map gathers at the
     nearest place on its border. Maps of several faces are one sheet: a disc runs on into the next face's rows.
     """
     position, normal, covered = receivers

@@ -8,8 +8,7 @@ the pixels.
 """
 
 from refgi.splat.sii.settings import SiiSettings, SplatSettings
-from refgi.splat.sii.sii import sii
-from refgi.splat.sii.splat import cut_irradiance, splat
+from refgi.splat.sii.sii import cut_irradiance, sii, splat
 
 __all__ = [
     "SiiSettings",

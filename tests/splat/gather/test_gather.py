@@ -12,7 +12,7 @@ from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.splat import GatherSettings, Receivers, SiiSettings, gather, sii
 from refgi.splat.gather.gather import gather_counted, gather_irradiance
 from refgi.splat.gather.gather_sum import disc_pattern
-from refgi.splat.gather.interpolation import Agreement, coarse_pixels, interpolate
+from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, interpolate
 from tests.naive import eq2
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -143,7 +143,7 @@ def test_interpolation_is_bilinear_on_a_plane():
     floor = plane(20, 30)
     light = np.stack([1 + floor.position[0], 2 + floor.position[1], floor.position[0] * 0 + 5])
     coarse = coarse_pixels(20, 30, 5)
-    got, done = interpolate(floor, light, coarse, Agreement(0.9, 100.0))
+    got, done = interpolate(floor, light, coarse, SimilarityLimits(0.9, 100.0))
     assert done.all()
     inside = np.s_[:, coarse[0][0] : coarse[0][-1] + 1, coarse[1][0] : coarse[1][-1] + 1]
     np.testing.assert_allclose(got[inside], light[inside], rtol=1e-12)
@@ -153,7 +153,7 @@ def test_interpolation_keeps_to_one_side_of_a_step():
     floor = plane(16, 16)
     floor.position[2, :, 8:] = 50  # a cliff
     light = np.where(floor.position > 1e9, 0, np.where(np.arange(16) < 8, 1.0, 9.0))
-    got, done = interpolate(floor, light, coarse_pixels(16, 16, 4), Agreement(0.9, 20.0))
+    got, done = interpolate(floor, light, coarse_pixels(16, 16, 4), SimilarityLimits(0.9, 20.0))
     np.testing.assert_allclose(got[:, done], light[:, done])
     assert 0.4 < done.mean() < 1
 
@@ -162,7 +162,7 @@ def test_interpolation_keeps_to_one_side_of_a_step():
 def test_interpolation_at_any_size(size):
     floor = plane(*size)
     light = np.ones((3, *size))
-    got, done = interpolate(floor, light, coarse_pixels(*size, 4), Agreement(0.9, 1e9))
+    got, done = interpolate(floor, light, coarse_pixels(*size, 4), SimilarityLimits(0.9, 1e9))
     np.testing.assert_allclose(got[:, done], 1)
     assert done.any()
 

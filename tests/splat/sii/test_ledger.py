@@ -12,7 +12,7 @@ from refgi.rsm.raster.projection import CUBE_FORWARD, CUBE_UP
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from refgi.splat import SiiSettings, sii
 from refgi.splat.sii.ledger import energy_ledger
-from refgi.splat.sii.ledger_sides import pixel_areas
+from refgi.splat.sii.ledger_terms import pixel_areas
 from refgi.stages import observe
 from tests.form_factors import polygon_form_factor
 from tests.naive import ledger as naive

@@ -19,7 +19,7 @@ from refgi.splat.sii.reach.fragments import fragments, gather_bits
 from refgi.splat.sii.reach.screen_bounds import covered_pixels, screen_quads
 from refgi.splat.sii.reach.threshold import low_irradiance
 from refgi.splat.sii.settings import SplatSettings
-from refgi.splat.sii.splat import cut_irradiance, splat
+from refgi.splat.sii.sii import cut_irradiance, splat
 from tests.naive import bounds as naive
 from tests.pairs import sets
 

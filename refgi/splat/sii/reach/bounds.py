@@ -1,4 +1,4 @@
-"""Where a pixel light is significant, and ellipsoids around it (SII appendix, with Eq. 8 corrected).
+"""Ellipsoids that bound where a pixel light is significant (SII appendix, Eq. 7 and 8 with the exponent restored).
 
 A light of exponent n (1: diffuse) sends B = I_0 cos^n(alpha) / r^2, so B >= I_low inside r^2 = R_0^2 cos^n(alpha),
 R_0^2 = I_0 / I_low. All lengths here are shares of R_0. x runs along the light's axis (normal or lobe axis), rho across
@@ -58,7 +58,9 @@ def appendix_ellipsoid(exponent: npt.ArrayLike) -> Ellipsoid:
     """
     n = np.asarray(exponent, np.float64)
     share = n / (n + 2)
-    center = share ** ((n + 2) / 4)  # Eq. (8)
+    # Eq. (8)
+    center = share ** ((n + 2) / 4)
+    # Eq. (7) at the centre
     height = share ** (n / 4) * np.sqrt(2 / (n + 2))
     return Ellipsoid(center, np.maximum(center, 1 - center), height)
 

@@ -1,4 +1,4 @@
-"""How far the lights of one picture reach, and which tiles their bounds list them for."""
+"""Ranges of the lights of one picture, and light lists of its tiles by the chosen bound (SII Sec. 3.2, 3.4)."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 
-class Lists:
+class LightLists:
     """The range of all lights of a picture, and lists of lights for any of its receivers.
 
     Parameters
@@ -35,7 +35,7 @@ class Lists:
     width : int
         Of the picture, in pixels.
     projection : Projection or None
-        The map its pixels are seen on.
+        The camera's map.
 
     Attributes
     ----------

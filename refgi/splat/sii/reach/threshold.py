@@ -4,7 +4,7 @@ The paper sets I_low to "x % of I_0", an irradiance to an intensity. Here it is 
 I_low = x max I_0 / L_ref^2: dim lights reach less far, as Sec. 3.6 says they do. The intensity of an RGB light is its
 largest channel.
 
-How much light the threshold takes from a picture: what the picture holds at some pixels, and what it would uncut.
+`cut_loss` is the share of light that the threshold removes: the picture's sum at sampled pixels against the full one.
 """
 
 import math
@@ -134,7 +134,7 @@ def light_range(
     scale = np.ones(len(peak))
     if settings.stochastic_range:
         scale = 1.0 - draws(settings.seed, RANGE, len(peak), part)  # (0, 1]
-    # far from the largest numbers, whose squares are taken, and from 0, which xi must not round to
+    # far from the largest numbers, which are squared, and from 0, which xi must not round to
     square = np.minimum(square, math.sqrt(float(np.finfo(dtype).max)))
     return Range(square.astype(dtype), np.maximum(scale, 1e-30).astype(dtype), outside)
 
@@ -164,9 +164,9 @@ def cut_loss(
         Of the light without visibility, at sampled pixels.
     """
     sample = sample_for(receivers, lights)
-    kept = light.reshape(3, -1)[:, sample.place]
+    cut = light.reshape(3, -1)[:, sample.place]
     whole = light_at(sample, lights, settings, footprint)
-    return lost_share(whole, float(kept.mean(dtype=np.float64))) if kept.size else 0.0
+    return lost_share(whole, float(cut.mean(dtype=np.float64))) if cut.size else 0.0
 
 
 def warn_of_cut(

@@ -49,8 +49,8 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, linear RGB, without visibility.
     """
-    lights = choose_lights(frame, settings)  # Sec. 3.1, 3.5 to 3.7
-    footprint = footprints(frame, settings)
+    lights = choose_lights(frame, settings.lights)  # Sec. 3.1, 3.5 to 3.7
+    footprint = footprints(frame, settings.lights, settings.pairs)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading
 
     reach = with_reference_length(receivers, lights, settings)
@@ -59,7 +59,7 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
         return splat(points, lights, reach, footprint, frame.gbuffer.projection)  # Eq. (2), Sec. 3.4
 
     light = half_resolution(receivers, evaluate) if settings.half_resolution else evaluate(receivers)
-    warn_of_clamp(receivers, lights, settings, footprint, "sii")
+    warn_of_clamp(receivers, lights, settings.pairs, footprint, "sii")
     warn_of_cut(light, receivers, lights, reach, footprint)
     return light
 
@@ -96,7 +96,7 @@ def splat(
     """
     if not settings.cuts:
         skip("splat.bins", "I_low is 0: every light reaches every pixel")
-        return irradiance(receivers, lights, settings, footprint)
+        return irradiance(receivers, lights, settings.pairs, footprint)
     return _splat(receivers, lights, settings, footprint, projection)
 
 
@@ -140,7 +140,7 @@ def _sum_in_range(
     receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None,
     projection: "Projection | None", *, outside: bool,
 ) -> Array:
-    packed = checked(receivers, lights, settings, footprint)
+    packed = checked(receivers, lights, settings.pairs, footprint)
     settings = with_reference_length(receivers, lights, settings)
     lists = LightLists(packed, settings, outside, receivers.covered.shape[1], projection)
     weighted = outside or settings.stochastic_range

@@ -4,9 +4,12 @@
 `interpolation` carries the light of a coarse grid of pixels to the others.
 """
 
-from refgi.splat.gather.gather import GatherSettings, gather
+from refgi.splat.gather.gather import PRESETS, DiscSettings, GatherSettings, Interpolation, gather
 
 __all__ = [
+    "PRESETS",
+    "DiscSettings",
     "GatherSettings",
+    "Interpolation",
     "gather",
 ]

@@ -7,12 +7,31 @@ Phong lobes conserve their flux above the surface, and the picture is that of th
 the pixels.
 """
 
-from refgi.splat.sii.settings import SiiSettings, SplatSettings
+from refgi.splat.sii.settings import (
+    PRESETS,
+    AbsoluteCut,
+    EllipsoidBound,
+    FullBound,
+    MeshBound,
+    QuadBound,
+    ReachSettings,
+    RelativeCut,
+    SiiSettings,
+    TangentBound,
+)
 from refgi.splat.sii.sii import cut_irradiance, sii, splat
 
 __all__ = [
+    "PRESETS",
+    "AbsoluteCut",
+    "EllipsoidBound",
+    "FullBound",
+    "MeshBound",
+    "QuadBound",
+    "ReachSettings",
+    "RelativeCut",
     "SiiSettings",
-    "SplatSettings",
+    "TangentBound",
     "cut_irradiance",
     "sii",
     "splat",

@@ -19,6 +19,8 @@ import numpy.typing as npt
 
 from refgi.lights.selection import footprints
 from refgi.pairs.irradiance import Receivers, irradiance
+from refgi.settings import replaced
+from refgi.splat.sii.settings import MeshBound
 from refgi.splat.sii.sii import cut_irradiance, sii
 
 if TYPE_CHECKING:
@@ -205,7 +207,7 @@ def screen_terms(frame: "Frame", lights: "PixelLights", settings: "SiiSettings")
     arrived = screen.picture()
     if settings.half_resolution:
         interpolated = screen.picture(half_resolution=False) - arrived
-    cut = screen.cut() if settings.cuts else none
+    cut = none if settings.reach.cut is None else screen.cut()
     return ScreenTerms(full, screen.pairs(turned=True), arrived, interpolated, cut, clamped, printed)
 
 
@@ -228,13 +230,14 @@ class _Screen:
 
     def picture(self, **changes: Any) -> Array:
         """Sum the picture, or what it would be with other settings."""
-        return self._flux(sii(self.frame, dataclasses.replace(self.settings, **changes)))
+        return self._flux(sii(self.frame, replaced(self.settings, changes)))
 
     def cut(self) -> Array:
         """Sum what the range leaves out, and what a mesh that does not enclose it leaves out besides."""
         cut = self._flux(cut_irradiance(self.receivers, self.lights, self.settings, self.footprint))
-        if self.settings.bound == "mesh" and not self.settings.inflate:
-            cut += self.picture(inflate=True) - self.picture()
+        bound = self.settings.reach.bound
+        if isinstance(bound, MeshBound) and not bound.inflate:
+            cut += self.picture(bound_inflate=True) - self.picture()
         return cut
 
     def _flux(self, values: Array) -> Array:

@@ -23,7 +23,7 @@ from refgi.splat.sii.half_resolution import half_resolution
 from refgi.splat.sii.reach.lists import LightLists
 from refgi.splat.sii.reach.reference_length import with_reference_length
 from refgi.splat.sii.reach.threshold import warn_of_cut
-from refgi.splat.sii.settings import SiiSettings, SplatSettings
+from refgi.splat.sii.settings import SiiSettings
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
@@ -53,19 +53,19 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     footprint = footprints(frame, settings.lights, settings.pairs)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading
 
-    reach = with_reference_length(receivers, lights, settings)
+    resolved = with_reference_length(receivers, lights, settings)
 
     def evaluate(points: Receivers) -> Array:
-        return splat(points, lights, reach, footprint, frame.gbuffer.projection)  # Eq. (2), Sec. 3.4
+        return splat(points, lights, resolved, footprint, frame.gbuffer.projection)  # Eq. (2), Sec. 3.4
 
     light = half_resolution(receivers, evaluate) if settings.half_resolution else evaluate(receivers)
     warn_of_clamp(receivers, lights, settings.pairs, footprint, "sii")
-    warn_of_cut(light, receivers, lights, reach, footprint)
+    warn_of_cut(light, receivers, lights, resolved, footprint)
     return light
 
 
 def splat(
-    receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None = None,
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None,
     projection: "Projection | None" = None,
 ) -> Array:
     """Sum the irradiance of every pixel light at the receivers where it may be significant (SII Eq. 2, Sec. 3.4).
@@ -76,8 +76,8 @@ def splat(
         Points to light; their dtype is that of the result.
     lights : PixelLights
         Lights to sum.
-    settings : SplatSettings
-        Threshold and bound, and how one light lights one receiver.
+    settings : SiiSettings
+        The parts `reach` and `pairs`.
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
     projection : Projection, optional
@@ -94,15 +94,15 @@ def splat(
     InputError
         As `irradiance`; or if the bound lacks its map.
     """
-    if not settings.cuts:
-        skip("splat.bins", "I_low is 0: every light reaches every pixel")
+    if settings.reach.cut is None:
+        skip("splat.bins", "no cut: every light reaches every pixel")
         return irradiance(receivers, lights, settings.pairs, footprint)
     return _splat(receivers, lights, settings, footprint, projection)
 
 
 @stage("splat.irradiance")
 def _splat(
-    receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None,
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
     projection: "Projection | None",
 ) -> Array:
     return _sum_in_range(receivers, lights, settings, footprint, projection, outside=False)
@@ -110,7 +110,7 @@ def _splat(
 
 @stage("splat.cut")
 def cut_irradiance(
-    receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None = None
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None
 ) -> Array:
     """Sum the irradiance of the pairs that `splat` leaves out.
 
@@ -120,8 +120,8 @@ def cut_irradiance(
         Points to light.
     lights : PixelLights
         Lights.
-    settings : SplatSettings
-        Those of `splat`; the bound does not matter.
+    settings : SiiSettings
+        As for `splat`; the bound does not matter.
     footprint : (N,) ndarray, optional
         As for `splat`.
 
@@ -131,19 +131,19 @@ def cut_irradiance(
         Irradiance, W/m^2, linear RGB: with that of `splat` it makes the full sum, but for rounding. With a random
         range it is the full sum less the weighted one, and may be below 0.
     """
-    if not settings.cuts:
+    if settings.reach.cut is None:
         return np.zeros_like(np.asarray(receivers.position))
     return _sum_in_range(receivers, lights, settings, footprint, None, outside=True)
 
 
 def _sum_in_range(
-    receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None,
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
     projection: "Projection | None", *, outside: bool,
 ) -> Array:
     packed = checked(receivers, lights, settings.pairs, footprint)
     settings = with_reference_length(receivers, lights, settings)
     lists = LightLists(packed, settings, outside, receivers.covered.shape[1], projection)
-    weighted = outside or settings.stochastic_range
+    weighted = outside or settings.reach.stochastic
 
     def add(here: Array, facing: Array, places: Array, sums: Array) -> None:
         if lists.diffuse is not None and packed.spheres is not None:

@@ -150,7 +150,7 @@ def test_error_and_cost_on_scenes(evidence):
     found = []
     for name in ("cornell_box", "stage", "atrium:faces=20000"):
         frame = Frame(load_scene(name), width=192, height=160, rsm_resolution=96)
-        settings = of(SiiSettings, i_low=0.0, lights=96, clamp="disc")
+        settings = of(SiiSettings, lights=96, clamp="disc")
         lights, area = choose_lights(frame, settings), footprints(frame, settings)
         receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
         counted = []

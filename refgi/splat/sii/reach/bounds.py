@@ -119,7 +119,7 @@ def half_ball_radius(square_range: Array, widening: float, literal: bool = False
 
 
 def light_solids(
-    position: Array, axis: Array, exponent: Array, square: Array, kind: str, widening: float = 0.0,
+    position: Array, axis: Array, exponent: Array, square: Array, tangent: bool, widening: float = 0.0,
     literal: bool = False,
 ) -> Solids:
     """Return the bounds of some lights.
@@ -132,8 +132,8 @@ def light_solids(
         n: 1 for diffuse lights.
     square : (N,) ndarray
         R_0^2 = I_0 / I_low, m^2.
-    kind : str
-        "tangent", or the ellipsoid of the appendix.
+    tangent : bool
+        Use tangent ellipsoids; else those of the appendix.
     widening : float
         The distance within which exponents fall, m; 0: nowhere.
     literal : bool
@@ -144,7 +144,7 @@ def light_solids(
     Solids
         In float64.
     """
-    ellipsoid = (tangent_ellipsoid if kind == "tangent" else appendix_ellipsoid)(exponent)
+    ellipsoid = (tangent_ellipsoid if tangent else appendix_ellipsoid)(exponent)
     square = np.asarray(square, np.float64)
     ball = half_ball_radius(square, widening, literal) if widening > 0 else None
     return Solids(np.asarray(position, np.float64), np.asarray(axis, np.float64), square, ellipsoid, ball)

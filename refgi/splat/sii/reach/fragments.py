@@ -18,7 +18,7 @@ from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES, reached
 from refgi.splat.sii.reach.lists import LightLists
 from refgi.splat.sii.reach.reference_length import lobe_strength, with_reference_length
-from refgi.splat.sii.settings import SplatSettings
+from refgi.splat.sii.settings import SiiSettings
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
@@ -70,7 +70,7 @@ def gather_bits(pixels: int, samples: int) -> int:
 
 
 def fragments(
-    receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None = None,
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None,
     projection: "Projection | None" = None,
 ) -> Fragments:
     """Count the pairs of light and pixel that `splat` keeps, and those it evaluates.
@@ -81,8 +81,8 @@ def fragments(
         Points to light.
     lights : PixelLights
         Lights.
-    settings : SplatSettings
-        Threshold and bound.
+    settings : SiiSettings
+        The parts `reach` and `pairs`.
     footprint : (N,) ndarray, optional
         As for `splat`.
     projection : Projection, optional
@@ -96,7 +96,7 @@ def fragments(
     """
     packed = checked(receivers, lights, settings.pairs, footprint)
     overdraw, of_light, evaluated = np.zeros(receivers.covered.shape, np.int32), np.zeros(len(packed.shines), int), 0
-    if not settings.cuts:
+    if settings.reach.cut is None:
         count = int(packed.shines.sum()) + int(packed.glossy.sum())
         overdraw[receivers.covered] = count
         pixels = int(np.count_nonzero(receivers.covered))

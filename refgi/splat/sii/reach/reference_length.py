@@ -9,7 +9,7 @@ B = I(w) / r^2 of a pair of light and receiver is what the threshold compares, i
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,16 +20,16 @@ from refgi.pairs.lobe_shape import CORRECTED, Widening, lobe_norm_factor
 from refgi.pairs.loss import PAIRS, sample_for
 from refgi.pairs.packing import Packed, pack
 from refgi.pairs.pair_sum import pair_cosines
+from refgi.pairs.settings import PairSettings
 from refgi.scene.values import LARGEST
 from refgi.splat.sii.reach.threshold import all_peaks
-from refgi.splat.sii.settings import SplatSettings
+from refgi.splat.sii.settings import RelativeCut, SiiSettings
 from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
-S = TypeVar("S", bound=SplatSettings)
 
 PAPER_OVERDRAW, PAPER_LIGHTS, PAPER_CUT = 125.0, 768, 0.05  # Figure 8
 LEAST_SAMPLED = 64  # pixels, enough to count pairs by; of more lights than go with them every n-th is tested
@@ -77,7 +77,7 @@ def _shape(cosine: float, r: float, exponent: float, widening: Widening | None, 
     return float(cosine**here * norm)
 
 
-def with_reference_length(receivers: Receivers, lights: "PixelLights", settings: S) -> S:
+def with_reference_length(receivers: Receivers, lights: "PixelLights", settings: SiiSettings) -> SiiSettings:
     """Return settings whose cut is in full: with the reference length of a picture where they need one and give none.
 
     Parameters
@@ -86,21 +86,24 @@ def with_reference_length(receivers: Receivers, lights: "PixelLights", settings:
         The picture's points.
     lights : PixelLights
         Its lights.
-    settings : SplatSettings
+    settings : SiiSettings
         Any.
 
     Returns
     -------
-    SplatSettings
+    SiiSettings
         The same, or with a `reference_length`.
     """
-    if settings.reference_length is not None or settings.irradiance_low is not None or not settings.cuts:
+    cut = settings.reach.cut
+    if not isinstance(cut, RelativeCut) or cut.reference_length is not None:
         return settings
-    return dataclasses.replace(settings, reference_length=reference_length(receivers, lights, settings))
+    length = reference_length(receivers, lights, settings.pairs)
+    return dataclasses.replace(settings, reach=dataclasses.replace(settings.reach, cut=dataclasses.replace(
+        cut, reference_length=length)))
 
 
 @stage("splat.reference_length")
-def reference_length(receivers: Receivers, lights: "PixelLights", settings: SplatSettings) -> float:
+def reference_length(receivers: Receivers, lights: "PixelLights", pairs: PairSettings) -> float:
     """Return the length under which lights cut at 5 % count at 125 / 768 of the pixels on average.
 
     Parameters
@@ -109,7 +112,7 @@ def reference_length(receivers: Receivers, lights: "PixelLights", settings: Spla
         The picture's points.
     lights : PixelLights
         Lights; those drawn without flux count as lights that reach nothing, as they do in the paper.
-    settings : SplatSettings
+    pairs : PairSettings
         Offset, norms and widening.
 
     Returns
@@ -117,7 +120,7 @@ def reference_length(receivers: Receivers, lights: "PixelLights", settings: Spla
     float
         Length, m; 1 where there is nothing to cut.
     """
-    packed = pack(lights, settings.pairs, np.zeros(lights.flux.shape[1]), np.float64)
+    packed = pack(lights, pairs, np.zeros(lights.flux.shape[1]), np.float64)
     position = sample_for(receivers, lights, least=LEAST_SAMPLED).position.astype(np.float64)
     step = 1 + lights.flux.shape[1] * LEAST_SAMPLED // PAIRS
     strength = _strengths(packed, position, step)

@@ -15,7 +15,7 @@ from refgi.lights.selection import choose_lights
 from refgi.rsm import rasterize
 from refgi.sampling import halton
 from refgi.scene import Scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.reach.fragments import fragments
 from refgi.stages import Memory, observe
@@ -39,7 +39,7 @@ def rows(quick: bool) -> Iterator[Row]:
 def _frames(name: str, scene: Scene, settings: SiiSettings, size: int, repeats: int, paper: float) -> Iterator[Row]:
     """Frames a second: with still buffers, as the paper timed its figures, and with light and camera moving."""
     still = Frame(scene, width=size, height=size)
-    lights, receivers = choose_lights(still, settings), _receivers(still)
+    lights, receivers = choose_lights(still, settings.lights), _receivers(still)
     drawn = fragments(receivers, lights, settings)
     splatting = seconds(lambda: sii(still, settings), repeats)  # choosing the lights included
     note = f"paper {paper:.0f}; overdraw {drawn.total / receivers.covered.sum():.0f}"
@@ -73,7 +73,7 @@ def _culling(size: int) -> Iterator[Row]:
         frame = Frame(load_scene(name), width=size, height=size)
         for bound in ("tangent", "ellipsoid", "quad", "full"):
             how = of(SiiSettings, cut_share=0.05, reference_length=length, bound=bound)
-            drawn = fragments(_receivers(frame), choose_lights(frame, how), how, None, frame.gbuffer.projection)
+            drawn = fragments(_receivers(frame), choose_lights(frame, how.lights), how, None, frame.gbuffer.projection)
             yield Row(f"{name}, {bound}: pairs evaluated over fragments", drawn.evaluated / drawn.total, "ratio",
                       "<= 1.3" if bound == "tangent" else "",
                       f"overdraw {drawn.total / frame.gbuffer.covered.sum():.0f} of 768")

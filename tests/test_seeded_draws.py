@@ -134,7 +134,7 @@ def test_roulette_keeps_light_k_by_draw_k(seed):
 def test_xi_of_the_stochastic_range(seed):
     settings = of(SiiSettings, stochastic=True, seed=seed)
     for part in (0, 1):
-        scale = light_range(np.ones(50), 0.1, settings, part, np.float64).scale
+        scale = light_range(np.ones(50), 0.1, settings.reach, part, np.float64).scale
         assert scale.tolist() == [1 - draw(seed, 3 + 256 * part, k) for k in range(50)]
 
 

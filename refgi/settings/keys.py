@@ -170,6 +170,7 @@ def _principals(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
 
 def _hint(key: str, tree: list[Leaf]) -> str:
     whole = {name: leaf.key for leaf in tree for name in (leaf.key.rpartition(".")[2], leaf.key)}
+    whole |= {part: part for leaf in tree for part in leaf.key.split(".")[:-1]}
     near = difflib.get_close_matches(key, whole, n=1)
     return f"; did you mean {whole[near[0]]!r}?" if near else ""
 

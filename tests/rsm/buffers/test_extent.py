@@ -67,7 +67,7 @@ def made_of(scene, **changes):
 
 @pytest.mark.parametrize(("method", "changes"), CASES, ids=lambda value: str(value))
 def test_a_plane_that_nobody_sees_changes_no_pixel(method, changes, evidence):
-    settings = find_method(method).load()[1](**changes)
+    settings = of(find_method(method).load()[1], **changes)
     plain, off = render(room(), method, settings, **SIZE).irradiance.astype(float), {}
     for half in HALVES:
         with_plane = render(room(half), method, settings, **SIZE).irradiance
@@ -83,7 +83,7 @@ def test_the_plane_is_not_what_the_settings_refer_to():
     for method, changes, key in (("val", {**VAL, "interleaving": 4, "blur_extent": 0.05}, "blur_extent"),
                                  ("hssil", {"visibility": "bitmask"}, "thickness"),
                                  ("gather", {"samples": 64, "grid": 6, "reach": 0.1}, "reach")):
-        settings = find_method(method).load()[1](**changes)
+        settings = of(find_method(method).load()[1], **changes)
         smaller = dataclasses.replace(settings, **{key: getattr(settings, key) / 10})
         one, other = (render(room(), method, s, **SIZE).irradiance for s in (settings, smaller))
         assert np.abs(one - other).max() > 1e3 * CHANGE * one.mean()

@@ -10,7 +10,7 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.rsm.raster.projection import CUBE_FORWARD, CUBE_UP
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
 from refgi.splat.sii.ledger import energy_ledger
 from refgi.splat.sii.ledger_terms import pixel_areas
@@ -149,10 +149,10 @@ def test_lobes_below_the_horizon_are_behind(evidence):
                                  materials=(Material("gloss", (0.1,) * 3, (0.5,) * 3, 3.0),))
     found, stray = [], None
     for norm in ("clamped", "full_lobe", "none"):
-        settings = dataclasses.replace(UNCUT, lobe_norm=norm)
+        settings = replaced(UNCUT, {"lobe_norm": norm})
         frames = list(around(glossy, (0.1, -0.1, 0.2), 64, rsm_resolution=64))
         views = [energy_ledger(frame, settings) for frame in frames]
-        lights = choose_lights(frames[0], settings)
+        lights = choose_lights(frames[0], settings.lights)
         tilt = np.arccos(np.clip((lights.normal * lights.lobe_axis).sum(axis=0), -1, 1).astype(float))
         above = np.array([lobe_fraction(t, 3.0) for t in tilt])
         whole = 2 * math.pi / 4 if norm == "none" else 1.0
@@ -188,7 +188,7 @@ def test_flux_that_meets_a_plate_has_its_form_factor(below, evidence):
     """Analytic: a light under a plate sends it Phi F; seen from above the plate is met from behind."""
     scene, plate = plates(below)
     frame = Frame(scene, width=256, height=256, rsm_resolution=64)
-    ledger, lights = energy_ledger(frame, UNCUT), choose_lights(frame, UNCUT)
+    ledger, lights = energy_ledger(frame, UNCUT), choose_lights(frame, UNCUT.lights)
     factors = np.array([polygon_form_factor(p, n, plate) for p, n in zip(lights.position.T, lights.normal.T,
                                                                         strict=True)])
     met, missed = lights.flux @ factors, lights.flux @ (1 - factors)
@@ -205,8 +205,8 @@ def test_cut_follows_the_law_of_the_range(evidence):
     """Analytic (E-SII-15): of one light facing a plate at distance D a share (D / R0)^(4/3) is out of range."""
     scene, plate = plates(below=True)
     frame = Frame(scene, width=256, height=256, rsm_resolution=64)
-    one = dataclasses.replace(UNCUT, lights=1, pattern="grid")
-    light = choose_lights(frame, one)
+    one = replaced(UNCUT, {"lights": 1, "pattern": "grid"})
+    light = choose_lights(frame, one.lights)
     factor = polygon_form_factor(light.position[:, 0], light.normal[:, 0], plate)
     found = []
     for reach in (1.05, 1.1):  # R0 in plate distances: the lit disc lies inside the plate

@@ -14,7 +14,7 @@ from refgi.lights.selection import choose_lights
 from refgi.pairs.settings import PairSettings
 from refgi.radiometry import lobe_fraction
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, cut_irradiance, irradiance, sii, splat
 from refgi.splat.sii.ledger import energy_ledger
 from refgi.splat.sii.reach.fragments import fragments
@@ -46,7 +46,7 @@ def quietly(run, *args):
 @pytest.mark.feature("SII-21")
 def test_nothing_is_cut_by_default(evidence):
     at = frame()
-    full = irradiance(receivers(at), choose_lights(at, SiiSettings()), PairSettings())
+    full = irradiance(receivers(at), choose_lights(at, SiiSettings().lights), PairSettings())
     np.testing.assert_array_equal(sii(at, SiiSettings()), full)
     assert SiiSettings().reach.cut is None
     evidence("defaults: the bits of the full sum")
@@ -73,7 +73,7 @@ def counted(at, lights, low):
 def test_the_papers_cut_leaves_the_papers_share_of_pairs(name):
     """Oracle: a count over all pixels, pair by pair, at the length found from some."""
     at = frame(name)
-    lights = choose_lights(at, PAPER)
+    lights = choose_lights(at, PAPER.lights)
     length = reference_length(receivers(at), lights, PAPER.pairs)
     low = low_irradiance(lights, replaced(PAPER, {"reference_length": length}))
     share = counted(at, lights, low) / lights.drawn / at.gbuffer.covered.sum()
@@ -85,7 +85,7 @@ def test_the_papers_cut_leaves_the_papers_share_of_pairs(name):
     {"as_published": {"per_light_ilow"}}, {"half_resolution": True}])
 def test_a_picture_is_that_of_its_length_given_by_hand(change):
     at, settings = frame(), of(SiiSettings, **{"cut_share": 0.05, "lights": 96} | change)
-    lights = choose_lights(at, settings)
+    lights = choose_lights(at, settings.lights)
     by_hand = replaced(settings, {"reference_length": reference_length(receivers(at), lights, settings.pairs)})
     with observe() as log:
         light = quietly(sii, at, settings)
@@ -96,7 +96,7 @@ def test_a_picture_is_that_of_its_length_given_by_hand(change):
 
 
 def test_stages_without_a_length_choose_the_methods():
-    at, lights = frame(), choose_lights(frame(), PAPER)
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
     to, view = receivers(at), at.gbuffer.projection
     by_hand = with_reference_length(to, lights, PAPER)
     assert by_hand.reach.cut.reference_length == reference_length(to, lights, PAPER.pairs)
@@ -109,8 +109,8 @@ def test_stages_without_a_length_choose_the_methods():
 
 
 def test_a_length_is_chosen_only_where_it_counts():
-    at, lights = frame(), choose_lights(frame(), PAPER)
-    for settings in (SiiSettings(), of(SiiSettings, cut_share=0.05, cut_irradiance=0.1), of(SiiSettings),
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
+    for settings in (SiiSettings(), of(SiiSettings, cut_irradiance=0.1),
                      of(SiiSettings, cut_share=0.05, reference_length=0.3)):
         assert with_reference_length(receivers(at), lights, settings) is settings
     assert low_irradiance(lights, SiiSettings()) == 0
@@ -140,7 +140,7 @@ def test_a_scene_in_mm_m_or_km_gives_the_same_picture(settings, unit):
 
 @pytest.mark.parametrize("factor", [2.0, 0.25, 1024.0])
 def test_lengths_scale_with_powers_of_two_to_the_bit(factor):
-    at, lights = frame(), choose_lights(frame(), PAPER)
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
     to = receivers(at)
     longer = lights._replace(position=lights.position * np.float32(factor), flux=lights.flux * np.float32(4))
     far = to._replace(position=to.position * np.float32(factor))
@@ -151,12 +151,13 @@ def test_many_lights_have_the_length_of_few():
     """Property: of 25,600 lights every second is looked at, and the length is a scene's, not a number of lights'."""
     at = Frame(load_scene("cornell_box"), width=64, height=64, rsm_resolution=160)
     every, few = of(SiiSettings, pattern="all", cut_share=0.05), of(SiiSettings, cut_share=0.05)
-    lengths = [reference_length(receivers(at), choose_lights(at, settings.lights), settings.pairs) for settings in (every, few)]
+    lengths = [reference_length(receivers(at), choose_lights(at, settings.lights), settings.pairs)
+               for settings in (every, few)]
     assert lengths[0] == pytest.approx(lengths[1], rel=SAMPLING)
 
 
 def test_nothing_to_cut_has_some_length():
-    at, lights = frame(), choose_lights(frame(), PAPER)
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
     arrays = {key: part[..., :0] for key, part in lights._asdict().items() if isinstance(part, np.ndarray)}
     none = lights._replace(**arrays)
     to = receivers(at)
@@ -166,7 +167,7 @@ def test_nothing_to_cut_has_some_length():
 
 def test_lights_that_reach_too_little_are_hardly_cut():
     """Limit: where all lights together reach fewer pairs than the paper's, the length is ten diagonals."""
-    at, lights = frame(), choose_lights(frame(), PAPER)
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
     few = lights._replace(drawn=100 * lights.drawn)
     length = reference_length(receivers(at), few, PAPER.pairs)
     assert length > 5 * at.scene.geometry.diagonal

@@ -14,7 +14,12 @@ SETS = ("as_published", "criteria")  # names joined by "+"
 VIEWS = {"cornell_side": Camera((0.5, 0.3, -0.6), (0.2, 0.2, 0.3)),
          "stage_side": Camera((0.9, 0.4, 0.9), (0.0, 0.1, 0.0))}
 # names of the ledger that are no short keys today, and values that have another name
-RENAMED: dict[str, dict[str, str]] = {}
+RENAMED: dict[str, dict[str, str]] = {
+    "sii": {"i_low": "reach.cut.share", "irradiance_low": "reach.cut.irradiance", "mesh_faces": "reach.bound.faces",
+            "stochastic_range": "reach.stochastic"},
+}
+# single values that are another key's value today
+RENAMED_CASES: dict[tuple[str, str, Any], tuple[str, Any]] = {("gather", "grid", 0): ("interpolation", "none")}
 RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {("truth", "emitters"): {"seen": "visible"}}
 
 
@@ -27,20 +32,32 @@ def settings_of(method: str, **named: Any) -> Any:
     kind = _settings_class(method)
     if not issubclass(kind, Settings):
         return kind(**named)
-    return replaced(kind(), {_name(method, name): renamed_value(method, name, value) for name, value in named.items()})
+    return replaced(kind(), dict(renamed(method, name, value) for name, value in named.items()))
 
 
-def renamed_value(method: str, name: str, value: Any) -> Any:
-    """Return what a value of the ledger is called today."""
-    return RENAMED_VALUES.get((method, name), {}).get(value, value) if isinstance(value, str) else value
+def renamed(method: str, name: str, value: Any) -> tuple[str, Any]:
+    """Return what a name and a value of the ledger are called today."""
+    if isinstance(value, str):
+        value = RENAMED_VALUES.get((method, name), {}).get(value, value)
+    elif (method, name, value) in RENAMED_CASES:
+        return RENAMED_CASES[method, name, value]
+    return RENAMED.get(method, {}).get(name, name), value
 
 
 def key_of(method: str, name: str) -> str:
-    """Return the whole key that a name of the ledger means."""
+    """Return the whole key that a name means."""
     kind = _settings_class(method)
     if not issubclass(kind, Settings) or name in (PRINTED, SEED):
         return name
-    return find_key(kind(), _name(method, name)).key
+    return find_key(kind(), RENAMED.get(method, {}).get(name, name)).key
+
+
+def choice_of(method: str, key: str) -> tuple[str, str] | None:
+    """Return the choice that has a setting, and its name; None for a setting that is always there."""
+    kind = _settings_class(method)
+    found = [leaf for leaf in leaves(kind) if leaf.key == key] if issubclass(kind, Settings) else []
+    above = [leaf for leaf in leaves(kind) if leaf.key == key.rpartition(".")[0]] if len(found) == 1 else []
+    return (above[0].key, found[0].owner.name()) if above else None
 
 
 def names_of(method: str) -> dict[str, set[Any]]:
@@ -63,10 +80,6 @@ def names_of(method: str) -> dict[str, set[Any]]:
         elif leaf.hint is bool:
             values |= {not leaf.field.default}
     return wanted
-
-
-def _name(method: str, name: str) -> str:
-    return RENAMED.get(method, {}).get(name, name)
 
 
 def _names_of_fields(kind: Any) -> dict[str, set[Any]]:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.pairs.shadow_rays import Receivers, add_free
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import Tracer
 from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
@@ -26,7 +26,7 @@ class Task(NamedTuple):
     tracer: Tracer
     surfaces: Surfaces
     lights: LightTable
-    receivers: Receivers
+    receivers: RayReceivers
     set_of: Array  # (r,) which set of light vertices each receiver picks from
     caustics: Film | None = None
     view: Projection | None = None  # only surfaces visible in it emit; None: all do

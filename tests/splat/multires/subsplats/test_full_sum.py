@@ -109,8 +109,8 @@ def test_against_gathering_shadowed_lights_and_truth(box, evidence):
                      True: multires(box, unclamped(lights=1024, visibility="rays"))},
         "full sum": {False: every_pixel(box, light)},
         "vpl": {True: vpl(box, of(VplSettings, lights=1024, pattern="grid"))},
-        "gather": {False: gather(box, GatherSettings(samples=4096, radius=WHOLE_MAP, grid=0))},
-        "gather within 0.3 maps": {False: gather(box, GatherSettings(grid=0))}}
+        "gather": {False: gather(box, of(GatherSettings, samples=4096, radius=WHOLE_MAP, interpolation="none"))},
+        "gather within 0.3 maps": {False: gather(box, of(GatherSettings, interpolation="none"))}}
     table = {}
     for name, kinds in pictures.items():
         for rays, picture in kinds.items():

@@ -1,4 +1,4 @@
-"""What becomes of a light's power before there are pixel lights: missed, absorbed, taken by glass, handed on.
+"""Terms of the energy ledger: what the first surface does with a light's power, and what the visible surface gets.
 
 What a light emits has a closed form: 2 pi I (1 - (cos inner + cos outer) / 2) for a spot, whose falloff in the cosine
 is even about its middle, 4 pi I for a point, and E_perp times the area of the map that encloses the scene for a
@@ -7,7 +7,7 @@ by itself, so that they give the closed form again only where solid angles, fall
 
 What pixel lights send to the visible surface: sums over pixels of irradiance times the area that a pixel sees.
 
-How much surface a pixel sees: what turns irradiance at pixels into flux on the visible surface.
+The area of surface that a pixel sees turns irradiance at pixels into flux on the visible surface.
 """
 
 import dataclasses
@@ -19,8 +19,9 @@ import numpy.typing as npt
 
 from refgi.lights.selection import footprints
 from refgi.pairs.irradiance import Receivers, irradiance
-from refgi.splat.sii.sii import sii
-from refgi.splat.sii.splat import cut_irradiance
+from refgi.settings import replaced
+from refgi.splat.sii.settings import MeshBound
+from refgi.splat.sii.sii import cut_irradiance, sii
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -34,7 +35,7 @@ Array = npt.NDArray[Any]
 PRINTED_WIDENINGS = frozenset({"sii_widening", "sii_widening_unnorm"})
 
 
-class LightSide(NamedTuple):
+class LightTerms(NamedTuple):
     """Power of one light by where it goes, (3,) float64 each, W."""
 
     emitted: Array  # closed form
@@ -45,8 +46,8 @@ class LightSide(NamedTuple):
     refracted: Array  # by glass, in lobes
 
 
-def light_side(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") -> LightSide:
-    """Say what becomes of a light's power at the first surface.
+def light_terms(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") -> LightTerms:
+    """Return what the first surface does with a light's power.
 
     Parameters
     ----------
@@ -59,18 +60,18 @@ def light_side(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") -> 
 
     Returns
     -------
-    LightSide
+    LightTerms
         Sums over all texels, in float64.
     """
     strength = _strength(rsm.light)
     glass = np.asarray(materials.ior) > 0
-    taken = 1.0 - np.asarray(materials.diffuse, np.float64) - materials.specular
+    absorption = 1.0 - np.asarray(materials.diffuse, np.float64) - materials.specular
     met, missed = _shares(rsm, geometry, len(glass))
-    refracted, reflected = _handed_on(rsm, geometry, glass)
-    return LightSide(
+    refracted, reflected = _refracted_and_reflected(rsm, geometry, glass)
+    return LightTerms(
         emitted=emitted_power(rsm.light, rsm.projection),
         missed=missed * strength,
-        absorbed=(met[~glass] @ taken[~glass]) * strength,
+        absorbed=(met[~glass] @ absorption[~glass]) * strength,
         glass=met[glass].sum() * strength - refracted,
         reflected=reflected,
         refracted=refracted,
@@ -121,7 +122,7 @@ def _shares(rsm: "Rsm", geometry: "Geometry", materials: int) -> tuple[Array, fl
     return np.bincount(material, share[met], minlength=materials), float(share[~met].sum())
 
 
-def _handed_on(rsm: "Rsm", geometry: "Geometry", glass: Array) -> tuple[Array, Array]:
+def _refracted_and_reflected(rsm: "Rsm", geometry: "Geometry", glass: Array) -> tuple[Array, Array]:
     """Return what glass and what opaque surfaces send on, W."""
     met = rsm.covered
     is_glass = np.zeros(met.shape, np.bool_)
@@ -155,45 +156,45 @@ def pixel_areas(buffer: "GBuffer", geometry: "Geometry") -> Array:
     from refgi.rsm.buffers.solid_angle import texel_solid_angles
 
     areas = np.zeros(buffer.covered.shape)
-    seen = buffer.covered
-    corners = geometry.vertices[geometry.faces[buffer.triangle_id[seen]]]
+    covered = buffer.covered
+    corners = geometry.vertices[geometry.faces[buffer.triangle_id[covered]]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    view = buffer.position[:, seen].T - buffer.projection.origin[0]
+    view = buffer.position[:, covered].T - buffer.projection.origin[0]
     square = (view**2).sum(axis=1)
     facing = np.abs((normal * view).sum(axis=1))  # |n| d cos
     length = np.sqrt((normal**2).sum(axis=1) * square)
     slant = np.divide(length, facing, out=np.zeros_like(length), where=facing > 0)
-    areas[seen] = texel_solid_angles(buffer.projection)[seen] * square * slant
+    areas[covered] = texel_solid_angles(buffer.projection)[covered] * square * slant
     return areas
 
 
-class ScreenSide(NamedTuple):
+class ScreenTerms(NamedTuple):
     """Flux at the visible surface, (3,) float64 each, W."""
 
     full: Array  # from the front, within any range, without clamp and with the calibrated widening
     behind: Array  # the same on the other side of every visible surface
     arrived: Array  # in the picture
-    interpolated: Array  # lost between pixels that are lit and those that are interpolated
+    interpolated: Array  # lost between evaluated and interpolated pixels
     cut: Array  # of pairs that the range leaves out
-    clamped: Array  # taken by the clamp
-    printed: Array  # taken by a widening as printed
+    clamped: Array  # removed by the clamp
+    printed: Array  # removed by a widening as printed
 
 
-def screen_side(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") -> ScreenSide:
+def screen_terms(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") -> ScreenTerms:
     """Sum what arrives on the visible surface, and by each thing that keeps light from it.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The scene and its buffers.
     lights : PixelLights
         As `sii` has them.
     settings : SiiSettings
-        As given to `sii`.
+        Those of `sii`.
 
     Returns
     -------
-    ScreenSide
+    ScreenTerms
         Each line from sums of its own; what a setting has no part in is 0 and costs no sum.
     """
     screen = _Screen(frame, lights, settings)
@@ -206,8 +207,8 @@ def screen_side(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") 
     arrived = screen.picture()
     if settings.half_resolution:
         interpolated = screen.picture(half_resolution=False) - arrived
-    cut = screen.cut() if settings.cuts else none
-    return ScreenSide(full, screen.pairs(turned=True), arrived, interpolated, cut, clamped, printed)
+    cut = none if settings.reach.cut is None else screen.cut()
+    return ScreenTerms(full, screen.pairs(turned=True), arrived, interpolated, cut, clamped, printed)
 
 
 class _Screen:
@@ -229,13 +230,14 @@ class _Screen:
 
     def picture(self, **changes: Any) -> Array:
         """Sum the picture, or what it would be with other settings."""
-        return self._flux(sii(self.frame, dataclasses.replace(self.settings, **changes)))
+        return self._flux(sii(self.frame, replaced(self.settings, changes)))
 
     def cut(self) -> Array:
         """Sum what the range leaves out, and what a mesh that does not enclose it leaves out besides."""
         cut = self._flux(cut_irradiance(self.receivers, self.lights, self.settings, self.footprint))
-        if self.settings.bound == "mesh" and not self.settings.inflate:
-            cut += self.picture(inflate=True) - self.picture()
+        bound = self.settings.reach.bound
+        if isinstance(bound, MeshBound) and not bound.inflate:
+            cut += self.picture(bound_inflate=True) - self.picture()
         return cut
 
     def _flux(self, values: Array) -> Array:

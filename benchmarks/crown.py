@@ -18,7 +18,7 @@ from refgi.jit import threads
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.add import ROWS, WIDE, add_two, term
 from refgi.sssil.crown.gather import gather
-from refgi.sssil.level import Level
+from refgi.sssil.pyramid.view import Level
 
 SAMPLES = 64
 

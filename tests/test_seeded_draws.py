@@ -21,7 +21,7 @@ from refgi.splat.sii.reach.threshold import light_range
 from refgi.splat.sii.settings import SplatSettings
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.pattern import offsets_at
-from refgi.sssil.visibility.slices import slice_offsets, steps_of
+from refgi.sssil.visibility.slices import slice_counts, slice_offsets
 from tests.naive.draws import draw, draw_bits, mix32
 from tests.rsm.shapes import geometry
 
@@ -238,13 +238,13 @@ def test_fixed_samples_are_mirror_images(seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_slices_of_the_bitmask(seed):
     settings = HssilSettings(radius=8.0, samples=16, inner_samples=4, visibility="bitmask", seed=seed)
-    steps = steps_of(settings, 0, 8.0)
+    steps = slice_counts(settings, 0, 8.0)
     offsets, _ = slice_offsets(settings, steps, 1, 4)
     for row in range(4):
         s, t = pair_of(row_key(level_key(seed, 1), row))
         for k in range(steps.slices):
             angle, shift = 2 * math.pi * (k + s) / steps.slices, (t + 0.6180339887498949 * k) % 1
-            lengths = [8.0 * (j + shift) / steps.blockers for j in range(steps.blockers)]
+            lengths = [8.0 * (j + shift) / steps.occluders for j in range(steps.occluders)]
             lengths += [8.0 * math.sqrt((j + shift) / steps.disc) for j in range(steps.disc)]
             lengths += [8.0 * math.sqrt(1 + 3 * (j + shift) / steps.crown) for j in range(steps.crown)]
             expected = [[math.floor(far * math.sin(angle) + 0.5), math.floor(far * math.cos(angle) + 0.5)]

@@ -1,16 +1,16 @@
-"""Screen-space indirect light: what a camera sees lights what it sees.
+"""Screen-space indirect light: the surfaces that a camera sees light each other.
 
 `hssil` (Soler, Hoel, Rochet, Jay and Holzschuch 2009) gathers light from samples around every pixel, near by at high
 and far away at low resolution.
 
-`pyramid` makes the levels, `crown` places samples and sums what they send, `upsampling` joins the levels, `temporal`
-keeps light from frame to frame, `cameras` add what the picture does not see, `visibility` tells what lies between.
+`pyramid` builds the mip levels, `crown` places samples and sums their light, `upsampling` joins the levels, `temporal`
+blends frames, `cameras` adds surfaces outside the picture, `visibility` tests what lies between receiver and sample.
 """
 
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.hssil import hssil
-from refgi.sssil.level import Level
 from refgi.sssil.pyramid.levels import pyramid
+from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.upsampling.upsample import Guide, upsample
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.sssil.cameras import several_cameras
+from refgi.sssil.cameras import join_cameras
 from refgi.sssil.crown.gather import gather
-from refgi.sssil.crown.reach import chosen_radius, expect_reach
-from refgi.sssil.level import Level
+from refgi.sssil.crown.reach import chosen_radius, warn_short_reach
 from refgi.sssil.pyramid.levels import pyramid
+from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.upsampling.upsample import Guide, upsample
 from refgi.sssil.visibility.bitmask import bitmask_gather
@@ -24,25 +24,25 @@ Array = npt.NDArray[Any]
 
 
 def hssil(frame: "Frame", settings: HssilSettings) -> Array:
-    """Light what a camera sees by what it sees, near by in detail and far away coarsely.
+    """Light what a camera sees by what it sees, near by at high and far away at low resolution.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        Scene, camera and lights.
     settings : HssilSettings
-        How densely, at which resolutions, and by how many cameras.
+        Sampling, levels, visibility and cameras.
 
     Returns
     -------
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, linear RGB.
     """
-    light = one_view(frame, settings)
+    irradiance = one_view(frame, settings)
     if not (settings.cameras or settings.views):
         skip("sssil.cameras", "one camera")
-        return light
-    return several_cameras(frame, light, settings, one_view)  # Sec. 5, discussion
+        return irradiance
+    return join_cameras(frame, irradiance, settings, one_view)  # Sec. 5, discussion
 
 
 def one_view(frame: "Frame", settings: HssilSettings) -> Array:
@@ -51,9 +51,9 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        Scene, camera and lights.
     settings : HssilSettings
-        How densely and at which resolutions.
+        Sampling, levels and visibility.
 
     Returns
     -------
@@ -61,32 +61,32 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
         Indirect irradiance, W/m^2.
     """
     levels = pyramid(frame, settings)  # Sec. 4, hierarchical maps
-    expect_reach(levels[0].shape, settings)
+    warn_short_reach(levels[0].shape, settings)
     settings = dataclasses.replace(settings, radius=chosen_radius(levels[0].shape, settings))
-    light = gathered(frame, levels[-1], len(levels) - 1, settings)
+    irradiance = gather_level(frame, levels[-1], len(levels) - 1, settings)
     for index in reversed(range(len(levels) - 1)):  # Sec. 3.2: starting from the smallest
-        here = gathered(frame, levels[index], index, settings)
-        light = upsample(light, guide(levels[index + 1]), guide(levels[index]), settings, here)
+        added = gather_level(frame, levels[index], index, settings)
+        irradiance = upsample(irradiance, guide_of(levels[index + 1]), guide_of(levels[index]), settings, added)
     if levels[0].number == 0:
         skip("sssil.upsample", "light was gathered at full resolution")
-        return light
+        return irradiance
     depth, normal = frame.gbuffer.resolve("depth", "normal")
-    return upsample(light, guide(levels[0]), Guide(depth, normal), settings)
+    return upsample(irradiance, guide_of(levels[0]), Guide(depth, normal), settings)
 
 
-def gathered(frame: "Frame", level: Level, index: int, settings: HssilSettings) -> Array:
-    """Return what the texels of one level receive from samples of it.
+def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettings) -> Array:
+    """Return the irradiance of the texels of one level from samples of it.
 
     Parameters
     ----------
     frame : Frame
-        The scene.
+        The scene whose view the level is.
     level : Level
         Receivers and senders.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     settings : HssilSettings
-        How many samples, and what may block them.
+        Sampling and visibility.
 
     Returns
     -------
@@ -102,8 +102,8 @@ def gathered(frame: "Frame", level: Level, index: int, settings: HssilSettings) 
     return gather(level, index, settings)
 
 
-def guide(level: Level) -> Guide:
-    """Return what says which texels of a level belong together.
+def guide_of(level: Level) -> Guide:
+    """Return the guide of joint bilateral upsampling to or from a level.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""How much memory screen-space indirect light takes beside what every picture takes: levels, light, samples, views.
+"""Memory estimate of screen-space indirect light beside the picture's buffers: levels, sums, samples, further cameras.
 
-What the levels take in memory (Sec. 3.2: mip levels of the buffers add a third to them).
+Mip levels of the buffers add a third to them (Sec. 4).
 """
 
 import math
@@ -25,11 +25,11 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
     Parameters
     ----------
     settings : HssilSettings
-        First level, number of levels, and how texels become one.
+        First level, number of levels, and downsampling.
     pixels : int
-        Of the picture.
+        Pixels of the picture.
     float_bytes : int
-        Of one number, 4 or 8.
+        Bytes of one number, 4 or 8.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
     Notes
     -----
     With n levels from full resolution on it is ``(4 - 4^(1 - n)) / 3`` times the first; from half resolution on, a
-    quarter of that. The mean of radiance alone keeps how many pixels it is of.
+    quarter of that. The mean of radiance alone needs the number of its pixels as well.
 
     Examples
     --------
@@ -52,12 +52,12 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
 
 
 def extra_bytes(settings: HssilSettings, size: tuple[int, int], float_bytes: int) -> int:
-    """Estimate the memory that levels, samples and further views add to a picture.
+    """Estimate the memory that levels, samples and further cameras add to a picture.
 
     Parameters
     ----------
     settings : HssilSettings
-        First level, number of levels, pattern, views.
+        First level, number of levels, pattern, cameras.
     size : tuple of 2 ints
         Width and height of the picture, pixels.
     float_bytes : int
@@ -80,7 +80,7 @@ def extra_bytes(settings: HssilSettings, size: tuple[int, int], float_bytes: int
 
 
 def _sample_bytes(settings: HssilSettings, rows: int, columns: int, radius: float) -> int:
-    """Return what the list of the first level's samples takes, the longest of all levels'."""
+    """Return the memory of the first level's list of samples, the longest of all levels'."""
     if settings.pattern == "all":
         reach = math.ceil(2 * radius)
         candidates = (2 * min(reach, rows) + 1) * (min(reach, columns) + 1)
@@ -89,6 +89,6 @@ def _sample_bytes(settings: HssilSettings, rows: int, columns: int, radius: floa
     if settings.pattern == "pixel":
         return 0
     rows = 1 if settings.pattern == "fixed" else rows
-    if settings.visibility == "bitmask":  # half as many blockers as samples of the crown
+    if settings.visibility == "bitmask":  # half as many occluders as samples of the crown
         return SLICED_BYTES * rows * (3 * settings.samples // 2 + settings.inner + 3 * settings.slice_count)
     return OFFSET_BYTES * rows * (settings.samples + settings.inner)

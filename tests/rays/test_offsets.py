@@ -92,12 +92,12 @@ def shares_of_rays(frame):
 
 
 def cameras_sight(frame):
-    from refgi.sssil.camera_transport import free
+    from refgi.sssil.camera_transport import unoccluded
 
     position, normal = (part[:, frame.gbuffer.covered].T.astype(float)
                         for part in (frame.gbuffer.position, frame.gbuffer.normal))
     lifted = position + frame.tracer.offsets(position)[:, None] * normal
-    return free(frame.tracer, lifted, np.roll(lifted, 7, axis=0)).astype(float)
+    return unoccluded(frame.tracer, lifted, np.roll(lifted, 7, axis=0)).astype(float)
 
 
 def walked_lights(frame):

@@ -10,7 +10,7 @@ from refgi.frame import Frame
 from refgi.scene import PointLight, load_scene
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.hssil import hssil
-from refgi.sssil.level import Level
+from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.truth import accumulate

@@ -1,10 +1,10 @@
-"""Where a receiver's samples lie: low-discrepancy points of a crown, and who shares them (Sec. 3.2, Fig. 2).
+"""Sample patterns: who shares the points of a crown, and their offsets from the receiver (Sec. 3.2, Fig. 2).
 
 Offsets are whole texels (ox, oy), columns to the right and rows down from the receiver.
 
 Receivers of a row share samples with the pattern "row". Each row takes the stretch of one long Kronecker sequence that
-follows the row above, so that rows which upsampling mixes complement each other; a shift by a hash of seed and level
-makes the share of samples that a texel gets the share of the crown that it covers, for every receiver.
+follows that of the row above, so that rows which upsampling mixes complement each other. A shift by a hash of seed and
+level makes the expected share of samples of a texel the share of its area within the crown, for every receiver.
 """
 
 import math
@@ -31,10 +31,6 @@ from refgi.sssil.crown.points import (
 )
 from refgi.sssil.settings import HssilSettings
 
-__all__ = [
-    "PHASES", "known_radius", "level_key", "offsets_at", "pixel_key", "pixel_offset", "row_key", "row_offsets",
-    "sample_points", "sample_weight", "shared_offsets", "shift_of", "shifted"]
-
 Array = npt.NDArray[Any]
 
 PHASES = 2  # even columns of a row share samples, and odd ones: rows that share all would show as streaks
@@ -48,15 +44,15 @@ def row_offsets(
     Parameters
     ----------
     settings : HssilSettings
-        Says how many, of which pattern ("row", "fixed" or "all"), and draws them.
+        Numbers of samples, pattern ("row", "fixed" or "all") and seed.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     number : int
-        Which level of the pyramid.
+        Number of the level in the pyramid.
     rows : int
-        How many rows there are.
+        Rows of the level.
     radius : float, optional
-        Inner radius of the crown, texels; that of the settings unless given.
+        Inner radius of the crown, texels; that of the settings by default.
     phase : int
         Column modulo PHASES; patterns "fixed" and "all" are those of every column.
 
@@ -87,17 +83,17 @@ def shared_offsets(
     Parameters
     ----------
     settings : HssilSettings
-        Says how many, of which pattern ("row", "fixed" or "all"), and draws them.
+        Numbers of samples, pattern ("row", "fixed" or "all") and seed.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     number : int
-        Which level of the pyramid.
+        Number of the level in the pyramid.
     rows : int
-        How many rows there are.
+        Rows of the level.
     radius : float, optional
-        Inner radius of the crown, texels; that of the settings unless given.
+        Inner radius of the crown, texels; that of the settings by default.
     columns : int, optional
-        How many columns there are: "all" then leaves out what is farther away than any texel of so small a picture.
+        Columns of the level: "all" then leaves out what is farther away than any texel of so small a picture.
 
     Returns
     -------
@@ -129,15 +125,15 @@ def offsets_at(
     Parameters
     ----------
     settings : HssilSettings
-        Says how many and of which pattern, and draws them.
+        Numbers of samples, pattern and seed.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     number : int
-        Which level of the pyramid.
+        Number of the level in the pyramid.
     row, column : int
         The receiver.
     radius : float, optional
-        Inner radius of the crown, texels; that of the settings unless given.
+        Inner radius of the crown, texels; that of the settings by default.
 
     Returns
     -------
@@ -146,8 +142,8 @@ def offsets_at(
     """
     if settings.pattern != "pixel":
         offsets, _ = row_offsets(settings, index, number, row + 1, radius, column % PHASES)
-        here: Array = offsets[min(row, len(offsets) - 1)]
-        return here
+        offsets_here: Array = offsets[min(row, len(offsets) - 1)]
+        return offsets_here
     inner = settings.inner if index == 0 else 0
     points = sample_points(inner, settings.samples)
     key = pixel_key(row_key(level_key(settings.seed, number), row), column)
@@ -161,9 +157,9 @@ def known_radius(settings: HssilSettings, radius: float | None) -> float:
     Parameters
     ----------
     settings : HssilSettings
-        May know it.
+        Their radius.
     radius : float or None
-        Goes before that of the settings.
+        Replaces that of the settings.
 
     Returns
     -------
@@ -173,7 +169,7 @@ def known_radius(settings: HssilSettings, radius: float | None) -> float:
     Raises
     ------
     InputError
-        If neither knows.
+        If neither is set.
     """
     found = settings.radius if radius is None else radius
     expect(found is not None, "radius", "texels, or the size of the first level to choose it by", found)
@@ -186,11 +182,11 @@ def _fill_rows(points: Array, inner: int, radius: float, key: Any, offsets: Arra
     for row in range(rows):
         for phase in range(phases):
             u, cosine, sine = shift_of(key, (row * phases + phase) * (count - inner))
-            here = offsets[row, phase]
+            offsets_here = offsets[row, phase]
             for j in range(np.uint64(inner)):
-                here[j, 0], here[j, 1] = shifted(points, j, 0.0, radius, u, cosine, sine)
+                offsets_here[j, 0], offsets_here[j, 1] = shifted(points, j, 0.0, radius, u, cosine, sine)
             for j in range(np.uint64(inner), np.uint64(count)):
-                here[j, 0], here[j, 1] = shifted(points, j, 1.0, radius, u, cosine, sine)
+                offsets_here[j, 0], offsets_here[j, 1] = shifted(points, j, 1.0, radius, u, cosine, sine)
 
 
 def _every_texel(low: float, high: float, within: tuple[int, int] | None) -> Array:
@@ -199,8 +195,8 @@ def _every_texel(low: float, high: float, within: tuple[int, int] | None) -> Arr
     down, right = (reach, reach) if within is None else (min(reach, size - 1) for size in within)
     oy, ox = np.mgrid[-down : down + 1, 0 : right + 1]
     square = ox**2 + oy**2
-    kept = (square >= low**2) & (square < high**2) & (square > 0)
-    beside, middle = kept & (ox > 0), kept & (ox == 0)
+    inside = (square >= low**2) & (square < high**2) & (square > 0)
+    beside, middle = inside & (ox > 0), inside & (ox == 0)
     half = np.stack([ox[beside], oy[beside]], axis=1)
     both = np.stack([half, half * (-1, 1)], axis=1).reshape(-1, 2)
     return np.concatenate([both, np.stack([ox[middle], oy[middle]], axis=1)]).astype(np.int32)

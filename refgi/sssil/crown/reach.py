@@ -1,9 +1,7 @@
-"""How far the crowns of all levels reach together, and the smallest radius with which they cover the picture.
+"""Reach of the crowns of all levels together, and the smallest radius with which they cover the picture (Sec. 3.2).
 
 The crown of level k ends at 2 r texels of that level: r 2^K texels of the first of K levels. A receiver in a corner
-needs the diagonal of the picture.
-
-How often each offset from a receiver is sampled: once, by the crowns of all levels together (Sec. 3.2, Fig. 2).
+needs the diagonal of the picture. Together the crowns sample each offset from a receiver once (Fig. 2).
 """
 
 import math
@@ -14,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
-from refgi.sssil.crown.pattern import offsets_at, row_offsets, sample_weight
+from refgi.sssil.crown.pattern import offsets_at, row_offsets
+from refgi.sssil.crown.points import sample_weight
 from refgi.sssil.settings import HssilSettings
 
 Array = npt.NDArray[Any]
@@ -30,7 +29,7 @@ def chosen_radius(shape: tuple[int, int], settings: HssilSettings) -> float:
     shape : tuple of int
         Rows and columns of the first level.
     settings : HssilSettings
-        May name a radius.
+        Radius and number of levels.
 
     Returns
     -------
@@ -64,12 +63,12 @@ def covering_radius(shape: tuple[int, int], levels: int) -> float:
 
 
 def reach(settings: HssilSettings, radius: float) -> float:
-    """Return how far the last crown ends from a receiver: r 2^K.
+    """Return the outer radius of the last crown: r 2^K.
 
     Parameters
     ----------
     settings : HssilSettings
-        Says how many levels there are.
+        Number of levels K.
     radius : float
         r, texels.
 
@@ -81,7 +80,7 @@ def reach(settings: HssilSettings, radius: float) -> float:
     return radius * float(1 << settings.levels)
 
 
-def expect_reach(shape: tuple[int, int], settings: HssilSettings) -> None:
+def warn_short_reach(shape: tuple[int, int], settings: HssilSettings) -> None:
     """Warn when light from one corner of the picture does not reach the other.
 
     Parameters
@@ -89,12 +88,12 @@ def expect_reach(shape: tuple[int, int], settings: HssilSettings) -> None:
     shape : tuple of int
         Rows and columns of the first level.
     settings : HssilSettings
-        Say how far it reaches.
+        Radius and number of levels.
 
     Warns
     -----
     RefgiWarning
-        With the reach, the diagonal, and the radius that would do.
+        With the reach, the diagonal, and the radius that covers it.
     """
     diagonal = math.hypot(*shape)
     far = reach(settings, chosen_radius(shape, settings))
@@ -148,11 +147,11 @@ def texel_weights(
     index : int
         0 for the first level, whose inner disc is sampled as well.
     number : int
-        Which level of the pyramid.
+        Number of the level in the pyramid.
     receivers : int
         How many rows of receivers are averaged, or receivers with samples of their own.
     radius : float, optional
-        Inner radius of the crown, texels; that of the settings unless given.
+        Inner radius of the crown, texels; that of the settings by default.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The pyramids of what a camera sees: position, normal, direct light and sample area (Sec. 4)."""
+"""Pyramid of what a camera sees: position, normal, direct radiance and sample area (Sec. 4, hierarchical maps)."""
 
 import itertools
 import math
@@ -10,11 +10,10 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.rsm.memory import plane
 from refgi.rsm.raster.projection import Projection
-from refgi.sssil.level import Level, Picture
-from refgi.sssil.pyramid.closest import BEYOND
+from refgi.sssil.pyramid.closest import NO_PIXEL
 from refgi.sssil.pyramid.fill import fill_coarser_level, fill_first_level
 from refgi.sssil.pyramid.mean import average_pixels, average_texels
-from refgi.sssil.pyramid.view import View, view_of
+from refgi.sssil.pyramid.view import Level, Picture, View, view_of
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import skip, stage
 
@@ -25,19 +24,19 @@ Array = npt.NDArray[Any]
 
 
 def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
-    """Return what a camera sees at the resolutions that light is gathered at.
+    """Return what a camera sees at the resolutions at which light is gathered.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        Scene, camera and lights.
     settings : HssilSettings
-        First level, number of levels and how texels become one.
+        First level, number of levels and downsampling.
 
     Returns
     -------
     list of Level
-        Finest first; fewer than asked for where the samples of the last ones would all lie off the picture.
+        Finest first; fewer than asked for where the samples of the last ones would all lie outside the picture.
     """
     buffer = frame.gbuffer
     # positions, which direct light needs, come from the same pass
@@ -101,9 +100,9 @@ def levels(
     Parameters
     ----------
     depth : (H, W) ndarray
-        Along the view direction, m; inf where no surface is seen.
+        Along the view direction, m; inf where there is no surface.
     normal : (3, H, W) ndarray
-        Unit vectors on the side that is seen, world space.
+        Unit vectors on the visible side, world space.
     albedo : (3, H, W) ndarray
         Diffuse reflectance.
     direct : (3, H, W) ndarray
@@ -135,31 +134,31 @@ def levels(
     keeps the light; its positions may lie between two surfaces.
     """
     shape = (projection.height, projection.width)
-    for name, given in (("normal", normal), ("albedo", albedo), ("direct", direct)):
-        expect(given.shape == (3, *shape), name, f"shape {(3, *shape)}", given.shape)
+    for name, array in (("normal", normal), ("albedo", albedo), ("direct", direct)):
+        expect(array.shape == (3, *shape), name, f"shape {(3, *shape)}", array.shape)
     expect(depth.shape == shape, "depth", f"shape {shape}", depth.shape)
-    expect(depth.size < BEYOND, "picture", f"fewer than {BEYOND:,} pixels", f"{depth.size:,}")
-    picture = Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(given, depth.dtype)
-                                                     for given in (normal, albedo, direct)))
+    expect(depth.size < NO_PIXEL, "picture", f"fewer than {NO_PIXEL:,} pixels", f"{depth.size:,}")
+    picture = Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(array, depth.dtype)
+                                                     for array in (normal, albedo, direct)))
     view = view_of(projection, as_published)
-    made = [_room(number, shape, depth.dtype) for number in range(first, first + count)]
-    fill_first_level(picture, view, made[0])
-    for fine, coarse in itertools.pairwise(made):
+    levels_made = [_empty_level(number, shape, depth.dtype) for number in range(first, first + count)]
+    fill_first_level(picture, view, levels_made[0])
+    for fine, coarse in itertools.pairwise(levels_made):
         fill_coarser_level(fine, *shape, coarse)
     if downsample != "closest":
-        _average(picture, view, downsample == "average", made)
-    return tuple(made)
+        _average(picture, view, downsample == "average", levels_made)
+    return tuple(levels_made)
 
 
-def _average(picture: Picture, view: View, by_surface: bool, made: list[Level]) -> None:
+def _average(picture: Picture, view: View, by_surface: bool, levels_made: list[Level]) -> None:
     """Put means into levels that hold the closest pixels."""
-    weights = [level.area if by_surface else plane(level.shape, level.area.dtype) for level in made]
-    average_pixels(picture, view, by_surface, made[0], weights[0])
-    for finer, coarser in itertools.pairwise(range(len(made))):
-        average_texels(made[finer], weights[finer], by_surface, made[coarser], weights[coarser])
+    weights = [level.area if by_surface else plane(level.shape, level.area.dtype) for level in levels_made]
+    average_pixels(picture, view, by_surface, levels_made[0], weights[0])
+    for finer, coarser in itertools.pairwise(range(len(levels_made))):
+        average_texels(levels_made[finer], weights[finer], by_surface, levels_made[coarser], weights[coarser])
 
 
-def _room(number: int, shape: tuple[int, int], dtype: npt.DTypeLike) -> Level:
+def _empty_level(number: int, shape: tuple[int, int], dtype: npt.DTypeLike) -> Level:
     h, w = level_shape(shape, number)
     three = (3, h, w)
     return Level(number, plane(three, dtype), plane((h, w), dtype), plane(three, dtype), plane(three, dtype),

@@ -1,6 +1,6 @@
-"""The temporal filter: F_i = a W(F_{i-1}) + (1 - a) I_i (Sec. 3.3).
+"""Temporal filter F_i = a W(F_{i-1}) + (1 - a) I_i (Sec. 3.3), and its settings.
 
-What the temporal filter can be set to.
+Symbols: I_i light of frame i as computed, F_i as filtered, W reprojection, a share of the frame before.
 """
 
 import dataclasses
@@ -15,8 +15,8 @@ from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.scene.model import Geometry
 from refgi.scene.values import is_number
-from refgi.sssil.reprojection import Fetch, Seen, look_up
-from refgi.sssil.temporal.motion import points_before
+from refgi.sssil.reprojection import Fetch, SourceView, reproject
+from refgi.sssil.temporal.motion import previous_points
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
@@ -68,10 +68,10 @@ class TemporalSettings:
 
 
 class History(NamedTuple):
-    """What a frame leaves to the next."""
+    """State that a frame leaves to the next."""
 
     irradiance: Array  # (3, h, w) F, or I for the printed form, W/m^2
-    seen: Seen  # what its camera saw
+    view: SourceView  # its camera, depths and normals
     geometry: Geometry  # the scene's triangles, where the scene has them
 
 
@@ -82,17 +82,17 @@ class Filtered(NamedTuple):
     reused: float  # share of the pixels with a surface that the frame before shows as well
 
 
-def remember(frame: "Frame", geometry: Geometry, irradiance: Array) -> History:
-    """Return what the next frame needs of this one.
+def history_of(frame: "Frame", geometry: Geometry, irradiance: Array) -> History:
+    """Return the state that the next frame needs of this one.
 
     Parameters
     ----------
     frame : Frame
         The frame.
     geometry : Geometry
-        Its scene's triangles as the scene was given: the very object of the next scene if nothing moves.
+        Its scene's triangles as the scene holds them: the very object of the next scene if nothing moves.
     irradiance : (3, h, w) ndarray
-        Its light as the form of the filter wants it, W/m^2.
+        Light for the next frame, F or I by the form of the filter, W/m^2.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def remember(frame: "Frame", geometry: Geometry, irradiance: Array) -> History:
     """
     buffer = frame.gbuffer
     depth, normal = buffer.resolve("depth", "normal")
-    return History(irradiance, Seen(buffer.projection, depth, normal, frame.origin), geometry)
+    return History(irradiance, SourceView(buffer.projection, depth, normal, frame.origin), geometry)
 
 
 @stage("sssil.temporal", kept=False)
@@ -117,16 +117,16 @@ def temporal_filter(
     frame : Frame
         The frame.
     geometry : Geometry
-        Its scene's triangles as the scene was given.
+        Its scene's triangles as the scene holds them.
     history : History
-        What the frame before left.
+        State of the frame before.
     settings : TemporalSettings
-        How much of it stays, and where.
+        Share of the frame before, and the disocclusion test.
 
     Returns
     -------
     Filtered
-        F_i and how much of the picture was found again.
+        F_i and the share of pixels that are not disoccluded.
 
     Raises
     ------
@@ -136,8 +136,9 @@ def temporal_filter(
     Notes
     -----
     The paper prints W(I_{i-1}), which averages two frames; what it says of a, "the larger, the farther in time", needs
-    W(F_{i-1}). A pixel whose point fails the tests has a = 0. The light of what moves is as old as that of what rests:
-    an object that leaves its place takes the light of its old place along, which is why its a falls with its speed.
+    W(F_{i-1}). A disoccluded pixel, whose point fails the tests, has a = 0. The light of a moving surface is as old as
+    that of a resting one: an object that leaves its place takes the light of its old place along, which is why its a
+    falls with its speed.
     """
     buffer = frame.gbuffer
     position, normal = buffer.resolve("position", "normal")
@@ -146,14 +147,16 @@ def temporal_filter(
         skip("sssil.motion", "the same geometry")
     else:
         expect_same_triangles(geometry, history.geometry)
-        position, normal, speed = points_before(buffer, frame.scene.geometry, _at(history.geometry, frame.origin))
-    found, weight = look_up(history.irradiance, history.seen, position, normal, buffer.covered, origin=frame.origin,
-                            depth_tolerance=settings.depth_tolerance, normal_cosine=settings.normal_cosine,
-                            fetch=settings.fetch)
+        before = _relative_to(history.geometry, frame.origin)
+        position, normal, speed = previous_points(buffer, frame.scene.geometry, before)
+    reprojected, weight = reproject(history.irradiance, history.view, position, normal, buffer.covered,
+                                    origin=frame.origin, depth_tolerance=settings.depth_tolerance,
+                                    normal_cosine=settings.normal_cosine, fetch=settings.fetch)
     real = irradiance.dtype.type
     reused = np.empty(len(weight), np.int64)  # pixels of each row
-    _blend(irradiance, speed, real(settings.weight), real(-math.log2(math.e) / settings.speed), weight, found, reused)
-    return Filtered(found, int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))))
+    falloff = real(-math.log2(math.e) / settings.speed)
+    _blend(irradiance, speed, real(settings.weight), falloff, weight, reprojected, reused)
+    return Filtered(reprojected, int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))))
 
 
 def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
@@ -162,7 +165,7 @@ def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
     Parameters
     ----------
     geometry, before : Geometry
-        Today's and the one of the frame before.
+        Those of this frame and of the frame before.
     """
     expect(geometry.vertices.shape == before.vertices.shape, "scenes", f"the {len(before.vertices):,} vertices of the "
            "frame before in each", f"{len(geometry.vertices):,}")
@@ -172,7 +175,7 @@ def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
            "vertex normals in all or in none", "some with and some without")
 
 
-def _at(geometry: Geometry, origin: tuple[float, float, float]) -> Geometry:
+def _relative_to(geometry: Geometry, origin: tuple[float, float, float]) -> Geometry:
     """Return the geometry relative to a frame's origin."""
     if not any(origin):
         return geometry
@@ -198,4 +201,5 @@ def _blend(
         for channel in range(3):
             for column in range(weight.shape[1]):
                 new = irradiance[channel, row, column]
+                # Eq. of Sec. 3.3: F_i = a W(F_{i-1}) + (1 - a) I_i
                 blended[channel, row, column] = new + weight[row, column] * (blended[channel, row, column] - new)

@@ -10,7 +10,7 @@ from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.scene.model import Camera
 from refgi.sssil import HssilSettings
-from refgi.sssil.cameras import placed_cameras, seen_by, several_cameras
+from refgi.sssil.cameras import frame_through, join_cameras, place_cameras
 from refgi.sssil.hssil import hssil
 from refgi.stages import observe
 from tests.sssil.cameras.hidden_side import SIDE_VIEW, from_the_lit_side, hidden_side
@@ -107,7 +107,7 @@ def test_the_camera_itself_as_a_further_view_changes_nothing():
 def test_the_largest_counts_not_the_last():
     """Property: views in any order, and a view twice, give the same."""
     frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
-    views = placed_cameras(frame, 2)
+    views = place_cameras(frame, 2)
     assert len(views) == 2
     first, second, twice = (hssil(frame, HssilSettings(views=given, **QUICK))
                             for given in (views, views[::-1], (*views, views[0])))
@@ -131,7 +131,7 @@ def test_maps_and_rays_are_shared_and_the_picture_is_as_large():
         hssil(frame, HssilSettings(views=(Camera((0.2, 0.2, -0.5), (0.3, 0.2, 0.5), width=99),), **QUICK))
     assert log.status("rsm.reflective_shadow_map") == ["ran"]
     assert log.status("rsm.gbuffer") == ["ran", "ran"]
-    other = seen_by(frame, frame.scene.camera)
+    other = frame_through(frame, frame.scene.camera)
     assert other.rsms is frame.rsms
     assert (other.width, other.height, other.rsm_resolution) == (21, 13, 64)
 
@@ -139,7 +139,7 @@ def test_maps_and_rays_are_shared_and_the_picture_is_as_large():
 def test_the_light_given_is_left_as_it_was():
     frame = Frame(load_scene("cornell_box"), width=9, height=7, rsm_resolution=64)
     light = np.zeros((3, 7, 9), np.float32)
-    joined = several_cameras(frame, light, HssilSettings(views=(frame.scene.camera,)), lambda *_: light + 1)
+    joined = join_cameras(frame, light, HssilSettings(views=(frame.scene.camera,)), lambda *_: light + 1)
     assert not light.any()
     assert (joined == frame.gbuffer.covered).all()
 

@@ -9,8 +9,9 @@ import pytest
 
 from refgi.jit import threads
 from refgi.sssil.crown.gather import gather
-from refgi.sssil.crown.pattern import offsets_at, row_offsets, sample_weight
-from refgi.sssil.level import Level
+from refgi.sssil.crown.pattern import offsets_at, row_offsets
+from refgi.sssil.crown.points import sample_weight
+from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from tests.naive import crown as naive
 

@@ -7,11 +7,11 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
-from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
-from refgi.sssil.level import Level
+from refgi.sssil.crown.points import level_key, pixel_key, row_key
+from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.slices import fill_slices, slice_offsets, steps_of
+from refgi.sssil.visibility.slices import fill_slices, slice_counts, slice_offsets
 from tests.naive import bitmask as naive
 
 SETTINGS = HssilSettings(radius=4, levels=1, samples=24, slices=5, start="full", thickness=0.1)
@@ -68,13 +68,13 @@ def twin(level, settings, offsets_of, thickness=DIAGONAL * SETTINGS.thickness):
 
 
 def shared(level, index, settings):
-    steps = steps_of(settings, index, settings.radius)
+    steps = slice_counts(settings, index, settings.radius)
     offsets, weight = slice_offsets(settings, steps, level.number, level.shape[0])
     return lambda row, _: (offsets[min(row, len(offsets) - 1)], weight[min(row, len(offsets) - 1)])
 
 
 def own(level, index, settings):
-    steps = steps_of(settings, index, settings.radius)
+    steps = slice_counts(settings, index, settings.radius)
     offsets, weight = np.empty((steps.slices, steps.per_slice, 2), np.int32), np.empty((steps.slices, steps.per_slice))
 
     def of(row, column):

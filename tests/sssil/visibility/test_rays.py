@@ -8,11 +8,12 @@ import pytest
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, merge
-from refgi.sssil.crown.pattern import offsets_at, sample_weight
+from refgi.sssil.crown.pattern import offsets_at
+from refgi.sssil.crown.points import sample_weight
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.rays import add_free, ray_gather
+from refgi.sssil.visibility.rays import add_unoccluded, ray_gather
 from tests.naive import bitmask as naive
 
 WHITE = Material("white", (0.6, 0.6, 0.6))
@@ -101,8 +102,8 @@ def test_mirror_images_are_added_to_each_other_first():
     blocked = rng.random(40) < 0.3
     exchanged = np.arange(40).reshape(-1, 2)[:, ::-1].ravel()
     sums = np.zeros((2, 3, 1))
-    add_free(radiance, 0, 1, 40, blocked, worth, sender, sums[0])
-    add_free(radiance, 0, 1, 40, blocked[exchanged], worth[exchanged], sender[exchanged], sums[1])
+    add_unoccluded(radiance, 0, 1, 40, blocked, worth, sender, sums[0])
+    add_unoccluded(radiance, 0, 1, 40, blocked[exchanged], worth[exchanged], sender[exchanged], sums[1])
     np.testing.assert_array_equal(sums[0], sums[1])
     np.testing.assert_allclose(sums[0, :, 0], radiance[:, sender] @ (worth * ~blocked), rtol=1e-14)
 

@@ -14,6 +14,7 @@ from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS, find_method, render, usual_shadows
 from refgi.scene import DirectionalLight, PointLight, load_scene
+from refgi.settings import of
 from refgi.splat import GatherSettings, MultiresSettings, SiiSettings
 from refgi.sssil import HssilSettings
 from refgi.truth import TruthSettings, VplSettings
@@ -54,7 +55,7 @@ RAYS = [
     (ValSettings(), False), (ValSettings(maps="rays"), True), (ValSettings(behind="raytrace"), True),
     (ValSettings(visibility="rectangle"), True), (ValSettings(visibility="members"), True),
     (ValSettings(source="walk"), True), (ValSettings(visibility="back_projection"), False), (HssilSettings(), False),
-    (HssilSettings(visibility="rays"), True), (HssilSettings(visibility="bitmask"), False), (object(), False)]
+    (of(HssilSettings, visibility="rays"), True), (of(HssilSettings, visibility="bitmask"), False), (object(), False)]
 
 
 @pytest.mark.parametrize(("settings", "rays"), RAYS)

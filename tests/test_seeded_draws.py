@@ -15,6 +15,7 @@ from refgi.rays.openness import openness
 from refgi.rsm import reflective_shadow_map
 from refgi.sampling import halton, sobol_owen
 from refgi.scene import PointLight, load_scene
+from refgi.settings import of
 from refgi.splat.gather.gather_sum import disc_pattern
 from refgi.splat.multires.error_target.error_driven import stratified
 from refgi.splat.sii.reach.threshold import light_range
@@ -201,8 +202,8 @@ def place(radius, near, u, angle):
 @pytest.mark.parametrize("index", [0, 1])
 @pytest.mark.parametrize("pattern", ["row", "pixel"])
 def test_samples_of_a_receiver(pattern, index, seed):
-    settings = HssilSettings(radius=6.5, samples=13, inner_samples=5, pattern=pattern, seed=seed)
-    inner = settings.inner if index == 0 else 0
+    settings = of(HssilSettings, radius=6.5, samples=13, inner_samples=5, pattern=pattern, seed=seed)
+    inner = settings.sampling.inner if index == 0 else 0
     for row, column in ((0, 0), (3, 6), (17, 41)):
         key = level_key(seed, 2)
         n = 2 * row + column % 2
@@ -215,15 +216,15 @@ def test_samples_of_a_receiver(pattern, index, seed):
                 u = ((0.5 + j * A) % 1 + s + n * 13 * A) % 1
                 v = (0.5 + j * B) % 1 + t + n * 13 * B
                 expected.append(place(6.5, near, u, 2 * math.pi * v))
-        assert offsets_at(settings, index, 2, row, column).tolist() == [list(offset) for offset in expected]
+        assert offsets_at(settings.sampling, index, 2, row, column).tolist() == [list(offset) for offset in expected]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_fixed_samples_are_mirror_images(seed):
-    settings = HssilSettings(radius=6.5, samples=13, inner_samples=5, pattern="fixed", seed=seed)
+    settings = of(HssilSettings, radius=6.5, samples=13, inner_samples=5, pattern="fixed", seed=seed)
     s, t = pair_of(level_key(seed, 1))
     pairs, middles = [], []
-    for near, count in ((0, settings.inner), (1, 13)):
+    for near, count in ((0, settings.sampling.inner), (1, 13)):
         for j in range((count + 1) // 2):
             u, v = (0.5 + j * A + s) % 1, (0.5 + j * B + t) % 1
             x, y = place(6.5, near, u, math.pi * (v - 0.5))
@@ -232,14 +233,14 @@ def test_fixed_samples_are_mirror_images(seed):
             else:
                 length = 6.5 * math.sqrt(near + (1 + 2 * near) * u)
                 middles.append((0, math.floor(math.copysign(length, v - 0.5) + 0.5)))
-    assert sorted(map(tuple, offsets_at(settings, 0, 1, 0, 0).tolist())) == sorted(pairs + middles)
+    assert sorted(map(tuple, offsets_at(settings.sampling, 0, 1, 0, 0).tolist())) == sorted(pairs + middles)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_slices_of_the_bitmask(seed):
-    settings = HssilSettings(radius=8.0, samples=16, inner_samples=4, visibility="bitmask", seed=seed)
-    steps = slice_counts(settings, 0, 8.0)
-    offsets, _ = slice_offsets(settings, steps, 1, 4)
+    settings = of(HssilSettings, radius=8.0, samples=16, inner_samples=4, visibility="bitmask", seed=seed)
+    steps = slice_counts(settings.sampling, settings.visibility, 0, 8.0)
+    offsets, _ = slice_offsets(settings.sampling, steps, 1, 4)
     for row in range(4):
         s, t = pair_of(row_key(level_key(seed, 1), row))
         for k in range(steps.slices):

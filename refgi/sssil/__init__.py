@@ -11,7 +11,33 @@ from refgi.sssil.crown.gather import gather
 from refgi.sssil.hssil import hssil
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.pyramid.view import Level
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import (
+    Bilateral,
+    Bilinear,
+    Bitmask,
+    CameraSettings,
+    HssilSettings,
+    Nearest,
+    Rays,
+    SamplingSettings,
+    SenderSettings,
+)
 from refgi.sssil.upsampling.upsample import Guide, upsample
 
-__all__ = ["Guide", "HssilSettings", "Level", "gather", "hssil", "pyramid", "upsample"]
+__all__ = [
+    "Bilateral",
+    "Bilinear",
+    "Bitmask",
+    "CameraSettings",
+    "Guide",
+    "HssilSettings",
+    "Level",
+    "Nearest",
+    "Rays",
+    "SamplingSettings",
+    "SenderSettings",
+    "gather",
+    "hssil",
+    "pyramid",
+    "upsample",
+]

@@ -18,7 +18,7 @@ from refgi.scene.model import Camera
 from refgi.scene.values import Vector
 from refgi.sssil.camera_transport import Points, Views, equal_flux_points, sampling_quality, transport, visible_points
 from refgi.sssil.reprojection import SourceView, reproject
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import CameraSettings
 from refgi.stages import skip, stage
 
 Array = npt.NDArray[Any]
@@ -30,7 +30,7 @@ LEAST_GAIN = 1e-3  # of the light that reaches the picture, that a further camer
 NEAREST = 1 / 32  # of the scene's diagonal: pairs nearer than that count as if they were that far apart
 COARSEST = 1 / 32  # of the scene's diagonal: a pixel that long on a surface shows it half as well
 STEEP = 0.99  # cosine between the view and the upward direction from which another direction has to be up
-OneView = Callable[[Frame, HssilSettings], Array]
+OneView = Callable[[Frame], Array]
 
 SHARED = ("materials", "lights", "rsms", "tracer")  # of a frame: independent of its camera
 
@@ -147,7 +147,7 @@ def _unit(vectors: Array) -> Array:
 
 
 @stage("sssil.cameras", kept=False)
-def join_cameras(frame: Frame, light: Array, settings: HssilSettings, one_view: OneView) -> Array:
+def join_cameras(frame: Frame, light: Array, settings: CameraSettings, one_view: OneView) -> Array:
     """Join the irradiance by a camera's own picture with that by further cameras' pictures.
 
     Parameters
@@ -156,10 +156,10 @@ def join_cameras(frame: Frame, light: Array, settings: HssilSettings, one_view: 
         Scene, camera and lights.
     light : (3, h, w) ndarray
         Irradiance by what this camera alone sees, W/m^2.
-    settings : HssilSettings
-        `cameras`: the user's views, number of cameras to place, and the test for the same surface.
+    settings : CameraSettings
+        The user's views, number of cameras to place, and the test for the same surface.
     one_view : callable
-        Irradiance by what a frame's camera alone sees, from frame and settings.
+        Irradiance of a frame by its own camera alone.
 
     Returns
     -------
@@ -174,8 +174,8 @@ def join_cameras(frame: Frame, light: Array, settings: HssilSettings, one_view: 
     maximum of several lies above their mean. Each camera renders a picture as large as the frame's.
     """
     cameras = [recentred(view, frame.origin) for view in settings.views]
-    if settings.cameras:
-        cameras += place_cameras(frame, settings.cameras)
+    if settings.count:
+        cameras += place_cameras(frame, settings.count)
     else:
         skip("sssil.placement", "no cameras are to be placed")
     position, normal, covered = frame.gbuffer.resolve("position", "normal", "covered")
@@ -185,7 +185,7 @@ def join_cameras(frame: Frame, light: Array, settings: HssilSettings, one_view: 
         depth, other_normal = other.gbuffer.resolve("depth", "normal")
         # Sec. 5: the depth and normal test of temporal coherence
         source = SourceView(other.gbuffer.projection, depth, other_normal)
-        found, _ = reproject(one_view(other, settings), source, position, normal, covered,
+        found, _ = reproject(one_view(other), source, position, normal, covered,
                              depth_tolerance=settings.depth_tolerance, normal_cosine=settings.normal_cosine)
         joined = np.maximum(joined, found, out=found)
     return joined

@@ -1,17 +1,17 @@
 """Hierarchical Screen-Space Indirect Illumination (Soler, Hoel, Rochet, Jay and Holzschuch 2009)."""
 
-import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from refgi.settings import replaced
 from refgi.sssil.cameras import join_cameras
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.crown.reach import chosen_radius, warn_short_reach
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.pyramid.view import Level
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import Bitmask, HssilSettings, Rays
 from refgi.sssil.upsampling.upsample import Guide, upsample
 from refgi.sssil.visibility.bitmask import bitmask_gather
 from refgi.sssil.visibility.rays import ray_gather
@@ -39,10 +39,11 @@ def hssil(frame: "Frame", settings: HssilSettings) -> Array:
         Indirect irradiance, W/m^2, linear RGB.
     """
     irradiance = one_view(frame, settings)
-    if not (settings.cameras or settings.views):
+    if not (settings.cameras.count or settings.cameras.views):
         skip("sssil.cameras", "one camera")
         return irradiance
-    return join_cameras(frame, irradiance, settings, one_view)  # Sec. 5, discussion
+    # Sec. 5, discussion
+    return join_cameras(frame, irradiance, settings.cameras, lambda other: one_view(other, settings))
 
 
 def one_view(frame: "Frame", settings: HssilSettings) -> Array:
@@ -61,8 +62,8 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
         Indirect irradiance, W/m^2.
     """
     levels = pyramid(frame, settings)  # Sec. 4, hierarchical maps
-    warn_short_reach(levels[0].shape, settings)
-    settings = dataclasses.replace(settings, radius=chosen_radius(levels[0].shape, settings))
+    warn_short_reach(levels[0].shape, settings.sampling)
+    settings = replaced(settings, {"sampling.radius": chosen_radius(levels[0].shape, settings.sampling)})
     irradiance = gather_level(frame, levels[-1], len(levels) - 1, settings)
     for index in reversed(range(len(levels) - 1)):  # Sec. 3.2: starting from the smallest
         added = gather_level(frame, levels[index], index, settings)
@@ -93,11 +94,11 @@ def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettin
     (3, h, w) ndarray
         Irradiance, W/m^2.
     """
-    if settings.only_level not in (None, index):
+    if settings.senders.only_level not in (None, index):
         return np.zeros_like(level.radiance)
-    if settings.visibility == "bitmask":
+    if isinstance(settings.visibility, Bitmask):
         return bitmask_gather(level, index, settings, frame.seen_extent.diagonal)
-    if settings.visibility == "rays":
+    if isinstance(settings.visibility, Rays):
         return ray_gather(level, index, settings, frame)
     return gather(level, index, settings)
 

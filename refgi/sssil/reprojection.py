@@ -1,6 +1,6 @@
 """Reprojection W: the value of each surface point in another view, with a disocclusion test (Sec. 3.3)."""
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -10,10 +10,10 @@ from refgi.jit import kernel, prange
 from refgi.rsm.memory import plane
 from refgi.rsm.raster.projection import PERSPECTIVE, Projection
 from refgi.scene.values import Vector
+from refgi.sssil.settings import Fetch
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
-Fetch = Literal["bilinear", "nearest"]
 
 SNAP = 2.0**-8  # texels: so far off may float32 put a point that lies at a texel's centre
 

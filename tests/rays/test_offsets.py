@@ -14,6 +14,7 @@ from refgi.rays import MISS, Tracer, openness
 from refgi.rays.offsets import GRAIN, STEPS, far_offset, grain_of, ray_offset
 from refgi.rays.watertight import REACH, cut
 from refgi.scene import Camera, Geometry, Material, Mesh, SpotLight, light_table, material_table
+from refgi.settings import of
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 from refgi.truth.surfaces import height_above, lift, surfaces
 from tests.truth.scenes import rectangle, scene
@@ -69,7 +70,7 @@ def small(scene, shadows="map"):
 def hssil_by_rays(frame):
     from refgi.sssil import HssilSettings, hssil
 
-    return hssil(frame, HssilSettings(visibility="rays"))
+    return hssil(frame, of(HssilSettings, visibility="rays"))
 
 
 def multires_by_rays(frame):

@@ -47,20 +47,21 @@ def gather(level: Level, index: int, settings: HssilSettings) -> Array:
         Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi and visibility.
     """
     rows, columns = level.shape
-    radius = chosen_radius((rows << index, columns << index), settings)
+    sampling = settings.sampling
+    radius = chosen_radius((rows << index, columns << index), sampling)
     real = level.position.dtype.type
-    disc, factor = settings.form_factor == "disc", real(math.pi * level_factor(index, settings))
+    disc, factor = settings.senders.form_factor == "disc", real(math.pi * level_factor(index, settings))
     farthest, result = math.ceil(2 * radius), plane(level.radiance.shape, level.radiance.dtype)
-    if settings.pattern == "pixel":
-        inner = settings.inner if index == 0 else 0
-        points, weight = sample_points(inner, settings.samples), sample_weight(radius, inner, settings.samples)
-        key = level_key(settings.seed, level.number)
+    if sampling.pattern == "pixel":
+        inner = sampling.inner if index == 0 else 0
+        points, weight = sample_points(inner, sampling.samples), sample_weight(radius, inner, sampling.samples)
+        key = level_key(sampling.seed, level.number)
         emitters = pack(level, 1, farthest, WIDE)
         _gather_per_pixel(emitters, level.normal, points, inner, radius, key, weight.astype(real), disc, factor, result)
         return result
-    offsets, weight = _reaching(*shared_offsets(settings, index, level.number, rows, radius, columns), rows, columns)
+    offsets, weight = _reaching(*shared_offsets(sampling, index, level.number, rows, radius, columns), rows, columns)
     emitters = pack(level, offsets.shape[1], farthest, WIDE)
-    paired = settings.pattern != "row"
+    paired = sampling.pattern != "row"
     _gather_shared(emitters, level.normal, offsets, weight.astype(real), paired, disc, factor, result)
     return result
 
@@ -89,7 +90,7 @@ def level_factor(index: int, settings: HssilSettings) -> float:
         1 / pi where Eq. 4 lacks its pi, times 4^k where areas are scaled by the level's 4^k a second time.
     """
     factor = 1.0
-    if "hss_disc_pi" in settings.as_published and settings.form_factor == "disc":
+    if "hss_disc_pi" in settings.as_published and settings.senders.form_factor == "disc":
         factor /= math.pi
     if "hss_level_factor" in settings.as_published:
         factor *= 4.0**index

@@ -29,7 +29,7 @@ from refgi.sssil.crown.points import (
     shift_of,
     shifted,
 )
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import SamplingSettings
 
 Array = npt.NDArray[Any]
 
@@ -37,13 +37,13 @@ PHASES = 2  # even columns of a row share samples, and odd ones: rows that share
 
 
 def row_offsets(
-    settings: HssilSettings, index: int, number: int, rows: int, radius: float | None = None, phase: int = 0
+    sampling: SamplingSettings, index: int, number: int, rows: int, radius: float | None = None, phase: int = 0
 ) -> tuple[Array, Array]:
     """Return the samples that receivers of a row share: every second one with the pattern "row".
 
     Parameters
     ----------
-    settings : HssilSettings
+    sampling : SamplingSettings
         Numbers of samples, pattern ("row", "fixed" or "all") and seed.
     index : int
         0 for the first level, whose inner disc is sampled as well.
@@ -69,20 +69,20 @@ def row_offsets(
     InputError
         If every pixel has a pattern of its own, or no radius is known.
     """
-    expect(settings.pattern != "pixel", "pattern", "one that receivers share", settings.pattern)
-    offsets, weight = shared_offsets(settings, index, number, rows, radius)
+    expect(sampling.pattern != "pixel", "pattern", "one that receivers share", sampling.pattern)
+    offsets, weight = shared_offsets(sampling, index, number, rows, radius)
     return offsets[:, min(phase, offsets.shape[1] - 1)], weight
 
 
 def shared_offsets(
-    settings: HssilSettings, index: int, number: int, rows: int, radius: float | None = None,
+    sampling: SamplingSettings, index: int, number: int, rows: int, radius: float | None = None,
     columns: int | None = None,
 ) -> tuple[Array, Array]:
     """Return the samples that receivers share, by row and by column modulo 2.
 
     Parameters
     ----------
-    settings : HssilSettings
+    sampling : SamplingSettings
         Numbers of samples, pattern ("row", "fixed" or "all") and seed.
     index : int
         0 for the first level, whose inner disc is sampled as well.
@@ -102,29 +102,29 @@ def shared_offsets(
     weight : (n,) ndarray of float64
         Texels of the level that each sample stands for.
     """
-    radius = known_radius(settings, radius)
-    inner = settings.inner if index == 0 else 0
-    if settings.pattern == "all":
+    radius = known_radius(sampling, radius)
+    inner = sampling.inner if index == 0 else 0
+    if sampling.pattern == "all":
         within = (rows, columns) if columns is not None else None
         every = _every_texel(0.0 if index == 0 else radius, 2.0 * radius, within)
         return every[None, None], np.ones(len(every))
-    if settings.pattern == "fixed":
-        mirrored, weight = _mirrored(settings, radius, inner, number)
+    if sampling.pattern == "fixed":
+        mirrored, weight = _mirrored(sampling, radius, inner, number)
         return mirrored[None, None], weight
-    points = sample_points(inner, settings.samples)
+    points = sample_points(inner, sampling.samples)
     offsets = np.empty((rows, PHASES, len(points), 2), np.int32)
-    _fill_rows(points, inner, radius, level_key(settings.seed, number), offsets)
-    return offsets, sample_weight(radius, inner, settings.samples)
+    _fill_rows(points, inner, radius, level_key(sampling.seed, number), offsets)
+    return offsets, sample_weight(radius, inner, sampling.samples)
 
 
 def offsets_at(
-    settings: HssilSettings, index: int, number: int, row: int, column: int, radius: float | None = None
+    sampling: SamplingSettings, index: int, number: int, row: int, column: int, radius: float | None = None
 ) -> Array:
     """Return the samples of one receiver, whatever the pattern.
 
     Parameters
     ----------
-    settings : HssilSettings
+    sampling : SamplingSettings
         Numbers of samples, pattern and seed.
     index : int
         0 for the first level, whose inner disc is sampled as well.
@@ -140,23 +140,23 @@ def offsets_at(
     (n, 2) ndarray of int32
         Texels (ox, oy) from the receiver, in the order of `row_offsets` and its weights.
     """
-    if settings.pattern != "pixel":
-        offsets, _ = row_offsets(settings, index, number, row + 1, radius, column % PHASES)
+    if sampling.pattern != "pixel":
+        offsets, _ = row_offsets(sampling, index, number, row + 1, radius, column % PHASES)
         offsets_here: Array = offsets[min(row, len(offsets) - 1)]
         return offsets_here
-    inner = settings.inner if index == 0 else 0
-    points = sample_points(inner, settings.samples)
-    key = pixel_key(row_key(level_key(settings.seed, number), row), column)
-    return np.array([pixel_offset(points, inner, known_radius(settings, radius), key, j) for j in range(len(points))],
+    inner = sampling.inner if index == 0 else 0
+    points = sample_points(inner, sampling.samples)
+    key = pixel_key(row_key(level_key(sampling.seed, number), row), column)
+    return np.array([pixel_offset(points, inner, known_radius(sampling, radius), key, j) for j in range(len(points))],
                     np.int32).reshape(-1, 2)
 
 
-def known_radius(settings: HssilSettings, radius: float | None) -> float:
+def known_radius(sampling: SamplingSettings, radius: float | None) -> float:
     """Return the inner radius of the crowns.
 
     Parameters
     ----------
-    settings : HssilSettings
+    sampling : SamplingSettings
         Their radius.
     radius : float or None
         Replaces that of the settings.
@@ -171,7 +171,7 @@ def known_radius(settings: HssilSettings, radius: float | None) -> float:
     InputError
         If neither is set.
     """
-    found = settings.radius if radius is None else radius
+    found = sampling.radius if radius is None else radius
     expect(found is not None, "radius", "texels, or the size of the first level to choose it by", found)
     return float(found)  # type: ignore[arg-type]
 
@@ -202,13 +202,13 @@ def _every_texel(low: float, high: float, within: tuple[int, int] | None) -> Arr
     return np.concatenate([both, np.stack([ox[middle], oy[middle]], axis=1)]).astype(np.int32)
 
 
-def _mirrored(settings: HssilSettings, radius: float, inner: int, number: int) -> tuple[Array, Array]:
+def _mirrored(sampling: SamplingSettings, radius: float, inner: int, number: int) -> tuple[Array, Array]:
     """Return a mirror-symmetric set and its weights: half of the points on the right, an odd one above or below."""
-    key = level_key(settings.seed, number)
+    key = level_key(sampling.seed, number)
     shift = np.array([hash_bits(key), hash_bits(key ^ np.uint32(0x27D4EB2F))]) * TO_UNIT
-    weight = sample_weight(radius, inner, settings.samples)
+    weight = sample_weight(radius, inner, sampling.samples)
     pairs, middles = [], []
-    for first, count, near in ((0, inner, 0.0), (inner, settings.samples, 1.0)):
+    for first, count, near in ((0, inner, 0.0), (inner, sampling.samples, 1.0)):
         half = np.arange((count + 1) // 2)
         u, v = (0.5 + half * FIRST_STEP + shift[0]) % 1.0, (0.5 + half * SECOND_STEP + shift[1]) % 1.0
         length = radius * np.sqrt(near + (3.0 if near else 1.0) * u)

@@ -14,7 +14,7 @@ from refgi.sssil.pyramid.closest import NO_PIXEL
 from refgi.sssil.pyramid.fill import fill_coarser_level, fill_first_level
 from refgi.sssil.pyramid.mean import average_pixels, average_texels
 from refgi.sssil.pyramid.view import Level, Picture, View, view_of
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
@@ -41,21 +41,22 @@ def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
     buffer = frame.gbuffer
     # positions, which direct light needs, come from the same pass
     depth, normal, albedo, _ = buffer.resolve("depth", "normal", "albedo", "position")
-    count = useful_levels((frame.height, frame.width), settings)
-    if count < settings.levels:
-        skip("sssil.level", f"no texel of level {settings.first_level + count} has another in its crown")
-    return list(levels(depth, normal, albedo, frame.direct, buffer.projection, settings.first_level, count,
-                       settings.downsample, settings.as_published & {"hss_tan_f"}))
+    sampling = settings.sampling
+    count = useful_levels((frame.height, frame.width), sampling)
+    if count < sampling.levels:
+        skip("sssil.level", f"no texel of level {sampling.first_level + count} has another in its crown")
+    return list(levels(depth, normal, albedo, frame.direct, buffer.projection, sampling.first_level, count,
+                       settings.senders.downsample, settings.as_published & {"hss_tan_f"}))
 
 
-def useful_levels(shape: tuple[int, int], settings: HssilSettings) -> int:
+def useful_levels(shape: tuple[int, int], sampling: SamplingSettings) -> int:
     """Return how many levels have texels that lie within each other's crown.
 
     Parameters
     ----------
     shape : tuple of 2 ints
         Height and width of the picture.
-    settings : HssilSettings
+    sampling : SamplingSettings
         Radius, first level and number of levels.
 
     Returns
@@ -63,13 +64,13 @@ def useful_levels(shape: tuple[int, int], settings: HssilSettings) -> int:
     int
         At least 1: the first level has a disc.
     """
-    if settings.radius is None:  # chosen so that all reach
-        return settings.levels
-    for index in range(1, settings.levels):
-        height, width = level_shape(shape, settings.first_level + index)
-        if settings.radius >= math.hypot(height, width):
+    if sampling.radius is None:  # chosen so that all reach
+        return sampling.levels
+    for index in range(1, sampling.levels):
+        height, width = level_shape(shape, sampling.first_level + index)
+        if sampling.radius >= math.hypot(height, width):
             return index
-    return settings.levels
+    return sampling.levels
 
 
 def level_shape(shape: tuple[int, int], number: int) -> tuple[int, int]:
@@ -134,9 +135,9 @@ def levels(
     keeps the light; its positions may lie between two surfaces.
     """
     shape = (projection.height, projection.width)
+    expect(depth.shape == shape, "depth", f"shape {shape}", depth.shape)
     for name, array in (("normal", normal), ("albedo", albedo), ("direct", direct)):
         expect(array.shape == (3, *shape), name, f"shape {(3, *shape)}", array.shape)
-    expect(depth.shape == shape, "depth", f"shape {shape}", depth.shape)
     expect(depth.size < NO_PIXEL, "picture", f"fewer than {NO_PIXEL:,} pixels", f"{depth.size:,}")
     picture = Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(array, depth.dtype)
                                                      for array in (normal, albedo, direct)))

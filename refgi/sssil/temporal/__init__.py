@@ -5,7 +5,7 @@ it had there is blended with the new (`filter`). `Sequence` renders scenes one a
 of the last; `refgi.scene.path` moves camera, lights and objects through one scene.
 """
 
-from refgi.sssil.temporal.filter import TemporalSettings
+from refgi.sssil.settings import TemporalSettings
 from refgi.sssil.temporal.sequence import Sequence, SequenceFrame
 
 __all__ = ["Sequence", "SequenceFrame", "TemporalSettings"]

@@ -1,6 +1,5 @@
 """Sequence of frames with temporal coherence (Sec. 3.3), each blended with the one before."""
 
-import dataclasses
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
@@ -9,8 +8,9 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.frame import Frame
 from refgi.scene.model import Scene
-from refgi.sssil.settings import LAST_SEED, HssilSettings
-from refgi.sssil.temporal.filter import History, TemporalSettings, history_of, temporal_filter
+from refgi.settings import flat, replaced
+from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
+from refgi.sssil.temporal.filter import History, history_of, temporal_filter
 
 Array = npt.NDArray[Any]
 Method = Callable[[Frame, Any], Array]
@@ -50,8 +50,8 @@ class Sequence:
 
     Notes
     -----
-    Of earlier frames only the last one's `History` stays in memory. Under one `stages.Memory` frames share what is the same
-    object in both: the G-buffer while camera and geometry rest, an RSM while its light does.
+    Of earlier frames only the last one's `History` stays in memory. Under one `stages.Memory` frames share what is the
+    same object in both: the G-buffer while camera and geometry rest, an RSM while its light does.
     """
 
     def __init__(
@@ -115,16 +115,17 @@ def seeded(settings: Any, number: int) -> Any:
 
     Parameters
     ----------
-    settings : dataclass
+    settings : Settings
         A method's settings.
     number : int
         Which frame: 0 leaves them as they are.
 
     Returns
     -------
-    dataclass
+    Settings
         The same object where the method draws no random numbers.
     """
-    if number == 0 or "seed" not in {field.name for field in dataclasses.fields(settings)}:
+    seeds = {key: seed for key, seed in flat(settings).items() if key.rpartition(".")[2] == "seed"}
+    if number == 0 or not seeds:
         return settings
-    return dataclasses.replace(settings, seed=(settings.seed + number) % (LAST_SEED + 1))
+    return replaced(settings, {key: (seed + number) % (LAST_SEED + 1) for key, seed in seeds.items()})

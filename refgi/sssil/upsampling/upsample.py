@@ -4,7 +4,7 @@ Bilinear and nearest upsampling ignore surfaces: bilinear light bleeds across ed
 """
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +12,10 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.memory import plane
+from refgi.sssil.settings import Bilateral, HssilSettings, Nearest
 from refgi.sssil.upsampling.bilateral import fill_bilateral
 from refgi.sssil.upsampling.lines import PAD
 from refgi.stages import stage
-
-if TYPE_CHECKING:
-    from refgi.sssil.settings import HssilSettings
 
 Array = npt.NDArray[Any]
 QUICK_POWER = 8.0  # of the cosine between normals: three multiplications
@@ -103,7 +101,7 @@ class Guide(NamedTuple):
 
 @stage("sssil.upsample", kept=False)
 def upsample(
-    coarse: Array, coarse_guide: Guide, guide: Guide, settings: "HssilSettings", added: Array | None = None
+    coarse: Array, coarse_guide: Guide, guide: Guide, settings: HssilSettings, added: Array | None = None
 ) -> Array:
     """Upsample irradiance to a finer level and add that level's own (joint bilateral upsampling, Sec. 3.2).
 
@@ -152,14 +150,15 @@ def upsample(
         expect(array is None or array.shape == shape, name, f"shape {shape}", array is not None and array.shape)
     result = plane((3, *depth.shape), dtype)
     adds, addend = (False, result) if addend is None else (True, addend)
-    if settings.upsampling != "bilateral":
-        fill_plain(values, coarse_depth, depth, factor, settings.upsampling == "nearest", addend, adds, result)
+    weights = settings.upsampling
+    if not isinstance(weights, Bilateral):
+        fill_plain(values, coarse_depth, depth, factor, isinstance(weights, Nearest), addend, adds, result)
         return result
     real = dtype.type
-    sharpness = real(1.0 / (4.0 * math.sqrt(2.0) * settings.depth_sigma))
+    sharpness = real(1.0 / (4.0 * math.sqrt(2.0) * weights.depth_sigma))
     # the closest of F x F pixels of a slope is at a corner of the texel
-    corner = real(0.0 if settings.downsample == "average" else (factor - 1) / (2 * factor))
-    power = None if settings.normal_power == QUICK_POWER else real(settings.normal_power)
+    corner = real(0.0 if settings.senders.downsample == "average" else (factor - 1) / (2 * factor))
+    power = None if weights.normal_power == QUICK_POWER else real(weights.normal_power)
     fill_bilateral(values, coarse_depth, coarse_normal, depth, normal, factor, sharpness, corner, power, addend, adds,
                    result)
     return result

@@ -29,7 +29,7 @@ from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.points import level_key, pixel_key, row_key
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import Bitmask, HssilSettings
 from refgi.sssil.visibility.slices import SliceCounts, fill_slices, slice_counts, slice_offsets
 from refgi.stages import stage
 
@@ -64,23 +64,25 @@ def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: 
     Raises
     ------
     InputError
-        If the pattern has no slices.
+        If `visibility` is no bitmask.
     """
-    expect(settings.pattern != "all", "pattern", "row, pixel or fixed with visibility by a bitmask", settings.pattern)
+    sampling, bitmask = settings.sampling, settings.visibility
+    expect(isinstance(bitmask, Bitmask), "visibility", "bitmask", bitmask)
+    assert isinstance(bitmask, Bitmask)
     rows, columns = level.shape
-    steps = slice_counts(settings, index, chosen_radius((rows << index, columns << index), settings))
+    steps = slice_counts(sampling, bitmask, index, chosen_radius((rows << index, columns << index), sampling))
     real = level.position.dtype.type
     scale = length_scale(level.depth)
     packed = np.empty((rows, PLANES, columns), level.position.dtype)
     _pack(level.position, level.normal, level.radiance, level.area, real(scale), packed)
-    thickness, disc = real(settings.thickness * diagonal * scale), settings.form_factor == "disc"
+    thickness, disc = real(bitmask.thickness * diagonal * scale), settings.senders.form_factor == "disc"
     factor = real(level_factor(index, settings))
     result = np.empty_like(level.radiance)
-    if settings.pattern == "pixel":
-        key = level_key(settings.seed, level.number)
+    if sampling.pattern == "pixel":
+        key = level_key(sampling.seed, level.number)
         _march_pixels(packed, steps, key, thickness, disc, factor, result)
     else:
-        offsets, weight = slice_offsets(settings, steps, level.number, rows)
+        offsets, weight = slice_offsets(sampling, steps, level.number, rows)
         _march_rows(packed, offsets, weight.astype(real), thickness, disc, factor, result)
     return result
 

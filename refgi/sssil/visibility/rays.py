@@ -21,7 +21,7 @@ from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.points import level_key, pixel_key, pixel_offset, row_key, sample_points, sample_weight
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
@@ -75,18 +75,18 @@ def ray_gather(level: Level, index: int, settings: HssilSettings, frame: "Frame"
     (3, h, w) ndarray
         Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi.
     """
-    surfels, samples = _surfels(level, frame), _samples(level, index, settings)
+    surfels, samples = _surfels(level, frame), _samples(level, index, settings.sampling)
     radiance = level.radiance.reshape(3, -1)
     total, count = np.zeros(radiance.shape), len(samples.weight)
     step = max(1, batch // max(count, 1))
     rays = [np.empty((step * count, 3), np.float32) for _ in range(2)]
     transfer, reach = np.empty(step * count), np.empty(step * count, np.float32)
     sender, blocked = np.empty(step * count, np.int64), np.empty(step * count, np.bool_)
+    disc = settings.senders.form_factor == "disc"
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])
         size = (last - first) * count
-        _write_rays(surfels, samples, level.shape, first, last, settings.form_factor == "disc", rays[0], rays[1], reach,
-                    transfer, sender)
+        _write_rays(surfels, samples, level.shape, first, last, disc, rays[0], rays[1], reach, transfer, sender)
         frame.tracer.fill_occluded(rays[0][:size], rays[1][:size], reach[:size], blocked[:size])
         add_unoccluded(radiance, first, last, count, blocked, transfer, sender, total)
         report_progress(last / total.shape[1])
@@ -105,16 +105,16 @@ def _surfels(level: Level, frame: "Frame") -> Surfels:
     return Surfels(position, normal, level.area.reshape(-1).astype(np.float64), facing, origin)
 
 
-def _samples(level: Level, index: int, settings: HssilSettings) -> SampleOffsets:
+def _samples(level: Level, index: int, sampling: SamplingSettings) -> SampleOffsets:
     rows, columns = level.shape
-    radius = chosen_radius((rows << index, columns << index), settings)
-    inner = settings.inner if index == 0 else 0
-    if settings.pattern == "pixel":
-        offsets, weight = np.zeros((1, 1, 0, 2), np.int32), sample_weight(radius, inner, settings.samples)
+    radius = chosen_radius((rows << index, columns << index), sampling)
+    inner = sampling.inner if index == 0 else 0
+    if sampling.pattern == "pixel":
+        offsets, weight = np.zeros((1, 1, 0, 2), np.int32), sample_weight(radius, inner, sampling.samples)
     else:
-        offsets, weight = shared_offsets(settings, index, level.number, rows, radius, columns)
-    points = sample_points(inner, settings.samples)
-    return SampleOffsets(offsets, weight, points, inner, radius, level_key(settings.seed, level.number))
+        offsets, weight = shared_offsets(sampling, index, level.number, rows, radius, columns)
+    points = sample_points(inner, sampling.samples)
+    return SampleOffsets(offsets, weight, points, inner, radius, level_key(sampling.seed, level.number))
 
 
 @kernel(parallel=True)

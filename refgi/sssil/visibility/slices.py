@@ -13,7 +13,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.sampling import hash_bits
 from refgi.sssil.crown.points import level_key, row_key
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import Bitmask, SamplingSettings
 
 Array = npt.NDArray[Any]
 
@@ -36,13 +36,15 @@ class SliceCounts(NamedTuple):
         return self.disc + self.crown + self.occluders
 
 
-def slice_counts(settings: HssilSettings, index: int, radius: float) -> SliceCounts:
+def slice_counts(sampling: SamplingSettings, bitmask: Bitmask, index: int, radius: float) -> SliceCounts:
     """Return how densely the slices of a level are sampled.
 
     Parameters
     ----------
-    settings : HssilSettings
-        Samples of crown and disc, shared out to slices; at least one a slice.
+    sampling : SamplingSettings
+        Samples of crown and disc, distributed over slices; at least one a slice.
+    bitmask : Bitmask
+        Number of slices.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     radius : float
@@ -53,18 +55,18 @@ def slice_counts(settings: HssilSettings, index: int, radius: float) -> SliceCou
     SliceCounts
         With half as many occluders as the crown has samples.
     """
-    slices = settings.slice_count
-    crown = max(1, round(settings.samples / slices))
-    disc = max(1, round(settings.inner / slices)) if index == 0 and settings.inner else 0
+    slices = bitmask.count(sampling.samples)
+    crown = max(1, round(sampling.samples / slices))
+    disc = max(1, round(sampling.inner / slices)) if index == 0 and sampling.inner else 0
     return SliceCounts(slices, disc, crown, (crown + 1) // 2, radius)
 
 
-def slice_offsets(settings: HssilSettings, steps: SliceCounts, number: int, rows: int) -> tuple[Array, Array]:
+def slice_offsets(sampling: SamplingSettings, steps: SliceCounts, number: int, rows: int) -> tuple[Array, Array]:
     """Return the samples that a row of receivers shares, slice by slice.
 
     Parameters
     ----------
-    settings : HssilSettings
+    sampling : SamplingSettings
         Pattern ("row" or "fixed") and seed.
     steps : Steps
         Of `steps_of`.
@@ -81,10 +83,10 @@ def slice_offsets(settings: HssilSettings, steps: SliceCounts, number: int, rows
     weight : (rows, slices, n) ndarray of float64
         Texels of the level that each sample stands for; 0 for a blocker.
     """
-    fixed = settings.pattern == "fixed"
+    fixed = sampling.pattern == "fixed"
     shape = (1 if fixed else rows, steps.slices, steps.per_slice)
     offsets, weight = np.empty((*shape, 2), np.int32), np.empty(shape)
-    _fill_rows(steps, level_key(settings.seed, number), fixed, offsets, weight)
+    _fill_rows(steps, level_key(sampling.seed, number), fixed, offsets, weight)
     return offsets, weight
 
 

@@ -77,7 +77,7 @@ def multires_by_rays(frame):
     from refgi.splat.multires.multires import multires
     from refgi.splat.multires.settings import MultiresSettings
 
-    return multires(frame, MultiresSettings(visibility="rays"))
+    return multires(frame, of(MultiresSettings, visibility="rays"))
 
 
 def shares_of_rays(frame):

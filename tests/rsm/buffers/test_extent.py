@@ -150,7 +150,7 @@ def test_rays_of_openness_are_a_tenth_of_what_lights_reach(monkeypatch):
         return openness(*args, radius=radius, **rest)
 
     monkeypatch.setattr(rays, "openness", noted)
-    render(scene, "sii", SiiSettings(lights=16, openness_flux="scale"), **SIZE)
+    render(scene, "sii", of(SiiSettings, lights=16, openness_flux="scale"), **SIZE)
     assert asked == [pytest.approx(Frame(scene, **SIZE).lit_extent.diagonal / 10)]
 
 

@@ -56,7 +56,7 @@ RAYS = [
     (of(ValSettings, visibility="rectangle"), True), (of(ValSettings, visibility="members"), True),
     (of(ValSettings, source="walk"), True), (of(ValSettings, visibility="back_projection"), False),
     (HssilSettings(), False),
-    (HssilSettings(visibility="rays"), True), (HssilSettings(visibility="bitmask"), False), (object(), False)]
+    (of(HssilSettings, visibility="rays"), True), (of(HssilSettings, visibility="bitmask"), False), (object(), False)]
 
 
 @pytest.mark.parametrize(("settings", "rays"), RAYS)

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.pairs.shadow_rays import RayReceivers
+from refgi.pairs.shadow_rays import RayReceivers, add_unoccluded
 from refgi.rays import Tracer
 from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
@@ -68,4 +68,4 @@ def add_unblocked(task: Task, rays: Shadows, first: int, per_receiver: int, sums
         task.tracer.fill_occluded(rays.origin, rays.direction, rays.reach, rays.blocked)
     else:
         np.less_equal(rays.reach, 0, out=rays.blocked)
-    add_free(sums, first, len(rays.reach) // per_receiver, per_receiver, rays.blocked, rays.contribution)
+    add_unoccluded(sums, first, len(rays.reach) // per_receiver, per_receiver, rays.blocked, rays.contribution)

@@ -31,6 +31,7 @@ from refgi.papers.hssil.subjects import (
 from refgi.papers.hssil.times import SETUPS
 from refgi.papers.subjects import seen_by
 from refgi.papers.workbench import FULL, Workbench
+from refgi.settings import of
 from refgi.sssil import HssilSettings
 from refgi.sssil.temporal.filter import TemporalSettings
 from tests.papers.conftest import SMALL
@@ -78,9 +79,8 @@ def test_a_full_run_has_the_papers_sizes():
     timed, judged = wide_frame(full, BASKET), frame_of(full, BASKET, LARGE)
     assert (timed.width, timed.height) == (1280, 720)
     assert (judged.width, judged.height) == (720, 720)
-    assert settings_of(timed) == HssilSettings(radius=20.0)
-    assert dataclasses.astuple(settings_of_figure(judged)) == dataclasses.astuple(
-        HssilSettings(radius=40.0, start="full", pattern="pixel"))
+    assert settings_of(timed) == of(HssilSettings, radius=20.0)
+    assert settings_of_figure(judged) == of(HssilSettings, radius=40.0, start="full", pattern="pixel")
 
 
 def test_smaller_pictures_reach_as_much_by_fewer_levels():
@@ -91,8 +91,8 @@ def test_smaller_pictures_reach_as_much_by_fewer_levels():
         frame = frame_of(full, BASKET, factor)
         settings = smaller(frame)
         assert reach_of(frame, settings) == pytest.approx(published)
-        assert settings.levels == levels
-        assert 20 / math.sqrt(2) <= settings.radius <= 20 * math.sqrt(2)
+        assert settings.sampling.levels == levels
+        assert 20 / math.sqrt(2) <= settings.sampling.radius <= 20 * math.sqrt(2)
 
 
 def test_stand_ins_are_kept_and_frames_fit_the_run(bench):
@@ -105,7 +105,7 @@ def test_stand_ins_are_kept_and_frames_fit_the_run(bench):
 @pytest.mark.feature("HSS-05")
 def test_levels_cover_each_distance_once(evidence):
     """Closed form: 1 everywhere within the last circle, but where circles cut texels."""
-    settings = HssilSettings(radius=8.0, levels=3, samples=64)
+    settings = of(HssilSettings, radius=8.0, levels=3, samples=64)
     every = profile(covered(every_texel(settings), 1))
     drawn = profile(covered(settings, 2048))
     assert every[0] == 0.0  # the receiver itself

@@ -12,6 +12,7 @@ from refgi.papers.curves import Axes, Curve, drawn
 from refgi.papers.hssil.subjects import RADIUS, every_texel
 from refgi.papers.records import Cell, Figure, Picture, Plot, Table
 from refgi.papers.val.painting import palette
+from refgi.settings import of
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.pattern import offsets_at
 from refgi.sssil.crown.reach import coverage
@@ -39,15 +40,16 @@ def figure2(bench: "Workbench") -> Figure:
     Figure
         The samples of one receiver, and how often each distance between pixels is covered.
     """
-    settings = HssilSettings(radius=max(2.0, RADIUS * bench.scale.size / 512))
+    settings = of(HssilSettings, radius=max(2.0, RADIUS * bench.scale.size / 512))
+    sampling = settings.sampling
     rows = ROWS * bench.scale.repeats
     drawn_by, exact = covered(settings, rows), covered(every_texel(settings), 1)
     along = {"64 samples, mean of many rows": profile(drawn_by), "every texel": profile(exact)}
     return Figure(
         shows="Each level samples a crown from r to 2 r of its texels, the first one the disc within as well: together "
               "they cover the picture without cracks or overlaps.",
-        facts=(f"radius {settings.radius:g}", f"{settings.levels} levels", f"{settings.samples} samples in a crown, "
-               f"{settings.inner} in the disc", f"means over {rows} rows of receivers"),
+        facts=(f"radius {sampling.radius:g}", f"{sampling.levels} levels", f"{sampling.samples} samples in a crown, "
+               f"{sampling.inner} in the disc", f"means over {rows} rows of receivers"),
         pictures=_pictures(settings, drawn_by, exact), columns=3,
         tables=(Table("Crowns", ("", "from, texels of the first level", "to", "samples", "texels for each sample",
                                  "covered within, mean"), tuple(_rows(settings, drawn_by))),),
@@ -72,8 +74,9 @@ def covered(settings: HssilSettings, rows: int) -> Array:
     (n, n) ndarray
         Offsets in texels of the first level as far as the last crown reaches, 0 in the middle.
     """
-    side = round((settings.radius or 1) * 2**settings.levels) + 1
-    return coverage(settings, (side, side), rows)
+    sampling = settings.sampling
+    side = round((sampling.radius or 1) * 2**sampling.levels) + 1
+    return coverage(sampling, (side, side), rows)
 
 
 def profile(times: Array) -> list[float]:
@@ -116,16 +119,17 @@ def placed(settings: HssilSettings) -> npt.NDArray[np.uint8]:
     (n, n, 3) ndarray of uint8
         A pixel is a texel of the first level; rings show where crowns begin and end.
     """
-    radius = settings.radius or 1
-    reach = round(radius * 2**settings.levels)
-    colours = palette(settings.levels)
+    sampling = settings.sampling
+    radius = sampling.radius or 1
+    reach = round(radius * 2**sampling.levels)
+    colours = palette(sampling.levels)
     pixels = np.full((2 * reach + 1, 2 * reach + 1, 3), GROUND)
     row, column = np.indices(pixels.shape[:2]) - reach
     distance = np.hypot(row, column)
-    for k in range(settings.levels + 1):
+    for k in range(sampling.levels + 1):
         pixels[np.abs(distance - radius * 2**k) < 0.5 + reach / 640] = RINGS
-    for k in reversed(range(settings.levels)):
-        for ox, oy in 2**k * offsets_at(settings, k, settings.first_level + k, 0, 0):
+    for k in reversed(range(sampling.levels)):
+        for ox, oy in 2**k * offsets_at(sampling, k, sampling.first_level + k, 0, 0):
             top, left = (max(0, reach + o - 2**k // 2) for o in (oy, ox))
             pixels[top : top + 2**k, left : left + 2**k] = colours[k]
     return (255 * pixels + 0.5).astype(np.uint8)
@@ -141,20 +145,22 @@ def _pictures(settings: HssilSettings, drawn_by: Array, exact: Array) -> tuple[P
 
 
 def _rows(settings: HssilSettings, times: Array) -> list[tuple[Cell, ...]]:
-    radius, distance = settings.radius or 1, _distance(times)
+    sampling = settings.sampling
+    radius, distance = sampling.radius or 1, _distance(times)
     rows: list[tuple[Cell, ...]] = []
-    for k in range(settings.levels):
+    for k in range(sampling.levels):
         near, far = (0.0 if k == 0 else radius * 2**k), radius * 2 ** (k + 1)
         within = (distance >= near) & (distance < far)
-        share = 3 * math.pi * radius**2 / settings.samples
-        samples = settings.samples + (settings.inner if k == 0 else 0)
+        share = 3 * math.pi * radius**2 / sampling.samples
+        samples = sampling.samples + (sampling.inner if k == 0 else 0)
         rows.append((f"level {k + 1}", near, far, samples, share, float(times[within].mean())))
     return rows
 
 
 def _notes(settings: HssilSettings, drawn_by: Array, exact: Array) -> tuple[str, ...]:
-    reach = (settings.radius or 1) * 2**settings.levels
-    inside = _distance(drawn_by) < reach * (1 - 0.5**settings.levels)
+    sampling = settings.sampling
+    reach = (sampling.radius or 1) * 2**sampling.levels
+    inside = _distance(drawn_by) < reach * (1 - 0.5**sampling.levels)
     away = [float(np.std(one[inside])) for one in (drawn_by, exact)]
     return (
         f"Within the last circle every pair of pixels is covered {drawn_by[inside].mean():.3f} times in the mean by "
@@ -162,5 +168,5 @@ def _notes(settings: HssilSettings, drawn_by: Array, exact: Array) -> tuple[str,
         "but where a circle cuts a coarse texel, whose pairs are all within or all without.",
         f"Around that mean the coverage by every texel varies by {100 * away[1]:.1f} %, at the circles; that by "
         f"samples by {100 * away[0]:.1f} %, at softer circles and by the chance of the rows that were counted.",
-        f"A sample of a crown stands for {3 * math.pi * (settings.radius or 1) ** 2 / settings.samples:.0f} texels: "
+        f"A sample of a crown stands for {3 * math.pi * (sampling.radius or 1) ** 2 / sampling.samples:.0f} texels: "
         "that is what its disc of Eq. 4 is as large as.")

@@ -1,6 +1,5 @@
 """Figure 4: what each level adds, under a spot that shines straight down."""
 
-import dataclasses
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from refgi.papers.curves import Axes, drawn
 from refgi.papers.hssil.references import mean_of, scan_line
 from refgi.papers.hssil.subjects import SPOT, lit, settings_of, wide_frame
 from refgi.papers.records import Figure, Picture, Plot, Table
+from refgi.settings import replaced
 from refgi.sssil import HssilSettings
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def figure4(bench: "Workbench") -> Figure:
         shows="Under a vertical spot, the light that each of four levels gathers, and all together: each level reaches "
               "twice as far as the one before, and they blend smoothly.",
         facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", "half resolution",
-               f"radius {settings.radius:g} texels", f"{settings.samples} samples a level"),
+               f"radius {settings.sampling.radius:g} texels", f"{settings.sampling.samples} samples a level"),
         pictures=_pictures(frame, settings, parts), columns=3,
         tables=(Table("Light by level", ("", "from, pixels away", "to", "mean, W/m²", "% of six levels"),
                       tuple(_rows(frame, settings, parts))),),
@@ -78,8 +78,8 @@ def parts_of(frame: "Frame", settings: HssilSettings) -> Parts:
     Parts
         Each level alone and the paper's four together.
     """
-    single = [lit(frame, dataclasses.replace(settings, only_level=k)) for k in range(settings.levels)]
-    return Parts(single, lit(frame, dataclasses.replace(settings, levels=SHOWN)))
+    single = [lit(frame, replaced(settings, {"only_level": k})) for k in range(settings.sampling.levels)]
+    return Parts(single, lit(frame, replaced(settings, {"levels": SHOWN})))
 
 
 def apart(parts: Parts) -> float:
@@ -106,7 +106,7 @@ def _pictures(frame: "Frame", settings: HssilSettings, parts: Parts) -> tuple[Pi
     for k, light in enumerate(parts.single[:SHOWN]):
         near, far = _crown(settings, k)
         shown.append(pictures.indirect(f"level{k + 1}", f"level {k + 1}", f"{near:g} to {far:g} pixels away", light,
-                                       exposure, dataclasses.replace(settings, only_level=k)))
+                                       exposure, replaced(settings, {"only_level": k})))
     shown += [pictures.indirect("levels", "levels 1 to 4", "indirect light", parts.whole, exposure),
               pictures.seen("seen", "with direct light", "what the camera receives", frame, parts.whole),
               pictures.indirect("further", "levels 5 and 6", "what four levels do not reach",
@@ -116,8 +116,8 @@ def _pictures(frame: "Frame", settings: HssilSettings, parts: Parts) -> tuple[Pi
 
 def _crown(settings: HssilSettings, index: int) -> tuple[float, float]:
     """Return where a level's samples lie, in pixels from the receiver."""
-    assert settings.radius is not None
-    near = settings.radius * 2.0 ** (settings.first_level + index)
+    assert settings.sampling.radius is not None
+    near = settings.sampling.radius * 2.0 ** (settings.sampling.first_level + index)
     return (0.0 if index == 0 else round(near, 1)), round(2 * near, 1)
 
 

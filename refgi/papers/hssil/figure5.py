@@ -21,6 +21,7 @@ from refgi.papers.hssil.subjects import (
 )
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.records import Figure, Picture, Plot, Table
+from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 
 if TYPE_CHECKING:
@@ -69,8 +70,9 @@ def figure5(bench: "Workbench") -> Figure:
     return Figure(
         shows="One bounce by path tracing and by the method, fed with exact direct light: with the point form factor "
               "(Eq. 3) spikes, with that of a disc (Eq. 4) none.",
-        facts=(frame.scene.description, f"{frame.width}² pixels", f"radius {settings.radius:g}", "4 levels from full "
-               "resolution", "64 samples a level, every pixel its own", "direct light with a shadow ray a pixel",
+        facts=(frame.scene.description, f"{frame.width}² pixels", f"radius {settings.sampling.radius:g}",
+               "4 levels from full resolution", "64 samples a level, every pixel its own",
+               "direct light with a shadow ray a pixel",
                f"path tracing with {bench.scale.truth_samples} samples a pixel"),
         pictures=_pictures(frame, light, right, off, row, ways), columns=4,
         tables=(Table("Errors in % of the mean, against path tracing in which only what the camera sees shines and "
@@ -94,7 +96,7 @@ def settings_of_figure(frame: "Frame") -> HssilSettings:
     HssilSettings
         Every pixel has its own samples, so that noise shows along the line.
     """
-    return HssilSettings(radius=scaled_radius(frame, RADIUS_FIGURE_5), start="full", pattern="pixel")
+    return of(HssilSettings, radius=scaled_radius(frame, RADIUS_FIGURE_5), start="full", pattern="pixel")
 
 
 def ways_of(settings: HssilSettings) -> dict[str, HssilSettings]:
@@ -110,7 +112,7 @@ def ways_of(settings: HssilSettings) -> dict[str, HssilSettings]:
     dict of str to HssilSettings
         By the keys of `NAMES`.
     """
-    point = dataclasses.replace(settings, form_factor="point")
+    point = replaced(settings, {"form_factor": "point"})
     return {POINT: point, DISC: settings, POINT_LIMIT: every_texel(point), DISC_LIMIT: every_texel(settings)}
 
 

@@ -31,7 +31,7 @@ def figure6(bench: "Workbench") -> Figure:
     return Figure(
         shows="Milliseconds of sampling, upsampling and compositing for five setups, on two graphics processors.",
         facts=(scene_of(bench, HALL).description, f"{frame.width} x {frame.height} pixels",
-               f"radius {settings_of(frame).radius:g} texels", f"medians of {bench.scale.repeats}",
+               f"radius {settings_of(frame).sampling.radius:g} texels", f"medians of {bench.scale.repeats}",
                "from the G-buffer and direct light to the picture"),
         ratios=tuple(Ratios(f"time of {what}, relative to {FIRST.title} (paper: {CARDS[1]})",
                             tuple(Bar(setup.title, _time(found[setup.title], what) / _time(found[FIRST.title], what),

@@ -1,6 +1,5 @@
 """Figure 9: a basket whose lit side the camera does not see, by one camera and by several."""
 
-import dataclasses
 import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,6 +12,7 @@ from refgi.papers.hssil.scenes import side_views
 from refgi.papers.hssil.subjects import BASKET, LARGE, every_texel, lit, smaller, wide_frame
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Cell, Figure, Picture, Table
+from refgi.settings import replaced
 from refgi.sssil import HssilSettings
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def figure9(bench: "Workbench") -> Figure:
     """
     frame = wide_frame(bench, BASKET, SIZE)
     base = every_texel(smaller(frame, 1, radius=None))  # what is missing is what is not seen
-    ways = {key: _way(frame, dataclasses.replace(base, **changes)) for key, changes in _changes().items()}
+    ways = {key: _way(frame, replaced(base, changes)) for key, changes in _changes().items()}
     free = traced(bench, frame, (BASKET, SIZE), visibility=False)
     exact = traced(bench, frame, (BASKET, SIZE))
     covered = frame.gbuffer.covered
@@ -60,8 +60,9 @@ def figure9(bench: "Workbench") -> Figure:
     return Figure(
         shows="A plant basket lit on its far side: with one camera its light is missing, with side views it comes "
               "back.",
-        facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", f"{base.levels} levels from half "
-               "resolution, every texel", f"path tracing with {bench.scale.truth_samples} samples a pixel"),
+        facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels",
+               f"{base.sampling.levels} levels from half resolution, every texel",
+               f"path tracing with {bench.scale.truth_samples} samples a pixel"),
         pictures=_pictures(frame, ways, free, exact), columns=3,
         tables=(Table("Light and error in % of the mean of path tracing in which nothing blocks",
                       ("", "light", "RMSE", "of the missing light, back", "ms, 64 samples"), tuple(rows)),),
@@ -73,7 +74,7 @@ def _changes() -> dict[str, dict[str, Any]]:
 
 
 def _way(frame: "Frame", settings: HssilSettings) -> Way:
-    usual = dataclasses.replace(settings, pattern="row")  # of which the time is of interest
+    usual = replaced(settings, {"pattern": "row"})  # of which the time is of interest
     lit(frame, usual)  # compiles what it needs
     started = time.perf_counter()
     lit(frame, usual)

@@ -15,7 +15,7 @@ from refgi.papers.judging import errors_of
 from refgi.papers.records import Figure, Picture, Plot, Table
 from refgi.papers.val.motion import changes
 from refgi.sssil import HssilSettings
-from refgi.sssil.temporal.filter import TemporalSettings
+from refgi.sssil.settings import TemporalSettings
 from refgi.sssil.temporal.sequence import Sequence
 from refgi.stages import observe
 
@@ -67,7 +67,8 @@ def filtered(bench: "Workbench") -> Figure:
         shows="Blending each frame with the one before, warped to the new camera, takes away noise at next to no cost. "
               "The paper has no figure of it.",
         facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", f"{count} frames",
-               "half resolution", f"{settings.levels} levels", f"{settings.samples} samples, others in each frame",
+               "half resolution", f"{settings.sampling.levels} levels",
+               f"{settings.sampling.samples} samples, others in each frame",
                "a = 0.9"),
         pictures=_pictures(frame, found, settings), columns=3,
         tables=(Table(f"Noise in % of the mean, against the mean of {bench.scale.truth_samples} pictures with other "

@@ -1,6 +1,5 @@
 """What pictures are judged by: path tracing, the mean of many pictures, their noise, a line across them."""
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy.typing as npt
 from refgi.compare.maps import luminance
 from refgi.papers.curves import Curve
 from refgi.papers.hssil.subjects import lit
+from refgi.settings import replaced
 from refgi.sssil import HssilSettings
 from refgi.truth import TruthResult, TruthSettings, trace_truth
 
@@ -40,7 +40,7 @@ def noise_of(frame: "Frame", settings: HssilSettings, first: Array | None = None
         Standard deviation, W/m^2: root mean square over pixels with a surface.
     """
     one = lit(frame, settings) if first is None else first
-    other = lit(frame, dataclasses.replace(settings, seed=settings.seed + 1))
+    other = lit(frame, replaced(settings, {"seed": settings.sampling.seed + 1}))
     return math.sqrt(0.5 * np.mean((one.astype(np.float64) - other)[:, frame.gbuffer.covered] ** 2))
 
 
@@ -63,7 +63,7 @@ def expected_light(frame: "Frame", settings: HssilSettings, seeds: int) -> Array
     """
     total = np.zeros((3, frame.height, frame.width))
     for seed in range(seeds):
-        total += lit(frame, dataclasses.replace(settings, seed=FAR_SEED + seed))
+        total += lit(frame, replaced(settings, {"seed": FAR_SEED + seed}))
     return total / seeds
 
 

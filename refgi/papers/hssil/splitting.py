@@ -1,6 +1,5 @@
 """Beyond the paper: which of its approximations costs how much, from path tracing to the published picture."""
 
-import dataclasses
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,6 +21,7 @@ from refgi.papers.hssil.subjects import (
 )
 from refgi.papers.judging import errors_of
 from refgi.papers.records import Cell, Figure, Picture, Table
+from refgi.settings import replaced
 from refgi.sssil import HssilSettings
 
 if TYPE_CHECKING:
@@ -86,11 +86,12 @@ def splitting(bench: "Workbench") -> Figure:
     """
     found = {name: _split(bench, name) for name in SCENES}
     frame = frame_of(bench, HORSE, JUDGED)
+    sampling = smaller(frame).sampling
     return Figure(
         shows="The paper says that its picture may be heavily biased, by what is not seen and by v = 1, and gives no "
               "figures.",
         facts=(f"{frame.width}² pixels", f"path tracing with {bench.scale.truth_samples} samples a pixel",
-               f"{smaller(frame).levels} levels of half resolution, a radius of {smaller(frame).radius:.3g}: texels as "
+               f"{sampling.levels} levels of half resolution, a radius of {sampling.radius:.3g}: texels as "
                "small beside their distance, and as much of the picture, as by the paper's settings at 1280 x 720"),
         pictures=_pictures(found[HORSE]), columns=4,
         tables=(Table("What each approximation changes in the picture before it, in % of the mean of path tracing: "
@@ -119,10 +120,10 @@ def chain(frame: "Frame") -> dict[str, HssilSettings]:
     """
     published = smaller(frame)
     discs = every_pixel(published)
-    levels = dataclasses.replace(discs, levels=published.levels + 2, downsample="average")
-    closest = dataclasses.replace(levels, downsample="closest")
-    reach = every_texel(published, start="full", levels=published.levels + 1)
-    return {"pixels": dataclasses.replace(discs, form_factor="point"), "discs": discs, "levels": levels,
+    levels = replaced(discs, {"levels": published.sampling.levels + 2, "downsample": "average"})
+    closest = replaced(levels, {"downsample": "closest"})
+    reach = every_texel(published, start="full", levels=published.sampling.levels + 1)
+    return {"pixels": replaced(discs, {"form_factor": "point"}), "discs": discs, "levels": levels,
             "closest": closest, "reach": reach, "start": every_texel(published), "samples": published}
 
 

@@ -6,7 +6,6 @@ traced many times is smaller than that in every run: there levels are left out i
 it is, so that a texel is as small beside its distance as in the paper.
 """
 
-import dataclasses
 import math
 import warnings
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.papers.hssil.scenes import BUILDERS
 from refgi.papers.subjects import Subjects
+from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 
@@ -73,7 +73,7 @@ def settings_of(frame: Frame, **changes: Any) -> HssilSettings:
     HssilSettings
         Half resolution, 4 levels of 64 samples where nothing else is said.
     """
-    return HssilSettings(**({"radius": scaled_radius(frame, RADIUS)} | changes))
+    return of(HssilSettings, **({"radius": scaled_radius(frame, RADIUS)} | changes))
 
 
 def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
@@ -96,7 +96,7 @@ def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
     share = math.hypot(frame.width, frame.height) / math.hypot(WIDE * PAPER_HEIGHT, PAPER_HEIGHT)
     levels = max(1, round(4 + math.log2(share)))
     radius = max(1.0, RADIUS * share * 2.0 ** (4 - levels))
-    return HssilSettings(**({"radius": radius, "levels": max(1, levels + further)} | changes))
+    return of(HssilSettings, **({"radius": radius, "levels": max(1, levels + further)} | changes))
 
 
 def scaled_radius(frame: Frame, radius: float, height: int = PAPER_HEIGHT) -> float:
@@ -134,7 +134,7 @@ def every_texel(settings: HssilSettings, **changes: Any) -> HssilSettings:
     HssilSettings
         Without noise.
     """
-    return dataclasses.replace(settings, **({"pattern": "all"} | changes))
+    return replaced(settings, {"pattern": "all"} | changes)
 
 
 def every_pixel(settings: HssilSettings, **changes: Any) -> HssilSettings:
@@ -208,7 +208,7 @@ def reach_of(frame: Frame, settings: HssilSettings) -> float:
     float
         1 or more where every pixel can light every other one.
     """
-    if settings.radius is None:
+    if settings.sampling.radius is None:
         return 1.0
-    pixels = settings.radius * 2.0 ** (settings.levels + settings.first_level)
+    pixels = settings.sampling.radius * 2.0 ** (settings.sampling.levels + settings.sampling.first_level)
     return pixels / math.hypot(frame.width, frame.height)

@@ -1,6 +1,5 @@
 """Beyond the paper: what leaving out visibility costs, and what a bitmask of the screen and rays bring back."""
 
-import dataclasses
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,8 +14,8 @@ from refgi.papers.hssil.subjects import HALL, HORSE, JUDGED, TITLES, frame_of, l
 from refgi.papers.judging import Errors, errors_of
 from refgi.papers.records import Cell, Figure, Picture, Plot, Table
 from refgi.papers.timing import interleaved
+from refgi.settings import replaced
 from refgi.sssil import HssilSettings
-from refgi.sssil.settings import Visibility
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -24,11 +23,11 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-NONE: Visibility = "none"
-BITMASK: Visibility = "bitmask"
-RAYS: Visibility = "rays"
-NAMES: dict[Visibility, str] = {NONE: "v = 1, as published", BITMASK: "bitmask of the screen",
-                                RAYS: "a ray to each sample"}
+NONE = "none"
+BITMASK = "bitmask"
+RAYS = "rays"
+NAMES: dict[str, str] = {NONE: "v = 1, as published", BITMASK: "bitmask of the screen",
+                         RAYS: "a ray to each sample"}
 MANY = 1024  # samples: next to no noise is left
 THICKNESS = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # share of the diagonal
 
@@ -37,13 +36,13 @@ class Judged(NamedTuple):
     """One scene by all ways."""
 
     frame: "Frame"
-    settings: dict[Visibility, HssilSettings]
-    light: dict[Visibility, Array]  # of many samples
-    usual: dict[Visibility, Array]  # of the paper's
+    settings: dict[str, HssilSettings]
+    light: dict[str, Array]  # of many samples
+    usual: dict[str, Array]  # of the paper's
     exact: Array  # path tracing, seen emitters
-    off: dict[Visibility, Errors]
-    off_usual: dict[Visibility, Errors]
-    seconds: dict[Visibility, float]
+    off: dict[str, Errors]
+    off_usual: dict[str, Errors]
+    seconds: dict[str, float]
     noise: float  # standard error of path tracing, % of the mean
     sweep: dict[float, float]  # RMSE of the bitmask by thickness
 
@@ -68,15 +67,16 @@ def visible(bench: "Workbench") -> Figure:
     curves += [Curve(f"{TITLES[name]}, {NAMES[key]}", [THICKNESS[0], THICKNESS[-1]], [one.off[key].rmse] * 2, True)
                for name, one in found.items() for key in (NONE, RAYS)]
     one = found[HORSE]
+    few = one.settings[NONE].sampling.samples
     return Figure(
         shows="The paper supposes that all that is seen sees each other (v = 1), and gives no bound of the error.",
         facts=(*(view.frame.scene.description for view in found.values()), f"{one.frame.width}² pixels",
-               f"{one.settings[NONE].levels} levels from half resolution", f"{MANY} samples",
+               f"{one.settings[NONE].sampling.levels} levels from half resolution", f"{MANY} samples",
                f"path tracing with {bench.scale.truth_samples} samples a pixel"),
         pictures=tuple(picture for name, view in found.items() for picture in _pictures(name, view)), columns=4,
         tables=(Table("Error in % of the mean, against path tracing in which only what the camera sees shines",
-                      ("", "mean, W/m²", "RMSE", "MAE", "darker by", f"RMSE, {one.settings[NONE].samples} samples",
-                       f"ms, {one.settings[NONE].samples} samples", "times as long"), tuple(rows)),),
+                      ("", "mean, W/m²", "RMSE", "MAE", "darker by", f"RMSE, {few} samples",
+                       f"ms, {few} samples", "times as long"), tuple(rows)),),
         plots=(Plot(drawn(curves, Axes("assumed thickness, share of the diagonal", "RMSE, % of the mean", log_x=True)),
                     "Error of the bitmask over the thickness that surfaces are assumed to have."),),
         notes=_notes(found))
@@ -85,8 +85,8 @@ def visible(bench: "Workbench") -> Figure:
 def _judged(bench: "Workbench", name: str) -> Judged:
     frame = frame_of(bench, name, JUDGED)
     base = smaller(frame, 1, radius=None)  # all light that the picture can give: what is left is visibility
-    settings = {key: dataclasses.replace(base, visibility=key) for key in NAMES}
-    many = {key: dataclasses.replace(one, samples=MANY) for key, one in settings.items()}
+    settings = {key: replaced(base, {"visibility": key}) for key in NAMES}
+    many = {key: replaced(one, {"samples": MANY}) for key, one in settings.items()}
     light = {key: lit(frame, one) for key, one in many.items()}
     usual = {key: lit(frame, one) for key, one in settings.items()}
     exact = traced(bench, frame, (name, JUDGED), emitters="visible")
@@ -94,8 +94,8 @@ def _judged(bench: "Workbench", name: str) -> Judged:
     off, off_usual = ({key: errors_of(one, exact, covered) for key, one in made.items()} for made in (light, usual))
     taken = interleaved({key: partial(lit, frame, one) for key, one in settings.items()},
                         max(1, bench.scale.repeats // 2))
-    seconds: dict[Visibility, float] = {key: taken[key] for key in settings}
-    sweep = {share: errors_of(lit(frame, dataclasses.replace(many[BITMASK], thickness=share)), exact, covered).rmse
+    seconds: dict[str, float] = {key: taken[key] for key in settings}
+    sweep = {share: errors_of(lit(frame, replaced(many[BITMASK], {"thickness": share})), exact, covered).rmse
              for share in THICKNESS}
     return Judged(frame, settings, light, usual, exact, off, off_usual, seconds,
                   doubt(bench, frame, (name, JUDGED), emitters="visible"), sweep)
@@ -123,7 +123,7 @@ def _pictures(name: str, one: Judged) -> list[Picture]:
 
 
 def _notes(found: dict[str, Judged]) -> tuple[str, ...]:
-    def each(key: Visibility, part: str) -> str:
+    def each(key: str, part: str) -> str:
         return " and ".join(f"{getattr(one.off[key], part):.1f}" for one in found.values())
 
     brighter = " and ".join(f"{-one.off[NONE].lost:.0f}" for one in found.values())

@@ -144,7 +144,7 @@ def test_screen_space_visibility_needs_no_rsm():
     method = find_method("hssil")
     run, kind = method.function, method.settings
     with observe() as log:
-        run(frame, kind(visibility="bitmask"))
+        run(frame, of(kind, visibility="bitmask"))
     assert "rsm.reflective_shadow_map" not in {run.name for run in log.runs}
 
 

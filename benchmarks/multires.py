@@ -17,10 +17,10 @@ from refgi import Frame, load_scene
 from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import Scene
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
-from refgi.splat.multires.refinement.criteria import needs
+from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import top_level
 from refgi.splat.multires.refinement.refine import refine
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 
 DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -78,13 +78,13 @@ def _parts(frame: Frame, settings: MultiresSettings, repeats: int) -> dict[str, 
     buffer, lights, area = frame.gbuffer, choose_lights(frame, settings), footprints(frame, settings)
     buffer.resolve("position", "normal", "depth", "covered")
     top = top_level(buffer.height, buffer.width, settings.coarsest)
-    need = needs(buffer, settings, top)
+    need = discontinuities(buffer, settings, top)
     leaves = refine(need, buffer.covered, settings)
-    points = at_subsplats(buffer, leaves)
+    points = representative_points(buffer, leaves)
     values = evaluate(*points, lights, settings, area)
-    return {"mips": seconds(lambda: needs(buffer, settings, top), repeats),
+    return {"mips": seconds(lambda: discontinuities(buffer, settings, top), repeats),
             "refinement": seconds(lambda: refine(need, buffer.covered, settings), repeats),
-            "fetching": seconds(lambda: at_subsplats(buffer, leaves), repeats),
+            "fetching": seconds(lambda: representative_points(buffer, leaves), repeats),
             "lighting": seconds(lambda: evaluate(*points, lights, settings, area), repeats),
             "upsampling": seconds(lambda: upsample(values, leaves, buffer.covered), repeats)}
 
@@ -125,7 +125,7 @@ def _sweep(size: int, repeats: int) -> Iterator[Row]:
         for threshold in (0.25, 1.4):
             settings = MultiresSettings(lights=count, clamp="none", normal_threshold=threshold)
             leaves = shared_subsplats(frame.gbuffer, settings)
-            points, lights = at_subsplats(frame.gbuffer, leaves), choose_lights(frame, settings)
+            points, lights = representative_points(frame.gbuffer, leaves), choose_lights(frame, settings)
             taken = seconds(lambda p=points, x=lights, s=settings: evaluate(*p, x, s), repeats)
             pairs = points[0].shape[1] * lights.position.shape[1]
             yield Row(f"{count} lights, normal threshold {threshold}", 1e9 * taken / pairs, "ns a pair", "",

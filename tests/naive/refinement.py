@@ -59,7 +59,7 @@ def curvature(normal, position, covered, i, j, rate=False):
     return max(pairs)
 
 
-def needs(shape, top, finest, test):
+def discontinuities(shape, top, finest, test):
     """For each level, where `test(level, i, j)` says that a cell must be refined."""
     found = []
     for level in range(top + 1):

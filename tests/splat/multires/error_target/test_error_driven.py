@@ -17,9 +17,9 @@ from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.multires.error_target import error_driven as module
 from refgi.splat.multires.error_target import trial as trial_module
-from refgi.splat.multires.error_target.descent import assemble, begin, descend
-from refgi.splat.multires.error_target.error_driven import error_driven, estimate, mean_of, stratified
-from refgi.splat.multires.error_target.interpolate import blends, levels_of
+from refgi.splat.multires.error_target.descent import fill_coarsest, fill_level, fill_picture
+from refgi.splat.multires.error_target.error_driven import draw_samples, error_driven, estimate_error, estimate_mean
+from refgi.splat.multires.error_target.interpolate import blend_weights, surface_levels
 from refgi.splat.multires.error_target.near import near_light
 from refgi.splat.multires.settings import MultiresSettings
 from refgi.stages import observe
@@ -178,19 +178,19 @@ def plane(height, width, turn=None):
 
 def from_level(top, image, position, normal, covered):
     """Interpolate a picture's values at the pixels of one level down to all."""
-    levels, exact = levels_of(position, normal, covered, top), np.stack([image] * 3)
-    made, squares = blends(levels), [-(-side // 16) for side in image.shape]
+    levels, exact = surface_levels(position, normal, covered, top), np.stack([image] * 3)
+    made, squares = blend_weights(levels), [-(-side // 16) for side in image.shape]
     none = np.zeros((3, 0, 0), np.float32), np.zeros(squares, bool)
     light = np.zeros((3, *levels[top].covered.shape), np.float32)
-    begin(levels[top].place, exact, *none, light)
+    fill_coarsest(levels[top].representative_pixel, exact, *none, light)
     for k in range(top - 1, -1, -1):
         shape, unsplit = levels[k].covered.shape, np.zeros(levels[k + 1].covered.shape, bool)
         fine, blend = np.full((3, *shape), np.nan, np.float32), made[k]
         if k:
-            descend(light, blend.weight, blend.across, unsplit, levels[k].place, exact, *none, fine,
+            fill_level(light, blend.weight, blend.across, unsplit, levels[k].representative_pixel, exact, *none, fine,
                     np.zeros(shape, bool), np.zeros(shape, np.float32))
         else:
-            assemble(light, blend.weight, blend.across, unsplit, covered, exact, *none, fine)
+            fill_picture(light, blend.weight, blend.across, unsplit, covered, exact, *none, fine)
         light = fine
     return light[0]
 
@@ -231,9 +231,10 @@ def test_residuals_are_those_of_the_interpolated_normals():
     """Analytic: none on a plane; a pixel turned by 90 degrees against all around is off by sqrt 2."""
     position, normal = plane(16, 16)
     covered = np.ones((16, 16), bool)
-    assert max(blend.rest.max() for blend in blends(levels_of(position, normal, covered, 2))) < 1e-12
+    blends = blend_weights(surface_levels(position, normal, covered, 2))
+    assert max(blend.normal_error.max() for blend in blends) < 1e-12
     normal[:, 4, 6] = 1, 0, 0  # an even row and column: it stands for no coarser cell
-    one, two = (blend.rest for blend in blends(levels_of(position, normal, covered, 2)))
+    one, two = (blend.normal_error for blend in blend_weights(surface_levels(position, normal, covered, 2)))
     assert one[2, 3] == pytest.approx(2, rel=1e-5)
     assert two[1, 1] == pytest.approx(2, rel=1e-5)
     assert two.sum() == pytest.approx(2, rel=1e-5)
@@ -250,7 +251,7 @@ def test_near_light_is_what_exceeds_the_bound(clamp):
     most, settings = 2.0, unclamped(**clamp)
     receivers = Receivers(position, normal, covered)
     near = near_light(receivers, checked(receivers, lights, settings, None), most)
-    got = np.where(np.kron(near.touched, np.ones((16, 16), bool))[:23, :37], near.light, np.float32(0))
+    got = np.where(np.kron(near.has_near, np.ones((16, 16), bool))[:23, :37], near.irradiance, np.float32(0))
     away = at.astype(np.float32).astype(float)[:, None, None] - position[..., None]
     square = (away**2).sum(axis=0)
     kept = np.maximum(square, 0.05**2) if clamp else square
@@ -270,12 +271,12 @@ def test_samples_stand_for_all_covered_pixels_and_bound_the_error():
     picture = full + (0.02 * rng.standard_t(4, full.shape)).astype(np.float32)
     error = relative_error(picture, full, covered)
     for seed in range(20):
-        samples = stratified(covered, seed)
+        samples = draw_samples(covered, seed)
         assert covered.reshape(-1)[samples.pixel].all()
         assert samples.share.sum() == pytest.approx(1)
         assert len(np.unique(samples.pixel)) == len(samples.pixel) < covered.sum() / 8
         light, exact = (part.reshape(3, -1)[:, samples.pixel] for part in (picture, full))
-        mean, doubt = mean_of(samples, exact)
+        mean, doubt = estimate_mean(samples, exact)
         assert abs(mean - full[:, covered].mean(dtype=float)) < doubt
-        found = estimate(samples, exact - light, (mean, doubt))
+        found = estimate_error(samples, exact - light, (mean, doubt))
         assert found.low < error < found.high < 1.4 * error

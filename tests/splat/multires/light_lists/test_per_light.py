@@ -14,11 +14,11 @@ from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.multires.light_lists import per_light as module
 from refgi.splat.multires.light_lists.per_light import per_light, per_light_counts
-from refgi.splat.multires.refinement.criteria import needs
+from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import MultiresSettings
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 from tests.naive import eq2
 from tests.naive import per_light as naive
@@ -74,7 +74,7 @@ def full_sum(seen, lights, settings, footprint=None):
 
 def shared_list(buffer, settings):
     top = top_level(*buffer.covered.shape, settings.coarsest)
-    return refine(needs(buffer, settings, top), buffer.covered, settings)
+    return refine(discontinuities(buffer, settings, top), buffer.covered, settings)
 
 
 def relative_rmse(picture, full, covered):
@@ -148,10 +148,10 @@ def test_lights_that_split_nothing_stay_with_the_shared_list():
     seen, lights = wall(40, 64, np.float32, bumps=0.2), lamps(7, np.float32)
     settings = unclamped(coarsest=4, light_threshold=10.0, normal_threshold=1.0)
     start = shared_list(seen, settings)
-    expected = upsample(evaluate(*at_subsplats(seen, start), lights, settings), start, seen.covered)
+    expected = upsample(evaluate(*representative_points(seen, start), lights, settings), start, seen.covered)
     np.testing.assert_array_equal(per_light_counts(seen, lights, settings, None, start), 7 * start.counts)
-    tree, lists = module._lists(seen, lights, settings, None, start)
-    for mine, theirs in zip(module.cut(tree, next(lists)[0]), start, strict=True):
+    tree, lists = module._leaf_lists(seen, lights, settings, None, start)
+    for mine, theirs in zip(module.subsplats_of_leaves(tree, next(lists)[0]), start, strict=True):
         for one, other in zip(mine, theirs, strict=True):
             np.testing.assert_array_equal(one, other)  # fields and their order, masks
     np.testing.assert_allclose(per_light(seen, lights, settings, None, start), expected, rtol=8 * ROUNDING)
@@ -188,19 +188,19 @@ def test_bits_do_not_depend_on_threads_and_batches(monkeypatch):
     seen, lights = wall(50, 70, np.float32, holes=0.1, bumps=0.1), lamps(9, np.float32)
     settings = unclamped(coarsest=8)
     whole = per_light(seen, lights, settings)
-    monkeypatch.setattr(module, "ROOM", 1)  # a light a thread
+    monkeypatch.setattr(module, "BATCH_BYTES", 1)  # a light a thread
     np.testing.assert_array_equal(per_light(seen, lights, settings), whole)
     with threads(1):
         np.testing.assert_array_equal(per_light(seen, lights, settings), whole)
 
 
-def test_room_is_bounded_whatever_the_number_of_lights(monkeypatch):
+def test_memory_is_bounded_whatever_the_number_of_lights(monkeypatch):
     """Property: rooms are of one size, and no larger than asked for, at 10 and at 10,000 lights."""
     points = np.empty((3, 5000), np.float32)
-    monkeypatch.setattr(module, "ROOM", 1 << 20)
+    monkeypatch.setattr(module, "BATCH_BYTES", 1 << 20)
     for lights in (10, 10_000):
-        assert sum(part.nbytes for part in module._room(lights, points)) <= module.ROOM * 1.001
-    assert len(module._room(10, points).entries) == 10
+        assert sum(part.nbytes for part in module._batch_lists(lights, points)) <= module.BATCH_BYTES * 1.001
+    assert len(module._batch_lists(10, points).entries) == 10
 
 
 def test_nothing_seen_nothing_lit():
@@ -227,7 +227,7 @@ def test_levels_of_two_lights_cannot_be_added_before_upsampling():
     settings = unclamped(coarsest=4, light_threshold=0.2, widening=WIDENING)
     together, merged = per_light(seen, both, settings), {}
     for k in range(2):
-        tree, lists = module._lists(seen, alone(both, k), settings, None, None)
+        tree, lists = module._leaf_lists(seen, alone(both, k), settings, None, None)
         cells, values = next(lists)
         for c, value in zip(cells, values[0], strict=True):
             place = int(tree.level[c]), int(tree.row[c]), int(tree.column[c])
@@ -288,7 +288,7 @@ def test_highlights_of_phong_emitters_are_found(buddha, evidence):
     buffer, lights = buddha.gbuffer, choose_pixel_lights(buddha.rsms, count=64, pattern="grid")
     settings = unclamped(coarsest=8, clamp="geometry", clamp_value=25.0, light_threshold=0.05)
     full, start = full_sum(buffer, lights, settings), shared_list(buffer, settings)
-    shared = upsample(evaluate(*at_subsplats(buffer, start), lights, settings), start, buffer.covered)
+    shared = upsample(evaluate(*representative_points(buffer, start), lights, settings), start, buffer.covered)
     tight = dataclasses.replace(settings, light_threshold=0.003)
     count, error = {"shared": lights.position.shape[1] * len(start.level)}, {}
     error["shared"] = relative_rmse(shared, full, buffer.covered)
@@ -310,7 +310,7 @@ def test_a_highlight_on_a_flat_wall(evidence):
     settings = unclamped(coarsest=8, light_threshold=0.05)
     full, start = full_sum(seen, lights, settings), shared_list(seen, settings)
     assert len(start.level) == 64
-    shared = upsample(evaluate(*at_subsplats(seen, start), lights, settings), start, seen.covered)
+    shared = upsample(evaluate(*representative_points(seen, start), lights, settings), start, seen.covered)
     found = per_light(seen, lights, settings)
     errors = relative_rmse(shared, full, seen.covered), relative_rmse(found, full, seen.covered)
     assert errors[1] < 0.1 * errors[0]

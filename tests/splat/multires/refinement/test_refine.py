@@ -7,7 +7,7 @@ import pytest
 
 from refgi import Frame, load_scene
 from refgi.jit import threads
-from refgi.splat.multires.refinement.criteria import needs
+from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import level_picture, representative, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import MultiresSettings
@@ -67,7 +67,7 @@ def listed(subsplats):
 def refined(seen, top=None, **settings):
     chosen = MultiresSettings(**settings)
     top = top_level(*seen.covered.shape, chosen.coarsest) if top is None else top
-    return refine(needs(seen, chosen, top), seen.covered, chosen)
+    return refine(discontinuities(seen, chosen, top), seen.covered, chosen)
 
 
 @pytest.mark.feature("AMS-06")
@@ -78,7 +78,7 @@ def test_subsplats_are_the_published_list(shape, rule):
     for finest in (0, 2):
         settings = MultiresSettings(diagonal=rule, coarsest=4, finest=finest)
         top = top_level(*shape, 4)
-        need = needs(seen, settings, top)
+        need = discontinuities(seen, settings, top)
         subsplats = refine(need, seen.covered, settings)
         expected = naive.refine(need, seen.covered, rule)
         assert listed(subsplats) == naive.in_order(expected, top, need[top].shape[1])
@@ -115,7 +115,7 @@ def test_six_passes_from_16_cells_to_1024_pixels(evidence):
         if threshold == 0.1:
             assert subsplats.leaf[0].any()
             assert subsplats.leaf[6].any()
-            need = needs(seen, settings, 6)
+            need = discontinuities(seen, settings, 6)
             assert not any((one & leaf).any() for one, leaf in zip(need, subsplats.leaf, strict=True))
             evidence(f"12 discs at 1024 x 1024: {subsplats.counts.tolist()} subsplats of levels 0 to 6, "
                      "none above its threshold but pixels")
@@ -147,7 +147,7 @@ def test_a_level_by_itself_gives_the_list_only_where_criteria_are_monotone(evide
     shares = {}
     for rule in RULES:
         settings = MultiresSettings(diagonal=rule, coarsest=4)
-        need = needs(seen, settings, 4)
+        need = discontinuities(seen, settings, 4)
         alone = naive.by_levels(need, seen.covered, rule)
         times = naive.times_covered(alone, seen.covered.shape)
         shares[rule] = (times[seen.covered] > 1).mean()
@@ -168,7 +168,7 @@ def test_thresholds_that_rise_with_the_level_break_a_level_by_itself(evidence):
         low, high = naive.span(seen.depth, seen.covered, level, i, j)
         return high - low > 0.13 * level * low
 
-    need = tuple(naive.needs((64, 64), top, 0, test))
+    need = tuple(naive.discontinuities((64, 64), top, 0, test))
     times = naive.times_covered(naive.by_levels(need, seen.covered, "off"), (64, 64))
     subsplats = refine(need, seen.covered, MultiresSettings(diagonal="off"))
     assert (naive.times_covered(listed(subsplats), (64, 64)) == 1).all()

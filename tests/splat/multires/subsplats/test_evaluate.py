@@ -12,7 +12,7 @@ from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.multires.refinement.grid import Subsplats, level_shape, representatives
 from refgi.splat.multires.settings import MultiresSettings
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 
 unclamped = partial(MultiresSettings, clamp="none")  # near pairs as they are: what these tests sum pair by pair
 
@@ -42,7 +42,7 @@ def test_points_get_the_bits_of_the_full_sum(box, change):
     buffer = box.gbuffer
     full = irradiance(Receivers(buffer.position, buffer.normal, buffer.covered), lights, settings, area)
     some = cells(buffer.covered, 2)
-    points = at_subsplats(buffer, some)
+    points = representative_points(buffer, some)
     np.testing.assert_array_equal(evaluate(*points, lights, settings, area), full.reshape(3, -1)[:, some.pixel])
     with threads(1):
         np.testing.assert_array_equal(evaluate(*points, lights, settings, area), full.reshape(3, -1)[:, some.pixel])
@@ -57,7 +57,7 @@ def test_means_are_those_of_the_cells_surface(box):
     """Oracle: means over slices, cut at the border and by what is not covered."""
     position, normal, covered = box.gbuffer.resolve("position", "normal", "covered")
     some = cells(covered, 3)
-    points, normals = at_subsplats(box.gbuffer, some, "mean")
+    points, normals = representative_points(box.gbuffer, some, "mean")
     for k, (i, j) in enumerate(zip(some.row, some.column, strict=True)):
         inside = np.s_[8 * i : 8 * i + 8, 8 * j : 8 * j + 8]
         mask = covered[inside]
@@ -65,5 +65,6 @@ def test_means_are_those_of_the_cells_surface(box):
         np.testing.assert_allclose(points[:, k], position[:, *inside][:, mask].mean(axis=1), atol=MEAN_ERROR)
         np.testing.assert_allclose(normals[:, k], mean / np.linalg.norm(mean), atol=MEAN_ERROR)
     one = cells(covered, 0)
-    for mean, own in zip(at_subsplats(box.gbuffer, one, "mean"), at_subsplats(box.gbuffer, one), strict=True):
+    means, pixels = representative_points(box.gbuffer, one, "mean"), representative_points(box.gbuffer, one)
+    for mean, own in zip(means, pixels, strict=True):
         np.testing.assert_array_equal(mean, own)

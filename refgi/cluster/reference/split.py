@@ -122,7 +122,7 @@ def split_error(
     InputError
         If the first picture has no light to be a share of.
     """
-    lights = choose_lights(frame, settings)
+    lights = choose_lights(frame, settings.lights)
     base = dataclasses.replace(settings, visibility="series", prefilter="mip")
     areas, maps = clustered(frame, lights, base)
     pictures = {} if truth is None else {"truth": truth}
@@ -187,7 +187,8 @@ def exact_shadows(frame: "Frame", lights: "PixelLights", settings: ValSettings) 
     single = AreaLights(position, normal, frames, none, frames[:, :2], none, none[0], none[0], np.ones(count, np.int64),
                         np.arange(count, dtype=np.int32))
     return clustered_irradiance(surface(frame), facing(frame), lights, single, None, settings,
-                                footprint=footprints(frame, settings), given=member_visibility(frame, lights, single))
+                                footprint=footprints(frame, settings.lights, settings.pairs),
+                                given=member_visibility(frame, lights, single))
 
 
 def _rms(values: Array) -> float:

@@ -8,6 +8,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.look import DEPTH, NEAREST, RADIUS, choices, look, numbers_of
 from refgi.cluster.visibility.step import rules, step_lanes
 from refgi.cluster.visibility.visible import visibility
+from refgi.settings import of
 from tests.cluster.visibility.plates import are_shares, lit_by, map_of_plates, on_plane, rooms, square_share
 from tests.naive import soft_shadow as naive
 
@@ -23,7 +24,7 @@ METRES = DepthScale(False, 0.0, 1.0, 1.0)  # depths of the series are metres
 
 def shadow(areas, maps, points, normals, **settings):
     """V; on the scene's scale, whose bias is a known length, where the settings name none."""
-    return visibility(maps, areas, 0, points, normals, ValSettings(**{"depth_scale": "scene", **settings}))
+    return visibility(maps, areas, 0, points, normals, of(ValSettings, **{"depth_scale": "scene", **settings}))
 
 
 @pytest.mark.feature("VAL-12")
@@ -50,7 +51,7 @@ def test_mean_depth_is_that_of_the_blockers(evidence):
     depth = map_of_plates(48, [(-0.3, -0.06, -0.5, 0.5, 0.3)], 0.7)
     points, normals = on_plane(0.7, 0.15, 5)
     _, maps = lit_by(depth, 0.3, 2.0)
-    settings = ValSettings(visibility="step", cone=False)
+    settings = of(ValSettings, visibility="step", cone=False)
     numbers, (_, room, _, todo, visible) = numbers_of(maps, 0, 0.3, settings), rooms(25, 1)
     chosen, rule = choices(settings), rules(settings, METRES)
     count = look(numbers, chosen, points, 25, np.ones(25, np.bool_), todo, visible, room)
@@ -110,7 +111,7 @@ def test_blockers_near_the_light_escape_the_published_search(evidence):
     covers, found = {}, {}
     for name, switches, near in (("published", SEARCH, maps.near[0]), ("radial", frozenset(), maps.near[0]),
                                  ("axial", frozenset(), 0.2)):
-        settings = ValSettings(visibility="step", cone=False, as_published=switches)
+        settings = of(ValSettings, visibility="step", cone=False, as_published=switches)
         numbers, (_, room, _, todo, visible) = numbers_of(maps, 0, 1.0, settings), rooms(1, 1)
         numbers[NEAREST] = near
         look(numbers, choices(settings), point, 1, np.ones(1, np.bool_), todo, visible, room)

@@ -184,7 +184,8 @@ def error_driven(
     expect(target is not None, "target_error", "a share of the mean above 0", target)
     assert target is not None
     receivers = Receivers(*map(np.ascontiguousarray, buffer.resolve("position", "normal", "covered")))
-    packed, samples = checked(receivers, lights, settings, footprint), draw_samples(receivers.covered, settings.seed)
+    packed = checked(receivers, lights, settings.effective_pairs, footprint)
+    samples = draw_samples(receivers.covered, settings.lights.seed)
     exact = ExactIrradiance(receivers, packed)
     exact.evaluate(samples.pixel)
     sampled = exact.at(samples.pixel)

@@ -153,7 +153,7 @@ def _each_light(
 ) -> Iterator[tuple[Array, Array]]:
     points, normals = cells.points, cells.normals
     receivers = Receivers(points[:, None], normals[:, None], np.ones((1, points.shape[1]), np.bool_))
-    packed = checked(receivers, lights, settings, footprint)
+    packed = checked(receivers, lights, settings.effective_pairs, footprint)
     lobe_clamp, widening = (None, None) if packed.lobes is None else packed.lobes[1:]
     lights_apart, threshold = single_lights(packed), _threshold(cells, lights, settings, footprint)
     count = len(packed.shines)
@@ -190,7 +190,7 @@ def _threshold(
     if settings.threshold_form == "absolute":
         return value, zero
     roots = slice(cells.roots)
-    sums = evaluate(cells.points[:, roots], cells.normals[:, roots], lights, settings, footprint)
+    sums = evaluate(cells.points[:, roots], cells.normals[:, roots], lights, settings.effective_pairs, footprint)
     return value * sums.max(initial=zero) / real(max(1, lights.position.shape[1])), zero
 
 

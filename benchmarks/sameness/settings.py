@@ -1,8 +1,10 @@
 """Where the names of a case become settings: names of a ledger stay as they are when settings are renamed."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
+from benchmarks.sameness.multires_keys import multires_keys
 from refgi.methods import METHODS
 from refgi.scene import Camera
 from refgi.settings import Settings, choices_of, flat, leaves, replaced
@@ -16,10 +18,13 @@ VIEWS = {"cornell_side": Camera((0.5, 0.3, -0.6), (0.2, 0.2, 0.3)),
 # names of the ledger that are no short keys today, and values that have another name
 RENAMED: dict[str, dict[str, str]] = {}
 RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {}
+# of methods whose names became choices: what names together are today
+TRANSLATIONS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {"multires": multires_keys}
 
 
 def settings_of(method: str, **named: Any) -> Any:
     """Return the settings of a method, of which some differ from the default; "temporal" is the temporal filter."""
+    named = translated(method, named)
     for name in named.keys() & set(SETS):
         named[name] = frozenset(filter(None, named[name].split("+")))
     if "views" in named:
@@ -28,6 +33,11 @@ def settings_of(method: str, **named: Any) -> Any:
     if not issubclass(kind, Settings):
         return kind(**named)
     return replaced(kind(), {_name(method, name): renamed_value(method, name, value) for name, value in named.items()})
+
+
+def translated(method: str, named: dict[str, Any]) -> dict[str, Any]:
+    """Return what names of the ledger are today."""
+    return TRANSLATIONS[method](named) if method in TRANSLATIONS else named
 
 
 def renamed_value(method: str, name: str, value: Any) -> Any:

@@ -6,9 +6,13 @@ until an error is met. Unlike in the paper subsplats keep what was evaluated for
 """
 
 from refgi.splat.multires.multires import multires, shared_subsplats
-from refgi.splat.multires.settings import MultiresSettings
+from refgi.splat.multires.settings import ByError, ByGeometry, ByIrradiance, Criteria, MultiresSettings
 
 __all__ = [
+    "ByError",
+    "ByGeometry",
+    "ByIrradiance",
+    "Criteria",
     "MultiresSettings",
     "multires",
     "shared_subsplats",

@@ -14,7 +14,7 @@ from refgi.splat.multires.light_lists.per_light import per_light
 from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.refinement.refine import refine
-from refgi.splat.multires.settings import MultiresSettings
+from refgi.splat.multires.settings import ByError, ByGeometry, ByIrradiance, MultiresSettings
 from refgi.splat.multires.subsplats.detail import surface_detail
 from refgi.splat.multires.subsplats.evaluate import evaluate, evaluate_visible, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
@@ -54,40 +54,43 @@ def _irradiance(
     frame: "Frame", buffer: "GBuffer", lights: "PixelLights", footprint: Array | None, settings: MultiresSettings
 ) -> Array:
     """Return the irradiance at the pixels of one G-buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
-    _resolve_channels(buffer, settings)
-    receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
-    warn_of_clamp(receivers, lights, settings.effective_pairs, footprint, "multires")
-    if settings.target_error is not None:
-        irradiance = error_driven(buffer, lights, settings, footprint).irradiance
-    elif settings.per_light == "light":
-        irradiance = per_light(buffer, lights, settings, footprint, None)  # Sec. 3.3.1
-    elif settings.per_light == "shared_then_light":
-        start = shared_subsplats(buffer, settings)
-        irradiance = per_light(buffer, lights, settings, footprint, start)  # Sec. 6
+    subsplats, pairs = settings.subsplats, settings.effective_pairs
+    filter_all = "ams_filter_all" in settings.as_published
+    _resolve_channels(buffer, subsplats)
+    warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), lights, pairs, footprint, "multires")
+    if isinstance(subsplats, ByError):
+        irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed).irradiance
+    elif isinstance(subsplats, ByIrradiance):
+        start = None if subsplats.start is None else shared_subsplats(buffer, subsplats.start)  # Sec. 6
+        irradiance = per_light(buffer, lights, subsplats, pairs, footprint, start, filter_all=filter_all)  # Sec. 3.3.1
     else:
-        subsplats = shared_subsplats(buffer, settings)  # Sec. 3.2, 3.3
-        irradiance = _upsampled(frame, buffer, subsplats, lights, footprint, settings)  # Sec. 3.4, 3.5
+        shared = shared_subsplats(buffer, subsplats)  # Sec. 3.2, 3.3
+        values = _evaluated(frame, buffer, shared, lights, footprint, settings)  # Sec. 3.4
+        irradiance = upsample(values, shared, buffer.covered, subsplats.upsampling, filter_all=filter_all)  # Sec. 3.5
+        if "ams_rho_in_splat" in settings.as_published:  # the picture's albedo is multiplied in again later
+            albedo = buffer.albedo
+            irradiance = np.divide(irradiance, albedo, out=np.zeros_like(irradiance), where=albedo > 0)
     if settings.detail == 0:
         return irradiance
     eye = frame.scene.camera.eye
     return surface_detail(irradiance, buffer.position, buffer.normal, buffer.covered, eye, settings.detail)  # Eq. (3)
 
 
-def _resolve_channels(buffer: "GBuffer", settings: MultiresSettings) -> None:
+def _resolve_channels(buffer: "GBuffer", subsplats: ByGeometry | ByIrradiance | ByError) -> None:
     """Compute in one pass the channels that the steps need; depth only where a criterion uses it."""
-    by_geometry = settings.target_error is None and settings.per_light != "light"
-    uses_depth = by_geometry and not settings.criteria.isdisjoint({"depth", "derivative"})
+    criteria = None if isinstance(subsplats, ByError) else subsplats.criteria
+    uses_depth = criteria is not None and (criteria.depth, criteria.derivative) != (None, None)
     buffer.resolve("position", "normal", *(("depth",) if uses_depth else ()))
 
 
-def shared_subsplats(buffer: "GBuffer", settings: MultiresSettings) -> Subsplats:
+def shared_subsplats(buffer: "GBuffer", settings: ByGeometry) -> Subsplats:
     """Refine by geometry, once for all lights (Sec. 3.2 and 3.3).
 
     Parameters
     ----------
     buffer : GBuffer
         The camera's G-buffer.
-    settings : MultiresSettings
+    settings : ByGeometry
         Criteria, thresholds, coarsest and finest level.
 
     Returns
@@ -95,27 +98,26 @@ def shared_subsplats(buffer: "GBuffer", settings: MultiresSettings) -> Subsplats
     Subsplats
         The leaves.
     """
-    top = top_level(buffer.height, buffer.width, settings.coarsest)
-    return refine(discontinuities(buffer, settings, top), buffer.covered, settings)
+    top, criteria = top_level(buffer.height, buffer.width, settings.coarsest), settings.criteria
+    discontinuous = discontinuities(buffer, criteria, top, settings.finest)
+    return refine(discontinuous, buffer.covered, criteria.diagonal, criteria.traversal)
 
 
-def _upsampled(
-    frame: "Frame", buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights", footprint: Array | None,
+def _evaluated(
+    frame: "Frame", buffer: "GBuffer", shared: Subsplats, lights: "PixelLights", footprint: Array | None,
     settings: MultiresSettings,
 ) -> Array:
-    if settings.visibility == "rays":
-        values = evaluate_visible(frame.tracer, frame.scene.geometry, buffer, subsplats, lights)
+    """Return the irradiance at the subsplats, (3, n), W/m^2; times their albedo if that is asked for as published."""
+    subsplats = settings.subsplats
+    assert isinstance(subsplats, ByGeometry)
+    if subsplats.visibility is not None:
+        values = evaluate_visible(frame.tracer, frame.scene.geometry, buffer, shared, lights)
     else:
-        points = representative_points(buffer, subsplats, settings.representative)
+        points = representative_points(buffer, shared, subsplats.representative)
         values = evaluate(*points, lights, settings.effective_pairs, footprint)
-    rho_in_splat = "ams_rho_in_splat" in settings.as_published
-    if rho_in_splat:
-        values = values * buffer.albedo.reshape(3, -1)[:, subsplats.pixel]
-    irradiance = upsample(values, subsplats, buffer.covered, settings.upsampling,
-                     filter_all="ams_filter_all" in settings.as_published)
-    if rho_in_splat:  # the picture's albedo is multiplied in again later
-        irradiance = np.divide(irradiance, buffer.albedo, out=np.zeros_like(irradiance), where=buffer.albedo > 0)
-    return irradiance
+    if "ams_rho_in_splat" in settings.as_published:
+        values = values * buffer.albedo.reshape(3, -1)[:, shared.pixel]
+    return values
 
 
 def _footprints(frame: "Frame", lights: "PixelLights", settings: MultiresSettings) -> Array | None:

@@ -12,7 +12,6 @@ What single lights give near points beyond half the mean is summed at every pixe
 the mean, would be found by no sample. So are lobes. Subsplats carry the rest.
 """
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.draws import ERROR_SAMPLES, draws
-from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.splat.multires.error_target.interpolate import surface_levels
@@ -32,8 +30,9 @@ from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
+    from refgi.pairs.settings import PairSettings
     from refgi.rsm import GBuffer
-    from refgi.splat.multires.settings import MultiresSettings
+    from refgi.splat.multires.settings import ByError
 
 Array = npt.NDArray[Any]
 
@@ -133,7 +132,6 @@ class ErrorDriven(NamedTuple):
     irradiance: Array  # (3, h, w), W/m^2; excludes albedo/pi
     split: tuple[Array, ...]  # (h_l, w_l) bool for levels 0 (none) to the coarsest: cells that are refined
     covered: Array  # (h, w) bool, whether there is a surface
-    settings: "MultiresSettings"  # those by which `split` makes subsplats
     error: float  # estimated RMSE over the mean of the full sum
     low: float  # bounds of it; `high` is at most the target
     high: float
@@ -145,14 +143,15 @@ class ErrorDriven(NamedTuple):
     @property
     def subsplats(self) -> Subsplats:
         """The leaves, listed when asked for."""
-        return refine(self.split, self.covered, self.settings)
+        return refine(self.split, self.covered, "off")
 
 
 @stage("splat.error_driven")
 def error_driven(
-    buffer: "GBuffer", lights: "PixelLights", settings: "MultiresSettings", footprint: Array | None = None
+    buffer: "GBuffer", lights: "PixelLights", settings: "ByError", pairs: "PairSettings",
+    footprint: Array | None = None, seed: int = 0,
 ) -> ErrorDriven:
-    """Evaluate a picture to a relative error, `settings.target_error`.
+    """Evaluate a picture to a relative error, `settings.target`.
 
     Parameters
     ----------
@@ -160,10 +159,14 @@ def error_driven(
         The camera's G-buffer.
     lights : PixelLights
         The lights to sum.
-    settings : MultiresSettings
-        The target, the pairs' settings, the coarsest level and the seed of the samples.
+    settings : ByError
+        The target and the coarsest level.
+    pairs : PairSettings
+        Clamp, offset and lobes of a pair of light and receiver.
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+    seed : int
+        Of the samples that estimate the error.
 
     Returns
     -------
@@ -173,19 +176,16 @@ def error_driven(
     Raises
     ------
     InputError
-        If there is no target, and as `irradiance`.
+        As `irradiance`.
 
     Notes
     -----
     The promise is that of a sample of one pixel in 64 (`estimate_error`). Depths are not used: without visibility,
     irradiance changes across them by position and normal alone.
     """
-    target = settings.target_error
-    expect(target is not None, "target_error", "a share of the mean above 0", target)
-    assert target is not None
     receivers = Receivers(*map(np.ascontiguousarray, buffer.resolve("position", "normal", "covered")))
-    packed = checked(receivers, lights, settings.effective_pairs, footprint)
-    samples = draw_samples(receivers.covered, settings.lights.seed)
+    packed = checked(receivers, lights, pairs, footprint)
+    samples = draw_samples(receivers.covered, seed)
     exact = ExactIrradiance(receivers, packed)
     exact.evaluate(samples.pixel)
     sampled = exact.at(samples.pixel)
@@ -193,16 +193,14 @@ def error_driven(
     near = near_light(receivers, packed, NEAR * typical)
     top = max(1, top_level(buffer.height, buffer.width, settings.coarsest))
     trials = Trials(exact, near, surface_levels(*receivers, top))
-    found, threshold, count = _search(trials, samples, mean, typical, target)
+    found, threshold, count = _search(trials, samples, mean, typical, settings.target)
     picture = trials.picture()
-    as_split = dataclasses.replace(settings, target_error=None, diagonal="off", refinement="single_pass")
     number = lights.flux.shape[1]
-    pairs = np.count_nonzero(exact.is_known) * number + near.pairs
+    evaluated = np.count_nonzero(exact.is_known) * number + near.pairs
     full_pairs = np.count_nonzero(receivers.covered) * number
-    skip("splat.full_sum", f"{pairs / max(1, full_pairs):.1%} of its pairs, {count} trials: the error is at most "
+    skip("splat.full_sum", f"{evaluated / max(1, full_pairs):.1%} of its pairs, {count} trials: the error is at most "
                            f"{found.high:.2%} of the mean")
-    return ErrorDriven(picture, tuple(trials.split), receivers.covered, as_split, *found, threshold, count, pairs,
-                       full_pairs)
+    return ErrorDriven(picture, tuple(trials.split), receivers.covered, *found, threshold, count, evaluated, full_pairs)
 
 
 def _mean_without_brightest(irradiance: Array) -> float:

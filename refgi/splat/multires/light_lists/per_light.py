@@ -30,8 +30,9 @@ from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
+    from refgi.pairs.settings import PairSettings
     from refgi.rsm import GBuffer
-    from refgi.splat.multires.settings import MultiresSettings
+    from refgi.splat.multires.settings import ByIrradiance
 
 Array = npt.NDArray[Any]
 
@@ -41,8 +42,8 @@ SMALL_PICTURE = 1 << 18  # pixels up to which threads would wait for each other 
 
 @stage("splat.per_light")
 def per_light(
-    buffer: "GBuffer", lights: "PixelLights", settings: "MultiresSettings", footprint: Array | None = None,
-    start: Subsplats | None = None,
+    buffer: "GBuffer", lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings",
+    footprint: Array | None = None, start: Subsplats | None = None, *, filter_all: bool = False,
 ) -> Array:
     """Sum the irradiance of every light at every pixel, each from subsplats of its own.
 
@@ -52,13 +53,17 @@ def per_light(
         What the camera sees.
     lights : PixelLights
         Lights to sum, diffuse, glossy or both.
-    settings : MultiresSettings
-        Levels, threshold, upsampling, and how one light lights one receiver.
+    settings : ByIrradiance
+        Levels, threshold and upsampling.
+    pairs : PairSettings
+        Clamp, offset and lobes of a pair of light and receiver.
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
     start : Subsplats, optional
         A list for all lights, of the same picture and levels, that each one goes on to refine; the coarsest cells if
         absent.
+    filter_all : bool
+        As for `upsample`.
 
     Returns
     -------
@@ -73,7 +78,7 @@ def per_light(
     Notes
     -----
     A cell is split where max - min of any channel over its quadrants, evaluated at their representatives (the paper
-    does not say where), exceeds T: `light_threshold` itself, that share of the largest irradiance of this light at its
+    does not say where), exceeds T: `threshold` itself, that share of the largest irradiance of this light at its
     samples of the quadrants' level and above, or that share of the largest sum of all lights at the coarsest cells,
     over N. The paper's T is the first; errors of N lights may add up to N T. A threshold of 0 splits
     every cell. Samples may miss a narrow highlight, or an edge: with `start`, the authors' plan for later (Sec. 6),
@@ -86,8 +91,7 @@ def per_light(
     Lights that need no split beyond the list they started from share its leaves; they are summed before they are
     upsampled, once. All sums are compensated, in the order of the lights.
     """
-    tree, lists = _leaf_lists(buffer, lights, settings, footprint, start)
-    filter_all = "ams_filter_all" in settings.as_published
+    tree, lists = _leaf_lists(buffer, lights, settings, pairs, footprint, start)
     picture = _CompensatedSum((3, *tree.shape), buffer.dtype)
     shared, shared_cells = _CompensatedSum((3, 0, 0), buffer.dtype), None
 
@@ -112,11 +116,11 @@ def per_light(
 
 
 def per_light_counts(
-    buffer: "GBuffer", lights: "PixelLights", settings: "MultiresSettings", footprint: Array | None = None,
-    start: Subsplats | None = None,
+    buffer: "GBuffer", lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings",
+    footprint: Array | None = None, start: Subsplats | None = None,
 ) -> Array:
     """Return the number of subsplats of all lights on each level, (top + 1,) int64 (Table 1); see `per_light`."""
-    tree, lists = _leaf_lists(buffer, lights, settings, footprint, start)
+    tree, lists = _leaf_lists(buffer, lights, settings, pairs, footprint, start)
     counts = np.zeros(tree.top + 1, np.int64)
     for cells, _ in lists:
         counts += np.bincount(tree.level[cells], minlength=tree.top + 1)
@@ -135,8 +139,8 @@ class _CompensatedSum:
 
 
 def _leaf_lists(
-    buffer: "GBuffer", lights: "PixelLights", settings: "MultiresSettings", footprint: Array | None,
-    start: Subsplats | None,
+    buffer: "GBuffer", lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings",
+    footprint: Array | None, start: Subsplats | None,
 ) -> tuple[CellTree, Iterator[tuple[Array, Array]]]:
     """Return the tree of all cells and, for each light, its leaves (n,) and their irradiance (3, n), W/m^2."""
     height, width = buffer.covered.shape
@@ -145,17 +149,17 @@ def _leaf_lists(
     points, normals = representative_points(buffer, everywhere, settings.representative)
     refined = np.zeros(len(tree.level), np.bool_) if start is None else interior_cells(tree, start)
     cells = ReceiverTree(tree.first, tree.roots, points, normals, refined)
-    return tree, _each_light(cells, lights, settings, footprint)
+    return tree, _each_light(cells, lights, settings, pairs, footprint)
 
 
 def _each_light(
-    cells: ReceiverTree, lights: "PixelLights", settings: "MultiresSettings", footprint: Array | None
+    cells: ReceiverTree, lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings", footprint: Array | None
 ) -> Iterator[tuple[Array, Array]]:
     points, normals = cells.points, cells.normals
     receivers = Receivers(points[:, None], normals[:, None], np.ones((1, points.shape[1]), np.bool_))
-    packed = checked(receivers, lights, settings.effective_pairs, footprint)
+    packed = checked(receivers, lights, pairs, footprint)
     lobe_clamp, widening = (None, None) if packed.lobes is None else packed.lobes[1:]
-    lights_apart, threshold = single_lights(packed), _threshold(cells, lights, settings, footprint)
+    lights_apart, threshold = single_lights(packed), _threshold(cells, lights, settings, pairs, footprint)
     count = len(packed.shines)
     batch = _batch_lists(count, points)
     chosen, values = np.empty(points.shape[1], np.int32), np.empty_like(points)
@@ -178,19 +182,19 @@ def _batch_lists(lights: int, points: Array) -> SubsplatLists:
 
 
 def _threshold(
-    cells: ReceiverTree, lights: "PixelLights", settings: "MultiresSettings", footprint: Array | None
+    cells: ReceiverTree, lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings", footprint: Array | None
 ) -> tuple[Any, Any]:
     """Return (a, b) of T = a + b times the largest irradiance of a light's samples."""
     real = cells.points.dtype.type
-    value, zero = real(settings.light_threshold), real(0.0)
+    value, zero = real(settings.threshold), real(0.0)
     if value == 0:  # splits every cell, those whose quadrants are all equal too
         return real(-1.0), zero
-    if settings.threshold_form == "relative":
+    if settings.form == "relative":
         return zero, value
-    if settings.threshold_form == "absolute":
+    if settings.form == "absolute":
         return value, zero
     roots = slice(cells.roots)
-    sums = evaluate(cells.points[:, roots], cells.normals[:, roots], lights, settings.effective_pairs, footprint)
+    sums = evaluate(cells.points[:, roots], cells.normals[:, roots], lights, pairs, footprint)
     return value * sums.max(initial=zero) / real(max(1, lights.position.shape[1])), zero
 
 

@@ -29,7 +29,7 @@ from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.rsm import GBuffer
-    from refgi.splat.multires.settings import MultiresSettings
+    from refgi.splat.multires.settings import Chord, Criteria, DepthRange, DepthSlope, NormalRange, Rate
 
 Array = npt.NDArray[Any]
 CHANNELS = {"depth": ("depth",), "derivative": ("depth",), "normal": ("normal",), "curvature": ("normal", "position")}
@@ -150,17 +150,17 @@ def _over_columns(least: Array, most: Array, rim: int, low: Array, high: Array) 
 
 
 @stage("splat.criteria")
-def discontinuities(buffer: "GBuffer", settings: "MultiresSettings", top: int) -> tuple[Array, ...]:
+def discontinuities(buffer: "GBuffer", criteria: "Criteria", top: int, finest: int = 0) -> tuple[Array, ...]:
     """Return which cells of each level hold a discontinuity.
 
     Parameters
     ----------
     buffer : GBuffer
         The camera's G-buffer.
-    settings : MultiresSettings
-        Criteria, their thresholds, `rim` and the level that is `finest`.
-    top : int
-        Coarsest level.
+    criteria : Criteria
+        Mipmaps to build, their thresholds and the `rim`.
+    top, finest : int
+        Coarsest and finest level.
 
     Returns
     -------
@@ -170,42 +170,45 @@ def discontinuities(buffer: "GBuffer", settings: "MultiresSettings", top: int) -
     height, width = buffer.covered.shape
     sizes = layout(height, width, top, first=1)
     discontinuous = np.zeros(element_count(sizes) if top else 0, np.bool_)
-    begin = sizes[settings.finest + 1, START] if settings.finest < top else len(discontinuous)
+    begin = sizes[finest + 1, START] if finest < top else len(discontinuous)
     if begin < len(discontinuous):
-        buffer.resolve(*(name for criterion in sorted(settings.criteria) for name in CHANNELS[criterion]))
-        for criterion in sorted(settings.criteria):
-            _MARK_BY[criterion](buffer, settings, top, discontinuous, begin)
+        chosen = [name for name in sorted(_MARK_BY) if getattr(criteria, name) is not None]
+        buffer.resolve(*(channel for name in chosen for channel in CHANNELS[name]))
+        for name in chosen:
+            _MARK_BY[name](buffer, getattr(criteria, name), criteria.rim, top, discontinuous, begin)
     return (np.zeros((height, width), np.bool_), *level_views(discontinuous, sizes, first=1))
 
 
-def _mark_by_depth(buffer: "GBuffer", settings: "MultiresSettings", top: int, discontinuous: Array, begin: int) -> None:
-    mip = depth_ranges(buffer.depth, buffer.covered, top, settings.rim)
-    _mark_depths(mip.lows[0], mip.highs[0], buffer.depth.dtype.type(settings.depth_threshold), begin, discontinuous)
+def _mark_by_depth(
+    buffer: "GBuffer", settings: "DepthRange", rim: int, top: int, discontinuous: Array, begin: int
+) -> None:
+    mip = depth_ranges(buffer.depth, buffer.covered, top, rim)
+    _mark_depths(mip.lows[0], mip.highs[0], buffer.depth.dtype.type(settings.threshold), begin, discontinuous)
 
 
 def _mark_by_derivative(
-    buffer: "GBuffer", settings: "MultiresSettings", top: int, discontinuous: Array, begin: int
+    buffer: "GBuffer", settings: "DepthSlope", _: int, top: int, discontinuous: Array, begin: int
 ) -> None:
     mip = depth_slopes(buffer.depth, buffer.covered, top)
-    _mark_maxima(mip.highs[0], buffer.depth.dtype.type(settings.derivative_threshold), begin, discontinuous)
+    _mark_maxima(mip.highs[0], buffer.depth.dtype.type(settings.threshold), begin, discontinuous)
 
 
 def _mark_by_normal(
-    buffer: "GBuffer", settings: "MultiresSettings", top: int, discontinuous: Array, begin: int
+    buffer: "GBuffer", settings: "NormalRange", rim: int, top: int, discontinuous: Array, begin: int
 ) -> None:
-    components = buffer.normal if settings.normal_components == "xyz" else buffer.normal[:2]
-    mip = normal_ranges(components, buffer.covered, top, settings.rim)
-    _mark_normals(mip.lows, mip.highs, buffer.normal.dtype.type(settings.normal_threshold), begin, discontinuous)
+    components = buffer.normal if settings.components == "xyz" else buffer.normal[:2]
+    mip = normal_ranges(components, buffer.covered, top, rim)
+    _mark_normals(mip.lows, mip.highs, buffer.normal.dtype.type(settings.threshold), begin, discontinuous)
 
 
 def _mark_by_curvature(
-    buffer: "GBuffer", settings: "MultiresSettings", top: int, discontinuous: Array, begin: int
+    buffer: "GBuffer", settings: "Chord | Rate", _: int, top: int, discontinuous: Array, begin: int
 ) -> None:
-    mip = curvatures(buffer.normal, buffer.position, buffer.covered, top, settings.curvature == "rate")
-    _mark_maxima(mip.highs[0], buffer.normal.dtype.type(settings.curvature_threshold), begin, discontinuous)
+    mip = curvatures(buffer.normal, buffer.position, buffer.covered, top, settings.name() == "rate")
+    _mark_maxima(mip.highs[0], buffer.normal.dtype.type(settings.threshold), begin, discontinuous)
 
 
-_MARK_BY = {"depth": _mark_by_depth, "derivative": _mark_by_derivative, "normal": _mark_by_normal,
+_MARK_BY: dict[str, Any] = {"depth": _mark_by_depth, "derivative": _mark_by_derivative, "normal": _mark_by_normal,
             "curvature": _mark_by_curvature}
 
 

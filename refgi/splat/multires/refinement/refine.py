@@ -7,7 +7,7 @@ are refined too: true of ranges with thresholds that do not rise with the level 
 of "corner" and "literal".
 """
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,6 @@ from refgi.splat.multires.refinement.cells import EMPTY, ENOUGH, REFINED, CellSt
 from refgi.splat.multires.refinement.grid import Subsplats, representative
 from refgi.splat.multires.refinement.mipmap import COLUMNS, ROWS, START, element_count, level_views
 from refgi.stages import stage
-
-if TYPE_CHECKING:
-    from refgi.splat.multires.settings import MultiresSettings
 
 Array = npt.NDArray[Any]
 
@@ -96,7 +93,9 @@ class _Columns(NamedTuple):
 
 
 @stage("splat.refine")
-def refine(discontinuous: tuple[Array, ...], covered: Array, settings: "MultiresSettings") -> Subsplats:
+def refine(
+    discontinuous: tuple[Array, ...], covered: Array, diagonal: str = "corner", traversal: str = "single_pass"
+) -> Subsplats:
     """Return the subsplats that cover every surface of the picture once.
 
     Parameters
@@ -105,16 +104,18 @@ def refine(discontinuous: tuple[Array, ...], covered: Array, settings: "Multires
         Which cells hold a discontinuity, for levels 0 to top; level 0 is never refined.
     covered : (h, w) ndarray of bool
         Whether a pixel shows a surface.
-    settings : MultiresSettings
-        `diagonal`, and `refinement`: "single_pass", depth first, or "list", as published; both give the same.
+    diagonal : str
+        Neighbours across a corner that count: "off", "corner", "literal" or "full8"; see `cells`.
+    traversal : str
+        "single_pass", depth first, or "list", as published; both give the same.
 
     Returns
     -------
     Subsplats
         Cells of the coarsest level row by row, depth first within them.
     """
-    cells = classify_cells(discontinuous, np.ascontiguousarray(covered), settings.diagonal)
-    return pass_by_pass(cells) if settings.refinement == "list" else _depth_first(cells)
+    cells = classify_cells(discontinuous, np.ascontiguousarray(covered), diagonal)
+    return pass_by_pass(cells) if traversal == "list" else _depth_first(cells)
 
 
 def _depth_first(cells: CellStates) -> Subsplats:

@@ -6,9 +6,17 @@ until an error is met. Unlike in the paper subsplats keep what was evaluated for
 """
 
 from refgi.splat.multires.multires import multires, shared_subsplats
-from refgi.splat.multires.settings import ByError, ByGeometry, ByIrradiance, Criteria, MultiresSettings
+from refgi.splat.multires.settings import (
+    PRESETS,
+    ByError,
+    ByGeometry,
+    ByIrradiance,
+    Criteria,
+    MultiresSettings,
+)
 
 __all__ = [
+    "PRESETS",
     "ByError",
     "ByGeometry",
     "ByIrradiance",

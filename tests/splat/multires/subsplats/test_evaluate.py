@@ -1,6 +1,5 @@
-"""Light at subsplats: the bits of the full sum, and where a subsplat is lit."""
+"""Irradiance at subsplats: the bits of the full sum, and representative points."""
 
-from functools import partial
 
 import numpy as np
 import pytest
@@ -11,10 +10,8 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.multires.refinement.grid import Subsplats, level_shape, representatives
-from refgi.splat.multires.settings import MultiresSettings
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
-
-unclamped = partial(MultiresSettings, clamp="none")  # near pairs as they are: what these tests sum pair by pair
+from tests.splat.multires.choices import unclamped
 
 MEAN_ERROR = 1e-6  # a float32 mean over at most 64 positions below 1 m and unit normals
 
@@ -38,19 +35,19 @@ def cells(covered, level):
 def test_points_get_the_bits_of_the_full_sum(box, change):
     """Oracle: `irradiance` at the same pixels, in another order and on one thread."""
     settings = unclamped(lights=64, **change)
-    lights, area = choose_lights(box, settings), footprints(box, settings)
-    buffer = box.gbuffer
-    full = irradiance(Receivers(buffer.position, buffer.normal, buffer.covered), lights, settings, area)
+    lights, buffer, pairs = choose_lights(box, settings.lights), box.gbuffer, settings.pairs
+    area = footprints(box, settings.lights, pairs)
+    full = irradiance(Receivers(buffer.position, buffer.normal, buffer.covered), lights, pairs, area)
     some = cells(buffer.covered, 2)
     points = representative_points(buffer, some)
-    np.testing.assert_array_equal(evaluate(*points, lights, settings, area), full.reshape(3, -1)[:, some.pixel])
+    np.testing.assert_array_equal(evaluate(*points, lights, pairs, area), full.reshape(3, -1)[:, some.pixel])
     with threads(1):
-        np.testing.assert_array_equal(evaluate(*points, lights, settings, area), full.reshape(3, -1)[:, some.pixel])
+        np.testing.assert_array_equal(evaluate(*points, lights, pairs, area), full.reshape(3, -1)[:, some.pixel])
 
 
 def test_no_points_get_no_light(box):
-    lights = choose_lights(box, unclamped(lights=16))
-    assert evaluate(np.zeros((3, 0), np.float32), np.zeros((3, 0), np.float32), lights, unclamped()).size == 0
+    lights = choose_lights(box, unclamped(lights=16).lights)
+    assert evaluate(np.zeros((3, 0), np.float32), np.zeros((3, 0), np.float32), lights, unclamped().pairs).size == 0
 
 
 def test_means_are_those_of_the_cells_surface(box):

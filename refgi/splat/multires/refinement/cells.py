@@ -9,17 +9,18 @@ artefacts (Fig. 15 bottom), so neighbours at the same level can count; outside t
     full8      any of the eight neighbours has one
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.splat.multires.refinement.mipmap import element_count, layout, level_views
+from refgi.splat.multires.settings import Diagonal
 
 Array = npt.NDArray[Any]
 
-RULES = ("off", "corner", "literal", "full8")
+RULES = get_args(Diagonal)
 EMPTY, ENOUGH, REFINED = range(3)  # states of a cell
 
 
@@ -32,7 +33,7 @@ class CellStates(NamedTuple):
     leaf_sizes: Array  # (top + 1, 3): layout with level 0
 
 
-def classify_cells(discontinuous: tuple[Array, ...], covered: Array, diagonal: str) -> CellStates:
+def classify_cells(discontinuous: tuple[Array, ...], covered: Array, diagonal: Diagonal) -> CellStates:
     """Return the state of every cell: REFINED if it, or by the rule a neighbour, is discontinuous.
 
     discontinuous: levels 0 to top of (h_l, w_l) bool, of which level 0 is never refined; covered: (h, w) bool, where

@@ -16,6 +16,7 @@ from refgi.jit import kernel, prange
 from refgi.splat.multires.refinement.cells import EMPTY, ENOUGH, REFINED, CellStates, classify_cells
 from refgi.splat.multires.refinement.grid import Subsplats, representative
 from refgi.splat.multires.refinement.mipmap import COLUMNS, ROWS, START, element_count, level_views
+from refgi.splat.multires.settings import Diagonal, Traversal
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
@@ -94,7 +95,8 @@ class _Columns(NamedTuple):
 
 @stage("splat.refine")
 def refine(
-    discontinuous: tuple[Array, ...], covered: Array, diagonal: str = "corner", traversal: str = "single_pass"
+    discontinuous: tuple[Array, ...], covered: Array, diagonal: Diagonal = "corner",
+    traversal: Traversal = "single_pass",
 ) -> Subsplats:
     """Return the subsplats that cover every surface of the picture once.
 

@@ -5,7 +5,7 @@ are those of `vpl`, a shadow ray each: the picture converges to `vpl` as subspla
 lights become many, at the subsplats' share of the rays.
 """
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.pairs.tiles import taken
 from refgi.scene import Geometry
 from refgi.splat.multires.refinement.grid import Subsplats
+from refgi.splat.multires.settings import Representative
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from refgi.rsm import GBuffer
 
 Array = npt.NDArray[Any]
-Representative = Literal["pixel", "mean"]
 
 
 @stage("splat.representative_points")

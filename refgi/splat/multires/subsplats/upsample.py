@@ -5,7 +5,7 @@ it makes halos and rings (Fig. 7). Instead the coarsest level is doubled, merged
 texels that hold irradiance and doubled again, down to the pixels.
 """
 
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +13,11 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel, prange, threads
 from refgi.splat.multires.refinement.grid import Subsplats, level_shape
+from refgi.splat.multires.settings import Upsampling
 from refgi.splat.multires.subsplats.tent import demo_pass, tent_pass
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
-Mode = Literal["tent", "demo", "nearest", "naive_bilinear"]
 
 FEW_TEXELS = 1 << 16  # of a level, that one thread fills before others are awake
 
@@ -80,7 +80,7 @@ def _sort(level: Array, row: Array, bases: Array, starts: Array, order: Array) -
 
 @stage("splat.upsample")
 def upsample(
-    values: Array, subsplats: Subsplats, covered: Array, mode: Mode = "tent", *, filter_all: bool = False,
+    values: Array, subsplats: Subsplats, covered: Array, mode: Upsampling = "tent", *, filter_all: bool = False,
     corner_rule: bool = True,
 ) -> Array:
     """Interpolate the irradiance of subsplats at every pixel.
@@ -117,7 +117,7 @@ def upsample(
     and no `corner_rule` are the paper to the letter. A constant stays that constant to the bit, but for
     "naive_bilinear".
     """
-    expect(mode in get_args(Mode), "mode", " or ".join(map(repr, get_args(Mode))), mode)
+    expect(mode in get_args(Upsampling), "mode", " or ".join(map(repr, get_args(Upsampling))), mode)
     expect(values.shape == (3, len(subsplats.level)), "values", f"shape (3, {len(subsplats.level)})", values.shape)
     expect(covered.shape == subsplats.shape, "covered", f"shape {subsplats.shape}", covered.shape)
     values, covered = np.ascontiguousarray(values), np.ascontiguousarray(covered)

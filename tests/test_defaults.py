@@ -66,7 +66,7 @@ def test_shadows_are_exact_where_the_method_traces_rays_anyway(settings, rays):
 
 @pytest.mark.parametrize("method", ["truth", "vpl", "sii"])
 def test_a_picture_has_the_shadows_of_its_method(method):
-    settings = FEW.get(method, find_method(method).load()[1](**({} if method in FEW else {"lights": 16})))
+    settings = FEW.get(method, of(find_method(method).settings, **({} if method in FEW else {"lights": 16})))
     frames = {shadows: Frame(BOX, shadows=shadows, **TINY) for shadows in ("map", "exact")}
     assert (frames["map"].direct != frames["exact"].direct).any()
     usual = "map" if method == "sii" else "exact"
@@ -94,6 +94,8 @@ def test_settings_of_multires_change_one_by_one_without_its_clamp_in_the_way():
         settings = of(MultiresSettings, **change)
         assert settings.effective_pairs.clamp is None
         assert replaced(settings, {"clamp": "none"}).effective_pairs.clamp is None
-    for change in ({}, {"openness_flux": "scale"}, {"subsplats": "error"}):
-        assert of(MultiresSettings, **change).effective_pairs.clamp == DiscClamp()
+    for settings in (MultiresSettings(), of(MultiresSettings, openness_flux="scale"),
+                     of(MultiresSettings, subsplats="error")):
+        assert settings.effective_pairs.clamp == DiscClamp()
     assert not of(SiiSettings, clamp="auto").pairs.clamps
+    assert not ValSettings().pairs.clamps

@@ -5,6 +5,7 @@
 `error_target` until an error is met. Unlike in the paper, subsplats at full resolution are not filtered.
 """
 
+from refgi.method import Method
 from refgi.splat.multires.multires import multires, shared_subsplats
 from refgi.splat.multires.settings import (
     PRESETS,
@@ -25,3 +26,7 @@ __all__ = [
     "multires",
     "shared_subsplats",
 ]
+
+METHOD = Method(
+    "multires", "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes",
+    multires, MultiresSettings, visibility=False, presets=PRESETS)

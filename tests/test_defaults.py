@@ -95,7 +95,7 @@ def test_settings_of_multires_change_one_by_one_without_its_clamp_in_the_way():
         assert settings.effective_pairs.clamp is None
         assert replaced(settings, {"clamp": "none"}).effective_pairs.clamp is None
     for settings in (MultiresSettings(), of(MultiresSettings, openness_flux="scale"),
-                     of(MultiresSettings, target_error=0.1)):
+                     of(MultiresSettings, subsplats="error")):
         assert settings.effective_pairs.clamp == DiscClamp()
     assert not of(SiiSettings, clamp="auto").pairs.clamps
     assert not ValSettings().pairs.clamps

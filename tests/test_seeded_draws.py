@@ -17,7 +17,7 @@ from refgi.sampling import halton, sobol_owen
 from refgi.scene import PointLight, load_scene
 from refgi.settings import of
 from refgi.splat.gather.gather_sum import disc_pattern
-from refgi.splat.multires.error_target.error_driven import stratified
+from refgi.splat.multires.error_target.error_driven import draw_samples
 from refgi.splat.sii.reach.threshold import light_range
 from refgi.splat.sii.settings import SiiSettings
 from refgi.sssil import HssilSettings
@@ -151,7 +151,7 @@ def test_samples_of_the_error_target_of_multires(seed):
             if here:
                 y, x = here[math.floor(draw(seed, 4, i * across + j) * len(here))]
                 expected.append(y * 151 + x)
-    assert stratified(covered, seed).pixel.tolist() == expected
+    assert draw_samples(covered, seed).pixel.tolist() == expected
 
 
 @pytest.mark.parametrize("seed", SEEDS)

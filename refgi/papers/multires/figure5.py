@@ -13,7 +13,7 @@ from refgi.papers.records import Cell, Figure, Picture, Table
 from refgi.splat.multires.multires import multires
 from refgi.splat.multires.refinement.grid import Subsplats, level_picture
 from refgi.splat.multires.settings import MultiresSettings
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _left_at(subsplats: Subsplats, level: int, blocks: Array, exposure: float) -
 
 
 def _blocks(frame: "Frame", settings: MultiresSettings, subsplats: Subsplats) -> Array:
-    points, normals = at_subsplats(frame.gbuffer, subsplats, settings.representative)
+    points, normals = representative_points(frame.gbuffer, subsplats, settings.representative)
     values = evaluate(points, normals, choose_lights(frame, settings), settings)
     return np.asarray(upsample(values, subsplats, frame.gbuffer.covered, "nearest"))
 

@@ -12,7 +12,7 @@ from refgi.papers.records import Figure, Table
 from refgi.papers.timing import interleaved
 from refgi.splat.multires.multires import multires
 from refgi.splat.multires.settings import MultiresSettings, Upsampling
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def _ways(settings: MultiresSettings) -> dict[str, MultiresSettings]:
 def _timed(bench: "Workbench") -> dict[str, float]:
     frame, settings = frame_of(bench, DRAGON, LARGE), settings_of(bench, DRAGON)
     subsplats, covered = subsplats_of(frame, settings), frame.gbuffer.covered
-    values = evaluate(*at_subsplats(frame.gbuffer, subsplats), choose_lights(frame, settings), settings)
+    values = evaluate(*representative_points(frame.gbuffer, subsplats), choose_lights(frame, settings), settings)
     work: dict[str, Any] = {way: partial(upsample, values, subsplats, covered, way) for way in get_args(Upsampling)}
     work["filter_all"] = partial(upsample, values, subsplats, covered, "tent", filter_all=True)
     return interleaved(work, bench.scale.repeats)

@@ -1,7 +1,7 @@
-"""Mips: where their levels lie in one array, and how a level follows from the one below it.
+"""Min-max and max mipmaps: where their levels lie in one array, and how a level follows from the one below it.
 
 Levels lie one after another, each row by row, so that what holds for every cell of every level is one loop. A row of
-cells of the coarsest level belongs to one thread, which makes all finer levels inside it while they are in its cache.
+cells of the coarsest level belongs to one thread, which fills all finer levels inside it while they are in its cache.
 """
 
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ Array = npt.NDArray[Any]
 START, ROWS, COLUMNS = range(3)  # columns of a layout
 
 
-class Mip(NamedTuple):
+class Mipmap(NamedTuple):
     """Least and largest values within the cells of levels 0 to top, or the largest alone (a max mip).
 
     Level 0 of a min-max mip is the channel as it came, on both sides. Elsewhere a cell without any surface has `low`
@@ -36,21 +36,7 @@ class Mip(NamedTuple):
 
 
 def layout(height: int, width: int, top: int, first: int = 0) -> Array:
-    """Return where each level lies.
-
-    Parameters
-    ----------
-    height, width : int
-        Size of the picture.
-    top : int
-        Coarsest level.
-    first : int
-        Finest level that is kept; those below it take no room.
-
-    Returns
-    -------
-    (top + 1, 3) ndarray of int64
-        First element, rows and columns of levels 0 to `top`.
+    """Return first element, rows and columns of levels 0 to `top`, (top + 1, 3) int64; levels below `first` are empty.
 
     Examples
     --------
@@ -63,80 +49,30 @@ def layout(height: int, width: int, top: int, first: int = 0) -> Array:
     return np.column_stack([cells.cumsum() - cells, shapes])
 
 
-def room(sizes: Array) -> int:
-    """Return how many elements the levels of a layout take together.
-
-    Parameters
-    ----------
-    sizes : (top + 1, 3) ndarray
-        The layout.
-
-    Returns
-    -------
-    int
-        Elements.
-    """
+def element_count(sizes: Array) -> int:
+    """Return the number of elements of a layout's levels together."""
     start, rows, columns = sizes[-1]
     return int(start + rows * columns)
 
 
-def views(values: Array, sizes: Array, first: int = 0) -> tuple[Array, ...]:
-    """Return the levels as arrays that share the memory of `values`.
-
-    Parameters
-    ----------
-    values : (..., n) ndarray
-        All levels.
-    sizes : (top + 1, 3) ndarray
-        Their layout.
-    first : int
-        Finest level that is kept.
-
-    Returns
-    -------
-    tuple of (..., h_l, w_l) ndarray
-        Levels `first` to `top`.
-    """
+def level_views(values: Array, sizes: Array, first: int = 0) -> tuple[Array, ...]:
+    """Return levels `first` to top of `values`, (..., n), as views of (..., h_l, w_l)."""
     return tuple(values[..., start : start + rows * columns].reshape(*values.shape[:-1], rows, columns)
                  for start, rows, columns in sizes[first:])
 
 
 @kernel
 def rows_of(strip: int, level: int, sizes: Array) -> tuple[int, int]:
-    """Return which rows of a level lie in a row of cells of the coarsest level.
-
-    Parameters
-    ----------
-    strip : int
-        Row of the coarsest level.
-    level : int
-        The level.
-    sizes : (top + 1, 3) ndarray
-        The layout.
-
-    Returns
-    -------
-    tuple of 2 ints
-        The first row and one past the last.
-    """
+    """Return the first row and one past the last of a level within one row (strip) of the coarsest level's cells."""
     along = len(sizes) - 1 - level
     return strip << along, min((strip + 1) << along, sizes[level, ROWS])
 
 
 @kernel
 def coarsen(strip: int, finest: int, sizes: Array, lows: Array, highs: Array) -> None:
-    """Fill the levels above the finest, as far as they lie in one row of cells of the coarsest level.
+    """Fill the levels above the finest, as far as they lie in one row (strip) of cells of the coarsest level.
 
-    Parameters
-    ----------
-    strip : int
-        Row of the coarsest level.
-    finest : int
-        Level that is known.
-    sizes : (top + 1, 3) ndarray
-        The layout.
-    lows, highs : (n,) ndarray
-        All levels of the least and of the largest values; `lows` is empty in a max mip.
+    lows, highs: (n,), all levels of the least and of the largest values; `lows` is empty in a max mipmap.
     """
     for level in range(finest + 1, len(sizes)):
         below, rows, fine = sizes[level - 1]

@@ -14,7 +14,7 @@ import click
 from refgi import __version__
 from refgi.cli.session import DONE, FAILED, USAGE, Session
 
-VERBS = ("scenes", "render", "sequence", "compare", "bench", "explain", "info")
+VERBS = ("scenes", "render", "sequence", "compare", "explain", "info")
 HELP = """Indirect light by four published methods on the CPU, judged by path tracing.
 
 SCENE is a built-in name such as cornell_box (see `refgi scenes`), a scene file (.json), or a mesh (.glb, .gltf, .obj,

@@ -28,7 +28,7 @@ def topics() -> list[str]:
 
 def main() -> int:
     if sys.argv[1:2] == ["paper"]:
-        return importlib.import_module("benchmarks.papers.command").main(sys.argv[2:])
+        return importlib.import_module("benchmarks.papers.runner").main(sys.argv[2:])
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("topics", nargs="*", metavar="topic", help=f"of {', '.join(topics())}; all if none")
     parser.add_argument("--quick", action="store_true", help="smaller sizes, fewer repeats")

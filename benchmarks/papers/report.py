@@ -1,58 +1,36 @@
 """The page of a paper: one file that works from disk, each figure beside the numbers that were printed."""
 
-import base64
 from pathlib import Path
 from typing import Any
 
-from benchmarks.papers.outcome import Outcome, Reproduction
-from benchmarks.papers.records import Cell, Figure, Picture, Ratios, Table
+from markupsafe import Markup
+
+from benchmarks.papers.records import Cell, Figure, Outcome, Picture, Ratios, Reproduction, Table
 from refgi.compare.report import PAGE as COMMON
-from refgi.compare.report import TIMES, number, templates
-from refgi.image import png_bytes, write_text
+from refgi.compare.report import TIMES, data_uri, machine, number, templates
+from refgi.image import write_text
 from refgi.provenance import plain
 
 PAGE = Path(__file__).with_name("page")
 
 
 def write_report(made: Reproduction, folder: Path) -> None:
-    """Write index.html, whole or not at all.
-
-    Parameters
-    ----------
-    made : Reproduction
-        What `reproduce` gave, whole or as far as it has come.
-    folder : Path
-        An existing folder.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
-    write_text(Path(folder) / "index.html", page(made))
+    """Write index.html, whole or not at all."""
+    write_text(folder / "index.html", page(made))
 
 
 def page(made: Reproduction) -> str:
-    """Return the page as HTML that refers to nothing outside itself.
-
-    Parameters
-    ----------
-    made : Reproduction
-        What `reproduce` gave.
-
-    Returns
-    -------
-    str
-        The same text for equal input.
-    """
-    from markupsafe import Markup
-
+    """Return the page as HTML that refers to nothing outside itself; the same text for equal input."""
     style = (COMMON / "style.css").read_text("utf-8") + (PAGE / "paper.css").read_text("utf-8")
+    lead = (f"{made.paper.citation}. Its figures and tables, made again and set beside the numbers that were printed. "
+            "Times are ratios within each machine\N{RIGHT SINGLE QUOTATION MARK}s own run.")
     return templates(PAGE).get_template("paper.html.j2").render(
         style=Markup(style), script=Markup((PAGE / "lightbox.js").read_text("utf-8")),
-        paper=made.paper, facts=_facts(made), verdict=_verdict(made), failures=_failures(made),
+        kind=f"papers · {made.paper.name}", title=made.paper.title, lead=lead, facts=_facts(made),
+        verdict=_verdict(made), failures=[(outcome.entry.label, f"could not be made: {outcome.failure}")
+                                          for outcome in made.outcomes if outcome.figure is None],
         figures=[_figure(outcome, outcome.figure) for outcome in made.outcomes if outcome.figure is not None],
-        versions=made.environment["versions"], machine=_machine(made.environment),
+        versions=made.environment["versions"], machine=machine(made.environment),
     )
 
 
@@ -60,7 +38,7 @@ def _facts(made: Reproduction) -> list[str]:
     scale = made.scale
     return [f"{scale.name} run", f"{scale.size} {TIMES} {scale.size} pixels",
             f"shadow maps of {scale.rsm_resolution} {TIMES} {scale.rsm_resolution}",
-            f"medians of {scale.repeats} interleaved rounds", _machine(made.environment)]
+            f"medians of {scale.repeats} interleaved rounds", machine(made.environment)]
 
 
 def _verdict(made: Reproduction) -> str:
@@ -70,15 +48,9 @@ def _verdict(made: Reproduction) -> str:
     return f"{whole}; the run ended before the other {pending}." if pending else f"{whole}."
 
 
-def _failures(made: Reproduction) -> list[tuple[str, str]]:
-    return [(outcome.entry.label, outcome.failure) for outcome in made.outcomes if outcome.figure is None]
-
-
 def _figure(outcome: Outcome, figure: Figure) -> dict[str, Any]:
-    return {
-        "key": outcome.entry.key, "label": outcome.entry.label, "title": outcome.entry.title, "shows": figure.shows,
-        "facts": figure.facts, "notes": figure.notes, "columns": figure.columns,
-        "seconds": f"{number(outcome.seconds)} s",
+    return outcome.entry._asdict() | {
+        "facts": figure.facts, "notes": figure.notes, "seconds": f"{number(outcome.seconds)} s",
         "pictures": [_picture(picture) for picture in figure.pictures],
         "ratios": [_ratios(ratios) for ratios in figure.ratios],
         "tables": [_table(table) for table in figure.tables],
@@ -90,7 +62,7 @@ def _figure(outcome: Outcome, figure: Figure) -> dict[str, Any]:
 def _picture(picture: Picture) -> dict[str, Any]:
     height, width = picture.pixels.shape[:2]
     return {"title": picture.title, "said": picture.said, "width": width, "height": height,
-            "source": "data:image/png;base64," + base64.b64encode(png_bytes(picture.pixels)).decode("ascii")}
+            "source": data_uri(picture.pixels)}
 
 
 def _ratios(ratios: Ratios) -> dict[str, Any]:
@@ -105,7 +77,7 @@ def _ratios(ratios: Ratios) -> dict[str, Any]:
 
 def _table(table: Table) -> dict[str, Any]:
     texts = {i for row in table.rows for i, cell in enumerate(row) if i and isinstance(cell, str)}
-    return {"title": table.title, "columns": list(table.columns), "paper": table.paper, "texts": texts,
+    return {"title": table.title, "columns": table.columns, "paper": table.paper, "texts": texts,
             "rows": [[_cell(cell) for cell in row] for row in table.rows]}
 
 
@@ -113,7 +85,3 @@ def _cell(cell: Cell) -> str:
     if cell is None:
         return ""
     return cell if isinstance(cell, str) else number(cell)
-
-
-def _machine(environment: Any) -> str:
-    return f"{environment['platform']}, {environment['cpu']}, {environment['threads']} threads"

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import __main__ as benchmarks
-from benchmarks.papers.catalogue import Entry, Paper
-from benchmarks.papers.records import Bar, Figure, Ratios
+from benchmarks.papers.records import Bar, Entry, Figure, Paper, Ratios
 from refgi.image import is_from_refgi
 
 ROOT = Path(__file__).parents[3]
@@ -32,7 +31,7 @@ def run(monkeypatch, capsys):
 
 
 def works(bench):
-    return Figure("Works.", (bench.scale.name,), ratios=(Ratios("speed", (Bar("slow", 1.0, 2.5),)),))
+    return Figure((bench.scale.name,), ratios=(Ratios("speed", (Bar("slow", 1.0, 2.5),)),))
 
 
 def fails(_bench):
@@ -41,7 +40,8 @@ def fails(_bench):
 
 @pytest.fixture
 def _two_figures(monkeypatch):
-    entries = (Entry("fig1", "Figure 1", "Works", works), Entry("fig2", "Figure 2", "Fails", fails))
+    entries = (Entry("fig1", "Figure 1", "Works", "Works.", works),
+               Entry("fig2", "Figure 2", "Fails", "Fails.", fails))
     monkeypatch.setattr(Paper, "load", lambda _: entries)
 
 

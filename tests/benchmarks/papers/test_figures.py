@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.papers.catalogue import PAPERS, find_paper
-from benchmarks.papers.files import as_json
+from benchmarks.papers.records import PAPERS, find_paper
 from benchmarks.papers.report import page
+from benchmarks.papers.runner import as_json
 from tests.compare.test_report import Outline
 
 KEYS = {"sii": ["fig4", "fig6", "fig7", "fig8", "fig11", "fig12", "table1", "table2", "table3", "full"],

@@ -7,14 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from benchmarks.papers.hssil.figure2 import covered, profile
-from benchmarks.papers.hssil.figure4 import SHOWN, apart, parts_of
-from benchmarks.papers.hssil.figure5 import settings_of_figure
-from benchmarks.papers.hssil.figure7 import expected
-from benchmarks.papers.hssil.filtered import left
-from benchmarks.papers.hssil.references import scan_line
-from benchmarks.papers.hssil.scenes import side_views
-from benchmarks.papers.hssil.splitting import STEPS, chain
+from benchmarks.papers.hssil.error import STEPS, chain
+from benchmarks.papers.hssil.judged import settings_of_figure_5
+from benchmarks.papers.hssil.levels import SHOWN, covered, parts_of, profile, scan_line
+from benchmarks.papers.hssil.setups import SETUPS, expected
 from benchmarks.papers.hssil.subjects import (
     BASKET,
     BOX,
@@ -25,12 +21,12 @@ from benchmarks.papers.hssil.subjects import (
     reach_of,
     scene_of,
     settings_of,
+    side_views,
     smaller,
     wide_frame,
 )
-from benchmarks.papers.hssil.times import SETUPS
-from benchmarks.papers.subjects import seen_by
-from benchmarks.papers.workbench import FULL, Workbench
+from benchmarks.papers.hssil.temporal import left
+from benchmarks.papers.workbench import FULL, Workbench, seen_by
 from refgi.sssil import HssilSettings
 from refgi.sssil.temporal.settings import TemporalSettings
 from tests.benchmarks.papers.conftest import SMALL
@@ -63,7 +59,7 @@ def table(figure, number=0):
 
 def test_the_papers_numbers_are_the_printed_ones(figures):
     figure = figures["fig6"]
-    paper = sorted(figure.tables[0].paper)
+    paper = figure.tables[0].paper
     assert {row[0]: tuple(row[k] for k in paper) for row in figure.tables[0].rows} == PRINTED
     for setup in SETUPS:
         for card in (0, 1):
@@ -79,7 +75,7 @@ def test_a_full_run_has_the_papers_sizes():
     assert (timed.width, timed.height) == (1280, 720)
     assert (judged.width, judged.height) == (720, 720)
     assert settings_of(timed) == HssilSettings(radius=20.0)
-    assert dataclasses.astuple(settings_of_figure(judged)) == dataclasses.astuple(
+    assert dataclasses.astuple(settings_of_figure_5(judged)) == dataclasses.astuple(
         HssilSettings(radius=40.0, start="full", pattern="pixel"))
 
 
@@ -123,8 +119,8 @@ def test_levels_add_up_to_the_picture(bench, evidence):
     parts = parts_of(frame, settings_of(frame, levels=6))
     assert len(parts.single) == 6
     assert all(light.any() for light in parts.single[:SHOWN])
-    assert apart(parts) < ROUNDING
-    evidence(f"Fig. 4: four levels one by one add up to their picture to {apart(parts):.1g} of its largest value")
+    assert parts.apart < ROUNDING
+    evidence(f"Fig. 4: four levels one by one add up to their picture to {parts.apart:.1g} of its largest value")
 
 
 @pytest.mark.feature("HSS-18")
@@ -151,6 +147,7 @@ def test_a_scan_line_is_a_row():
 def test_the_first_level_has_most_samples(figures, evidence):
     without_disc = [1 / 4**k for k in range(4)]
     assert without_disc[0] / sum(without_disc) == pytest.approx(0.753, abs=5e-4)  # of the paper's four levels
+    assert expected(4) == pytest.approx([0.803, 0.15, 0.038, 0.009], abs=5e-4)
     share = expected(5)
     assert sum(share) == pytest.approx(1)
     assert share[0] > 0.7
@@ -185,6 +182,7 @@ def test_more_cameras_bring_light_back(figures, evidence):
 def test_the_filter_takes_noise_away(figures, evidence):
     a = TemporalSettings().weight
     assert left(a, 2)[1] == pytest.approx(a**2 + (1 - a) ** 2)  # two frames
+    assert left(0.9, 3) == pytest.approx([1.0, 0.82, 0.674], abs=5e-4)
     assert left(a, 500)[-1] == pytest.approx((1 - a) / (1 + a))
     rows = table(figures["temporal"])
     kept = {name: row["variance left, %"] for name, row in rows.items()}

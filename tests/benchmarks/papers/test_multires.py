@@ -5,8 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from benchmarks.papers.curves import Axes, Curve, drawn
-from benchmarks.papers.multires.scenes import BUILDERS
+from benchmarks.papers.multires.subjects import BUILDERS
 
 
 @pytest.fixture
@@ -164,12 +163,3 @@ def test_the_headline_has_every_way_on_both_scenes(figures):
             assert row["RMSE"] <= float(name.split("target error ")[1].removesuffix(" %")), name
         assert row["RMSE"] >= 0
         assert row["speed-up"] > 0
-
-
-def test_curves_leave_out_what_cannot_be_drawn():
-    points = Curve("a", (1, 2, 4), (1.0, float("nan"), 3.0)), Curve("b", (0, 2, 4), (1.0, 0.0, 3.0), dashed=True)
-    svg = drawn(points, Axes("lights", "error", log_x=True, log_y=True))
-    assert svg == drawn(points, Axes("lights", "error", log_x=True, log_y=True))
-    assert 'aria-label="error over lights"' in svg
-    assert "nan" not in svg
-    assert "#0102" not in svg

@@ -7,11 +7,10 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from benchmarks.papers.catalogue import PAPERS, Entry, choose, find_paper
+from benchmarks.papers.records import PAPERS, Entry, choose, find_paper
 from benchmarks.papers.report import page
 from benchmarks.papers.runner import reproduce
-from benchmarks.papers.timing import interleaved
-from benchmarks.papers.workbench import FULL, QUICK, Workbench
+from benchmarks.papers.workbench import FULL, QUICK, Workbench, interleaved
 from refgi.errors import InputError
 from refgi.image import read_exr
 from tests.benchmarks.papers.conftest import ENTRIES, TINY, gradient
@@ -69,7 +68,7 @@ def test_an_interrupted_run_leaves_whole_files(paper, tmp_path, monkeypatch):
     def interrupt(_bench):
         raise KeyboardInterrupt
 
-    entries = (*ENTRIES[:2], Entry("fig3", "Figure 3", "Never", interrupt), ENTRIES[2])
+    entries = (*ENTRIES[:2], Entry("fig3", "Figure 3", "Never", "Nothing.", interrupt), ENTRIES[2])
     monkeypatch.setattr(type(paper), "load", lambda _: entries)
     with pytest.raises(KeyboardInterrupt):
         reproduce(paper, scale=TINY, out=tmp_path)
@@ -120,7 +119,8 @@ def test_progress_names_each_figure(paper):
 
 def test_work_is_timed_in_turn_after_a_warm_up():
     order = []
-    interleaved({"a": lambda: order.append("a"), "b": lambda: order.append("b")}, 2)
+    seconds = interleaved({"a": lambda: order.append("a"), "b": lambda: order.append("b")}, 2)
+    assert list(seconds) == ["a", "b"]
     assert order == ["a", "b", "a", "b", "a", "b"]
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.papers.judging import errors_of
+from benchmarks.papers.workbench import errors_of
 
 
 @pytest.fixture

@@ -7,17 +7,24 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from benchmarks.papers.subjects import seen_by
-from benchmarks.papers.val.figure8 import clustered_along, moved
-from benchmarks.papers.val.figure12 import pieces
-from benchmarks.papers.val.figure13 import _penumbra
-from benchmarks.papers.val.motion import changes, mean_motion, motion
-from benchmarks.papers.val.painting import cluster_of_pixel, painted, palette
-from benchmarks.papers.val.scenes import ATRIUM_FACES, BUILDERS, blob_at, body
-from benchmarks.papers.val.sequence import EXACT, FEWER, INTERLEAVED, RESTARTED, WARM
-from benchmarks.papers.val.subjects import HORSE, Clustered, clustered, frame_of, settings_of
-from benchmarks.papers.val.table2 import STEPS, own_seconds
-from benchmarks.papers.workbench import Workbench
+from benchmarks.papers.val.clusters import cluster_of_pixel, moved, painted
+from benchmarks.papers.val.frames import STEPS, own_seconds
+from benchmarks.papers.val.moving import EXACT, FEWER, INTERLEAVED, RESTARTED, WARM, mean_motion, motion, pieces
+from benchmarks.papers.val.shadows import penumbra
+from benchmarks.papers.val.subjects import (
+    ATRIUM_FACES,
+    BUILDERS,
+    HORSE,
+    Clustered,
+    blob_at,
+    body,
+    clustered,
+    clustered_along,
+    frame_of,
+    scene_of,
+    settings_of,
+)
+from benchmarks.papers.workbench import Workbench, changes, palette, seen_by
 from refgi.frame import Frame
 from refgi.rsm import PixelLights
 from refgi.scene import Mesh
@@ -107,8 +114,9 @@ def test_centres_move_continuously_with_the_light(bench, evidence):
     diagonal = frame_of(bench, HORSE).scene.geometry.diagonal
     moves = []
     for count in (17, 33):
-        frames = moved(bench, count)[count // 2 : count]  # the upper half of the way, on the ceiling alone at its end
-        found = clustered_along(frames, settings_of(bench), warm=False).frames
+        frames = moved(bench, scene_of(bench, HORSE), count)
+        upper = frames[count // 2 : count]  # half of the way, on the ceiling alone at its end
+        found = clustered_along(upper, settings_of(bench), warm=False)
         moves.append(mean_motion([motion(*pair, diagonal) for pair in pairwise(found)]))
     ratio = moves[1].typical / moves[0].typical
     assert abs(ratio - 0.5) < HALF_THE_STEP
@@ -172,10 +180,10 @@ def test_a_narrow_spot_is_crisp(figures):
     assert wide["penumbra by rays, %"] > narrow["penumbra by rays, %"]
 
 
-def test_what_is_no_shadow_is_no_penumbra():
+def test_what_is_no_shadow_is_nopenumbra():
     free, covered = np.full((3, 1, 4), 2.0), np.ones((1, 4), bool)
     light = np.stack([np.array([[2.0, 1.9, 1.0, 0.1]])] * 3)
-    assert _penumbra(light, free, covered) == 50.0  # two in shadow, one of them half lit
+    assert penumbra(light, free, covered) == 50.0  # two in shadow, one of them half lit
 
 
 def test_the_split_ends_at_the_published_picture(figures):

@@ -23,7 +23,11 @@ NOT_TOPICS = {"__init__", "__main__", "harness"}
 
 
 def topics() -> list[str]:
-    return sorted(path.stem for path in FOLDER.glob("*.py") if path.stem not in NOT_TOPICS)
+    """Return the names of modules, and of packages that have `rows`."""
+    modules = {path.stem for path in FOLDER.glob("*.py")} - NOT_TOPICS
+    packages = (path.parent.name for path in FOLDER.glob("*/__init__.py"))
+    return sorted(modules.union(name for name in packages
+                                if hasattr(importlib.import_module(f"benchmarks.{name}"), "rows")))
 
 
 def main() -> int:

@@ -13,13 +13,13 @@ import numpy as np
 
 from benchmarks.harness import Row, ratio, seconds
 from benchmarks.raster import _disc_rays, _tracer
-from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.maps import shadow_maps
 from refgi.cluster.settings import ValSettings
 from refgi.jit import threads
 from refgi.rays import Tracer
 from refgi.rsm import paraboloid_depth_maps
-from refgi.rsm.projection import paraboloid_projection
+from refgi.rsm.raster.projection import paraboloid_projection
 from refgi.scene import Geometry, load_scene
 from refgi.stages import Memory, observe
 

@@ -17,11 +17,11 @@ from refgi import Frame, load_scene
 from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import Scene
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
-from refgi.splat.refinement.criteria import needs
-from refgi.splat.refinement.grid import top_level
-from refgi.splat.refinement.refine import refine
-from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
-from refgi.splat.subsplats.upsample import upsample
+from refgi.splat.multires.refinement.criteria import needs
+from refgi.splat.multires.refinement.grid import top_level
+from refgi.splat.multires.refinement.refine import refine
+from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.upsample import upsample
 
 DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 STAND_INS = {"dragon_bunny": "atrium:faces=405000", "flying_bunnies": "atrium:faces=417000,seed=2",

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.harness import Row, ratio, seconds
 from refgi.rsm import camera_projection, gbuffer, paraboloid_depth_maps, rasterize
-from refgi.rsm.projection import Projection, paraboloid_projection
+from refgi.rsm.raster.projection import Projection, paraboloid_projection
 from refgi.scene import Geometry, load_scene, material_table
 
 CHANNELS = ("depth", "position", "normal", "albedo", "material_id", "triangle_id")

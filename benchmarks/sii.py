@@ -10,12 +10,13 @@ import numpy as np
 
 from benchmarks.harness import Row, ratio, seconds
 from refgi import Frame, load_scene
+from refgi.lights import Warp, warp_stacked
 from refgi.lights.selection import choose_lights
-from refgi.rsm import Warp, rasterize, warp_stacked
+from refgi.rsm import rasterize
 from refgi.sampling import halton
 from refgi.scene import Scene
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.reach.fragments import fragments
+from refgi.splat.sii.reach.fragments import fragments
 from refgi.stages import Memory, observe
 
 ROOM = "cornell_sphere:faces=17000"

@@ -14,8 +14,8 @@ from refgi.rays import Tracer
 from refgi.rays.embree import RunDoor
 from refgi.scene import Geometry, load_scene
 from refgi.truth import TruthSettings
-from refgi.truth.moments import add_pass, no_passes
 from refgi.truth.passes import one_pass
+from refgi.truth.result import add_pass, no_passes
 from refgi.truth.settings import Estimator
 from refgi.truth.task import Task
 from refgi.truth.truth import task_of

@@ -13,14 +13,14 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.scene.model import LightTable, MaterialTable, Scene, light_table, material_table
-from refgi.scene.origin import near_origin
+from refgi.scene.motion import near_origin
 from refgi.scene.values import is_count
 from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.rays import Tracer
     from refgi.rsm import GBuffer, Rsm
-    from refgi.rsm.extent import Extent
+    from refgi.rsm.buffers.extent import Extent
 
 Array = npt.NDArray[Any]
 Shadows = Literal["map", "exact"]
@@ -113,21 +113,21 @@ class Frame:
     @cached_property
     def seen_extent(self) -> "Extent":
         """The box of what the camera sees; of all triangles where it sees nothing."""
-        from refgi.rsm.extent import seen_extent
+        from refgi.rsm.buffers.extent import seen_extent
 
         return seen_extent(self.gbuffer).or_whole(self.scene.geometry)
 
     @cached_property
     def lit_extent(self) -> "Extent":
         """The box of what lights reach; of all triangles where that is nothing."""
-        from refgi.rsm.extent import lit_extent
+        from refgi.rsm.buffers.extent import lit_extent
 
         return lit_extent(self.rsms).or_whole(self.scene.geometry)
 
     @cached_property
     def extent(self) -> "Extent":
         """The scene's extent: the box of what the camera sees and of what lights reach."""
-        from refgi.rsm.extent import joined
+        from refgi.rsm.buffers.extent import joined
 
         return joined(self.seen_extent, self.lit_extent)
 

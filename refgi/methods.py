@@ -54,7 +54,7 @@ METHODS = {
     for method in (
         Method("sii", "refgi.splat.sii:sii", "SiiSettings", False,
                "Splatting Indirect Illumination (2006): pixel lights shine where they are significant",
-               "refgi.splat.account.ledger:energy_ledger"),
+               "refgi.splat.sii.ledger:energy_ledger"),
         Method("multires", "refgi.splat.multires:multires", "MultiresSettings", False,
                "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes"),
         Method("val", "refgi.cluster.val:val", "ValSettings", True,
@@ -63,7 +63,7 @@ METHODS = {
         Method("hssil", "refgi.sssil.hssil:hssil", "HssilSettings", False,
                "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees",
                memory="refgi.sssil.memory:extra_bytes"),
-        Method("gather", "refgi.splat.gathering.gather:gather", "GatherSettings", False,
+        Method("gather", "refgi.splat.gather:gather", "GatherSettings", False,
                "Reflective Shadow Maps (2005): gathering around the projected point"),
         Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,
                "the same pixel lights with ray-traced visibility"),

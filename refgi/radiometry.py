@@ -57,7 +57,7 @@ def falloff_in_float64(d: Any, axis: Any, cone: Any, plain: float) -> tuple[floa
     axis : tuple of 3 floats
         Direction the spot shines in, of any length; float64.
     cone : (6,) ndarray of float64
-        Of `refgi.scene.cone.cone_row`.
+        Of `refgi.scene.light.cone_row`.
     plain : float
         Sine of the angle inside the cone from which on float64 alone will do: `FOR_FLOAT32`, or inf for nowhere.
 
@@ -95,7 +95,7 @@ def spot_falloff(d: Any, axis: Any, cone: Any, plain: float) -> Any:
     axis : tuple of 3 floats
         Direction the spot shines in, of any length; float64.
     cone : (6,) ndarray of float64
-        Of `refgi.scene.cone.cone_row`.
+        Of `refgi.scene.light.cone_row`.
     plain : float
         Sine of the angle inside the cone from which on float64 alone will do: `FOR_FLOAT32`, or inf for nowhere.
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from refgi.rsm.light_projection import light_projection
-from refgi.rsm.projection import PARABOLOID, PERSPECTIVE, cube_projection, dual_paraboloid_projection, project
+from refgi.rsm.buffers.light_projection import light_projection
+from refgi.rsm.raster.projection import PARABOLOID, PERSPECTIVE, cube_projection, dual_paraboloid_projection, project
 from refgi.scene import DirectionalLight, SpotLight, load_scene
 
 DOCUMENT = (Path(__file__).parents[1] / "docs" / "conventions.md").read_text(encoding="utf-8")

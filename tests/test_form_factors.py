@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from refgi.form_factors import (
+from tests.form_factors import (
     coaxial_discs_form_factor,
     disc_form_factor,
     parallel_rectangles_form_factor,

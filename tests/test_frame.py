@@ -11,7 +11,8 @@ from refgi import Frame, load_scene
 from refgi.errors import InputError, RefgiWarning
 from refgi.methods import METHODS, find_method, render
 from refgi.scene import DirectionalLight, Geometry, PointLight
-from refgi.splat.sii import SiiSettings, sii
+from refgi.splat.sii.settings import SiiSettings
+from refgi.splat.sii.sii import sii
 from refgi.stages import Memory, observe
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss

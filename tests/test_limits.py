@@ -7,8 +7,8 @@ import pytest
 from refgi.errors import InputError
 from refgi.scene import Camera, DirectionalLight
 from refgi.scene.motion import rotation_about
-from refgi.splat.gathering.gather import GatherSettings
-from refgi.splat.sii import SiiSettings
+from refgi.splat.gather.gather import GatherSettings
+from refgi.splat.sii.settings import SiiSettings
 from refgi.truth.vpl import VplSettings
 
 

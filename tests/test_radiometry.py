@@ -18,7 +18,7 @@ from refgi.radiometry import (
     spot_falloff,
 )
 from refgi.scene import DirectionalLight, PointLight, SpotLight, light_table
-from refgi.scene.cone import cone_row
+from refgi.scene.light import cone_row
 from tests.naive import radiometry as naive
 
 ROUNDING = {np.float32: 1e-6, np.float64: 1e-14}  # a dozen operations on numbers near 1

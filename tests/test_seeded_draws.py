@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.lights import choose_pixel_lights
 from refgi.lights.openness_flux import roulette
 from refgi.rays import Tracer
 from refgi.rays.openness import openness
-from refgi.rsm import choose_pixel_lights, reflective_shadow_map
+from refgi.rsm import reflective_shadow_map
 from refgi.sampling import halton, sobol_owen
 from refgi.scene import PointLight, load_scene
-from refgi.splat.error_target.samples import stratified
-from refgi.splat.gathering.gather_sum import disc_pattern
-from refgi.splat.reach.threshold import light_range
-from refgi.splat.settings import SplatSettings
+from refgi.splat.gather.gather_sum import disc_pattern
+from refgi.splat.multires.error_target.error_driven import stratified
+from refgi.splat.sii.reach.threshold import light_range
+from refgi.splat.sii.settings import SplatSettings
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.pattern import offsets_at
 from refgi.sssil.visibility.slices import slice_offsets, steps_of

@@ -18,11 +18,10 @@ from benchmarks.papers.records import Entry, Outcome, Paper, Picture, Reproducti
 from benchmarks.papers.report import write_report
 from benchmarks.papers.workbench import FULL, QUICK, Scale, Workbench
 from refgi.cli.destination import Permission, folder
-from refgi.cli.progress import progress
-from refgi.cli.session import FAILED, say, table
-from refgi.cli.threads import on_threads
+from refgi.cli.options import on_threads
+from refgi.cli.session import FAILED, progress, say, table
 from refgi.compare.comparison import require_folder
-from refgi.compare.environment import environment
+from refgi.compare.provenance import environment
 from refgi.compare.report import number
 from refgi.errors import RefgiError, RefgiWarning
 from refgi.image import canonical_json, write_exr, write_png, write_text

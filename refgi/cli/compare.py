@@ -35,8 +35,8 @@ def _compare(session: Session, /, methods: str | None, pairs: tuple[str, ...], d
     """
     from refgi.cli.destination import Permission, folder
     from refgi.cli.memory import require_memory
-    from refgi.cli.progress import progress
-    from refgi.cli.threads import on_threads
+    from refgi.cli.options import on_threads
+    from refgi.cli.session import progress
     from refgi.cli.view import View
     from refgi.compare import compare
     from refgi.compare.results import file_names

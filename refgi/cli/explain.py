@@ -39,9 +39,9 @@ def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: st
     The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving.
     """
     from refgi.cli.memory import require_memory
-    from refgi.cli.progress import progress
+    from refgi.cli.options import on_threads
+    from refgi.cli.session import progress
     from refgi.cli.settings import read_settings
-    from refgi.cli.threads import on_threads
     from refgi.cli.view import View
     from refgi.compare.results import ledger_json
     from refgi.errors import RefgiWarning

@@ -1,4 +1,7 @@
-"""The command's frame: verbs loaded when used, errors and warnings as one line each, exit codes."""
+"""The command's frame: verbs loaded when used, errors and warnings as one line each, exit codes.
+
+An exception that ended a run, as exit code, message, file and key.
+"""
 
 import difflib
 import importlib
@@ -6,13 +9,14 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 import click
 
 from refgi import __version__
-from refgi.cli.session import DONE, FAILED, USAGE, Session
+from refgi.cli.session import DONE, FAILED, INTERRUPTED, USAGE, Fault, Session
+from refgi.errors import InputError, RefgiError
 
 VERBS = ("scenes", "render", "sequence", "compare", "explain", "info")
 HELP = """Indirect light by four published methods on the CPU, judged by path tracing.
@@ -22,6 +26,71 @@ SCENE is a built-in name such as cornell_box (see `refgi scenes`), a scene file 
 
 Exit codes: 0 done, 1 a check failed, 2 usage or input error, 130 interrupted.
 """
+
+
+def fault_of(error: BaseException, *, debug: bool = False) -> Fault:
+    """Return what went wrong, for people and for programs.
+
+    Parameters
+    ----------
+    error : BaseException
+        What was raised.
+    debug : bool
+        Whether the traceback is shown anyway.
+
+    Returns
+    -------
+    Fault
+        One line of message, or one for each fault of a file.
+    """
+    if isinstance(error, click.exceptions.Abort | KeyboardInterrupt):
+        return Fault(INTERRUPTED, "interrupted")
+    if isinstance(error, click.UsageError):
+        asked = error.ctx.command_path if error.ctx else "refgi"
+        return Fault(USAGE, f"{_one_line(error.format_message())} (see {asked} --help)", key=_option(error))
+    if isinstance(error, click.ClickException):
+        return Fault(USAGE, _one_line(error.format_message()))
+    if isinstance(error, RefgiError):
+        return Fault(USAGE, str(error), *_place(error))
+    if isinstance(error, MemoryError):
+        return Fault(USAGE, f"out of memory: {_one_line(str(error)) or 'try a smaller --size'}")
+    hint = "" if debug else " (a fault of refgi; --debug shows where)"
+    return Fault(FAILED, f"unexpected {type(error).__name__}: {_one_line(str(error))}{hint}")
+
+
+def _option(error: click.UsageError) -> str | None:
+    """Return the option or argument that click refuses."""
+    if isinstance(error, click.NoSuchOption | click.BadOptionUsage):
+        return error.option_name
+    if isinstance(error, click.BadParameter) and error.param is not None:
+        return error.param.opts[-1] if isinstance(error.param, click.Option) else error.param.human_readable_name
+    return None
+
+
+def _place(error: RefgiError) -> tuple[str | None, str | None]:
+    """Return file and key of an error, as far as it or one that it arose from says them.
+
+    A file's error names file and key at the start of its message: `file: key: expected ...`.
+    """
+    said = [one for one in _chain(error) if isinstance(one, InputError)]
+    file = next((one.file for one in said if one.file is not None), None)
+    key = next((one.key for one in said if one.key is not None), None)
+    prefix = f"{file}: "
+    if key is None and str(error).startswith(prefix) and "\n" not in str(error):
+        start, colon, _ = str(error).removeprefix(prefix).partition(": ")
+        key = start if colon and " " not in start else None
+    key = None if key == file or key is None else key.removeprefix(prefix)
+    return file, key
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    while error is not None:
+        yield error
+        error = error.__cause__
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 class VerbGroup(click.Group):
@@ -92,7 +161,6 @@ def _explained(error: BaseException, session: Session) -> int:
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         click.echo(error.format_message(), file=sys.stderr)
         return USAGE
-    from refgi.cli.fault import fault_of
 
     fault = fault_of(error, debug=session.debug)
     session.fault(fault)

@@ -1,12 +1,17 @@
-"""Options that several verbs share, and how their values are read."""
+"""Options that several verbs share, and how their values are read.
+
+--threads: how many threads compiled kernels run on.
+"""
 
 import re
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
 import click
 
 from refgi.cli.session import Session
+from refgi.errors import expect
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -173,3 +178,31 @@ def shadows(default: str) -> Callable[[F], F]:
     return click.option("--shadows", type=click.Choice(names), default=default, show_default=True,
                         callback=lambda _, __, value: None if value == "auto" else value,
                         help=f"Direct light's shadows: from the shadow map as published, or by rays{auto}.")
+
+
+def on_threads(count: int | None) -> AbstractContextManager[None]:
+    """Run kernels on `count` threads inside the block.
+
+    Parameters
+    ----------
+    count : int or None
+        Threads; all where None.
+
+    Returns
+    -------
+    context manager
+        Restores the number at its end.
+
+    Raises
+    ------
+    InputError
+        If there are not so many.
+    """
+    import numba
+
+    from refgi.jit import threads
+
+    config: Any = numba.config
+    most = config.NUMBA_NUM_THREADS
+    expect(count is None or 1 <= count <= most, "--threads", f"1 to {most} (NUMBA_NUM_THREADS)", count)
+    return threads(count)

@@ -61,8 +61,8 @@ command = _render
 def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None, options: dict[str, Any]) -> int:
     from refgi import stages
     from refgi.cli.job import differences, require_view
-    from refgi.cli.progress import progress
-    from refgi.cli.threads import on_threads
+    from refgi.cli.options import on_threads
+    from refgi.cli.session import progress
     from refgi.methods import render
 
     started = time.perf_counter()

@@ -13,7 +13,7 @@ from refgi.cli.session import DONE, FAILED, Session, say
 
 if TYPE_CHECKING:
     from refgi.cli.frame_files import FrameFiles
-    from refgi.cli.progress import Tell
+    from refgi.cli.session import Tell
     from refgi.methods import KeepingEstimate
     from refgi.scene import Scene
     from refgi.scene.path import Path as Way
@@ -55,9 +55,9 @@ def _sequence(session: Session, /, **options: Any) -> int:
     from refgi.cli.frame_files import FrameFiles
     from refgi.cli.job import require_view
     from refgi.cli.memory import require_memory
-    from refgi.cli.progress import progress
+    from refgi.cli.options import on_threads
+    from refgi.cli.session import progress
     from refgi.cli.settings import read_settings
-    from refgi.cli.threads import on_threads
     from refgi.methods import KeepingEstimate, find_method, usual_shadows
     from refgi.provenance import method_record, scene_record
     from refgi.provenance.frames import frame_record, path_record, require_repeatable

@@ -1,12 +1,108 @@
-"""The scene as the options ask for it: loaded, seen by the given camera, under the given lights."""
+"""The scene as the options ask for it: loaded, seen by the given camera, under the given lights.
+
+`--light KIND:KEY=VALUE:...`: lights from the command line.
+"""
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from refgi.cli.lights import read_lights
-from refgi.scene import Camera, Scene, load_scene
+from refgi.errors import InputError
+from refgi.scene import Camera, DirectionalLight, Light, PointLight, Scene, SpotLight, load_scene
+from refgi.scene.files import did_you_mean
+
+KEYS = {
+    "spot": ("position", "direction", "target", "inner_deg", "outer_deg", "intensity"),
+    "point": ("position", "intensity"),
+    "directional": ("direction", "irradiance"),
+}
+DEFAULT_OUTER_DEG = 40.0
+INNER_SHARE = 0.9  # of the outer half-angle, where the inner is not given
+
+
+def read_lights(texts: Sequence[str]) -> list[Light] | None:
+    """Make lights from text.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Such as ``spot:position=0,2,0:target=0,0,0:outer_deg=35:intensity=20``.
+
+    Returns
+    -------
+    list of Light or None
+        None where there are no texts: the scene keeps its own.
+
+    Raises
+    ------
+    InputError
+        If a kind, key or value is not usable; names the light.
+    """
+    return [_read(text) for text in texts] if texts else None
+
+
+def _read(text: str) -> Light:
+    kind, _, rest = text.partition(":")
+    try:
+        if kind not in KEYS:
+            raise InputError(f"expected one of {', '.join(KEYS)}, got {kind!r}" + did_you_mean(kind, KEYS))
+        return _build(kind, _values(kind, rest))
+    except InputError as error:
+        raise InputError(f"--light {text!r}: {error}", key="--light") from error
+
+
+def _values(kind: str, rest: str) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for pair in filter(None, rest.split(":")):
+        key, _, value = pair.partition("=")
+        if key not in KEYS[kind]:
+            raise InputError(f"{key!r} is not a key of {kind} ({', '.join(KEYS[kind])})"
+                             + did_you_mean(key, KEYS[kind]))
+        values[key] = _number(key, value) if key.endswith("_deg") else _triple(key, value)
+    return values
+
+
+def _build(kind: str, values: dict[str, Any]) -> Light:
+    if kind == "spot" and "target" in values:
+        if "direction" in values:
+            raise InputError("direction: expected direction or target, got both")
+        target, position = values.pop("target"), _needed(values, "position")
+        values["direction"] = tuple(t - p for t, p in zip(target, position, strict=True))
+    needed = {"spot": ("position", "direction", "intensity"), "point": KEYS["point"],
+              "directional": KEYS["directional"]}[kind]
+    given = [_needed(values, key) for key in needed]
+    if kind == "point":
+        return PointLight(*given)
+    if kind == "directional":
+        return DirectionalLight(*given)
+    outer = values.get("outer_deg", DEFAULT_OUTER_DEG)
+    inner = values.get("inner_deg", INNER_SHARE * outer)
+    position, direction, intensity = given
+    return SpotLight(position, direction, math.radians(inner), math.radians(outer), intensity)
+
+
+def _needed(values: dict[str, Any], key: str) -> Any:
+    if key not in values:
+        raise InputError(f"{key}: expected a value, got none")
+    return values[key]
+
+
+def _triple(key: str, text: str) -> tuple[float, ...]:
+    parts = text.split(",")
+    if len(parts) == 1 and key in ("intensity", "irradiance"):
+        parts *= 3  # white
+    if len(parts) != 3:
+        raise InputError(f"{key}: expected three numbers, got {text!r}")
+    return tuple(_number(key, part) for part in parts)
+
+
+def _number(key: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InputError(f"{key}: expected a number, got {text!r}") from error
 
 
 @dataclasses.dataclass(frozen=True)

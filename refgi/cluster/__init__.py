@@ -8,9 +8,8 @@ of them, `lighting` the picture. `adaptive` says how many area lights are enough
 steps is measured against, and what it costs.
 """
 
-from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import Clusters, cluster
-from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps

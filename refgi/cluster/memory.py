@@ -2,9 +2,8 @@
 
 import numba
 
-from refgi.cluster.adaptive import MOST_TEXELS
+from refgi.cluster.adaptive import MOST_TEXELS, WITHOUT_MAPS
 from refgi.cluster.filters.eight import EIGHT
-from refgi.cluster.grouping import WITHOUT_MAPS
 from refgi.cluster.settings import ValSettings
 
 LISTED_FLOATS = 24  # of a pixel, where receivers are gathered by lists: measured, and a fifth more

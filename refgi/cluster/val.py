@@ -4,9 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
-from refgi.cluster.adaptive import enough_area_lights
-from refgi.cluster.area_lights import AreaLights
-from refgi.cluster.grouping import grouped
+from refgi.cluster.adaptive import enough_area_lights, grouped
+from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
@@ -20,7 +19,7 @@ from refgi.stages import skip
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -1,6 +1,6 @@
 """Methods judged against path tracing: figures of error, one comparison, its files and its page.
 
-`metrics` has the figures and `measurement` puts each beside what the truth's own noise gives; `comparison.compare` runs
+`metrics` has the figures and `outcome` puts each beside what the truth's own noise gives; `comparison.compare` runs
 every method on one scene; `results` writes EXR, PNG and results.json; `report` writes the one-file page. The package
 itself can be called: `refgi.compare(...)` is `refgi.compare.compare(...)`.
 """
@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from refgi.compare.comparison import compare
-    from refgi.compare.measurement import Figure, Measurement, measure
-    from refgi.compare.outcome import Comparison, MethodResult
+    from refgi.compare.outcome import Comparison, Figure, Measurement, MethodResult, measure
 
 __all__ = ["Comparison", "Figure", "Measurement", "MethodResult", "compare", "measure"]
 
 _HOME = {
-    "Comparison": "outcome", "Figure": "measurement", "Measurement": "measurement", "MethodResult": "outcome",
-    "compare": "comparison", "measure": "measurement",
+    "Comparison": "outcome", "Figure": "outcome", "Measurement": "outcome", "MethodResult": "outcome",
+    "compare": "comparison", "measure": "outcome",
 }
 
 

@@ -20,10 +20,9 @@ from typing import Any
 import numpy as np
 
 from refgi import stages
-from refgi.compare.environment import environment
 from refgi.compare.flip import flip
-from refgi.compare.measurement import measure
-from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
+from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference, measure
+from refgi.compare.provenance import environment
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS, Method, find_method
@@ -114,7 +113,7 @@ def find_ledger(method: Method) -> Callable[[Frame, Any], Any] | None:
     -------
     callable or None
         Takes frame and settings; its result has `rows` and `difference` as those of
-        `refgi.splat.account.ledger.Ledger`. None for a method without one.
+        `refgi.splat.sii.ledger.Ledger`. None for a method without one.
     """
     module, _, function = method.ledger.partition(":")
     return getattr(import_module(module), function) if module else None

@@ -1,13 +1,18 @@
-"""The record of a comparison's pictures as rows of text, for its page."""
+"""The record of a comparison's pictures as rows of text, for its page.
+
+What a result was made with: versions, processor, threads.
+"""
 
 import math
+import platform
 from collections.abc import Sequence
 from typing import Any
 
-from refgi.provenance import Record
+from refgi.provenance import Record, versions
 from refgi.scene.files import text_of
 
 DEGREE = "\N{DEGREE SIGN}"
+SIMD = ("sse2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
 
 
 def provenance_rows(record: Record) -> list[tuple[str, str]]:
@@ -44,3 +49,24 @@ def _value(value: Sequence[float] | float) -> str:
     if isinstance(value, Sequence):
         return ", ".join(f"{part:g}" for part in value)
     return str(value) if isinstance(value, int) else f"{math.degrees(value):g}{DEGREE}"  # sizes, and angles
+
+
+def environment() -> dict[str, Any]:
+    """Return versions, platform, SIMD features and threads as JSON values.
+
+    Returns
+    -------
+    dict
+        With the keys versions, platform, cpu, simd and threads.
+    """
+    import llvmlite.binding
+    import numba
+
+    features = llvmlite.binding.get_host_cpu_features()
+    return {
+        "versions": versions(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "cpu": llvmlite.binding.get_host_cpu_name(),
+        "simd": [name for name in SIMD if features.get(name)],
+        "threads": numba.get_num_threads(),
+    }

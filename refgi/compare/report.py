@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from refgi import stages
 from refgi.compare import maps
-from refgi.compare.measurement import Figure, Measurement
-from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
+from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, Figure, Measurement, MethodResult, Reference
 from refgi.compare.plot import Point, time_against_error
 from refgi.compare.provenance import provenance_rows
 from refgi.compare.results import error_scale, signed_error

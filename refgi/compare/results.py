@@ -15,8 +15,7 @@ import numpy.typing as npt
 from refgi import stages
 from refgi.compare import maps
 from refgi.compare.flip import Flip
-from refgi.compare.measurement import Measurement
-from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
+from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, Measurement, MethodResult, Reference
 from refgi.compare.pictures import linear_planes, write_preview
 from refgi.image import canonical_json, write_encoded, write_exr, write_text
 from refgi.provenance import UNITS, Record, method_record, plain

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numba.extending import overload
 
 from refgi.elementary import double, single
+from refgi.jit import by_type
 
 
 def exp2(x: Any) -> Any:
@@ -98,7 +98,7 @@ def _choose_pow(x: Any, y: Any) -> Any:  # noqa: ARG001
     return (single if x == types.float32 else double).FUNCTIONS["pow"]
 
 
-overload(exp2)(_choose("exp2"))
-overload(log2)(_choose("log2"))
-overload(log2p1)(_choose("log2p1"))
-overload(pow)(_choose_pow)
+by_type(exp2)(_choose("exp2"))
+by_type(log2)(_choose("log2"))
+by_type(log2p1)(_choose("log2p1"))
+by_type(pow)(_choose_pow)

@@ -18,8 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import InputError, expect
-from refgi.image.mark import MARK, canonical_json
-from refgi.image.whole import is_text, whole_file
+from refgi.image.whole import MARK, canonical_json, is_text, whole_file
 
 Array = npt.NDArray[Any]
 Channels = dict[str, Array]

@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning, expect
-from refgi.image.mark import MARK, canonical_json
-from refgi.image.whole import whole_file
+from refgi.image.whole import MARK, canonical_json, whole_file
 
 Array = npt.NDArray[Any]
 

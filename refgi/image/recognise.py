@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from refgi.image.mark import MARK
 from refgi.image.png import read_png_attributes
+from refgi.image.whole import MARK
 
 START_OF_PAGE = 4096  # bytes that hold a page's head
 GENERATOR = f'<meta name="generator" content="{MARK}'

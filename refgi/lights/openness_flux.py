@@ -15,7 +15,7 @@ from refgi.errors import expect
 from refgi.stages import stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights
+    from refgi.pairs.pixel_lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.lights.footprint_area import texel_areas
-from refgi.lights.solid_angle import with_equal_solid_angles
+from refgi.lights.footprints import texel_areas, with_equal_solid_angles
 from refgi.pairs.settings import FOOTPRINT_CLAMPS
 from refgi.stages import skip
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights.settings import LightSettings
-    from refgi.rsm import PixelLights, Rsm
+    from refgi.pairs.pixel_lights import PixelLights
+    from refgi.rsm import Rsm
 
 Array = npt.NDArray[Any]
 
@@ -59,7 +59,7 @@ def light_maps(frame: "Frame", settings: "LightSettings") -> "tuple[Rsm, ...]":
     tuple of Rsm
         One a light.
     """
-    from refgi.rsm import refracted
+    from refgi.lights.refraction import refracted
 
     equal = "equal_solid_angle" in settings.as_published
     rsms = tuple(map(with_equal_solid_angles, frame.rsms)) if equal else frame.rsms
@@ -88,7 +88,7 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: "LightSetti
     list of (H, W) ndarray, or None
         None where no pattern is warped.
     """
-    from refgi.rsm import importance
+    from refgi.lights.importance import importance
 
     if settings.warp == "none":
         skip("rsm.warp", "lights follow their pattern alone")
@@ -170,7 +170,8 @@ def pixel_lights(
     PixelLights
         Lights with their share of the flux.
     """
-    from refgi.rsm import Warp, choose_pixel_lights
+    from refgi.lights.pixel_lights import choose_pixel_lights
+    from refgi.lights.warp import Warp
 
     count = None if settings.pattern == "all" else settings.lights
     warp = None if settings.warp == "none" else Warp(settings.warp, settings.warp_levels)
@@ -194,7 +195,7 @@ def drawn_from_maps(rsms: "Sequence[Rsm]", settings: "LightSettings") -> list[in
     list of int
         One number a map.
     """
-    from refgi.rsm.pixel_lights import map_shares
+    from refgi.lights.pixel_lights import map_shares
 
     return map_shares(rsms, None if settings.pattern == "all" else settings.lights, settings.pattern)
 

@@ -16,12 +16,12 @@ from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.radiometry import DIRECTIONAL, POINT, orthonormal_basis, radiant_intensity
 from refgi.sampling import cosine_hemisphere, halton
-from refgi.scene.cone import CAP
+from refgi.scene.light import CAP
 from refgi.stages import stage
 
 if TYPE_CHECKING:
+    from refgi.pairs.pixel_lights import PixelLights
     from refgi.rays import Tracer
-    from refgi.rsm import PixelLights
     from refgi.scene import Geometry, LightTable, MaterialTable
 
 Array = npt.NDArray[Any]
@@ -89,7 +89,7 @@ def walk_lights(
     Paths are not ended at random: each carries on with its power times the diffuse reflectance, so the walk adds no
     noise beyond its directions. Glossy materials leave a lobe, but paths go on by diffuse reflection alone.
     """
-    from refgi.rsm.pixel_lights import equal_shares
+    from refgi.lights.pixel_lights import equal_shares
 
     count = len(lights.kind)
     expect(paths >= count, "lights", f"at least one path for each of {count} lights", paths)
@@ -195,7 +195,7 @@ def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: Rays)
 
 
 def _pixel_lights(left: list[Left], drawn: int) -> "PixelLights":
-    from refgi.rsm import PixelLights
+    from refgi.pairs.pixel_lights import PixelLights
 
     position, normal, flux, lobe_flux, axis, exponent = (np.concatenate(parts).T for parts in zip(*left, strict=True))
     glossy: Array = (lobe_flux != 0).any(axis=0)

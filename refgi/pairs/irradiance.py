@@ -11,16 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.pairs.blocks import block_by_block, put, taken
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.packing import Packed, pack
 from refgi.pairs.pair_sum import TILE, sum_pairs
 from refgi.pairs.settings import FOOTPRINT_CLAMPS, PairSettings
 from refgi.pairs.sphere_sum import sum_spheres
+from refgi.pairs.tiles import block_by_block, put, taken
 from refgi.stages import report_progress, skip, stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights
+    from refgi.pairs.pixel_lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -34,7 +34,7 @@ from refgi.pairs.lobe_shape import (
     widened,
 )
 from refgi.pairs.pair_sum import GROUP, LEAST_SQUARE, LOST, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, load_tile
-from refgi.pairs.range import Range
+from refgi.pairs.pixel_lights import Range
 
 Array = npt.NDArray[Any]
 

@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
-from refgi.pairs.blocks import block_by_block, taken
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.packing import pack
 from refgi.pairs.settings import PairSettings
+from refgi.pairs.tiles import block_by_block, taken
 from refgi.stages import stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights
+    from refgi.pairs.pixel_lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -16,7 +16,7 @@ from refgi.pairs.pair_sum import Clamp
 from refgi.pairs.settings import PairSettings
 
 if TYPE_CHECKING:
-    from refgi.rsm import PixelLights
+    from refgi.pairs.pixel_lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.culling import bound_tile, lights_in_reach
+from refgi.pairs.tiles import bound_tile, lights_in_reach
 
 Array = npt.NDArray[Any]
 

@@ -27,7 +27,7 @@ from refgi.pairs.pair_sum import (
     geometry_term,
     load_tile,
 )
-from refgi.pairs.range import Range
+from refgi.pairs.pixel_lights import Range
 
 Array = npt.NDArray[Any]
 

@@ -24,7 +24,7 @@ import numpy as np
 from refgi.jit import kernel
 from refgi.radiometry import orthonormal_basis
 
-POINTS = 12  # of the Gauss rule in each quadrant; tests/splat/test_sphere.py measures its error
+POINTS = 12  # of the Gauss rule in each quadrant; tests/pairs/test_sphere.py measures its error
 LEAST_RATIO = 1e-12  # (r / |d|)^2 below which a horizon cuts the cone as it cuts a point
 LEAST_LENGTH = 1e-6  # of l + n_x (they face apart) and l - n_x (they face each other)
 TINY = 1e-30  # stands in for a square that rounds to 0

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import GROUP, LEAST_SQUARE, NX, ROWS, SUM, TILE, TOTAL, X, close_group, load_tile
-from refgi.pairs.range import Range
+from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import range_factor
 from refgi.pairs.sphere_pair import LEAST_RATIO, cone_term, cut_cone_term
 

@@ -5,9 +5,17 @@ method with all settings, what it was computed in, and which refgi did it.
 """
 
 from refgi.provenance.again import Job, job_of, read_record
-from refgi.provenance.plain import plain
-from refgi.provenance.program import program, versions
-from refgi.provenance.record import CONTENT, UNITS, Record, estimate_record, method_record, scene_record
+from refgi.provenance.content import plain
+from refgi.provenance.record import (
+    CONTENT,
+    UNITS,
+    Record,
+    estimate_record,
+    method_record,
+    program,
+    scene_record,
+    versions,
+)
 
 __all__ = [
     "CONTENT", "UNITS", "Job", "Record", "estimate_record", "job_of", "method_record", "plain", "program",

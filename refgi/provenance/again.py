@@ -10,8 +10,7 @@ from refgi.errors import InputError, RefgiWarning, blame, expect
 from refgi.image import read_exr
 from refgi.methods import find_method
 from refgi.provenance.content import camera_from, geometry_digest, light_from, materials_digest
-from refgi.provenance.program import program, versions
-from refgi.provenance.record import VERSION, Record
+from refgi.provenance.record import VERSION, Record, program, versions
 from refgi.scene import Scene, builtin_scenes, load_scene
 from refgi.scene.files import is_there
 

@@ -1,7 +1,11 @@
-"""What a scene consists of, as JSON values and back: digests of its surfaces, its camera and lights in full."""
+"""What a scene consists of, as JSON values and back: digests of its surfaces, its camera and lights in full.
+
+Values of Python as values of JSON.
+"""
 
 import dataclasses
 import hashlib
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,11 +13,38 @@ import numpy as np
 
 from refgi.errors import InputError
 from refgi.image import canonical_json
-from refgi.provenance.plain import plain
 from refgi.scene import Camera, DirectionalLight, Light, PointLight, Scene, SpotLight
 
 LIGHTS: dict[str, type[SpotLight] | type[PointLight] | type[DirectionalLight]] = {
     "spot": SpotLight, "point": PointLight, "directional": DirectionalLight}
+
+
+def plain(value: Any) -> Any:
+    """Turn settings and figures into finite JSON values.
+
+    Parameters
+    ----------
+    value : object
+        Dataclasses, mappings, sequences, sets, numbers, text, types.
+
+    Returns
+    -------
+    object
+        The same as dict, list, str, int, float, bool and None.
+    """
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, dict) or hasattr(value, "items"):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, set | frozenset):
+        return sorted(map(plain, value))
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value if value is None or isinstance(value, bool | int | float | str) else str(value)
 
 
 def geometry_digest(scene: Scene) -> str:

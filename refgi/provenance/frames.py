@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 from refgi.errors import InputError, expect
 from refgi.methods import KeepingEstimate, Picture, find_method
-from refgi.provenance.content import light_json
-from refgi.provenance.plain import plain
+from refgi.provenance.content import light_json, plain
 from refgi.provenance.record import Record
 from refgi.scene import Scene
 from refgi.scene.files import read_bytes

@@ -3,7 +3,7 @@
 A ray that starts on a surface must not find it again. What moves the surface about in float32, with u = 2^-24: the
 rounding of the start, u |y|, and that of the triangle test, a few u times the distance from the start to the corners.
 No triangle that Embree has is longer than the larger of the scene's grain and the distance of its points from the
-coordinates' origin (`pieces`), so the lift 4 u (|y|_1 + grain) covers both, whatever lies elsewhere in the scene. A
+coordinates' origin (`cut`), so the lift 4 u (|y|_1 + grain) covers both, whatever lies elsewhere in the scene. A
 segment's far end is subject to the rounding of its direction as well, u times its length.
 """
 

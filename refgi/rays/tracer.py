@@ -10,8 +10,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.rays.embree import MISS, Door, open_door
 from refgi.rays.offsets import GRAIN, STEPS, grain_of
-from refgi.rays.pieces import Pieces, cut
-from refgi.rays.watertight import Corners, closest_around, corners
+from refgi.rays.watertight import Corners, Pieces, closest_around, corners, cut
 from refgi.scene import DirectionalLight, Geometry, Light
 
 Array = npt.NDArray[Any]

@@ -3,6 +3,8 @@
 Errors: a shape that is not a mesh, a coordinate that is not finite, an index without a vertex. Mended: zero-area faces
 are dropped, vertex normals are brought to unit length, and a vertex whose normal is zero or not finite gets the mean
 of its faces' normals.
+
+Lights that shine: one without power is left out, with a count, and a scene needs at least one.
 """
 
 import dataclasses
@@ -13,7 +15,7 @@ import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.mesh import Batch, Mesh, batches, missing_normals
-from refgi.scene.model import Geometry
+from refgi.scene.model import DirectionalLight, Geometry, Light
 from refgi.scene.values import Array
 
 # A face counts as flat when twice its area is lost in the rounding of the cross product that gives it.
@@ -197,3 +199,35 @@ def mean_face_normals(vertices: Array, faces: Array) -> Array:
     total[length == 0] = (0.0, 1.0, 0.0)
     length[length == 0] = 1.0
     return np.asarray(total / length[:, None])
+
+
+def shining(lights: Sequence[Light], where: str) -> tuple[Light, ...]:
+    """Return the lights that have power.
+
+    Parameters
+    ----------
+    lights : sequence of Light
+        All lights of a scene.
+    where : str
+        File and key, for texts.
+
+    Returns
+    -------
+    tuple of Light
+        In the given order, at least one.
+
+    Raises
+    ------
+    InputError
+        If none has power: the picture would be silently black.
+    """
+    kept = tuple(light for light in lights if max(_power(light)) > 0)
+    expect(bool(kept), where, "at least one light of power above 0", f"{len(lights)} without" if lights else "none")
+    if dropped := len(lights) - len(kept):
+        noun = "light" if dropped == 1 else "lights"
+        warnings.warn(RefgiWarning(f"{where}: {dropped} {noun} of zero power left out"), stacklevel=3)
+    return kept
+
+
+def _power(light: Light) -> tuple[float, float, float]:
+    return light.irradiance if isinstance(light, DirectionalLight) else light.intensity

@@ -1,14 +1,18 @@
-"""Lights, and the table of them that kernels read."""
+"""Lights, and the table of them that kernels read.
+
+A spot's cone as kernels read it: numbers that keep their digits however narrow or wide it is.
+"""
 
 import dataclasses
+import decimal
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from refgi.elementary.twofold import DIGITS, sine_cosine_digits, twofold
 from refgi.errors import expect
-from refgi.scene.cone import cone_row
 from refgi.scene.values import (
     BRIGHTEST,
     LARGEST,
@@ -23,8 +27,29 @@ from refgi.scene.values import (
     settle,
 )
 
+# places in a row of `cone_row`; sine and cosine of the outer half-angle come in two parts, the second the rest
+SINE, SINE_REST, COSINE, COSINE_REST, SPAN, CAP = range(6)
 SPOT, POINT, DIRECTIONAL = 0, 1, 2  # kinds of light in a LightTable
 NARROWEST = math.radians(1e-5)  # half-angle; rays in float32 tell directions apart down to a third of it
+
+
+def cone_row(inner: float, outer: float) -> Array:
+    """Return what kernels need of a spot's half-angles.
+
+    Parameters
+    ----------
+    inner, outer : float
+        Half-angles, rad, 0 <= inner <= outer < pi/2.
+
+    Returns
+    -------
+    (6,) ndarray of float64
+        sin outer and cos outer, each a float64 and the rest; cos inner - cos outer; 1 - cos outer.
+    """
+    sine, cosine = sine_cosine_digits(outer)
+    _, cosine_inner = sine_cosine_digits(inner)
+    with decimal.localcontext(prec=DIGITS):
+        return np.array([*twofold(sine), *twofold(cosine), float(cosine_inner - cosine), float(1 - cosine)])
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,21 +1,81 @@
-"""`load_scene`: a built-in name, a scene file or a mesh file in, a `Scene` out."""
+"""`load_scene`: a built-in name, a scene file or a mesh file in, a `Scene` out.
+
+A camera and a spot for a mesh that comes without: from above, front right, and from above, front left.
+"""
 
 import dataclasses
+import math
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from refgi.errors import InputError, RefgiWarning, blame, first_faults
 from refgi.scene.builtin import SCENES, build_named
 from refgi.scene.files import did_you_mean, is_there, text_of
-from refgi.scene.framing import framed, lit
-from refgi.scene.health import mended_all, warn_of_flat_faces, warn_of_unit
+from refgi.scene.health import mended_all, shining, warn_of_flat_faces, warn_of_unit
 from refgi.scene.meshfile import READERS, read_mesh_file
-from refgi.scene.model import Camera, Light, Scene, merge
-from refgi.scene.power import shining
+from refgi.scene.model import Array, Camera, Geometry, Light, Scene, SpotLight, Vector, merge
 from refgi.scene.scenefile import read_scene_file
 from refgi.scene.source import reading, source_of
 from refgi.stages import stage
+
+VIEW = np.array([0.55, 0.4, 1.0])  # from the middle of the mesh towards the eye
+SHINE = np.array([-0.8, 1.1, 0.7])  # ... towards the light
+VFOV = math.radians(35.0)
+LIGHT_DISTANCE = 4.0  # radii of the bounding sphere
+SMALLEST_RADIUS = 1e-9  # m; eye and target of a camera must differ
+FULL_IRRADIANCE = math.pi  # W/m^2 at the middle of the mesh: an albedo's radiance is then the albedo itself
+
+
+def framed(geometry: Geometry) -> Camera:
+    """Return a camera that sees the whole bounding box.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        What to see, not empty.
+
+    Returns
+    -------
+    Camera
+        512 x 512 pixels.
+    """
+    middle, radius = _sphere(geometry)
+    eye = middle + VIEW / np.linalg.norm(VIEW) * (radius / math.sin(VFOV / 2))
+    return Camera(_vector(eye), _vector(middle), vfov=VFOV)
+
+
+def lit(geometry: Geometry) -> SpotLight:
+    """Return a spot that lights the whole bounding box.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        What to light, not empty.
+
+    Returns
+    -------
+    SpotLight
+        White, with an irradiance of pi W/m^2 at the middle.
+    """
+    middle, radius = _sphere(geometry)
+    distance = LIGHT_DISTANCE * radius
+    position = middle + SHINE / np.linalg.norm(SHINE) * distance
+    outer = 1.2 * math.asin(1 / LIGHT_DISTANCE)
+    power = FULL_IRRADIANCE * distance**2
+    return SpotLight(_vector(position), _vector(middle - position), outer / 1.2, outer, (power, power, power))
+
+
+def _sphere(geometry: Geometry) -> tuple[Array, float]:
+    low, high = geometry.bounds
+    return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, SMALLEST_RADIUS)
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
 
 
 @stage("scene.load")

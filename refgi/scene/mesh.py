@@ -2,9 +2,12 @@
 
 A file may hold a hundred thousand meshes of a few triangles each. NumPy asked about them one by one takes longer than
 everything else that is done with them, so small ones are joined into batches first.
+
+Whether a scene of so many triangles can be held at all, asked before the memory is taken.
 """
 
 import dataclasses
+import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -18,6 +21,9 @@ SMALL = 1 << 12  # vertices and faces of a mesh that goes into a batch; a larger
 BATCH = 1 << 18  # vertices and faces in a batch: some megabytes
 
 SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes nor overflows
+# A vertex is 24 bytes, a face 12 and its material 4; joining the meshes holds them twice for a moment.
+BYTES_OF_VERTEX, BYTES_OF_FACE = 2 * 24, 2 * (12 + 4)
+MOST_VERTICES = 2**31 - 1  # corner indices are int32
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -169,3 +175,40 @@ def _starts(counts: list[int]) -> Array:
 
 def _rows_of_three(array: Array, kinds: str) -> bool:
     return array.ndim == 2 and array.shape[1] == 3 and array.dtype.kind in kinds
+
+
+def expect_room(vertices: int, faces: int, where: str) -> None:
+    """Raise `InputError` unless indices and memory suffice for a scene's geometry.
+
+    Parameters
+    ----------
+    vertices, faces : int
+        Of the whole scene, instances counted each.
+    where : str
+        File and key, for the error's text.
+
+    Raises
+    ------
+    InputError
+        If there are more vertices than an int32 can count, or more bytes than the machine has.
+    """
+    expect(vertices <= MOST_VERTICES, where, f"at most {MOST_VERTICES} vertices in all", vertices)
+    needed = vertices * BYTES_OF_VERTEX + faces * BYTES_OF_FACE
+    present = physical_memory()
+    if needed > present:  # asked for every object of a file; the text is made once
+        expect(False, where, f"a scene that fits in {present / 2**30:.1f} GiB of memory",
+               f"{vertices} vertices and {faces} faces ({needed / 2**30:.1f} GiB)")
+
+
+def physical_memory() -> float:
+    """Return the machine's memory in bytes, infinity where the platform does not say.
+
+    Returns
+    -------
+    float
+        Bytes.
+    """
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, OSError, ValueError):
+        return float("inf")

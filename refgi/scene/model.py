@@ -27,8 +27,7 @@ from refgi.scene.light import (
     light_table,
 )
 from refgi.scene.material import Material, MaterialTable, material_table
-from refgi.scene.mesh import Mesh, expect_all_sound
-from refgi.scene.room import expect_room
+from refgi.scene.mesh import Mesh, expect_all_sound, expect_room
 from refgi.scene.source import Source
 from refgi.scene.values import (
     BLACK,

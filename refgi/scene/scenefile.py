@@ -12,11 +12,10 @@ import numpy as np
 
 from refgi.errors import MOST_FAULTS, InputError, expect, first_faults, shortened
 from refgi.scene.files import Contents, is_there, read_bytes
-from refgi.scene.health import mended_all, warn_of_flat_faces, warn_of_unit
+from refgi.scene.health import mended_all, shining, warn_of_flat_faces, warn_of_unit
+from refgi.scene.mesh import expect_room
 from refgi.scene.meshfile import read_mesh_file
 from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
-from refgi.scene.power import shining
-from refgi.scene.room import expect_room
 from refgi.scene.transform import placed_all
 
 PLAINER = {"missing": "expected a value, nothing given", "extra_forbidden": "unknown key",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.sssil.cameras.several import several_cameras
+from refgi.sssil.cameras import several_cameras
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.crown.reach import chosen_radius, expect_reach
 from refgi.sssil.level import Level

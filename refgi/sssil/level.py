@@ -1,4 +1,7 @@
-"""Level: what a camera sees, as one level of the pyramids holds it."""
+"""Level: what a camera sees, as one level of the pyramids holds it.
+
+Picture: what a camera sees at full resolution, as the kernels of the pyramids read it.
+"""
 
 from typing import Any, NamedTuple
 
@@ -27,3 +30,12 @@ class Level(NamedTuple):
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
         return self.area.shape[0], self.area.shape[1]
+
+
+class Picture(NamedTuple):
+    """Planes of full resolution, all of one dtype."""
+
+    depth: Array  # (H, W) along the view direction, m; inf where no surface is seen
+    normal: Array  # (3, H, W) unit vectors on the side that is seen
+    albedo: Array  # (3, H, W) diffuse reflectance
+    direct: Array  # (3, H, W) direct irradiance, W/m^2

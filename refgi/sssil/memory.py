@@ -1,11 +1,15 @@
-"""How much memory screen-space indirect light takes beside what every picture takes: levels, light, samples, views."""
+"""How much memory screen-space indirect light takes beside what every picture takes: levels, light, samples, views.
+
+What the levels take in memory (Sec. 3.2: mip levels of the buffers add a third to them).
+"""
 
 import math
 
 from refgi.sssil.crown.reach import chosen_radius
-from refgi.sssil.pyramid.memory import level_bytes
 from refgi.sssil.settings import HssilSettings
 
+FLOATS = 11  # a texel: position, depth, normal, radiance, area
+PIXEL_BYTES = 4  # and the pixel that it shows
 PLANES, LIGHT_FLOATS = 9, 6  # of a texel of the level that is summed: as senders, and its light and that below
 PADDING = 64  # lanes around a row of senders at least, twice 16 for even and for odd columns
 VIEW_FLOATS = 32  # of a pixel of a further view: its G-buffer, direct and indirect light, and temporaries
@@ -13,6 +17,38 @@ RAY_BYTES = 1 << 26  # rays that are held at a time
 OFFSET_BYTES, SLICED_BYTES = 16, 32  # of a sample in an even and an odd column of a row, and of one in a slice
 CANDIDATE_BYTES = 104  # of a texel that may be among all around a receiver
 LISTED_RAY_BYTES = 48  # of a sample of one receiver
+
+
+def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
+    """Return the memory that the levels of one picture take.
+
+    Parameters
+    ----------
+    settings : HssilSettings
+        First level, number of levels, and how texels become one.
+    pixels : int
+        Of the picture.
+    float_bytes : int
+        Of one number, 4 or 8.
+
+    Returns
+    -------
+    int
+        Bytes; texels that the picture's edge cuts are counted as their share.
+
+    Notes
+    -----
+    With n levels from full resolution on it is ``(4 - 4^(1 - n)) / 3`` times the first; from half resolution on, a
+    quarter of that. The mean of radiance alone keeps how many pixels it is of.
+
+    Examples
+    --------
+    >>> level_bytes(HssilSettings(start="full", levels=1), 100, 4)
+    4800
+    """
+    floats = FLOATS + (settings.downsample == "closest_average")
+    numbers = range(settings.first_level, settings.first_level + settings.levels)
+    return sum(-(-pixels >> 2 * number) for number in numbers) * (floats * float_bytes + PIXEL_BYTES)
 
 
 def extra_bytes(settings: HssilSettings, size: tuple[int, int], float_bytes: int) -> int:

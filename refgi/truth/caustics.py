@@ -17,8 +17,8 @@ from refgi.jit import kernel, prange
 from refgi.lobes import inverse_fraction, lobe_direction
 from refgi.radiometry import radiant_intensity
 from refgi.rays import MISS, Tracer, ray_offset
-from refgi.rsm.projection import camera_projection, project
-from refgi.rsm.solid_angle import texel_solid_angles
+from refgi.rsm.buffers.solid_angle import texel_solid_angles
+from refgi.rsm.raster.projection import camera_projection, project
 from refgi.sampling import hash_bits
 from refgi.scene import DirectionalLight, LightTable, Scene, material_table
 from refgi.truth.light_grid import light_rays

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import InputError, RefgiWarning, expect
-from refgi.truth.moments import Moments, no_passes
+from refgi.truth.result import Moments, no_passes
 
 Array = npt.NDArray[Any]
 

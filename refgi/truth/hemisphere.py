@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.pairs.shadow_rays import Receivers
 from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS, STEPS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
-from refgi.shadowed import Receivers
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, found, row
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
 

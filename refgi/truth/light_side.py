@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
+from refgi.pairs.shadow_rays import Receivers
 from refgi.rays import far_offset, ray_offset
 from refgi.sampling import hash_bits
-from refgi.shadowed import Receivers
 from refgi.truth.lit_points import BLOCK, LitPoints
 
 Array = npt.NDArray[Any]

@@ -1,24 +1,140 @@
-"""One pass of the ground truth: an independent, unbiased estimate of every receiver's one-bounce irradiance."""
+"""One pass of the ground truth: an independent, unbiased estimate of every receiver's one-bounce irradiance.
+
+Where a path goes after it found a surface: through it, where nothing blocks, or on by the surface's reflection.
+"""
 
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from refgi.jit import kernel, prange
+from refgi.lobes import inverse_fraction, lobe_direction
+from refgi.pairs.shadow_rays import Receivers
+from refgi.rays import MISS
+from refgi.sampling import hash_bits
 from refgi.truth.caustics import photon_pass
-from refgi.truth.hemisphere import gather, scrambled_points, send
+from refgi.truth.hemisphere import cosine_direction, gather, scrambled_points, send
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side
-from refgi.truth.paths import Paths
-from refgi.truth.scattering import pass_through, scatter
+from refgi.truth.paths import Paths, dot, found, row
 from refgi.truth.seen import aim_paths
+from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
 from refgi.truth.task import Task, settle, shadow_batch, spans
 
 Array = npt.NDArray[Any]
-
-
 # A lobe may point below an interpolated horizon: K is 1/2 no more, but <r.w>^P / K stays below 18 for K >= 1e-12.
 BELOW_HORIZON = 9.0
+
+
+@kernel(parallel=True)
+def pass_through(surfaces: Surfaces, grain: float, paths: Paths) -> None:
+    """Move each ray to the far side of what it found, with the same direction.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    grain : float
+        The tracer's: how far rays start above faces, m.
+    paths : Paths
+        Origins, reach and lengths are moved on; rays that found nothing end.
+    """
+    for ray in prange(len(paths.reach)):
+        _pass_through(surfaces, grain, paths, ray)
+
+
+@kernel
+def _pass_through(surfaces: Surfaces, grain: float, paths: Paths, ray: int) -> None:
+    if paths.triangle_id[ray] == MISS:
+        paths.reach[ray] = 0
+        return
+    w, y = found(paths, ray)
+    g = face_normal(surfaces, paths.triangle_id[ray], w[0], w[1], w[2])  # on the side the ray leaves to
+    offset = lift(surfaces, paths.triangle_id[ray], y, g, grain)
+    for c in range(3):
+        paths.origin[ray, c] = y[c] + offset * g[c]
+    paths.travelled[ray] += paths.distance[ray]
+    paths.reach[ray] -= paths.distance[ray]
+
+
+@kernel(parallel=True)
+def scatter(surfaces: Surfaces, grain: float, seed: int, to: Receivers, first: int, per_receiver: int,
+            paths: Paths) -> None:
+    """Send each path on from the surface it found, by that surface's reflection.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        The scene.
+    grain : float
+        The tracer's: how far rays start above faces, m.
+    seed : int
+        Random numbers: a hash of it, the receiver's pixel and the path's number there.
+    to : Receivers
+        Receivers.
+    first : int
+        Receiver of the first path.
+    per_receiver : int
+        Paths of each receiver.
+    paths : Paths
+        Origins, directions, reach and weights are renewed; paths that found nothing or a black surface end.
+
+    Notes
+    -----
+    One of the two parts is chosen by its largest reflectance, with probability p. With v the way back, the diffuse
+    part sends on a cosine-distributed direction around the face normal g with weight rho <n.v> / (<g.v> p), the lobe a
+    direction around the mirror direction of v with density (P + 1) / (2 pi) cos^P and weight rho <g.w> / (K <g.v> p),
+    K for light that comes from w.
+    """
+    for ray in prange(len(paths.reach)):
+        pixel = to.pixel[first + ray // per_receiver]
+        word = hash_bits(hash_bits(np.uint32(pixel) ^ np.uint32(seed)) + np.uint32(ray % per_receiver))
+        _scatter(surfaces, grain, word, paths, ray)
+
+
+@kernel
+def _scatter(surfaces: Surfaces, grain: float, word: Any, paths: Paths, ray: int) -> None:
+    triangle = paths.triangle_id[ray]
+    paths.reach[ray] = 0
+    if triangle == MISS:
+        return
+    material = surfaces.material_of_face[triangle]
+    rho, glossy = row(surfaces.diffuse, material), row(surfaces.specular, material)
+    most, most_glossy = max(rho[0], rho[1], rho[2]), max(glossy[0], glossy[1], glossy[2])
+    if most + most_glossy <= 0:
+        return
+    u, v = _uniform(word ^ np.uint32(0x68E31DA4)), _uniform(word ^ np.uint32(0xB5297A4D))
+    chance = most / (most + most_glossy)
+    back, y = found(paths, ray)
+    g = face_normal(surfaces, triangle, -back[0], -back[1], -back[2])
+    n = shading_normal(surfaces, triangle, y, g)
+    cos_g, cos_n = dot(g, back), dot(n, back)
+    if cos_g <= 0 or cos_n <= 0:
+        return
+    if _uniform(word ^ np.uint32(0x1B56C4E9)) < chance:
+        x0, x1, x2 = cosine_direction(u, v)
+        w = around(g, x0, x1, x2)
+        part, factor = rho, cos_n / (cos_g * chance)
+    else:
+        exponent = surfaces.exponent[material]
+        mirror = (2 * cos_n * n[0] - back[0], 2 * cos_n * n[1] - back[1], 2 * cos_n * n[2] - back[2])
+        x0, x1, x2 = lobe_direction(u, v, exponent)
+        w = around(mirror, x0, x1, x2)
+        part, factor = glossy, dot(g, w) * inverse_fraction(dot(n, w), exponent) / (cos_g * (1 - chance))
+    if dot(g, w) <= 0 or factor <= 0:
+        return
+    paths.reach[ray] = np.inf
+    offset = lift(surfaces, triangle, y, g, grain)
+    for c in range(3):
+        paths.origin[ray, c] = y[c] + offset * g[c]
+        paths.direction[ray, c] = w[c]
+        paths.weight[ray, c] *= part[c] * factor
+
+
+@kernel
+def _uniform(word: Any) -> Any:
+    return (hash_bits(word) + 0.5) * 2.0**-32
 
 
 def one_pass(task: Task, number: int) -> Array:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rays import MISS, Tracer, ray_offset
-from refgi.rsm.projection import Projection, texel_of
+from refgi.rsm.raster.projection import Projection, texel_of
 from refgi.truth.lit_points import LitPoints
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, found
 from refgi.truth.surfaces import Surfaces, face_normal, lift

@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.pairs.shadow_rays import Receivers, add_free
 from refgi.rays import Tracer
-from refgi.rsm.projection import Projection
+from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
-from refgi.shadowed import Receivers, add_free
 from refgi.truth.caustics import Film
-from refgi.truth.density import Density
+from refgi.truth.light_grid import Density
 from refgi.truth.paths import Shadows
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import Surfaces

@@ -13,16 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
-from refgi.rsm.projection import camera_projection
+from refgi.pairs.shadow_rays import receivers
+from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene
-from refgi.shadowed import receivers
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.checkpoint import Checkpoint
-from refgi.truth.moments import Moments, add_pass, blocks_of, no_passes, with_means
+from refgi.truth.light_pass import pilot
 from refgi.truth.passes import one_pass
-from refgi.truth.pilot import pilot
-from refgi.truth.result import TruthResult, result_of
+from refgi.truth.result import Moments, TruthResult, add_pass, blocks_of, no_passes, result_of, with_means
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import lights_of, surfaces
 from refgi.truth.task import Task, sets_of

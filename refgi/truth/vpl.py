@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.shadowed import BATCH, receivers, shadowed_sum
+from refgi.pairs.shadow_rays import BATCH, receivers, shadowed_sum
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -65,7 +65,7 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     (3, h, w) ndarray
         Indirect irradiance in the frame's dtype, W/m^2, linear RGB. Excludes the receiver's albedo/pi.
     """
-    from refgi.rsm import choose_pixel_lights
+    from refgi.lights import choose_pixel_lights
 
     settings = settings or VplSettings()
     lights = choose_pixel_lights(frame.rsms, count=None if settings.pattern == "all" else settings.lights,

@@ -2,8 +2,8 @@
 
 import sys
 
-from refgi.cli import progress as module
-from refgi.cli.progress import progress
+from refgi.cli import session as module
+from refgi.cli.session import progress
 
 
 def test_lines_come_only_every_few_seconds(monkeypatch, capsys):

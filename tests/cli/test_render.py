@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from refgi.cli import memory
 from refgi.cli.group import VerbGroup
-from refgi.cli.lights import read_lights
+from refgi.cli.view import read_lights
 from refgi.cluster import ValSettings
 from refgi.errors import RefgiWarning
 from refgi.image import read_exr

@@ -16,7 +16,7 @@ from refgi.scene import load_scene
 from refgi.scene.path import scenes_along
 from refgi.scene.pathfile import read_path
 from refgi.splat import SiiSettings
-from refgi.splat.sii import sii
+from refgi.splat.sii.sii import sii
 from refgi.sssil.temporal import Sequence, TemporalSettings
 
 PATH = """

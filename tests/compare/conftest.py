@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from refgi.compare.flip import Flip
-from refgi.compare.measurement import measure
-from refgi.compare.outcome import Comparison, MethodResult, Reference
+from refgi.compare.outcome import Comparison, MethodResult, Reference, measure
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
 from refgi.stages import Run
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from refgi.compare import metrics
-from refgi.compare.measurement import measure
+from refgi.compare.outcome import measure
 from refgi.compare.ssim import ssim_of_noise
 from refgi.errors import InputError
 from tests.naive import metrics as naive

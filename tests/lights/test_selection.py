@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
+from refgi.lights import Warp, choose_pixel_lights, importance
 from refgi.lights.openness_flux import roulette, scale_flux
 from refgi.rays import Tracer, openness
-from refgi.rsm import Warp, choose_pixel_lights, importance, reflective_shadow_map
+from refgi.rsm import reflective_shadow_map
 from refgi.scene import Material, SpotLight, load_scene, material_table
 from refgi.splat import PairSettings, Receivers, irradiance
 from tests.rsm.shapes import geometry

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from refgi.rsm import PixelLights
+from refgi.lights import PixelLights
 from refgi.splat import Receivers
 
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from refgi.form_factors import disc_form_factor, parallel_rectangles_form_factor, polygon_form_factor
 from refgi.splat import PairSettings, irradiance
+from tests.form_factors import disc_form_factor, parallel_rectangles_form_factor, polygon_form_factor
 from tests.naive import eq2
 from tests.pairs import sets
 

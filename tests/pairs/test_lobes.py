@@ -10,7 +10,7 @@ from refgi.jit import threads
 from refgi.pairs.lobe_shape import CLAMPED, FULL_LOBE, NO_NORM, lobe_norm_factor
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.packing import pack_clamp, pack_lobes, pack_widening
-from refgi.pairs.range import Range
+from refgi.pairs.pixel_lights import Range
 from refgi.splat import PairSettings, Receivers, irradiance
 from tests.naive import eq2
 from tests.naive.radiometry import lobe_fraction

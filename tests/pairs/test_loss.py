@@ -17,7 +17,7 @@ from refgi.pairs.loss import sample_pixels
 from refgi.pairs.settings import PairSettings
 from refgi.scene import PointLight, load_scene
 from refgi.splat import GatherSettings, MultiresSettings, SiiSettings, gather, multires, sii
-from refgi.splat.gathering.loss import disc_loss
+from refgi.splat.gather.gather_sum import disc_loss
 from refgi.stages import observe
 
 # points of 100, besides the rounding of the words: without a clamp the sum has a standard deviation of 0.8 to 2.2 of

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from refgi.pairs.packing import HEADROOM, pack
-from refgi.rsm.pixel_lights import PixelLights
-from refgi.splat.reach.threshold import all_peaks, light_range, low_irradiance
-from refgi.splat.settings import SplatSettings
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.splat.sii.reach.threshold import all_peaks, light_range, low_irradiance
+from refgi.splat.sii.settings import SplatSettings
 
 UP = np.array([[0.0], [1.0], [0.0]], np.float32)
 NORMS = ("none", "full_lobe", "clamped")

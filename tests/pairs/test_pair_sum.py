@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from refgi.errors import InputError
 from refgi.jit import threads
-from refgi.pairs.culling import bound_tile, lights_in_reach
 from refgi.pairs.packing import pack_diffuse
 from refgi.pairs.pair_sum import GROUP, TILE, geometry_term, sum_pairs
+from refgi.pairs.tiles import bound_tile, lights_in_reach
 from refgi.splat import PairSettings, Receivers, irradiance
 from tests.naive import eq2
 from tests.pairs import sets

@@ -13,7 +13,7 @@ from refgi import Frame, load_scene
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight
 from refgi.splat import PairSettings, SplatSettings, irradiance
-from refgi.splat.splat import splat
+from refgi.splat.sii.splat import splat
 from tests.pairs import sets
 
 U = 2.0**-24  # unit of rounding of float32

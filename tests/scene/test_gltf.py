@@ -271,7 +271,7 @@ def test_more_instances_than_memory_holds(tmp_path: Path, monkeypatch: pytest.Mo
         tree["nodes"] += [{"mesh": 0}] * 9
         tree["scenes"][0]["nodes"] = [0, *range(3, 12)]
 
-    monkeypatch.setattr("refgi.scene.room.physical_memory", lambda: 4 * 48.0 * 10)
+    monkeypatch.setattr("refgi.scene.mesh.physical_memory", lambda: 4 * 48.0 * 10)
     with pytest.raises(InputError, match=r"nodes\[9\]\.mesh: expected a scene that fits"):
         load_scene(written(tmp_path, edit))
 

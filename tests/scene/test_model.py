@@ -23,9 +23,8 @@ from refgi.scene import (
     material_table,
     merge,
 )
-from refgi.scene.framing import framed, lit
-from refgi.scene.health import mended, zero_area
-from refgi.scene.power import shining
+from refgi.scene.health import mended, shining, zero_area
+from refgi.scene.load import framed, lit
 from refgi.scene.transform import affine, placed
 
 VERTICES = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])

@@ -258,7 +258,7 @@ def test_flat_faces_are_skipped_and_counted(tmp_path: Path) -> None:
 
 
 def test_more_instances_than_memory_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("refgi.scene.room.physical_memory", lambda: 4 * 48.0 * 10)
+    monkeypatch.setattr("refgi.scene.mesh.physical_memory", lambda: 4 * 48.0 * 10)
     with pytest.raises(InputError, match=r"objects\[7\].*fits in .* GiB of memory, got '32 vertices and 16 faces"):
         load_scene(write_scene(tmp_path, objects=[{"mesh": "square.ply"}] * 8))
 

@@ -5,13 +5,13 @@ import math
 import numpy as np
 
 from refgi.frame import Frame
+from refgi.lights import choose_pixel_lights
+from refgi.lights.importance import importance
+from refgi.lights.warp import Warp
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
-from refgi.rsm import choose_pixel_lights
-from refgi.rsm.importance import importance
-from refgi.rsm.warp import Warp
 from refgi.scene import load_scene
-from refgi.splat.account.pixel_area import pixel_areas
+from refgi.splat.sii.ledger_sides import pixel_areas
 from refgi.truth import TruthSettings, trace_truth
 
 PUBLISHED = Warp("B", 3)  # SII Table 1: 4096 lights, 3 levels, method B

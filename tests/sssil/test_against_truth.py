@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad
 
-from refgi.form_factors import polygon_form_factor
 from refgi.frame import Frame
 from refgi.scene import PointLight, load_scene
 from refgi.sssil.crown.gather import gather
@@ -15,6 +14,7 @@ from refgi.sssil.level import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.truth import accumulate
+from tests.form_factors import polygon_form_factor
 from tests.truth.scenes import corner_room
 
 SIGMAS = 5.0  # Student's t of 8 passes

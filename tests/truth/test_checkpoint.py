@@ -19,7 +19,7 @@ from refgi.frame import Frame
 from refgi.scene import load_scene
 from refgi.truth import TruthSettings, checkpoint, trace_truth
 from refgi.truth.checkpoint import DIGEST, FIRST_LINE, Checkpoint, _digest
-from refgi.truth.moments import add_pass
+from refgi.truth.result import add_pass
 
 ROOT, SIZE, VALUES = Path(__file__).parents[2], 24, 5
 NAME = b"n" * DIGEST

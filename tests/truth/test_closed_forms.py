@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from refgi.form_factors import polygon_form_factor
 from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight
 from refgi.truth import TruthSettings
 from refgi.truth.truth import accumulate
+from tests.form_factors import polygon_form_factor
 from tests.naive.truth import one_bounce, truncated_series
 from tests.truth.scenes import CAMERA, at, corner_room, floor, receivers_in_corner, rectangle, scene, spot_down
 

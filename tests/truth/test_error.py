@@ -14,8 +14,8 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.scene import load_scene
 from refgi.truth import TruthResult, TruthSettings, trace_truth, truth
-from refgi.truth.moments import add_pass, no_passes, with_means
 from refgi.truth.passes import one_pass
+from refgi.truth.result import add_pass, no_passes, with_means
 
 SIZE = 48
 

@@ -16,7 +16,7 @@ from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.caustics import SHARP_LOBE
 from refgi.truth.light_grid import light_rays
 from refgi.truth.lit_points import join, trace_lit_points
-from refgi.truth.moments import add_pass, no_passes, with_means
+from refgi.truth.result import add_pass, no_passes, with_means
 from refgi.truth.surfaces import lights_of, lobe_pattern, surfaces
 from tests.naive.truth import mirror_mean
 from tests.test_lobes import literal_power

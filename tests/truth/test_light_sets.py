@@ -10,8 +10,7 @@ from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from refgi.truth import TruthSettings, trace_truth
-from refgi.truth.density import density_of, warp
-from refgi.truth.light_grid import cell_centres, light_rays, rays_through, stratified_sets
+from refgi.truth.light_grid import cell_centres, density_of, light_rays, rays_through, stratified_sets, warp
 from refgi.truth.light_pass import fresh_points
 from refgi.truth.light_side import TILE, tiles
 from refgi.truth.lit_points import BLOCK

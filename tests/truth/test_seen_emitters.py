@@ -8,12 +8,12 @@ import pytest
 
 from refgi import jit
 from refgi.errors import InputError
-from refgi.form_factors import polygon_form_factor
 from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, load_scene, merge
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.truth import accumulate
+from tests.form_factors import polygon_form_factor
 from tests.truth.scenes import WHITE, rectangle
 
 ESTIMATORS = ["combined", "hemisphere", "light"]

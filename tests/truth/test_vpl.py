@@ -45,7 +45,8 @@ def test_all_texels_converge_to_the_truth(name, evidence):
 
 @pytest.mark.feature("REF-03")
 def test_the_full_sum_without_visibility_is_that_of_sii_and_of_the_truth(evidence):
-    from refgi.splat.sii import SiiSettings, sii
+    from refgi.splat.sii.settings import SiiSettings
+    from refgi.splat.sii.sii import sii
 
     frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=128)
     ours = vpl(frame, VplSettings(pattern="all", visibility=False))

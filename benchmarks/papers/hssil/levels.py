@@ -20,8 +20,8 @@ from refgi.compare.maps import DIVERGING, Scale, luminance
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.sssil import HssilSettings
-from refgi.sssil.crown.coverage import coverage
 from refgi.sssil.crown.pattern import offsets_at
+from refgi.sssil.crown.reach import coverage
 
 ROWS = 256  # of receivers whose samples are counted, in units of a run's repeats
 GROUND, RINGS = 0.08, 0.3  # grey values

@@ -22,7 +22,7 @@ from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight
 from refgi.scene.builtin.atrium import LEAF
-from refgi.scene.builtin.atrium_cloth import shrub
+from refgi.scene.builtin.atrium_pieces import shrub
 from refgi.scene.builtin.cornell import cornell_box
 from refgi.scene.builtin.surfaces import patch, rectangle
 from refgi.scene.health import mean_face_normals

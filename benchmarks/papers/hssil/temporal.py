@@ -12,8 +12,8 @@ from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.scene import Scene
 from refgi.sssil import HssilSettings
+from refgi.sssil.temporal.filter import TemporalSettings
 from refgi.sssil.temporal.sequence import Sequence
-from refgi.sssil.temporal.settings import TemporalSettings
 from refgi.stages import observe
 
 RAW, PRINTED, RECURSIVE = "each frame alone", "as printed", "recursive"

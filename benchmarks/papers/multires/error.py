@@ -23,11 +23,11 @@ from benchmarks.papers.records import Array, Case, Figure, Picture, Table, relat
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved, seen_by
 from refgi.compare.maps import DIVERGING, Scale, luminance
 from refgi.frame import Frame
-from refgi.lights.solid_angle import with_equal_solid_angles
+from refgi.lights.footprints import with_equal_solid_angles
 from refgi.scene import Camera, Material, Scene, SpotLight
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import Mesh, merge
-from refgi.splat.gathering.gather import GatherSettings, gather
+from refgi.splat.gather import GatherSettings, gather
 from refgi.splat.multires import MultiresSettings, multires
 
 WHOLE_MAP = 1.4143  # map widths: a disc past every corner

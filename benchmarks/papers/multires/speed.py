@@ -26,8 +26,8 @@ from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import Scene
-from refgi.splat.error_target.error_driven import error_driven
 from refgi.splat.multires import MultiresSettings, multires
+from refgi.splat.multires.error_target.error_driven import error_driven
 
 # eye and target on the way, m: towards the body, close past it, over it and back
 WAY = np.array([

@@ -30,7 +30,7 @@ from refgi.scene.builtin.surfaces import lathe, patch, sphere
 from refgi.scene.health import mean_face_normals
 from refgi.scene.model import Camera, Material, Mesh, SpotLight, merge
 from refgi.splat.multires import MultiresSettings, multires, shared_subsplats
-from refgi.splat.refinement.grid import Subsplats
+from refgi.splat.multires.refinement.grid import Subsplats
 
 TEAPOT, BUDDHA, DRAGON, BUNNIES = "simple", "carved", "serpent", "flock"
 CLAMP = 0.04  # least distance, share of the diagonal

@@ -25,12 +25,12 @@ from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, i
 from refgi.compare.maps import Scale
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
-from refgi.splat.light_lists.per_light import per_light_counts
-from refgi.splat.multires import MultiresSettings, Upsampling, multires
-from refgi.splat.refinement.grid import Subsplats
-from refgi.splat.refinement.picture import level_picture
-from refgi.splat.subsplats.evaluate import at_subsplats, evaluate
-from refgi.splat.subsplats.upsample import upsample
+from refgi.splat.multires import MultiresSettings, multires
+from refgi.splat.multires.light_lists.per_light import per_light_counts
+from refgi.splat.multires.refinement.grid import Subsplats, level_picture
+from refgi.splat.multires.settings import Upsampling
+from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.upsample import upsample
 
 PICTURE_LIGHTS = 256  # of Table 1's pictures
 

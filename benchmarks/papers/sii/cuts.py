@@ -14,9 +14,9 @@ from refgi.compare.maps import Scale
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.splat import GatherSettings, SiiSettings, gather, sii
-from refgi.splat.reach.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
-from refgi.splat.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW
-from refgi.splat.reach.threshold import low_irradiance
+from refgi.splat.sii.reach.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
+from refgi.splat.sii.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW
+from refgi.splat.sii.reach.threshold import low_irradiance
 from refgi.stages import observe
 
 PAPER_PIXELS = 512 * 512

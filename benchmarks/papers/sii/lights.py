@@ -12,11 +12,11 @@ from benchmarks.papers.records import Array, Case, Figure, Picture, Table, relat
 from benchmarks.papers.sii.subjects import full_sum
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, interleaved, whole_frame
 from refgi.frame import Frame
+from refgi.lights import importance_pyramid
 from refgi.lights.selection import choose_lights, importance_maps
-from refgi.rsm.pyramid import importance_pyramid
-from refgi.rsm.warp import warp_samples
+from refgi.lights.warp import warp_samples
+from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.sampling import halton
-from refgi.shadowed import receivers, shadowed_sum
 from refgi.splat import SiiSettings, sii
 
 BLOCK = 8  # pixels along a side, by whose means caustics are judged

@@ -13,9 +13,9 @@ from benchmarks.papers.workbench import Workbench
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.reach.fragments import Fragments, fragments
-from refgi.splat.reach.reference_length import PAPER_CUT, PAPER_LIGHTS
-from refgi.splat.reach.reference_length import reference_length as reference_length_of
+from refgi.splat.sii.reach.fragments import Fragments, fragments
+from refgi.splat.sii.reach.reference_length import PAPER_CUT, PAPER_LIGHTS
+from refgi.splat.sii.reach.reference_length import reference_length as reference_length_of
 
 BOX = "cornell_sphere:faces=17000"  # as many faces as the scenes of a game in 2006
 CAUSTIC = SiiSettings(lights=4096, warp="B", warp_levels=3, importance="peak", i_low=PAPER_CUT,

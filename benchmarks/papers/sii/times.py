@@ -9,9 +9,8 @@ from typing import Any
 from benchmarks.papers.records import Cell, Figure, Table, relative
 from benchmarks.papers.sii.subjects import CAUSTIC
 from benchmarks.papers.workbench import Redrawing, Workbench, interleaved, seen_by
-from refgi.rsm.importance import importance
-from refgi.rsm.pyramid import importance_pyramid
-from refgi.rsm.warp import Method, warp_samples
+from refgi.lights import importance, importance_pyramid
+from refgi.lights.warp import Method, warp_samples
 from refgi.sampling import halton
 from refgi.scene import Scene
 from refgi.splat import sii

@@ -29,7 +29,7 @@ from benchmarks.papers.val.subjects import (
 from benchmarks.papers.workbench import Gallery, Workbench, changes, errors_of, interleaved, seen_by
 from refgi.cluster.val import val
 from refgi.frame import Frame
-from refgi.rsm import PixelLights
+from refgi.lights import PixelLights
 from refgi.scene import Scene
 from refgi.stages import Memory, observe
 

@@ -31,7 +31,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.compare.maps import luminance
 from refgi.frame import Frame
-from refgi.rsm import PixelLights
+from refgi.lights import PixelLights
 from refgi.scene import Camera, Material, Scene, SpotLight
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import merge

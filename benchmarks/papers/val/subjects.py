@@ -22,9 +22,8 @@ import numpy as np
 
 from benchmarks.papers.records import Array
 from benchmarks.papers.workbench import Subjects, Workbench, whole_frame
-from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import Clusters, cluster
-from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
@@ -32,14 +31,14 @@ from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import facing, val
 from refgi.frame import Frame
+from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights
 from refgi.pairs.irradiance import Receivers
-from refgi.rsm import PixelLights
+from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, load_scene
 from refgi.scene.builtin.cornell import CAMERA, cornell_box, shell
 from refgi.scene.builtin.metaballs import HALF_SIZE, MIDDLE, Balls, blob, metaballs
 from refgi.scene.model import merge
-from refgi.shadowed import receivers, shadowed_sum
 from refgi.truth.vpl import VplSettings, vpl
 
 HORSE, CORNER, BOX, ATRIUM, BLOB, MARCH = "horse", "corner", "plain box", "atrium", "blob", "march"

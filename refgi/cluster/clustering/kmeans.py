@@ -1,4 +1,7 @@
-"""Clusters of lights by k-means over position and normal (Sec. 5): the mapping C(i) from light to area light."""
+"""Clusters of lights by k-means over position and normal (Sec. 5): the mapping C(i) from light to area light.
+
+What a clustering is worth: how much normals differ in a cluster (Fig. 6), how many clusters are in use (Fig. 8).
+"""
 
 import math
 from typing import Any, NamedTuple
@@ -139,3 +142,41 @@ def _metric(distance: Distance, weights: tuple[float, float], diagonal: float, s
     elif distance == "squared":
         position, span = position / diagonal**2, span * span
     return Metric(position, angle, distance == "squared", SLACK * float(position * span + angle * math.pi))
+
+
+def mean_angle(normal: Array, clusters: Clusters) -> float:
+    """Return the mean over lights of the angle between a light's normal and its cluster's.
+
+    Parameters
+    ----------
+    normal : (3, N) ndarray
+        Unit normals of the lights.
+    clusters : Clusters
+        Their clusters.
+
+    Returns
+    -------
+    float
+        Radians; 0 without lights.
+    """
+    if normal.shape[1] == 0:
+        return 0.0
+    ours, own = np.asarray(normal, np.float64), clusters.normal[:, clusters.of]
+    across, along = np.linalg.norm(np.cross(ours, own, axis=0), axis=0), (ours * own).sum(axis=0)
+    return float(np.arctan2(across, along).mean())
+
+
+def in_use(clusters: Clusters) -> int:
+    """Return how many clusters have lights.
+
+    Parameters
+    ----------
+    clusters : Clusters
+        The clusters.
+
+    Returns
+    -------
+    int
+        0 to M.
+    """
+    return int(np.count_nonzero(clusters.members))

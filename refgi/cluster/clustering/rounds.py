@@ -47,7 +47,7 @@ class Rounds(NamedTuple):
     picks: Array  # (workers, 2, TILE) int64: places in `order`, nearest area lights
 
 
-@kernel(parallel=True)
+@kernel
 def iterate(state: Rounds, metric: Metric, rounds: int, objective: Array) -> int:
     """Run k-means until no light changes its area light, or for a number of rounds.
 
@@ -67,20 +67,24 @@ def iterate(state: Rounds, metric: Metric, rounds: int, objective: Array) -> int
     int
         Rounds of means made.
     """
-    workers = len(state.scratch)
     done = 0
     while True:
         tiles = _sort(state)
         if done > 0:
             _move_to_means(state)
-        for worker in prange(workers):
-            _assign(state, metric, int(worker), tiles)
+        _assign_all(state, metric, tiles)
         objective[done] = _total(state.own)
         if done == rounds or (done > 0 and _total(state.changed[:tiles]) == 0):
             break
         done += 1
     _sort(state)
     return done
+
+
+@kernel(parallel=True)
+def _assign_all(state: Rounds, metric: Metric, tiles: int) -> None:
+    for worker in prange(len(state.scratch)):
+        _assign(state, metric, worker, tiles)
 
 
 @kernel

@@ -7,8 +7,22 @@ S_k = sin(c_k t), C_k = cos(c_k t), c_k = (2k - 1) pi, from the first pair by tu
 t is the depth over the range of the series, 0 to less than 1 (the rest keeps the far end from wrapping around to the
 near one); where nothing is seen it is the far end. The paper's channels are the 2 M of the basis and the 2 M of the
 "basis-z"; the mean of (1 - f) t needs the plain t as well.
+
+What is left of the basis in the published textures: 8 bits for sines and cosines, 16 for those times z (Sec. 6).
+
+8 bits store [-1, 1] as 0 .. 255; the paper does not say how, this is the mapping of normalised textures. Each number
+is off by 1/255 at most, so V is off by sum_k 2 sqrt(2) / (255 c_k) at most: 0.0059 with 4 terms. 16 bits are the
+IEEE format of 11 significant ones, rounded to nearest, ties to even.
+
+What the square beyond the unit disc holds, for filters that cannot leave it out.
+
+The disc is the hemisphere before the light, and a square map has a fifth of its texels beyond it. Holding nothing
+they are lit, so that light leaks in over the rim. `mirrored` texels hold what lies in the direction mirrored at the
+light's plane, (s, t) / (s^2 + t^2): the filter then sees nothing but the hemisphere, as the sum over the texels of
+the disc does.
 """
 
+import functools
 import math
 from typing import Any
 
@@ -16,14 +30,56 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.filters.depth_scale import DepthScale, series_depths
-from refgi.cluster.filters.quantise import eight_bits, half_precision
 from refgi.jit import kernel
 
+STEPS = 255.0
+HALF_STEP = 0.5001  # what lies half way, as means of four often do, is rounded up however it was rounded before
+LEAST_EXPONENT = -14  # of a half with all its 11 bits; below it the spacing stays 2^-24
 Array = npt.NDArray[Any]
 
 # sin(pi u) / u and cos(pi u) in powers of u^2, |u| <= 1/2: Taylor series to half a unit in the last place
 SINE = tuple((-1) ** k * math.pi ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(12))
 COSINE = tuple((-1) ** k * math.pi ** (2 * k) / math.factorial(2 * k) for k in range(13))
+INSIDE = 1.5  # texels from the rim, within which the centre of a texel lies in the disc
+
+
+@kernel
+def eight_bits(value: Any) -> Any:
+    """Return what a texture of 8 bits keeps of a number.
+
+    Parameters
+    ----------
+    value : float
+        Number of [-1, 1].
+
+    Returns
+    -------
+    float
+        The nearest of 256 evenly spaced numbers from -1 to 1.
+    """
+    real = type(value)
+    step = math.floor((value + real(1.0)) * real(0.5 * STEPS) + real(HALF_STEP))
+    return real(step) * real(2.0 / STEPS) - real(1.0)
+
+
+@kernel
+def half_precision(value: Any) -> Any:
+    """Return what a float of 16 bits keeps of a number.
+
+    Parameters
+    ----------
+    value : float
+        Number within 65504 in size.
+
+    Returns
+    -------
+    float
+        The nearest half, of two equally near ones the even.
+    """
+    real = type(value)
+    _, exponent = math.frexp(value)
+    spacing = math.ldexp(1.0, max(exponent - 1, LEAST_EXPONENT) - 10)
+    return real(np.rint(value / spacing) * spacing)
 
 
 @kernel
@@ -124,3 +180,47 @@ def fill_basis(depth: Array, terms: int, quantised: bool, basis: Array, basis_z:
                     basis[i, j, c] = eight_bits(basis[i, j, c])
                 for c in range(2 * terms + 1):
                     basis_z[i, j, c] = half_precision(basis_z[i, j, c])
+
+
+@functools.lru_cache(maxsize=8)
+def beyond_disc(size: int, mirrored: bool) -> Array:
+    """Pair the texels beyond the unit disc with those they mirror.
+
+    Parameters
+    ----------
+    size : int
+        Texels along a side of the map, n.
+    mirrored : bool
+        Whether they mirror any; no pairs otherwise.
+
+    Returns
+    -------
+    (count, 2) ndarray
+        Int32: a texel beyond and the one it copies, row by row.
+    """
+    if not mirrored:
+        return np.zeros((0, 2), np.int32)
+    centres = (np.arange(size) + 0.5) * 2 / size - 1
+    s, t = np.meshgrid(centres, centres)
+    rho = np.hypot(s, t)
+    beyond = np.flatnonzero(rho.ravel() > 1)
+    scale = np.minimum(1 / rho.ravel()[beyond], 1 - INSIDE / size) / rho.ravel()[beyond]
+    column, row = (((x.ravel()[beyond] * scale + 1) * size / 2).astype(np.int64) for x in (s, t))
+    return np.stack([beyond, row * size + column], axis=1).astype(np.int32)
+
+
+@kernel
+def fill_beyond(pairs: Array, depth: Array) -> None:
+    """Copy depths to the texels beyond the unit disc.
+
+    Parameters
+    ----------
+    pairs : (count, 2) ndarray
+        As from `beyond_disc`.
+    depth : (n, n) ndarray
+        Changed in place.
+    """
+    n = len(depth)
+    for k in range(len(pairs)):
+        target, source = pairs[k, 0], pairs[k, 1]
+        depth[target // n, target % n] = depth[source // n, source % n]

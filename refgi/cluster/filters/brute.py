@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import types
 
-from refgi.cluster.filters.basis import fill_basis, normalise
-from refgi.cluster.filters.beyond import beyond_disc, fill_beyond
+from refgi.cluster.filters.basis import beyond_disc, fill_basis, fill_beyond, normalise
 from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.eight import room_of
 from refgi.cluster.settings import MOST_TERMS

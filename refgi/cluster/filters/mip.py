@@ -14,9 +14,8 @@ import numpy.typing as npt
 from numba import types
 
 from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store_at, transpose
-from refgi.cluster.filters.level_0 import CHUNK, DIRECT, LEVEL, MAP, add_level_0
 from refgi.cluster.filters.mip_build import build_mip, build_mips
-from refgi.cluster.filters.pyramid import Mip, mip_of, mips
+from refgi.cluster.filters.pyramid import CHUNK, DIRECT, LEVEL, MAP, Mip, add_level_0, mip_of, mips
 from refgi.elementary import log2p1
 from refgi.jit import kernel
 

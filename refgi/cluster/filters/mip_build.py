@@ -8,12 +8,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.filters.basis import fill_basis, normalise, sine_cosine, turned
-from refgi.cluster.filters.beyond import fill_beyond
+from refgi.cluster.filters.basis import (
+    eight_bits,
+    fill_basis,
+    fill_beyond,
+    half_precision,
+    normalise,
+    sine_cosine,
+    turned,
+)
 from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store
 from refgi.cluster.filters.pyramid import Mip, mip_of
-from refgi.cluster.filters.quantise import eight_bits, half_precision
 from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]

@@ -15,8 +15,8 @@ from refgi.cluster.maps.hard import hard_tile
 from refgi.cluster.visibility.look import ROOM_ROWS, Choices
 from refgi.cluster.visibility.soft import FULL, soft_tile
 from refgi.jit import kernel, prange
-from refgi.pairs.culling import bound_tile, lights_in_reach
 from refgi.pairs.pair_sum import GROUP, ROWS, TILE, TOTAL, Clamp, X, add_listed, load_tile
+from refgi.pairs.tiles import bound_tile, lights_in_reach
 
 Array = npt.NDArray[Any]
 

@@ -13,10 +13,19 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights, Given
+from refgi.cluster.clustering.rectangle import AreaLights, Given
 from refgi.cluster.lighting.area_sum import Tiles, add_hard, add_soft, add_unshadowed, bound_tiles
-from refgi.cluster.lighting.interleave import SUBSET, Subsets, dealt, put, subsets, take
-from refgi.cluster.lighting.member_lights import MemberLights, add_members, member_lights
+from refgi.cluster.lighting.interleave import (
+    SUBSET,
+    MemberLights,
+    Subsets,
+    add_members,
+    dealt,
+    member_lights,
+    put,
+    subsets,
+    take,
+)
 from refgi.cluster.visibility.filtered import build, room_for
 from refgi.cluster.visibility.look import choices, numbers_of, scale_of
 from refgi.cluster.visibility.series import series
@@ -28,8 +37,8 @@ from refgi.stages import report_progress, stage
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
     from refgi.cluster.settings import ValSettings
+    from refgi.lights import PixelLights
     from refgi.rays import Tracer
-    from refgi.rsm import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
 from refgi.errors import expect
 from refgi.jit import kernel, prange

@@ -11,14 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.chunks import Chunks, chunks
-from refgi.rsm.extent import Extent
+from refgi.rsm.buffers.extent import Extent
+from refgi.rsm.raster.triangle import Chunks, chunks
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -6,7 +6,6 @@ shadows for every light to the published one, each takes one approximation more;
 
 from refgi.cluster.reference.back_projection import back_projected_visibility
 from refgi.cluster.reference.chosen import reference_visibility
-from refgi.cluster.reference.members import member_visibility
-from refgi.cluster.reference.rectangle import rectangle_visibility
+from refgi.cluster.reference.rays import member_visibility, rectangle_visibility
 
 __all__ = ["back_projected_visibility", "member_visibility", "rectangle_visibility", "reference_visibility"]

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights, Given
+from refgi.cluster.clustering.rectangle import AreaLights, Given
 from refgi.cluster.maps.hard import SLACK
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
 from refgi.jit import kernel, prange

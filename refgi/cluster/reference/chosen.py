@@ -2,17 +2,16 @@
 
 from typing import TYPE_CHECKING
 
-from refgi.cluster.area_lights import AreaLights, Given
+from refgi.cluster.clustering.rectangle import AreaLights, Given
 from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.reference.back_projection import back_projected_visibility
-from refgi.cluster.reference.members import member_visibility
-from refgi.cluster.reference.rectangle import rectangle_visibility
+from refgi.cluster.reference.rays import member_visibility, rectangle_visibility
 from refgi.cluster.settings import ValSettings
 
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 
 def reference_visibility(

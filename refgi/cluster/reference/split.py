@@ -23,11 +23,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights
-from refgi.cluster.clustering.rectangle import map_frames
+from refgi.cluster.clustering.rectangle import AreaLights, map_frames
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.reference.members import member_visibility
+from refgi.cluster.reference.rays import member_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import PUBLISHED_BLOCK, clustered, facing, lit, surface
 from refgi.errors import expect
@@ -35,7 +34,7 @@ from refgi.lights.selection import choose_lights, footprints
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.rsm import PixelLights
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 

@@ -3,13 +3,13 @@
 from typing import Any
 
 import numpy.typing as npt
-from numba.extending import overload
 
 from refgi.cluster.filters.brute import Brute, brute_means, brutes, build_brute
 from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.mip import Mip, build_mip, mip_means, mip_of, mips
 from refgi.cluster.filters.sat import Sat, build_sat, sat_means, sats
 from refgi.cluster.settings import ValSettings
+from refgi.jit import by_type
 
 Array = npt.NDArray[Any]
 
@@ -42,7 +42,7 @@ def filtered(
     MEANS[type(filters)](filters, s, t, radius, wanted, count, with_z, out)
 
 
-@overload(filtered)
+@by_type(filtered)
 def _by_type(
     filters: Any, s: Any, t: Any, radius: Any, wanted: Any, count: Any, with_z: Any, out: Any  # noqa: ARG001
 ) -> Any:

@@ -5,12 +5,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.maps.hard import hard_visibility
 from refgi.cluster.maps.shadow_maps import ShadowMaps
-from refgi.cluster.reference.rectangle import rectangle_points
-from refgi.cluster.reference.unobstructed import Ball, free_share
+from refgi.cluster.reference.rays import Ball, free_share, rectangle_points
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.filtered import build
 from refgi.cluster.visibility.look import ROOM_ROWS, Choices, choices, look, numbers_of, scale_of

@@ -11,10 +11,9 @@ from itertools import pairwise
 import numpy as np
 
 from refgi.errors import expect
-from refgi.scene.builtin import atrium_arches as arches
-from refgi.scene.builtin import atrium_cloth as cloth
-from refgi.scene.builtin.atrium_arches import BAY
+from refgi.scene.builtin import atrium_pieces as pieces
 from refgi.scene.builtin.atrium_parts import Part, swept, turned, with_arguments
+from refgi.scene.builtin.atrium_pieces import BAY
 from refgi.scene.model import Array, Camera, Material, Scene, SpotLight, merge
 
 FEWEST_FACES, MOST_FACES = 10_000, 20_000_000
@@ -108,10 +107,10 @@ def _building() -> list[Part]:
              Part("balusters", COLUMN, with_arguments(turned, BALUSTER), (14, 12), _balusters(bays), True,
                   (2, 3))]
     for storey, spring, top in (("lower", GROUND_SPRING, GROUND_TOP), ("upper", UPPER_SPRING, UPPER_TOP)):
-        for name, shape, arguments, cells in (("front", arches.arch_front, (spring, top), (6, 34)),
-                                              ("back", arches.arch_back, (spring, top), (6, 34)),
-                                              ("under", arches.arch_under, (spring,), (4, 34)),
-                                              ("moulding", arches.archivolt, (spring,), (6, 34))):
+        for name, shape, arguments, cells in (("front", pieces.arch_front, (spring, top), (6, 34)),
+                                              ("back", pieces.arch_back, (spring, top), (6, 34)),
+                                              ("under", pieces.arch_under, (spring,), (4, 34)),
+                                              ("moulding", pieces.archivolt, (spring,), (6, 34))):
             material = COLUMN if name == "moulding" else STONE
             found.append(Part(f"{storey}_arch_{name}", material, with_arguments(shape, *arguments), cells, bays,
                               least=(1, 7)))
@@ -148,7 +147,7 @@ def _floor() -> list[Part]:
     x, z = np.meshgrid(np.arange(-11.5, 12.0), np.arange(-2.5, 3.0), indexing="ij")
     dark = (np.round(x + z) % 2).astype(bool).ravel()
     places = np.stack([x.ravel(), np.zeros(x.size), z.ravel(), np.zeros(x.size)], axis=1)
-    shape = with_arguments(cloth.tile, 1.0)
+    shape = with_arguments(pieces.tile, 1.0)
     return [Part("pale_tiles", PALE_TILE, shape, (10, 10), places[~dark], least=(1, 1)),
             Part("dark_tiles", DARK_TILE, shape, (10, 10), places[dark], least=(1, 1))]
 
@@ -157,7 +156,7 @@ def _furniture() -> list[Part]:
     spots = np.array([(x, 0.0, z, 0.0) for x in (-6.0, 0.0, 6.0, 10.2) for z in (-2.15, 2.15)])
     middle = np.array([(3.0, 0.0, 0.0, 0.0)])
     return [Part("pots", TERRACOTTA, with_arguments(turned, POT), (24, 32), spots, True, (4, 6)),
-            Part("shrubs", LEAF, with_arguments(cloth.shrub, 0.46), (40, 60), _at_height(spots, 0.95), True,
+            Part("shrubs", LEAF, with_arguments(pieces.shrub, 0.46), (40, 60), _at_height(spots, 0.95), True,
                  (4, 6)),
             Part("fountain", COLUMN, with_arguments(turned, FOUNTAIN), (24, 72), middle, True, (5, 8)),
             Part("fountain_bowl", COLUMN, with_arguments(turned, FOUNTAIN_BOWL), (40, 56), middle, True,
@@ -175,11 +174,11 @@ def _cloth(random: np.random.Generator) -> list[Part]:
             material = CLOTHS[(first + number + (2 if side > 0 else 0)) % len(CLOTHS)]
             folds, gathered, phase = int(random.integers(9, 13)), random.choice([0.0, 0.35, 1.0]), random.uniform(0, 6)
             place = np.array([(x, 0.0, side * (HALF_WIDTH + 0.1), turn)])
-            shape = with_arguments(cloth.curtain, folds, gathered, phase)
+            shape = with_arguments(pieces.curtain, folds, gathered, phase)
             found.append(Part(f"curtain_{number}", material, shape, (36, 130), place, least=(2, 14)))
             if number % 2 == (0 if side > 0 else 1):
                 place = np.array([(x, UPPER_SPRING - 0.15, side * (HALF_WIDTH - 0.05), turn)])
-                shape = with_arguments(cloth.swag, float(random.uniform(0.9, 1.3)))
+                shape = with_arguments(pieces.swag, float(random.uniform(0.9, 1.3)))
                 material = CLOTHS[(first + number // 2 + 1) % len(CLOTHS)]
                 found.append(Part(f"swag_{number}", material, shape, (60, 40), place, least=(4, 6)))
     return found

@@ -8,12 +8,10 @@ import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.files import Contents
-from refgi.scene.gltf.accessors import accessor
-from refgi.scene.gltf.container import Document
-from refgi.scene.gltf.nodes import scene_nodes
-from refgi.scene.gltf.punctual import node_camera, node_light
+from refgi.scene.gltf.container import Document, accessor
+from refgi.scene.gltf.nodes import node_camera, node_light, scene_nodes
+from refgi.scene.mesh import expect_room
 from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
-from refgi.scene.room import expect_room
 from refgi.scene.transform import placed_all
 
 TRIANGLES, STRIP, FAN = 4, 5, 6

@@ -9,13 +9,11 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.memory import plane
-from refgi.rsm.projection import Projection
-from refgi.sssil.level import Level
+from refgi.rsm.raster.projection import Projection
+from refgi.sssil.level import Level, Picture
 from refgi.sssil.pyramid.closest import BEYOND
-from refgi.sssil.pyramid.coarser import fill_coarser_level
+from refgi.sssil.pyramid.fill import fill_coarser_level, fill_first_level
 from refgi.sssil.pyramid.mean import average_pixels, average_texels
-from refgi.sssil.pyramid.picture import Picture
-from refgi.sssil.pyramid.start import fill_first_level
 from refgi.sssil.pyramid.view import View, view_of
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import skip, stage

@@ -15,10 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.sssil.level import Level
-from refgi.sssil.pyramid.picture import Picture
-from refgi.sssil.pyramid.sample_area import pixel_surface
-from refgi.sssil.pyramid.view import View, centre
+from refgi.sssil.level import Level, Picture
+from refgi.sssil.pyramid.view import View, centre, pixel_surface
 
 Array = npt.NDArray[Any]
 

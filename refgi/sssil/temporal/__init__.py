@@ -5,7 +5,7 @@ there is blended with the new (`filter`). `Sequence` renders scenes one after th
 needs; `refgi.scene.path` moves camera, lights and objects through one scene.
 """
 
+from refgi.sssil.temporal.filter import TemporalSettings
 from refgi.sssil.temporal.sequence import Sequence, Step
-from refgi.sssil.temporal.settings import TemporalSettings
 
 __all__ = ["Sequence", "Step", "TemporalSettings"]

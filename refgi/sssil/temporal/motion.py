@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.gbuffer import GBuffer
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.buffers.runs import cross
 from refgi.rsm.memory import plane
-from refgi.rsm.runs import cross
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 

@@ -10,8 +10,7 @@ from refgi.errors import expect
 from refgi.frame import Frame
 from refgi.scene.model import Scene
 from refgi.sssil.settings import LAST_SEED, HssilSettings
-from refgi.sssil.temporal.filter import History, remember, temporal_filter
-from refgi.sssil.temporal.settings import TemporalSettings
+from refgi.sssil.temporal.filter import History, TemporalSettings, remember, temporal_filter
 
 Array = npt.NDArray[Any]
 Light = Callable[[Frame, Any], Array]

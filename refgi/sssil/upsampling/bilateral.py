@@ -11,7 +11,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.sssil.upsampling import lines, receivers, weights
 from refgi.sssil.upsampling.lines import SPAN, WIDE
-from refgi.sssil.upsampling.tent import TENTS, write_tents
+from refgi.sssil.upsampling.weights import TENTS, write_tents
 
 Array = npt.NDArray[Any]
 

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.pairs.shadow_rays import receivers
 from refgi.rays import far_offset
-from refgi.shadowed.receivers import receivers
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.pattern import (
     level_key,

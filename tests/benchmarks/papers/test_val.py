@@ -26,7 +26,7 @@ from benchmarks.papers.val.subjects import (
 )
 from benchmarks.papers.workbench import Workbench, changes, palette, seen_by
 from refgi.frame import Frame
-from refgi.rsm import PixelLights
+from refgi.lights import PixelLights
 from refgi.scene import Mesh
 from refgi.scene.model import merge
 from refgi.stages import Run

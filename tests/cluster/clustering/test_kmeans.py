@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from refgi.cluster.clustering.kmeans import Clusters, cluster
-from refgi.cluster.clustering.measures import in_use, mean_angle
+from refgi.cluster.clustering.kmeans import Clusters, cluster, in_use, mean_angle
 from refgi.cluster.clustering.metric import angle
 from refgi.errors import InputError
 from refgi.stages import observe

@@ -10,8 +10,8 @@ from refgi.cluster.clustering.kmeans import Clusters, cluster
 from refgi.cluster.clustering.rectangle import area_lights, map_frames
 from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError
-from refgi.rsm import PixelLights
-from refgi.rsm.projection import paraboloid_projection
+from refgi.lights import PixelLights
+from refgi.rsm.raster.projection import paraboloid_projection
 from tests.naive import kmeans as naive
 
 PUBLISHED = ValSettings()

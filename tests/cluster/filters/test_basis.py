@@ -6,9 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from refgi.cluster.filters.basis import fill_basis, normalise, sine_cosine
+from refgi.cluster.filters.basis import eight_bits, fill_basis, half_precision, normalise, sine_cosine
 from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.filters.quantise import eight_bits, half_precision
 from refgi.jit import kernel
 from tests.naive import filters as naive
 

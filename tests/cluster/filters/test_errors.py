@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.rsm.depth_maps import paraboloid_depth_maps
+from refgi.rsm.raster.depth_maps import paraboloid_depth_maps
 from refgi.scene import load_scene
 from tests.cluster.filters import reads
 from tests.naive import filters as naive

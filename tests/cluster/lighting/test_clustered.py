@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.area_lights import AreaLights
 from refgi.cluster.clustering.kmeans import cluster
-from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.lighting import clustered_irradiance
 from refgi.cluster.lighting.interleave import RUNS, dealt
 from refgi.cluster.maps.hard import hard_visibility
@@ -15,9 +14,10 @@ from refgi.cluster.visibility.visible import visibility
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights
 from refgi.pairs.irradiance import Receivers, irradiance
-from refgi.rsm import PixelLights, facing_normals
+from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from tests.naive import eq2
 from tests.naive.interleaving import lights_of

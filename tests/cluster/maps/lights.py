@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from refgi.cluster.area_lights import AreaLights
-from refgi.rsm.projection import paraboloid_projection
+from refgi.cluster.clustering.rectangle import AreaLights
+from refgi.rsm.raster.projection import paraboloid_projection
 
 
 def area_lights(center, normal, radius=0.0, members=None):

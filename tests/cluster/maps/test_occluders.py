@@ -11,7 +11,7 @@ from refgi.cluster.maps.occluders import Ends, blockers, ends_of, everywhere, oc
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
-from refgi.rsm.extent import Extent
+from refgi.rsm.buffers.extent import Extent
 from refgi.scene import load_scene
 from refgi.stages import Memory, observe
 from tests.cluster.maps.lights import surface_points

@@ -9,8 +9,8 @@ from refgi.cluster.reference import member_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
+from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.scene import load_scene
-from refgi.shadowed import receivers, shadowed_sum
 from tests.naive import truth
 
 SETTINGS = ValSettings(lights=64)

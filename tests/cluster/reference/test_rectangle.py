@@ -10,7 +10,7 @@ from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.reference import back_projected_visibility, rectangle_visibility, reference_visibility
-from refgi.cluster.reference.rectangle import rectangle_points
+from refgi.cluster.reference.rays import rectangle_points
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights

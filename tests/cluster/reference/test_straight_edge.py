@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from refgi.cluster.area_lights import AreaLights
-from refgi.cluster.clustering.rectangle import map_frames
+from refgi.cluster.clustering.rectangle import AreaLights, map_frames
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.reference import back_projected_visibility, rectangle_visibility
 from refgi.cluster.settings import ValSettings

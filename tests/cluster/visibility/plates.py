@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from refgi.cluster.area_lights import AreaLights
+from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.visibility.look import NUMBERS, ROOM_ROWS
 

@@ -8,12 +8,12 @@ import pytest
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.rays import Tracer
-from refgi.rsm.projection import camera_projection
+from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import BLACK, Camera, Material, Scene, SpotLight, merge
-from refgi.sssil.cameras.placement import placed_cameras
-from refgi.sssil.cameras.transport import Points, Views, free, lit_points, seen_points, sight, transport
+from refgi.sssil.camera_transport import Points, Views, free, lit_points, seen_points, sight, transport
+from refgi.sssil.cameras import placed_cameras
 from refgi.stages import observe
 from tests.sssil.cameras.hidden_side import BACK, HALF_ANGLE, LIGHT, hidden_side
 

@@ -10,8 +10,7 @@ from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.scene.model import Camera
 from refgi.sssil import HssilSettings
-from refgi.sssil.cameras.placement import placed_cameras
-from refgi.sssil.cameras.several import seen_by, several_cameras
+from refgi.sssil.cameras import placed_cameras, seen_by, several_cameras
 from refgi.sssil.hssil import hssil
 from refgi.stages import observe
 from tests.sssil.cameras.hidden_side import SIDE_VIEW, from_the_lit_side, hidden_side

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
-from refgi.sssil.crown.coverage import coverage, texel_weights
 from refgi.sssil.crown.pattern import offsets_at, row_offsets
+from refgi.sssil.crown.reach import coverage, texel_weights
 from refgi.sssil.settings import HssilSettings
 from tests.naive import crown as naive
 

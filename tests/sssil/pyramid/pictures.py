@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from refgi.rsm.projection import camera_projection
+from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Camera
 from refgi.sssil.pyramid.levels import levels
 

@@ -8,7 +8,7 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
-from refgi.rsm.projection import camera_projection
+from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
 from refgi.sssil.pyramid.levels import pyramid, useful_levels
 from refgi.sssil.settings import HssilSettings

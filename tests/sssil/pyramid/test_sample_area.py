@@ -7,10 +7,10 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.frame import Frame
-from refgi.rsm.projection import camera_projection
+from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Camera, Material, PointLight, Scene, merge
 from refgi.scene.builtin.surfaces import rectangle
-from refgi.sssil.pyramid.sample_area import GRAZING, sample_area
+from refgi.sssil.pyramid.view import GRAZING, sample_area
 from tests.sssil.pyramid.pictures import FLOAT64, camera, random_picture
 
 SUM_720P = 1e-3  # 0.1 % is asked at 720 lines; pixels on the outline count whole or not at all

@@ -1,0 +1,23 @@
+"""Whether the tables have every setting of every method, and of each every name."""
+
+from benchmarks.sameness.rows import Table
+from benchmarks.sameness.settings import names_of
+from benchmarks.sameness.tables import TABLES
+
+
+def gaps() -> list[str]:
+    """Return what no case of the tables covers, and what they name without need."""
+    return [gap for method, table in TABLES.items() for gap in _gaps_of(method, table)]
+
+
+def _gaps_of(method: str, table: Table) -> list[str]:
+    wanted = names_of(method)
+    tried: dict[str, set[object]] = {}
+    for row in table.rows:
+        for value in row.values:
+            several = row.field in ("as_published", "criteria")
+            tried.setdefault(row.field, set()).update(value.split("+") if several else [value])
+    found = [f"{method}: no case has {name}" for name in wanted if name not in tried and name not in table.excluded]
+    found += [f"{method}: {name} is no setting" for name in (*tried, *table.excluded) if name not in wanted]
+    return found + [f"{method}: no case has {name} {value!r}" for name, values in wanted.items()
+                    if name not in table.excluded for value in sorted(values - tried.get(name, set()), key=str)]

@@ -1,0 +1,280 @@
+"""Visibility of an area light's rectangle by rays: what every soft shadow approximates (Sec. 4.1, Fig. 4).
+
+Visibility of an area light as the share of its pixel lights that rays reach: what clustering alone leaves (Sec. 4).
+
+V_C(x) = sum over the cluster of w_i V(p_i, x) / sum of w_i. With w_i = L_i(x), what each light gives to x, the sum of
+the paper's third equation is that of its second, exactly: no error of clustering is left, and none of soft shadows.
+
+Rays from receivers to points on lights, many for each receiver, and what share of them arrives.
+"""
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.clustering.rectangle import AreaLights, Given
+from refgi.cluster.maps.occluders import Blockers, Ends, blockers
+from refgi.cluster.settings import ValSettings
+from refgi.rays import Tracer
+from refgi.sampling import halton
+from refgi.scene.model import Geometry
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+    from refgi.lights import PixelLights
+
+Array = npt.NDArray[Any]
+
+RAYS_AT_ONCE = 1 << 18
+SHORTEST = 1e-6  # of a ray: a reach of 0 would count as blocked
+POINTS = 256  # on each rectangle: at most 1/256 off for an edge along a side, about 1/60 for others
+Weights = Literal["even", "flux", "light"]
+
+
+class Ball(NamedTuple):
+    """Where nothing blocks."""
+
+    center: Array  # (3,) m
+    radius: float  # m
+
+
+def free_share(
+    tracer: "Tracer", points: Array, facing: Array, targets: Array, upward: Array,
+    worth: Callable[[Array, Array], Array] | None, grain: float, ball: Ball | None = None,
+) -> Array:
+    """Return the share of each receiver's rays that arrives, each ray after its worth.
+
+    Parameters
+    ----------
+    tracer : Tracer
+        What blocks.
+    points, facing : (3, n) ndarray
+        Receivers (m) and the unit normals of their surfaces, off which rays start.
+    targets : (3, k) ndarray
+        Points on lights, m.
+    upward : (3, k) or (3, 1) ndarray
+        Unit normals at the targets, on the side that rays come from.
+    worth : callable or None
+        Given vectors (n, k, 3) from some receivers to the targets and their normals (n, 3), the weight (n, k) of each
+        ray, 0 or more; None: all the same. Rays of no worth, and those to targets below a receiver's surface, are
+        not traced.
+    grain : float
+        The scene tracer's: how far above their surfaces rays start and end, as `ray_offset` has it, m.
+    ball : Ball, optional
+        Rays end where they enter it.
+
+    Returns
+    -------
+    (n,) ndarray
+        In the dtype of the points, 0 to 1; 1 where no ray is of any worth.
+    """
+    from refgi.rays import STEPS
+
+    visible = np.ones(points.shape[1], points.dtype)
+    step = max(1, RAYS_AT_ONCE // max(1, targets.shape[1]))
+    for first in range(0, len(visible), step):
+        part = slice(first, first + step)
+        at, up = points[:, part].T.astype(np.float64), facing[:, part].T.astype(np.float64)
+        toward = targets.T[None] - at[:, None]
+        above = np.einsum("nkc,nc->nk", toward, up) > 0
+        weight = np.where(above, 1.0 if worth is None else worth(toward, up), 0.0)
+        reach = np.where(weight > 0, _way_to(ball, at, toward), 0.0)
+        starts = at + STEPS * (np.abs(at).sum(axis=1, keepdims=True) + grain) * up
+        lift = STEPS * (np.abs(targets).sum(axis=0) + grain + np.abs(toward).sum(axis=2))
+        arrives = ~_blocked(tracer, starts, targets.T + lift[..., None] * upward.T, reach)
+        whole = weight.sum(axis=1)
+        share = np.divide((weight * arrives).sum(axis=1), whole, out=np.ones_like(whole), where=whole > 0)
+        visible[part] = np.minimum(share, 1.0)
+    return visible
+
+
+def _blocked(tracer: "Tracer", origins: Array, ends: Array, reach: Array) -> Array:
+    """Return which of the rays from each origin (n, 3) to its ends (n, k, 3) are blocked, (n, k) bool."""
+    shape = (*reach.shape, 3)
+    starts = np.broadcast_to(origins[:, None], shape)
+    directions = (ends - starts).astype(np.float32).reshape(-1, 3)
+    blocked = np.zeros(reach.size, np.bool_)
+    tracer.fill_occluded(np.ascontiguousarray(starts, np.float32).reshape(-1, 3), directions,
+                         reach.reshape(-1).astype(np.float32), blocked)
+    return blocked.reshape(reach.shape)
+
+
+def _way_to(ball: Ball | None, at: Array, toward: Array) -> Any:
+    """Return the share of each way `toward` (n, k, 3) that lies before the ball, (n, k); 1 where it misses it."""
+    if ball is None or ball.radius == 0:
+        return 1.0
+    start = at - ball.center
+    square, half = np.einsum("nkc,nkc->nk", toward, toward), np.einsum("nkc,nc->nk", toward, start)
+    root = half**2 - square * (np.einsum("nc,nc->n", start, start) - ball.radius**2)[:, None]
+    share = np.divide(-half - np.sqrt(np.maximum(root, 0)), square, out=np.ones_like(square), where=square > 0)
+    return np.where(root > 0, np.clip(share, SHORTEST, 1.0), 1.0)
+
+
+def rectangle_visibility(
+    frame: "Frame", areas: AreaLights, settings: ValSettings, points: int = POINTS, ends: Ends | None = None
+) -> Given:
+    """Return V of an area light as the share of its rectangle that a receiver sees.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene.
+    areas : AreaLights
+        The area lights.
+    settings : ValSettings
+        What blocks near an area light, and what is seen from behind it.
+    points : int
+        Points on each rectangle, spread evenly.
+    ends : Ends, optional
+        Where light begins and ends; absent: anywhere in the scene.
+
+    Returns
+    -------
+    callable
+        ``(m, points (3, n), facing (3, n)) -> (n,)``, in the dtype of the points.
+
+    Notes
+    -----
+    The rectangle is the bounding one with its own sides, not a disc or square of size Delta. As in the maps,
+    nothing within a share `near_distance` of the cluster's radius around the centre blocks, or no plane that passes
+    there (`near_geometry`). Points below the receiver's surface do not count; where none is left V is 1. Behind the
+    area light V is 1 ("visible"), or what rays say in all other modes of `behind`.
+    """
+    drawn = blockers(frame.scene.geometry, settings.occluders_alone, ends)
+    on_square = _even(points)
+
+    @lru_cache(maxsize=1)
+    def tracer_of(m: int) -> Tracer:
+        return tracer_without_near(frame, drawn, areas, m, settings)
+
+    def given(m: int, points: Array, facing: Array) -> Array:
+        tracer, visible = tracer_of(m), np.ones(points.shape[1], points.dtype)
+        radius = settings.near_distance * float(areas.radius[m])
+        ball = Ball(areas.center[:, m], radius) if settings.near_geometry == "ball" else None
+        height = areas.normal[:, m] @ (points - areas.center[:, m, None])
+        within = np.where(height > 0, True, settings.behind != "visible")
+        for side in (1.0, -1.0):
+            on = within & (height * side > 0)
+            visible[on] = free_share(tracer, points[:, on], facing[:, on], rectangle_points(areas, m, on_square),
+                                     side * areas.normal[:, m, None], None, frame.tracer.grain, ball)
+        return visible
+
+    return given
+
+
+def rectangle_points(areas: AreaLights, m: int, on_square: Array) -> Array:
+    """Return points of an area light's rectangle.
+
+    Parameters
+    ----------
+    areas : AreaLights
+        The area lights.
+    m : int
+        Which.
+    on_square : (2, k) ndarray
+        Places in [0, 1]^2.
+
+    Returns
+    -------
+    (3, k) ndarray
+        World space, m.
+    """
+    along = areas.offset[:, m, None] + (on_square - 0.5) * areas.side[:, m, None]
+    points: Array = areas.center[:, m, None] + areas.axes[m].T @ along
+    return points
+
+
+def tracer_without_near(
+    frame: "Frame", drawn: Blockers, areas: AreaLights, m: int, settings: ValSettings
+) -> Tracer:
+    """Return rays against what an area light's map is drawn from.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene.
+    drawn : Blockers
+        Triangles that can block at all.
+    areas : AreaLights
+        The area lights.
+    m : int
+        Which.
+    settings : ValSettings
+        Whether planes near the centre are left out.
+
+    Returns
+    -------
+    Tracer
+        That of the frame where nothing is left out.
+    """
+    distance = settings.near_distance * areas.radius[m]
+    if settings.near_geometry != "planes" or distance == 0:
+        return frame.tracer
+    corner = drawn.vertices[drawn.faces] - areas.center[:, m]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    height = np.abs((normal * corner[:, 0]).sum(axis=1))
+    faces = drawn.faces[height >= distance * np.linalg.norm(normal, axis=1)]
+    return Tracer(Geometry(drawn.vertices, faces, np.zeros(len(faces), np.int32)))
+
+
+def _even(count: int) -> Array:
+    """Return Hammersley's points: as many distinct lines each way as there are points."""
+    second = halton(count, bases=(2,))[:, 0] + 0.5 / count
+    return np.stack([(np.arange(count) + 0.5) / count, second])
+
+
+def member_visibility(
+    frame: "Frame", lights: "PixelLights", areas: AreaLights, weights: Weights = "flux"
+) -> Given:
+    """Return V of an area light as the share of its lights that a receiver sees.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, whose triangles block.
+    lights : PixelLights
+        The lights.
+    areas : AreaLights
+        Their clusters.
+    weights : {"even", "flux", "light"}
+        What a light counts: all alike; by its flux; by the light it would give a diffuse receiver, with both cosines
+        and the distance.
+
+    Returns
+    -------
+    callable
+        ``(m, points (3, n), facing (3, n)) -> (n,)``, in the dtype of the points.
+
+    Notes
+    -----
+    Lights that face away from a receiver, or lie below its surface, give it nothing and do not count; where none is
+    left V is 1. There is no rule for receivers behind the area light: each light has a normal of its own. A light's
+    flux is the sum over its channels, diffuse and glossy.
+    """
+    position, normal = (np.asarray(a, np.float64) for a in (lights.position, lights.normal))
+    flux = np.asarray(lights.flux, np.float64).sum(axis=0)
+    if lights.lobe_flux is not None:
+        flux = flux + np.asarray(lights.lobe_flux, np.float64).sum(axis=0)
+    order = np.argsort(areas.of, kind="stable")
+    first = np.searchsorted(areas.of[order], np.arange(len(areas.members) + 1))
+
+    def given(m: int, points: Array, facing: Array) -> Array:
+        of = order[first[m] : first[m + 1]]
+
+        def worth(toward: Array, up: Array) -> Array:
+            away: Array = -np.einsum("nkc,ck->nk", toward, normal[:, of])
+            if weights != "light":
+                counted: Array = np.where(away > 0, flux[of] if weights == "flux" else 1.0, 0.0)
+                return counted
+            square = np.einsum("nkc,nkc->nk", toward, toward)
+            above = np.einsum("nkc,nc->nk", toward, up)
+            faced = (away > 0) & (above > 0)
+            given_light: Array = np.divide(flux[of] * away * above, square**2, out=np.zeros_like(square), where=faced)
+            return given_light
+
+        return free_share(frame.tracer, points, facing, position[:, of], normal[:, of], worth, frame.tracer.grain)
+
+    return given

@@ -1,0 +1,146 @@
+"""`Kernel`: a compiled function that is native code for Python and plain LLVM code for other kernels.
+
+Numba makes native code of every compiled function, also of one that is only ever called from others, where it is
+optimised and made native once more as a part of each. A `Kernel` therefore holds two dispatchers: itself, for calls
+from Python, with the cache on disk, and a `Callee`, which types and lowers the function for its callers and leaves
+the rest to them.
+"""
+
+import gc
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
+from numba.extending import overload as numba_overload
+
+from refgi.jit.cache import KernelCache
+from refgi.jit.key import OVERLOADS
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+OPTIONS = {"nopython": True, "nogil": True, "fastmath": False, "error_model": "numpy", "boundscheck": None,
+           "no_cfunc_wrapper": True}
+
+
+class CalleeLibrary(JITCodeLibrary):
+    """LLVM code of a callee: linked into its callers, neither optimised nor made native by itself."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class EntryPoint:
+    """What stands for a callee's native code where Numba looks its implementation up."""
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class CalleeLowering(NativeLowering):
+    """Lower a function to LLVM code without an interface to Python."""
+
+    _name = "callee_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower, and register the result for callers."""
+        state.library = CalleeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
+        super().run_pass(state)
+        state.library.finalize()
+        lowered = state["cr"]._replace(cfunc=EntryPoint())
+        state.targetctx.insert_user_function(lowered.cfunc, lowered.fndesc, [state.library])
+        state["cr"] = lowered
+        return True
+
+
+class CalleeCompiler(CompilerBase):
+    """Numba's usual passes, with `CalleeLowering` at their end."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the one pipeline."""
+        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        manager.passes = [(CalleeLowering if step is NativeLowering else step, text) for step, text in manager.passes]
+        manager._finalized = False  # so that the pass that is new is looked up
+        manager.finalize()
+        return [manager]
+
+
+class Callee(CPUDispatcher):
+    """A function as other kernels call it."""
+
+    def add_overload(self, compiled: Any) -> None:
+        """Keep a specialisation; there is nothing that Python could call."""
+        self.overloads[tuple(compiled.signature.args)] = compiled
+
+
+class Kernel(CPUDispatcher):
+    """A compiled function: an entry point from Python, and a callee of other kernels.
+
+    Parameters
+    ----------
+    function : callable
+        A function on arrays and numbers.
+    compiled : callable, optional
+        Returns what is compiled in its place, with the same parameters; asked only when something is compiled.
+    """
+
+    def __init__(self, function: Callable[..., Any], compiled: Callable[[], Callable[..., Any]] | None = None) -> None:
+        super().__init__(function, {}, dict(OPTIONS))
+        self._cache = KernelCache(function)
+        self.callee = Callee(function, {}, dict(OPTIONS), CalleeCompiler)
+        if compiled is not None:
+            dispatchers: tuple[Any, ...] = self, self.callee
+            for dispatcher in dispatchers:
+                dispatcher._compiler._get_implementation = lambda *_: compiled()
+
+    def compile(self, signature: Any) -> Any:
+        """Return the entry point for argument types, from the disk or made anew."""
+        collecting = gc.isenabled()
+        gc.disable()  # a compiler makes millions of objects and no garbage of size: a tenth of its time
+        try:
+            return super().compile(signature)
+        finally:
+            if collecting:
+                gc.enable()
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how a call from another kernel is typed."""
+        return self.callee.get_call_template(args, kws)
+
+    def get_overload(self, signature: Any) -> Any:
+        """Return what stands for the implementation that another kernel calls."""
+        return self.callee.get_overload(signature)
+
+    def lowered(self, arguments: tuple[Any, ...]) -> Any:
+        """Return the compile result of the callee for some argument types."""
+        self.callee.get_call_template(arguments, {})
+        return self.callee.overloads[arguments]
+
+
+def by_type(function: Callable[P, R]) -> Callable[[Callable[..., Any]], None]:
+    """Register what a function stands for inside kernels, chosen by the types of its arguments.
+
+    Parameters
+    ----------
+    function : callable
+        Called in kernels; from Python it is itself.
+
+    Returns
+    -------
+    callable
+        Takes a function that returns the implementation for argument types, as for `numba.extending.overload`, and
+        makes its code a part of the key of every kernel that calls `function`.
+    """
+
+    def register(choose: Callable[..., Any]) -> None:
+        numba_overload(function)(choose)
+        setattr(function, OVERLOADS, (*getattr(function, OVERLOADS, ()), choose))
+
+    return register

@@ -1,0 +1,239 @@
+"""Footprints of pixel lights: a partition of a map's texels into one cell per chosen texel, and sums over cells.
+
+The surface that each texel of a reflective shadow map shows its light: A = O d^2 / cos.
+
+Reflective shadow maps whose texels are taken to subtend the same solid angle, as the papers print it.
+
+A texel at the centre of a square 90 degree frustum subtends 1.910 times the mean, one in its corner 0.368 times, so
+with equal ones lights come out too dim inside and too bright outside (Nichols and Wyman 2009, Fig. 13).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.jit import kernel, prange
+from refgi.rsm.raster.projection import Projection
+
+if TYPE_CHECKING:
+    from refgi.pairs.pixel_lights import PixelLights
+    from refgi.rsm import Rsm
+    from refgi.scene.model import Light
+
+Array = npt.NDArray[Any]
+
+EQUALLY_NEAR = 8  # chosen texels looked at for ties
+LEAST_COSINE = 1e-3  # surfaces seen from the side would be endless
+DEMO_CONSTANT = 1.5  # pi over the 2 pi / 3 sr of a square 90 degree frustum
+
+
+def cells_of_grid(maps: Projection, count: int) -> Array:
+    """Return the grid cell that holds each texel's centre.
+
+    Parameters
+    ----------
+    maps : Projection
+        k stacked maps.
+    count : int
+        k n^2 cells: n x n on each map, row by row, map by map.
+
+    Returns
+    -------
+    (H * W,) ndarray of int
+        Cell of each texel.
+
+    Raises
+    ------
+    InputError
+        If there are more cells than texels along a side.
+    """
+    n = math.isqrt(count // maps.maps)
+    shorter = min(maps.height, maps.width)
+    expect(n <= shorter, "count", f"at most {maps.maps * shorter**2} with filtering", count)
+    row = (2 * np.arange(maps.height) + 1) * n // (2 * maps.height)
+    column = (2 * np.arange(maps.width) + 1) * n // (2 * maps.width)
+    one = row[:, None] * n + column
+    return np.ravel(np.add.outer(np.arange(maps.maps) * (n * n), one))
+
+
+def cells_of_nearest(maps: Projection, texel: Array) -> Array:
+    """Return the nearest chosen texel of each texel, on its own map as long as that has one.
+
+    Parameters
+    ----------
+    maps : Projection
+        The stacked maps.
+    texel : (N,) ndarray of int
+        Chosen texels, indices into the flattened maps; of equal or equally near ones the first gets the texel.
+
+    Returns
+    -------
+    (H * W,) ndarray of int
+        Index into `texel` of each texel.
+    """
+    from scipy.spatial import cKDTree
+
+    apart = 4 * (maps.height + maps.width)  # keeps stacked maps from being neighbours
+
+    def place(index: Array) -> Array:
+        row, column = index // maps.width, index % maps.width
+        return np.stack([row + row // maps.height * apart, column], axis=1).astype(np.float64)
+
+    unique, first = np.unique(texel, return_index=True)
+    candidates = np.arange(1, min(EQUALLY_NEAR, len(unique)) + 1)
+    distance, nearest = cKDTree(place(unique)).query(place(np.arange(math.prod(maps.shape))), k=candidates)
+    tied = np.rint(distance**2) == np.rint(distance[:, :1] ** 2)  # squares of integer steps
+    return np.asarray(np.where(tied, first[nearest], len(texel)).min(axis=1))
+
+
+def cell_sums(flux: Array, cell: Array, count: int) -> Array:
+    """Return the flux of each cell.
+
+    Parameters
+    ----------
+    flux : (3, H, W) ndarray
+        Flux of each texel, W.
+    cell : (H * W,) ndarray of int
+        Cell of each texel.
+    count : int
+        Number of cells.
+
+    Returns
+    -------
+    (3, count) ndarray
+        W, summed in float64.
+    """
+    sums = [np.bincount(cell, channel.reshape(-1), minlength=count) for channel in flux]
+    return np.stack(sums).astype(flux.dtype)
+
+
+def lit_texels(texel: Array, cell: Array, lit: Array) -> Array:
+    """Return the texel that stands for each cell: the chosen one, or where that is dark the nearest lit one.
+
+    Parameters
+    ----------
+    texel : (N,) ndarray of int
+        Chosen texels.
+    cell : (H * W,) ndarray of int
+        Cell of each texel.
+    lit : (H, W) ndarray of bool
+        Which texels have flux.
+
+    Returns
+    -------
+    (N,) ndarray of int
+        As `texel` where the whole cell is dark; of equally near texels the first.
+    """
+    width = lit.shape[1]
+    shines = lit.reshape(-1)
+    candidates = np.flatnonzero(shines & ~shines[texel][cell])
+    own = texel[cell[candidates]]
+    square = (candidates // width - own // width) ** 2 + (candidates % width - own % width) ** 2
+    order = np.lexsort((candidates, square, cell[candidates]))
+    cells, first = np.unique(cell[candidates][order], return_index=True)
+    moved = texel.copy()
+    moved[cells] = candidates[order][first]
+    return moved
+
+
+def texel_areas(rsm: "Rsm") -> Array:
+    """Return the area of surface behind each texel that reflects anything.
+
+    Parameters
+    ----------
+    rsm : Rsm
+        A map.
+
+    Returns
+    -------
+    (H, W) ndarray
+        m^2, in the map's dtype; 0 where nothing is reflected. A directional light's texels have an area in place of a
+        solid angle, and d is 1.
+    """
+    from refgi.scene import DirectionalLight
+
+    light, areas = rsm.light, np.zeros_like(rsm.solid_angle)
+    far = isinstance(light, DirectionalLight)
+    source = np.asarray(light.direction if isinstance(light, DirectionalLight) else light.position, np.float64)
+    _fill_areas(rsm.position, rsm.normal, rsm.solid_angle, rsm.flux, rsm.lobe_flux, source, far, areas)
+    return areas
+
+
+@kernel(parallel=True)
+def _fill_areas(
+    position: Array, normal: Array, solid_angle: Array, flux: Array, lobe: Array | None, source: Array, far: bool,
+    areas: Array,
+) -> None:
+    for i in prange(areas.shape[0]):
+        for j in range(areas.shape[1]):
+            reflected = flux[0, i, j] != 0 or flux[1, i, j] != 0 or flux[2, i, j] != 0
+            if lobe is not None:
+                reflected = reflected or lobe[0, i, j] != 0 or lobe[1, i, j] != 0 or lobe[2, i, j] != 0
+            if reflected:
+                square, along = 0.0, 0.0
+                for axis in range(3):
+                    d = source[axis] - (0.0 if far else float(position[axis, i, j]))
+                    square += d * d
+                    along += d * normal[axis, i, j]
+                cosine = abs(along) / np.sqrt(square) if square > 0.0 else 0.0
+                areas[i, j] = solid_angle[i, j] * (1.0 if far else square) / max(cosine, LEAST_COSINE)
+
+
+def with_equal_solid_angles(rsm: "Rsm") -> "Rsm":
+    """Return a map with the flux its texels would have if all that the light shines into subtended the same.
+
+    Parameters
+    ----------
+    rsm : Rsm
+        A map with exact solid angles.
+
+    Returns
+    -------
+    Rsm
+        With solid angles and fluxes scaled; the solid angle of the whole map is unchanged.
+    """
+    from refgi.rsm.buffers.light_projection import incident_flux
+
+    exact = rsm.solid_angle
+    inside = incident_flux(rsm.light, rsm.projection, exact, exact.dtype).any(axis=0)
+    mean = exact[inside].sum(dtype=np.float64) / max(1, np.count_nonzero(inside))
+    equal = np.where(inside, mean, exact).astype(exact.dtype)
+    factor = np.divide(equal, exact, out=np.zeros_like(exact), where=inside)
+    lobe = None if rsm.lobe_flux is None else rsm.lobe_flux * factor
+    return rsm._replace(solid_angle=equal, flux=rsm.flux * factor, lobe_flux=lobe)
+
+
+def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]", shares: "Sequence[int]") -> Array:
+    """Return the disc that each light stands for in the authors' demo: pi L^2 / (1.5 N).
+
+    Parameters
+    ----------
+    lights : PixelLights
+        Of maps.
+    sources : sequence of Light
+        The light of each map.
+    shares : sequence of int
+        N: how many texels were drawn from each map.
+
+    Returns
+    -------
+    (N',) ndarray
+        Area, m^2: that of equal shares of a square 90 degree frustum, seen from the front.
+
+    Raises
+    ------
+    InputError
+        If a light is directional and so has no distance L.
+    """
+    area = np.zeros(lights.position.shape[1])
+    for index, (source, count) in enumerate(zip(sources, shares, strict=True)):
+        place = getattr(source, "position", None)
+        expect(place is not None, "as_published", "no 'ams_disc' under a directional light", "ams_disc")
+        mine = lights.map_index == index
+        away = lights.position[:, mine] - np.asarray(place, np.float64)[:, None]
+        area[mine] = np.pi / (DEMO_CONSTANT * count) * (away**2).sum(axis=0)
+    return area

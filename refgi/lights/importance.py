@@ -1,0 +1,245 @@
+"""Importance of texels for warping: flux, flux times lobe peak, and both times (1 - openness) (SII Sec. 3.5).
+
+A texel's importance is the largest channel of Phi_diffuse + g(P) Phi_lobe. The largest channel is zero only where all
+of the flux is, so no flux is out of reach. g(P) = (P + 1) / 2 is the peak of a normalised Phong lobe over that of a
+diffuse light, 1 for P = 1; the paper takes P.
+
+Sums of an importance map over ever larger cells, for any size of map.
+
+Level l has 2^l x 2^l cells with borders at rows floor(i H / 2^l) and columns floor(j W / 2^l): every border of a level
+is one of the next, and for powers of two the cells are squares. On the last level, L = ceil(log2(max(H, W))), a cell
+holds one texel or none, and the map itself takes the place of the sums.
+"""
+
+import math
+from typing import Any, Literal, NamedTuple, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.jit import kernel
+from refgi.rsm.buffers.reflective import Rsm
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+Kind = Literal["flux", "peak", "openness"]
+
+
+@stage("rsm.importance")
+def importance(
+    rsm: Rsm, kind: Kind = "flux", openness: Array | None = None, floor: float = 0.05, defensive: float = 0.0
+) -> Array:
+    """Return what each texel is worth to `warp_samples`.
+
+    Parameters
+    ----------
+    rsm : Rsm
+        The map.
+    kind : {"flux", "peak", "openness"}
+        Phi; Phi g(P); or Phi g(P) max(floor, 1 - O).
+    openness : (H, W) ndarray, optional
+        Share O of unoccluded directions, 0 to 1, for the kind "openness".
+    floor : float
+        Least factor that openness leaves, 0 to 1. With 0 texels in the open are never chosen and their flux is lost.
+    defensive : float
+        Share beta, 0 to 1, of the samples that are uniform over the map.
+
+    Returns
+    -------
+    (H, W) ndarray
+        W, dtype of the map.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a number out of range, or openness is missing or of another shape.
+
+    Notes
+    -----
+    p = Phi (1 - O) P is zero where O = 1: the estimate then lacks that flux, hence the floor.
+
+    With method A a texel's density is at least beta of the uniform one on every level, so for any f the mean of
+    (w Phi f)^2 is at most 1 / beta times that of uniform samples, and the variance at most
+    1 / beta Var + (1 / beta - 1) mean^2. Uniform over the map, not over its lit texels alone, because a cell's
+    samples spread over all of its texels unless the warp goes down to them. Method B takes products of marginals:
+    there the share keeps every texel within reach but gives no such bound.
+    """
+    expect(kind in get_args(Kind), "kind", " or ".join(get_args(Kind)), kind)
+    expect(0 <= floor <= 1, "floor", "0 to 1", floor)
+    expect(0 <= defensive <= 1, "defensive", "0 to 1", defensive)
+    real = rsm.flux.dtype.type
+    if rsm.lobe_flux is None or rsm.lobe_exponent is None:
+        worth: Array = rsm.flux.max(axis=0)
+    else:
+        worth = np.empty_like(rsm.flux[0])
+        _add_lobes(rsm.flux, rsm.lobe_flux, rsm.lobe_exponent, kind != "flux", worth)
+    if kind == "openness":
+        worth = worth * _hidden(rsm, openness, real(floor))
+    if defensive:
+        worth = real(1 - defensive) * worth + real(defensive * worth.mean(dtype=np.float64))
+    return worth
+
+
+@kernel
+def _add_lobes(flux: Array, lobe_flux: Array, exponent: Array, by_peak: bool, worth: Array) -> None:
+    """Fill the largest channel of Phi_diffuse + g(P) Phi_lobe; g = 1 unless `by_peak`."""
+    real = worth.dtype.type
+    one, half = real(1), real(0.5)
+    for row in range(worth.shape[0]):
+        for column in range(worth.shape[1]):
+            peak = half * (exponent[row, column] + one) if by_peak else one
+            most = real(0)
+            for c in range(3):
+                most = max(most, flux[c, row, column] + peak * lobe_flux[c, row, column])
+            worth[row, column] = most
+
+
+def _hidden(rsm: Rsm, openness: Array | None, floor: Any) -> Array:
+    """Return max(floor, 1 - O)."""
+    if openness is None or np.shape(openness) != rsm.depth.shape:
+        expect(False, "openness", f"shape {rsm.depth.shape} for the kind 'openness'",
+               None if openness is None else np.shape(openness))
+        raise AssertionError
+    expect(bool(((openness >= 0) & (openness <= 1)).all()), "openness", "numbers from 0 to 1", "others")
+    hidden: Array = np.maximum(1 - openness, floor).astype(rsm.flux.dtype)
+    return hidden
+
+
+class Levels(NamedTuple):
+    """A pyramid as the warp's kernel reads it."""
+
+    coarse: Array  # S_0, S_1 .. one after the other, those above the map's level that are used
+    finest: Array  # (H, W): the map
+    depth: int  # L: the map's level
+
+
+def importance_pyramid(importance: Array) -> tuple[Array, ...]:
+    """Sum an importance map over ever larger cells.
+
+    Parameters
+    ----------
+    importance : (H, W) ndarray
+        Importance of each texel, >= 0, any unit.
+
+    Returns
+    -------
+    tuple of ndarray
+        S_0 (1, 1) .. S_L, L = ceil(log2(max(H, W))): S_l has (2^l, 2^l) sums, float64, and S_L is the map.
+
+    Raises
+    ------
+    InputError
+        If the map is empty or not two-dimensional, or holds negative or infinite numbers or NaN.
+
+    Examples
+    --------
+    >>> [s.tolist() for s in importance_pyramid(np.array([[1.0, 2.0], [3.0, 4.0]]))]
+    [[[10.0]], [[1.0, 2.0], [3.0, 4.0]]]
+    """
+    importance = np.asarray(importance)
+    expect(importance.ndim == 2 and importance.size > 0, "importance", "shape (H, W) with texels", importance.shape)
+    finest = np.ascontiguousarray(importance, np.float32 if importance.dtype == np.float32 else np.float64)
+    expect(bool(finest.min() >= 0), "importance", "numbers >= 0", "negative numbers or NaN")
+    levels = [finest]
+    for level in range((max(finest.shape) - 1).bit_length() - 1, -1, -1):
+        sums = np.empty((1 << level, 1 << level))
+        if len(levels) == 1:
+            _sum_texels(finest, level, sums)
+        else:
+            _sum_quarters(levels[-1], sums)
+        levels.append(sums)
+    expect(math.isfinite(levels[-1].sum()), "importance", "numbers with a finite sum", "infinity")
+    return tuple(reversed(levels))
+
+
+def packed(pyramid: tuple[Array, ...], levels: int) -> Levels:
+    """Put the first `levels` levels below S_0 into one array.
+
+    Parameters
+    ----------
+    pyramid : tuple of ndarray
+        S_0 .. S_L.
+    levels : int
+        At most L.
+
+    Returns
+    -------
+    Levels
+        For `cell_sum`.
+    """
+    coarse = [sums.reshape(-1) for sums in pyramid[: min(levels + 1, len(pyramid) - 1)]]
+    return Levels(np.concatenate([np.empty(0), *coarse]), pyramid[-1], len(pyramid) - 1)
+
+
+@kernel
+def border(index: int, level: int, size: int) -> int:
+    """Return the first row or column of a cell.
+
+    Parameters
+    ----------
+    index : int
+        Row or column of the cell, up to 2^level.
+    level : int
+        Level of the pyramid.
+    size : int
+        Texels along the side.
+
+    Returns
+    -------
+    int
+        The floor of index * size / 2^level.
+    """
+    return (index * size) >> level
+
+
+@kernel
+def _sum_texels(finest: Array, level: int, sums: Array) -> None:
+    """Sum the texels of each cell of a level, rows first: columns are the SIMD lanes."""
+    height, width = finest.shape
+    rows = np.empty(width)
+    for i in range(1 << level):
+        rows[:] = 0.0
+        for row in range(border(i, level, height), border(i + 1, level, height)):
+            for column in range(width):
+                rows[column] += finest[row, column]
+        for j in range(1 << level):
+            total = 0.0
+            for column in range(border(j, level, width), border(j + 1, level, width)):
+                total += rows[column]
+            sums[i, j] = total
+
+
+@kernel
+def _sum_quarters(below: Array, sums: Array) -> None:
+    for i in range(sums.shape[0]):
+        for j in range(sums.shape[1]):
+            sums[i, j] = ((below[2 * i, 2 * j] + below[2 * i, 2 * j + 1])
+                          + (below[2 * i + 1, 2 * j] + below[2 * i + 1, 2 * j + 1]))
+
+
+@kernel
+def cell_sum(levels: Levels, level: int, i: int, j: int) -> Any:
+    """Return the importance of a cell.
+
+    Parameters
+    ----------
+    levels : Levels
+        The pyramid.
+    level : int
+        One of those packed.
+    i, j : int
+        Row and column of the cell.
+
+    Returns
+    -------
+    float
+        S_level[i, j]; 0 for a cell without texels.
+    """
+    if level < levels.depth:
+        return levels.coarse[((1 << (2 * level)) - 1) // 3 + (i << level) + j]
+    height, width = levels.finest.shape
+    row, column = border(i, level, height), border(j, level, width)
+    if row == border(i + 1, level, height) or column == border(j + 1, level, width):
+        return 0.0
+    return levels.finest[row, column]

@@ -1,0 +1,254 @@
+"""Pixel lights: texels of reflective shadow maps taken as point lights (docs/radiometry).
+
+N texels of a map of T are chosen with equal chance, so each stands for T/N texels: Phi_i = Phi_t T / N. Texels
+without flux count in N but are dropped from the list. With a `warp` texels are drawn after their importance, and each
+light's flux is T/N w Phi_t with the weight w of `refgi.lights.warp`. `filtered` replaces T/N times one texel's flux by
+the sum over the texel's cell (SII's filtered flux look-up); the cells partition the map, so the flux sum is the map's.
+
+With several maps each gets an equal share of the count, the first ones one more where it does not divide. Under the
+grid pattern a map draws the k n^2 texels nearest to its share, n x n on each of its k maps (6 for a cube), never none;
+its lights carry T over that number, so rounding moves no light from one map to another.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.draws import PIXEL_LIGHTS, draws
+from refgi.errors import expect
+from refgi.lights.footprints import cell_sums, cells_of_grid, cells_of_nearest, lit_texels
+from refgi.lights.importance import importance as importance_of
+from refgi.lights.warp import Warp, texel_of, warp_stacked
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.rsm.buffers.gbuffer import taken
+from refgi.rsm.buffers.reflective import Rsm
+from refgi.sampling import grid, halton
+from refgi.stages import skip, stage
+
+Array = npt.NDArray[Any]
+Pattern = Literal["grid", "halton", "all", "random"]
+
+
+@stage("rsm.pixel_lights")
+def choose_pixel_lights(
+    rsms: Sequence[Rsm],
+    *,
+    count: int | None,
+    pattern: Pattern,
+    seed: int = 0,
+    filtered: bool = False,
+    warp: Warp | None = None,
+    importance: Sequence[Array] | None = None,
+    renormalise: bool = False,
+) -> PixelLights:
+    """Choose texels as pixel lights.
+
+    Parameters
+    ----------
+    rsms : sequence of Rsm
+        One map a light.
+    count : int or None
+        How many are asked for, over all maps; None with pattern "all". `map_shares` says how many each map draws.
+    pattern : {"grid", "halton", "all", "random"}
+        Where the texels lie: the centres of n x n equal cells on each map (on each of a cube's faces); the Halton set
+        in bases 2, 3 over the stacked maps; every texel; independently random.
+    seed : int
+        Of the random pattern, and of the Halton set's shift modulo 1; seed 0 leaves the Halton set unshifted.
+    filtered : bool
+        Let each light carry the flux of its cell: the grid's cell, or the texels nearest to it.
+    warp : Warp, optional
+        Move the pattern to where the map is important; stacked maps are chosen by importance first.
+    importance : sequence of (H, W) ndarray, optional
+        Importance of each map's texels for the warp; the flux if absent.
+    renormalise : bool
+        Scale each map's weights w to a sum of N. Biased, and noisier where the warp goes down to texels.
+
+    Returns
+    -------
+    PixelLights
+        Those with flux.
+
+    Raises
+    ------
+    InputError
+        If the pattern is unknown, the count does not suit it, or there is nothing for the warp to move.
+
+    Notes
+    -----
+    A filtered light whose own texel has no flux moves to the nearest texel of its cell that has. Filtered lights of a
+    warped pattern stand at warped places and carry the flux of the texels nearest to them, without weight: the cells
+    already are small where the lights are dense. Of several on one texel the first has it all.
+    """
+    expect(len(rsms) > 0, "rsms", "at least one map", "none")
+    expect(pattern in get_args(Pattern), "pattern", " or ".join(get_args(Pattern)), pattern)
+    expect(warp is None or pattern != "all", "pattern", "'grid', 'halton' or 'random' with a warp", pattern)
+    expect(warp is not None or importance is None, "importance", "None without a warp", "maps")
+    expect(importance is None or len(importance) == len(rsms), "importance", f"one for each of {len(rsms)} maps",
+           None if importance is None else len(importance))
+    parts = []
+    for index, (rsm, share) in enumerate(zip(rsms, map_shares(rsms, count, pattern), strict=True)):
+        if warp is None:
+            texel, weight = _choose(rsm, share, pattern, seed, index), None
+        else:
+            worth = importance_of(rsm) if importance is None else importance[index]
+            texel, weight = _warped(rsm, _points(rsm, share, pattern, seed, index), worth, warp)
+            weight = weight * (share / weight.sum()) if renormalise else weight
+        if filtered and pattern != "all":
+            part = _filtered_lights(rsm, texel, on_grid=pattern == "grid" and warp is None)
+        else:
+            part = _weighted_lights(rsm, texel, rsm.texels / share if weight is None else rsm.texels / share * weight)
+        parts.append(part._replace(map_index=np.full(part.flux.shape[1], index, np.int32)))
+    return parts[0] if len(parts) == 1 else _joined(parts)
+
+
+def map_shares(rsms: Sequence[Rsm], count: int | None, pattern: Pattern) -> list[int]:
+    """Return how many texels are drawn from each map.
+
+    Parameters
+    ----------
+    rsms : sequence of Rsm
+        One map a light.
+    count : int or None
+        How many are asked for, over all maps; None with pattern "all".
+    pattern : {"grid", "halton", "all", "random"}
+        As for `choose_pixel_lights`.
+
+    Returns
+    -------
+    list of int
+        One number a map, at least 1. They sum to the count, but for the grid, whose n x n cells on each of a map's
+        faces come as near to the map's share as they can.
+
+    Raises
+    ------
+    InputError
+        If the count does not suit the pattern.
+    """
+    if pattern == "all":
+        total = sum(rsm.texels for rsm in rsms)
+        expect(count is None or count == total, "count", f"None or {total} with pattern 'all'", count)
+        return [rsm.texels for rsm in rsms]
+    if not isinstance(count, int | np.integer) or count < len(rsms):
+        expect(False, "count", f"an integer, at least one for each of {len(rsms)} lights", count)
+        raise AssertionError
+    shares = equal_shares(int(count), len(rsms))
+    if pattern != "grid":
+        return shares
+    cells = [_nearest_grid(share, rsm.projection.maps) for share, rsm in zip(shares, rsms, strict=True)]
+    if cells != shares:
+        skip("rsm.grid_cells", f"{sum(cells)} texels for {count}: n x n on each map of {len(rsms)} lights")
+    return cells
+
+
+def equal_shares(count: int, parts: int) -> list[int]:
+    """Return how many of `count` things each of some parts gets, the first ones one more where it does not divide.
+
+    Parameters
+    ----------
+    count, parts : int
+        Things, and parts to give them to.
+
+    Returns
+    -------
+    list of int
+        One number a part.
+    """
+    return [count // parts + (index < count % parts) for index in range(parts)]
+
+
+def _nearest_grid(share: int, maps: int) -> int:
+    """Return the number of cells nearest to a share that puts n x n on each of some maps; of two the smaller."""
+    below = max(1, math.isqrt(share // maps))
+    return min((maps * n * n for n in (below, below + 1)), key=lambda cells: abs(cells - share))
+
+
+def _choose(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Array:
+    """Return the chosen texels as indices into the flattened map."""
+    height, width = rsm.projection.shape
+    if pattern == "all":
+        return np.arange(rsm.texels)
+    if pattern == "grid":
+        maps, rows = rsm.projection.maps, rsm.projection.height
+        points = grid(math.isqrt(share // maps))
+        row = np.add.outer(np.arange(maps) * rows, texel_of(points[:, 1], rows))
+        return np.ravel(row * width + texel_of(points[:, 0], width))
+    points = _points(rsm, share, pattern, seed, index)
+    return np.asarray(texel_of(points[:, 1], height) * width + texel_of(points[:, 0], width))
+
+
+def _points(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Array:
+    """Return the pattern as points (u, v) of the unit square over the stacked maps."""
+    if pattern == "grid":
+        maps = rsm.projection.maps
+        one = grid(math.isqrt(share // maps))
+        return np.concatenate([np.stack([one[:, 0], (k + one[:, 1]) / maps], axis=1) for k in range(maps)])
+    if pattern == "random":
+        return draws(seed, PIXEL_LIGHTS, 2 * share, index).reshape(share, 2)
+    shift = None if seed == 0 and index == 0 else draws(seed, PIXEL_LIGHTS, 2, index).tolist()
+    return halton(share, shift=shift)
+
+
+def _warped(rsm: Rsm, points: Array, importance: Array, warp: Warp) -> tuple[Array, Array]:
+    """Return the texels that the warped points fall on, and their weights 1 / (T q)."""
+    height, width = rsm.projection.shape
+    expect(np.shape(importance) == (height, width), "importance", f"shape {(height, width)} as its map",
+           np.shape(importance))
+    warped, weight = warp_stacked(points, importance, rsm.projection.maps, warp)
+    return texel_of(warped[:, 1], height) * width + texel_of(warped[:, 0], width), weight
+
+
+def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array) -> PixelLights:
+    """Return the texels as lights with T/N, or T/N w, times their flux."""
+    (flux,) = rsm.at(texel, "flux")
+    scale = np.asarray(weight).astype(flux.dtype)
+    lobe = None if rsm.lobe_flux is None else taken(rsm.lobe_flux, texel) * scale
+    return _lights(rsm, texel, flux * scale, lobe)
+
+
+def _filtered_lights(rsm: Rsm, texel: Array, on_grid: bool) -> PixelLights:
+    cell = cells_of_grid(rsm.projection, len(texel)) if on_grid else cells_of_nearest(rsm.projection, texel)
+    flux = cell_sums(rsm.flux, cell, len(texel))
+    lobe = None if rsm.lobe_flux is None else cell_sums(rsm.lobe_flux, cell, len(texel))
+    power = rsm.flux.sum(axis=0) if rsm.lobe_flux is None else (rsm.flux + rsm.lobe_flux).sum(axis=0)
+    return _lights(rsm, lit_texels(texel, cell, power > 0), flux, lobe)
+
+
+def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None) -> PixelLights:
+    """Gather the chosen texels, leaving out those without flux."""
+    lit = flux.any(axis=0) if lobe is None else flux.any(axis=0) | lobe.any(axis=0)
+    kept = texel[lit]
+    position, normal = rsm.at(kept, "position", "normal")
+    return PixelLights(
+        position,
+        normal,
+        flux[:, lit],
+        None if lobe is None else lobe[:, lit],
+        None if rsm.lobe_axis is None else taken(rsm.lobe_axis, kept),
+        None if rsm.lobe_exponent is None else taken(rsm.lobe_exponent, kept),
+        len(texel),
+        kept.astype(np.int32),
+    )
+
+
+def _joined(parts: Sequence[PixelLights]) -> PixelLights:
+    """Join the lights of several maps; those without lobes get dark ones where others have any."""
+    glossy = any(part.lobe_flux is not None for part in parts)
+    if glossy:
+        parts = [part if part.lobe_flux is not None else _with_dark_lobes(part) for part in parts]
+
+    def joined(field: int) -> Array:
+        return np.concatenate([part[field] for part in parts], axis=-1)
+
+    together = PixelLights(joined(0), joined(1), joined(2), None, None, None, sum(part.drawn for part in parts),
+                           joined(7), joined(8))
+    if glossy:
+        together = together._replace(lobe_flux=joined(3), lobe_axis=joined(4), lobe_exponent=joined(5))
+    return together
+
+
+def _with_dark_lobes(part: PixelLights) -> PixelLights:
+    zero = np.zeros_like(part.flux)
+    return part._replace(lobe_flux=zero, lobe_axis=zero, lobe_exponent=zero[0])

@@ -1,0 +1,188 @@
+"""The pixels of a picture in an order that keeps neighbours together, which is the order kernels see them in.
+
+Blocks of 16 x 16 pixels go row by row; within a block 8 x 8 after 8 x 8, within these 4 x 4 after 4 x 4. Pixels
+without surface are left out, so the tiles of the kernels are filled and still compact: fewer lights reach into them
+than into a piece of a row. One thread does it: copying a picture takes less than it may take another to start.
+
+Which lights can reach which tile of receivers: what lies behind a plane adds exactly 0 and need not be summed.
+
+A tile is bounded by boxes around its positions and its normals. A light is passed over when the whole tile lies
+behind the light's surface, or the light behind the surface of every receiver, by more than the rounding of the
+cosines: then each term is 0 in the kernels' arithmetic as well, and the sum is the same to the bit.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+
+Array = npt.NDArray[Any]
+
+BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
+ROUNDING = 32.0  # units of rounding of |d| that a cosine computed from d may be off; about 6 are possible
+
+
+def block_by_block(covered: Array) -> Array:
+    """Return the flat indices of covered pixels, block by block.
+
+    Parameters
+    ----------
+    covered : (h, w) ndarray of bool
+        Whether there is a surface.
+
+    Returns
+    -------
+    (n,) ndarray of int64
+        Indices.
+    """
+    places = np.empty(covered.size, np.int64)
+    count = _fill(covered, _path(), places)
+    return places[:count]
+
+
+def taken(plane: Array, places: Array) -> Array:
+    """Return the values of three channels at some pixels.
+
+    Parameters
+    ----------
+    plane : (3, h, w) ndarray
+        Values.
+    places : (n,) ndarray of int64
+        Flat indices.
+
+    Returns
+    -------
+    (3, n) ndarray
+        The values there.
+    """
+    values = np.empty((3, len(places)), plane.dtype)
+    _take(np.ascontiguousarray(plane).reshape(3, -1), places, values)
+    return values
+
+
+def put(plane: Array, places: Array, values: Array) -> None:
+    """Store the values of three channels at some pixels.
+
+    Parameters
+    ----------
+    plane : (3, h, w) ndarray
+        Changed; contiguous.
+    places : (n,) ndarray of int64
+        Flat indices, each once.
+    values : (3, n) ndarray
+        What to store.
+    """
+    _put(values, places, plane.reshape(3, -1))
+
+
+def _path() -> Array:
+    """Return row and column within a block in the order of its pixels, (2, BLOCK^2)."""
+    index = np.arange(BLOCK * BLOCK).reshape(2, 2, 4, 2, 2, 4).transpose(0, 3, 1, 4, 2, 5).reshape(-1)
+    return np.stack([index // BLOCK, index % BLOCK])
+
+
+@kernel
+def _fill(covered: Array, path: Array, places: Array) -> int:
+    height, width = covered.shape
+    count = 0
+    for top in range(0, height, BLOCK):
+        for left in range(0, width, BLOCK):
+            for i in range(BLOCK * BLOCK):
+                row, column = top + path[0, i], left + path[1, i]
+                if row < height and column < width and covered[row, column]:
+                    places[count] = row * width + column
+                    count += 1
+    return count
+
+
+@kernel
+def _take(plane: Array, places: Array, values: Array) -> None:
+    for c in range(3):
+        for i in range(len(places)):
+            values[c, i] = plane[c, places[i]]
+
+
+@kernel
+def _put(values: Array, places: Array, plane: Array) -> None:
+    for c in range(3):
+        for i in range(len(places)):
+            plane[c, places[i]] = values[c, i]
+
+
+@kernel
+def bound_tile(tile: Array, size: int, low: Array, high: Array) -> None:
+    """Bound the positions (entries 0 to 2) and normals (3 to 5) of a tile's receivers.
+
+    Parameters
+    ----------
+    tile : (>= 6, TILE) ndarray
+        Receivers: position and normal; TILE is a power of two.
+    size : int
+        How many of them count.
+    low, high : (6,) ndarray
+        Filled with the corners of both boxes.
+    """
+    # by halves, element by element, which runs in lanes; a running minimum would not
+    lanes = tile.shape[1]
+    least, most = np.empty(lanes, tile.dtype), np.empty(lanes, tile.dtype)
+    for row in range(6):
+        for i in range(lanes):
+            least[i] = most[i] = tile[row, i if i < size else 0]
+        half = lanes // 2
+        while half > 0:
+            for i in range(half):
+                least[i] = least[i + half] if least[i + half] < least[i] else least[i]
+                most[i] = most[i + half] if most[i + half] > most[i] else most[i]
+            half //= 2
+        low[row], high[row] = least[0], most[0]
+
+
+@kernel
+def lights_in_reach(lights: Array, first: int, last: int, low: Array, high: Array, reach: Array, chosen: Array) -> int:
+    """List the lights of a group that may reach a tile.
+
+    Parameters
+    ----------
+    lights : (>= 6, N) ndarray
+        Packed lights: position and reversed normal.
+    first, last : int
+        The group: lights first to last - 1.
+    low, high : (6,) ndarray
+        Boxes of the tile's positions and normals.
+    reach : (>= last - first,) ndarray of bool
+        Room to work in.
+    chosen : (>= last - first,) ndarray of int64
+        Filled with indices of lights, rising.
+
+    Returns
+    -------
+    int
+        How many were listed.
+    """
+    _reaches(lights, first, last, low, high, reach)
+    count = 0
+    for k in range(first, last):
+        chosen[count] = k
+        count += reach[k - first]
+    return count
+
+
+@kernel
+def _reaches(lights: Array, first: int, last: int, low: Array, high: Array, reach: Array) -> None:
+    real = lights.dtype.type
+    zero = real(0.0)
+    slack = real(ROUNDING) * real(np.finfo(lights.dtype).eps)
+    ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
+    ux, uy, uz, vx, vy, vz = low[3], low[4], low[5], high[3], high[4], high[5]
+    for k in range(first, last):
+        # d = light - receiver lies between e and f
+        ex, ey, ez = lights[0, k] - bx, lights[1, k] - by, lights[2, k] - bz
+        fx, fy, fz = lights[0, k] - ax, lights[1, k] - ay, lights[2, k] - az
+        lx, ly, lz = lights[3, k], lights[4, k], lights[5, k]
+        cl = max(ex * lx, fx * lx) + max(ey * ly, fy * ly) + max(ez * lz, fz * lz)
+        cx = (max(max(ex * ux, ex * vx), max(fx * ux, fx * vx)) + max(max(ey * uy, ey * vy), max(fy * uy, fy * vy))
+              + max(max(ez * uz, ez * vz), max(fz * uz, fz * vz)))
+        size = max(abs(ex), abs(fx)) + max(abs(ey), abs(fy)) + max(abs(ez), abs(fz))
+        reach[k - first] = (cl + slack * size > zero) & (cx + slack * size > zero)

@@ -1,0 +1,130 @@
+"""The scene's extent: the box of what takes part, which settings that are shares of the scene's size refer to.
+
+What nobody sees and no light reaches has no part in a picture, so its size must have none either. Surfaces take part
+where the camera sees them and where light falls on them that they reflect. Of a light's map a grid of texels is asked,
+so that no other texel's place need be known.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.buffers.reflective import Rsm
+from refgi.scene.model import Geometry
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+ASKED = 96  # texels along a side of a light's map: the box is then short of 1 % of what the map shows at either end
+
+
+class Extent(NamedTuple):
+    """An axis-aligned box."""
+
+    low: Array  # (3,) float64, m
+    high: Array  # (3,) float64, m; below `low` where nothing is within
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing is within."""
+        return bool((self.high < self.low).any())
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the box's diagonal, m; 0 where it is empty."""
+        return 0.0 if self.empty else float(np.linalg.norm(self.high - self.low))
+
+    @property
+    def largest(self) -> float:
+        """Largest coordinate in size, m; 0 where the box is empty."""
+        return 0.0 if self.empty else float(max(np.abs(self.low).max(), np.abs(self.high).max()))
+
+    def or_whole(self, geometry: Geometry) -> "Extent":
+        """Return the box, or that of all triangles where this one has no size."""
+        return self if self.diagonal > 0 else Extent(*geometry.bounds)
+
+
+@stage("frame.seen_extent")
+def seen_extent(buffer: GBuffer) -> Extent:
+    """Return the box of what a camera sees.
+
+    Parameters
+    ----------
+    buffer : GBuffer
+        Its view.
+
+    Returns
+    -------
+    Extent
+        Empty where it sees nothing.
+    """
+    rows = np.empty((6, buffer.height))
+    position, covered = buffer.resolve("position", "covered")
+    _row_bounds(position, covered, rows)
+    return Extent(rows[:3].min(axis=1), rows[3:].max(axis=1))
+
+
+@stage("frame.lit_extent")
+def lit_extent(rsms: Sequence[Rsm]) -> Extent:
+    """Return the box of what lights reach and is not black, at a grid of each map's texels.
+
+    Parameters
+    ----------
+    rsms : sequence of Rsm
+        What each light sees.
+
+    Returns
+    -------
+    Extent
+        Empty where nothing is lit.
+    """
+    places = np.concatenate([np.zeros((3, 0)), *(_lit_places(rsm) for rsm in rsms)], axis=1, dtype=np.float64)
+    return Extent(places.min(axis=1, initial=np.inf), places.max(axis=1, initial=-np.inf))
+
+
+def joined(one: Extent, other: Extent) -> Extent:
+    """Return the box around two.
+
+    Parameters
+    ----------
+    one, other : Extent
+        Boxes.
+
+    Returns
+    -------
+    Extent
+        The smallest that holds both.
+    """
+    return Extent(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
+
+
+def _lit_places(rsm: Rsm) -> Array:
+    """Return positions of lit texels among a grid, (3, n)."""
+    height, width = rsm.covered.shape
+    maps = max(1, height // width)
+    rows, columns = ((np.arange(min(size, count)) + 0.5) * size / min(size, count)
+                     for size, count in ((height, maps * ASKED), (width, ASKED)))
+    texel = (rows.astype(np.int64)[:, None] * width + columns.astype(np.int64)).ravel()
+    texel = texel[rsm.covered.reshape(-1)[texel]]
+    position, flux = rsm.at(texel, "position", "flux")
+    lit = flux.any(axis=0)
+    lobes = rsm.lobe_flux
+    if lobes is not None:
+        lit |= lobes.reshape(3, -1)[:, texel].any(axis=0)
+    return np.asarray(position[:, lit])
+
+
+@kernel
+def _row_bounds(position: Array, covered: Array, rows: Array) -> None:
+    """Fill least and most coordinates of the covered pixels of each row."""
+    for row in range(covered.shape[0]):
+        for c in range(3):
+            low, high = np.inf, -np.inf
+            for column in range(covered.shape[1]):
+                if covered[row, column]:
+                    low, high = min(low, position[c, row, column]), max(high, position[c, row, column])
+            rows[c, row], rows[3 + c, row] = low, high

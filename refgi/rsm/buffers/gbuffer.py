@@ -1,0 +1,252 @@
+"""The G-buffer: what a camera or a light sees through every texel, each channel resolved when first asked for."""
+
+from typing import Any
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.rsm.buffers.attributes import Planes, Wanted, resolve, resolve_at
+from refgi.rsm.buffers.runs import Surface
+from refgi.rsm.memory import plane
+from refgi.rsm.raster.projection import Projection, camera_projection
+from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
+from refgi.scene.model import Camera, Geometry, MaterialTable
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+MANY = 8  # as soon as one texel in so many is asked for, all are computed
+
+
+class GBuffer:
+    """Channels of the visible surface; `resolve` computes several in one pass, a property one alone.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    materials : MaterialTable
+        Their materials.
+    projection : Projection
+        Who looks.
+    visibility : Visibility
+        Which triangle each texel sees.
+    dtype : dtype
+        Float32 or float64, of every channel but the ids.
+
+    Notes
+    -----
+    Where there is no surface, depth and distance are inf, ids are -1 and all else is 0.
+    """
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        materials: MaterialTable,
+        projection: Projection,
+        visibility: Visibility,
+        dtype: npt.DTypeLike,
+    ) -> None:
+        self.projection = projection
+        self.visibility = visibility
+        self.dtype = np.dtype(dtype)
+        self._geometry = geometry
+        self._materials = materials
+        self._channels: dict[str, Array] = {}
+
+    @property
+    def height(self) -> int:
+        """Rows, of all stacked maps."""
+        return int(self.visibility.triangle_id.shape[0])
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return int(self.visibility.triangle_id.shape[1])
+
+    @property
+    def triangle_id(self) -> Array:
+        """Triangle that is seen, (h, w) int32, -1 for none."""
+        return self.visibility.triangle_id
+
+    @property
+    def covered(self) -> Array:
+        """Whether any surface is seen, (h, w) bool."""
+        if "covered" not in self._channels:
+            covered = plane(self.visibility.triangle_id.shape, np.bool_)
+            self._channels["covered"] = np.greater_equal(self.visibility.triangle_id, 0, out=covered)
+        return self._channels["covered"]
+
+    @property
+    def depth(self) -> Array:
+        """Axial depth, (h, w), m; distance on a paraboloid map."""
+        return self.resolve("depth")[0]
+
+    @property
+    def distance(self) -> Array:
+        """Distance from the centre of projection, (h, w), m."""
+        return self.resolve("distance")[0]
+
+    @property
+    def position(self) -> Array:
+        """Surface point, (3, h, w), world space, m."""
+        return self.resolve("position")[0]
+
+    @property
+    def normal(self) -> Array:
+        """Unit normal on the side that is seen, (3, h, w): interpolated where the geometry has vertex normals."""
+        return self.resolve("normal")[0]
+
+    @property
+    def albedo(self) -> Array:
+        """Diffuse reflectance, (3, h, w)."""
+        return self.resolve("albedo")[0]
+
+    @property
+    def material_id(self) -> Array:
+        """Material that is seen, (h, w) int32, -1 for none."""
+        return self.resolve("material_id")[0]
+
+    def resolve(self, *names: str) -> tuple[Array, ...]:
+        """Return channels by name, computing in one pass those not yet known.
+
+        Parameters
+        ----------
+        *names : str
+            Among depth, distance, position, normal, albedo, material_id, triangle_id, covered.
+
+        Returns
+        -------
+        tuple of ndarray
+            The channels, in the order asked for.
+
+        Raises
+        ------
+        InputError
+            If a name is not a channel.
+        """
+        for name in names:
+            expect(name in (*Wanted._fields, "triangle_id", "covered"), "channel", "a channel of the G-buffer", name)
+        missing = [name for name in Wanted._fields if name in names and name not in self._channels]
+        if missing:
+            self._channels.update(_resolve(self._geometry, self._materials, self.projection,
+                                           self.visibility.triangle_id, self.dtype, tuple(missing)))  # fmt: skip
+        return tuple(self._channels[n] if n in self._channels else getattr(self, n) for n in names)
+
+    def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
+        """Return channels at some texels alone, computing there those not yet known.
+
+        Parameters
+        ----------
+        texel : (n,) ndarray of int
+            Texels, row * w + column.
+        *names : str
+            As for `resolve`.
+
+        Returns
+        -------
+        tuple of (n,) or (3, n) ndarray
+            The channels, in the order asked for, with the bits that `resolve` gives.
+        """
+        if MANY * len(texel) > self.visibility.triangle_id.size:
+            self.resolve(*names)
+        missing = tuple(name for name in Wanted._fields if name in names and name not in self._channels)
+        there = {}
+        if missing:
+            planes = _planes(missing, (len(texel), 1), self.dtype)
+            surface = _surface(self._geometry, self._materials, self.dtype)
+            wanted = Wanted(*(name in missing for name in Wanted._fields))
+            resolve_at(surface, self.projection, self.visibility.triangle_id, texel, wanted, planes)
+            there = {name: getattr(planes, name)[..., 0] for name in missing}
+        return tuple(there[n] if n in there else taken(self.resolve(n)[0], texel) for n in names)
+
+
+def taken(channel: Array, texel: Array) -> Array:
+    """Return a channel's values at some texels.
+
+    Parameters
+    ----------
+    channel : (..., h, w) ndarray
+        The channel.
+    texel : (n,) ndarray of int
+        Texels, row * w + column.
+
+    Returns
+    -------
+    (..., n) ndarray
+        The values.
+    """
+    return channel.reshape(*channel.shape[:-2], -1)[..., texel]
+
+
+@stage("rsm.gbuffer")
+def gbuffer(
+    geometry: Geometry,
+    materials: MaterialTable,
+    camera: Camera,
+    width: int | None = None,
+    height: int | None = None,
+    dtype: npt.DTypeLike = np.float32,
+) -> GBuffer:
+    """Look at triangles through a camera.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    materials : MaterialTable
+        Their materials.
+    camera : Camera
+        Who looks.
+    width, height : int, optional
+        Size in pixels; the camera's own where absent.
+    dtype : dtype
+        Float32 or float64.
+
+    Returns
+    -------
+    GBuffer
+        Its visibility is known, its channels are resolved when asked for.
+
+    Raises
+    ------
+    InputError
+        If the size or type cannot be used.
+    """
+    expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
+    projection = camera_projection(camera, width, height)
+    return GBuffer(geometry, materials, projection, rasterize(geometry, projection), dtype)
+
+
+@stage("rsm.resolve")
+def _resolve(
+    geometry: Geometry,
+    materials: MaterialTable,
+    projection: Projection,
+    triangle_id: Array,
+    dtype: np.dtype[Any],
+    names: tuple[str, ...],
+) -> dict[str, Array]:
+    """Return the named channels, computed in one pass."""
+    planes = _planes(names, triangle_id.shape, dtype)
+    wanted = Wanted(*(name in names for name in Wanted._fields))
+    resolve(_surface(geometry, materials, dtype), projection, triangle_id, wanted, planes, numba.get_num_threads())
+    return {name: getattr(planes, name) for name in names}
+
+
+def _planes(names: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype[Any]) -> Planes:
+    """Return room for the named channels."""
+    planes = {}
+    for name in Wanted._fields:
+        size = shape if name in names else (0, 0)
+        planes[name] = plane((3, *size) if name in ("position", "normal", "albedo") else size,
+                             np.int32 if name == "material_id" else dtype)  # fmt: skip
+    return Planes(**planes)
+
+
+def _surface(geometry: Geometry, materials: MaterialTable, dtype: np.dtype[Any]) -> Surface:
+    normals = np.zeros((0, 3)) if geometry.vertex_normals is None else geometry.vertex_normals
+    return Surface(geometry.vertices, geometry.faces, normals, geometry.material_of_face,
+                   materials.diffuse.astype(dtype, copy=False))  # fmt: skip

@@ -1,0 +1,65 @@
+"""Light that leaves what a camera sees towards the camera: emission + albedo/pi irradiance."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.memory import plane
+from refgi.scene.model import MaterialTable
+
+Array = npt.NDArray[Any]
+
+NONE = np.zeros((0, 0), np.int32)
+
+
+def leaving_radiance(irradiance: Array, more: Array | None, buffer: GBuffer, materials: MaterialTable) -> Array:
+    """Return what the camera receives: L = L_e + albedo/pi (E + more).
+
+    Parameters
+    ----------
+    irradiance : (3, h, w) ndarray
+        What arrives, W/m^2.
+    more : (3, h, w) ndarray, optional
+        What arrives besides, W/m^2.
+    buffer : GBuffer
+        What the camera sees.
+    materials : MaterialTable
+        Their emission.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Radiance, W/m^2/sr, linear RGB.
+    """
+    radiance = plane(irradiance.shape, irradiance.dtype if more is None else np.result_type(irradiance, more))
+    emits = bool(materials.emission.any())
+    material_id = buffer.material_id if emits else NONE
+    _leave(irradiance, irradiance if more is None else more, more is not None, buffer.albedo, radiance)
+    if emits:
+        _emit(materials.emission, material_id, radiance)
+    return radiance
+
+
+@kernel(parallel=True)
+def _leave(irradiance: Array, more: Array, both: bool, albedo: Array, radiance: Array) -> None:
+    pi = irradiance.dtype.type(np.pi)
+    for row in prange(radiance.shape[1]):
+        for channel in range(3):
+            for x in range(radiance.shape[2]):
+                arriving = irradiance[channel, row, x]
+                if both:
+                    arriving = arriving + more[channel, row, x]
+                radiance[channel, row, x] = arriving * albedo[channel, row, x] / pi
+
+
+@kernel(parallel=True)
+def _emit(emission: Array, material_id: Array, radiance: Array) -> None:
+    for row in prange(radiance.shape[1]):
+        for x in range(radiance.shape[2]):
+            material = material_id[row, x]
+            if material >= 0:
+                for channel in range(3):
+                    radiance[channel, row, x] += emission[material, channel]

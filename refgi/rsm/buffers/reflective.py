@@ -1,0 +1,281 @@
+"""The reflective shadow map: the scene from a light, with the flux that each texel's surface reflects.
+
+Phi_t = albedo * (integral of I over the texel's directions), W, without cosine or distance (docs/radiometry); a
+directional light gives albedo * E_perp * A_perp. Glass reflects nothing here. The Phong lobe of a material leaves in
+the mirror direction r = d - 2 (n . d) n of the incoming direction d, with its own flux.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.jit import kernel, prange
+from refgi.rsm.buffers.gbuffer import GBuffer, taken
+from refgi.rsm.buffers.light_projection import MapShape, incident_flux, light_projection
+from refgi.rsm.buffers.runs import texel_ray
+from refgi.rsm.buffers.solid_angle import texel_solid_angles
+from refgi.rsm.raster.projection import Projection, project
+from refgi.rsm.raster.visibility_buffer import rasterize
+from refgi.scene.model import Geometry, Light, MaterialTable
+from refgi.stages import stage
+
+__all__ = ["Rsm", "reflective_shadow_map"]
+
+Array = npt.NDArray[Any]
+
+SEEN = ("depth", "position", "normal")  # channels of the light's view
+LOBE = ("lobe_flux", "lobe_axis", "lobe_exponent")
+
+
+class Rsm:
+    """What one light sees and reflects, on H x W texels (stacked maps); a channel is computed when first asked for.
+
+    Parameters
+    ----------
+    light : Light
+        Whose view.
+    view : GBuffer
+        What it sees.
+    materials : MaterialTable
+        What that is made of.
+    given : mapping of str to ndarray or None, optional
+        Channels that are known to be others than those of the view.
+    """
+
+    def __init__(
+        self, light: Light, view: GBuffer, materials: MaterialTable, given: Mapping[str, Array | None] | None = None
+    ) -> None:
+        self.light = light
+        self.projection = view.projection
+        self._view = view
+        self._materials = materials
+        self._given = dict(given or {})
+        self._glossy = bool((materials.specular.any(axis=1) & (materials.ior == 0)).any())
+
+    def _replace(self, **channels: Array | None) -> "Rsm":
+        """Return the map with other channels."""
+        return Rsm(self.light, self._view, self._materials, {**self._given, **channels})
+
+    @property
+    def triangle_id(self) -> Array:
+        """Triangle that is seen, (H, W) int32, -1 for none."""
+        return self._view.triangle_id
+
+    @property
+    def covered(self) -> Array:
+        """Whether any surface is seen, (H, W) bool."""
+        return self._view.covered
+
+    @property
+    def depth(self) -> Array:
+        """Axial depth, or distance on a paraboloid map, (H, W), m; inf where nothing is seen."""
+        return self.resolve("depth")[0]
+
+    @property
+    def position(self) -> Array:
+        """Surface point, (3, H, W), world space, m."""
+        return self.resolve("position")[0]
+
+    @property
+    def normal(self) -> Array:
+        """Unit normal on the lit side, (3, H, W)."""
+        return self.resolve("normal")[0]
+
+    @property
+    def solid_angle(self) -> Array:
+        """Solid angle of the whole texel, (H, W), sr; directional: its area perpendicular to the light, m^2."""
+        return self.resolve("solid_angle")[0]
+
+    @property
+    def flux(self) -> Array:
+        """Flux that the diffuse part reflects, (3, H, W), W."""
+        return self.resolve("flux")[0]
+
+    @property
+    def lobe_flux(self) -> Array | None:
+        """Flux that the lobe reflects, (3, H, W), W; None where no material has one."""
+        return self._lobe("lobe_flux")
+
+    @property
+    def lobe_axis(self) -> Array | None:
+        """Mirror direction, (3, H, W) unit vectors."""
+        return self._lobe("lobe_axis")
+
+    @property
+    def lobe_exponent(self) -> Array | None:
+        """Phong exponent of the lobe, (H, W)."""
+        return self._lobe("lobe_exponent")
+
+    def resolve(self, *names: str) -> tuple[Array, ...]:
+        """Return channels by name, computing in one pass those of the view not yet known.
+
+        Parameters
+        ----------
+        *names : str
+            Among depth, position, normal, solid_angle, flux.
+
+        Returns
+        -------
+        tuple of ndarray
+            The channels, in the order asked for.
+        """
+        self._view.resolve(*(name for name in names if name in SEEN and name not in self._given))
+        return tuple(self._whole(name) for name in names)
+
+    def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
+        """Return channels at some texels alone, computing there those not yet known.
+
+        Parameters
+        ----------
+        texel : (n,) ndarray of int
+            Texels, row * W + column.
+        *names : str
+            Among depth, position, normal, flux.
+
+        Returns
+        -------
+        tuple of (n,) or (3, n) ndarray
+            The channels, in the order asked for, with the bits that they have on the whole map.
+        """
+        parts = {name: taken(self._whole(name), texel) for name in names if name in self._given}
+        absent = [name for name in names if name not in parts]
+        wanted = dict.fromkeys([*(n for n in absent if n in SEEN), *(self._reflecting if "flux" in absent else ())])
+        seen = dict(zip(wanted, self._view.at(texel, *wanted), strict=True))
+        if "flux" in absent:
+            seen["flux"] = self._flux(incident_flux(self.light, self.projection, None, self._view.dtype, texel), seen)
+        parts.update(seen)
+        return tuple(parts[name] for name in names)
+
+    @property
+    def _reflecting(self) -> tuple[str, ...]:
+        """Channels of the view that the flux depends on."""
+        return ("albedo", "material_id") if self._glossy or self._materials.ior.any() else ("albedo",)
+
+    def _flux(self, incident: Array, seen: Mapping[str, Array]) -> Array:
+        """Return what the diffuse part reflects of the incident flux, in its place."""
+        if "material_id" in seen:
+            incident *= (self._materials.ior == 0)[seen["material_id"]]
+        incident *= seen["albedo"]
+        return incident
+
+    def _whole(self, name: str) -> Array:
+        if name in SEEN and name not in self._given:
+            return self._view.resolve(name)[0]
+        if name not in self._given:
+            if name == "solid_angle":
+                self._given[name] = texel_solid_angles(self.projection).astype(self._view.dtype)
+            else:
+                incident = incident_flux(self.light, self.projection, None, self._view.dtype)
+                seen = zip(self._reflecting, self._view.resolve(*self._reflecting), strict=True)
+                self._given[name] = self._flux(incident, dict(seen))
+        channel = self._given[name]
+        assert channel is not None
+        return channel
+
+    def _lobe(self, name: str) -> Array | None:
+        if name not in self._given and not self._glossy:
+            return None
+        if name not in self._given:
+            normal, material = self._view.resolve("normal", "material_id")
+            incident = incident_flux(self.light, self.projection, None, self._view.dtype)
+            incident *= (self._materials.ior == 0)[material]
+            lobe = _lobe(self._materials, self.projection, material, normal, incident * self.covered)
+            self._given = {**dict(zip(LOBE, lobe, strict=True)), **self._given}
+        return self._given[name]
+
+    @property
+    def texels(self) -> int:
+        """Number of texels, those without surface included."""
+        return self.triangle_id.size
+
+    def project(self, position: Array) -> tuple[Array, Array, Array]:
+        """Return continuous row, column and depth of points on the stacked maps, nan outside.
+
+        Parameters
+        ----------
+        position : (3, ...) ndarray
+            World space, m.
+
+        Returns
+        -------
+        row, column, depth : (...) ndarray
+            As in `refgi.rsm.raster.projection.project`.
+        """
+        return project(self.projection, position)
+
+
+@stage("rsm.reflective_shadow_map")
+def reflective_shadow_map(
+    geometry: Geometry,
+    materials: MaterialTable,
+    light: Light,
+    resolution: int,
+    dtype: npt.DTypeLike = np.float32,
+    projection: MapShape = "auto",
+) -> Rsm:
+    """Look at the scene from a light and find what each texel reflects.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    materials : MaterialTable
+        Their materials.
+    light : Light
+        Whose view.
+    resolution : int
+        Texels along a side of one map.
+    dtype : dtype
+        Float32 or float64.
+    projection : {"auto", "perspective", "cube", "paraboloid", "orthographic"}
+        Shape of the map. "auto": spot one perspective map around the cone, or one paraboloid map where the half-angle
+        is over 75 degrees; point a cube; directional orthographic around the scene. "cube" suits spots too,
+        "paraboloid" is one map for a spot and two for a point light.
+
+    Returns
+    -------
+    Rsm
+        Its visibility is known, its channels are computed when asked for.
+
+    Raises
+    ------
+    InputError
+        If the resolution, type or shape does not suit the light.
+
+    Notes
+    -----
+    A spot's falloff is integrated over each texel, not taken at its centre, so the fluxes sum to
+    albedo * (integral of I) to rounding however few the texels.
+    """
+    expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
+    maps = light_projection(light, geometry, resolution, projection)
+    return Rsm(light, GBuffer(geometry, materials, maps, rasterize(geometry, maps), dtype), materials)
+
+
+def _lobe(
+    materials: MaterialTable, maps: Projection, material: Array, normal: Array, incident: Array
+) -> tuple[Array, Array, Array]:
+    """Return flux, axis and exponent of the lobes."""
+    flux = np.moveaxis(materials.specular.astype(normal.dtype)[material], -1, 0) * incident
+    has_lobe: Array = np.asarray(flux.any(axis=0))
+    exponent = materials.exponent.astype(normal.dtype)[material] * has_lobe
+    axis = np.zeros_like(normal)
+    _mirror(maps, normal, has_lobe, axis)
+    return np.ascontiguousarray(flux), axis, exponent
+
+
+@kernel(parallel=True)
+def _mirror(maps: Projection, normal: Array, has_lobe: Array, axis: Array) -> None:
+    for row in prange(has_lobe.shape[0]):
+        for column in range(has_lobe.shape[1]):
+            if has_lobe[row, column]:
+                _, _, _, dx, dy, dz = texel_ray(maps, row, column)
+                nx, ny, nz = normal[0, row, column], normal[1, row, column], normal[2, row, column]
+                twice = 2.0 * (dx * nx + dy * ny + dz * nz)
+                rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
+                scale = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)
+                axis[0, row, column], axis[1, row, column], axis[2, row, column] = rx * scale, ry * scale, rz * scale

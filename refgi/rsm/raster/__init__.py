@@ -1,0 +1,18 @@
+"""The software rasterizer: which triangle each texel of a map sees, and how near.
+
+`projection` says how maps see the world; `batch` draws triangles on perspective and orthographic maps, `paraboloid` on
+paraboloid ones, `visibility_buffer` on either kind, several maps at once. `depth_maps` keeps distances alone.
+"""
+
+from refgi.rsm.raster.depth_maps import paraboloid_depth_maps
+from refgi.rsm.raster.projection import Projection, camera_projection, project
+from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
+
+__all__ = [
+    "Projection",
+    "Visibility",
+    "camera_projection",
+    "paraboloid_depth_maps",
+    "project",
+    "rasterize",
+]

@@ -1,0 +1,181 @@
+"""Triangles drawn in batches on a perspective or orthographic map: which texels each owns, and how near it is there.
+
+With vertices v_i = (column w, row w, w) and the texel centre (x, y, 1):
+
+- edge function e_i = (x, y, 1) . (v_j x v_k) = a x + b y + c, barycentric coordinate b_i = e_i / sum(e),
+- nearness = sum(e_i n_i) / det(v), that is 1/w in perspective, an affine function of (x, y) in both.
+
+The forward part of a triangle that crosses the plane of the eye is where all e_i have the sign of det. Adjacent
+triangles compute exactly negated edges from the same two vertices (strict IEEE products commute), so a texel centre on
+an edge belongs to exactly one of them: to the one that would own it after a shift of the sample by an infinitesimal to
+the right, and a smaller one downwards (the top-left rule).
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+from refgi.rsm.raster.triangle import LANES, SMALLEST, SPAN_CUT
+
+Array = npt.NDArray[Any]
+
+NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the eye
+BATCH = 64  # triangles set up at once
+LIMIT, CORNERS, ROWS = 15 * BATCH, 16 * BATCH, 28  # where a batch's limits and corners start, and its rows in all
+
+
+class Part(NamedTuple):
+    """Triangles to draw, and the rows to draw them in."""
+
+    members: Array  # (...) int32: triangle ids, in mesh order
+    start: int  # first and one past the last place in `members`
+    stop: int
+    boxes: Array  # (..., 4) uint16: first and last column, first and last row of triangle `base`, `base` + 1, ...
+    base: int
+    top: int  # first and last row to draw
+    bottom: int
+
+
+@kernel
+def edge(
+    xj: float, yj: float, wj: float, xk: float, yk: float, wk: float, sign: float
+) -> tuple[float, float, float, float]:
+    """Return the edge function v_j x v_k and the value from which on a texel centre is inside.
+
+    Parameters
+    ----------
+    xj, yj, wj, xk, yk, wk : float
+        Column, row and w of the edge's two vertices.
+    sign : float
+        Sign of the triangle's determinant, 1 or -1.
+
+    Returns
+    -------
+    tuple of 4 floats
+        a, b, c of a x + b y + c, and the threshold.
+    """
+    xj, yj, xk, yk = xj * wj, yj * wj, xk * wk, yk * wk
+    a = (yj * wk - yk * wj) * sign
+    b = (xk * wj - xj * wk) * sign
+    c = (xj * yk - xk * yj) * sign
+    owns = a > 0.0 or (a == 0.0 and b > 0.0)
+    return a, b, c, 0.0 if owns else SMALLEST
+
+
+@kernel
+def draw(corners: Array, faces: Array, part: Part, nearness: Array, ids: Array) -> None:
+    """Write nearness and id of triangles where each is the nearest so far; ties stay with the earlier one.
+
+    Parameters
+    ----------
+    corners : (n, 4) ndarray
+        Projected vertices.
+    faces : (m, 3) ndarray
+        Vertices of each triangle.
+    part : Part
+        Which triangles, in which order, and where.
+    nearness : (h, max(w, LANES)) ndarray
+        Nearest so far, float32; 0 where nothing is.
+    ids : (h, max(w, LANES)) ndarray
+        Triangle id, int32.
+
+    Notes
+    -----
+    The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
+    """
+    width, members, boxes = nearness.shape[1], part.members, part.boxes
+    setup = np.zeros(ROWS * BATCH)
+    for base in range(part.start, part.stop, BATCH):
+        count = min(BATCH, part.stop - base)
+        _gather(corners, faces, members, base, count, setup)
+        _set_up(setup, width)
+        for b in range(count):
+            face, limit = members[base + b], np.float32(setup[LIMIT + b])
+            a0, b0, c0, t0 = setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b]
+            a1, b1, c1, t1 = setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b]
+            a2, b2, c2, t2 = setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b]
+            an, bn, cn = setup[12 * BATCH + b], setup[13 * BATCH + b], setup[14 * BATCH + b]
+            place_of_box = face - part.base
+            left, right = _integer(boxes[place_of_box, 0]), _integer(boxes[place_of_box, 1])
+            upper, lower = _integer(boxes[place_of_box, 2]), _integer(boxes[place_of_box, 3])
+            for row in range(max(upper, part.top), min(lower, part.bottom) + 1):
+                y = row + 0.5
+                r0, r1, r2, rn = b0 * y + c0, b1 * y + c1, b2 * y + c2, bn * y + cn
+                first, last = left, right
+                if last - first > SPAN_CUT:
+                    first, last = _cut(first, last, a0, r0)
+                    first, last = _cut(first, last, a1, r1)
+                    first, last = _cut(first, last, a2, r2)
+                for block in range((last - first + LANES) // LANES):
+                    # a fixed number of lanes becomes straight SIMD code; those outside the span fail by themselves
+                    start = min(first + block * LANES, width - LANES)
+                    line, place_0, x0 = np.uint64(row), np.uint64(start), start + 0.5
+                    for lane in range(LANES):
+                        x, column = x0 + lane, place_0 + np.uint64(lane)
+                        near = np.float32(an * x + rn)
+                        inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
+                        if inside & (near > nearness[line, column]) & (near <= limit):
+                            nearness[line, column] = near
+                            ids[line, column] = face
+
+
+@kernel
+def _gather(corners: Array, faces: Array, members: Array, base: int, count: int, setup: Array) -> None:
+    """Write the corners of some triangles: loads that wait for memory, many under way at once."""
+    for b in range(count):
+        face = members[base + b]
+        i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+        for c in range(4):
+            setup[CORNERS + c * BATCH + b] = corners[i, c]
+            setup[CORNERS + (4 + c) * BATCH + b] = corners[j, c]
+            setup[CORNERS + (8 + c) * BATCH + b] = corners[k, c]
+
+
+@kernel
+def _set_up(setup: Array, width: int) -> None:
+    """Write edges, plane of nearness and limit of a batch from its corners, in SIMD lanes."""
+    for b in range(BATCH):
+        at = CORNERS + b
+        xi, yi, wi, ni = setup[at], setup[at + BATCH], setup[at + 2 * BATCH], setup[at + 3 * BATCH]
+        xj, yj, wj, nj = setup[at + 4 * BATCH], setup[at + 5 * BATCH], setup[at + 6 * BATCH], setup[at + 7 * BATCH]
+        xk, yk, wk, nk = setup[at + 8 * BATCH], setup[at + 9 * BATCH], setup[at + 10 * BATCH], setup[at + 11 * BATCH]
+        det = ((xj - xi) * (yk - yi) - (xk - xi) * (yj - yi)) * (wi * wj * wk)
+        sign = 1.0 if det > 0.0 else -1.0
+        a0, b0, c0, t0 = edge(xj, yj, wj, xk, yk, wk, sign)
+        a1, b1, c1, t1 = edge(xk, yk, wk, xi, yi, wi, sign)
+        a2, b2, c2, t2 = edge(xi, yi, wi, xj, yj, wj, sign)
+        scale = sign / det
+        setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b] = a0, b0, c0, t0
+        setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b] = a1, b1, c1, t1
+        setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b] = a2, b2, c2, t2
+        setup[12 * BATCH + b] = (a0 * ni + a1 * nj + a2 * nk) * scale
+        setup[13 * BATCH + b] = (b0 * ni + b1 * nj + b2 * nk) * scale
+        setup[14 * BATCH + b] = (c0 * ni + c1 * nj + c2 * nk) * scale
+        size = max(_size(xi, yi, wi, width), max(_size(xj, yj, wj, width), _size(xk, yk, wk, width)))
+        # no area, or seen edge-on: nothing is near enough
+        setup[LIMIT + b] = 1.0 / (NEAREST * size) if det != 0.0 else 0.0
+
+
+@kernel
+def _size(x: float, y: float, w: float, width: int) -> float:
+    """Return about how far a corner is from the eye, whatever plane holds both."""
+    return max(abs(w), max(abs(x * w), abs(y * w)) / width)
+
+
+@kernel
+def _integer(side: Any) -> Any:
+    """Widen a side of a box: 16-bit and signed integers together would become floats."""
+    return np.int64(side)
+
+
+@kernel
+def _cut(first: int, last: int, a: float, r: float) -> tuple[int, int]:
+    """Shorten a span to where a x + r may be >= 0, with a texel to spare."""
+    if a == 0.0:
+        return (first, last) if r >= 0.0 else (first, first - 1)
+    crossing = min(max(-r / a, first - 2.0), last + 2.0)
+    if a > 0.0:
+        return max(first, int(crossing) - 1), last
+    return first, min(last, int(crossing) + 1)

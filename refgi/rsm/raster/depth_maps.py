@@ -1,0 +1,86 @@
+"""Distances to the nearest surface on hemispheres around many points, one paraboloid map each."""
+
+from typing import Any
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.rsm.memory import plane
+from refgi.rsm.raster.paraboloid import BLOCK, Ignored, draw_distances
+from refgi.rsm.raster.projection import Projection, paraboloid_projection
+from refgi.rsm.raster.triangle import Chunks, chunks
+from refgi.scene.model import Geometry
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+
+@stage("rsm.paraboloid_depth_maps")
+def paraboloid_depth_maps(
+    geometry: Geometry, centers: Array, axes: Array, size: int, dtype: npt.DTypeLike = np.float32
+) -> Array:
+    """Measure the distance to the nearest surface from many points, on a hemisphere each.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    centers, axes : (k, 3) ndarray
+        Where each map looks from (m) and to (any length).
+    size : int
+        Texels along a side.
+    dtype : dtype
+        Float32 or float64.
+
+    Returns
+    -------
+    (k, n, n) ndarray
+        Distance, m; inf where nothing is seen and outside the disc. Map m's frame is
+        ``refgi.rsm.raster.projection.paraboloid_projection(centers, axes, size).frame[m]``.
+
+    Raises
+    ------
+    InputError
+        If centres and axes do not match or are not finite, an axis is zero, or the size cannot be used.
+    """
+    centers = np.reshape(np.asarray(centers, np.float64), (-1, 3))
+    axes = np.reshape(np.asarray(axes, np.float64), (-1, 3))
+    expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
+    expect(len(centers) == len(axes), "axes", f"{len(centers)} as many as centres", len(axes))
+    expect(bool(np.isfinite(centers).all()), "centers", "finite coordinates", centers)
+    expect(bool(np.isfinite(axes).all() and axes.any(axis=1).all()), "axes", "finite vectors, not zero", axes)
+    laid = chunks(geometry.vertices, geometry.faces)
+    return distance_maps(paraboloid_projection(centers, axes, size), laid, dtype)[0]
+
+
+def distance_maps(
+    projection: Projection, laid: Chunks, dtype: npt.DTypeLike, ignored: Ignored | None = None
+) -> tuple[Array, Array, Array]:
+    """Measure the distance to the nearest of some triangles on paraboloid maps.
+
+    Parameters
+    ----------
+    projection : Projection
+        k paraboloid maps of n x n texels.
+    laid : Chunks
+        The triangles.
+    dtype : dtype
+        Float32 or float64.
+    ignored : Ignored, optional
+        What lies too near the centres to count; nothing where absent.
+
+    Returns
+    -------
+    distance : (k, n, n) ndarray
+        Distance, m; inf where nothing is seen and outside the disc.
+    nearest : (k,) ndarray
+        Float64: smallest distance on each map, m; inf where nothing is.
+    left_out : (k,) ndarray
+        Int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in its ball.
+    """
+    n, none = projection.width, np.zeros(projection.maps)
+    distance = plane((projection.maps * n, max(n, BLOCK)), dtype)
+    found = draw_distances(projection, laid, ignored or Ignored(none, none), numba.get_num_threads(), distance)
+    return np.ascontiguousarray(distance[:, :n]).reshape(-1, n, n), *found

@@ -1,0 +1,244 @@
+"""Paraboloid maps, exact: a texel is inside a triangle when its direction lies within the triangle's three planes.
+
+Straight edges are arcs on a paraboloid map, so the test is made in direction space. With vertices v_i in the map's
+frame, n_i = v_j x v_k, and the texel's direction d = (2s, 2t, 1 - s^2 - t^2) of length 1 + s^2 + t^2:
+
+- e_i = d . n_i = -n_z s^2 + 2 n_x s + (2 t n_y + (1 - t^2) n_z), along a row a quadratic in s,
+- inside where all e_i have the sign of det(v); on a plane the sign of n's first component that is not zero decides,
+- the hit is tau d with 1/tau = sum(e_i)/det, its distance tau (1 + s^2 + t^2).
+
+Adjacent triangles get exactly negated n, so a texel on a shared edge belongs to exactly one.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.rsm.raster.paraboloid_batch import (
+    ACROSS,
+    BEHIND,
+    BOX,
+    LIMIT,
+    NEAR,
+    NEARNESS,
+    ROWS,
+    SQUARE,
+    STATE,
+    UNSEEN,
+    bound_across,
+    is_behind,
+    orient,
+    place,
+)
+from refgi.rsm.raster.projection import Projection
+from refgi.rsm.raster.triangle import CHUNK, SPAN_CUT, Chunks, chunks
+
+Array = npt.NDArray[Any]
+
+BLOCK = 16  # texels tested at once; a map has at least as many columns in memory
+
+
+class Ignored(NamedTuple):
+    """What each map does not see of the geometry near its centre."""
+
+    planes: Array  # (k,) float64, m: triangles whose plane passes nearer than this
+    ball: Array  # (k,) float64, m: surfaces nearer than this, as if cut away
+
+
+def draw_paraboloids(
+    projection: Projection, vertices: Array, faces: Array, workers: int, nearness: Array, ids: Array
+) -> None:
+    """Draw triangles on every paraboloid map, inside the hemisphere's disc.
+
+    Parameters
+    ----------
+    projection : Projection
+        The maps.
+    vertices : (n, 3) ndarray
+        World space, m.
+    faces : (m, 3) ndarray
+        Vertices of each triangle.
+    workers : int
+        Threads; maps are dealt to them in turn.
+    nearness : (H, max(W, BLOCK)) ndarray
+        Float32, receives 1/tau; 0 where nothing is.
+    ids : (H, max(W, BLOCK)) ndarray
+        Int32, receives the triangle's id.
+    """
+    laid, none = chunks(vertices, faces), np.zeros(projection.maps)
+    room = np.zeros((workers, 1, nearness.shape[1]), np.int32)
+    _draw_maps(projection, laid, Ignored(none, none), nearness, ids, room, np.zeros(projection.maps, np.int64), none)
+
+
+def draw_distances(
+    projection: Projection, laid: Chunks, ignored: Ignored, workers: int, distance: Array
+) -> tuple[Array, Array]:
+    """Draw triangles on every paraboloid map and turn nearness into distance.
+
+    Parameters
+    ----------
+    projection : Projection
+        The maps.
+    laid : Chunks
+        The triangles.
+    ignored : Ignored
+        What lies too near the centres to count.
+    workers : int
+        Threads; maps are dealt to them in turn.
+    distance : (H, max(W, BLOCK)) ndarray
+        Float32 or float64, of any content; receives the distance, m, inf where nothing is and outside the disc.
+
+    Returns
+    -------
+    nearest : (k,) ndarray
+        Float64: smallest distance on each map, m; inf where nothing is.
+    left_out : (k,) ndarray
+        Int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in its ball.
+    """
+    left_out, nearest = np.zeros(projection.maps, np.int64), np.full(projection.maps, np.inf)
+    room = np.zeros((workers, projection.height, distance.shape[1]), np.int32)
+    _draw_maps(projection, laid, ignored, distance, room[0, :0], room, left_out, nearest)
+    return nearest, left_out
+
+
+@kernel(parallel=True)
+def _draw_maps(
+    projection: Projection, laid: Chunks, ignored: Ignored, nearness: Array, ids: Array, room: Array, left_out: Array,
+    nearest: Array,
+) -> None:
+    workers, height, wanted = len(room), projection.height, len(ids) > 0
+    corners, box = laid.corners, laid.box
+    for worker in prange(workers):
+        setup = np.zeros(ROWS * CHUNK)
+        for m in range(worker, len(projection.origin), workers):
+            first, last = m * height, (m + 1) * height
+            own, seen = nearness[first:last], ids[first:last] if wanted else room[worker]
+            own[:] = 0
+            limits = 1.0 / (ignored.planes[m] * ignored.planes[m]), ignored.ball[m]
+            left_out[m] = _draw(projection, m, corners, box, limits, setup, own, seen)
+            if wanted:
+                _clear_outside_disc(projection, own, seen)
+            else:
+                nearest[m] = _to_distance(projection, own)
+
+
+@kernel
+def _clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> None:
+    n, half = projection.width, projection.half[0]
+    step = 2.0 * half / n
+    for row in range(n):
+        t = (row + 0.5) * step - half
+        for column in range(n):
+            s = (column + 0.5) * step - half
+            if s * s + t * t > 1.0:
+                nearness[row, column] = 0.0
+                ids[row, column] = -1
+
+
+@kernel
+def _to_distance(projection: Projection, nearness: Array) -> float:
+    """Turn nearness into distance, inf outside the disc, and return the smallest."""
+    n, half, least = projection.width, projection.half[0], np.inf
+    step, real = 2.0 * half / n, nearness.dtype.type
+    for row in range(n):
+        t = (row + 0.5) * step - half
+        for column in range(n):
+            s = (column + 0.5) * step - half
+            square = s * s + t * t
+            # nothing seen: nearness 0, distance inf
+            distance = (1.0 + square) / nearness[row, column]
+            nearness[row, column] = real(distance if square <= 1.0 else np.inf)
+            least = min(least, nearness[row, column])
+    return least
+
+
+@kernel
+def _draw(
+    projection: Projection, m: int, corners: Array, box: Array, limits: tuple[float, float], setup: Array,
+    nearness: Array, ids: Array,
+) -> int:
+    """Draw every triangle on one map; the loop is inside because calls with arrays cost atomic reference counts."""
+    n, width, half = projection.width, nearness.shape[1], projection.half[0]
+    step, real = 2.0 * half / n, nearness.dtype.type
+    steepest, ball = limits  # 1 / distance^2 of planes, distance of hits that are ignored
+    nearest, within = 1.0 / ball, 1.0 / (ball * ball)
+    origin, frame = projection.origin, projection.frame
+    view = (origin[m, 0], origin[m, 1], origin[m, 2], frame[m, 0, 0], frame[m, 0, 1], frame[m, 0, 2],
+            frame[m, 1, 0], frame[m, 1, 1], frame[m, 1, 2], frame[m, 2, 0], frame[m, 2, 1], frame[m, 2, 2])  # fmt: skip
+    left_out = 0
+    for chunk in range(len(box)):
+        if is_behind(box, chunk, view):
+            continue
+        place(corners, chunk, view, half, n, ball, setup)
+        orient(setup)
+        for b in range(CHUNK):
+            state = setup[STATE + b]
+            if state == BEHIND:
+                continue
+            if state == NEAR or setup[SQUARE + b] > steepest:  # its plane lies 1/sqrt of this from the centre
+                left_out += 1
+                continue
+            if state == UNSEEN or (state == ACROSS and not bound_across(setup, b, half, n)):
+                continue
+            face, limit = chunk * CHUNK + b, real(setup[LIMIT + b])
+            x0, y0, z0, t0 = setup[b], setup[CHUNK + b], setup[2 * CHUNK + b], setup[3 * CHUNK + b]
+            x1, y1, z1, t1 = setup[4 * CHUNK + b], setup[5 * CHUNK + b], setup[6 * CHUNK + b], setup[7 * CHUNK + b]
+            x2, y2, z2, t2 = setup[8 * CHUNK + b], setup[9 * CHUNK + b], setup[10 * CHUNK + b], setup[11 * CHUNK + b]
+            at = NEARNESS + b
+            xn, yn, zn = setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK]
+            cut_short = nearest if setup[SQUARE + b] > within else np.inf
+            at = BOX + b
+            first, last = int(setup[at]), int(setup[at + CHUNK])
+            for row in range(int(setup[at + 2 * CHUNK]), int(setup[at + 3 * CHUNK]) + 1):
+                t = (row + 0.5) * step - half
+                rest = 1.0 - t * t
+                r0, r1, r2 = 2.0 * t * y0 + rest * z0, 2.0 * t * y1 + rest * z1, 2.0 * t * y2 + rest * z2
+                rn = 2.0 * t * yn + rest * zn
+                line, left, right, length = np.uint64(row), first, last, 1.0 + t * t
+                if last - first > SPAN_CUT:
+                    left, right = _cut(left, right, x0, z0, r0, step, 0.5 * (n - 1))
+                    left, right = _cut(left, right, x1, z1, r1, step, 0.5 * (n - 1))
+                    left, right = _cut(left, right, x2, z2, r2, step, 0.5 * (n - 1))
+                for block in range((right - left + BLOCK) // BLOCK):
+                    start = min(left + block * BLOCK, width - BLOCK)
+                    place_0, centre = np.uint64(start), start + 0.5
+                    for lane in range(BLOCK):
+                        column = place_0 + np.uint64(lane)
+                        s = (centre + lane) * step - half
+                        near = real((2.0 * xn - zn * s) * s + rn)
+                        inside = (
+                            ((2.0 * x0 - z0 * s) * s + r0 >= t0)
+                            & ((2.0 * x1 - z1 * s) * s + r1 >= t1)
+                            & ((2.0 * x2 - z2 * s) * s + r2 >= t2)
+                        )
+                        far_enough = (near <= limit) & (near <= (length + s * s) * cut_short)
+                        if inside & (near > nearness[line, column]) & far_enough:
+                            nearness[line, column] = near
+                            ids[line, column] = face
+    return left_out
+
+
+@kernel
+def _cut(
+    first: int, last: int, nx: float, nz: float, rest: float, step: float, middle: float
+) -> tuple[int, int]:
+    """Shorten a span to where -n_z s^2 + 2 n_x s + rest may be >= 0, with a texel to spare."""
+    square = nx * nx + nz * rest
+    if square < 0.0:
+        return (first, last) if nz < 0.0 else (first, first - 1)
+    q = nx + math.copysign(math.sqrt(square), nx)
+    if q == 0.0:
+        return first, last
+    one, other = q / (nz + 0.0) / step + middle, -rest / q / step + middle  # roots, as columns; nz + 0.0 is never -0.0
+    low = min(max(min(one, other), first - 2.0), last + 2.0)
+    high = min(max(max(one, other), first - 2.0), last + 2.0)
+    if nz >= 0.0:  # between the roots
+        return max(first, int(low) - 1), min(last, int(high) + 2)
+    if low < first - 1.0:  # outside them: to the right
+        return max(first, int(high) - 1), last
+    if high > last + 1.0:
+        return first, min(last, int(low) + 2)
+    return first, last

@@ -1,0 +1,260 @@
+"""A chunk of triangles made ready for one paraboloid map, in SIMD lanes: boxes, planes through the centre, nearness.
+
+Where a triangle may be on a paraboloid map: the box of its corners, made wider for edges that are arcs.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+from refgi.rsm.raster.triangle import BOX_PAD, CHUNK, SMALLEST, centres_between
+
+Array = npt.NDArray[Any]
+
+NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the centre
+
+# rows of a set-up, CHUNK numbers each
+PLANES = 0  # of each of three edges: x, y, z of n, and the value of e from which on a texel is inside
+NEARNESS = 12 * CHUNK  # x, y, z of the vector whose product with a texel's direction is 1/tau
+LIMIT = 15 * CHUNK  # greatest 1/tau that is no rounding
+SQUARE = 16 * CHUNK  # 1 / squared distance of the plane from the centre
+STATE = 17 * CHUNK  # one of those below
+BOX = 18 * CHUNK  # first and last column, first and last row
+CORNERS = 22 * CHUNK  # x, y, z of the corners in the map's frame
+ROWS = 31
+# behind the plane z = 0; ahead of it; across it; ahead of it but between texels; within the ball that is cut away
+BEHIND, AHEAD, ACROSS, UNSEEN, NEAR = 0.0, 1.0, 2.0, 3.0, 4.0
+
+
+@kernel
+def bulge(square: float) -> Any:
+    """Return how far an edge may leave its chord of squared length L^2: 1 - sqrt(1 - L^2/4).
+
+    Parameters
+    ----------
+    square : float
+        L^2.
+
+    Returns
+    -------
+    float
+        In the units of the unit disc, a little too much.
+
+    Notes
+    -----
+    Each edge is an arc of at most half a circle, of radius R >= 1: R - sqrt(R^2 - L^2/4) is largest for R = 1.
+    """
+    if square < 0.04:
+        return 0.13 * square + 1e-12
+    return 1.0 - math.sqrt(max(1.0 - 0.25 * square, 0.0)) + 1e-12
+
+
+@kernel
+def box_across(x: Any, y: Any, z: Any) -> tuple[float, float, float, float]:
+    """Return the range of s and of t that the part ahead of z = 0 may cover of a triangle that crosses it.
+
+    Parameters
+    ----------
+    x, y, z : tuple of 4 floats
+        Corners in the map's frame, the first again at the end.
+
+    Returns
+    -------
+    tuple of 4 floats
+        Least and greatest s, least and greatest t.
+    """
+    s_low, s_high, t_low, t_high, longest = np.inf, -np.inf, np.inf, -np.inf, 0.0
+    s_first, t_first, s_last, t_last = np.nan, np.nan, np.nan, np.nan
+    for half_step in range(6):  # each corner, then where its edge meets the plane
+        a = half_step // 2
+        if half_step % 2 == 0:
+            if z[a] < 0.0:
+                continue
+            scale = 1.0 / max(math.sqrt(x[a] * x[a] + y[a] * y[a] + z[a] * z[a]) + z[a], SMALLEST)
+            s, t = x[a] * scale, y[a] * scale
+        else:
+            if (z[a] < 0.0) == (z[a + 1] < 0.0):
+                continue
+            share = z[a] / (z[a] - z[a + 1])
+            rim_x, rim_y = x[a] + share * (x[a + 1] - x[a]), y[a] + share * (y[a + 1] - y[a])
+            length = math.sqrt(rim_x * rim_x + rim_y * rim_y)
+            if length == 0.0:  # through the centre itself: no way to tell
+                return -1.0, 1.0, -1.0, 1.0
+            s, t = rim_x / length, rim_y / length
+        s_low, s_high, t_low, t_high = min(s_low, s), max(s_high, s), min(t_low, t), max(t_high, t)
+        if s_first == s_first:
+            longest = max(longest, (s - s_last) * (s - s_last) + (t - t_last) * (t - t_last))
+        else:
+            s_first, t_first = s, t
+        s_last, t_last = s, t
+    longest = max(longest, (s_first - s_last) * (s_first - s_last) + (t_first - t_last) * (t_first - t_last))
+    spare = bulge(longest)
+    return s_low - spare, s_high + spare, t_low - spare, t_high + spare
+
+
+@kernel
+def is_behind(box: Array, chunk: int, view: Any) -> bool:
+    """Tell whether a whole chunk lies behind a map's plane z = 0.
+
+    Parameters
+    ----------
+    box : (c, 6) ndarray
+        Box of each chunk, m.
+    chunk : int
+        Which chunk.
+    view : tuple of 12 floats
+        Centre of the map, then its frame, row by row.
+
+    Returns
+    -------
+    bool
+        True where no corner's z can be 0 or more: z is summed as that of corners is, and rounding is monotone.
+    """
+    ox, oy, oz, _, _, _, _, _, _, fx, fy, fz = view
+    px = (box[chunk, 3] if fx > 0.0 else box[chunk, 0]) - ox
+    py = (box[chunk, 4] if fy > 0.0 else box[chunk, 1]) - oy
+    pz = (box[chunk, 5] if fz > 0.0 else box[chunk, 2]) - oz
+    z: float = fx * px + fy * py + fz * pz
+    return z < 0.0
+
+
+@kernel
+def _edge(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float, sign: float
+) -> tuple[float, float, float, float]:
+    """Return n = a x b times the sign of det, and the value of e from which on a texel is inside."""
+    nx, ny, nz = (ay * bz - az * by) * sign, (az * bx - ax * bz) * sign, (ax * by - ay * bx) * sign
+    owns = (nx > 0.0) | ((nx == 0.0) & ((ny > 0.0) | ((ny == 0.0) & (nz > 0.0))))
+    return nx, ny, nz, 0.0 if owns else SMALLEST
+
+
+@kernel
+def _longest(x: float, y: float, z: float) -> Any:
+    return max(abs(x), max(abs(y), abs(z)))
+
+
+@kernel
+def place(corners: Array, chunk: int, view: Any, half: float, size: int, ball: float, setup: Array) -> None:
+    """Write where every triangle of a chunk lies on a map.
+
+    Parameters
+    ----------
+    corners : (c, 9, CHUNK) ndarray
+        Corners of the triangles of each chunk, world space, m.
+    chunk : int
+        Which chunk.
+    view : tuple of 12 floats
+        Centre of the map, then its frame, row by row.
+    half : float
+        Half extent of the map.
+    size : int
+        Texels along a side.
+    ball : float
+        Triangles all nearer than this to the centre are `NEAR`, m.
+    setup : (ROWS * CHUNK,) ndarray
+        Receives corners, state and box of each.
+    """
+    ox, oy, oz, rx, ry, rz, dx, dy, dz, fx, fy, fz = view
+    texels, within = 0.5 * size / half, ball * ball
+    low_offset, high_offset = half * texels - (0.5 + BOX_PAD), half * texels + (BOX_PAD - 0.5)
+    for b in range(CHUNK):
+        px, py, pz = corners[chunk, 0, b] - ox, corners[chunk, 1, b] - oy, corners[chunk, 2, b] - oz
+        xi, yi, zi = rx * px + ry * py + rz * pz, dx * px + dy * py + dz * pz, fx * px + fy * py + fz * pz
+        px, py, pz = corners[chunk, 3, b] - ox, corners[chunk, 4, b] - oy, corners[chunk, 5, b] - oz
+        xj, yj, zj = rx * px + ry * py + rz * pz, dx * px + dy * py + dz * pz, fx * px + fy * py + fz * pz
+        px, py, pz = corners[chunk, 6, b] - ox, corners[chunk, 7, b] - oy, corners[chunk, 8, b] - oz
+        xk, yk, zk = rx * px + ry * py + rz * pz, dx * px + dy * py + dz * pz, fx * px + fy * py + fz * pz
+        at = CORNERS + b
+        setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK] = xi, yi, zi
+        setup[at + 3 * CHUNK], setup[at + 4 * CHUNK], setup[at + 5 * CHUNK] = xj, yj, zj
+        setup[at + 6 * CHUNK], setup[at + 7 * CHUNK], setup[at + 8 * CHUNK] = xk, yk, zk
+        qi, qj, qk = xi * xi + yi * yi + zi * zi, xj * xj + yj * yj + zj * zj, xk * xk + yk * yk + zk * zk
+        wi = 1.0 / max(math.sqrt(qi) + zi, SMALLEST)
+        wj = 1.0 / max(math.sqrt(qj) + zj, SMALLEST)
+        wk = 1.0 / max(math.sqrt(qk) + zk, SMALLEST)
+        s_low, s_high = min(xi * wi, min(xj * wj, xk * wk)), max(xi * wi, max(xj * wj, xk * wk))
+        t_low, t_high = min(yi * wi, min(yj * wj, yk * wk)), max(yi * wi, max(yj * wj, yk * wk))
+        # the diagonal of the corners' box is no shorter than the longest chord
+        spare = bulge((s_high - s_low) * (s_high - s_low) + (t_high - t_low) * (t_high - t_low))
+        last = size - 1.0
+        first_column = np.ceil(max((s_low - spare) * texels + low_offset, 0.0))
+        last_column = np.floor(min((s_high + spare) * texels + high_offset, last))
+        first_row = np.ceil(max((t_low - spare) * texels + low_offset, 0.0))
+        last_row = np.floor(min((t_high + spare) * texels + high_offset, last))
+        nearest, farthest = min(zi, min(zj, zk)), max(zi, max(zj, zk))
+        seen = (first_column <= last_column) & (first_row <= last_row)
+        state = ACROSS if nearest < 0.0 else (AHEAD if seen else UNSEEN)
+        state = NEAR if max(qi, max(qj, qk)) < within else state
+        setup[STATE + b] = BEHIND if farthest < 0.0 else state
+        at = BOX + b
+        setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK], setup[at + 3 * CHUNK] = (
+            first_column, last_column, first_row, last_row)  # fmt: skip
+
+
+@kernel
+def orient(setup: Array) -> None:
+    """Write the planes through the centre and the edges of every triangle of a chunk, and its own plane.
+
+    Parameters
+    ----------
+    setup : (ROWS * CHUNK,) ndarray
+        Corners are read, the rest is written.
+    """
+    for b in range(CHUNK):
+        at = CORNERS + b
+        xi, yi, zi = setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK]
+        xj, yj, zj = setup[at + 3 * CHUNK], setup[at + 4 * CHUNK], setup[at + 5 * CHUNK]
+        xk, yk, zk = setup[at + 6 * CHUNK], setup[at + 7 * CHUNK], setup[at + 8 * CHUNK]
+        ax, ay, az, bx, by, bz = xj - xi, yj - yi, zj - zi, xk - xi, yk - yi, zk - zi
+        nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        det = xi * nx + yi * ny + zi * nz
+        sign = 1.0 if det > 0.0 else -1.0
+        scale = 1.0 / det
+        nx, ny, nz = nx * scale, ny * scale, nz * scale
+        x0, y0, z0, t0 = _edge(xj, yj, zj, xk, yk, zk, sign)
+        x1, y1, z1, t1 = _edge(xk, yk, zk, xi, yi, zi, sign)
+        x2, y2, z2, t2 = _edge(xi, yi, zi, xj, yj, zj, sign)
+        setup[b], setup[CHUNK + b], setup[2 * CHUNK + b], setup[3 * CHUNK + b] = x0, y0, z0, t0
+        setup[4 * CHUNK + b], setup[5 * CHUNK + b], setup[6 * CHUNK + b], setup[7 * CHUNK + b] = x1, y1, z1, t1
+        setup[8 * CHUNK + b], setup[9 * CHUNK + b], setup[10 * CHUNK + b], setup[11 * CHUNK + b] = x2, y2, z2, t2
+        at = NEARNESS + b
+        setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK] = nx, ny, nz
+        longest = max(_longest(xi, yi, zi), max(_longest(xj, yj, zj), _longest(xk, yk, zk)))
+        # no area, or seen edge-on: nothing is near enough
+        setup[LIMIT + b] = 1.0 / (NEAREST * longest) if det != 0.0 else 0.0
+        setup[SQUARE + b] = nx * nx + ny * ny + nz * nz if det != 0.0 else 0.0
+
+
+@kernel
+def bound_across(setup: Array, b: int, half: float, size: int) -> bool:
+    """Bound a triangle that crosses the plane z = 0.
+
+    Parameters
+    ----------
+    setup : (ROWS * CHUNK,) ndarray
+        Set-up of the chunk; receives the box.
+    b : int
+        Which triangle.
+    half : float
+        Half extent of the map.
+    size : int
+        Texels along a side.
+
+    Returns
+    -------
+    bool
+        Whether it may cover a texel.
+    """
+    at, texels = CORNERS + b, 0.5 * size / half
+    xi, yi, zi = setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK]
+    xj, yj, zj = setup[at + 3 * CHUNK], setup[at + 4 * CHUNK], setup[at + 5 * CHUNK]
+    xk, yk, zk = setup[at + 6 * CHUNK], setup[at + 7 * CHUNK], setup[at + 8 * CHUNK]
+    s_low, s_high, t_low, t_high = box_across((xi, xj, xk, xi), (yi, yj, yk, yi), (zi, zj, zk, zi))
+    first, last = centres_between((s_low + half) * texels, (s_high + half) * texels, size)
+    top, bottom = centres_between((t_low + half) * texels, (t_high + half) * texels, size)
+    at = BOX + b
+    setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK], setup[at + 3 * CHUNK] = first, last, top, bottom
+    return first <= last and top <= bottom

@@ -1,0 +1,210 @@
+"""Where a triangle may be on a perspective or orthographic map: its vertices there, and the texels it may cover.
+
+A vertex is kept as (column, row, w, n): its continuous texel coordinates, w (axial depth; 1 when orthographic) and n
+(1; the nearness 1 - depth/reach when orthographic). Nothing is clipped: of a triangle that crosses the plane of the
+eye, the box is that of its forward part.
+
+Triangles in chunks of consecutive ones, their corners laid out for SIMD lanes, each chunk with its box.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.rsm.memory import plane
+from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
+
+Array = npt.NDArray[Any]
+
+SMALLEST_W = 1e-30  # stands for a vertex in the plane of the eye, m
+BOX_PAD = 1e-3  # texels; far above the rounding of a projected vertex
+SPAN_CUT = 32  # texels; narrower boxes are cheaper to test whole
+BEHIND = -1  # column of a vertex that is not in front of the eye
+LANES = 16  # texels tested at once; a map has at least as many columns in memory
+BLOCK = 256  # triangles bounded without a branch before those among them that cross the plane of the eye
+SMALLEST = 1e-300  # an edge that owns its line needs e >= 0, another needs e >= SMALLEST
+CHUNK = 64  # triangles
+
+
+@kernel
+def project_vertices(
+    projection: Projection, m: int, vertices: Array, first: int, last: int, corners: Array, cells: Array
+) -> None:
+    """Fill rows of `corners` and `cells` with vertices as seen on map `m`.
+
+    Parameters
+    ----------
+    projection : Projection
+        Perspective or orthographic maps.
+    m : int
+        Which map.
+    vertices : (n, 3) ndarray
+        World space, m.
+    first, last : int
+        First vertex and one past the last.
+    corners : (n, 4) ndarray
+        Column, row, w, n.
+    cells : (n, 4) ndarray of int
+        First column and row whose centre is not left of or above the vertex, and the negatives of the last ones whose
+        centre is not right of or below it, a little widened: the least of each bounds a triangle. `BEHIND` first where
+        the vertex is not in front of the eye.
+    """
+    width, height = projection.width, projection.height
+    for i in range(first, last):
+        x, y, depth = view_coordinates(projection, m, vertices[i, 0], vertices[i, 1], vertices[i, 2])
+        w, nearness = depth, 1.0
+        if projection.kind == ORTHOGRAPHIC:
+            w, nearness = 1.0, 1.0 - depth / projection.reach
+        elif abs(w) < SMALLEST_W:
+            w = SMALLEST_W
+        x = (x / w / projection.half[0] + 1.0) * (0.5 * width)
+        y = (y / w / projection.half[1] + 1.0) * (0.5 * height)
+        corners[i, 0], corners[i, 1], corners[i, 2], corners[i, 3] = x, y, w, nearness
+        left, right = centres_between(x, x, width)
+        top, bottom = centres_between(y, y, height)
+        cells[i, 0], cells[i, 1] = left if w > 0.0 else BEHIND, top
+        cells[i, 2], cells[i, 3] = -right, -bottom
+
+
+@kernel
+def bound_triangles(
+    corners: Array, cells: Array, faces: Array, first: int, last: int, size: tuple[int, int], boxes: Array
+) -> None:
+    """Write the texels whose centres triangles may cover.
+
+    Parameters
+    ----------
+    corners : (n, 4) ndarray
+        Projected vertices.
+    cells : (n, 4) ndarray of int
+        The texels that each lies between.
+    faces : (m, 3) ndarray
+        Vertices of each triangle.
+    first, last : int
+        First triangle and one past the last.
+    size : tuple of 2 int
+        Columns and rows of the map.
+    boxes : (last - first, 4) ndarray
+        First and last column, first and last row; first > last where a triangle covers nothing.
+
+    Notes
+    -----
+    The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
+    """
+    for block in range(first, last, BLOCK):
+        crossing, stop = 0, min(block + BLOCK, last)
+        for face in range(block, stop):
+            i, j, k, place = faces[face, 0], faces[face, 1], faces[face, 2], face - first
+            left, top = min(cells[i, 0], cells[j, 0], cells[k, 0]), min(cells[i, 1], cells[j, 1], cells[k, 1])
+            right, bottom = -min(cells[i, 2], cells[j, 2], cells[k, 2]), -min(cells[i, 3], cells[j, 3], cells[k, 3])
+            crossing += left == BEHIND
+            empty = (left > right) | (top > bottom)
+            boxes[place, 0], boxes[place, 1] = 1 if empty else left, 0 if empty else right
+            boxes[place, 2], boxes[place, 3] = 0 if empty else top, 0 if empty else bottom
+        if crossing > 0:
+            _bound_crossing(corners, faces, block, stop, size, boxes[block - first : stop - first])
+
+
+@kernel
+def _bound_crossing(corners: Array, faces: Array, first: int, last: int, size: tuple[int, int], boxes: Array) -> None:
+    """Bound those of some triangles that are not all in front of the eye."""
+    for face in range(first, last):
+        i, j, k, place = faces[face, 0], faces[face, 1], faces[face, 2], face - first
+        w = corners[i, 2], corners[j, 2], corners[k, 2], corners[i, 2]
+        if w[0] > 0.0 and w[1] > 0.0 and w[2] > 0.0:
+            continue
+        low, high = _open_interval((corners[i, 0], corners[j, 0], corners[k, 0], corners[i, 0]), w)
+        left, right = centres_between(low, high, size[0])
+        low, high = _open_interval((corners[i, 1], corners[j, 1], corners[k, 1], corners[i, 1]), w)
+        top, bottom = centres_between(low, high, size[1])
+        if left > right or top > bottom:
+            left, right, top, bottom = 1, 0, 0, 0
+        boxes[place, 0], boxes[place, 1], boxes[place, 2], boxes[place, 3] = left, right, top, bottom
+
+
+@kernel
+def centres_between(low: float, high: float, size: int) -> tuple[int, int]:
+    """Return the first and last texel whose centre lies in an interval, or a little outside it.
+
+    Parameters
+    ----------
+    low, high : float
+        The interval, continuous texel coordinates.
+    size : int
+        Texels in all.
+
+    Returns
+    -------
+    tuple of 2 int
+        Within 0 to `size` - 1; first > last where there is none.
+    """
+    first = np.ceil(min(max(low, 0.0), size + 1.0) - (0.5 + BOX_PAD))
+    last = np.floor(min(max(high, -1.0), float(size)) + (BOX_PAD - 0.5))
+    return max(int(first), 0), min(int(last), size - 1)
+
+
+@kernel
+def _open_interval(place: Any, w: Any) -> tuple[float, float]:
+    """Return the range on one axis of the part in front of the eye: an edge through its plane goes to infinity."""
+    low, high = np.inf, -np.inf
+    for a in range(3):
+        b = a + 1
+        if w[a] > 0.0:
+            low, high = min(low, place[a]), max(high, place[a])
+        if (w[a] > 0.0) != (w[b] > 0.0):
+            # the sign of the coordinate times w where the edge meets the plane of the eye
+            pa, pb = place[a] * w[a], place[b] * w[b]
+            meets = (pa * w[b] - pb * w[a]) * (-1.0 if w[a] > 0.0 else 1.0)
+            doubt = 1e-9 * (abs(pa * w[b]) + abs(pb * w[a]))
+            if meets <= doubt:
+                low = -np.inf
+            if meets >= -doubt:
+                high = np.inf
+    return low, high
+
+
+class Chunks(NamedTuple):
+    """Triangles of c chunks, in mesh order; the last is filled up with triangles without area."""
+
+    corners: Array  # (c, 9, CHUNK) float64, m: x, y, z of the first corner, of the second, of the third
+    box: Array  # (c, 6) float64, m: least x, y, z, then greatest
+
+
+def chunks(vertices: Array, faces: Array) -> Chunks:
+    """Lay out triangles in chunks.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64 ndarray
+        World space, m.
+    faces : (m, 3) ndarray
+        Vertices of each triangle.
+
+    Returns
+    -------
+    Chunks
+        A copy of their corners.
+    """
+    number = (len(faces) + CHUNK - 1) // CHUNK
+    laid = Chunks(plane((number, 9, CHUNK), np.float64), np.empty((number, 6)))
+    _lay_out(vertices, faces, laid.corners, laid.box)
+    return laid
+
+
+@kernel(parallel=True)
+def _lay_out(vertices: Array, faces: Array, corners: Array, box: Array) -> None:
+    for chunk in prange(len(box)):
+        first = np.int64(chunk) * CHUNK
+        for axis in range(3):
+            box[chunk, axis], box[chunk, 3 + axis] = np.inf, -np.inf
+        for b in range(CHUNK):
+            face, here = first + b, first + b < len(faces)
+            for corner in range(3):
+                vertex = faces[face if here else len(faces) - 1, corner if here else 0]
+                for axis in range(3):
+                    value = vertices[vertex, axis]
+                    corners[chunk, 3 * corner + axis, b] = value
+                    box[chunk, axis] = min(box[chunk, axis], value)
+                    box[chunk, 3 + axis] = max(box[chunk, 3 + axis], value)

@@ -1,0 +1,223 @@
+"""The visibility buffer: which triangle each texel sees, and how near.
+
+Work is split by rows. One map is cut into bands; each band keeps the list of triangles that reach it, in mesh order,
+and draws them alone, so that the result does not depend on the height of a band or the number of threads. Several
+maps are drawn one map per task without lists. Depth is kept as nearness in float32, ties go to the lowest id.
+"""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.rsm.memory import plane
+from refgi.rsm.raster.batch import Part, draw
+from refgi.rsm.raster.paraboloid import draw_paraboloids
+from refgi.rsm.raster.projection import PARABOLOID, Projection
+from refgi.rsm.raster.triangle import LANES, bound_triangles, project_vertices
+from refgi.scene.model import Geometry
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+BATCH = 1024  # triangles whose boxes are found before they are drawn on one of several maps
+CHUNKS = 32  # pieces of the list of triangles that are counted and listed on their own
+
+
+class Visibility(NamedTuple):
+    """What is seen through each texel of the stacked maps."""
+
+    triangle_id: Array  # (H, W) int32, -1: nothing
+    inverse_depth: Array  # (H, W) float32: 1/depth, 1/m; orthographic 1 - depth/reach; 0: nothing
+
+
+class Bands(NamedTuple):
+    """Triangles by band of rows."""
+
+    boxes: Array  # (m, 4) uint16: first and last column, first and last row; first > last: covers nothing
+    starts: Array  # (bands + 1,) where each band's triangles start in `members`
+    members: Array  # (...) int32: triangles of band 0, of band 1, ..., each in mesh order; then CHUNKS of no meaning
+    rows: int  # height of a band
+
+
+class Scratch(NamedTuple):
+    """Room for each worker that draws whole maps."""
+
+    corners: Array  # (workers, n, 4) float64
+    cells: Array  # (workers, n, 4) int32
+    boxes: Array  # (workers, BATCH, 4) uint16
+    members: Array  # (workers, BATCH) int32
+
+
+@stage("rsm.rasterize")
+def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | None = None) -> Visibility:
+    """Find the nearest triangle at every texel centre.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles; those without area are passed over.
+    projection : Projection
+        The maps.
+    band_rows : int, optional
+        Height of a band of one map, in rows; the result does not depend on it.
+
+    Returns
+    -------
+    Visibility
+        Triangle and nearness at each texel of the stacked maps.
+
+    Notes
+    -----
+    A centre on an edge belongs to one of the two triangles that share it, never to both or none. Paraboloid maps are
+    drawn inside the inscribed circle of the hemisphere only.
+    """
+    vertices, faces = geometry.vertices, geometry.faces
+    height, width = projection.shape
+    columns = max(width, LANES)
+    seen = Visibility(plane((height, columns), np.int32), plane((height, columns), np.float32))
+    _clear(seen.triangle_id, seen.inverse_depth)
+    workers = numba.get_num_threads()
+    if projection.kind == PARABOLOID:
+        draw_paraboloids(projection, vertices, faces, workers, seen.inverse_depth, seen.triangle_id)
+    elif projection.maps > 1:
+        _draw_maps(projection, vertices, faces, scratch(workers, len(vertices)), seen)
+    else:
+        corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
+        _project(projection, vertices, corners, cells)
+        rows = band_rows or min(max(projection.height // 32, 4), 32)
+        _draw_bands(corners, faces, bands(corners, cells, faces, width, height, rows), workers, seen)
+    if width < LANES:
+        seen = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in seen))
+    return seen
+
+
+def scratch(workers: int, vertices: int) -> Scratch:
+    """Allocate room for workers that draw whole maps.
+
+    Parameters
+    ----------
+    workers : int
+        How many run at once.
+    vertices : int
+        Vertices of the geometry.
+
+    Returns
+    -------
+    Scratch
+        Uninitialised arrays.
+    """
+    return Scratch(
+        plane((workers, vertices, 4), np.float64),
+        plane((workers, vertices, 4), np.int32),
+        np.empty((workers, BATCH, 4), np.uint16),
+        np.empty((workers, BATCH), np.int32),
+    )
+
+
+def bands(corners: Array, cells: Array, faces: Array, width: int, height: int, rows: int) -> Bands:
+    """List the triangles of each band of rows.
+
+    Parameters
+    ----------
+    corners : (n, 4) ndarray
+        Projected vertices.
+    cells : (n, 4) ndarray of int
+        The texels that each lies between.
+    faces : (m, 3) ndarray
+        Vertices of each triangle.
+    width, height : int
+        Size of the map.
+    rows : int
+        Height of a band.
+
+    Returns
+    -------
+    Bands
+        The lists, in mesh order.
+    """
+    boxes = plane((len(faces), 4), np.uint16)
+    band_of = np.arange(height, dtype=np.int32) // np.int32(rows)
+    counts = np.zeros((CHUNKS, band_of[-1] + 1), np.int64)
+    _count(corners, cells, faces, (width, height), band_of, boxes, counts)
+    ends = np.cumsum(counts.T).reshape(counts.T.shape)  # band by band, chunk by chunk
+    members = plane((int(ends[-1, -1]) + CHUNKS,), np.int32)
+    _list(boxes, band_of, np.ascontiguousarray((ends - counts.T).T), members)
+    return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)
+
+
+@kernel(parallel=True)
+def _clear(triangle_id: Array, inverse_depth: Array) -> None:
+    for row in prange(len(triangle_id)):
+        triangle_id[row] = -1
+        inverse_depth[row] = 0.0
+
+
+@kernel(parallel=True)
+def _project(projection: Projection, vertices: Array, corners: Array, cells: Array) -> None:
+    step = -(-len(vertices) // CHUNKS)
+    for chunk in prange(CHUNKS):
+        last = min((chunk + 1) * step, len(vertices))
+        project_vertices(projection, 0, vertices, chunk * step, last, corners, cells)
+
+
+@kernel(parallel=True)
+def _count(
+    corners: Array, cells: Array, faces: Array, size: tuple[int, int], band_of: Array, boxes: Array, counts: Array
+) -> None:
+    step = -(-len(faces) // CHUNKS)
+    for chunk in prange(CHUNKS):
+        first, last = min(chunk * step, len(faces)), min((chunk + 1) * step, len(faces))
+        bound_triangles(corners, cells, faces, first, last, size, boxes[first:last])
+        for face in range(first, last):
+            upper, lower = band_of[boxes[face, 2]], band_of[boxes[face, 3]]
+            counts[chunk, upper] += boxes[face, 0] <= boxes[face, 1]
+            for band in range(upper + 1, lower + 1):
+                counts[chunk, band] += 1
+
+
+@kernel(parallel=True)
+def _list(boxes: Array, band_of: Array, cursors: Array, members: Array) -> None:
+    step = -(-len(boxes) // CHUNKS)
+    for chunk in prange(CHUNKS):
+        spare = len(members) - 1 - chunk  # takes what covers nothing: no branch for it
+        for face in range(chunk * step, min((chunk + 1) * step, len(boxes))):
+            upper, lower = band_of[boxes[face, 2]], band_of[boxes[face, 3]]
+            there, cursor = boxes[face, 0] <= boxes[face, 1], cursors[chunk, upper]
+            members[cursor if there else spare] = face
+            cursors[chunk, upper] = cursor + there
+            for band in range(upper + 1, lower + 1):
+                members[cursors[chunk, band]] = face
+                cursors[chunk, band] += 1
+
+
+@kernel(parallel=True)
+def _draw_bands(corners: Array, faces: Array, lists: Bands, workers: int, seen: Visibility) -> None:
+    for worker in prange(workers):
+        for band in range(worker, len(lists.starts) - 1, workers):  # interleaved: neighbours cost alike
+            top = band * lists.rows
+            part = Part(
+                lists.members, lists.starts[band], lists.starts[band + 1], lists.boxes, 0, top, top + lists.rows - 1
+            )
+            draw(corners, faces, part, seen.inverse_depth, seen.triangle_id)
+
+
+@kernel(parallel=True)
+def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: Scratch, seen: Visibility) -> None:
+    workers, height = len(scratch.corners), projection.height
+    for worker in prange(workers):
+        corners, cells = scratch.corners[worker], scratch.cells[worker]
+        boxes, members = scratch.boxes[worker], scratch.members[worker]
+        for m in range(worker, len(projection.origin), workers):
+            rows = slice(m * height, (m + 1) * height)
+            project_vertices(projection, m, vertices, 0, len(vertices), corners, cells)
+            for base in range(0, len(faces), BATCH):
+                count, last = 0, min(base + BATCH, len(faces))
+                bound_triangles(corners, cells, faces, base, last, (projection.width, height), boxes)
+                for face in range(base, last):
+                    members[count] = face
+                    count += boxes[face - base, 0] <= boxes[face - base, 1]
+                part = Part(members, 0, count, boxes, base, 0, height - 1)
+                draw(corners, faces, part, seen.inverse_depth[rows], seen.triangle_id[rows])

@@ -1,0 +1,248 @@
+"""Fields of settings: type, range, unit and one line of help, checked when settings are made."""
+
+import dataclasses
+import math
+import numbers
+import re
+from functools import cache
+from types import NoneType, UnionType
+from typing import Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from refgi.errors import expect
+
+
+def setting(
+    default: Any, about: str, *, least: float | None = None, most: float | None = None, above: float | None = None,
+    unit: str = "", study: bool = False,
+) -> Any:
+    """Describe one field of a `Settings` class.
+
+    Parameters
+    ----------
+    default : object
+        Its value unless given.
+    about : str
+        What it is, in one line.
+    least, most : float, optional
+        The range of a number, both ends in it.
+    above : float, optional
+        What a number exceeds, in place of `least`.
+    unit : str
+        Its unit.
+    study : bool
+        Whether it is there to study a method, not to use it; such fields stand apart in tables.
+
+    Returns
+    -------
+    object
+        A field of a dataclass.
+    """
+    about_it = {"about": about, "least": least, "most": most, "above": above, "unit": unit, "study": study}
+    return dataclasses.field(default=default, metadata=about_it)
+
+
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    """Base of all settings: checks every field by its type and range, then calls `check`.
+
+    Fields are numbers, `bool`, `Literal` names, `frozenset[str]` out of `SWITCHES`, any of these or None, other
+    `Settings`, or a union of `Settings` classes: a choice. Other types are left to `check`.
+    """
+
+    PRINCIPAL: ClassVar[str] = ""  # the field that the whole stands for: lights=1024
+    SWITCHES: ClassVar[frozenset[str]] = frozenset()
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if (kept := checked(type(self), field, value)) is not value:
+                object.__setattr__(self, field.name, kept)
+        self.check()
+
+    def check(self) -> None:
+        """Check what fields ask of each other; raise `InputError`."""
+
+    @classmethod
+    def name(cls) -> str:
+        """Return the name by which a choice is chosen: the class's, in lower case with underscores."""
+        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__.removesuffix("Settings")).lower()
+
+
+def hints(kind: type[Settings]) -> dict[str, Any]:
+    """Return the types of a class's fields.
+
+    Parameters
+    ----------
+    kind : type
+        Settings.
+
+    Returns
+    -------
+    dict
+        By name.
+    """
+    found: dict[str, Any] = _hints(kind)
+    return found
+
+
+_hints: Any = cache(get_type_hints)
+
+
+def members(hint: Any) -> tuple[Any, ...]:
+    """Return the types that a hint allows, without None.
+
+    Parameters
+    ----------
+    hint : type
+        A type or a union.
+
+    Returns
+    -------
+    tuple
+        One or more types.
+    """
+    parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    return tuple(part for part in parts if part is not NoneType)
+
+
+def may_be_none(hint: Any) -> bool:
+    """Return whether a hint allows None.
+
+    Parameters
+    ----------
+    hint : type
+        A type or a union.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
+    return get_origin(hint) in (Union, UnionType) and NoneType in get_args(hint)
+
+
+def choices_of(hint: Any) -> dict[str, type[Settings]]:
+    """Return the classes that a field may hold, by name.
+
+    Parameters
+    ----------
+    hint : type
+        The field's type.
+
+    Returns
+    -------
+    dict
+        Empty for a plain value.
+    """
+    kinds = [kind for kind in members(hint) if isinstance(kind, type) and issubclass(kind, Settings)]
+    return {kind.name(): kind for kind in kinds}
+
+
+def is_choice(hint: Any) -> bool:
+    """Return whether a field holds one of several classes, or one or none.
+
+    Parameters
+    ----------
+    hint : type
+        The field's type.
+
+    Returns
+    -------
+    bool
+        False for a plain value and for a part that is always there.
+    """
+    found = choices_of(hint)
+    return len(found) > 1 or (len(found) == 1 and may_be_none(hint))
+
+
+def expected(field: Any, hint: Any) -> str:
+    """Say what a field takes.
+
+    Parameters
+    ----------
+    field : dataclasses.Field
+        The field.
+    hint : type
+        Its type.
+
+    Returns
+    -------
+    str
+        Such as "a whole number, 1 to 64".
+    """
+    none = "none or " if may_be_none(hint) else ""
+    if kinds := choices_of(hint):
+        return f"{none}{' or '.join(kinds)}"
+    kind = members(hint)[0]
+    if get_origin(kind) is Literal:
+        return none + " or ".join(map(repr, get_args(kind)))
+    if kind is bool:
+        return f"{none}true or false"
+    return f"{none}{'a whole number' if kind is int else 'a number'}{_range(field.metadata)}"
+
+
+def _range(about: Any) -> str:
+    low, high, above = about.get("least"), about.get("most"), about.get("above")
+    unit = f" {about['unit']}" if about.get("unit") else ""
+    start = f"{above:g} < x" if above is not None else f"{low:,}" if isinstance(low, int) else f"{low:g}" \
+        if low is not None else ""
+    end = "" if high is None else f"{high:,}" if isinstance(high, int) else f"{high:g}"
+    if not (start or end):
+        return unit and f" of{unit}"
+    if above is not None:
+        return f", {start}{f' <= {end}' if end else ''}{unit}"
+    return f", {start} to {end}{unit}" if start and end else f", {start} or more{unit}" if start else \
+        f", up to {end}{unit}"
+
+
+def checked(owner: type[Settings], field: Any, value: Any) -> Any:
+    """Return what a field keeps of a value.
+
+    Parameters
+    ----------
+    owner : type
+        The settings class.
+    field : dataclasses.Field
+        One of its fields.
+    value : object
+        What it is given.
+
+    Returns
+    -------
+    object
+        The value; names as a frozenset.
+
+    Raises
+    ------
+    InputError
+        If the field does not take it.
+    """
+    hint = hints(owner)[field.name]
+    if value is None and may_be_none(hint):
+        return value
+    kind = members(hint)[0]
+    fits = True
+    if kinds := choices_of(hint):
+        fits = isinstance(value, tuple(kinds.values()))
+    elif get_origin(kind) is Literal:
+        fits = isinstance(value, str) and value in get_args(kind)
+    elif kind is bool:
+        fits = isinstance(value, bool | np.bool_)
+    elif kind in (int, float):
+        fits = _is_in_range(value, kind, field.metadata)
+    elif get_origin(kind) is frozenset:
+        value = frozenset({value} if isinstance(value, str) else value)
+        expect(value <= owner.SWITCHES, field.name, f"names out of {sorted(owner.SWITCHES)}", sorted(map(str, value)))
+    expect(fits, field.name, expected(field, hint), value)
+    return value
+
+
+def _is_in_range(value: Any, kind: Any, about: Any) -> bool:
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral if kind is int else numbers.Real):
+        return False
+    if not math.isfinite(value) and value != about.get("most"):
+        return False
+    low, high, above = about.get("least"), about.get("most"), about.get("above")
+    return (low is None or value >= low) and (high is None or value <= high) and (above is None or value > above)

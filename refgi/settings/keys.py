@@ -1,0 +1,266 @@
+"""Values by key: find what a key means, change several at once, and list them."""
+
+import dataclasses
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
+
+from refgi.errors import InputError, first_faults
+from refgi.settings.fields import Settings, checked, choices_of, expected, hints, is_choice, may_be_none
+from refgi.settings.tree import Leaf, leaves
+
+S = TypeVar("S", bound=Settings)
+
+
+def of(kind: type[S], /, **values: Any) -> S:
+    """Make settings from values by key.
+
+    Parameters
+    ----------
+    kind : type
+        A settings class.
+    **values : object
+        By key, whole or short, with dots or underscores; a choice by its name or as an instance.
+
+    Returns
+    -------
+    Settings
+        The defaults but for what is given.
+
+    Raises
+    ------
+    InputError
+        If keys or values are not usable; names all of them.
+    """
+    return replaced(kind(), values)
+
+
+def replaced(settings: S, values: Mapping[str, Any]) -> S:
+    """Return settings with other values.
+
+    Parameters
+    ----------
+    settings : Settings
+        What to start from.
+    values : mapping
+        As for `of`.
+
+    Returns
+    -------
+    Settings
+        A new instance.
+
+    Raises
+    ------
+    InputError
+        If keys or values are not usable; names all of them.
+    """
+    errors: list[InputError] = []
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        try:
+            found[find_key(settings, key).key] = value
+        except InputError as error:
+            errors.append(error)
+    made: S = _rebuilt(settings, _nested(found), "", errors)
+    raise_all(errors, type(settings))
+    return made
+
+
+def raise_all(errors: Iterable[InputError], kind: type[Settings]) -> None:
+    """Raise one error for all, if there are any.
+
+    Parameters
+    ----------
+    errors : iterable of InputError
+        What is wrong with settings.
+    kind : type
+        Their class, whose keys the message lists.
+    """
+    errors = list(errors)
+    if not errors:
+        return
+    keys = dict.fromkeys(error.key for error in errors if error.key)
+    known = ", ".join(dict.fromkeys(leaf.key for leaf in leaves(kind)))
+    raise InputError(f"{first_faults(list(dict.fromkeys(map(str, errors))), '; ')} (settings: {known})",
+                     key=", ".join(keys))
+
+
+def find_key(settings: Settings, key: str) -> Leaf:
+    """Return what a key means.
+
+    Parameters
+    ----------
+    settings : Settings
+        Whose keys; where several choices have a field of one name, the chosen one's is meant.
+    key : str
+        Whole, or shortened to its last parts; with dots or underscores.
+
+    Returns
+    -------
+    Leaf
+        The key's place in the tree.
+
+    Raises
+    ------
+    InputError
+        If there is none, or more than one.
+    """
+    tree = leaves(type(settings))
+    wanted = key.replace(".", "_")
+    known: dict[str, Leaf] = {}
+    for leaf in tree:
+        whole = leaf.key.replace(".", "_")
+        if whole == wanted:
+            return leaf
+        if whole.endswith(f"_{wanted}"):
+            known.setdefault(leaf.key, leaf)
+    for leaf in _principals(type(settings), ""):
+        if f"_{leaf.key.rpartition('.')[0].replace('.', '_')}".endswith(f"_{wanted}"):
+            known.setdefault(leaf.key, leaf)
+    if len(known) > 1:
+        at_ends = {name: leaf for name, leaf in known.items() if name.rpartition(".")[2] == key}
+        known = at_ends or known
+    if len(known) > 1:
+        there = flat(settings).keys()
+        known = {name: leaf for name, leaf in known.items() if name in there} or known
+    if len(known) == 1:
+        return next(iter(known.values()))
+    if known:
+        raise InputError(f"{key!r} may be {' or '.join(known)}", key=key)
+    raise InputError(f"{key!r} is not a setting of {type(settings).__name__}{_hint(key, tree)}", key=key)
+
+
+def _principals(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
+    """Return, for every part that a bare value may stand for, the key of that value."""
+    for field in dataclasses.fields(kind):
+        hint = hints(kind)[field.name]
+        for part in () if is_choice(hint) else choices_of(hint).values():
+            inner = f"{prefix}{field.name}."
+            if part.PRINCIPAL:
+                principal = next(one for one in dataclasses.fields(part) if one.name == part.PRINCIPAL)
+                yield Leaf(inner + part.PRINCIPAL, principal, hints(part)[part.PRINCIPAL], ())
+            yield from _principals(part, inner)
+
+
+def _hint(key: str, tree: list[Leaf]) -> str:
+    whole = {name: leaf.key for leaf in tree for name in (leaf.key.rpartition(".")[2], leaf.key)}
+    near = difflib.get_close_matches(key, whole, n=1)
+    return f"; did you mean {whole[near[0]]!r}?" if near else ""
+
+
+def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Turn dotted keys into a tree; what a choice is set to stands under the empty key."""
+    tree: dict[str, Any] = {}
+    for key, value in values.items():
+        *above, last = key.split(".")
+        node = tree
+        for part in above:
+            node = node.setdefault(part, {})
+        node.setdefault(last, {})[""] = value
+    return tree
+
+
+def _rebuilt(settings: Any, tree: dict[str, Any], prefix: str, errors: list[InputError]) -> Any:
+    """Return settings with the values of a tree; what is wrong goes to `errors`."""
+    changes = {}
+    before = len(errors)
+    for name, node in tree.items():
+        field = next(field for field in dataclasses.fields(settings) if field.name == name)
+        hint, key = hints(type(settings))[name], prefix + name
+        inner = {part: value for part, value in node.items() if part}
+        try:
+            changes[name] = _value(getattr(settings, name), node, field, hint, key)
+            changes[name] = checked(type(settings), field, changes[name])
+        except InputError as error:
+            errors.append(_with_prefix(prefix, error))
+            continue
+        if inner:
+            part = changes[name]
+            if part is None and (fitting := _having(hint, inner)):
+                part = fitting
+            unknown = [one for one in inner if part is None or not hasattr(part, one)]
+            chosen = "none" if part is None else part.name()
+            errors += [InputError(f"{key}.{one}: not a setting of {key}={chosen}", key=f"{key}.{one}")
+                       for one in unknown]
+            if not unknown:
+                changes[name] = _rebuilt(part, inner, f"{key}.", errors)
+    if len(errors) > before:
+        return settings
+    try:
+        return dataclasses.replace(settings, **changes)
+    except InputError as error:
+        errors.append(_with_prefix(prefix, error))
+        return settings
+
+
+def _value(now: Any, node: dict[str, Any], field: Any, hint: Any, key: str) -> Any:
+    """Return what a field is set to, before what is set inside it."""
+    if "" not in node:
+        return now
+    value, kinds = node[""], choices_of(hint)
+    if isinstance(value, str) and kinds:
+        if value == "none" and may_be_none(hint):
+            return None
+        if value not in kinds:
+            raise InputError(f"{key}: expected {expected(field, hint)}, got {value!r}", key=key)
+        return now if isinstance(now, kinds[value]) else kinds[value]()
+    return value
+
+
+def _having(hint: Any, names: Iterable[str]) -> Any:
+    """Return the one choice that has fields of all names, at its defaults; None if there is none or several."""
+    fitting = [kind for kind in choices_of(hint).values() if set(names) <= set(hints(kind))]
+    return fitting[0]() if len(fitting) == 1 else None
+
+
+def _with_prefix(prefix: str, error: InputError) -> InputError:
+    """Return an error with the whole key that it is about."""
+    if (error.key or "").startswith(prefix):
+        return error
+    return InputError(f"{prefix}{error}", key=f"{prefix}{error.key}")
+
+
+def flat(settings: Settings) -> dict[str, Any]:
+    """Return all values by dotted key; a choice's own value is its name.
+
+    Parameters
+    ----------
+    settings : Settings
+        Any.
+
+    Returns
+    -------
+    dict
+        What `of` makes the same settings from.
+    """
+    found: dict[str, Any] = {}
+    for field in dataclasses.fields(settings):
+        value, hint = getattr(settings, field.name), hints(type(settings))[field.name]
+        if not choices_of(hint):
+            found[field.name] = value
+            continue
+        if is_choice(hint):
+            found[field.name] = None if value is None else value.name()
+        if value is not None:
+            found |= {f"{field.name}.{key}": inner for key, inner in flat(value).items()}
+    return found
+
+
+def changed(settings: Settings, base: Settings | None = None) -> dict[str, Any]:
+    """Return the values that differ from others.
+
+    Parameters
+    ----------
+    settings : Settings
+        Any.
+    base : Settings, optional
+        Of the same class; the defaults where absent.
+
+    Returns
+    -------
+    dict
+        By dotted key.
+    """
+    there = flat(type(settings)() if base is None else base)
+    return {key: value for key, value in flat(settings).items() if key not in there or there[key] != value}

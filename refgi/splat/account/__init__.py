@@ -1,1 +1,0 @@
-"""Where the power of the lights goes: the energy ledger of `sii`, from the light's side and from the screen's."""

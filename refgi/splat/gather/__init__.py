@@ -1,0 +1,12 @@
+"""Gathering around the projected point (Reflective Shadow Maps 2005): what splatting replaced, and its baseline.
+
+`gather` lets each pixel look around its own place in the map: `gather_sum` sums Eq. 2 over a disc of texels there,
+`interpolation` carries the light of a coarse grid of pixels to the others.
+"""
+
+from refgi.splat.gather.gather import GatherSettings, gather
+
+__all__ = [
+    "GatherSettings",
+    "gather",
+]

@@ -1,0 +1,206 @@
+"""The sum of RSM gathering: each receiver sums Eq. 2 over a disc of texels around its own place in the map.
+
+The pattern is polar with radius r_max xi_1, so its density falls as 1 / r and each sample weighs xi_1
+(Dachsbacher and Stamminger 2005). Symbols as in `pair_sum`.
+
+Where in the reflective shadow map a pixel's disc of texels lies.
+
+How much light lies outside the discs of texels that pixels gather from, told from some pixels and texels.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.draws import GATHERING, draws
+from refgi.jit import kernel, prange
+from refgi.pairs.irradiance import Receivers
+from refgi.pairs.loss import lost_share, sample_pixels
+from refgi.pairs.pair_sum import geometry_term
+from refgi.sampling import halton
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.rsm import Rsm
+
+Array = npt.NDArray[Any]
+TEXELS = 1024  # of each map
+SAMPLED = 512  # pixels
+CORNER = math.sqrt(2)  # map widths: a disc of that radius holds the whole map, wherever its centre lies
+
+
+class GatherMap(NamedTuple):
+    """What gathering reads of a reflective shadow map."""
+
+    position: Array  # (3, H, W) of the texels' surface, moved by the offset, m
+    normal: Array  # (3, H, W) unit vectors
+    flux: Array  # (3, H, W) reflected flux, W
+
+
+def disc_pattern(samples: int, seed: int, weight_squared: bool = False) -> Array:
+    """Return offsets in the unit disc and the weight of each: area integral = mean of weight * value.
+
+    Parameters
+    ----------
+    samples : int
+        Number of points.
+    seed : int
+        0: the plain Halton set; else a shift of it drawn with this seed.
+    weight_squared : bool
+        Weigh by xi_1^2 as is often done (switch `rsm_weight_squared`), not by xi_1.
+
+    Returns
+    -------
+    (samples, 3) ndarray of float64
+        Offset down, offset right, weight.
+
+    Examples
+    --------
+    >>> pattern = disc_pattern(10_000, 0)
+    >>> round(float(pattern[:, 2].mean()), 2)  # the disc's area, pi
+    3.14
+    """
+    shift = draws(seed, GATHERING, 2).tolist() if seed else None
+    xi, turn = halton(samples, shift=shift, start=1).T
+    # density 1 / (2 pi xi): the weight is 2 pi xi; with xi^2 the mean weight is kept, 2 pi * 3/2 xi^2
+    weight = 2 * math.pi * (1.5 * xi * xi if weight_squared else xi)
+    return np.stack([xi * np.cos(2 * math.pi * turn), xi * np.sin(2 * math.pi * turn), weight], axis=1)
+
+
+@kernel(parallel=True)
+def gather_discs(
+    position: Array, normal: Array, center: Array, source: GatherMap, pattern: Array, scale: Any, irradiance: Array
+) -> None:
+    """Add E = scale * sum over the pattern of weight Phi g for every receiver.
+
+    Parameters
+    ----------
+    position, normal : (3, n) ndarray
+        Receivers, world space; m and unit vectors.
+    center : (2, n) ndarray of float64
+        Their row and column in the map, continuous.
+    source : GatherMap
+        The map.
+    pattern : (S, 3) ndarray
+        Rows down and columns right of the centre, and weight (dtype of the receivers).
+    scale : float
+        1 / (pi S) times the texels in a disc of unit weight.
+    irradiance : (3, n) ndarray
+        Added to, W/m^2. Texels outside the map count 0.
+    """
+    real = position.dtype.type
+    height, width = source.flux.shape[1:]
+    for i in prange(position.shape[1]):
+        red, green, blue = real(0.0), real(0.0), real(0.0)
+        x, y, z = position[0, i], position[1, i], position[2, i]
+        nx, ny, nz = normal[0, i], normal[1, i], normal[2, i]
+        for s in range(pattern.shape[0]):
+            row = math.floor(center[0, i] + pattern[s, 0])
+            column = math.floor(center[1, i] + pattern[s, 1])
+            if 0 <= row < height and 0 <= column < width:
+                t, u = int(row), int(column)
+                fr, fg, fb = source.flux[0, t, u], source.flux[1, t, u], source.flux[2, t, u]
+                if fr > 0 or fg > 0 or fb > 0:
+                    p, n = source.position, source.normal
+                    g = geometry_term(p[0, t, u] - x, p[1, t, u] - y, p[2, t, u] - z,
+                                      -n[0, t, u], -n[1, t, u], -n[2, t, u], nx, ny, nz)
+                    g *= real(pattern[s, 2])
+                    red, green, blue = red + g * fr, green + g * fg, blue + g * fb
+        irradiance[0, i] += red * scale
+        irradiance[1, i] += green * scale
+        irradiance[2, i] += blue * scale
+
+
+def centers(rsm: "Rsm", points: Array) -> Array:
+    """Return where in the map each point gathers: at its own place, or from outside at the nearest place towards it.
+
+    Parameters
+    ----------
+    rsm : Rsm
+        The map.
+    points : (3, n) ndarray
+        World space, m.
+
+    Returns
+    -------
+    (2, n) ndarray of float64
+        Row and column, continuous, on the stacked maps.
+    """
+    row, column, _ = rsm.project(points)
+    center = np.stack([row, column]).astype(np.float64)
+    outside = np.isnan(center[0])
+    if outside.any():
+        from refgi.rsm.raster.projection import ORTHOGRAPHIC
+
+        maps = rsm.projection
+        right, down, ahead = maps.frame[0] @ (points[:, outside] - maps.origin[0][:, None])
+        plane = np.stack([down / maps.half[1], right / maps.half[0]])
+        if maps.kind != ORTHOGRAPHIC:
+            plane /= np.where(ahead > 0, ahead, 1e-30)  # behind the light: as far out as can be
+        plane /= np.maximum(np.abs(plane).max(axis=0), 1)
+        center[:, outside] = (plane + 1) / 2 * np.array([[maps.height], [maps.width]])
+    return center
+
+
+@stage("gather.loss")
+def disc_loss(receivers: Receivers, rsms: "Sequence[Rsm]", radius: float, offset: float = 0.0) -> float:
+    """Return the share of the light that comes from texels outside the pixels' discs.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    rsms : sequence of Rsm
+        Reflective shadow maps, one a light.
+    radius : float
+        Of the discs, map widths.
+    offset : float
+        By which texels are moved back along their normals, m.
+
+    Returns
+    -------
+    float
+        Of the diffuse light without visibility, at sampled pixels by sampled texels; 0 where a disc is the whole map.
+    """
+    if radius >= CORNER and all(rsm.projection.maps == 1 for rsm in rsms):
+        return 0.0
+    sample = sample_pixels(receivers, SAMPLED)
+    position, normal = (plane.astype(np.float64) for plane in (sample.position, sample.normal))
+    sums = np.zeros((2, position.shape[1]))
+    for rsm in rsms:
+        side = radius * np.array([[rsm.projection.height], [rsm.projection.width]])
+        texel, lights = _texels(rsm, offset)
+        _add_shares(position, normal, centers(rsm, sample.position) / side, lights, texel / side, sums)
+    inside, whole = sums.sum(axis=1)
+    return lost_share(float(whole), float(inside))
+
+
+def _texels(rsm: "Rsm", offset: float) -> tuple[Array, Array]:
+    """Return row and column of some texels, (2, N), and their position, reversed normal and flux, (7, N)."""
+    from refgi.lights import choose_pixel_lights
+
+    lights = choose_pixel_lights([rsm], count=TEXELS, pattern="halton")
+    assert lights.texel is not None
+    place = np.stack(np.divmod(lights.texel, rsm.projection.width)) + 0.5
+    normal = np.asarray(lights.normal, np.float64)
+    flux = lights.flux.sum(axis=0, dtype=np.float64)
+    return place, np.concatenate([lights.position - offset * normal, -normal, flux[None]])
+
+
+@kernel(parallel=True)
+def _add_shares(position: Array, normal: Array, center: Array, lights: Array, texel: Array, sums: Array) -> None:
+    """Add what lights inside the disc, and what all lights, give each pixel; places are in radii of the disc."""
+    for i in prange(position.shape[1]):
+        inside, whole = 0.0, 0.0
+        for k in range(lights.shape[1]):
+            term = lights[6, k] * geometry_term(
+                lights[0, k] - position[0, i], lights[1, k] - position[1, i], lights[2, k] - position[2, i],
+                lights[3, k], lights[4, k], lights[5, k], normal[0, i], normal[1, i], normal[2, i])
+            whole += term
+            if (texel[0, k] - center[0, i]) ** 2 + (texel[1, k] - center[1, i]) ** 2 <= 1.0:
+                inside += term
+        sums[0, i] += inside
+        sums[1, i] += whole

@@ -1,0 +1,217 @@
+"""Light that no interpolation holds: what near pixel lights give beyond a bound on each one's share, and lobes.
+
+E = sum (Phi / pi) min(g, b) + sum (Phi / pi) max(0, g - b): the first sum is bounded and smooth, fit for subsplats; the
+second, which is summed here, is not 0 only where r^2 < 1 / b, since g <= 1 / r^2. Tiles that no light is near to cost
+a test of their box a light. Lobes can be as narrow as a pixel at any distance, so they are summed here as a whole.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.pairs.irradiance import Receivers
+from refgi.pairs.lobe_sum import add_lobes
+from refgi.pairs.packing import Packed
+from refgi.pairs.pair_sum import NX, SUM, Clamp, X, clamped_term, geometry_term
+from refgi.pairs.tiles import block_by_block, put, taken
+from refgi.rsm.memory import plane
+from refgi.splat.multires.refinement.grid import level_shape
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+SIDE = 16  # pixels along a square that is tested as a whole
+ROWS = 9  # of its tile: position, normal and sums
+
+
+class NearLight(NamedTuple):
+    """Light of few pixels, by squares of `SIDE` x `SIDE`."""
+
+    light: Array  # (3, h, w), W/m^2; of any content in squares that are not touched
+    touched: Array  # (rows, columns) bool
+    pairs: int  # of light and point that were looked at
+
+
+@kernel
+def near_at(light: Array, touched: Array, c: int, row: int, column: int) -> Any:
+    """Return what is near a pixel.
+
+    Parameters
+    ----------
+    light, touched : ndarray
+        Of `NearLight`.
+    c, row, column : int
+        Channel and pixel.
+
+    Returns
+    -------
+    float
+        W/m^2.
+    """
+    return light[c, row, column] if touched[row // SIDE, column // SIDE] else light.dtype.type(0.0)
+
+
+@stage("splat.near")
+def near_light(receivers: Receivers, packed: Packed, most: float) -> NearLight:
+    """Sum what single lights give each receiver beyond a bound, and by their lobes, at full resolution.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        Points that are lit; contiguous.
+    packed : Packed
+        Lights, of `checked`.
+    most : float
+        The bound, W/m^2.
+
+    Returns
+    -------
+    NearLight
+        0 where every light keeps below the bound and none is glossy.
+
+    Notes
+    -----
+    Virtual spherical lights have another term, which is bounded by itself: their excess counts as 0.
+    """
+    position, normal, covered = receivers
+    light, pairs = plane(position.shape, position.dtype), 0
+    touched = np.zeros(level_shape(covered.shape[0], covered.shape[1], SIDE.bit_length() - 1), np.bool_)
+    if packed.lobes is not None:
+        places = block_by_block(covered)
+        sums = np.zeros((3, len(places)), position.dtype)
+        add_lobes(taken(position, places), taken(normal, places), *packed.lobes, None, None, sums)
+        light[:], touched[:] = 0, True
+        put(light, places, sums)
+        pairs = len(places) * packed.lobes.lights.shape[1]
+    if packed.spheres is None and packed.diffuse.shape[1] > 1 and most > 0:
+        bound = (most / packed.diffuse[6:, :-1].astype(np.float64).max(axis=0)).astype(position.dtype)
+        looked = np.zeros(touched.shape, np.int64)
+        _add_excess(position, normal, covered, packed.diffuse, packed.clamp, bound, light, touched, looked)
+        pairs += int(looked.sum())
+    return NearLight(light, touched, pairs)
+
+
+@kernel(parallel=True)
+def _add_excess(
+    position: Array, normal: Array, covered: Array, lights: Array, clamp: Clamp | None, bound: Array, light: Array,
+    touched: Array, pairs: Array,
+) -> None:
+    rows, columns = touched.shape
+    for k in prange(rows * columns):
+        i, j = k // columns, k % columns
+        near, low, high = np.empty(len(bound), np.bool_), np.empty(3, position.dtype), np.empty(3, position.dtype)
+        tile = np.zeros((ROWS, SIDE * SIDE), position.dtype)
+        there = _load(position, covered, i * SIDE, j * SIDE, tile)
+        _bound(tile, low, high)
+        if there and _mark_near(lights, bound, low, high, near):
+            _face(normal, covered, i * SIDE, j * SIDE, tile)
+            _sum_near(tile, lights, clamp, bound, near)
+            pairs[i, j] = there * np.count_nonzero(near)
+            _put(tile, touched[i, j], i * SIDE, j * SIDE, light)
+            touched[i, j] = True
+
+
+@kernel
+def _load(position: Array, covered: Array, top: int, left: int, tile: Array) -> int:
+    """Load the positions of a square of pixels, a copy of one for others without surface; return how many have one."""
+    count, kept = 0, 0
+    for y in range(top, min(top + SIDE, covered.shape[0])):
+        there, first = covered[y, left : left + SIDE], (y - top) * SIDE
+        for c in range(3):
+            _copy(position[c, y, left:], tile[X + c, first : first + len(there)])
+        for x in range(len(there)):
+            if there[x]:
+                count, kept = count + 1, first + x
+    for k in range(SIDE * SIDE if 0 < count < SIDE * SIDE else 0):
+        y, x = top + k // SIDE, left + k % SIDE
+        if y >= covered.shape[0] or x >= covered.shape[1] or not covered[y, x]:
+            for c in range(3):
+                tile[X + c, k] = tile[X + c, kept]
+    return count
+
+
+@kernel
+def _face(normal: Array, covered: Array, top: int, left: int, tile: Array) -> None:
+    """Load the normals of a square of pixels; those without a surface face nothing and stay dark."""
+    for y in range(top, min(top + SIDE, covered.shape[0])):
+        for x in range(left, min(left + SIDE, covered.shape[1])):
+            for c in range(3):
+                tile[NX + c, (y - top) * SIDE + x - left] = normal[c, y, x] if covered[y, x] else 0
+
+
+@kernel
+def _bound(tile: Array, low: Array, high: Array) -> None:
+    """Bound the positions of a square, whose rows are the lanes."""
+    for axis in range(3):
+        at = tile[X + axis]
+        least, most = at[:SIDE].copy(), at[:SIDE].copy()
+        for first in range(SIDE, SIDE * SIDE, SIDE):
+            for k in range(SIDE):
+                value = at[first + k]
+                least[k] = value if value < least[k] else least[k]
+                most[k] = value if value > most[k] else most[k]
+        low[axis], high[axis] = least.min(), most.max()
+
+
+@kernel
+def _copy(pixels: Array, row: Array) -> None:
+    for k in range(len(row)):
+        row[k] = pixels[k]
+
+
+@kernel
+def _sum_near(tile: Array, lights: Array, clamp: Clamp | None, bound: Array, near: Array) -> None:
+    """Sum what lights that are marked give beyond their bounds."""
+    zero = tile.dtype.type(0.0)
+    at = np.empty((ROWS, SIDE * SIDE), tile.dtype)  # of a known shape: else the loop below would not run in lanes
+    at[:] = tile
+    for k in range(len(bound)):
+        if not near[k]:
+            continue
+        lx, ly, lz, b = lights[3, k], lights[4, k], lights[5, k], bound[k]
+        px, py, pz = lights[0, k], lights[1, k], lights[2, k]
+        red, green, blue = lights[6, k], lights[7, k], lights[8, k]
+        for i in range(SIDE * SIDE):
+            dx, dy, dz = px - at[X, i], py - at[X + 1, i], pz - at[X + 2, i]
+            nx, ny, nz = at[NX, i], at[NX + 1, i], at[NX + 2, i]
+            if clamp is None:
+                g = geometry_term(dx, dy, dz, lx, ly, lz, nx, ny, nz)
+            else:
+                g = clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, clamp, k)
+            over = g - b if g > b else zero
+            at[SUM, i] += over * red
+            at[SUM + 1, i] += over * green
+            at[SUM + 2, i] += over * blue
+    tile[SUM:] = at[SUM:]
+
+
+@kernel
+def _put(tile: Array, add: bool, top: int, left: int, light: Array) -> None:
+    """Store a square's sums, or add them to what is there."""
+    zero = light.dtype.type(0.0)
+    for c in range(3):
+        for y in range(top, min(top + SIDE, light.shape[1])):
+            for x in range(left, min(left + SIDE, light.shape[2])):
+                more = tile[SUM + c, (y - top) * SIDE + x - left]
+                light[c, y, x] = more + (light[c, y, x] if add else zero)
+
+
+@kernel
+def _mark_near(lights: Array, bound: Array, low: Array, high: Array, near: Array) -> bool:
+    """Mark the lights that some point of a box is nearer to than 1 / sqrt(bound), on their lit side, if any."""
+    real = lights.dtype.type
+    zero, one = real(0.0), real(1.0)
+    ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
+    for k in range(len(bound)):
+        # light - receiver lies between e and f
+        ex, ey, ez = lights[0, k] - bx, lights[1, k] - by, lights[2, k] - bz
+        fx, fy, fz = lights[0, k] - ax, lights[1, k] - ay, lights[2, k] - az
+        dx, dy, dz = max(ex, -fx, zero), max(ey, -fy, zero), max(ez, -fz, zero)
+        lx, ly, lz = lights[3, k], lights[4, k], lights[5, k]
+        cl = max(ex * lx, fx * lx) + max(ey * ly, fy * ly) + max(ez * lz, fz * lz)
+        square = dx * dx + dy * dy + dz * dz
+        # g <= c_l / r^3 as well
+        near[k] = (square * bound[k] < one) & (cl > zero) & (square * square * square * bound[k] * bound[k] < cl * cl)
+    return bool(near.any())

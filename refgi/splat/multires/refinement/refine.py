@@ -1,0 +1,246 @@
+"""The list of subsplats (Nichols and Wyman 2009, Sec. 3.3): cells are split until none needs it or the finest is met.
+
+The paper refines a list pass by pass (`pass_by_pass`). Visiting the cells of the coarsest level one by one, depth
+first, and going down only where a cell is refined gives the same subsplats in one visit, whatever the criteria. To
+read a level off by itself ("own level enough, level above not", as the authors' demo does) gives them only where all
+cells around a refined one are refined too: true of ranges with thresholds that do not rise with the level and of the
+rules "off" and "full8", not of "corner" and "literal".
+
+The list of subsplats as the paper refines it (Nichols and Wyman 2009, Sec. 3.3): the whole list, pass by pass.
+"""
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.splat.multires.refinement.cells import EMPTY, ENOUGH, REFINED, Cells, classified
+from refgi.splat.multires.refinement.grid import Subsplats, representative
+from refgi.splat.multires.refinement.pyramid import COLUMNS, ROWS, START, room, views
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.splat.multires.settings import MultiresSettings
+
+Array = npt.NDArray[Any]
+
+
+def pass_by_pass(cells: Cells) -> Subsplats:
+    """Refine the list of the coarsest cells until each subsplat had a chance to become pixels.
+
+    Parameters
+    ----------
+    cells : Cells
+        All cells and which of them are refined.
+
+    Returns
+    -------
+    Subsplats
+        Put in order: cells of the coarsest level row by row, depth first within them.
+
+    Notes
+    -----
+    As printed, every pass tests every subsplat at its own level again, and those that stay fail each time. The order
+    of the printed list, children of a pass behind each other, means nothing to the picture.
+    """
+    top, sizes = len(cells.sizes) - 1, cells.sizes
+    grids = (cells.covered.view(np.uint8), *views(cells.state, sizes, first=1))
+    rows, columns = np.nonzero(grids[top])
+    listed = np.stack([np.full(len(rows), top), rows, columns])
+    for _ in range(top):
+        state = np.zeros(listed.shape[1], np.uint8)
+        for level in range(1, top + 1):
+            here = listed[0] == level
+            state[here] = grids[level][listed[1, here], listed[2, here]]
+        split = state == REFINED
+        listed = np.concatenate([listed[:, ~split], _children(listed[:, split], grids)], axis=1)
+    listed = listed[:, np.argsort(_place(listed, sizes))]
+    return _subsplats(listed, cells)
+
+
+def _children(parents: Array, grids: tuple[Array, ...]) -> Array:
+    """Return the four children of each subsplat, but for those outside the picture or without surface."""
+    level, row, column = np.repeat(parents, 4, axis=1)
+    corner = np.tile(np.arange(4), parents.shape[1])
+    children = np.stack([level - 1, 2 * row + corner // 2, 2 * column + corner % 2])
+    shown = np.zeros(children.shape[1], np.bool_)
+    for finer, grid in enumerate(grids):
+        here = (children[0] == finer) & (children[1] < grid.shape[0]) & (children[2] < grid.shape[1])
+        shown[here] = grid[children[1, here], children[2, here]] != EMPTY
+    return children[:, shown]
+
+
+def _place(listed: Array, sizes: Array) -> Array:
+    """Return the place of each subsplat's first pixel: cells of the coarsest level by row, Morton order within."""
+    top = len(sizes) - 1
+    row, column = listed[1] << listed[0], listed[2] << listed[0]
+    place = (row >> top) * sizes[top, COLUMNS] + (column >> top)
+    for bit in reversed(range(top)):
+        place = place << 2 | (row >> bit & 1) << 1 | column >> bit & 1
+    return np.asarray(place)
+
+
+def _subsplats(listed: Array, cells: Cells) -> Subsplats:
+    count = listed.shape[1]
+    level, row, column = listed[0].astype(np.uint8), listed[1].astype(np.int32), listed[2].astype(np.int32)
+    pixel = np.empty(count, np.int64)
+    _represent(cells.covered, level, row, column, pixel)
+    leaf = np.zeros(room(cells.leaf_sizes), np.bool_)
+    starts, _, columns = cells.leaf_sizes[listed[0]].T
+    leaf[starts + listed[1] * columns + listed[2]] = True
+    return Subsplats(level, row, column, pixel, views(leaf, cells.leaf_sizes), cells.covered.shape)
+
+
+@kernel
+def _represent(covered: Array, level: Array, row: Array, column: Array, pixel: Array) -> None:
+    for k in range(len(pixel)):
+        pixel[k] = representative(covered, int(level[k]), int(row[k]), int(column[k]))
+
+
+class _List(NamedTuple):
+    """Where the subsplats are written."""
+
+    level: Array
+    row: Array
+    column: Array
+    pixel: Array
+    leaf: Array  # (n,) bool, levels 0 to top
+
+
+@stage("splat.refine")
+def refine(need: tuple[Array, ...], covered: Array, settings: "MultiresSettings") -> Subsplats:
+    """Return the subsplats that cover every surface of the picture once.
+
+    Parameters
+    ----------
+    need : tuple of (h_l, w_l) ndarray of bool
+        Which cells hold a discontinuity, for levels 0 to top; level 0 is never refined.
+    covered : (h, w) ndarray of bool
+        Whether there is a surface.
+    settings : MultiresSettings
+        `diagonal`, and `refinement`: "single_pass", depth first, or "list", as published; both give the same.
+
+    Returns
+    -------
+    Subsplats
+        Cells of the coarsest level row by row, depth first within them.
+    """
+    cells = classified(need, np.ascontiguousarray(covered), settings.diagonal)
+    return pass_by_pass(cells) if settings.refinement == "list" else _depth_first(cells)
+
+
+def _depth_first(cells: Cells) -> Subsplats:
+    """Return the subsplats from one visit: count those of each cell of the coarsest level, then write them."""
+    counts = np.zeros(cells.leaf_sizes[-1, ROWS] * cells.leaf_sizes[-1, COLUMNS], np.int64)
+    _count(cells, counts)
+    ends = np.cumsum(counts)
+    total = int(ends[-1])
+    out = _List(np.empty(total, np.uint8), np.empty(total, np.int32), np.empty(total, np.int32),
+                np.empty(total, np.int64), np.zeros(room(cells.leaf_sizes), np.bool_))
+    _write(cells, ends - counts, out)
+    return Subsplats(*out[:4], views(out.leaf, cells.leaf_sizes), cells.covered.shape)
+
+
+@kernel(parallel=True)
+def _count(cells: Cells, counts: Array) -> None:
+    rows, columns = cells.leaf_sizes[-1, ROWS], cells.leaf_sizes[-1, COLUMNS]
+    for k in prange(len(counts)):
+        # column by column: threads take contiguous shares, and left and right are more alike than top and bottom
+        i, j = k % rows, k // rows
+        counts[i * columns + j] = _count_in(cells, i, j)
+
+
+@kernel(parallel=True)
+def _write(cells: Cells, begins: Array, out: _List) -> None:
+    rows, columns = cells.leaf_sizes[-1, ROWS], cells.leaf_sizes[-1, COLUMNS]
+    for k in prange(len(begins)):
+        i, j = k % rows, k // rows
+        _write_in(cells, i, j, begins[i * columns + j], out)
+
+
+@kernel
+def _state(cells: Cells, level: int, i: int, j: int) -> int:
+    """Return the state of a cell; EMPTY outside the picture."""
+    rows, columns = cells.sizes[level, ROWS], cells.sizes[level, COLUMNS]
+    if i >= rows or j >= columns:
+        return EMPTY
+    return int(cells.state[cells.sizes[level, START] + i * columns + j]) if level else int(cells.covered[i, j])
+
+
+@kernel
+def _next(level: int, i: int, j: int, top: int) -> tuple[int, int, int]:
+    """Return the cell after one and all inside it, depth first; its level is above `top` where there is none."""
+    while level < top and i & 1 and j & 1:
+        level, i, j = level + 1, i >> 1, j >> 1
+    if level == top:
+        return top + 1, i, j
+    return level, i + (j & 1), j ^ 1
+
+
+@kernel
+def _blocks_in(cells: Cells, level: int, i: int, j: int) -> tuple[int, int, int, int]:
+    """Return the first and last + 1 of the rows and columns of level 1 in a cell of level 1 or 2."""
+    along = level - 1
+    rows, columns = cells.sizes[1, ROWS], cells.sizes[1, COLUMNS]
+    return i << along, min((i + 1) << along, rows), j << along, min((j + 1) << along, columns)
+
+
+@kernel
+def _count_in(cells: Cells, i: int, j: int) -> int:
+    """Return the subsplats in a cell of the coarsest level."""
+    top = len(cells.sizes) - 1
+    level, count = top, 0
+    while level <= top:
+        state = _state(cells, level, i, j)
+        if state == REFINED and level > 2:
+            level, i, j = level - 1, 2 * i, 2 * j
+            continue
+        if state == REFINED:
+            first, last, left, right = _blocks_in(cells, level, i, j)
+            for y in range(first, last):
+                for x in range(left, right):
+                    count += _count_of_block(cells, y, x)
+        else:
+            count += state == ENOUGH
+        level, i, j = _next(level, i, j, top)
+    return count
+
+
+@kernel
+def _count_of_block(cells: Cells, i: int, j: int) -> int:
+    """Return the subsplats in a cell of level 1, whose level above is refined."""
+    covered = cells.covered
+    y, x = min(2 * i + 1, covered.shape[0] - 1), min(2 * j + 1, covered.shape[1] - 1)
+    below, right = y > 2 * i, x > 2 * j
+    pixels = covered[2 * i, 2 * j] + (covered[2 * i, x] & right) + (covered[y, 2 * j] & below)
+    pixels += covered[y, x] & below & right
+    state = cells.state[i * cells.sizes[1, COLUMNS] + j]
+    return pixels if state == REFINED else int(state)
+
+
+@kernel
+def _write_in(cells: Cells, i: int, j: int, at: int, out: _List) -> None:
+    """Write the subsplats in a cell of the coarsest level, from place `at` of the list on."""
+    covered, _, sizes, leaf_sizes = cells
+    levels, rows, columns, pixels, leaf = out
+    top = len(sizes) - 1
+    level = top
+    while level <= top:
+        state = _state(cells, level, i, j)
+        if state == REFINED and level > 1:
+            level, i, j = level - 1, 2 * i, 2 * j
+            continue
+        if state == ENOUGH:
+            pixels[at] = representative(covered, level, i, j)
+            levels[at], rows[at], columns[at] = level, i, j
+            leaf[leaf_sizes[level, START] + i * leaf_sizes[level, COLUMNS] + j] = True
+            at += 1
+        elif state == REFINED:
+            for y in range(2 * i, min(2 * i + 2, covered.shape[0])):
+                for x in range(2 * j, min(2 * j + 2, covered.shape[1])):
+                    if covered[y, x]:
+                        levels[at], rows[at], columns[at], pixels[at] = 0, y, x, y * covered.shape[1] + x
+                        leaf[y * covered.shape[1] + x] = True
+                        at += 1
+        level, i, j = _next(level, i, j, top)

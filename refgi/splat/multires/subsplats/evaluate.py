@@ -1,0 +1,167 @@
+"""Light at the subsplats alone, by the same sum over pairs as at every pixel (Sec. 3.4, Eq. 2).
+
+Light at the subsplats with visibility: the pairs of `vpl` at the pixels that stand for subsplats, a shadow ray each.
+
+No paper on splatting knows what blocks indirect light. With rays at subsplats alone the picture converges to `vpl` as
+they become fine, and to the truth as lights become many, at the subsplats' share of the rays.
+"""
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
+from refgi.pairs.pair_sum import TILE
+from refgi.pairs.settings import PairSettings
+from refgi.pairs.shadow_rays import receivers, shadowed_sum
+from refgi.pairs.tiles import taken
+from refgi.scene import Geometry
+from refgi.splat.multires.refinement.grid import Subsplats
+from refgi.stages import report_progress, stage
+
+if TYPE_CHECKING:
+    from refgi.lights import PixelLights
+    from refgi.rays import Tracer
+    from refgi.rsm import GBuffer
+
+Array = npt.NDArray[Any]
+Representative = Literal["pixel", "mean"]
+
+
+@stage("splat.representative_points")
+def at_subsplats(
+    buffer: "GBuffer", subsplats: Subsplats, representative: Representative = "pixel"
+) -> tuple[Array, Array]:
+    """Return where each subsplat is lit.
+
+    Parameters
+    ----------
+    buffer : GBuffer
+        What the camera sees.
+    subsplats : Subsplats
+        The subsplats.
+    representative : {"pixel", "mean"}
+        Position and normal of the pixel that stands for the cell, or the mean over the cell's surface.
+
+    Returns
+    -------
+    points, normals : (3, n) ndarray
+        World space, m, and unit vectors.
+    """
+    position, normal = buffer.resolve("position", "normal")
+    points, normals = taken(position, subsplats.pixel), taken(normal, subsplats.pixel)
+    if representative == "mean":
+        cells = np.stack([subsplats.level, subsplats.row, subsplats.column]).astype(np.int64)
+        _average(position, normal, buffer.covered, cells, points, normals)
+    return points, normals
+
+
+@stage("splat.irradiance")
+def evaluate(
+    points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
+) -> Array:
+    """Sum the irradiance of every pixel light at some points (Eq. 2).
+
+    Parameters
+    ----------
+    points, normals : (3, n) ndarray
+        World space, m, and unit vectors; neighbours should follow each other.
+    lights : PixelLights
+        Lights to sum.
+    settings : PairSettings
+        How one light lights one receiver.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+
+    Returns
+    -------
+    (3, n) ndarray
+        Irradiance, W/m^2, linear RGB: that of `irradiance` at the same points, to the bit.
+
+    Raises
+    ------
+    InputError
+        As `irradiance`.
+
+    Notes
+    -----
+    Eq. 2 prints the vector to the light from the wrong end, both BRDFs and a pi. Here a light holds the flux it
+    reflects, and the receiver's albedo/pi is multiplied in after upsampling, pixel by pixel.
+    """
+    count = points.shape[1]
+    receivers = Receivers(points[:, None], normals[:, None], np.ones((1, count), np.bool_))
+    packed = checked(receivers, lights, settings, footprint)
+    result = np.zeros_like(points)
+    step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
+    for first in range(0, count, step):
+        part = slice(first, first + step)
+        sums = np.zeros_like(np.ascontiguousarray(points[:, part]))
+        add_lights(np.ascontiguousarray(points[:, part]), np.ascontiguousarray(normals[:, part]), packed, sums)
+        result[:, part] = sums
+        report_progress(min(1.0, (first + step) / count))
+    return result
+
+
+@kernel(parallel=True)
+def _average(position: Array, normal: Array, covered: Array, cells: Array, points: Array, normals: Array) -> None:
+    for k in prange(cells.shape[1]):
+        _average_cell(position, normal, covered, cells, points, normals, k)
+
+
+@kernel
+def _average_cell(
+    position: Array, normal: Array, covered: Array, cells: Array, points: Array, normals: Array, k: int
+) -> None:
+    height, width = covered.shape
+    level, row, column = cells[0, k], cells[1, k], cells[2, k]
+    x, y, z, p, q, r, count = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
+    for i in range(row << level, min((row + 1) << level, height)):
+        for j in range(column << level, min((column + 1) << level, width)):
+            if covered[i, j]:
+                x, y, z = x + position[0, i, j], y + position[1, i, j], z + position[2, i, j]
+                p, q, r = p + normal[0, i, j], q + normal[1, i, j], r + normal[2, i, j]
+                count += 1
+    length = np.sqrt(p * p + q * q + r * r)
+    if count <= 1 or length == 0:  # opposite normals have no mean: the pixel's stays
+        return
+    points[0, k], points[1, k], points[2, k] = x / count, y / count, z / count
+    normals[0, k], normals[1, k], normals[2, k] = p / length, q / length, r / length
+
+
+@stage("splat.visible")
+def evaluate_visible(
+    tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights"
+) -> Array:
+    """Sum the irradiance that reaches each subsplat's pixel from every pixel light.
+
+    Parameters
+    ----------
+    tracer : Tracer
+        The scene's rays.
+    geometry : Geometry
+        The triangles that the buffer shows.
+    buffer : GBuffer
+        What the camera sees.
+    subsplats : Subsplats
+        The subsplats.
+    lights : PixelLights
+        Lights to sum.
+
+    Returns
+    -------
+    (3, n) ndarray
+        Irradiance, W/m^2, linear RGB, in the buffer's dtype: that of `vpl` for the same lights, to the bit.
+        Excludes the receiver's albedo/pi.
+
+    Notes
+    -----
+    Pairs are calibrated and not clamped, summed in float64: the code of `vpl`. Settings that change a pair (clamps,
+    offsets, lobes' norms and widening, published forms) and means over a cell, which lie on no triangle, have no
+    counterpart here.
+    """
+    position, normal, triangle_id = buffer.resolve("position", "normal", "triangle_id")
+    seen = triangle_id.reshape(-1)[subsplats.pixel]
+    to = receivers(geometry, taken(position, subsplats.pixel), taken(normal, subsplats.pixel), seen, tracer.grain)
+    return shadowed_sum(tracer, to, lights).astype(np.asarray(position).dtype)

@@ -1,0 +1,235 @@
+"""One pass of the masked upsampling: a level from the next coarser one and from what was lit at the level itself.
+
+A texel takes the mean of the 3 x 3 texels C around it, those of the coarser level each repeated 2 x 2 (P7)::
+
+    out = C_0 + sum_k m_k w_k (C_k - C_0) / sum_k m_k w_k,    w = (1, 2, 1) x (1, 2, 1),
+
+m = 1 where a texel was lit, here or at any coarser level, so that nothing enters from or spreads into empty ones. The
+differences to the texel itself leave constants as they are, to the bit. A texel across a corner counts only if one of
+the two beside it is there (E-AMS-09). Outside the picture lies a copy of its outermost texels: a pass over texels that
+all came from the coarser level is then its bilinear interpolation, at any size.
+
+Work goes by bands of rows. A task keeps three rows of C and m, and writes the one between.
+
+One pass of the upsampling as the authors' demo does it (GPU Pro, 2010), which is not quite what the paper says.
+
+A texel looks at the 3 x 3 texels of the coarser level around the one it lies in, with weights (1 - f, 1, f)/2 along
+each axis, f the place of its centre in that texel: a wider filter than the tent. Only where the coarser level holds
+nothing is the neighbour at the texel's own level taken. Across a corner as in `tent`, which took its rule from here.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+
+Array = npt.NDArray[Any]
+
+BAND = 32  # rows of a task: two more are read than written
+MASK, SHARE = 3, 4  # planes of a row after the three channels: m, and m where the texel is to be filtered
+
+
+@kernel(parallel=True)
+def tent_pass(
+    values: Array, order: Array, starts: Array, column: Array, coarse: Array, coarse_mask: Array, filled: Array,
+    filter_all: bool, corner: float, result: Array, mask: Array,
+) -> None:
+    """Fill a level.
+
+    Parameters
+    ----------
+    values : (3, n) ndarray
+        Irradiance of all subsplats.
+    order : (n,) ndarray of int64
+        Subsplats row by row.
+    starts : (h_l + 1,) ndarray of int64
+        Where each row of this level starts in `order`.
+    column : (n,) ndarray of int32
+        Columns of all subsplats.
+    coarse, coarse_mask : (3, h', w') and (h', w') ndarray
+        The level above and where it has texels.
+    filled : (h_l, w_l) ndarray of bool
+        Whether a cell shows a surface.
+    filter_all : bool
+        Filter the texels lit at this level too.
+    corner : float
+        Share of a texel across a corner that counts where neither of the two beside it is there, 0 or 1.
+    result, mask : (3, h_l, w_l) and (h_l, w_l) ndarray
+        Filled: irradiance, 0 where there is none, and whether there is any.
+    """
+    height, width = filled.shape
+    for band in prange((height + BAND - 1) // BAND):
+        rows = np.zeros((3, 5, width + 3), values.dtype)
+        first, last = band * BAND, min(band * BAND + BAND, height)
+        for step in range(last - first + 2):
+            i = min(max(first + step - 1, 0), height - 1)
+            row = rows[step % 3]
+            _inherit(coarse, coarse_mask, filled, i, row)
+            _insert(values, order[starts[i] : starts[i + 1]], column, filter_all, row)
+            if step >= 2:
+                here = rows[(step - 1) % 3]
+                _filter(rows[(step - 2) % 3], here, row, values.dtype.type(corner), first + step - 2, result)
+                _mark(here[MASK, 1:], mask[first + step - 2])
+
+
+@kernel
+def _inherit(coarse: Array, coarse_mask: Array, filled: Array, i: int, row: Array) -> None:
+    """Repeat the coarse texels along row i twice each, where there is a surface."""
+    for c in range(3):
+        _double(coarse[c, i >> 1], row[c, 1:])
+    there, share, surface = row[MASK, 1:], row[SHARE, 1:], filled[i]
+    _double(coarse_mask[i >> 1], there)
+    for j in range(len(surface)):
+        there[j] *= surface[j]
+    for j in range(len(surface)):
+        share[j] = there[j]
+    for c in range(3):
+        channel = row[c, 1:]
+        for j in range(len(surface)):
+            channel[j] *= there[j]
+
+
+@kernel
+def _double(coarse: Array, fine: Array) -> None:
+    for j in range(len(coarse)):
+        fine[2 * j] = coarse[j]
+        fine[2 * j + 1] = coarse[j]
+
+
+@kernel
+def _insert(values: Array, members: Array, column: Array, filter_all: bool, row: Array) -> None:
+    """Put the texels of a row that were lit at this level, and copies of the outermost texels beside them."""
+    for k in members:
+        j = column[k] + 1
+        for c in range(3):
+            row[c, j] = values[c, k]
+        row[MASK, j] = 1
+        row[SHARE, j] = filter_all
+    width = row.shape[1] - 3
+    for c in range(MASK + 1):
+        row[c, 0] = row[c, 1]
+        row[c, width + 1] = row[c, width]
+
+
+@kernel
+def _filter(above: Array, here: Array, below: Array, corner: Any, i: int, result: Array) -> None:
+    """Fill row i by the rows around it: all channels in one loop, the weights of a texel found once."""
+    real = type(corner)
+    two, four = real(2.0), real(4.0)
+    mnw, mn, mne = above[MASK], above[MASK, 1:], above[MASK, 2:]
+    mw, me, share = here[MASK], here[MASK, 2:], here[SHARE, 1:]
+    msw, ms, mse = below[MASK], below[MASK, 1:], below[MASK, 2:]
+    a0, a1, a2, h0, h1, h2 = above[0], above[1], above[2], here[0], here[1], here[2]
+    b0, b1, b2 = below[0], below[1], below[2]
+    red, green, blue = result[0, i], result[1, i], result[2, i]
+    for j in range(len(red)):
+        n, w, e, s = two * mn[j], two * mw[j], two * me[j], two * ms[j]
+        nw, ne = mnw[j] * max(mn[j], mw[j], corner), mne[j] * max(mn[j], me[j], corner)
+        sw, se = msw[j] * max(ms[j], mw[j], corner), mse[j] * max(ms[j], me[j], corner)
+        weights = nw, n, ne, w, e, sw, s, se
+        scale = share[j] / (four + ((n + s) + (w + e)) + ((nw + ne) + (sw + se)))
+        red[j] = h0[j + 1] + scale * _pull(a0, h0, b0, j, weights)
+        green[j] = h1[j + 1] + scale * _pull(a1, h1, b1, j, weights)
+        blue[j] = h2[j + 1] + scale * _pull(a2, h2, b2, j, weights)
+
+
+@kernel
+def _pull(above: Array, here: Array, below: Array, j: int, weights: Any) -> Any:
+    """Return the weighted sum of the differences of a texel's neighbours to it."""
+    nw, n, ne, w, e, sw, s, se = weights
+    x = here[j + 1]
+    edges = (n * (above[j + 1] - x) + s * (below[j + 1] - x)) + (w * (here[j] - x) + e * (here[j + 2] - x))
+    corners = (nw * (above[j] - x) + ne * (above[j + 2] - x)) + (sw * (below[j] - x) + se * (below[j + 2] - x))
+    return edges + corners
+
+
+@kernel
+def _mark(there: Array, mask: Array) -> None:
+    for j in range(len(mask)):
+        mask[j] = there[j] != 0
+
+
+@kernel(parallel=True)
+def demo_pass(
+    lit: Array, leaf: Array, coarse: Array, coarse_mask: Array, filled: Array, filter_all: bool, result: Array,
+    mask: Array,
+) -> None:
+    """Fill a level.
+
+    Parameters
+    ----------
+    lit, leaf : (3, h_l, w_l) and (h_l, w_l) ndarray
+        What was lit at this level and where.
+    coarse, coarse_mask : (3, h', w') and (h', w') ndarray
+        The level above and where it has texels.
+    filled : (h_l, w_l) ndarray of bool
+        Whether a cell shows a surface.
+    filter_all : bool
+        Filter the texels lit at this level too.
+    result, mask : (3, h_l, w_l) and (h_l, w_l) ndarray
+        Filled: irradiance, 0 where there is none, and whether there is any.
+    """
+    height, width = filled.shape
+    for i in prange(height):
+        for j in range(width):
+            mask[i, j] = leaf[i, j] or (filled[i, j] and coarse_mask[i >> 1, j >> 1])
+            if mask[i, j] and (filter_all or not leaf[i, j]):
+                red, green, blue = _filtered(lit, leaf, coarse, coarse_mask, i, j)
+            else:
+                red, green, blue = lit[0, i, j], lit[1, i, j], lit[2, i, j]
+            result[0, i, j], result[1, i, j], result[2, i, j] = red, green, blue
+
+
+@kernel
+def _filtered(lit: Array, leaf: Array, coarse: Array, coarse_mask: Array, i: int, j: int) -> Any:
+    """Return the weighted mean of the taps around a texel, by differences to the tap in the middle."""
+    real = lit.dtype.type
+    down, across = _weights(real, i), _weights(real, j)
+    vertical = _holds(leaf, coarse_mask, i, j, -1, 0), True, _holds(leaf, coarse_mask, i, j, 1, 0)
+    horizontal = _holds(leaf, coarse_mask, i, j, 0, -1), True, _holds(leaf, coarse_mask, i, j, 0, 1)
+    x, y, z = _tap(lit, coarse, coarse_mask, i, j, 0, 0)
+    total, red, green, blue = real(0.0), real(0.0), real(0.0), real(0.0)
+    for k in range(9):
+        di, dj = k // 3 - 1, k % 3 - 1
+        beside = vertical[di + 1] or horizontal[dj + 1]  # of the taps that touch a corner
+        if beside and _holds(leaf, coarse_mask, i, j, di, dj):
+            r, g, b = _tap(lit, coarse, coarse_mask, i, j, di, dj)
+            weight = down[di + 1] * across[dj + 1]
+            total += weight
+            red, green, blue = red + weight * (r - x), green + weight * (g - y), blue + weight * (b - z)
+    return x + red / total, y + green / total, z + blue / total
+
+
+@kernel
+def _weights(real: Any, i: int) -> Any:
+    """Return 1 - f, 1 and f of texel i."""
+    f = real(0.75) if i % 2 else real(0.25)
+    return real(1.0) - f, real(1.0), f
+
+
+@kernel
+def _holds(leaf: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) -> Any:
+    """Return whether there is light one texel further, of the coarser level or of this one."""
+    row, column = _inside(coarse_mask, (i >> 1) + di, (j >> 1) + dj)
+    if coarse_mask[row, column]:
+        return True
+    row, column = _inside(leaf, i + di, j + dj)
+    return leaf[row, column]
+
+
+@kernel
+def _tap(lit: Array, coarse: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) -> Any:
+    """Return the light one texel further, of the coarser level where that has any."""
+    row, column = _inside(coarse_mask, (i >> 1) + di, (j >> 1) + dj)
+    if coarse_mask[row, column]:
+        return coarse[0, row, column], coarse[1, row, column], coarse[2, row, column]
+    row, column = _inside(lit[0], i + di, j + dj)
+    return lit[0, row, column], lit[1, row, column], lit[2, row, column]
+
+
+@kernel
+def _inside(plane: Array, i: int, j: int) -> Any:
+    """Return the nearest texel of the picture."""
+    return min(max(i, 0), plane.shape[0] - 1), min(max(j, 0), plane.shape[1] - 1)

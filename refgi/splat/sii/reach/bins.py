@@ -1,0 +1,205 @@
+"""Which lights may count for which tile of receivers (SII Sec. 3.4 on tiles instead of fragments).
+
+A tile of 8 x 8 pixels is bounded by boxes around its positions and normals. A light is left out where the whole tile
+lies behind its surface, it behind the surfaces of all receivers, its solid misses the box, or the largest B that the
+box admits is below I_low. Tiles of 16 x 16 are asked first, their parts only about lights that may reach the whole.
+All is done from differences of positions, with a margin for rounding: lists may be longer than need be, never shorter.
+
+Symbols: d vector from the solid's centre to the box's, q the half sides of the box; with the solid scaled to the unit
+ball, Q is the square of the distance to the box's centre and S how far the box reaches towards the ball, times sqrt Q.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.pairs.pair_sum import TILE
+from refgi.pairs.ranged_sum import LANES
+from refgi.splat.sii.reach.bounds import Solids
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+MARGIN = 1e-3  # of the solids' axes: the pair test in float32 is off by less at any angle
+ROUNDING = 32.0  # units of rounding that differences of squares may be off
+# rows of a packed solid
+PLACE, BACK, SHIFT, AXIS, ACROSS, FLATNESS, BALL, SQUARE, SOLID_ROWS = 0, 3, 6, 9, 12, 13, 14, 15, 16
+
+
+def pack_solids(solids: Solids, back: Array, *, hollow: bool = False, nearest: bool = False) -> Array:
+    """Pack the solids of lights for the lists.
+
+    Parameters
+    ----------
+    solids : Solids
+        The lights' bounds.
+    back : (3, N) ndarray
+        Reversed normals of the lights; their dtype is that of the result.
+    hollow : bool
+        Leave the ellipsoids aside: only what lies behind surfaces is left out.
+    nearest : bool
+        Bound B by the box's nearest point too; for diffuse lights.
+
+    Returns
+    -------
+    (SOLID_ROWS, N) ndarray
+        Position, reversed normal, centre less position, axis, 1 / h^2, 1 / w^2 - 1 / h^2, radius^2 of the half ball
+        (0: none), R_0^2 to bound B with (else infinite).
+    """
+    radius, ellipsoid = np.sqrt(solids.square), solids.ellipsoid
+    packed = np.zeros((SOLID_ROWS, len(radius)))
+    packed[PLACE:BACK], packed[BACK:SHIFT], packed[AXIS:ACROSS] = solids.position, back, solids.axis
+    packed[SHIFT:AXIS] = solids.axis * radius * ellipsoid.center
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # an infinite solid is never found apart
+        across, along = ((part * radius * (1 + MARGIN)) ** -2.0 for part in (ellipsoid.height, ellipsoid.half_width))
+        packed[ACROSS], packed[FLATNESS] = (0.0, 0.0) if hollow else (across, along - across)
+        packed[BALL] = 0.0 if solids.ball is None else (solids.ball * (1 + MARGIN)) ** 2
+        packed[SQUARE] = solids.square * (1 + MARGIN) if nearest else np.inf
+        return packed.astype(back.dtype)
+
+
+@stage("splat.bins", kept=False)  # of receivers that are gathered anew
+def list_lights(position: Array, normal: Array, solids: Array) -> Array:
+    """List the lights whose bound may reach each tile of receivers.
+
+    Parameters
+    ----------
+    position, normal : (3, n) ndarray
+        Receivers, block by block.
+    solids : (SOLID_ROWS, N) ndarray
+        The lights' bounds.
+
+    Returns
+    -------
+    (ceil(n / LANES), N) ndarray of bool
+        Whether a light may count for some receiver of a tile.
+    """
+    listed = np.zeros((-(-position.shape[1] // LANES), solids.shape[1]), np.bool_)
+    _list(position, normal, solids, bool((solids[BALL] > 0).any()), listed)
+    return listed
+
+
+def of_whole_tiles(listed: Array) -> Array:
+    """Return the lists of tiles of TILE receivers: of any of their parts.
+
+    Parameters
+    ----------
+    listed : (m, N) ndarray of bool
+        Lists of tiles of LANES receivers.
+
+    Returns
+    -------
+    (ceil(m LANES / TILE), N) ndarray of bool
+        Lists of tiles of TILE receivers.
+    """
+    parts = TILE // LANES
+    whole = listed[::parts].copy()
+    for part in range(1, parts):
+        some = listed[part::parts]
+        whole[: len(some)] |= some
+    return whole
+
+
+@kernel(parallel=True)
+def _list(position: Array, normal: Array, solids: Array, balls: bool, listed: Array) -> None:
+    count, parts = position.shape[1], TILE // LANES
+    for block in prange((count + TILE - 1) // TILE):
+        low, high = np.empty((parts + 1, 6), position.dtype), np.empty((parts + 1, 6), position.dtype)
+        here = min(parts, (count - block * TILE + LANES - 1) // LANES)
+        _bound_parts(position, normal, block * TILE, here, low, high)
+        passed = np.empty(solids.shape[1], np.bool_)
+        _reach(solids, solids.shape[1], low[parts], high[parts], balls, passed)
+        near, chosen = np.empty_like(solids), np.empty(solids.shape[1], np.uint32)
+        found = _gather(solids, passed, near, chosen)
+        for part in range(here):
+            _reach(near, found, low[part], high[part], balls, passed)
+            _mark(listed[block * parts + part], chosen, passed, found)
+
+
+@kernel
+def _bound_parts(position: Array, normal: Array, first: int, parts: int, low: Array, high: Array) -> None:
+    """Bound each part of a tile, and in the last row the whole."""
+    last = len(low) - 1
+    for part in range(parts):
+        start = first + part * LANES
+        end = min(start + LANES, position.shape[1])
+        for axis in range(3):
+            low[part, axis], high[part, axis] = _extremes(position, axis, start, end)
+            low[part, 3 + axis], high[part, 3 + axis] = _extremes(normal, axis, start, end)
+    for row in range(6):
+        low[last, row], high[last, row] = low[0, row], high[0, row]
+        for part in range(1, parts):
+            low[last, row] = min(low[last, row], low[part, row])
+            high[last, row] = max(high[last, row], high[part, row])
+
+
+@kernel
+def _extremes(values: Array, row: int, first: int, last: int) -> Any:
+    """Return the least and the largest of values[row, first:last]."""
+    # four at a time, so that one comparison need not wait for another
+    a = b = c = d = e = f = g = h = values[row, first]
+    rest = first + (last - first) // 4 * 4
+    for i in range(first, rest, 4):
+        p, q, r, s = values[row, i], values[row, i + 1], values[row, i + 2], values[row, i + 3]
+        a, b, c, d = p if p < a else a, q if q < b else b, r if r < c else c, s if s < d else d
+        e, f, g, h = p if p > e else e, q if q > f else f, r if r > g else g, s if s > h else h
+    for i in range(rest, last):
+        p = values[row, i]
+        a, e = p if p < a else a, p if p > e else e
+    return min(min(a, b), min(c, d)), max(max(e, f), max(g, h))
+
+
+@kernel
+def _gather(solids: Array, passed: Array, near: Array, chosen: Array) -> int:
+    """Copy the solids that passed to the front."""
+    count = 0
+    for k in range(len(passed)):
+        chosen[count] = k
+        count += passed[k]
+    for row in range(SOLID_ROWS):
+        for i in range(count):
+            near[row, i] = solids[row, chosen[i]]
+    return count
+
+
+@kernel
+def _mark(listed: Array, chosen: Array, passed: Array, count: int) -> None:
+    for i in range(count):
+        listed[chosen[i]] = passed[i]
+
+
+@kernel
+def _reach(solids: Array, count: int, low: Array, high: Array, balls: bool, passed: Array) -> None:
+    """Tell of the first `count` lights whether they may count inside a box."""
+    real = solids.dtype.type
+    zero, half, one = real(0.0), real(0.5), real(1.0)
+    slack = real(ROUNDING) * real(np.finfo(solids.dtype).eps)
+    ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
+    ux, uy, uz, vx, vy, vz = low[3], low[4], low[5], high[3], high[4], high[5]
+    qx, qy, qz = half * (bx - ax), half * (by - ay), half * (bz - az)
+    for k in range(count):
+        # light - receiver lies between e and f
+        ex, ey, ez = solids[0, k] - bx, solids[1, k] - by, solids[2, k] - bz
+        fx, fy, fz = solids[0, k] - ax, solids[1, k] - ay, solids[2, k] - az
+        lx, ly, lz = solids[3, k], solids[4, k], solids[5, k]
+        size = max(abs(ex), abs(fx)) + max(abs(ey), abs(fy)) + max(abs(ez), abs(fz))
+        cl = max(ex * lx, fx * lx) + max(ey * ly, fy * ly) + max(ez * lz, fz * lz) + slack * size
+        cx = (max(max(ex * ux, ex * vx), max(fx * ux, fx * vx)) + max(max(ey * uy, ey * vy), max(fy * uy, fy * vy))
+              + max(max(ez * uz, ez * vz), max(fz * uz, fz * vz)))
+        # B at most: the largest cosine at the nearest point
+        gx, gy, gz = max(max(ex, -fx), zero), max(max(ey, -fy), zero), max(max(ez, -fz), zero)
+        square = gx * gx + gy * gy + gz * gz
+        b = solids[15, k] * (cl * (one / square))
+        dx, dy, dz = half * (ex + fx) + solids[6, k], half * (ey + fy) + solids[7, k], half * (ez + fz) + solids[8, k]
+        nx, ny, nz, across, flat = solids[9, k], solids[10, k], solids[11, k], solids[12, k], solids[13, k]
+        s = dx * nx + dy * ny + dz * nz
+        gradient = (abs(across * dx + flat * s * nx) * qx + abs(across * dy + flat * s * ny) * qy
+                    + abs(across * dz + flat * s * nz) * qz)
+        q = across * (dx * dx + dy * dy + dz * dz) + flat * (s * s)
+        span = abs(dx) + abs(dy) + abs(dz)
+        gap = q - gradient - slack * across * (span * (span + qx + qy + qz))
+        apart = (gap > zero) & (gap * gap > q) & (q > one)
+        faces = (cl > zero) & (cx + slack * size > zero)
+        passed[k] = faces & ~(b * b < square) & (~apart | (balls & (square <= solids[14, k])))

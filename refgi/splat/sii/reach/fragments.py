@@ -1,0 +1,180 @@
+"""What a splatted picture costs: how many lights count at each pixel, and the traffic that makes (SII Fig. 8, Sec. 6).
+
+A fragment is a pair of light and pixel with B >= I_low; the parts of a light, diffuse and glossy, count by themselves.
+On graphics hardware each fragment reads 72 bits of receiver (48 position, 24 normal), each sample of a gather 112 bits
+of light (16 + 48 + 24 + 24), Sec. 6.
+"""
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.pairs.irradiance import Receivers, checked, over_receivers
+from refgi.pairs.lobe_shape import Widening
+from refgi.pairs.pair_sum import TILE
+from refgi.pairs.pixel_lights import Range
+from refgi.pairs.ranged_sum import LANES, reached
+from refgi.splat.sii.reach.lists import Lists
+from refgi.splat.sii.reach.reference_length import lobe_strength, with_reference_length
+from refgi.splat.sii.settings import SplatSettings
+
+if TYPE_CHECKING:
+    from refgi.lights import PixelLights
+    from refgi.rsm import Projection
+
+Array = npt.NDArray[Any]
+
+FRAGMENT_BITS = 72
+SAMPLE_BITS = 112
+
+
+class Fragments(NamedTuple):
+    """Counts of one picture."""
+
+    overdraw: Array  # (h, w) int32: lights that count at a pixel
+    of_light: Array  # (N,) int64: pixels at which a light counts
+    evaluated: int  # pairs that the kernels look at
+
+    @property
+    def total(self) -> int:
+        """All fragments."""
+        return int(self.of_light.sum())
+
+    @property
+    def bits(self) -> int:
+        """Bits read for the receivers, P O 72."""
+        return FRAGMENT_BITS * self.total
+
+
+def gather_bits(pixels: int, samples: int) -> int:
+    """Return the bits that gathering reads for its samples, P S 112.
+
+    Parameters
+    ----------
+    pixels, samples : int
+        Pixels that gather, and texels each takes.
+
+    Returns
+    -------
+    int
+        Bits.
+
+    Examples
+    --------
+    >>> gather_bits(512 * 512, 308) // 8 // 2**20  # MB
+    1078
+    """
+    return SAMPLE_BITS * pixels * samples
+
+
+def fragments(
+    receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None = None,
+    projection: "Projection | None" = None,
+) -> Fragments:
+    """Count the pairs of light and pixel that `splat` keeps, and those it looks at.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        Points that are lit.
+    lights : PixelLights
+        Lights.
+    settings : SplatSettings
+        Threshold and bound.
+    footprint : (N,) ndarray, optional
+        As for `splat`.
+    projection : Projection, optional
+        As for `splat`.
+
+    Returns
+    -------
+    Fragments
+        Overdraw and fragments depend on the threshold alone, pairs evaluated on the bound as well. Lobes are counted
+        in float64: at the edge of their range a pair may be told apart from the sum's.
+    """
+    packed = checked(receivers, lights, settings, footprint)
+    overdraw, of_light, evaluated = np.zeros(receivers.covered.shape, np.int32), np.zeros(len(packed.shines), int), 0
+    if not settings.cuts:
+        count = int(packed.shines.sum()) + int(packed.glossy.sum())
+        overdraw[receivers.covered] = count
+        pixels = int(np.count_nonzero(receivers.covered))
+        return Fragments(overdraw, pixels * (packed.shines.astype(int) + packed.glossy), pixels * count)
+    settings = with_reference_length(receivers, lights, settings)
+    lists = Lists(packed, settings, False, receivers.covered.shape[1], projection)
+
+    def add(here: Array, facing: Array, places: Array, _: Array) -> None:
+        nonlocal evaluated
+        anywhere = np.zeros_like(facing)  # a fragment may face away: no light lies behind receivers without normals
+        if lists.diffuse is not None:
+            listed = lists.of_diffuse(here, anywhere, places)
+            counts, total = np.zeros(listed.shape, np.uint8), np.zeros(len(places), np.int32)
+            _count_diffuse(here, packed.diffuse, lists.diffuse, listed, counts, total)
+            overdraw.reshape(-1)[places] += total
+            of_light[packed.shines] += counts.sum(axis=0, dtype=int)
+            evaluated += _pairs(lists.of_diffuse(here, facing, places), LANES, len(places))
+        if packed.lobes is not None and lists.lobes is not None:
+            listed = lists.of_lobes(here, anywhere, places)
+            finer = np.repeat(listed, TILE // LANES, axis=0)[: -(-len(places) // LANES)]
+            counts, total = np.zeros(finer.shape, np.uint8), np.zeros(len(places), np.int32)
+            _count_lobes(here, packed.lobes.lights, packed.lobes.widening, lists.lobes, finer, counts, total)
+            overdraw.reshape(-1)[places] += total
+            of_light[packed.glossy] += counts.sum(axis=0, dtype=int)
+            evaluated += _pairs(lists.of_lobes(here, facing, places), TILE, len(places))
+
+    over_receivers(receivers, packed, add)
+    return Fragments(overdraw, of_light, evaluated)
+
+
+def _pairs(listed: Array, lanes: int, count: int) -> int:
+    """Return how many pairs of listed light and receiver there are."""
+    sizes = np.minimum(lanes, count - lanes * np.arange(len(listed)))
+    return int((np.count_nonzero(listed, axis=1) * sizes).sum())
+
+
+@kernel(parallel=True)
+def _count_diffuse(position: Array, lights: Array, reach: Range, listed: Array, counts: Array, total: Array) -> None:
+    for block in prange(len(listed)):
+        first = block * LANES
+        last = min(first + LANES, position.shape[1])
+        for k in range(listed.shape[1]):
+            if listed[block, k]:
+                counts[block, k] = _count_one(position, first, last, lights, k, reach.square[k] / reach.scale[k], total)
+
+
+@kernel
+def _count_one(position: Array, first: int, last: int, lights: Array, k: int, square: Any, total: Array) -> int:
+    count = 0
+    px, py, pz, lx, ly, lz = lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k]
+    for i in range(first, last):
+        counts = reached(px - position[0, i], py - position[1, i], pz - position[2, i], lx, ly, lz, square)
+        total[i] += counts
+        count += counts
+    return count
+
+
+@kernel(parallel=True)
+def _count_lobes(
+    position: Array, lights: Array, widening: Widening | None, reach: Range, listed: Array, counts: Array, total: Array
+) -> None:
+    for block in prange(len(listed)):
+        first = block * LANES
+        last = min(first + LANES, position.shape[1])
+        for k in range(listed.shape[1]):
+            if listed[block, k]:
+                square = float(reach.square[k]) / float(reach.scale[k])
+                counts[block, k] = _count_lobe(position, first, last, lights, widening, k, square, total)
+
+
+@kernel
+def _count_lobe(
+    position: Array, first: int, last: int, lights: Array, widening: Widening | None, k: int, square: float,
+    total: Array,
+) -> int:
+    count = 0
+    for i in range(first, last):
+        counts = square * lobe_strength(position, i, lights, widening, k) >= 1.0
+        total[i] += counts
+        count += counts
+    return count

@@ -1,0 +1,108 @@
+"""How far the lights of one picture reach, and which tiles their bounds list them for."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+from refgi.pairs.packing import Packed
+from refgi.pairs.pixel_lights import Range
+from refgi.pairs.ranged_sum import LANES
+from refgi.splat.sii.reach.bins import list_lights, of_whole_tiles, pack_solids
+from refgi.splat.sii.reach.bounds import Solids, light_solids
+from refgi.splat.sii.reach.screen_bounds import covered_pixels, screen_quads, tiles_of_pixels, tiles_of_quads
+from refgi.splat.sii.reach.threshold import DIFFUSE, GLOSSY, all_peaks, light_range, threshold
+from refgi.splat.sii.settings import SplatSettings
+
+if TYPE_CHECKING:
+    from refgi.rsm import Projection
+
+Array = npt.NDArray[Any]
+
+
+class Lists:
+    """The range of all lights of a picture, and lists of lights for any of its receivers.
+
+    Parameters
+    ----------
+    packed : Packed
+        The lights.
+    settings : SplatSettings
+        Threshold and bound.
+    outside : bool
+        Sum what the cut loses; every light is then listed everywhere.
+    width : int
+        Of the picture, in pixels.
+    projection : Projection or None
+        The map its pixels are seen on.
+
+    Attributes
+    ----------
+    low : float
+        I_low, W/m^2.
+    diffuse, lobes : Range or None
+        Of the packed diffuse lights (with the black one) and lobes; None where there are none.
+    """
+
+    def __init__(
+        self, packed: Packed, settings: SplatSettings, outside: bool, width: int, projection: "Projection | None"
+    ) -> None:
+        self._bound = "full" if outside else settings.bound
+        if self._bound in ("quad", "mesh"):
+            expect(projection is not None, "projection", f"the receivers' map for the bound {self._bound!r}", None)
+        self._packed, self._settings, self._width, self._projection = packed, settings, width, projection
+        diffuse, glossy = all_peaks(packed)
+        self.low = threshold(np.concatenate([diffuse, glossy]), settings)
+        dtype = packed.diffuse.dtype
+        self.diffuse = light_range(diffuse, self.low, settings, DIFFUSE, dtype, outside) if len(diffuse) > 1 else None
+        self.lobes = light_range(glossy, self.low, settings, GLOSSY, dtype, outside) if len(glossy) else None
+
+    def of_diffuse(self, position: Array, normal: Array, places: Array) -> Array:
+        """Return which diffuse lights may count for which tile of LANES receivers, (ceil(n / LANES), M) bool."""
+        return self._list(position, normal, places, self._packed.diffuse[:, :-1], self.diffuse_solids(), nearest=True)
+
+    def of_lobes(self, position: Array, normal: Array, places: Array) -> Array:
+        """Return which lobes may count for which tile of TILE receivers, (ceil(n / TILE), K) bool."""
+        assert self._packed.lobes is not None
+        return of_whole_tiles(
+            self._list(position, normal, places, self._packed.lobes.lights, self.lobe_solids(), nearest=False))
+
+    def diffuse_solids(self) -> Solids:
+        """Return the bounds of the diffuse lights, without the black one."""
+        assert self.diffuse is not None
+        lights, square = self._packed.diffuse[:, :-1], _square(self.diffuse)[:-1]
+        return light_solids(lights[:3], -lights[3:6], np.ones(len(square)), square, self._settings.bound)
+
+    def lobe_solids(self) -> Solids:
+        """Return the bounds of the lobes."""
+        assert self.lobes is not None
+        assert self._packed.lobes is not None
+        lights = self._packed.lobes.lights
+        return light_solids(lights[:3], -lights[6:9], lights[9], _square(self.lobes), self._settings.bound,
+                            self._settings.widening, "sii_widening" in self._settings.as_published)
+
+    def _list(
+        self, position: Array, normal: Array, places: Array, lights: Array, solids: Solids, nearest: bool
+    ) -> Array:
+        if self._bound == "full":
+            return np.ones((-(-len(places) // LANES), lights.shape[1]), np.bool_)
+        on_screen = self._bound in ("quad", "mesh")
+        packed = pack_solids(solids, lights[3:6], hollow=on_screen, nearest=nearest and self._bound == "tangent")
+        listed = list_lights(position, normal, packed)
+        return listed & self._on_screen(places, solids) if on_screen else listed
+
+    def _on_screen(self, places: Array, solids: Solids) -> Array:
+        assert self._projection is not None
+        if self._bound == "quad":
+            return tiles_of_quads(screen_quads(self._projection, solids.position, np.sqrt(solids.square)), places,
+                                  self._width)
+        faces, inflate = self._settings.mesh_faces, self._settings.inflate
+        return np.stack([tiles_of_pixels(covered_pixels(self._projection, solids, k, faces, inflate), places)
+                         for k in range(solids.position.shape[1])], axis=1)
+
+
+def _square(reach: Range) -> Array:
+    """Return R_0^2 / xi."""
+    square: Array = reach.square.astype(np.float64) / reach.scale
+    return square

@@ -1,0 +1,196 @@
+"""The reference length of a picture whose settings give none: the length under which the paper's cut is the paper's.
+
+I_low is "x % of I_0", an irradiance of an intensity: the paper's unit of length is missing, and with it how far splats
+reach. Figure 8 tells how far they do: of 768 lights cut at 5 % a mean of 125 counts at a pixel. Here B of pairs of
+lights and sampled pixels is sorted: the length is the one under which 5 % leave that share of them, in any unit.
+
+B = I(w) / r^2 of a pair of light and receiver: what the threshold is held against, in float64.
+"""
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.pairs.irradiance import Receivers
+from refgi.pairs.lobe_shape import CORRECTED, Widening, lobe_norm_factor
+from refgi.pairs.loss import PAIRS, sample_for
+from refgi.pairs.packing import Packed, pack
+from refgi.scene.values import LARGEST
+from refgi.splat.sii.reach.threshold import all_peaks
+from refgi.splat.sii.settings import SplatSettings
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.lights import PixelLights
+
+Array = npt.NDArray[Any]
+S = TypeVar("S", bound=SplatSettings)
+
+PAPER_OVERDRAW, PAPER_LIGHTS, PAPER_CUT = 125.0, 768, 0.05  # Figure 8
+LEAST_SAMPLED = 64  # pixels, enough to count pairs by; of more lights than go with them every so many-th is looked at
+LONGEST = 10.0  # diagonals of the sample: where not even that leaves as many pairs, next to nothing is cut
+
+
+@kernel
+def diffuse_strength(position: Array, i: int, lights: Array, k: int) -> float:
+    """Return B / I_0 = cos / r^2 of a packed diffuse light at a receiver.
+
+    Parameters
+    ----------
+    position : (3, n) ndarray
+        Receivers, m.
+    i : int
+        Which receiver.
+    lights : (9, N) ndarray
+        Packed lights: position, reversed normal, flux / pi.
+    k : int
+        Which light.
+
+    Returns
+    -------
+    float
+        1/m^2; 0 behind the light.
+    """
+    above, r2 = 0.0, 0.0
+    for axis in range(3):
+        d = float(lights[axis, k]) - float(position[axis, i])
+        above += d * lights[3 + axis, k]
+        r2 += d * d
+    return above / (r2 * math.sqrt(r2)) if above > 0.0 else 0.0
+
+
+@kernel
+def lobe_strength(position: Array, i: int, lights: Array, widening: Widening | None, k: int) -> float:
+    """Return B / I_0 = cos^P / r^2 of a packed lobe at a receiver.
+
+    Parameters
+    ----------
+    position : (3, n) ndarray
+        Receivers, m.
+    i : int
+        Which receiver.
+    lights : (13, N) ndarray
+        Packed lobes: position, reversed normal and axis, exponent, flux times norm.
+    widening : Widening or None
+        How exponents fall near the light.
+    k : int
+        Which lobe.
+
+    Returns
+    -------
+    float
+        1/m^2; 0 behind the light's surface and behind the lobe.
+    """
+    above, along, r2 = 0.0, 0.0, 0.0
+    for axis in range(3):
+        d = float(lights[axis, k]) - float(position[axis, i])
+        above += d * lights[3 + axis, k]
+        along += d * lights[6 + axis, k]
+        r2 += d * d
+    if above <= 0.0 or along <= 0.0:
+        return 0.0
+    r = math.sqrt(r2)
+    return _shape(along / r, r, float(lights[9, k]), widening, k) / r2
+
+
+@kernel
+def _shape(cosine: float, r: float, exponent: float, widening: Widening | None, k: int) -> float:
+    """Return I(w) / I_0 of a lobe."""
+    if widening is None:
+        return float(cosine**exponent)
+    share = r / widening.distance if widening.slope == CORRECTED else 1.0 / (r * widening.distance)
+    here = exponent * min(share, 1.0)
+    theta = float(widening.cos_theta[k])
+    norm = 1.0
+    if widening.norm >= 0:
+        norm = lobe_norm_factor(theta, here, widening.norm) / lobe_norm_factor(theta, exponent, widening.norm)
+    return float(cosine**here * norm)
+
+
+def with_reference_length(receivers: Receivers, lights: "PixelLights", settings: S) -> S:
+    """Return settings whose cut is in full: with the reference length of a picture where they need one and give none.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    lights : PixelLights
+        Its lights.
+    settings : SplatSettings
+        Any.
+
+    Returns
+    -------
+    SplatSettings
+        The same, or with a `reference_length`.
+    """
+    if settings.reference_length is not None or settings.irradiance_low is not None or not settings.cuts:
+        return settings
+    return dataclasses.replace(settings, reference_length=reference_length(receivers, lights, settings))
+
+
+@stage("splat.reference_length")
+def reference_length(receivers: Receivers, lights: "PixelLights", settings: SplatSettings) -> float:
+    """Return the length under which lights cut at 5 % count at 125 / 768 of the pixels on average.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    lights : PixelLights
+        Lights; those drawn without flux count as lights that reach nothing, as they do in the paper.
+    settings : SplatSettings
+        Offset, norms and widening.
+
+    Returns
+    -------
+    float
+        Length, m; 1 where there is nothing to cut.
+    """
+    packed = pack(lights, settings, np.zeros(lights.flux.shape[1]), np.float64)
+    position = sample_for(receivers, lights, least=LEAST_SAMPLED).position.astype(np.float64)
+    step = 1 + lights.flux.shape[1] * LEAST_SAMPLED // PAIRS
+    strength = _strengths(packed, position, step)
+    if strength.size == 0:
+        return 1.0
+    counted = round(PAPER_OVERDRAW / PAPER_LIGHTS * lights.drawn / step * position.shape[1])
+    length = LONGEST * math.hypot(*np.ptp(np.concatenate([position, lights.position], axis=1), axis=1))
+    positive = strength[strength > 0]  # partition takes long over equal numbers
+    if 0 < counted <= len(positive):
+        length = min(length, math.sqrt(PAPER_CUT / float(np.partition(positive, -counted)[-counted])))
+    return min(max(length, 1 / LARGEST), LARGEST)
+
+
+def _strengths(packed: Packed, position: Array, step: int) -> Array:
+    """Return B of pairs over the largest I_0, of every so many-th diffuse light and lobe and all places, 1/m^2."""
+    diffuse, lobes = all_peaks(packed)
+    brightest = max(diffuse.max(), lobes.max(initial=0.0))
+    peaks, glossy = diffuse[:-1:step], lobes[::step]
+    strength = np.zeros((len(peaks) + len(glossy), position.shape[1]))
+    _diffuse_strengths(position, np.ascontiguousarray(packed.diffuse[:, :-1:step]), strength[: len(peaks)])
+    if packed.lobes is not None:
+        widening = packed.lobes.widening
+        if widening is not None:
+            widening = widening._replace(cos_theta=np.ascontiguousarray(widening.cos_theta[::step]))
+        lights = np.ascontiguousarray(packed.lobes.lights[:, ::step])
+        _lobe_strengths(position, lights, widening, strength[len(peaks) :])
+    strength *= (np.concatenate([peaks, glossy]) / (brightest or 1.0))[:, None]
+    return strength
+
+
+@kernel(parallel=True)
+def _diffuse_strengths(position: Array, lights: Array, strength: Array) -> None:
+    for k in prange(strength.shape[0]):
+        for i in range(strength.shape[1]):
+            strength[k, i] = diffuse_strength(position, i, lights, k)
+
+
+@kernel(parallel=True)
+def _lobe_strengths(position: Array, lights: Array, widening: Widening | None, strength: Array) -> None:
+    for k in prange(strength.shape[0]):
+        for i in range(strength.shape[1]):
+            strength[k, i] = lobe_strength(position, i, lights, widening, k)

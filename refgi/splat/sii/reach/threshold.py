@@ -1,0 +1,199 @@
+"""I_low, the irradiance below which a pair is left out, and the range it gives each light (E-SII-11, E-SII-15).
+
+The paper sets I_low to "x % of I_0", an irradiance to an intensity. Here it is one irradiance for all lights,
+I_low = x max I_0 / L_ref^2: dim lights reach less far, as Sec. 3.6 says they do. The intensity of an RGB light is its
+largest channel.
+
+How much light the threshold takes from a picture: what the picture holds at some pixels, and what it would uncut.
+"""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.draws import RANGE, draws
+from refgi.errors import expect
+from refgi.pairs.irradiance import Receivers
+from refgi.pairs.loss import light_at, lost_share, sample_for, warn_of_loss
+from refgi.pairs.packing import Packed, pack
+from refgi.pairs.pixel_lights import Range
+from refgi.splat.sii.settings import SplatSettings
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.lights import PixelLights
+
+Array = npt.NDArray[Any]
+
+LEAST_THRESHOLD = 1e-200  # W/m^2: any light over it is a number
+DIFFUSE, GLOSSY = 0, 1  # parts of a light, which have each their own xi
+
+
+def low_irradiance(lights: "PixelLights", settings: SplatSettings) -> float:
+    """Return I_low = x max I_0 / L_ref^2, or what `irradiance_low` says.
+
+    Parameters
+    ----------
+    lights : PixelLights
+        Lights; the peak of a lobe is its flux times its norm.
+    settings : SplatSettings
+        Share, reference length and norms.
+
+    Returns
+    -------
+    float
+        Irradiance, W/m^2; 0 without lights.
+
+    Notes
+    -----
+    Settings without a reference length get one from `with_reference_length`.
+    With `per_light_ilow` this is the I_low of the brightest light.
+    """
+    packed = pack(lights, settings, np.zeros(lights.flux.shape[1]), np.float64)
+    return threshold(np.concatenate(all_peaks(packed)), settings)
+
+
+def all_peaks(packed: Packed) -> tuple[Array, Array]:
+    """Return the scalar peak intensity I_0 of all packed lights: the largest channel.
+
+    Parameters
+    ----------
+    packed : Packed
+        The lights.
+
+    Returns
+    -------
+    diffuse : (M + 1,) ndarray of float64
+        Of the diffuse lights and the black one, W/sr.
+    lobes : (K,) ndarray of float64
+        Of the lobes, W/sr.
+    """
+    lobes = np.zeros((3, 0)) if packed.lobes is None else packed.lobes.lights[10:13]
+    return packed.diffuse[6:9].max(axis=0).astype(np.float64), lobes.max(axis=0).astype(np.float64)
+
+
+def threshold(peak: Array, settings: SplatSettings) -> float:
+    """Return I_low for lights of these peak intensities.
+
+    Parameters
+    ----------
+    peak : (N,) ndarray
+        I_0 of all lights, W/sr.
+    settings : SplatSettings
+        Share and reference length, or the irradiance itself.
+
+    Returns
+    -------
+    float
+        Irradiance, W/m^2.
+    """
+    if settings.irradiance_low is not None:
+        return settings.irradiance_low
+    return settings.i_low * float(peak.max(initial=0.0)) / _length(settings) ** 2
+
+
+def _length(settings: SplatSettings) -> float:
+    length = settings.reference_length if settings.i_low > 0 else 1.0
+    expect(length is not None, "reference_length", "a length for lights without receivers, m", length)
+    assert length is not None
+    return length
+
+
+def light_range(
+    peak: Array, low: float, settings: SplatSettings, part: int, dtype: npt.DTypeLike, outside: bool = False
+) -> Range:
+    """Return how far lights reach.
+
+    Parameters
+    ----------
+    peak : (N,) ndarray
+        I_0 of each light, W/sr.
+    low : float
+        I_low, W/m^2; counts as at least `LEAST_THRESHOLD`.
+    settings : SplatSettings
+        Whether the range is random, and the seed.
+    part : int
+        DIFFUSE or GLOSSY.
+    dtype : dtype
+        Of the kernels.
+    outside : bool
+        Sum what the cut loses.
+
+    Returns
+    -------
+    Range
+        R_0^2 and xi of each light.
+    """
+    square = peak / max(low, LEAST_THRESHOLD)
+    if "per_light_ilow" in settings.as_published and settings.irradiance_low is None:
+        # I_low = x I_0 of the light itself
+        own = _length(settings) ** 2 / settings.i_low if settings.i_low > 0 else math.inf  # 0: nothing is cut
+        square = np.where(peak > 0, own, 0.0)
+    scale = np.ones(len(peak))
+    if settings.stochastic_range:
+        scale = 1.0 - draws(settings.seed, RANGE, len(peak), part)  # (0, 1]
+    # far from the largest numbers, whose squares are taken, and from 0, which xi must not round to
+    square = np.minimum(square, math.sqrt(float(np.finfo(dtype).max)))
+    return Range(square.astype(dtype), np.maximum(scale, 1e-30).astype(dtype), outside)
+
+
+@stage("splat.cut_loss")
+def cut_loss(
+    light: Array, receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None = None
+) -> float:
+    """Return the share of the light that the threshold leaves out of a picture.
+
+    Parameters
+    ----------
+    light : (3, h, w) ndarray
+        The picture's irradiance, W/m^2.
+    receivers : Receivers
+        Its points.
+    lights : PixelLights
+        Its lights.
+    settings : SplatSettings
+        How one light lights one receiver.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+
+    Returns
+    -------
+    float
+        Of the light without visibility, at sampled pixels.
+    """
+    sample = sample_for(receivers, lights)
+    kept = light.reshape(3, -1)[:, sample.place]
+    whole = light_at(sample, lights, settings, footprint)
+    return lost_share(whole, float(kept.mean(dtype=np.float64))) if kept.size else 0.0
+
+
+def warn_of_cut(
+    light: Array, receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None
+) -> None:
+    """Warn where the threshold of `sii` leaves out more than `LEAST_LOSS` of the light.
+
+    Parameters
+    ----------
+    light : (3, h, w) ndarray
+        The picture's irradiance, W/m^2.
+    receivers : Receivers
+        Its points.
+    lights : PixelLights
+        Its lights.
+    settings : SplatSettings
+        The threshold. A random range takes no light in the mean and is passed over.
+    footprint : (N,) ndarray or None
+        Surface area each light stands for, m^2.
+
+    Warns
+    -----
+    RefgiWarning
+        With setting and share.
+    """
+    if not settings.cuts or settings.stochastic_range:
+        return
+    said = (f"i_low {settings.i_low:g} with reference_length {settings.reference_length:.3g} m"
+            if settings.irradiance_low is None else f"irradiance_low {settings.irradiance_low:g} W/m^2")
+    warn_of_loss(cut_loss(light, receivers, lights, settings, footprint), f"sii: {said}")

@@ -1,1 +1,0 @@
-"""Further cameras that see what the picture does not (Sec. 5, discussion)."""

@@ -1,0 +1,175 @@
+"""Property tests of the key of a kernel's code: equal for equal code, different for whatever changes what it does."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+from importlib import import_module
+from pathlib import Path
+from pkgutil import walk_packages
+from types import ModuleType
+
+import pytest
+
+import refgi
+from refgi.jit.dispatch import Kernel
+from refgi.jit.key import code_key
+
+BASE = """
+    import math
+    import numpy as np
+    from typing import NamedTuple
+    from refgi.jit import kernel
+    from refgi.elementary import exp2
+
+    SIZE = 4
+    TABLE = np.array([1.0, 2.0])
+    UNUSED = 1
+
+    class Point(NamedTuple):
+        x: float
+        y: float
+
+    @kernel
+    def inner(x):
+        return x + SIZE
+
+    @kernel
+    def outer(x, y=1.0):
+        \"\"\"Say something.\"\"\"
+        if x == "name":
+            return TABLE[0]
+        return exp2(math.sqrt(inner(x))) + Point(x, y).x
+    """
+SAME = {
+    "docstring": ("Say something.", "Say another thing."),
+    "comment": ("return x + SIZE", "return x + SIZE  # why"),
+    "line": ("@kernel\n    def outer", "\n\n    @kernel\n    def outer"),
+    "unused": ("UNUSED = 1", "UNUSED = 2"),
+}
+CHANGED = {
+    "code": ("TABLE[0]", "TABLE[1]"),
+    "callee": ("x + SIZE", "x - SIZE"),
+    "constant of a callee": ("SIZE = 4", "SIZE = 5"),
+    "table": ("[1.0, 2.0]", "[1.0, 3.0]"),
+    "string": ('"name"', '"other"'),
+    "default": ("y=1.0", "y=2.0"),
+    "fields": ("x: float\n        y: float", "y: float\n        x: float"),
+    "function of a library": ("math.sqrt", "math.cbrt"),
+    "type of a constant": ("SIZE = 4", "SIZE = 4.0"),
+}
+
+
+def key(text: str, name: str = "outer") -> str:
+    module = ModuleType("refgi_key_test")
+    exec(textwrap.dedent(text), module.__dict__)
+    return code_key(module.__dict__[name].py_func)
+
+
+@pytest.mark.parametrize("change", SAME)
+def test_what_changes_nothing_keeps_the_key(change):
+    old, new = SAME[change]
+    assert old in BASE
+    assert key(BASE) == key(BASE.replace(old, new))
+
+
+@pytest.mark.parametrize("change", CHANGED)
+def test_what_changes_code_changes_the_key(change):
+    old, new = CHANGED[change]
+    assert old in BASE
+    assert key(BASE) != key(BASE.replace(old, new))
+
+
+def test_a_plain_function_counts_with_its_code():
+    text = """
+        from numba.extending import register_jitable
+        from refgi.jit import kernel
+
+        @register_jitable
+        def helper(x):
+            return 2 * x
+
+        @kernel
+        def outer(x):
+            return helper(x)
+        """
+    assert key(text) != key(text.replace("2 * x", "3 * x"))
+
+
+def test_overloads_count_with_what_they_choose():
+    text = """
+        from refgi.jit import by_type, kernel
+
+        @kernel
+        def one(x):
+            return x + 1
+
+        KERNELS = {"one": one}
+
+        def chosen(x):
+            return x
+
+        @by_type(chosen)
+        def choose(x):
+            function = KERNELS["one"]
+            return lambda x: function(x)
+
+        @kernel
+        def outer(x):
+            return chosen(x)
+        """
+    assert key(text) != key(text.replace("x + 1", "x + 2"))
+
+
+def test_intrinsics_count_with_their_code():
+    text = """
+        from numba import types
+        from numba.extending import intrinsic
+        from refgi.jit import kernel
+
+        @intrinsic
+        def constant(typing):
+            return types.int64(), lambda context, builder, signature, values: context.get_constant(types.int64, 7)
+
+        @kernel
+        def outer():
+            return constant()
+        """
+    assert key(text) != key(text.replace(", 7)", ", 8)"))
+
+
+def kernels() -> dict[str, str]:
+    modules = [import_module(name) for _, name, _ in walk_packages(refgi.__path__, "refgi.")
+               if not name.startswith(("refgi.cli", "refgi.__main__"))]
+    found = {id(value): value for module in modules for value in vars(module).values() if isinstance(value, Kernel)}
+    return {f"{value.py_func.__module__}.{value.py_func.__name__}": code_key(value.py_func)
+            for value in found.values()}
+
+
+def test_every_kernel_has_a_key_of_its_own():
+    keys = kernels()
+    assert len(keys) > 300
+    assert len(set(keys.values())) == len(keys)
+
+
+def test_keys_are_the_same_in_every_process():
+    code = "import json, tests.jit.test_key as t; print(json.dumps(t.kernels()))"
+    root = Path(refgi.__file__).parent.parent
+    other = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True,
+                           env=os.environ | {"PYTHONHASHSEED": "7", "PYTHONPATH": str(root)})
+    assert json.loads(other.stdout) == kernels()
+
+
+def test_editing_materials_recompiles_nothing(tmp_path: Path):
+    copy = tmp_path / "refgi"
+    shutil.copytree(Path(refgi.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    code = Path(__file__).read_text()
+    (tmp_path / "keys.py").write_text(code + "\n\nprint(json.dumps(kernels()))\n")
+    for edit in ("", "NEW = 1\n\n\ndef new():\n    return NEW\n"):
+        material = copy / "scene" / "material.py"
+        material.write_text(material.read_text() + edit)
+        done = subprocess.run([sys.executable, "keys.py"], cwd=tmp_path, capture_output=True, text=True, check=True,
+                              env=os.environ | {"PYTHONPATH": str(tmp_path)})
+        assert json.loads(done.stdout) == kernels()

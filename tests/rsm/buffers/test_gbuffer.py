@@ -1,0 +1,160 @@
+"""The G-buffer: attributes against a literal twin, conventions where nothing is seen, channels one by one."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from refgi.errors import InputError
+from refgi.rsm import gbuffer
+from refgi.rsm.buffers.attributes import Wanted
+from refgi.scene import Camera, Material, material_table
+from tests.naive import raster as naive
+from tests.rsm.shapes import geometry, soup, sphere
+
+CHANNELS = (*Wanted._fields, "triangle_id", "covered")
+MATERIALS = (Material(diffuse=(0.1, 0.2, 0.3)), Material(diffuse=(0.4, 0.5, 0.6)), Material(diffuse=(0.7, 0.8, 0.9)))
+CAMERA = Camera((0.4, 0.3, 2.5), (0.1, 0, 0), vfov=math.radians(55), width=44, height=36)
+FLOAT64 = 1e-12  # two ways to the same point in float64; cancellation at grazing angles costs some digits
+DOUBT = 1e-7
+
+
+def shapes():
+    rng = np.random.default_rng(11)
+    flat = soup(rng, 60)
+    ball = sphere(8)
+    inverted = geometry(ball.vertices, ball.faces[:, ::-1], ball.vertex_normals)
+    banded = geometry(flat.vertices, flat.faces, materials=np.arange(60) % 3)
+    return {"flat": banded, "smooth": ball, "smooth inverted": inverted}
+
+
+def buffer(shape, dtype=np.float64, camera=CAMERA, **size):
+    return gbuffer(shape, material_table(MATERIALS, dtype), camera, dtype=dtype, **size)
+
+
+@pytest.mark.parametrize("name", shapes())
+def test_channels_equal_those_of_a_literal_twin(name):
+    shape = shapes()[name]
+    seen = buffer(shape)
+    frame = naive.look(np.subtract(CAMERA.target, CAMERA.eye), CAMERA.up)
+    half = (math.tan(CAMERA.vfov / 2) * CAMERA.width / CAMERA.height, math.tan(CAMERA.vfov / 2))
+    compared = 0
+    for row in range(CAMERA.height):
+        for column in range(CAMERA.width):
+            ray = naive.perspective_ray(CAMERA.eye, frame, half, CAMERA.height, CAMERA.width, row, column)
+            hit = naive.nearest(*ray, shape.vertices, shape.faces)
+            if hit[0] < 0 or hit[3] < DOUBT:
+                continue
+            expected = naive.attributes(ray[1], hit, shape.vertices, shape.faces, shape.vertex_normals)
+            position, normal, distance = expected
+            at = row, column
+            assert seen.triangle_id[at] == hit[0]
+            np.testing.assert_allclose(seen.depth[at], hit[1], rtol=FLOAT64)
+            np.testing.assert_allclose(seen.distance[at], distance, rtol=FLOAT64)
+            np.testing.assert_allclose(seen.position[:, row, column], position, atol=FLOAT64)
+            np.testing.assert_allclose(seen.normal[:, row, column], normal, atol=1e3 * FLOAT64)
+            material = shape.material_of_face[hit[0]]
+            assert seen.material_id[at] == material
+            np.testing.assert_array_equal(seen.albedo[:, row, column], MATERIALS[material].diffuse)
+            compared += 1
+    assert compared > 300
+
+
+def test_positions_lie_on_their_triangles_planes():
+    shape = shapes()["flat"]
+    seen = buffer(shape, camera=dataclasses.replace(CAMERA, width=300, height=200))
+    ids = seen.triangle_id[seen.covered]
+    corners = shape.vertices[shape.faces[ids]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    height = np.einsum("ij,ij->i", seen.position[:, seen.covered].T - corners[:, 0], normal)
+    assert np.abs(height).max() < 1e-14
+
+
+def test_normals_are_unit_vectors_that_face_the_eye():
+    for shape in shapes().values():
+        seen = buffer(shape)
+        normal, position = seen.normal[:, seen.covered], seen.position[:, seen.covered]
+        np.testing.assert_allclose(np.linalg.norm(normal, axis=0), 1, rtol=1e-15 * 4)
+        if shape.vertex_normals is None:
+            assert ((normal * (np.array(CAMERA.eye)[:, None] - position)).sum(axis=0) > 0).all()
+
+
+@pytest.mark.feature("REF-19")
+def test_float32_is_the_rounded_float64(evidence):
+    for name, shape in shapes().items():
+        double, single = buffer(shape), buffer(shape, np.float32)
+        for channel in CHANNELS:
+            exact, (rounded,) = double.resolve(channel)[0], single.resolve(channel)
+            if channel in ("triangle_id", "material_id", "covered"):
+                np.testing.assert_array_equal(exact, rounded)
+            else:
+                assert rounded.dtype == np.float32
+                np.testing.assert_array_equal(exact.astype(np.float32), rounded, err_msg=f"{name} {channel}")
+    evidence("every channel: float32 equals the rounded float64")
+
+
+@pytest.mark.parametrize("name", shapes())
+def test_channels_alone_equal_channels_together(name):
+    shape = shapes()[name]
+    together = dict(zip(CHANNELS, buffer(shape).resolve(*CHANNELS), strict=True))
+    for channel in CHANNELS:
+        alone = buffer(shape)
+        np.testing.assert_array_equal(getattr(alone, channel), together[channel])
+        assert getattr(alone, channel) is getattr(alone, channel)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("name", shapes())
+def test_channels_at_some_texels_are_those_of_the_whole(name, dtype):
+    rng = np.random.default_rng(4)
+    whole = buffer(shapes()[name], dtype)
+    for texel in (rng.integers(0, 36 * 44, 150), np.arange(36 * 44), np.zeros(0, np.int64), np.array([7, 7])):
+        some = buffer(shapes()[name], dtype)
+        for given, channel in zip(some.at(texel, *CHANNELS), CHANNELS, strict=True):
+            full = getattr(whole, channel)
+            np.testing.assert_array_equal(given, full.reshape(*full.shape[:-2], -1)[..., texel])
+            assert given.dtype == full.dtype
+
+
+def test_a_channel_is_computed_only_when_asked_for():
+    seen = buffer(shapes()["flat"])
+    assert set(seen._channels) == set()
+    _ = seen.depth
+    assert set(seen._channels) == {"depth"}
+
+
+def test_where_there_is_no_surface():
+    seen = buffer(shapes()["smooth"])
+    empty = ~seen.covered
+    assert empty.any()
+    assert np.isinf(seen.depth[empty]).all()
+    assert np.isinf(seen.distance[empty]).all()
+    assert (seen.triangle_id[empty] == -1).all()
+    assert (seen.material_id[empty] == -1).all()
+    for channel in (seen.position, seen.normal, seen.albedo):
+        assert (channel[:, empty] == 0).all()
+        assert channel.flags.c_contiguous
+    assert (seen.height, seen.width) == (36, 44)
+
+
+def test_nothing_to_see():
+    seen = buffer(geometry(np.zeros((0, 3)), np.zeros((0, 3))))
+    assert not seen.covered.any()
+    assert np.isinf(seen.depth).all()
+
+
+def test_a_vertex_without_a_normal_shades_with_the_faces():
+    ball = sphere(6)
+    bare = geometry(ball.vertices, ball.faces, np.zeros_like(ball.vertices))
+    flat = geometry(ball.vertices, ball.faces)
+    np.testing.assert_allclose(buffer(bare).normal, buffer(flat).normal)
+
+
+def test_errors_name_what_is_wrong():
+    shape = shapes()["flat"]
+    with pytest.raises(InputError, match="channel: expected a channel of the G-buffer, got 'colour'"):
+        buffer(shape).resolve("colour")
+    with pytest.raises(InputError, match="dtype: expected float32 or float64, got 'float16'"):
+        buffer(shape, np.float16)

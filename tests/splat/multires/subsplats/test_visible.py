@@ -1,0 +1,46 @@
+"""Subsplats with shadow rays: the bits of `vpl` at the same pixels."""
+
+import numpy as np
+import pytest
+
+from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
+from refgi.scene import load_scene
+from refgi.splat.multires.refinement.grid import Subsplats, level_shape, representatives
+from refgi.splat.multires.settings import MultiresSettings
+from refgi.splat.multires.subsplats.evaluate import evaluate_visible
+from refgi.truth import VplSettings, vpl
+
+
+@pytest.fixture(scope="module")
+def box():
+    return Frame(load_scene("cornell_box"), width=33, height=27, rsm_resolution=32)
+
+
+def cells(covered, level):
+    """Every filled cell of one level as a subsplat."""
+    places = representatives(covered, level)
+    row, column = np.nonzero(places[level] >= 0)
+    empty = tuple(np.zeros(level_shape(*covered.shape, k), bool) for k in range(level))
+    return Subsplats(np.full(len(row), level, np.uint8), row.astype(np.int32), column.astype(np.int32),
+                     places[level][row, column].astype(np.int64), (*empty, places[level] >= 0), covered.shape)
+
+
+@pytest.mark.parametrize("level", [0, 2])
+def test_subsplats_get_the_bits_of_vpl(box, level):
+    """Oracle: `vpl` with the same lights, which lights every pixel."""
+    lights = choose_lights(box, MultiresSettings(lights=64))
+    some = cells(box.gbuffer.covered, level)
+    ours = evaluate_visible(box.tracer, box.scene.geometry, box.gbuffer, some, lights)
+    full = vpl(box, VplSettings(lights=64, pattern="grid"))
+    assert ours.dtype == box.dtype
+    np.testing.assert_array_equal(ours, full.reshape(3, -1)[:, some.pixel])
+    free = vpl(box, VplSettings(lights=64, pattern="grid", visibility=False)).reshape(3, -1)[:, some.pixel]
+    assert (ours <= free).all()
+    assert 0.5 < ours.mean() / free.mean() < 0.95
+
+
+def test_no_subsplats_trace_no_rays(box):
+    lights = choose_lights(box, MultiresSettings(lights=16))
+    nothing = cells(np.zeros((27, 33), bool), 1)
+    assert evaluate_visible(box.tracer, box.scene.geometry, box.gbuffer, nothing, lights).shape == (3, 0)

@@ -1,0 +1,226 @@
+"""What multires costs and what it is off by, over thresholds, lights, triangles, a flight and moving lights."""
+
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from refgi.frame import Frame
+from refgi.lights.footprints import with_equal_solid_angles
+from refgi.lights.selection import choose_lights
+from refgi.rsm.buffers.solid_angle import texel_solid_angles
+from refgi.rsm.raster.projection import PERSPECTIVE, Projection, spot_projection
+from refgi.scene import PointLight, SpotLight, load_scene
+from refgi.splat.multires.multires import multires, shared_subsplats
+from refgi.splat.multires.settings import MultiresSettings
+from refgi.stages import observe
+
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
+THRESHOLDS = (0.0, 0.25, 0.5, 1.0, 1.4, 2.0)
+EVERY_PIXEL = 1 << 16  # cells along a side: more than pixels
+TEXEL = 0.02  # of the ratio at the rim: a texel there spans about a hundredth of the cone
+
+
+@pytest.fixture(scope="module")
+def atrium():
+    return Frame(load_scene("atrium:faces=10000"), width=128, height=128, rsm_resolution=128)
+
+
+@pytest.fixture(scope="module")
+def box():
+    return Frame(load_scene("cornell_box"), width=24, height=20, rsm_resolution=128)
+
+
+def subsplats(frame, **changes):
+    return len(shared_subsplats(frame.gbuffer, MultiresSettings(**changes)).pixel)
+
+
+def rmse(image, reference, covered):
+    off = (image.astype(np.float64) - reference)[:, covered]
+    return 100 * math.sqrt((off**2).mean()) / reference[:, covered].mean(dtype=np.float64)
+
+
+def clamped(frame, share=0.02, **changes):
+    return MultiresSettings(clamp="distance", clamp_value=share * frame.scene.geometry.diagonal, **changes)
+
+
+@pytest.mark.feature("AMS-01")
+def test_lights_stand_on_texel_centres_of_a_fixed_grid(box, evidence):
+    """Row and column floor(W (i + 1/2) / n), whatever the map holds; with n = W the lights are all texels."""
+    every = multires(box, clamped(box, pattern="all", coarsest=EVERY_PIXEL))
+    covered, found = box.gbuffer.covered, []
+    for n in (16, 32, 64, 128):
+        lights = choose_lights(box, MultiresSettings(lights=n * n))
+        row, column = np.divmod(lights.texel, 128)
+        grid = np.floor((np.arange(n) + 0.5) / n * 128)
+        assert np.isin(row, grid).all()
+        assert np.isin(column, grid).all()
+        assert len(np.unique(lights.texel)) == len(lights.texel) == lights.flux.any(axis=0).sum()
+        assert lights.drawn == n * n
+        found.append(rmse(multires(box, clamped(box, lights=n * n, coarsest=EVERY_PIXEL)), every, covered))
+    assert found == sorted(found, reverse=True)
+    assert found[-1] == 0
+    evidence("RMSE to the sum over 128² texels: "
+             + ", ".join(f"{n}² lights {off:.2g} %" for n, off in zip((16, 32, 64, 128), found, strict=True)))
+
+
+@pytest.mark.feature("AMS-15")
+def test_supersampled_is_the_mean_of_four_pixels(box, evidence):
+    settings = MultiresSettings(lights=64, supersampled=True)
+    fine = Frame(box.scene, width=2 * box.width, height=2 * box.height, rsm_resolution=128)
+    light, seen = multires(fine, dataclasses.replace(settings, supersampled=False)), fine.gbuffer.covered
+    blocks = (box.height, 2, box.width, 2)
+    count = seen.reshape(blocks).sum(axis=(1, 3))
+    mean = (light * seen).reshape(3, *blocks).astype(np.float64).sum(axis=(2, 4)) / np.maximum(count, 1)
+    both = box.gbuffer.covered & (count > 0)
+    got = multires(box, settings)
+    assert got.shape == (3, box.height, box.width)
+    np.testing.assert_allclose(got[:, both], mean[:, both], rtol=1e-6)  # a rounding each for three sums and a quotient
+    assert not got[:, ~box.gbuffer.covered].any()
+    plain = multires(box, dataclasses.replace(settings, supersampled=False))
+    evidence(f"equal to means of four to {np.abs(got[:, both] / mean[:, both] - 1).max():.0e}; differs from one "
+             f"sample a pixel by {rmse(got, plain, both):.1f} % of the mean")
+
+
+class Map(NamedTuple):
+    """What the switch knows of a map."""
+
+    light: Any
+    projection: Projection
+    solid_angle: Any
+    flux: Any
+    lobe_flux: Any = None
+
+
+def square(fov):
+    half = math.tan(math.radians(fov) / 2)
+    return Projection(PERSPECTIVE, 256, 256, np.zeros((1, 3)), np.eye(3)[None], np.array([half, half]), math.inf)
+
+
+def ratios(light, projection):
+    """Return exact over equal solid angle in the middle and where it is least."""
+    exact = texel_solid_angles(projection)
+    changed = with_equal_solid_angles(Map(light, projection, exact, np.ones((3, *exact.shape))))
+    share = np.divide(exact, changed.solid_angle, where=exact != changed.solid_angle, out=np.ones_like(exact))
+    assert changed.flux[0, 128, 128] == pytest.approx(1 / share[128, 128])
+    return share[128, 128], share.min()
+
+
+# density cos^3 of solid angle over its mean Omega / (4 tan^2), Omega = 4 asin sin^2 (f / 2)
+@pytest.mark.parametrize(("fov", "middle", "corner"), [
+    (90, 1.910, 0.368), (60, 1.319, 0.613), (30, 1.071, 0.876), (120, 3.54, 0.191)])
+@pytest.mark.feature("AMS-16")
+def test_equal_solid_angles_in_square_maps(fov, middle, corner, evidence):
+    tangent = math.tan(math.radians(fov) / 2)
+    mean = math.asin(math.sin(math.radians(fov) / 2) ** 2) / tangent**2
+    assert 1 / mean == pytest.approx(middle, rel=2e-3)  # the constants are those of the closed form
+    assert (1 + 2 * tangent**2) ** -1.5 / mean == pytest.approx(corner, rel=2e-3)
+    got = ratios(PointLight((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), square(fov))
+    assert got[0] == pytest.approx(1 / mean, rel=1e-3)
+    assert got[1] == pytest.approx((1 + 2 * tangent**2) ** -1.5 / mean, rel=2 * TEXEL)
+    evidence(f"{fov} degrees square: middle {got[0]:.3f} ({middle}), corner {got[1]:.3f} ({corner})")
+
+
+@pytest.mark.feature("AMS-16")
+def test_equal_solid_angles_in_a_cone(evidence):
+    """What lies outside of the cone has no share: within it cos^3 over its mean 2 (1 - cos) / tan^2."""
+    half = math.radians(45)
+    light = SpotLight((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), half - 1e-4, half, (1.0, 1.0, 1.0))
+    middle = math.tan(half) ** 2 / (2 * (1 - math.cos(half)))
+    assert middle == pytest.approx(1.707, abs=1e-3)
+    got = ratios(light, spot_projection(light, 256))
+    assert got[0] == pytest.approx(1.707, rel=TEXEL)
+    assert got[1] == pytest.approx(0.604, rel=TEXEL)
+    evidence(f"cone of 45 degrees: middle {got[0]:.3f} (1.707), rim {got[1]:.3f} (0.604)")
+
+
+def test_equal_solid_angles_dim_the_middle(box):
+    """The power is that of a cone of even light either way; where the middle of the spot shines, E falls."""
+    exact, equal = (choose_lights(box, MultiresSettings(pattern="all", as_published=names))
+                    for names in (frozenset(), frozenset({"equal_solid_angle"})))
+    change = equal.flux.sum(axis=0) / exact.flux.sum(axis=0)
+    along = np.asarray(box.scene.lights[0].direction) @ (
+        exact.position - np.asarray(box.scene.lights[0].position)[:, None])
+    away = along / np.linalg.norm(exact.position - np.asarray(box.scene.lights[0].position)[:, None], axis=0)
+    assert change[away > 0.99].max() < 1 < change[away < 0.68].min()
+
+
+@pytest.mark.feature("AMS-19")
+def test_cost_and_error_over_the_normal_threshold(atrium, evidence):
+    """Fig. 10: nothing to gain at 16² to 64², much at the full size, at the price of the error."""
+    covered = atrium.gbuffer.covered
+    full = multires(atrium, clamped(atrium, lights=64, coarsest=EVERY_PIXEL))
+    counts = {side: [subsplats(atrium, normal_threshold=t, finest=level) for t in THRESHOLDS]
+              for side, level in ((16, 3), (32, 2), (64, 1), (128, 0))}
+    for row in counts.values():
+        assert row == sorted(row, reverse=True)
+    assert len(set(counts[16])) == 1
+    saved = {side: row[0] - row[-1] for side, row in counts.items()}
+    assert saved[32] < 0.1 * saved[128]
+    assert saved[64] < 0.25 * saved[128]
+    off = [rmse(multires(atrium, clamped(atrium, lights=64, normal_threshold=t)), full, covered) for t in THRESHOLDS]
+    assert off == sorted(off)
+    evidence("thresholds " + ", ".join(map(str, THRESHOLDS)) + "; subsplats at 128²: "
+             + ", ".join(map(str, counts[128])) + "; RMSE: " + ", ".join(f"{value:.1f} %" for value in off)
+             + "; saved at 16², 32², 64² of what is saved at 128²: "
+             + ", ".join(f"{saved[side] / saved[128]:.1%}" for side in (16, 32, 64)))
+
+
+@pytest.mark.feature("AMS-20")
+def test_pairs_are_subsplats_times_lights(atrium, evidence):
+    """Every pair is evaluated once, none besides; what that takes is told and not judged."""
+    told = []
+    for n in (8, 16, 32):
+        for finest in (0, 2):
+            settings = clamped(atrium, lights=n * n, finest=finest)
+            with observe(record=True) as log:
+                multires(atrium, settings)
+            run, = (run for run in log.runs if run.name == "splat.irradiance")
+            points, _, lights = run.inputs["0"], run.inputs["1"], run.inputs["2"]
+            assert points.shape[1] == subsplats(atrium, finest=finest)
+            assert lights.flux.shape[1] == choose_lights(atrium, settings).flux.shape[1]
+            told.append((points.shape[1] * lights.flux.shape[1], 1e3 * run.seconds))
+    evidence("million pairs and ms: " + ", ".join(f"{pairs / 1e6:.2f} {taken:.1f}" for pairs, taken in sorted(told)))
+
+
+@pytest.mark.feature("AMS-20")
+def test_subsplats_hardly_depend_on_triangles(evidence):
+    counts = [subsplats(Frame(load_scene(f"stage:faces={n}"), width=128, height=128)) for n in (2_000, 20_000, 200_000)]
+    assert max(counts) < 1.1 * min(counts)
+    evidence(f"vase of 2, 20 and 200 thousand triangles at 128²: {', '.join(map(str, counts))} subsplats")
+
+
+@pytest.mark.feature("AMS-21")
+def test_subsplats_along_a_flight(evidence):
+    """Sec. 5: as the viewpoint moves, counts can vary up to 300 %. Towards the vase from afar, past it to the wall."""
+    scene, series = load_scene("stage:faces=20000"), []
+    for k in range(8):
+        eye = np.array((0.3, 0.5, 1.6)) + k / 7 * np.array((0.0, -0.2, -1.5))
+        seen = scene.with_camera(eye=tuple(eye), target=(eye[0] - 0.3, 0.15, eye[2] - 1.2))
+        frame = Frame(seen, width=128, height=128)
+        leaves = shared_subsplats(frame.gbuffer, MultiresSettings())
+        series.append(int(leaves.counts.sum()))
+    assert max(series) > 2 * min(series)
+    evidence(f"subsplats {', '.join(map(str, series))}: most over least {max(series) / min(series):.2f}")
+
+
+@pytest.mark.feature("AMS-22")
+def test_flicker_falls_with_the_number_of_lights(evidence):
+    """What changes from frame to frame beyond what the sum over all texels changes, mean magnitude over its mean."""
+    scene = load_scene("metaballs:resolution=16")
+    x, y, z = scene.lights[0].position
+    frames = [Frame(scene.with_lights(dataclasses.replace(scene.lights[0], position=(x + 0.01 * k, y, z))), width=24,
+                    height=24, rsm_resolution=128) for k in range(6)]
+
+    def light(**changes):
+        return np.stack([multires(f, clamped(f, 0.04, coarsest=EVERY_PIXEL, **changes)) for f in frames])
+
+    smooth = light(pattern="all")
+    found = {n: 100 * np.abs(np.diff(light(lights=n * n) - smooth, axis=0)).mean() / smooth.mean()
+             for n in (8, 16, 32, 64)}
+    assert list(found.values()) == sorted(found.values(), reverse=True)
+    assert found[64] < found[8] / 4
+    evidence("flicker in % of the mean: " + ", ".join(f"{n}² lights {value:.1f}" for n, value in found.items()))

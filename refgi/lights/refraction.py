@@ -131,13 +131,13 @@ def refracted(
     expect(mode in get_args(Mode), "mode", "'back_face' or 'two_interface'", mode)
     expect(0 <= exponent <= SHARPEST, "exponent", f"a Phong exponent from 0 to {SHARPEST:g}", exponent)
     if not materials.ior.any():
-        skip("rsm.refraction", "no material is glass")
+        skip("lights.refraction", "no material is glass")
         return rsm
     expect(mode == "back_face" or tracer is not None, "tracer", "one for the mode 'two_interface'", None)
     return _refracted(rsm, geometry, materials, exponent, tracer if mode == "two_interface" else None, fresnel)
 
 
-@stage("rsm.refraction")
+@stage("lights.refraction")
 def _refracted(
     rsm: Rsm, geometry: Geometry, materials: MaterialTable, exponent: float, tracer: RayTracer | None, fresnel: bool
 ) -> Rsm:

@@ -136,6 +136,11 @@ class GBuffer:
                                            self.visibility.triangle_id, self.dtype, tuple(missing)))  # fmt: skip
         return tuple(self._channels[n] if n in self._channels else getattr(self, n) for n in names)
 
+    def recorded(self) -> dict[str, Array]:
+        """Return every channel by name, as logs keep them."""
+        names = (*ChannelMask._fields, "triangle_id", "covered")
+        return dict(zip(names, self.resolve(*names), strict=True))
+
     def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
         """Return channels at some texels alone, computing there those not yet known.
 

@@ -95,12 +95,12 @@ def splat(
         As `irradiance`; or if the bound lacks its map.
     """
     if settings.reach.cut is None:
-        skip("splat.bins", "no cut: every light reaches every pixel")
+        skip("sii.bins", "no cut: every light reaches every pixel")
         return irradiance(receivers, lights, settings.pairs, footprint)
     return _splat(receivers, lights, settings, footprint, projection)
 
 
-@stage("splat.irradiance")
+@stage("sii.splat")
 def _splat(
     receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
     projection: "Projection | None",
@@ -108,7 +108,7 @@ def _splat(
     return _sum_in_range(receivers, lights, settings, footprint, projection, outside=False)
 
 
-@stage("splat.cut")
+@stage("sii.cut_irradiance")
 def cut_irradiance(
     receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None
 ) -> Array:

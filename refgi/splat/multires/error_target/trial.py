@@ -87,7 +87,7 @@ class Trials:
         exact.evaluate(pixel[~exact.is_known[pixel]])
         fill_coarsest(top.representative_pixel, *self._values, self._irradiance[-1])
 
-    @stage("splat.trial")
+    @stage("multires.trial")
     def run(self, threshold: float) -> None:
         """Refine from the coarsest level down wherever stopping would cost more than `threshold`^2, W^2/m^4."""
         for level in range(len(self._levels) - 2, 0, -1):
@@ -118,7 +118,7 @@ class Trials:
         for split in self.split[1:]:
             split[:] = True
 
-    @stage("splat.assemble")
+    @stage("multires.assemble")
     def picture(self) -> Array:
         """Evaluate the pixels of the last split cells and return the picture, (3, h, w), W/m^2."""
         self._exact.evaluate(self._exact.unlit(self.split[1], self._levels[0]))

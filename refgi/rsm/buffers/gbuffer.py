@@ -235,7 +235,28 @@ def _resolve(
     dtype: np.dtype[Any],
     names: tuple[str, ...],
 ) -> dict[str, Array]:
-    """Return the named channels, computed in one pass."""
+    """Compute channels of the visible surface in one pass.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    materials : MaterialTable
+        Their materials.
+    projection : Projection
+        The view.
+    triangle_id : (h, w) ndarray of int32
+        Visible triangle of each texel, -1 for none.
+    dtype : dtype
+        Of the channels.
+    names : tuple of str
+        Channels to compute.
+
+    Returns
+    -------
+    dict of str to (h, w) or (3, h, w) ndarray
+        The channels by name, units as `GBuffer` states them.
+    """
     planes = _planes(names, triangle_id.shape, dtype)
     channels = ChannelMask(*(name in names for name in ChannelMask._fields))
     resolve(_surface(geometry, materials, dtype), projection, triangle_id, channels, planes, numba.get_num_threads())

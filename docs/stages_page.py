@@ -4,6 +4,7 @@
 """
 
 import importlib
+import inspect
 import pkgutil
 import re
 import warnings
@@ -74,7 +75,7 @@ def _tables() -> list[str]:
 
 
 def _stage(name: str, stage: Callable[..., Any]) -> list[str]:
-    text = re.sub(r"\n    ", "\n", stage.__doc__ or "").strip()
+    text = inspect.cleandoc(stage.__doc__ or "")
     summary = text.splitlines()[0] if text else ""
     lines = [f"### `{name}`", "", f"{summary} `{stage.__module__}.{stage.__name__}`", "", "| | type | what |",
              "|---|---|---|"]

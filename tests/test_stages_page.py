@@ -1,6 +1,7 @@
 """Property test of docs/stages.md: it is what its program makes of the stages there are."""
 
 import importlib.util
+import inspect
 from pathlib import Path
 
 import pytest
@@ -26,4 +27,4 @@ def test_every_stage_says_what_it_takes_and_gives(program):
     program._import_all()
     for name, stage in stages.STAGES.items():
         if stage.__module__.startswith("refgi."):
-            assert program._fields(stage.__doc__.replace("\n    ", "\n"), "Returns"), name
+            assert program._fields(inspect.cleandoc(stage.__doc__), "Returns"), name

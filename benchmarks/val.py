@@ -58,7 +58,8 @@ def _frames(name: str, size: int, repeats: int, paper: float) -> Iterator[Row]:
 
     for label, aim, settings in (
             ("8 x 8 interleaved and blurred", f"> {paper}", ValSettings(interleaving=8)),
-            ("the same, lights dealt out by cluster", f"> {paper}", ValSettings(interleaving=8, dealing="cluster")),
+            ("the same, lights assigned by cluster", f"> {paper}",
+             ValSettings(interleaving=8, assignment="cluster")),
             ("every light at every pixel", "", ValSettings(interleaving=1))):
         def draw(how: ValSettings = settings) -> None:
             frame(how)
@@ -91,7 +92,7 @@ def _errors(name: str, size: int) -> Iterator[Row]:
     unshadowed = vpl(frame, VplSettings(lights=1024, visibility=False))
     yield Row(f"{name}: no visibility", *_relative(unshadowed, truth, frame), "")
     for label, settings in (("every light", ValSettings(interleaving=1)), ("8 x 8", ValSettings(interleaving=8)),
-                            ("exact step", ValSettings(interleaving=1, visibility="step"))):
+                            ("PCSS", ValSettings(interleaving=1, visibility="pcss"))):
         yield Row(f"{name}: 30 area lights, {label}", *_relative(val(frame, settings), truth, frame), "")
 
 

@@ -52,7 +52,7 @@ RAYS = [
     (SiiSettings(warp="A"), False), (SiiSettings(importance="openness"), False), (GatherSettings(), False),
     (MultiresSettings(), False), (MultiresSettings(visibility="rays"), True), (MultiresSettings(source="walk"), True),
     (ValSettings(), False), (ValSettings(maps="rays"), True), (ValSettings(behind="raytrace"), True),
-    (ValSettings(visibility="rectangle"), True), (ValSettings(visibility="members"), True),
+    (ValSettings(visibility="rays_rectangle"), True), (ValSettings(visibility="rays_vpls"), True),
     (ValSettings(source="walk"), True), (ValSettings(visibility="back_projection"), False), (HssilSettings(), False),
     (HssilSettings(visibility="rays"), True), (HssilSettings(visibility="bitmask"), False), (object(), False)]
 

@@ -12,12 +12,20 @@ VIEWS = {"cornell_side": Camera((0.5, 0.3, -0.6), (0.2, 0.2, 0.3)),
          "stage_side": Camera((0.9, 0.4, 0.9), (0.0, 0.1, 0.0))}
 
 
+VAL_NAMES = {"dealing": "assignment"}
+VAL_KINDS = {"series": "csm", "step": "pcss", "rectangle": "rays_rectangle", "members": "rays_vpls"}
+
+
 def settings_of(method: str, **flat: Any) -> Any:
     """Return the settings of a method, of which some differ from the default; "temporal" is the temporal filter."""
     for name in flat.keys() & set(SETS):
         flat[name] = frozenset(filter(None, flat[name].split("+")))
     if "views" in flat:
         flat["views"] = (VIEWS[flat["views"]],)
+    if method == "val":
+        flat = {VAL_NAMES.get(name, name): value for name, value in flat.items()}
+        if "visibility" in flat:
+            flat["visibility"] = VAL_KINDS.get(flat["visibility"], flat["visibility"])
     return _settings_class(method)(**flat)
 
 
@@ -32,6 +40,9 @@ def names_of(method: str) -> dict[str, set[Any]]:
         if types[field.name] is bool:
             wanted[field.name] = {not field.default}
     wanted.get("as_published", set()).update(getattr(settings_class, "SWITCHES", ()))
+    if method == "val":
+        old = {new: old for old, new in (VAL_NAMES | VAL_KINDS).items()}
+        wanted = {old.get(name, name): {old.get(value, value) for value in values} for name, values in wanted.items()}
     return wanted
 
 

@@ -1,4 +1,4 @@
-"""How much memory clustered visibility takes beside what every picture takes: its maps, and these filtered."""
+"""Memory estimate of clustered visibility: its shadow maps, and these filtered."""
 
 import numba
 
@@ -29,7 +29,7 @@ def extra_bytes(settings: ValSettings, size: tuple[int, int], float_bytes: int) 
     texels, count = settings.map_resolution**2, _maps(settings)
     sides = 2 if settings.behind == "dual_paraboloid" else 1
     depth = 2 * count * sides * texels * float_bytes  # twice: maps on which there is nothing are dropped by a copy
-    series = settings.visibility == "series"
+    series = settings.visibility == "csm"
     at_once = min(count, numba.get_num_threads() + 1) if series else 0  # one of them is read from
     filtered = at_once * texels * _filtered_bytes(settings, float_bytes)
     return depth + filtered + size[0] * size[1] * LISTED_FLOATS * float_bytes
@@ -47,8 +47,6 @@ def _maps(settings: ValSettings) -> int:
 def _filtered_bytes(settings: ValSettings, float_bytes: int) -> int:
     """Return what one filtered map takes for each of its texels."""
     channels = 4 * settings.terms + 2  # basis, basis-z, mean depth, and the depth itself
-    if settings.prefilter == "sat":
-        return 8 * channels
     if settings.prefilter == "brute":
         return channels * float_bytes
     basis = -(-2 * settings.terms // EIGHT) * EIGHT

@@ -12,18 +12,18 @@ from refgi.scene.values import is_count, is_number
 Distance = Literal["raw", "normalised", "squared"]
 Axes = Literal["fixed", "pca", "min_area"]
 Extent = Literal["root", "longer", "shorter"]
-Visibility = Literal["series", "step", "hard", "back_projection", "rectangle", "members", "none"]
-Prefilter = Literal["mip", "sat", "brute"]
+Visibility = Literal["hard", "pcf", "pcss", "csm", "back_projection", "rays_rectangle", "rays_vpls", "none"]
+Prefilter = Literal["mip", "brute"]
 Rescale = Literal["none", "scale2", "plateau"]
 Behind = Literal["visible", "dual_paraboloid", "raytrace"]
 NearGeometry = Literal["keep", "planes", "ball"]
-Dealing = Literal["index", "cluster"]
+Assignment = Literal["index", "cluster"]
 Blur = Literal["none", "box", "geometry"]
 Depths = Literal["log_map", "map", "scene"]
 
 CHOICES: dict[str, Any] = {
     "distance": Distance, "axes": Axes, "extent": Extent, "visibility": Visibility, "prefilter": Prefilter,
-    "rescale": Rescale, "behind": Behind, "near_geometry": NearGeometry, "dealing": Dealing, "blur": Blur,
+    "rescale": Rescale, "behind": Behind, "near_geometry": NearGeometry, "assignment": Assignment, "blur": Blur,
     "single_light": Literal["point", "footprint"], "maps": Literal["raster", "rays"],
     "quantisation": Literal["none", "published"], "depth_scale": Depths}
 PUBLISHED_AREA_LIGHTS = 30
@@ -31,12 +31,12 @@ MOST_TERMS = 64
 MOST_BLOCK = 64  # pixels
 LARGEST_MAP = 4096  # texels
 # least and most of each number
-COUNTS = (("area_lights", 1, MOST_LIGHTS), ("rounds", 1, 1000), ("map_resolution", 1, LARGEST_MAP),
+COUNTS = (("area_lights", 1, MOST_LIGHTS), ("rounds", 1, 1000), ("map_resolution", 1, LARGEST_MAP), ("texels", 1, 255),
           ("terms", 1, MOST_TERMS))
 FLAGS = ("unbiased_area", "foreshortened", "occluders_alone", "receiver_plane", "cone")
 # least and most of each number that may have a fraction, and what it is; the least target is about what rays for a
 # thousand pixels can tell
-NUMBERS = {
+CONSTANTS = {
     "position_weight": (0.0, 1e6, "a weight"), "normal_weight": (0.0, 1e6, "a weight"),
     "target_error": (1e-4, 1e6, "a share of the mean"),
     "near_distance": (0.0, 100.0, "a share of the cluster's radius"), "bias": (0.0, 0.25, "a share of the depth range"),
@@ -60,13 +60,14 @@ class ValSettings(LightSettings):
     radius, and with `occluders_alone` what nothing lies behind. `behind` says what receivers behind an area light see
     of it.
 
-    Visibility: "series" of `terms` terms with the filter `prefilter`, the exact "step", one "hard" test towards the
-    centre, or by reference: the map projected back ("back_projection"), rays to the "rectangle", rays to the
-    "members"; or "none". The series compares depths on a `depth_scale` from the nearest to the farthest of what a map
-    holds, by their logarithm ("log_map") or in metres ("map"), or from 0 to the far end of the scene's extent
-    ("scene"). A receiver is moved by `bias` (share of the depth range; none: where the series is 1 for the first
-    time); `attenuation` is that of the series' terms and `rescale` what becomes of it; `quantisation` is that of the
-    published textures. The step counts what lies before the `receiver_plane` and within the `cone`.
+    Visibility: convolution shadow maps ("csm") of `terms` terms with the filter `prefilter`; percentage closer soft
+    shadows ("pcss"); percentage closer filtering ("pcf") of `texels` x `texels` depth tests; one "hard" test; by
+    reference, the map projected back ("back_projection"), "rays_rectangle" or "rays_vpls"; or "none". CSM compares
+    depths on a `depth_scale` from the nearest to the farthest of what a map holds, by their logarithm ("log_map") or in
+    metres ("map"), or from 0 to the far end of the scene's extent ("scene"). A receiver is moved by `bias` (share of
+    the depth range; none: where the series is 1 for the first time); `attenuation` is that of the series' terms and
+    `rescale` what becomes of it; `quantisation` is that of the published textures. PCSS counts what lies before the
+    `receiver_plane` and within the `cone`.
 
     `interleaving` n sums one light of n^2 at each pixel of n x n (8 as published; 1: all; none: all where that is no
     more than 2^30 pairs, else 8), and `blur` joins them, within `blur_extent` of the scene's diagonal and above
@@ -91,7 +92,8 @@ class ValSettings(LightSettings):
     near_distance: float = 0.6
     occluders_alone: bool = True
     behind: Behind = "visible"
-    visibility: Visibility = "series"
+    visibility: Visibility = "csm"
+    texels: int = 5
     terms: int = 4
     depth_scale: Depths = "log_map"
     prefilter: Prefilter = "mip"
@@ -102,7 +104,7 @@ class ValSettings(LightSettings):
     receiver_plane: bool = True
     cone: bool = True
     interleaving: int | None = None
-    dealing: Dealing = "index"
+    assignment: Assignment = "index"
     blur: Blur = "geometry"
     blur_extent: float = 0.1
     blur_cosine: float = 0.8
@@ -118,7 +120,7 @@ class ValSettings(LightSettings):
         expect_choices(self, CHOICES)
         for key in FLAGS:
             expect(isinstance(getattr(self, key), bool | np.bool_), key, "true or false", getattr(self, key))
-        for key, (low, high, what) in NUMBERS.items():
+        for key, (low, high, what) in CONSTANTS.items():
             value = getattr(self, key)
             expect((value is None and key in MAY_BE_NONE) or (is_number(value) and low <= value <= high), key,
                    f"{'none or ' if key in MAY_BE_NONE else ''}{what}, {low:g} to {high:g}", value)
@@ -126,6 +128,7 @@ class ValSettings(LightSettings):
                "more than 0 beside a normal_weight of 0", self.position_weight)
         expect(self.interleaving is None or (is_count(self.interleaving) and 1 <= self.interleaving <= MOST_BLOCK),
                "interleaving", f"none or 1 to {MOST_BLOCK} pixels", self.interleaving)
+        expect(self.texels % 2 == 1, "texels", "an odd number", self.texels)
         expect(self.single_light == "point" or self.source == "rsm", "single_light", "'point' with the source 'walk'",
                self.single_light)
         self._expect_heeded()
@@ -134,7 +137,7 @@ class ValSettings(LightSettings):
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
         return super().traces_rays or self.maps == "rays" or self.behind == "raytrace" or self.visibility in (
-            "rectangle", "members")
+            "rays_rectangle", "rays_vpls")
 
     def _expect_heeded(self) -> None:
         """Refuse what a target for the error would not heed."""

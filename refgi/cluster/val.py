@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
-from refgi.cluster.adaptive import enough_area_lights, grouped
+from refgi.cluster.adaptive import count_for_error, group_lights
 from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
@@ -33,7 +33,7 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The scene with its buffers.
     settings : ValSettings
         Which lights, how they are clustered and how an area light's visibility is found.
 
@@ -43,24 +43,24 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
         Indirect irradiance, W/m^2, linear RGB.
     """
     lights = choose_lights(frame, settings)  # Sec. 6, VPL generation
-    areas, maps = clustered(frame, lights, settings)
+    areas, maps = cluster_lights(frame, lights, settings)
     block = block_side(frame, lights, settings)
-    light = lit(frame, lights, areas, maps, settings, block)  # Sec. 4 and 6
+    light = light_pixels(frame, lights, areas, maps, settings, block)  # Sec. 4 and 6
     if block == 1 or settings.blur == "none":
-        skip("cluster.blur", "every pixel sums all lights" if block == 1 else "left out by the settings")
+        skip("cluster.blur", "every pixel sums all lights" if block == 1 else "off in the settings")
         return light
-    return blur(light, surface(frame), block, settings, frame.seen_extent.diagonal)  # Sec. 6, geometry-aware blur
+    return blur(light, receivers_of(frame), block, settings, frame.seen_extent.diagonal)  # Sec. 6, geometry-aware blur
 
 
-def lit(
+def light_pixels(
     frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: ShadowMaps | None, settings: ValSettings, block: int
 ) -> Array:
-    """Light every pixel by pixel lights that are grouped already.
+    """Light every pixel by pixel lights that are clustered already.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen.
+        The scene with its buffers.
     lights : PixelLights
         The pixel lights.
     areas : AreaLights
@@ -78,14 +78,16 @@ def lit(
         Indirect irradiance, W/m^2, not blurred.
     """
     footprint = footprints(frame, settings)
-    warn_of_clamp(surface(frame), lights, settings, footprint, "val")
+    warn_of_clamp(receivers_of(frame), lights, settings, footprint, "val")
     return clustered_irradiance(
-        surface(frame), facing(frame), lights, areas, maps, settings, footprint=footprint,
-        given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
+        receivers_of(frame), face_normals(frame), lights, areas, maps, settings, footprint=footprint,
+        visibility_of=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
         rays=frame.tracer if settings.behind == "raytrace" else None)
 
 
-def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> tuple[AreaLights, ShadowMaps | None]:
+def cluster_lights(
+    frame: "Frame", lights: "PixelLights", settings: ValSettings
+) -> tuple[AreaLights, ShadowMaps | None]:
     """Group pixel lights into as many area lights as asked for, or as an error asks for, and draw their maps.
 
     Parameters
@@ -105,19 +107,19 @@ def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> t
         What each sees; None where nothing asks for it.
     """
     if settings.target_error is not None:
-        chosen = enough_area_lights(frame, lights, settings, areas_of_lights(frame, settings))
+        chosen = count_for_error(frame, lights, settings, light_areas(frame, settings))
         return chosen.areas, chosen.maps
-    skip("cluster.adaptive", "the number of area lights is given")
-    return grouped(frame, lights, settings, settings.area_lights, areas_of_lights(frame, settings))  # Sec. 5
+    skip("cluster.adaptive", "the number of area lights is set")
+    return group_lights(frame, lights, settings, settings.area_lights, light_areas(frame, settings))  # Sec. 5
 
 
-def areas_of_lights(frame: "Frame", settings: ValSettings) -> Array | None:
+def light_areas(frame: "Frame", settings: ValSettings) -> Array | None:
     """Return the surface that each pixel light stands for, where a cluster of one light has its light's size.
 
     Parameters
     ----------
     frame : Frame
-        The scene, lit.
+        The scene with its buffers.
     settings : ValSettings
         What the lights were chosen by.
 
@@ -153,13 +155,13 @@ def block_side(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> 
     return 1 if frame.width * frame.height * lights.flux.shape[1] <= PAIRS_IN_FULL else PUBLISHED_BLOCK
 
 
-def surface(frame: "Frame") -> Receivers:
+def receivers_of(frame: "Frame") -> Receivers:
     """Return the points that a frame's pixels see.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen.
+        The scene with its buffers.
 
     Returns
     -------
@@ -169,13 +171,13 @@ def surface(frame: "Frame") -> Receivers:
     return Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
 
 
-def facing(frame: "Frame") -> Array:
+def face_normals(frame: "Frame") -> Array:
     """Return the normals of the triangles that a frame's pixels see.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen.
+        The scene with its buffers.
 
     Returns
     -------

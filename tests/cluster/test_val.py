@@ -52,8 +52,8 @@ def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
 
 
 @pytest.mark.parametrize("how", [
-    {}, {"visibility": "step"}, {"visibility": "hard"}, {"visibility": "members"}, {"visibility": "rectangle"},
-    {"visibility": "back_projection"}, {"prefilter": "sat"}, {"prefilter": "brute"}, {"interleaving": 4},
+    {}, {"visibility": "pcss"}, {"visibility": "hard"}, {"visibility": "rays_vpls"}, {"visibility": "rays_rectangle"},
+    {"visibility": "back_projection"}, {"visibility": "pcf"}, {"prefilter": "brute"}, {"interleaving": 4},
     {"quantisation": "published"}, {"behind": "dual_paraboloid"}, {"behind": "raytrace"}, {"clamp": "disc"},
     {"single_light": "footprint"}, {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"maps": "rays"},
     TO_AN_ERROR, {"distance": "raw"}, {"distance": "squared"}, {"axes": "pca"}, {"axes": "min_area"},
@@ -139,7 +139,8 @@ def test_what_is_not_needed_does_not_run(ball):
     ("position_weight", -1), ("normal_weight", float("inf")), ("attenuation", -1), ("interleaving", 0),
     ("interleaving", 65), ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0), ("target_error", float("nan")),
     ("position_weight", "much"), ("bias", "some"), ("cone", None), ("occluders_alone", "no"), ("near_distance", -1),
-    ("as_published", {"val_beta"}), ("dealing", "cards"), ("behind", "mirror"), ("near_geometry", "some"),
+    ("as_published", {"val_beta"}), ("assignment", "cards"), ("texels", 4), ("texels", 0),
+    ("behind", "mirror"), ("near_geometry", "some"),
     ("axes", "x"), ("extent", "area")])
 def test_a_setting_that_cannot_be_is_named(key, value):
     with pytest.raises(InputError, match=key):

@@ -1,6 +1,6 @@
 """Clusters of lights by k-means over position and normal (Sec. 5): the mapping C(i) from light to area light.
 
-What a clustering is worth: how much normals differ in a cluster (Fig. 6), how many clusters are in use (Fig. 8).
+What a clustering is contribution: how much normals differ in a cluster (Fig. 6), how many clusters are in use (Fig. 8).
 """
 
 import math

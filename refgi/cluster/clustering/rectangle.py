@@ -1,10 +1,8 @@
-"""The area light of each cluster (Sec. 6): the bounding rectangle of its lights, projected onto its plane.
+"""Virtual area lights (VALs, Sec. 4, 5, 6): the bounding rectangle of each cluster's lights, projected onto its plane.
 
-Along which axes the bounding rectangle of a cluster lies in its plane: fixed, of the lights, or of least area.
-
-The paper names none. A square turned by 45 degrees fills twice its area of fixed axes.
-
-A virtual area light stands for the visibility of the lights of one cluster (Sec. 4, 5).
+A virtual area light stands for the visibility of the lights of one cluster. Its rectangle lies along fixed axes, those
+of the lights, or those of least area; the paper names none. A square turned by 45 degrees fills twice its area of fixed
+axes.
 """
 
 import math
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 ROUND = 1e-9  # a spread this near to that of a disc has no direction
-Given = Callable[[int, Array, Array], Array]  # (area light, points (3, n), facing (3, n)) -> V (n,)
+VisibilityFunction = Callable[[int, Array, Array], Array]  # (area light, points (3, n), facing (3, n)) -> V (n,)
 UPRIGHT = 0.999  # |y| of a normal from which a map's up is -z, as for all maps
 FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line, of no width but the rounding of its lights
 
@@ -65,8 +63,8 @@ def _of_least_area(flat: Array) -> float:
     length = np.hypot(*edges)
     if len(length) < 2 or not length.any():
         return 0.0
-    (c, d), kept = (edges / np.where(length > 0, length, 1)), length > 0
-    c, d = c[kept, None], d[kept, None]
+    (c, d), proper = (edges / np.where(length > 0, length, 1)), length > 0
+    c, d = c[proper, None], d[proper, None]
     along, across = c * corners[0] + d * corners[1], c * corners[1] - d * corners[0]
     best = int(np.argmin(np.ptp(along, axis=1) * np.ptp(across, axis=1)))
     return math.atan2(float(d[best, 0]), float(c[best, 0]))

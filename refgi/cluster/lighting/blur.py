@@ -1,8 +1,8 @@
-"""Geometry-aware blur: the mean over n x n pixels of the same surface (Sec. 6, Laine et al. 2007).
+"""Geometry-aware blur, a joint bilateral box filter: the mean over n x n pixels of the same surface (Sec. 6).
 
-A pixel q counts for p where ``|x_q - x_p| <= extent`` and ``<n_p . n_q> >= cosine``. All weights are 1: a window of
-n x n pixels sees each subset of lights once wherever it lies, and any other kernel would leave the pattern of the
-subsets in the picture. At the rim of the picture the window is moved inwards, for the same reason.
+[Laine et al. 2007] A pixel q counts for p where ``|x_q - x_p| <= extent`` and ``<n_p . n_q> >= cosine``. All weights
+are 1: a window of n x n pixels sees each subset of lights once wherever it lies, and any other kernel would leave the
+pattern of the subsets in the picture. At the rim of the picture the window is moved inwards, for the same reason.
 
 Threads take tiles of TALL x WIDE pixels with their surroundings; the pixels of a row are the SIMD lanes. Where bounds
 say that all pixels around a tile count for each other, nothing is compared.
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.lighting.blur_tile import COLUMNS, END, FAR, TALL, WIDE, E, N, X, alike, load_pixels
+from refgi.cluster.lighting.blur_tile import COLUMNS, END, FAR, TALL, WIDE, E, N, X, is_one_surface, load_pixels
 from refgi.cluster.settings import MOST_BLOCK
 from refgi.errors import expect
 from refgi.jit import kernel, prange
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-TASKS = 64  # parts that tiles are dealt to, whatever the number of threads
+TASKS = 64  # parts that tiles are split into, whatever the number of threads
 
 
 @stage("cluster.blur")
@@ -37,7 +37,7 @@ def blur(irradiance: Array, receivers: Receivers, size: int, settings: "ValSetti
     irradiance : (3, h, w) ndarray
         W/m^2.
     receivers : Receivers
-        The points that are lit; their dtype is that of the result.
+        Receivers; their dtype is that of the result.
     size : int
         n, 1 to 64: pixels along a side of the window.
     settings : ValSettings
@@ -84,14 +84,14 @@ def _blur(
     across = (width + WIDE - 1) // WIDE
     tiles = across * ((height + TALL - 1) // TALL)
     for task in prange(TASKS):
-        room = np.empty((TALL + size - 1, END), position.dtype)  # once: pages of memory cost more than their use
+        scratch = np.empty((TALL + size - 1, END), position.dtype)  # once: pages of memory cost more than their use
         sums = np.empty((4, WIDE), position.dtype)
         for t in range(np.int64(task), tiles, TASKS):
             top, left = t // across * TALL, t % across * WIDE
             tall, wide = min(TALL, height - top), min(WIDE, width - left)
-            tile = room[: tall + size - 1]
+            tile = scratch[: tall + size - 1]
             load_pixels(tile, irradiance, position, normal, covered, top - size // 2, left - size // 2, wide, size)
-            whole = alike(tile, wide + size - 1, square_extent, cosine)
+            whole = is_one_surface(tile, wide + size - 1, square_extent, cosine)
             for row in range(tall):
                 if whole:
                     _add_all(tile, row, size, sums)

@@ -1,10 +1,10 @@
-"""What each area light sees: paraboloid maps of the distance to the nearest occluder (Sec. 4.2, 6).
+"""Paraboloid shadow maps: the distance from each area light's centre to the nearest occluder (Sec. 4.2, 6).
 
 A map looks along the area light's normal from its centre, lifted a little off the surface. The centre of a cluster
 may lie inside geometry, so what is near it must be ignored (Sec. 5.1, Fig. 7); the paper does not say how near.
 Here it is a share `near_distance` of the cluster's radius, and `near_geometry` says what within it is left out.
 
-The maps' twin: each texel's distance by a ray through its centre.
+`traced_maps` finds the same distances by a ray through each texel's centre.
 """
 
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -53,7 +53,7 @@ def traced_maps(
     Returns
     -------
     distance : (k, n, n) ndarray
-        Distance, m; inf where nothing is seen and outside the disc.
+        Distance, m; inf where the map is empty and outside the disc.
     nearest : (k,) ndarray
         Float64: smallest distance on each map, m; inf where nothing is.
     left_out : (k,) ndarray
@@ -63,10 +63,10 @@ def traced_maps(
     distance, left_out = np.full((projection.maps, n, n), np.inf, dtype), np.zeros(projection.maps, np.int64)
     directions, inside = _texel_directions(n)
     for m in range(projection.maps):
-        kept, left_out[m] = _kept(drawn, projection, m, ignored)
-        if kept.all():
-            tracer = tracer or _tracer(drawn, kept)
-        rays = tracer if kept.all() and tracer else _tracer(drawn, kept)
+        selected, left_out[m] = _select(drawn, projection, m, ignored)
+        if selected.all():
+            tracer = tracer or _tracer(drawn, selected)
+        rays = tracer if selected.all() and tracer else _tracer(drawn, selected)
         toward, start = directions @ projection.frame[m], ignored.ball[m]
         hits = rays.closest(projection.origin[m] + start * toward, toward)
         distance[m][inside] = hits.distance + start
@@ -82,8 +82,8 @@ def _texel_directions(n: int) -> tuple[Array, Array]:
     return local[inside], inside
 
 
-def _kept(drawn: Blockers, projection: Projection, m: int, ignored: Ignored) -> tuple[Array, int]:
-    """Tell which planes do not pass too near the centre; count what reaches ahead and is ignored."""
+def _select(drawn: Blockers, projection: Projection, m: int, ignored: Ignored) -> tuple[Array, int]:
+    """Return which planes do not pass too near the centre; count what reaches ahead and is ignored."""
     corners = drawn.vertices[drawn.faces] - projection.origin[m]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     height = np.abs((normal * corners[:, 0]).sum(axis=1))
@@ -93,11 +93,11 @@ def _kept(drawn: Blockers, projection: Projection, m: int, ignored: Ignored) -> 
     return ~near_plane, int((ahead & (near_plane | inside)).sum())
 
 
-def _tracer(drawn: Blockers, kept: Array) -> "Tracer":
+def _tracer(drawn: Blockers, selected: Array) -> "Tracer":
     from refgi.rays import Tracer
     from refgi.scene import Geometry
 
-    faces = drawn.faces[kept]
+    faces = drawn.faces[selected]
     return Tracer(Geometry(drawn.vertices, faces, np.zeros(len(faces), np.int32)))
 
 
@@ -152,9 +152,9 @@ def shadow_maps(
     expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
     extent = Extent(*geometry.bounds) if ends is None else ends.extent
     drawn, both = blockers(geometry, settings.occluders_alone, ends), settings.behind == "dual_paraboloid"
-    lit = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
-    center = np.ascontiguousarray((areas.center + LIFT * extent.largest * areas.normal)[:, lit].T)
-    frame, radius = areas.frame[lit], settings.near_distance * areas.radius[lit]
+    used = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
+    center = np.ascontiguousarray((areas.center + LIFT * extent.largest * areas.normal)[:, used].T)
+    frame, radius = areas.frame[used], settings.near_distance * areas.radius[used]
     rays = tracer if len(drawn.faces) == len(geometry.faces) else None
     depth, near, left_out = _draw(drawn, center, frame, radius, settings, dtype, rays)
     behind = near_behind = None
@@ -163,7 +163,7 @@ def shadow_maps(
         behind, near_behind, more = _draw(drawn, center, BACKWARD @ frame, radius, settings, dtype, rays)
         needed, left_out = needed | np.isfinite(near_behind), left_out + more
     map_of = np.full(len(areas.members), -1, np.int32)
-    map_of[lit[needed]] = np.arange(needed.sum())
+    map_of[used[needed]] = np.arange(needed.sum())
     if (map_of < 0).any():
         skip("cluster.depth_maps", f"nothing occludes {(map_of < 0).sum()} of {len(map_of)} area lights")
     maps = ShadowMaps(depth, map_of, center, frame, near, _farthest(depth), _farthest_corner(extent, center), behind,
@@ -197,9 +197,9 @@ def _farthest_in_columns(depth: Array, columns: Array) -> None:
 
 def _without(maps: ShadowMaps, needed: Array) -> ShadowMaps:
     """Drop the maps on which there is nothing."""
-    kept: dict[str, Any] = {name: values[needed] for name, values in maps._asdict().items()
+    shown: dict[str, Any] = {name: values[needed] for name, values in maps._asdict().items()
                             if name not in ("map_of", "left_out") and values is not None}
-    return maps._replace(**kept)
+    return maps._replace(**shown)
 
 
 def _draw(
@@ -214,4 +214,4 @@ def _draw(
     ignored = Ignored(radius if rule == "planes" else none, radius if rule == "ball" else none)
     if settings.maps == "rays":
         return traced_maps(projection, drawn, ignored, dtype, tracer)
-    return distance_maps(projection, drawn.laid, dtype, ignored)
+    return distance_maps(projection, drawn.chunks, dtype, ignored)

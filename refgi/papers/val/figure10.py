@@ -23,8 +23,8 @@ Array = npt.NDArray[Any]
 
 SHOWN = (2, 4, 8, 16, AREA_LIGHTS)
 FURTHER = (128, 512, 1024)
-KINDS = {"series": "series of 4 terms", "step": "exact step", "hard": "one hard shadow"}
-STEPS_TO = AREA_LIGHTS  # up to which the exact step, which reads every texel, is looked at
+KINDS = {"csm": "CSM, 4 terms", "pcss": "PCSS", "hard": "one hard shadow"}
+STEPS_TO = AREA_LIGHTS  # up to which PCSS, which reads every texel, is drawn
 
 
 class Sweep(NamedTuple):
@@ -99,12 +99,12 @@ def swept(bench: "Workbench", frame: "Frame", right: Array, traced: Array) -> Sw
     covered, most = frame.gbuffer.covered, settings_of(bench).lights
     found = Sweep({}, {}, {}, {})
     for m in (*SHOWN, *(n for n in FURTHER if SHOWN[-1] < n < most), most):
-        for kind in KINDS if m <= STEPS_TO else ("series", "hard") if m == most else ("series",):
+        for kind in KINDS if m <= STEPS_TO else ("csm", "hard") if m == most else ("csm",):
             started = time.perf_counter()
             light = val(frame, settings_of(bench, area_lights=m, visibility=kind))
             taken = time.perf_counter() - started
             found.rmse[kind, m] = errors_of(light, right, covered).rmse
-            if kind == "series":
+            if kind == "csm":
                 found.seconds[m] = taken
                 found.truth[m] = errors_of(light, traced, covered).mae
                 if m in SHOWN:
@@ -130,13 +130,13 @@ def _pictures(frame: "Frame", settings: ValSettings, sweep: Sweep, right: Array,
 
 def _notes(sweep: Sweep, counts: list[int], vpl_off: float, off: float) -> tuple[str, ...]:
     most = counts[-1]
-    slope = float(np.polyfit(np.log(SHOWN), np.log([sweep.rmse["series", m] for m in SHOWN]), 1)[0])
+    slope = float(np.polyfit(np.log(SHOWN), np.log([sweep.rmse["csm", m] for m in SHOWN]), 1)[0])
     return (
         f"From 2 to {AREA_LIGHTS} area lights the RMSE against a ray to each light falls from "
         f"{sweep.rmse['series', 2]:.1f} to {sweep.rmse['series', AREA_LIGHTS]:.1f} % of the mean, about as their "
         f"number to the {slope:.2f}. One hard shadow for each area light comes to "
-        f"{sweep.rmse['hard', 2]:.1f} and {sweep.rmse['hard', AREA_LIGHTS]:.1f} %, and the exact step to "
-        f"{sweep.rmse['step', 2]:.1f} and {sweep.rmse['step', AREA_LIGHTS]:.1f} %: what soft shadows gain in RMSE, the "
+        f"{sweep.rmse['hard', 2]:.1f} and {sweep.rmse['hard', AREA_LIGHTS]:.1f} %, and PCSS to "
+        f"{sweep.rmse['pcss', 2]:.1f} and {sweep.rmse['pcss', AREA_LIGHTS]:.1f} %: what soft shadows gain in RMSE, the "
         "bias of four terms takes back the more, the smaller the area lights; what is left of their worth is that "
         "bands turn into gradients.",
         f"With {most} area lights it is {sweep.rmse['series', most]:.1f} %: each light is then its own area light "

@@ -24,10 +24,10 @@ VIEWS = (View("huge", "very large light", Lamp((0.3, 2.7, 0.3), (0.0, -1.0, 0.0)
          View("contact", "contact, from near", Lamp((0.5, 2.9, 0.5), (0.0, -1.0, 0.0), 0.8), "body", (0.9, 0.5, 1.3),
               (0.25, 0.12, 0.0)))
 WAYS: dict[str, dict[str, Any]] = {
-    "as published: 4 terms, mip": {}, "4 terms, summed areas": {"prefilter": "sat"},
-    "4 terms, every texel": {"prefilter": "brute"}, "16 terms, summed areas": {"prefilter": "sat", "terms": 16},
-    "exact step": {"visibility": "step"}, "one hard shadow": {"visibility": "hard"}}
-PUBLISHED, STEP = "as published: 4 terms, mip", "exact step"
+    "as published: 4 terms, mip": {}, "4 terms, every texel": {"prefilter": "brute"},
+    "16 terms, every texel": {"prefilter": "brute", "terms": 16},
+    "PCSS": {"visibility": "pcss"}, "one hard shadow": {"visibility": "hard"}}
+PUBLISHED, STEP = "as published: 4 terms, mip", "PCSS"
 
 
 def figure5(bench: "Workbench") -> Figure:
@@ -60,7 +60,7 @@ def figure5(bench: "Workbench") -> Figure:
                                     made[PUBLISHED], exposure),
                   pictures.indirect(f"{view.name}_rays", f"{view.title}, by rays", "what is right", right, exposure),
                   *pictures.errors({f"{view.name}_published": (view.title, made[PUBLISHED])}, right, covered),
-                  pictures.indirect(f"{view.name}_step", f"{view.title}, exact step", f"RMSE {rmse[STEP][-1]:.1f} %",
+                  pictures.indirect(f"{view.name}_step", f"{view.title}, PCSS", f"RMSE {rmse[STEP][-1]:.1f} %",
                                     made[STEP], exposure)]
     return Figure(
         shows="Limitations: ringing for very large senders, curved penumbras at a grazing angle of a large sender, "
@@ -77,12 +77,11 @@ def _notes(rmse: dict[str, list[float]]) -> tuple[str, ...]:
         return ", ".join(f"{value:.1f}" for value in rmse[way]) + " %"
 
     return (
-        f"The three pictures are {said(PUBLISHED)} off as published. With summed areas, which know no steps between "
-        f"mip levels, it is {said('4 terms, summed areas')}. Every texel of the disc comes to "
-        f"{said('4 terms, every texel')}.",
-        f"Sixteen terms, whose bias is a quarter, come to {said('16 terms, summed areas')}; the exact step, with the "
+        f"The three pictures are {said(PUBLISHED)} off as published. Every texel of the disc, which knows no steps "
+        f"between mip levels, comes to {said('4 terms, every texel')}.",
+        f"Sixteen terms, whose bias is a quarter, come to {said('16 terms, every texel')}; PCSS, with the "
         f"receiver's plane and the cone towards the light, to {said(STEP)}. One hard shadow comes to "
         f"{said('one hard shadow')}.",
-        "What is left with the exact step is the method's one mean depth of blockers and its round filter for a square "
-        "light; next to contacts the published series lets light through where the step does not, as the paper says "
+        "What is left with PCSS is the method's one mean depth of blockers and its round filter for a square "
+        "light; next to contacts the published series lets light through where PCSS does not, as the paper says "
         "of its own.")

@@ -11,7 +11,7 @@ from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.val import facing
+from refgi.cluster.val import face_normals
 from refgi.pairs.irradiance import Receivers
 from refgi.papers.val.subjects import Clustered
 
@@ -64,7 +64,8 @@ def lit(frame: "Frame", found: Clustered, settings: ValSettings, maps: ShadowMap
     maps = maps_of(frame, found, settings) if maps is None else maps
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     given = reference_visibility(frame, found.lights, found.areas, maps, settings)
-    return clustered_irradiance(receivers, facing(frame), found.lights, found.areas, maps, settings, given=given)
+    return clustered_irradiance(receivers, face_normals(frame), found.lights, found.areas, maps, settings,
+                                visibility_of=given)
 
 
 def alone(found: Clustered, number: int) -> Clustered:

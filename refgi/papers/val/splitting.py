@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from refgi.papers.workbench import Workbench
 
 TITLES = {BOX: "Cornell Box", HORSE: "Cornell Horse", ATRIUM: "Sponza", BLOB: "Metaballs"}
-STEPS = {"lights": "pixel lights for all light, near ones clamped", "members": "clusters: the share of lights seen",
-         "rectangle": "their bounding rectangle", "back_projection": "one map from its centre, projected back",
-         "step": "one mean blocker, one disc", "series": "series of 4 terms", "sat": "squares for discs",
-         "mip": "mip levels for squares", "interleaved": "interleaving and blur"}
+STEPS = {"lights": "pixel lights for all light, near ones clamped", "rays_vpls": "clusters: the share of lights seen",
+         "rays_rectangle": "their bounding rectangle", "back_projection": "one map from its centre, projected back",
+         "pcss": "one mean blocker, one disc", "csm": "series of 4 terms",
+         "mip": "mip levels for discs", "interleaved": "interleaving and blur"}
 SIZE = MOVING / 2  # pixels a side in units of the run's: references are slow
 METHOD = tuple(STEPS)[1:-1]  # what stands between exact shadows and the full sum
-SHOWN = ("lights", "members", "step", "mip")
+SHOWN = ("lights", "rays_vpls", "pcss", "mip")
 
 
 def splitting(bench: "Workbench") -> Figure:

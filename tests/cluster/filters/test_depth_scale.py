@@ -8,9 +8,9 @@ import pytest
 from refgi.cluster.filters.depth_scale import depth_scale, series_depths, series_distance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.look import scale_of
+from refgi.cluster.visibility.pcss import rules
+from refgi.cluster.visibility.search_region import scale_of
 from refgi.cluster.visibility.series import above_half, series
-from refgi.cluster.visibility.step import rules
 
 EXACT = 1e-14
 OVERSHOOT = 0.1  # of the series, 9 % of its height

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.maps import ShadowMaps, hard_visibility, shadow_maps
-from refgi.cluster.maps.hard import SLACK
+from refgi.cluster.maps import ShadowMaps, shadow_maps
 from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.pcf import SLACK
 from refgi.errors import InputError
 from refgi.rays import Tracer
 from refgi.scene import load_scene
-from tests.cluster.maps.lights import area_lights, surface_points
+from tests.cluster.maps.lights import area_lights, hard_visibility, surface_points
 from tests.naive import hard_map
 from tests.rsm.shapes import geometry, soup
 

@@ -6,13 +6,13 @@ import numba
 import numpy as np
 import pytest
 
-from refgi.cluster.maps import hard_visibility, shadow_maps
+from refgi.cluster.maps import shadow_maps
 from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError
 from refgi.rays import Tracer
 from refgi.scene import load_scene
 from refgi.stages import observe
-from tests.cluster.maps.lights import area_lights, surface_points
+from tests.cluster.maps.lights import area_lights, hard_visibility, surface_points
 from tests.cluster.maps.test_occluders import box, together
 from tests.rsm.shapes import geometry, soup
 

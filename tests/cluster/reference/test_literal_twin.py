@@ -57,11 +57,13 @@ def twin(frame, settings, block=1):
     def visible(m, x, facing):
         if settings.visibility == "hard" or areas[m].delta == 0:
             return naive.hard(above[m], maps[m], x, facing)
-        if settings.visibility == "step":
-            return naive.step(above[m], maps[m], x, facing)
+        if settings.visibility == "pcss":
+            return naive.pcss(above[m], maps[m], x, facing)
+        if settings.visibility == "pcf":
+            return naive.pcf(above[m], maps[m], x, facing, settings.texels)
         if settings.visibility == "none":
             return 1.0
-        return naive.series(above[m], maps[m], x, settings.terms, settings.depth_scale)
+        return naive.csm(above[m], maps[m], x, settings.terms, settings.depth_scale)
 
     light = naive.irradiance(pixels, (positions, normals, fluxes), areas, visible, block)
     if block > 1:
@@ -74,7 +76,7 @@ def twin(frame, settings, block=1):
 
 
 @pytest.mark.feature("REF-15", "VAL-01", "VAL-12")
-@pytest.mark.parametrize("mode", ["series", "step", "hard", "none"])
+@pytest.mark.parametrize("mode", ["csm", "pcss", "pcf", "hard", "none"])
 def test_every_pixel_is_that_of_the_loops(box, mode, evidence):
     settings = dataclasses.replace(SETTINGS, visibility=mode)
     expected, got = twin(box, settings), val(box, settings)
@@ -99,7 +101,7 @@ def test_other_scales_of_depth_as_well(box, scale, evidence):
 
 @pytest.mark.feature("VAL-23", "VAL-24")
 def test_interleaved_and_blurred_as_well(box, evidence):
-    settings = dataclasses.replace(SETTINGS, interleaving=4, dealing="index")
+    settings = dataclasses.replace(SETTINGS, interleaving=4, assignment="index")
     expected, got = twin(box, settings, 4), val(box, settings)
     off = np.abs(got - expected).max() / expected.max()
     evidence(f"4 x 4 interleaved, blurred, {box.dtype}: {off:.1e} of the maximum off a picture by plain loops")

@@ -9,7 +9,7 @@ import pytest
 from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
 from refgi.cluster.maps.shadow_maps import shadow_maps
-from refgi.cluster.reference import back_projected_visibility, rectangle_visibility, reference_visibility
+from refgi.cluster.reference import back_projection_visibility, rectangle_visibility, reference_visibility
 from refgi.cluster.reference.rays import rectangle_points
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
@@ -70,7 +70,7 @@ def test_one_point_of_the_rectangle_is_a_ray_against_every_triangle(box, evidenc
 def test_the_map_projected_back_agrees_with_rays(box, evidence):
     frame, _, areas, points, facing = box
     maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
-    traced, projected = rectangle_visibility(frame, areas, SETTINGS), back_projected_visibility(areas, maps)
+    traced, projected = rectangle_visibility(frame, areas, SETTINGS), back_projection_visibility(areas, maps)
     off = []
     for m in range(6):
         a, b = traced(m, points, facing), projected(m, points, facing)
@@ -97,10 +97,10 @@ def test_behind_the_area_light(box, evidence):
     off, wide = [], 0
     for m in range(6):
         back = height_above(areas, m, points) < -1e-3
-        seen = back_projected_visibility(areas, maps)(m, points[:, back], facing[:, back])
+        seen = back_projection_visibility(areas, maps)(m, points[:, back], facing[:, back])
         off += list(seen - rays(m, points[:, back], facing[:, back]))
         wide += (seen < 1).sum()
-        by_rays = back_projected_visibility(areas, maps, rays)(m, points[:, back], facing[:, back])
+        by_rays = back_projection_visibility(areas, maps, rays)(m, points[:, back], facing[:, back])
         assert np.array_equal(by_rays, rays(m, points[:, back], facing[:, back]))
     evidence(f"behind 6 area lights: V is 1 as published; the map of the hemisphere behind, projected back, is "
              f"{np.sqrt(np.mean(np.square(off))):.3f} (rms) off rays at {len(off)} receivers")
@@ -127,7 +127,7 @@ def test_same_bits_for_any_threads_and_any_split(box):
     frame, lights, areas, points, facing = box
     maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
     before = numba.get_num_threads()
-    for mode in ("members", "rectangle", "back_projection"):
+    for mode in ("rays_vpls", "rays_rectangle", "back_projection"):
         given = reference_visibility(frame, lights, areas, maps, dataclasses.replace(SETTINGS, visibility=mode))
         whole = given(2, points, facing)
         numba.set_num_threads(1)

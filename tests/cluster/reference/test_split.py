@@ -21,10 +21,10 @@ pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # th
 SETTINGS = ValSettings(lights=128, area_lights=12, map_resolution=64, clamp="distance", clamp_value=0.1,
                        depth_scale="scene", near_distance=0.5)
 ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
-# the root of summed squares over the error of all seven steps of visibility: 1 for independent ones, 7^-1/2 where all
+# the root of summed squares over the error of all six steps of visibility: 1 for independent ones, 6^-1/2 where all
 # are alike (Cauchy and Schwarz), without bound where they cancel: 3.1 on cornell_horse, whose rectangle darkens what
 # one view from its centre brightens
-LEAST_ROOT = 7**-0.5 - ROUNDING
+LEAST_ROOT = 6**-0.5 - ROUNDING
 MOST_ROOT = 2.0  # in the boxes, where blockers are simple
 
 
@@ -42,13 +42,13 @@ def judge(name, frame, settings, samples, evidence):
     """Split a frame's error, record it and check how the steps add up."""
     reference = trace_truth(frame, TruthSettings(samples=samples)).mean
     found = split_error(frame, settings, reference, block=4)
-    whole, root = found.together("members", "mip")
+    whole, root = found.together("rays_vpls", "mip")
     evidence(f"{name}, rmse / mean of truth: " + ", ".join(f"{step.name} {step.rmse:.3f}" for step in found.steps)
              + f"; steps of visibility together {whole:.3f}, root of their squares {root:.3f} ({root / whole:.2f}); "
              f"all {found.whole:.3f}, root {found.root_of_squares:.3f}")
     assert [step.name for step in found.steps] == ["lights", *STEPS, "interleaved"]
     assert all(0 < step.rmse < 1 for step in found.steps[1:])  # of few lights in a large scene more may be missing
-    assert whole <= sum(found.steps[i].rmse for i in range(1, 8)) + ROUNDING  # triangle inequality
+    assert whole <= sum(found.steps[i].rmse for i in range(1, 1 + len(STEPS))) + ROUNDING  # triangle inequality
     assert root / whole > LEAST_ROOT
     return found, root / whole
 

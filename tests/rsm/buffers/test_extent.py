@@ -25,8 +25,8 @@ ROUNDING = 1e-6  # float32 at a metre or two
 CASES = [
     ("sii", LIGHTS), ("multires", LIGHTS), ("val", VAL), ("val", {**VAL, "distance": "squared"}),
     ("val", {**VAL, "depth_scale": "map"}), ("val", {**VAL, "depth_scale": "scene"}),
-    ("val", {**VAL, "interleaving": 4, "blur_extent": 0.05}), ("val", {**VAL, "visibility": "step"}),
-    ("val", {**VAL, "visibility": "step", "receiver_plane": False, "bias": 0.05}),
+    ("val", {**VAL, "interleaving": 4, "blur_extent": 0.05}), ("val", {**VAL, "visibility": "pcss"}),
+    ("val", {**VAL, "visibility": "pcss", "receiver_plane": False, "bias": 0.05}),
     ("val", {**VAL, "visibility": "hard"}),
     ("val", {**VAL, "occluders_alone": False}), ("val", {**VAL, "behind": "dual_paraboloid"}),
     ("val", {**VAL, "visibility": "back_projection"}), ("hssil", {}), ("hssil", {"visibility": "bitmask"}),

@@ -1,4 +1,4 @@
-"""One name for the three filters of a map, told apart by the type of what they read when kernels are compiled."""
+"""Prefilters of convolution shadow maps (Sec. 6): mip maps and the brute force, chosen by type when kernels compile."""
 
 from typing import Any
 
@@ -7,7 +7,6 @@ import numpy.typing as npt
 from refgi.cluster.filters.brute import Brute, brute_means, brutes, build_brute
 from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.mip import Mip, build_mip, mip_means, mip_of, mips
-from refgi.cluster.filters.sat import Sat, build_sat, sat_means, sats
 from refgi.cluster.settings import ValSettings
 from refgi.jit import by_type
 
@@ -15,73 +14,73 @@ Array = npt.NDArray[Any]
 
 # a read between texels is a tent twice as wide as a texel of its level: half the level makes it the filter's width
 LEVEL_SHIFT = -1.0
-MEANS: dict[Any, Any] = {Mip: mip_means, Sat: sat_means, Brute: brute_means}
-FILL: dict[Any, Any] = {Mip: build_mip, Sat: build_sat, Brute: build_brute}
+MEANS: dict[Any, Any] = {Mip: mip_means, Brute: brute_means}
+BUILD: dict[Any, Any] = {Mip: build_mip, Brute: build_brute}
 
 
-def filtered(
-    filters: Any, s: Array, t: Array, radius: Array, wanted: Array, count: int, with_z: bool, out: Array
+def filter_means(
+    filters: Any, s: Array, t: Array, radius: Array, active: Array, count: int, with_z: bool, out: Array
 ) -> None:
     """Read the means of the channels over a disc for each lane of a tile.
 
     Parameters
     ----------
-    filters : Mip, Sat or Brute
+    filters : Mip or Brute
         The filtered map.
     s, t, radius : (lanes,) ndarray
         Centre and radius of the discs, in units of the map's half side.
-    wanted : (lanes,) ndarray of bool
+    active : (lanes,) ndarray of bool
         Lanes to read.
     count : int
         Lanes in use.
     with_z : bool
         All 4 M + 1 channels instead of the first 2 M.
     out : (channels, lanes) ndarray
-        Filled where wanted.
+        Filled where active.
     """
-    MEANS[type(filters)](filters, s, t, radius, wanted, count, with_z, out)
+    MEANS[type(filters)](filters, s, t, radius, active, count, with_z, out)
 
 
-@by_type(filtered)
+@by_type(filter_means)
 def _by_type(
-    filters: Any, s: Any, t: Any, radius: Any, wanted: Any, count: Any, with_z: Any, out: Any  # noqa: ARG001
+    filters: Any, s: Any, t: Any, radius: Any, active: Any, count: Any, with_z: Any, out: Any  # noqa: ARG001
 ) -> Any:
     means = MEANS[filters.instance_class]
 
     def call(
-        filters: Any, s: Any, t: Any, radius: Any, wanted: Any, count: Any, with_z: Any, out: Any
+        filters: Any, s: Any, t: Any, radius: Any, active: Any, count: Any, with_z: Any, out: Any
     ) -> None:
-        means(filters, s, t, radius, wanted, count, with_z, out)
+        means(filters, s, t, radius, active, count, with_z, out)
 
     return call
 
 
-def build(depth: Array, scale: DepthScale, settings: ValSettings, room: Any = None) -> Any:
+def build_filters(depth: Array, scale: DepthScale, settings: ValSettings, scratch: Any = None) -> Any:
     """Filter one map as settings ask for.
 
     Parameters
     ----------
     depth : (n, n) ndarray
-        Radial distance, m; inf where nothing is seen.
+        Radial distance, m; inf where the map is empty.
     scale : DepthScale
         From metres to the series' scale.
     settings : ValSettings
         `prefilter`, `terms` and `quantisation` count.
-    room : Mip, Sat or Brute, optional
-        Of `room_for` with the same settings; overwritten and returned.
+    scratch : Mip or Brute, optional
+        Of `allocate_filters` with the same settings; overwritten and returned.
 
     Returns
     -------
-    Mip, Sat or Brute
+    Mip or Brute
         In the dtype of `depth`.
     """
-    room = room_for(len(depth), depth.dtype, settings) if room is None else room
-    FILL[type(room)](depth, scale, room)
-    return room
+    scratch = allocate_filters(len(depth), depth.dtype, settings) if scratch is None else scratch
+    BUILD[type(scratch)](depth, scale, scratch)
+    return scratch
 
 
-def room_for(n: int, dtype: npt.DTypeLike, settings: ValSettings) -> Any:
-    """Make room for one filtered map.
+def allocate_filters(n: int, dtype: npt.DTypeLike, settings: ValSettings) -> Any:
+    """Allocate the filters of one map.
 
     Parameters
     ----------
@@ -94,7 +93,7 @@ def room_for(n: int, dtype: npt.DTypeLike, settings: ValSettings) -> Any:
 
     Returns
     -------
-    Mip, Sat or Brute
+    Mip or Brute
         Not yet filled.
 
     Notes
@@ -105,6 +104,4 @@ def room_for(n: int, dtype: npt.DTypeLike, settings: ValSettings) -> Any:
     quantised = settings.quantisation == "published"
     if settings.prefilter == "mip":
         return mip_of(mips(1, n, settings.terms, dtype, shift=LEVEL_SHIFT, quantised=quantised, mirrored=True), 0)
-    if settings.prefilter == "sat":
-        return sats(n, settings.terms, dtype, quantised=quantised, mirrored=True)
     return brutes(n, settings.terms, dtype, box="val_alpha_over_pi" in settings.as_published, quantised=quantised)

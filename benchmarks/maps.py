@@ -21,6 +21,7 @@ from refgi.rays import Tracer
 from refgi.rsm import paraboloid_depth_maps
 from refgi.rsm.raster.projection import paraboloid_projection
 from refgi.scene import Geometry, load_scene
+from refgi.settings import of
 from refgi.stages import Memory, observe
 
 MAPS = 30
@@ -65,7 +66,7 @@ def _left_out(shape: Geometry, areas: AreaLights, repeats: int) -> Iterator[Row]
 
     for rule in ("keep", "planes", "ball"):
         for alone in (False, True):
-            settings = ValSettings(near_geometry=rule, occluders_alone=alone)
+            settings = of(ValSettings, near_geometry=rule, occluders_alone=alone)
             maps = shadow_maps(shape, areas, settings, np.float32)
             note = f"{len(maps.depth)} maps, {maps.left_out / MAPS:.0f} triangles a map left out"
             taken = seconds(lambda: draw(settings), repeats)  # noqa: B023

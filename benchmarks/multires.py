@@ -16,6 +16,7 @@ from benchmarks.harness import Row, ratio, seconds
 from refgi import Frame, load_scene
 from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import Scene
+from refgi.settings import of
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
 from refgi.splat.multires.refinement.criteria import needs
 from refgi.splat.multires.refinement.grid import top_level
@@ -38,7 +39,7 @@ def rows(quick: bool) -> Iterator[Row]:
     for name in ("sponza", "cornell_horse"):
         frame = Frame(_scene(name), width=size, height=size)
         for clamp, how in CLAMPS.items():
-            yield from _errors(f"{name}, {clamp}", frame, MultiresSettings(**how), repeats)
+            yield from _errors(f"{name}, {clamp}", frame, of(MultiresSettings, **how), repeats)
     yield from _sweep(size, repeats)
 
 
@@ -123,7 +124,7 @@ def _sweep(size: int, repeats: int) -> Iterator[Row]:
     frame = Frame(_scene("sponza"), width=size, height=size)
     for count in (64, 256, 1024):
         for threshold in (0.25, 1.4):
-            settings = MultiresSettings(lights=count, clamp="none", normal_threshold=threshold)
+            settings = of(MultiresSettings, lights=count, clamp="none", normal_threshold=threshold)
             leaves = shared_subsplats(frame.gbuffer, settings)
             points, lights = at_subsplats(frame.gbuffer, leaves), choose_lights(frame, settings)
             taken = seconds(lambda p=points, x=lights, s=settings: evaluate(*p, x, s), repeats)

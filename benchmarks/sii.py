@@ -15,13 +15,15 @@ from refgi.lights.selection import choose_lights
 from refgi.rsm import rasterize
 from refgi.sampling import halton
 from refgi.scene import Scene
+from refgi.settings import of
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.reach.fragments import fragments
 from refgi.stages import Memory, observe
 
 ROOM = "cornell_sphere:faces=17000"
-FIVE_PERCENT = SiiSettings(i_low=0.05, reference_length=0.171)  # a sixth of the pairs count, as in Fig. 8: 125 of 768
-CAUSTIC = SiiSettings(lights=4096, warp="B", importance="peak", i_low=0.05, reference_length=1.0)
+# a sixth of the pairs count, as in Fig. 8: 125 of 768
+FIVE_PERCENT = of(SiiSettings, i_low=0.05, reference_length=0.171)
+CAUSTIC = of(SiiSettings, lights=4096, warp="B", importance="peak", i_low=0.05, reference_length=1.0)
 
 
 def rows(quick: bool) -> Iterator[Row]:
@@ -70,7 +72,7 @@ def _culling(size: int) -> Iterator[Row]:
     for name, length in scenes.items():
         frame = Frame(load_scene(name), width=size, height=size)
         for bound in ("tangent", "ellipsoid", "quad", "full"):
-            how = SiiSettings(i_low=0.05, reference_length=length, bound=bound)
+            how = of(SiiSettings, i_low=0.05, reference_length=length, bound=bound)
             drawn = fragments(_receivers(frame), choose_lights(frame, how), how, None, frame.gbuffer.projection)
             yield Row(f"{name}, {bound}: pairs evaluated over fragments", drawn.evaluated / drawn.total, "ratio",
                       "<= 1.3" if bound == "tangent" else "",

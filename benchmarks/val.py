@@ -17,6 +17,7 @@ from benchmarks.harness import Row, seconds
 from refgi import Frame, load_scene
 from refgi.cluster import ValSettings, val
 from refgi.scene import Scene
+from refgi.settings import of
 from refgi.stages import observe
 from refgi.truth.vpl import VplSettings, vpl
 
@@ -57,10 +58,10 @@ def _frames(name: str, size: int, repeats: int, paper: float) -> Iterator[Row]:
         moved.radiance(val(moved, settings))
 
     for label, aim, settings in (
-            ("8 x 8 interleaved and blurred", f"> {paper}", ValSettings(interleaving=8)),
+            ("8 x 8 interleaved and blurred", f"> {paper}", of(ValSettings, interleaving=8)),
             ("the same, lights assigned by cluster", f"> {paper}",
-             ValSettings(interleaving=8, assignment="cluster")),
-            ("every light at every pixel", "", ValSettings(interleaving=1))):
+             of(ValSettings, interleaving=8, assignment="cluster")),
+            ("every light at every pixel", "", of(ValSettings, interleaving=1))):
         def draw(how: ValSettings = settings) -> None:
             frame(how)
 
@@ -91,8 +92,10 @@ def _errors(name: str, size: int) -> Iterator[Row]:
     truth = vpl(frame, VplSettings(lights=1024)).astype(np.float64)
     unshadowed = vpl(frame, VplSettings(lights=1024, visibility=False))
     yield Row(f"{name}: no visibility", *_relative(unshadowed, truth, frame), "")
-    for label, settings in (("every light", ValSettings(interleaving=1)), ("8 x 8", ValSettings(interleaving=8)),
-                            ("PCSS", ValSettings(interleaving=1, visibility="pcss"))):
+    for label, settings in (("every light", of(ValSettings, interleaving=1)),
+                            ("8 x 8", of(ValSettings, interleaving=8)),
+                            ("PCF", of(ValSettings, interleaving=1, visibility="pcf")),
+                            ("PCSS", of(ValSettings, interleaving=1, visibility="pcss"))):
         yield Row(f"{name}: 30 area lights, {label}", *_relative(val(frame, settings), truth, frame), "")
 
 

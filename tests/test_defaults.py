@@ -14,6 +14,7 @@ from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS, find_method, render, usual_shadows
 from refgi.scene import DirectionalLight, PointLight, load_scene
+from refgi.settings import of
 from refgi.splat import GatherSettings, MultiresSettings, SiiSettings
 from refgi.sssil import HssilSettings
 from refgi.truth import TruthSettings, VplSettings
@@ -22,7 +23,7 @@ BOX = load_scene("cornell_box")
 KINDS = (BOX.lights[0], PointLight((0.3, 0.4, 0.3), (0.1, 0.1, 0.1)),
          DirectionalLight((0.3, -0.2, 0.9), (1.0, 1.0, 1.0)))
 TINY = {"width": 16, "height": 14, "rsm_resolution": 16}
-FEW = {"truth": TruthSettings(samples=16), "val": ValSettings(map_resolution=16)}  # else at its defaults
+FEW = {"truth": TruthSettings(samples=16), "val": of(ValSettings, map_resolution=16)}  # else at its defaults
 
 
 def mixed(count):
@@ -47,13 +48,14 @@ def test_every_method_runs_on_one_to_eight_lights_of_all_kinds(method, count):
 
 RAYS = [
     (TruthSettings(), True), (TruthSettings(visibility=False), True), (VplSettings(), True),
-    (VplSettings(visibility=False), True), (SiiSettings(), False), (SiiSettings(source="walk"), True),
-    (SiiSettings(openness_flux="scale"), True), (SiiSettings(warp="A", importance="openness"), True),
-    (SiiSettings(warp="A"), False), (SiiSettings(importance="openness"), False), (GatherSettings(), False),
-    (MultiresSettings(), False), (MultiresSettings(visibility="rays"), True), (MultiresSettings(source="walk"), True),
-    (ValSettings(), False), (ValSettings(maps="rays"), True), (ValSettings(behind="raytrace"), True),
-    (ValSettings(visibility="rays_rectangle"), True), (ValSettings(visibility="rays_vpls"), True),
-    (ValSettings(source="walk"), True), (ValSettings(visibility="back_projection"), False), (HssilSettings(), False),
+    (VplSettings(visibility=False), True), (SiiSettings(), False), (of(SiiSettings, source="walk"), True),
+    (of(SiiSettings, openness_flux="scale"), True), (of(SiiSettings, warp="A", importance="openness"), True),
+    (of(SiiSettings, warp="A"), False), (GatherSettings(), False), (MultiresSettings(), False),
+    (of(MultiresSettings, visibility="rays"), True), (of(MultiresSettings, source="walk"), True),
+    (ValSettings(), False), (of(ValSettings, maps="rays"), True), (of(ValSettings, behind="raytrace"), True),
+    (of(ValSettings, visibility="rays_rectangle"), True), (of(ValSettings, visibility="rays_vpls"), True),
+    (of(ValSettings, source="walk"), True), (of(ValSettings, visibility="back_projection"), False),
+    (HssilSettings(), False),
     (HssilSettings(visibility="rays"), True), (HssilSettings(visibility="bitmask"), False), (object(), False)]
 
 
@@ -89,10 +91,10 @@ def test_methods_without_rays_load_none(method):
 
 def test_settings_of_multires_change_one_by_one_without_its_clamp_in_the_way():
     for change in ({"source": "walk"}, {"openness_flux": "roulette"}, {"visibility": "rays"}):
-        for settings in (MultiresSettings(**change), dataclasses.replace(MultiresSettings(), **change)):
+        for settings in (of(MultiresSettings, **change), dataclasses.replace(MultiresSettings(), **change)):
             assert settings.effective_clamp == "none"
             assert dataclasses.replace(settings, clamp="none").effective_clamp == "none"
     assert MultiresSettings().effective_clamp == "disc"
-    assert MultiresSettings(openness_flux="scale").effective_clamp == "disc"
-    assert MultiresSettings(target_error=0.1).effective_clamp == "disc"
-    assert SiiSettings(clamp="auto").effective_clamp == ValSettings().effective_clamp == "none"
+    assert of(MultiresSettings, openness_flux="scale").effective_clamp == "disc"
+    assert of(MultiresSettings, target_error=0.1).effective_clamp == "disc"
+    assert of(SiiSettings, clamp="auto").effective_clamp == ValSettings().effective_clamp == "none"

@@ -11,6 +11,7 @@ from refgi import Frame, load_scene
 from refgi.errors import InputError, RefgiWarning
 from refgi.methods import METHODS, find_method, render
 from refgi.scene import DirectionalLight, Geometry, PointLight
+from refgi.settings import of
 from refgi.splat.sii.settings import SiiSettings
 from refgi.splat.sii.sii import sii
 from refgi.stages import Memory, observe
@@ -18,7 +19,7 @@ from refgi.stages import Memory, observe
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 SIZE = {"width": 48, "height": 32, "rsm_resolution": 64}
-SETTINGS = SiiSettings(lights=64)
+SETTINGS = of(SiiSettings, lights=64)
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +92,7 @@ def test_frames_of_an_animation_share_what_did_not_change(scene, moves):
 
 def test_several_lights_add_up(scene):
     others = (PointLight((0.1, 0.3, 0.1), (0.05, 0.04, 0.03)), DirectionalLight((0.1, -0.2, 1.0), (0.2, 0.2, 0.2)))
-    settings = SiiSettings(pattern="all", i_low=0)
+    settings = of(SiiSettings, pattern="all", i_low=0)
     options = {"width": 24, "height": 16, "rsm_resolution": 16, "dtype": np.float64}
     lights = (*scene.lights, *others)
     together = sii(Frame(scene.with_lights(*lights), **options), settings)

@@ -15,6 +15,7 @@ from refgi.rays.openness import openness
 from refgi.rsm import reflective_shadow_map
 from refgi.sampling import halton, sobol_owen
 from refgi.scene import PointLight, load_scene
+from refgi.settings import of
 from refgi.splat.gather.gather_sum import disc_pattern
 from refgi.splat.multires.error_target.error_driven import stratified
 from refgi.splat.sii.reach.threshold import light_range
@@ -131,7 +132,7 @@ def test_roulette_keeps_light_k_by_draw_k(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_xi_of_the_stochastic_range(seed):
-    settings = SplatSettings(stochastic_range=True, seed=seed)
+    settings = of(SplatSettings, stochastic_range=True, seed=seed)
     for part in (0, 1):
         scale = light_range(np.ones(50), 0.1, settings, part, np.float64).scale
         assert scale.tolist() == [1 - draw(seed, 3 + 256 * part, k) for k in range(50)]
@@ -162,7 +163,7 @@ def test_samples_of_the_error_target_of_val(seed, monkeypatch):
     lights = choose_pixel_lights(frame.rsms, count=16, pattern="halton")
     monkeypatch.setattr(adaptive, "SAMPLES", 100)
     monkeypatch.setattr(adaptive, "_by_rays", lambda *_: np.zeros((3, 100), np.float32))
-    position = adaptive._samples(frame, lights, ValSettings(seed=seed, target_error=0.1)).receivers.position
+    position = adaptive._samples(frame, lights, of(ValSettings, seed=seed, target_error=0.1)).receivers.position
     surface = np.flatnonzero(frame.gbuffer.covered)
     drawn = [surface[math.floor((k + draw(seed, 6, k)) * len(surface) / 100)] for k in range(100)]
     np.testing.assert_array_equal(position[:, 0], frame.gbuffer.position.reshape(3, -1)[:, drawn])

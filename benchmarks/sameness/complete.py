@@ -1,7 +1,7 @@
 """Whether the tables have every setting of every method, and of each every name."""
 
 from benchmarks.sameness.rows import Table
-from benchmarks.sameness.settings import names_of
+from benchmarks.sameness.settings import key_of, names_of, renamed_value
 from benchmarks.sameness.tables import TABLES
 
 
@@ -16,8 +16,10 @@ def _gaps_of(method: str, table: Table) -> list[str]:
     for row in table.rows:
         for value in row.values:
             several = row.field in ("as_published", "criteria")
-            tried.setdefault(row.field, set()).update(value.split("+") if several else [value])
-    found = [f"{method}: no case has {name}" for name in wanted if name not in tried and name not in table.excluded]
-    found += [f"{method}: {name} is no setting" for name in (*tried, *table.excluded) if name not in wanted]
+            values = value.split("+") if several else [renamed_value(method, row.field, value)]
+            tried.setdefault(key_of(method, row.field), set()).update(values)
+    excluded = {key_of(method, name) for name in table.excluded}
+    found = [f"{method}: no case has {name}" for name in wanted if name not in tried and name not in excluded]
+    found += [f"{method}: {name} is no setting" for name in (*tried, *excluded) if name not in wanted]
     return found + [f"{method}: no case has {name} {value!r}" for name, values in wanted.items()
-                    if name not in table.excluded for value in sorted(values - tried.get(name, set()), key=str)]
+                    if name not in excluded for value in sorted(values - tried.get(name, set()), key=str)]

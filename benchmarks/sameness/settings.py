@@ -1,48 +1,84 @@
-"""Where the flat names of a case become a settings object; the one file to change when settings are composed anew."""
+"""Where the names of a case become settings: names of a ledger stay as they are when settings are renamed."""
 
 import dataclasses
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from refgi.methods import METHODS
 from refgi.scene import Camera
+from refgi.settings import Settings, choices_of, flat, leaves, replaced
+from refgi.settings.fields import is_choice, may_be_none
+from refgi.settings.keys import PRINTED, SEED, find_key
 from refgi.sssil.temporal import TemporalSettings
 
 SETS = ("as_published", "criteria")  # names joined by "+"
 VIEWS = {"cornell_side": Camera((0.5, 0.3, -0.6), (0.2, 0.2, 0.3)),
          "stage_side": Camera((0.9, 0.4, 0.9), (0.0, 0.1, 0.0))}
+# names of the ledger that are no short keys today, and values that have another name
+RENAMED: dict[str, dict[str, str]] = {"val": {"dealing": "assignment"}}
+RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {
+    ("val", "visibility"): {"series": "csm", "step": "pcss", "rectangle": "rays_rectangle", "members": "rays_vpls"}}
 
 
-VAL_NAMES = {"dealing": "assignment"}
-VAL_KINDS = {"series": "csm", "step": "pcss", "rectangle": "rays_rectangle", "members": "rays_vpls"}
-
-
-def settings_of(method: str, **flat: Any) -> Any:
+def settings_of(method: str, **named: Any) -> Any:
     """Return the settings of a method, of which some differ from the default; "temporal" is the temporal filter."""
-    for name in flat.keys() & set(SETS):
-        flat[name] = frozenset(filter(None, flat[name].split("+")))
-    if "views" in flat:
-        flat["views"] = (VIEWS[flat["views"]],)
-    if method == "val":
-        flat = {VAL_NAMES.get(name, name): value for name, value in flat.items()}
-        if "visibility" in flat:
-            flat["visibility"] = VAL_KINDS.get(flat["visibility"], flat["visibility"])
-    return _settings_class(method)(**flat)
+    for name in named.keys() & set(SETS):
+        named[name] = frozenset(filter(None, named[name].split("+")))
+    if "views" in named:
+        named["views"] = (VIEWS[named["views"]],)
+    kind = _settings_class(method)
+    if not issubclass(kind, Settings):
+        return kind(**named)
+    return replaced(kind(), {_name(method, name): renamed_value(method, name, value) for name, value in named.items()})
+
+
+def renamed_value(method: str, name: str, value: Any) -> Any:
+    """Return what a value of the ledger is called today."""
+    return RENAMED_VALUES.get((method, name), {}).get(value, value) if isinstance(value, str) else value
+
+
+def key_of(method: str, name: str) -> str:
+    """Return the whole key that a name of the ledger means."""
+    kind = _settings_class(method)
+    if not issubclass(kind, Settings) or name in (PRINTED, SEED):
+        return name
+    return find_key(kind(), _name(method, name)).key
 
 
 def names_of(method: str) -> dict[str, set[Any]]:
     """Return every setting of a method, each with the values that a ledger must have beside the default."""
-    settings_class = _settings_class(method)
-    types = get_type_hints(settings_class)
+    kind = _settings_class(method)
+    if not issubclass(kind, Settings):
+        return _names_of_fields(kind)
     wanted: dict[str, set[Any]] = {}
-    for field in dataclasses.fields(settings_class):
+    defaults = flat(kind())
+    for leaf in leaves(kind):
+        last = leaf.key.rpartition(".")[2]
+        values = wanted.setdefault(last if last in (PRINTED, SEED) else leaf.key, set())
+        if last == PRINTED:
+            values |= leaf.owner.SWITCHES
+        elif is_choice(leaf.hint):
+            names = {*choices_of(leaf.hint), *(["none"] if may_be_none(leaf.hint) else [])}
+            values |= names - {defaults.get(leaf.key) or "none"}
+        elif get_origin(leaf.hint) is Literal:
+            values |= {*get_args(leaf.hint)} - {defaults.get(leaf.key, leaf.field.default)}
+        elif leaf.hint is bool:
+            values |= {not leaf.field.default}
+    return wanted
+
+
+def _name(method: str, name: str) -> str:
+    return RENAMED.get(method, {}).get(name, name)
+
+
+def _names_of_fields(kind: Any) -> dict[str, set[Any]]:
+    types = get_type_hints(kind)
+    wanted: dict[str, set[Any]] = {}
+    for field in dataclasses.fields(kind):
         names = get_args(types[field.name]) if get_origin(types[field.name]) is Literal else ()
         wanted[field.name] = {name for name in names if name != field.default}
         if types[field.name] is bool:
             wanted[field.name] = {not field.default}
-    wanted.get("as_published", set()).update(getattr(settings_class, "SWITCHES", ()))
-    if method == "val":
-        old = {new: old for old, new in (VAL_NAMES | VAL_KINDS).items()}
-        wanted = {old.get(name, name): {old.get(value, value) for value in values} for name, values in wanted.items()}
+    wanted.get("as_published", set()).update(getattr(kind, "SWITCHES", ()))
     return wanted
 
 

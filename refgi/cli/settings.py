@@ -9,11 +9,14 @@ from typing import Any, get_args, get_type_hints
 from refgi.errors import InputError, first_faults
 from refgi.scene.files import did_you_mean
 from refgi.scene.values import is_number
+from refgi.settings import Settings, from_text
 
 ABSENT = frozenset({"none", "null", ""})
 
 
-def read_settings(wanted: type, pairs: Iterable[str], seed: int | None = None, owner: str = "") -> Any:
+def read_settings(
+    wanted: type[Any], pairs: Iterable[str], seed: int | None = None, owner: str = "", base: Any = None
+) -> Any:
     """Make a method's settings from text.
 
     Parameters
@@ -26,6 +29,8 @@ def read_settings(wanted: type, pairs: Iterable[str], seed: int | None = None, o
         Value of the key ``seed``.
     owner : str
         The method, for messages.
+    base : object, optional
+        What to start from; the defaults where absent.
 
     Returns
     -------
@@ -37,6 +42,8 @@ def read_settings(wanted: type, pairs: Iterable[str], seed: int | None = None, o
     InputError
         If a key is unknown or a value not usable; names all of them.
     """
+    if issubclass(wanted, Settings):
+        return from_text(base or wanted(), [*pairs, *([] if seed is None else [f"seed={seed}"])])
     hints = get_type_hints(wanted)
     known = [field.name for field in fields(wanted)]
     values: dict[str, Any] = {}

@@ -203,13 +203,13 @@ def _samples(frame: "Frame", lights: "PixelLights", settings: "ValSettings") -> 
     surface = np.flatnonzero(covered)
     drawn = np.arange(min(SAMPLES, len(surface)))
     if len(drawn) < len(surface):
-        spread = (drawn + draws(settings.seed, AREA_LIGHT_SAMPLES, len(drawn))) * (len(surface) / len(drawn))
+        spread = (drawn + draws(settings.lights.seed, AREA_LIGHT_SAMPLES, len(drawn))) * (len(surface) / len(drawn))
         drawn = np.minimum(spread.astype(np.int64), len(surface) - 1)
     at = surface[drawn]
     points, normals = (np.ascontiguousarray(plane.reshape(3, -1)[:, None, at]) for plane in (position, normal))
     receivers = Receivers(points, normals, np.ones((1, len(at)), np.bool_))
     facing = facing_normals(frame.scene.geometry, triangle_id.reshape(-1)[None, at], normals)
-    area = footprints(frame, settings)
+    area = footprints(frame, settings.lights, settings.pairs)
     exact = _by_rays(frame, lights, settings, receivers, facing, area)
     return PixelSamples(receivers, facing, exact, area, len(at) / max(1, len(surface)))
 

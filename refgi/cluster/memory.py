@@ -5,6 +5,7 @@ import numba
 from refgi.cluster.adaptive import MOST_TEXELS, WITHOUT_MAPS
 from refgi.cluster.filters.eight import EIGHT
 from refgi.cluster.settings import ValSettings
+from refgi.lights.settings import MapLights
 
 LISTED_FLOATS = 24  # of a pixel, where receivers are gathered by lists: measured, and a fifth more
 
@@ -41,7 +42,10 @@ def _maps(settings: ValSettings) -> int:
         return 0
     texels = settings.map_resolution**2
     asked = settings.area_lights if settings.target_error is None else max(1, MOST_TEXELS // texels)
-    return asked if settings.pattern == "all" else min(asked, settings.lights * settings.bounces)
+    source = settings.lights.source
+    if isinstance(source, MapLights):
+        return asked if source.pattern == "all" else min(asked, settings.lights.count)
+    return min(asked, settings.lights.count * source.bounces)
 
 
 def _filtered_bytes(settings: ValSettings, float_bytes: int) -> int:

@@ -1,13 +1,15 @@
 """What clustered visibility can be set to."""
 
 import dataclasses
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from refgi.errors import expect
-from refgi.lights.settings import MOST_LIGHTS, LightSettings, expect_choices
+from refgi.lights.settings import MOST_LIGHTS, LightSettings, MapLights, expect_footprints
+from refgi.pairs.settings import PairSettings
 from refgi.scene.values import is_count, is_number
+from refgi.settings import Settings, setting
 
 Distance = Literal["raw", "normalised", "squared"]
 Axes = Literal["fixed", "pca", "min_area"]
@@ -21,11 +23,6 @@ Assignment = Literal["index", "cluster"]
 Blur = Literal["none", "box", "geometry"]
 Depths = Literal["log_map", "map", "scene"]
 
-CHOICES: dict[str, Any] = {
-    "distance": Distance, "axes": Axes, "extent": Extent, "visibility": Visibility, "prefilter": Prefilter,
-    "rescale": Rescale, "behind": Behind, "near_geometry": NearGeometry, "assignment": Assignment, "blur": Blur,
-    "single_light": Literal["point", "footprint"], "maps": Literal["raster", "rays"],
-    "quantisation": Literal["none", "published"], "depth_scale": Depths}
 PUBLISHED_AREA_LIGHTS = 30
 MOST_TERMS = 64
 MOST_BLOCK = 64  # pixels
@@ -46,7 +43,7 @@ MAY_BE_NONE = frozenset({"target_error", "bias"})
 
 
 @dataclasses.dataclass(frozen=True)
-class ValSettings(LightSettings):
+class ValSettings(Settings):
     """What `val` can be set to; the defaults are the paper's, those of docs/methods/val where it is silent.
 
     Clustering: `area_lights` clusters by a `distance` ("raw" as printed, "normalised" by the scene's diagonal and pi,
@@ -74,7 +71,8 @@ class ValSettings(LightSettings):
     `blur_cosine` between normals.
     """
 
-    lights: int = 1024
+    lights: LightSettings = setting(LightSettings(count=1024), "pixel lights")
+    pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
     area_lights: int = PUBLISHED_AREA_LIGHTS
     target_error: float | None = None
     distance: Distance = "normalised"
@@ -108,16 +106,16 @@ class ValSettings(LightSettings):
     blur: Blur = "geometry"
     blur_extent: float = 0.1
     blur_cosine: float = 0.8
+    as_published: frozenset[str] = setting(frozenset(), "forms to use as printed", study=True)
 
-    SWITCHES: ClassVar[frozenset[str]] = LightSettings.SWITCHES | {
-        "val_alpha", "val_alpha_over_pi", "val_search_solid_angle"}
+    SWITCHES: ClassVar[frozenset[str]] = frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"})
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def check(self) -> None:
+        """Check ranges, and what fields ask of each other."""
         for key, least, most in COUNTS:
             count = getattr(self, key)
             expect(is_count(count) and least <= count <= most, key, f"a whole number, {least} to {most:,}", count)
-        expect_choices(self, CHOICES)
+        expect_footprints(self.lights, self.pairs)
         for key in FLAGS:
             expect(isinstance(getattr(self, key), bool | np.bool_), key, "true or false", getattr(self, key))
         for key, (low, high, what) in CONSTANTS.items():
@@ -129,14 +127,14 @@ class ValSettings(LightSettings):
         expect(self.interleaving is None or (is_count(self.interleaving) and 1 <= self.interleaving <= MOST_BLOCK),
                "interleaving", f"none or 1 to {MOST_BLOCK} pixels", self.interleaving)
         expect(self.texels % 2 == 1, "texels", "an odd number", self.texels)
-        expect(self.single_light == "point" or self.source == "rsm", "single_light", "'point' with the source 'walk'",
-               self.single_light)
+        expect(self.single_light == "point" or isinstance(self.lights.source, MapLights), "single_light",
+               "'point' with the source 'walk'", self.single_light)
         self._expect_heeded()
 
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return super().traces_rays or self.maps == "rays" or self.behind == "raytrace" or self.visibility in (
+        return self.lights.traces_rays or self.maps == "rays" or self.behind == "raytrace" or self.visibility in (
             "rays_rectangle", "rays_vpls")
 
     def _expect_heeded(self) -> None:

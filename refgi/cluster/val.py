@@ -12,6 +12,7 @@ from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.lights.selection import choose_lights, footprints, light_footprints, light_maps
+from refgi.lights.settings import MapLights
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
 from refgi.rsm import facing_normals
@@ -42,7 +43,7 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, linear RGB.
     """
-    lights = choose_lights(frame, settings)  # Sec. 6, VPL generation
+    lights = choose_lights(frame, settings.lights)  # Sec. 6, VPL generation
     areas, maps = cluster_lights(frame, lights, settings)
     block = block_side(frame, lights, settings)
     light = light_pixels(frame, lights, areas, maps, settings, block)  # Sec. 4 and 6
@@ -77,8 +78,8 @@ def light_pixels(
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, not blurred.
     """
-    footprint = footprints(frame, settings)
-    warn_of_clamp(receivers_of(frame), lights, settings, footprint, "val")
+    footprint = footprints(frame, settings.lights, settings.pairs)
+    warn_of_clamp(receivers_of(frame), lights, settings.pairs, footprint, "val")
     return clustered_irradiance(
         receivers_of(frame), face_normals(frame), lights, areas, maps, settings, footprint=footprint,
         visibility_of=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
@@ -128,9 +129,9 @@ def light_areas(frame: "Frame", settings: ValSettings) -> Array | None:
     (N,) ndarray or None
         Area, m^2.
     """
-    if settings.single_light == "point":
+    if settings.single_light == "point" or not isinstance(settings.lights.source, MapLights):
         return None
-    return light_footprints(light_maps(frame, settings), settings)
+    return light_footprints(light_maps(frame, settings.lights.source), settings.lights)
 
 
 def block_side(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> int:

@@ -7,19 +7,19 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.lights.footprints import texel_areas, with_equal_solid_angles
-from refgi.pairs.settings import FOOTPRINT_CLAMPS
+from refgi.lights.settings import LightSettings, MapLights, PathLights
 from refgi.stages import skip
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.lights.settings import LightSettings
     from refgi.pairs.pixel_lights import PixelLights
+    from refgi.pairs.settings import PairSettings
     from refgi.rsm import Rsm
 
 Array = npt.NDArray[Any]
 
 
-def choose_lights(frame: "Frame", settings: "LightSettings") -> "PixelLights":
+def choose_lights(frame: "Frame", settings: LightSettings) -> "PixelLights":
     """Return the pixel lights of a frame.
 
     Parameters
@@ -34,24 +34,25 @@ def choose_lights(frame: "Frame", settings: "LightSettings") -> "PixelLights":
     PixelLights
         Lights with their share of the flux.
     """
-    if settings.source == "walk":
-        lights = _walked(frame, settings)
+    source = settings.source
+    if isinstance(source, PathLights):
+        lights = _walked(frame, settings.count, source.bounces, settings.seed)
     else:
-        rsms = light_maps(frame, settings)
+        rsms = light_maps(frame, source)
         lights = pixel_lights(rsms, settings, importance_maps(frame, rsms, settings))
-        if "sii_no_tn" in settings.as_published:
+        if "sii_no_tn" in source.as_published:
             lights = _without_weight(lights, rsms, settings)
     return thinned(frame, lights, settings)
 
 
-def light_maps(frame: "Frame", settings: "LightSettings") -> "tuple[Rsm, ...]":
+def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
     """Return the maps that lights are taken from: those of the frame, with what glass lets through.
 
     Parameters
     ----------
     frame : Frame
         The scene, lit.
-    settings : LightSettings
+    settings : MapLights
         Says how glass refracts.
 
     Returns
@@ -63,15 +64,16 @@ def light_maps(frame: "Frame", settings: "LightSettings") -> "tuple[Rsm, ...]":
 
     equal = "equal_solid_angle" in settings.as_published
     rsms = tuple(map(with_equal_solid_angles, frame.rsms)) if equal else frame.rsms
-    if settings.refraction == "none":
+    if settings.refraction is None:
         return rsms
-    traced = settings.refraction == "two_interface" and frame.materials.ior.any()
+    mode: Any = settings.refraction.name()
+    traced = mode == "two_interface" and frame.materials.ior.any()
     tracer = frame.tracer if traced else None
-    return tuple(refracted(rsm, frame.scene.geometry, frame.materials, settings.refraction,
-                           settings.refraction_exponent, tracer=tracer) for rsm in rsms)
+    return tuple(refracted(rsm, frame.scene.geometry, frame.materials, mode, settings.refraction.exponent,
+                           tracer=tracer) for rsm in rsms)
 
 
-def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: "LightSettings") -> list[Array] | None:
+def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettings) -> list[Array] | None:
     """Return what each texel is worth to the warp (Sec. 3.5).
 
     Parameters
@@ -90,19 +92,20 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: "LightSetti
     """
     from refgi.lights.importance import importance
 
-    if settings.warp == "none":
+    warp = _map_lights(settings).warp
+    if warp is None:
         skip("rsm.warp", "lights follow their pattern alone")
         return None
     maps = []
     for rsm in rsms:
         free = None
-        if settings.importance == "openness":
+        if warp.importance == "openness":
             free = _openness(frame, rsm.position, rsm.normal, settings, _lit(rsm))
-        maps.append(importance(rsm, settings.importance, free, settings.openness_floor, settings.defensive))
+        maps.append(importance(rsm, warp.importance, free, settings.openness.floor, warp.defensive))
     return maps
 
 
-def thinned(frame: "Frame", lights: "PixelLights", settings: "LightSettings") -> "PixelLights":
+def thinned(frame: "Frame", lights: "PixelLights", settings: LightSettings) -> "PixelLights":
     """Darken or remove lights in the open, if the settings ask for it (Sec. 3.6).
 
     Parameters
@@ -122,37 +125,37 @@ def thinned(frame: "Frame", lights: "PixelLights", settings: "LightSettings") ->
     from refgi.lights.openness_flux import power, roulette, scale_flux
     from refgi.pairs.loss import lost_share, warn_of_loss
 
-    if settings.openness_flux == "none":
+    if settings.openness.flux == "none":
         return lights
     free = _openness(frame, lights.position, lights.normal, settings)
-    if settings.openness_flux == "scale":
+    if settings.openness.flux == "scale":
         scaled = scale_flux(lights, free)[0]
         warn_of_loss(lost_share(power(lights).sum(), power(scaled).sum()), "openness_flux 'scale'")
         return scaled
-    return roulette(lights, free, settings.openness_floor, settings.seed)
+    return roulette(lights, free, settings.openness.floor, settings.seed)
 
 
 def _openness(
-    frame: "Frame", position: Array, normal: Array, settings: "LightSettings", covered: Array | None = None
+    frame: "Frame", position: Array, normal: Array, settings: LightSettings, covered: Array | None = None
 ) -> Array:
     from refgi.rays import openness
 
-    radius = settings.openness_radius or frame.lit_extent.diagonal / 10
-    return openness(frame.tracer, position, normal, covered, radius=radius, rays=settings.openness_rays,
+    radius = settings.openness.radius or frame.lit_extent.diagonal / 10
+    return openness(frame.tracer, position, normal, covered, radius=radius, rays=settings.openness.rays,
                     seed=settings.seed)
 
 
-def _walked(frame: "Frame", settings: "LightSettings") -> "PixelLights":
+def _walked(frame: "Frame", count: int, bounces: int, seed: int) -> "PixelLights":
     from refgi.lights.walk import walk_lights
     from refgi.scene import light_table, material_table
 
     scene = frame.scene
     return walk_lights(frame.tracer, scene.geometry, material_table(scene.materials), light_table(scene.lights),
-                       settings.lights, settings.bounces, settings.seed)
+                       count, bounces, seed)
 
 
 def pixel_lights(
-    rsms: "Sequence[Rsm]", settings: "LightSettings", importance: "Sequence[Array] | None" = None
+    rsms: "Sequence[Rsm]", settings: LightSettings, importance: "Sequence[Array] | None" = None
 ) -> "PixelLights":
     """Choose pixel lights from maps as the settings say.
 
@@ -173,14 +176,21 @@ def pixel_lights(
     from refgi.lights.pixel_lights import choose_pixel_lights
     from refgi.lights.warp import Warp
 
-    count = None if settings.pattern == "all" else settings.lights
-    warp = None if settings.warp == "none" else Warp(settings.warp, settings.warp_levels)
-    return choose_pixel_lights(rsms, count=count, pattern=settings.pattern, seed=settings.seed,
-                               filtered=settings.filtered, warp=warp, importance=importance,
-                               renormalise=settings.renormalise_weights)
+    source = _map_lights(settings)
+    count = None if source.pattern == "all" else settings.count
+    method: Any = source.warp and source.warp.name()
+    warp = None if source.warp is None else Warp(method, source.warp.levels)
+    return choose_pixel_lights(rsms, count=count, pattern=source.pattern, seed=settings.seed,
+                               filtered=source.filtered, warp=warp, importance=importance,
+                               renormalise=source.warp is not None and source.warp.renormalise_weights)
 
 
-def drawn_from_maps(rsms: "Sequence[Rsm]", settings: "LightSettings") -> list[int]:
+def _map_lights(settings: LightSettings) -> MapLights:
+    """Return how lights are taken from maps; the defaults where they are ends of paths."""
+    return settings.source if isinstance(settings.source, MapLights) else MapLights()
+
+
+def drawn_from_maps(rsms: "Sequence[Rsm]", settings: LightSettings) -> list[int]:
     """Return N, how many texels the settings draw from each map.
 
     Parameters
@@ -197,12 +207,13 @@ def drawn_from_maps(rsms: "Sequence[Rsm]", settings: "LightSettings") -> list[in
     """
     from refgi.lights.pixel_lights import map_shares
 
-    return map_shares(rsms, None if settings.pattern == "all" else settings.lights, settings.pattern)
+    pattern = _map_lights(settings).pattern
+    return map_shares(rsms, None if pattern == "all" else settings.count, pattern)
 
 
-def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: "LightSettings") -> "PixelLights":
+def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: LightSettings) -> "PixelLights":
     """Return lights as the paper has them: each with its texel's flux, T/N left out."""
-    if settings.pattern == "all" or lights.map_index is None:
+    if _map_lights(settings).pattern == "all" or lights.map_index is None:
         return lights
     drawn = drawn_from_maps(rsms, settings)
     share = np.array([n / rsm.texels for n, rsm in zip(drawn, rsms, strict=True)], lights.flux.dtype)
@@ -211,7 +222,7 @@ def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: "Lig
     return lights._replace(flux=lights.flux * factor, lobe_flux=lobe)
 
 
-def footprints(frame: "Frame", settings: "LightSettings") -> Array | None:
+def footprints(frame: "Frame", settings: LightSettings, pairs: "PairSettings") -> Array | None:
     """Return the surface area of each light of `choose_lights`, where the clamp asks for it.
 
     Parameters
@@ -220,20 +231,22 @@ def footprints(frame: "Frame", settings: "LightSettings") -> Array | None:
         The scene, lit.
     settings : LightSettings
         What the lights were chosen by.
+    pairs : PairSettings
+        The clamp.
 
     Returns
     -------
     (N,) ndarray or None
         Area, m^2.
     """
-    if settings.effective_clamp not in FOOTPRINT_CLAMPS:
+    if not pairs.needs_footprints:
         return None
-    rsms = light_maps(frame, settings)
+    rsms = light_maps(frame, _map_lights(settings))
     return light_footprints(rsms, settings, importance_maps(frame, rsms, settings))
 
 
 def light_footprints(
-    rsms: "Sequence[Rsm]", settings: "LightSettings", importance: "Sequence[Array] | None" = None
+    rsms: "Sequence[Rsm]", settings: LightSettings, importance: "Sequence[Array] | None" = None
 ) -> Array:
     """Return the surface area that each pixel light stands for: O d^2 / cos, with the same T / N as its flux.
 

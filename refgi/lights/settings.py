@@ -1,120 +1,151 @@
-"""Which pixel lights a splatting method uses, beside how each lights a receiver."""
+"""Settings of pixel lights: how many, from shadow maps or light paths, with which importance and openness."""
 
 import dataclasses
-from typing import Any, ClassVar, Literal, get_args
+from typing import ClassVar, Literal
 
 from refgi.errors import expect
 from refgi.lights.walk import MOST_BOUNCES
-from refgi.pairs.settings import FOOTPRINT_CLAMPS, LAST_SEED, PairSettings
+from refgi.pairs.settings import LAST_SEED, PairSettings
 from refgi.scene.material import SHARPEST
-from refgi.scene.values import LARGEST, is_count
+from refgi.scene.values import LARGEST
+from refgi.settings import Settings, setting
 
 Pattern = Literal["grid", "halton", "all", "random"]
-Source = Literal["rsm", "walk"]
-WarpMethod = Literal["none", "A", "B"]
-Importance = Literal["flux", "peak", "openness"]
-OpennessFlux = Literal["none", "scale", "roulette"]
-Refraction = Literal["none", "back_face", "two_interface"]
 
-CHOICES: dict[str, Any] = {"pattern": Pattern, "source": Source, "warp": WarpMethod, "importance": Importance,
-                           "openness_flux": OpennessFlux, "refraction": Refraction}
 MOST_LIGHTS = 1 << 24  # every texel of a map of 4096 x 4096
-# least and most of each number
-COUNTS = (("lights", 1, MOST_LIGHTS), ("bounces", 1, MOST_BOUNCES), ("warp_levels", 0, 32),
-          ("openness_rays", 1, 1 << 16), ("seed", 0, LAST_SEED))
-FOR_MAPS = ("pattern", "filtered", "warp", "renormalise_weights")  # no effect on paths: must be left as they are
-FOR_MAPS_AS_PUBLISHED = frozenset({"sii_no_tn", "equal_solid_angle"})
 
 
 @dataclasses.dataclass(frozen=True)
-class LightSettings(PairSettings):
-    """Which pixel lights, and how one lights one receiver.
+class WarpSettings(Settings):
+    """Warp the pattern towards what is important (SII Sec. 3.5)."""
 
-    `lights` of a shadow map (`source` "rsm"), or as many paths of `bounces` bounces from each light ("walk",
-    Sec. 3.7 of SII), are taken by a `pattern` ("all": every texel, `lights` is not used) with `seed`; `filtered`
-    averages the flux over each light's cell (Sec. 4). `refraction` at glass is that of its back faces alone, as
-    published, of both interfaces, or none; its lobes have `refraction_exponent`.
+    levels: int = setting(3, "levels of the importance pyramid", least=0, most=32)
+    importance: Literal["flux", "peak", "openness"] = setting(
+        "flux", "flux, flux times the lobe's peak, or that times 1 - openness")
+    defensive: float = setting(0.0, "share of the importance that is spread evenly", least=0.0, most=1.0)
+    renormalise_weights: bool = setting(False, "weights sum to those of unwarped lights, which costs a bias",
+                                        study=True)
 
-    Importance (Sec. 3.5): `warp` by method "A" or "B" over `warp_levels` levels, towards flux, flux times the lobe's
-    `peak`, or that times 1 - `openness` (at least `openness_floor`), of which a share `defensive` is spread evenly;
-    `renormalise_weights` makes their sum that of unwarped lights, at the cost of bias. `openness_flux` (Sec. 3.6)
-    scales fluxes by 1 - openness, or plays roulette with them, which costs no energy in the mean. Openness is that of
-    `openness_rays` rays of length `openness_radius` (m; 0: a tenth of the scene's diagonal).
-    """
 
-    lights: int = 768
-    pattern: Pattern = "halton"
-    filtered: bool = False
-    source: Source = "rsm"
-    bounces: int = 1
-    seed: int = 0
-    warp: WarpMethod = "none"
-    warp_levels: int = 3
-    importance: Importance = "flux"
-    defensive: float = 0.0
-    renormalise_weights: bool = False
-    openness_radius: float = 0.0
-    openness_rays: int = 16
-    openness_floor: float = 0.05
-    openness_flux: OpennessFlux = "none"
-    refraction: Refraction = "back_face"
-    refraction_exponent: float = 3000.0
+@dataclasses.dataclass(frozen=True)
+class WarpA(WarpSettings):
+    """Warping by method A of SII Sec. 3.5."""
 
-    SWITCHES: ClassVar[frozenset[str]] = PairSettings.SWITCHES | FOR_MAPS_AS_PUBLISHED
+    NAME = "A"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for key, least, most in COUNTS:
-            count = getattr(self, key)
-            expect(is_count(count) and least <= count <= most, key, f"a whole number, {least} to {most:,}", count)
-        expect_choices(self, CHOICES)
-        self._expect_source()
-        expect(self.effective_clamp not in FOOTPRINT_CLAMPS or self.openness_flux != "roulette", "openness_flux",
-               f"'none' or 'scale' with the clamp {self.effective_clamp!r}", self.openness_flux)
-        expect(self.warp == "none" or self.pattern != "all", "warp", "'none' with the pattern 'all'", self.warp)
-        expect(0 <= self.openness_radius <= LARGEST, "openness_radius", f"0 to {LARGEST:g} m", self.openness_radius)
-        for key in ("defensive", "openness_floor"):
-            expect(0 <= getattr(self, key) <= 1, key, "a share from 0 to 1", getattr(self, key))
-        expect(self.openness_floor > 0 or self.openness_flux != "roulette", "openness_floor",
-               "more than 0 for roulette", self.openness_floor)
-        expect(0 <= self.refraction_exponent <= SHARPEST, "refraction_exponent", f"0 to {SHARPEST:g}",
-               self.refraction_exponent)
+
+@dataclasses.dataclass(frozen=True)
+class WarpB(WarpSettings):
+    """Warping by method B of SII Sec. 3.5."""
+
+    NAME = "B"
+
+
+@dataclasses.dataclass(frozen=True)
+class RefractionSettings(Settings):
+    """What glass does to the light of a map."""
+
+    exponent: float = setting(3000.0, "exponent of the lobes that leave glass", least=0.0, most=SHARPEST)
+
+
+@dataclasses.dataclass(frozen=True)
+class BackFace(RefractionSettings):
+    """Refraction at back faces alone, as published."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TwoInterface(RefractionSettings):
+    """Refraction at both interfaces."""
+
+
+@dataclasses.dataclass(frozen=True)
+class MapLights(Settings):
+    """Pixel lights are texels of reflective shadow maps."""
+
+    NAME = "rsm"
+    SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_no_tn", "equal_solid_angle"})
+
+    pattern: Pattern = setting("halton", "where they lie in a map; all: every texel, whatever the count")
+    filtered: bool = setting(False, "flux is averaged over each light's cell (SII Sec. 4)")
+    warp: WarpA | WarpB | None = setting(None, "importance warping (SII Sec. 3.5)")
+    refraction: BackFace | TwoInterface | None = setting(BackFace(), "refraction at glass")
+    as_published: frozenset[str] = setting(frozenset(), "forms of the maps to use as printed", study=True)
+
+    def check(self) -> None:
+        """Check that a warped pattern leaves some texels out."""
+        expect(self.warp is None or self.pattern != "all", "warp", "none with the pattern 'all'",
+               self.warp and self.warp.name())
+
+
+@dataclasses.dataclass(frozen=True)
+class PathLights(Settings):
+    """Pixel lights are the ends of quasi-random light paths (SII Sec. 3.7)."""
+
+    NAME = "walk"
+
+    bounces: int = setting(1, "bounces of a path before its end lights", least=1, most=MOST_BOUNCES)
+
+
+@dataclasses.dataclass(frozen=True)
+class OpennessSettings(Settings):
+    """How open the surroundings of a light are, and what that does to its flux (SII Sec. 3.6)."""
+
+    radius: float = setting(0.0, "length of the rays; 0: a tenth of the scene's diagonal", least=0.0, most=LARGEST,
+                            unit="m", study=True)
+    rays: int = setting(16, "rays of one light", least=1, most=1 << 16, study=True)
+    floor: float = setting(0.05, "least importance of a light in the open", least=0.0, most=1.0, study=True)
+    flux: Literal["none", "scale", "roulette"] = setting(
+        "none", "flux times 1 - openness, or roulette with it, which costs no energy in the mean")
+
+    def check(self) -> None:
+        """Check that roulette can let a light live."""
+        expect(self.floor > 0 or self.flux != "roulette", "floor", "more than 0 for roulette", self.floor)
+
+
+@dataclasses.dataclass(frozen=True)
+class LightSettings(Settings):
+    """Which pixel lights there are."""
+
+    PRINCIPAL = "count"
+
+    count: int = setting(768, "pixel lights of a map, or paths of a light", least=1, most=MOST_LIGHTS)
+    seed: int = setting(0, "which random numbers", least=0, most=LAST_SEED)
+    source: MapLights | PathLights = setting(MapLights(), "texels of shadow maps, or ends of light paths")
+    openness: OpennessSettings = setting(OpennessSettings(), "lights in the open")
 
     @property
     def traces_rays(self) -> bool:
         """Whether lights are found by rays."""
-        warped_by_rays = self.warp != "none" and self.importance == "openness"
-        return self.source == "walk" or self.openness_flux != "none" or warped_by_rays
+        return isinstance(self.source, PathLights) or self.openness.flux != "none" or self._warps_by_rays
 
-    def _expect_source(self) -> None:
-        expect(self.effective_clamp not in FOOTPRINT_CLAMPS or self.source == "rsm", "clamp",
-               "one without footprints with the source 'walk'", self.clamp)
-        expect(self.bounces == 1 or self.source == "walk", "bounces", "1 with the source 'rsm'", self.bounces)
-        if self.source == "walk":
-            left = {field.name: field.default for field in dataclasses.fields(self)}
-            for key in FOR_MAPS:
-                expect(getattr(self, key) == left[key], key, f"{left[key]!r} with the source 'walk'",
-                       getattr(self, key))
-            of_maps = self.as_published & FOR_MAPS_AS_PUBLISHED
-            expect(not of_maps, "as_published", f"no {' or '.join(map(repr, sorted(of_maps)))} with the source 'walk'",
-                   sorted(self.as_published))
+    @property
+    def _warps_by_rays(self) -> bool:
+        warp = self.source.warp if isinstance(self.source, MapLights) else None
+        return warp is not None and warp.importance == "openness"
+
+    @property
+    def has_footprints(self) -> bool:
+        """Whether each light stands for a known surface area."""
+        return isinstance(self.source, MapLights) and self.openness.flux != "roulette"
 
 
-def expect_choices(settings: Any, choices: dict[str, Any]) -> None:
-    """Check that settings are among the names their types list.
+def expect_footprints(lights: LightSettings, pairs: PairSettings) -> None:
+    """Check that lights have the footprints that a clamp needs.
 
     Parameters
     ----------
-    settings : object
-        Settings.
-    choices : dict of str to Literal
-        The type of each key to check.
+    lights : LightSettings
+        Where lights come from.
+    pairs : PairSettings
+        The clamp.
 
     Raises
     ------
     InputError
-        If a value is not among the names.
+        If they have none.
     """
-    for key, names in choices.items():
-        value = getattr(settings, key)
-        expect(value in get_args(names), key, " or ".join(map(repr, get_args(names))), value)
+    if pairs.needs_footprints:
+        expect(isinstance(lights.source, MapLights), "pairs.clamp", "one without footprints with the source 'walk'",
+               pairs.clamp and pairs.clamp.name())
+        expect(lights.openness.flux != "roulette", "lights.openness.flux",
+               f"'none' or 'scale' with the clamp {pairs.clamp and pairs.clamp.name()!r}", lights.openness.flux)

@@ -14,7 +14,7 @@ from refgi.errors import expect
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.packing import Packed, pack
 from refgi.pairs.pair_sum import TILE, sum_pairs
-from refgi.pairs.settings import FOOTPRINT_CLAMPS, PairSettings
+from refgi.pairs.settings import PairSettings, SphereClamp
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.pairs.tiles import block_by_block, put, taken
 from refgi.stages import report_progress, skip, stage
@@ -178,11 +178,11 @@ def _check(
         if values is not None:
             expect(values.shape == (3, count), f"lights.{key}", f"shape (3, {count})", values.shape)
             expect(bool(np.isfinite(values).all()), f"lights.{key}", "finite numbers", "NaN or infinity")
-    clamp = settings.effective_clamp
-    if clamp in FOOTPRINT_CLAMPS:
+    clamp = settings.clamp
+    if clamp is not None and settings.needs_footprints:
         expect(footprint is not None and footprint.shape == (count,), "footprint",
-               f"the area of each of {count} lights for the clamp {clamp!r}", None if footprint is None else
+               f"the area of each of {count} lights for the clamp {clamp.name()!r}", None if footprint is None else
                footprint.shape)
-    if clamp == "sphere":
+    if isinstance(clamp, SphereClamp):
         expect(lights.lobe_flux is None or not lights.lobe_flux.any(), "clamp",
-               "another one for glossy materials ('sphere' knows diffuse lights alone)", clamp)
+               "another one for glossy materials ('sphere' knows diffuse lights alone)", "sphere")

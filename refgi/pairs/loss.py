@@ -5,6 +5,7 @@ setting and without, at pixels that are the same in every run. Without a clamp a
 the share is as good as the sample: within 3 of 100 in the tests.
 """
 
+import dataclasses
 import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -135,25 +136,7 @@ def clamp_loss(
     """
     sample = sample_for(receivers, lights)
     clamped = light_at(sample, lights, settings, footprint)
-    return lost_share(light_at(sample, lights, without_clamp(settings)), clamped)
-
-
-def without_clamp(settings: PairSettings) -> PairSettings:
-    """Return how one light lights one receiver but for the clamp.
-
-    Parameters
-    ----------
-    settings : PairSettings
-        Those of any method.
-
-    Returns
-    -------
-    PairSettings
-        With what sums over all pairs heed.
-    """
-    switches = settings.as_published & PairSettings.SWITCHES
-    return PairSettings(offset=settings.offset, lobe_norm=settings.lobe_norm, widening=settings.widening,
-                        as_published=switches)
+    return lost_share(light_at(sample, lights, dataclasses.replace(settings, clamp=None)), clamped)
 
 
 def lost_share(whole: float, left: float) -> float:
@@ -195,10 +178,10 @@ def warn_of_clamp(
     RefgiWarning
         With setting and share.
     """
-    if settings.effective_clamp != "none":
-        value = f" of {settings.clamp_value:g}" if settings.clamp_value > 0 else ""
+    if settings.clamp is not None and settings.clamps:
+        value = getattr(settings.clamp, "value", None)
         warn_of_loss(clamp_loss(receivers, lights, settings, footprint),
-                     f"{method}: clamp {settings.effective_clamp!r}{value}")
+                     f"{method}: clamp {settings.clamp.name()!r}" + (f" of {value:g}" if value is not None else ""))
 
 
 def warn_of_loss(share: float, setting: str) -> None:

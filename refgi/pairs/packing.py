@@ -13,7 +13,7 @@ from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.pairs.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
 from refgi.pairs.pair_sum import Clamp
-from refgi.pairs.settings import PairSettings
+from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, PairSettings, SphereClamp
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
@@ -66,10 +66,10 @@ def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None,
     glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
     diffuse = pack_diffuse(lights, settings, dtype, shines)
     clamp, spheres = None, None
-    if settings.effective_clamp != "none":
+    if settings.clamps:
         clamp = pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
-    if settings.effective_clamp == "sphere" and footprint is not None:
-        spheres = pack_spheres(settings, footprint, shines, dtype)
+    if isinstance(settings.clamp, SphereClamp) and footprint is not None:
+        spheres = pack_spheres(settings.clamp.value, footprint, shines, dtype)
     lobes = None
     if glossy.any():
         packed = pack_lobes(lights, settings, dtype, glossy)
@@ -130,7 +130,7 @@ def pack_lobes(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLi
     flux, axis, exponent = _lobes(lights, chosen)
     cos_theta = (np.asarray(lights.normal[:, chosen], np.float64) * axis).sum(axis=0)
     norm = np.empty_like(exponent)
-    _fill_norms(cos_theta, exponent, NORMS[settings.lobe_norm], norm)
+    _fill_norms(cos_theta, exponent, NORMS[settings.lobe.norm], norm)
     packed = np.concatenate([*_place(lights, settings, chosen), -axis, exponent[None], _finite(flux * norm, dtype)])
     return packed.astype(dtype, order="C")
 
@@ -175,20 +175,21 @@ def pack_clamp(settings: PairSettings, footprint: Array | None, chosen: Array, c
         With neutral values for the modes not in use.
     """
     softness = np.zeros(count, dtype)
-    if settings.effective_clamp == "disc" and footprint is not None:
+    mode = settings.clamp
+    if isinstance(mode, DiscClamp) and footprint is not None:
         softness[: np.count_nonzero(chosen)] = footprint[chosen] / math.pi
-    least = settings.clamp_value**2 if settings.effective_clamp == "distance" else 0.0
-    bound = settings.clamp_value if settings.effective_clamp == "geometry" else math.inf
+    least = mode.value**2 if isinstance(mode, DistanceClamp) and mode.value is not None else 0.0
+    bound = mode.value if isinstance(mode, GeometryClamp) and mode.value is not None else math.inf
     return Clamp(np.dtype(dtype).type(least), softness, np.dtype(dtype).type(bound))
 
 
-def pack_spheres(settings: PairSettings, footprint: Array, chosen: Array, dtype: Any) -> Array:
-    """Size virtual spherical lights: pi r^2 is `clamp_value` times the footprint.
+def pack_spheres(scale: float, footprint: Array, chosen: Array, dtype: Any) -> Array:
+    """Size virtual spherical lights: pi r^2 is `scale` times the footprint.
 
     Parameters
     ----------
-    settings : PairSettings
-        Says the factor; 0, the default, stands for 1.
+    scale : float
+        Factor.
     footprint : (N,) ndarray
         Surface area each light stands for, m^2.
     chosen : (N,) ndarray of bool
@@ -201,7 +202,7 @@ def pack_spheres(settings: PairSettings, footprint: Array, chosen: Array, dtype:
     (M,) ndarray
         r^2 of the M chosen lights, m^2.
     """
-    square: Array = footprint[chosen] * ((settings.clamp_value or 1.0) / math.pi)
+    square: Array = footprint[chosen] * (scale / math.pi)
     return _finite(square, dtype).astype(dtype)
 
 
@@ -229,11 +230,11 @@ def pack_widening(lights: "PixelLights", settings: PairSettings, dtype: Any, cho
     Widening or None
         None where exponents stay.
     """
-    if settings.widening == 0:
+    if settings.lobe.widening == 0:
         return None
     _, axis, _ = _lobes(lights, chosen)
     literal = "sii_widening" in settings.as_published
     keeps_norm = literal or "sii_widening_unnorm" in settings.as_published
-    return Widening(np.dtype(dtype).type(settings.widening), LITERAL if literal else CORRECTED,
-                    -1 if keeps_norm else NORMS[settings.lobe_norm],
+    return Widening(np.dtype(dtype).type(settings.lobe.widening), LITERAL if literal else CORRECTED,
+                    -1 if keeps_norm else NORMS[settings.lobe.norm],
                     (lights.normal[:, chosen] * axis).sum(axis=0).astype(dtype))

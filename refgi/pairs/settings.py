@@ -1,55 +1,93 @@
-"""How one pixel light lights one receiver: what sums over pairs can be set to."""
+"""Settings of one pixel light that lights one receiver: the clamp of near pairs, the light's offset, its lobe."""
 
 import dataclasses
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, Literal
 
 from refgi.errors import expect
 from refgi.scene.values import LARGEST
+from refgi.settings import Settings, setting
 
-ClampMode = Literal["auto", "none", "distance", "geometry", "disc", "sphere"]
-LobeNorm = Literal["none", "full_lobe", "clamped"]
-
-FOOTPRINT_CLAMPS = ("disc", "sphere")  # need the surface area that each light stands for
 STRONGEST_CLAMP = 1e18  # m, 1/m^2 or 1: its square stays within float32
 LAST_SEED = 2**32 - 1
 
 
 @dataclasses.dataclass(frozen=True)
-class PairSettings:
-    """How one pixel light lights one receiver.
+class AutoClamp(Settings):
+    """The clamp is left to the method: none, unless it has one of its own."""
 
-    `clamp` keeps near pairs finite: not at all, by a minimum `distance` of `clamp_value` m, by a `geometry` term of
-    at most `clamp_value` 1/m^2, by the form factor of a `disc` of the light's footprint A, or by a virtual `sphere`
-    light of radius r, pi r^2 = `clamp_value` A (0: 1 A), for diffuse lights alone; "auto" leaves it to the method.
-    `offset` moves lights back along their normals (m). `lobe_norm` is the norm of Phong lobes and `widening` the
-    distance a (m) within which their exponents fall (0: nowhere). `as_published` names forms to use as printed; see
-    docs/methods/sii.
-    """
+    NAME = "auto"
 
-    clamp: ClampMode = "none"
-    clamp_value: float = 0.0
-    offset: float = 0.0
-    lobe_norm: LobeNorm = "clamped"
-    widening: float = 0.0
-    as_published: frozenset[str] = frozenset()
+
+@dataclasses.dataclass(frozen=True)
+class DistanceClamp(Settings):
+    """Pairs count as at least a distance apart."""
+
+    NAME = "distance"
+
+    value: float | None = setting(None, "least distance; must be given", above=0.0, most=STRONGEST_CLAMP, unit="m")
+
+
+@dataclasses.dataclass(frozen=True)
+class GeometryClamp(Settings):
+    """The geometry term of a pair has a bound."""
+
+    NAME = "geometry"
+
+    value: float | None = setting(None, "largest term; must be given", above=0.0, most=STRONGEST_CLAMP, unit="1/m^2")
+
+
+@dataclasses.dataclass(frozen=True)
+class DiscClamp(Settings):
+    """A light is a disc of its footprint A: r^2 + A / pi takes the place of one r^2."""
+
+    NAME = "disc"
+
+
+@dataclasses.dataclass(frozen=True)
+class SphereClamp(Settings):
+    """A light is a virtual spherical light of radius r, pi r^2 = `value` A, A its footprint; diffuse lights alone."""
+
+    NAME = "sphere"
+
+    value: float = setting(1.0, "pi r^2 of the sphere over the light's footprint", above=0.0, most=STRONGEST_CLAMP)
+
+
+Clamp = AutoClamp | DistanceClamp | GeometryClamp | DiscClamp | SphereClamp
+
+
+@dataclasses.dataclass(frozen=True)
+class LobeSettings(Settings):
+    """The Phong lobe of a glossy pixel light (SII Sec. 3.3)."""
+
+    norm: Literal["none", "full_lobe", "clamped"] = setting("clamped", "norm of a lobe that the surface cuts off")
+    widening: float = setting(0.0, "distance a within which exponents fall; 0: nowhere", least=0.0, most=LARGEST,
+                              unit="m", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class PairSettings(Settings):
+    """How one pixel light lights one receiver."""
 
     SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_no_pi", "sii_widening", "sii_widening_unnorm"})
 
-    def __post_init__(self) -> None:
-        expect(self.clamp in get_args(ClampMode), "clamp", " or ".join(map(repr, get_args(ClampMode))), self.clamp)
-        needed = self.clamp in ("distance", "geometry")
-        expect(0 <= self.clamp_value <= STRONGEST_CLAMP and (self.clamp_value > 0 or not needed), "clamp_value",
-               f"{f'a number > 0 for the clamp {self.clamp!r},' if needed else '0'} up to {STRONGEST_CLAMP:g}",
-               self.clamp_value)
-        expect(abs(self.offset) <= LARGEST, "offset", f"a length up to {LARGEST:g} m", self.offset)
-        expect(self.lobe_norm in ("none", "full_lobe", "clamped"), "lobe_norm",
-               "'none', 'full_lobe' or 'clamped'", self.lobe_norm)
-        expect(0 <= self.widening <= LARGEST, "widening", f"0 to {LARGEST:g} m", self.widening)
-        object.__setattr__(self, "as_published", frozenset(self.as_published))
-        expect(self.as_published <= self.SWITCHES, "as_published", f"names out of {sorted(self.SWITCHES)}",
-               sorted(self.as_published))
+    clamp: Clamp | None = setting(None, "what keeps near pairs finite")
+    offset: float = setting(0.0, "how far lights lie behind their surface", least=-LARGEST, most=LARGEST, unit="m",
+                            study=True)
+    lobe: LobeSettings = setting(LobeSettings(), "lobes of glossy lights")
+    as_published: frozenset[str] = setting(frozenset(), "forms of the pair term to use as printed", study=True)
+
+    def check(self) -> None:
+        """Check that a clamp has its value."""
+        if isinstance(self.clamp, DistanceClamp | GeometryClamp):
+            expect(self.clamp.value is not None, "clamp.value",
+                   f"a number > 0 for the clamp {self.clamp.name()!r}, up to {STRONGEST_CLAMP:g}", None)
 
     @property
-    def effective_clamp(self) -> ClampMode:
-        """The clamp in use: "auto" is none, unless a method has one of its own."""
-        return "none" if self.clamp == "auto" else self.clamp
+    def needs_footprints(self) -> bool:
+        """Whether the clamp needs the surface area that each light stands for."""
+        return isinstance(self.clamp, DiscClamp | SphereClamp)
+
+    @property
+    def clamps(self) -> bool:
+        """Whether any pair is clamped; "auto" that no method has resolved clamps none."""
+        return self.clamp is not None and not isinstance(self.clamp, AutoClamp)

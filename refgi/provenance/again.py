@@ -13,6 +13,7 @@ from refgi.provenance.content import camera_from, geometry_digest, light_from, m
 from refgi.provenance.record import VERSION, Record, program, versions
 from refgi.scene import Scene, builtin_scenes, load_scene
 from refgi.scene.files import is_there
+from refgi.settings import Settings, flat, of_record
 
 if TYPE_CHECKING:
     from refgi.provenance.frames import SequenceFrame
@@ -143,6 +144,8 @@ def _places(source: str, path: Path) -> Iterator[Path]:
 def _settings(wanted: type[Any], values: Mapping[str, Any], path: Path) -> Any:
     from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+    if issubclass(wanted, Settings):
+        return _composed(wanted, values, path)
     hints, names = get_type_hints(wanted), [field.name for field in dataclasses.fields(wanted)]
     if set(values) != set(names):
         raise InputError(f"{path}: {wanted.__name__}: expected {', '.join(names)}; got {', '.join(values)}",
@@ -153,6 +156,18 @@ def _settings(wanted: type[Any], values: Mapping[str, Any], path: Path) -> Any:
     except ValidationError as error:
         raise InputError(f"{path}: {wanted.__name__}: {error.errors()[0]['msg']}", key="settings") from error
     return wanted(**read)
+
+
+def _composed(wanted: type[Settings], values: Mapping[str, Any], path: Path) -> Settings:
+    """Return settings of a record, which holds every key of their tree."""
+    try:
+        made = of_record(wanted, values)
+    except InputError as error:
+        raise InputError(f"{path}: {wanted.__name__}: {error}", key="settings") from error
+    if set(flat(made)) != set(values):
+        raise InputError(f"{path}: {wanted.__name__}: expected {', '.join(flat(made))}; got {', '.join(values)}",
+                         key="settings")
+    return made
 
 
 def _frame(record: Mapping[str, Any], path: Path) -> "SequenceFrame | None":

@@ -14,6 +14,7 @@ import numpy as np
 from refgi.errors import InputError
 from refgi.image import canonical_json
 from refgi.scene import Camera, DirectionalLight, Light, PointLight, Scene, SpotLight
+from refgi.settings import Settings, flat
 
 LIGHTS: dict[str, type[SpotLight] | type[PointLight] | type[DirectionalLight]] = {
     "spot": SpotLight, "point": PointLight, "directional": DirectionalLight}
@@ -32,6 +33,8 @@ def plain(value: Any) -> Any:
     object
         The same as dict, list, str, int, float, bool and None.
     """
+    if isinstance(value, Settings):
+        return {key: plain(item) for key, item in flat(value).items()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
     if isinstance(value, dict) or hasattr(value, "items"):

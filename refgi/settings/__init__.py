@@ -8,7 +8,7 @@ stands for its most important value (`lights=1024`). `of` takes such keys in Pyt
 
 from refgi.settings.fields import Settings, choices_of, setting
 from refgi.settings.keys import changed, flat, of, replaced
-from refgi.settings.text import from_text
+from refgi.settings.text import from_text, of_record
 from refgi.settings.tree import Leaf, leaves, schema
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "from_text",
     "leaves",
     "of",
+    "of_record",
     "replaced",
     "schema",
     "setting",

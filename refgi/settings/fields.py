@@ -51,6 +51,7 @@ class Settings:
     `Settings`, or a union of `Settings` classes: a choice. Other types are left to `check`.
     """
 
+    NAME: ClassVar[str] = ""  # of a choice; the class's name in lower case with underscores where empty
     PRINCIPAL: ClassVar[str] = ""  # the field that the whole stands for: lights=1024
     SWITCHES: ClassVar[frozenset[str]] = frozenset()
 
@@ -66,8 +67,8 @@ class Settings:
 
     @classmethod
     def name(cls) -> str:
-        """Return the name by which a choice is chosen: the class's, in lower case with underscores."""
-        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__.removesuffix("Settings")).lower()
+        """Return the name by which a choice is chosen."""
+        return cls.NAME or re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__.removesuffix("Settings")).lower()
 
 
 def hints(kind: type[Settings]) -> dict[str, Any]:
@@ -227,16 +228,35 @@ def checked(owner: type[Settings], field: Any, value: Any) -> Any:
     if kinds := choices_of(hint):
         fits = isinstance(value, tuple(kinds.values()))
     elif get_origin(kind) is Literal:
-        fits = isinstance(value, str) and value in get_args(kind)
+        fits = any(type(value) is type(option) and value == option for option in get_args(kind))
     elif kind is bool:
         fits = isinstance(value, bool | np.bool_)
     elif kind in (int, float):
         fits = _is_in_range(value, kind, field.metadata)
     elif get_origin(kind) is frozenset:
-        value = frozenset({value} if isinstance(value, str) else value)
-        expect(value <= owner.SWITCHES, field.name, f"names out of {sorted(owner.SWITCHES)}", sorted(map(str, value)))
+        value, known = frozenset({value} if isinstance(value, str) else value), names_of(owner, hint)
+        expect(value <= known, field.name, f"names out of {sorted(known)}", sorted(map(str, value)))
     expect(fits, field.name, expected(field, hint), value)
     return value
+
+
+def names_of(owner: type[Settings], hint: Any) -> frozenset[str]:
+    """Return the names that a set may hold.
+
+    Parameters
+    ----------
+    owner : type
+        The settings class.
+    hint : type
+        `frozenset` of a `Literal`, or of any text, which stands for the class's `SWITCHES`.
+
+    Returns
+    -------
+    frozenset of str
+        The names.
+    """
+    (kind,) = get_args(members(hint)[0])
+    return frozenset(get_args(kind)) if get_origin(kind) is Literal else owner.SWITCHES
 
 
 def _is_in_range(value: Any, kind: Any, about: Any) -> bool:

@@ -11,6 +11,9 @@ from refgi.settings.tree import Leaf, leaves
 
 S = TypeVar("S", bound=Settings)
 
+PRINTED = "as_published"  # the field of every part that has printed forms
+SEED = "seed"  # the field of every part that draws random numbers
+
 
 def of(kind: type[S], /, **values: Any) -> S:
     """Make settings from values by key.
@@ -59,12 +62,35 @@ def replaced(settings: S, values: Mapping[str, Any]) -> S:
     found: dict[str, Any] = {}
     for key, value in values.items():
         try:
-            found[find_key(settings, key).key] = value
+            found |= _shared(settings, key, value, values) or {find_key(settings, key).key: value}
         except InputError as error:
             errors.append(error)
     made: S = _rebuilt(settings, _nested(found), "", errors)
     raise_all(errors, type(settings))
     return made
+
+
+def _shared(settings: Settings, key: str, value: Any, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a key sets that is meant for every part of a tree: the seed, and printed forms."""
+    if key == PRINTED and not any(other.endswith(f".{PRINTED}") for other in values):
+        return _printed_forms(settings, value)
+    if key == SEED and not any(other.endswith(f".{SEED}") for other in values):
+        return {leaf.key: value for leaf in leaves(type(settings)) if leaf.key.rpartition(".")[2] == SEED
+                and leaf.key in flat(settings)}
+    return {}
+
+
+def _printed_forms(settings: Settings, names: Any) -> dict[str, Any]:
+    """Give each part of a tree those names of printed forms that are its own."""
+    names = frozenset({names} if isinstance(names, str) else names)
+    parts = [leaf for leaf in leaves(type(settings)) if leaf.key.rpartition(".")[2] == PRINTED]
+    known = frozenset[str]().union(*(leaf.owner.SWITCHES for leaf in parts))
+    if not names <= known:
+        raise InputError(f"{PRINTED}: expected names out of {sorted(known)}, got {sorted(map(str, names))}",
+                         key=PRINTED)
+    own = [(leaf.key, names & leaf.owner.SWITCHES) for leaf in parts]
+    there = flat(settings)
+    return {key: chosen for key, chosen in own if chosen or (there.get(key))}
 
 
 def raise_all(errors: Iterable[InputError], kind: type[Settings]) -> None:
@@ -106,29 +132,28 @@ def find_key(settings: Settings, key: str) -> Leaf:
     InputError
         If there is none, or more than one.
     """
-    tree = leaves(type(settings))
-    wanted = key.replace(".", "_")
-    known: dict[str, Leaf] = {}
-    for leaf in tree:
-        whole = leaf.key.replace(".", "_")
-        if whole == wanted:
-            return leaf
-        if whole.endswith(f"_{wanted}"):
-            known.setdefault(leaf.key, leaf)
+    wanted = "." + key.replace("_", ".")
+    ranked: list[dict[str, Leaf]] = [{}, {}, {}]  # whole keys; ends of keys; what parts stand for
+    for leaf in leaves(type(settings)):
+        whole = "." + leaf.key.replace("_", ".")
+        if whole.endswith(wanted):
+            ranked[0 if whole == wanted else 1].setdefault(leaf.key, leaf)
     for leaf in _principals(type(settings), ""):
-        if f"_{leaf.key.rpartition('.')[0].replace('.', '_')}".endswith(f"_{wanted}"):
-            known.setdefault(leaf.key, leaf)
+        part = "." + leaf.key.rpartition(".")[0].replace("_", ".")
+        if part.endswith(wanted):
+            ranked[0 if part == wanted else 2].setdefault(leaf.key, leaf)
+    known = next(filter(None, ranked), {})
+    if len(known) > 1:  # a name that is a whole last part, then what is chosen now, before others
+        known = {name: leaf for name, leaf in known.items() if name.rpartition(".")[2] == key} or known
     if len(known) > 1:
-        at_ends = {name: leaf for name, leaf in known.items() if name.rpartition(".")[2] == key}
-        known = at_ends or known
-    if len(known) > 1:
-        there = flat(settings).keys()
+        there = flat(settings)
         known = {name: leaf for name, leaf in known.items() if name in there} or known
     if len(known) == 1:
         return next(iter(known.values()))
     if known:
         raise InputError(f"{key!r} may be {' or '.join(known)}", key=key)
-    raise InputError(f"{key!r} is not a setting of {type(settings).__name__}{_hint(key, tree)}", key=key)
+    hint = _hint(key, leaves(type(settings)))
+    raise InputError(f"{key!r} is not a setting of {type(settings).__name__}{hint}", key=key)
 
 
 def _principals(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
@@ -139,7 +164,7 @@ def _principals(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
             inner = f"{prefix}{field.name}."
             if part.PRINCIPAL:
                 principal = next(one for one in dataclasses.fields(part) if one.name == part.PRINCIPAL)
-                yield Leaf(inner + part.PRINCIPAL, principal, hints(part)[part.PRINCIPAL], ())
+                yield Leaf(inner + part.PRINCIPAL, principal, hints(part)[part.PRINCIPAL], part)
             yield from _principals(part, inner)
 
 

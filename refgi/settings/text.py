@@ -2,13 +2,13 @@
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar, get_args, get_origin
 
 from refgi.errors import InputError
 from refgi.settings.fields import Settings, choices_of, may_be_none
-from refgi.settings.keys import find_key, raise_all, replaced
-from refgi.settings.tree import Leaf
+from refgi.settings.keys import PRINTED, SEED, find_key, raise_all, replaced
+from refgi.settings.tree import Leaf, leaves
 
 S = TypeVar("S", bound=Settings)
 
@@ -42,8 +42,14 @@ def from_text(base: S, pairs: Iterable[str]) -> S:
         try:
             if not equals:
                 raise InputError(f"{key!r} is not key=value", key="--set")
-            leaf = find_key(base, key)
-            values[leaf.key] = _read(leaf, text)
+            if key == PRINTED:
+                values[key] = _names(text)
+            elif key == SEED:
+                seeds = [leaf for leaf in leaves(type(base)) if leaf.key.rpartition(".")[2] == SEED]
+                values[key] = _read(seeds[0] if seeds else find_key(base, key), text)
+            else:
+                leaf = find_key(base, key)
+                values[leaf.key] = _read(leaf, text)
         except InputError as error:
             errors.append(error)
     try:
@@ -54,6 +60,43 @@ def from_text(base: S, pairs: Iterable[str]) -> S:
         errors.append(error)
     raise_all(errors, type(base))
     return made
+
+
+def of_record(kind: type[S], values: Mapping[str, Any]) -> S:
+    """Return settings from what a record holds of them: JSON values by whole key.
+
+    Parameters
+    ----------
+    kind : type
+        A settings class.
+    values : mapping
+        As `flat` gives them, in the values of JSON.
+
+    Returns
+    -------
+    Settings
+        The same settings.
+
+    Raises
+    ------
+    InputError
+        If a key or value is not usable.
+    """
+    known = {leaf.key: leaf for leaf in leaves(kind)}
+    if unknown := [key for key in values if key not in known]:
+        raise InputError(f"{', '.join(unknown)}: not a setting of {kind.__name__}", key=unknown[0])
+    return replaced(kind(), {key: _from_json(known[key], value) for key, value in values.items()})
+
+
+def _from_json(leaf: Leaf, value: Any) -> Any:
+    from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+    if value is None or choices_of(leaf.hint):
+        return value
+    try:
+        return TypeAdapter(leaf.hint, config=ConfigDict(extra="forbid")).validate_python(value)
+    except ValidationError as error:
+        raise InputError(f"{leaf.key}: {_reason(error.errors()[0])}, got {value!r}", key=leaf.key) from error
 
 
 def _read(leaf: Leaf, text: str) -> Any:
@@ -82,15 +125,18 @@ def _reason(error: Any) -> str:
     return f"{of}{text[:1].lower()}{text[1:]}"
 
 
+def _names(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
 def _candidates(text: str, hint: Any) -> list[Any]:
     """Return what a text may stand for: itself, JSON, a list with commas; what was probably meant comes first."""
-    parts = [part.strip() for part in text.split(",") if part.strip()]
     if get_origin(hint) is frozenset or any(get_origin(part) is frozenset for part in get_args(hint)):
-        return [parts]
+        return [_names(text)]
     try:
         read = json.loads(text, object_hook=_in_radians)
     except ValueError:
-        return [text, parts]
+        return [text, _names(text)]
     return [read, text] if isinstance(read, list | dict) else [text, read]
 
 

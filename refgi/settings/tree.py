@@ -13,7 +13,7 @@ class Leaf(NamedTuple):
     key: str  # dotted
     field: Any  # of a dataclass
     hint: Any  # its type
-    owners: tuple[tuple[str, type[Settings]], ...]  # for each choice above it: its key and the class that has the field
+    owner: type[Settings]  # the class that has it
 
     @property
     def about(self) -> str:
@@ -45,20 +45,17 @@ def leaves(kind: type[Settings]) -> list[Leaf]:
     list of Leaf
         In the order of the fields; a choice before what it holds.
     """
-    return list(_leaves(kind, "", (), False))
+    return list(_leaves(kind, ""))
 
 
-def _leaves(
-    kind: type[Settings], prefix: str, owners: tuple[tuple[str, type[Settings]], ...], study: bool
-) -> Iterator[Leaf]:
+def _leaves(kind: type[Settings], prefix: str) -> Iterator[Leaf]:
     for field in dataclasses.fields(kind):
         hint, key = hints(kind)[field.name], prefix + field.name
         kinds = choices_of(hint)
         if is_choice(hint) or not kinds:
-            yield Leaf(key, field, hint, owners)
+            yield Leaf(key, field, hint, kind)
         for one in kinds.values():
-            above = (*owners, (key, one)) if is_choice(hint) else owners
-            yield from _leaves(one, f"{key}.", above, study)
+            yield from _leaves(one, f"{key}.")
 
 
 def schema(kind: type[Settings]) -> dict[str, Any]:

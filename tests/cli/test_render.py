@@ -16,6 +16,7 @@ from refgi.errors import RefgiWarning
 from refgi.image import read_exr
 from refgi.methods import Picture, find_method, render
 from refgi.scene import Camera, PointLight, SpotLight, load_scene
+from refgi.settings import of
 from refgi.splat import SiiSettings
 
 TINY = ["--size", "12x10", "--rsm-resolution", "16", "--set", "lights=16"]
@@ -66,7 +67,7 @@ def test_an_exr_holds_what_python_computes(tmp_path):
     assert run("cornell_box", *TINY, "--out", tmp_path / "a.exr").exit_code == 0
     channels, attributes = read_exr(tmp_path / "a.exr")
     scene = load_scene("cornell_box").with_camera(width=12, height=10)
-    picture = render(scene, "sii", SiiSettings(lights=16), rsm_resolution=16)
+    picture = render(scene, "sii", of(SiiSettings, lights=16), rsm_resolution=16)
     for index, name in enumerate("RGB"):
         assert np.array_equal(channels[name], picture.radiance[index])
         assert np.array_equal(channels[f"irradiance.{name}"], picture.irradiance[index])
@@ -184,7 +185,7 @@ def test_maps_of_area_lights_that_do_not_fit_are_refused(how, tmp_path, monkeypa
 def test_what_fits_is_not_refused_for_its_maps(how, monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
     scene = load_scene("cornell_box").with_camera(width=24, height=24)
-    memory.require_memory(scene, "float32", 512, settings={"val": ValSettings(**how)})
+    memory.require_memory(scene, "float32", 512, settings={"val": of(ValSettings, **how)})
 
 
 def test_where_memory_cannot_be_told_nothing_is_refused(monkeypatch):

@@ -15,6 +15,7 @@ from refgi.methods import find_method, render
 from refgi.scene import load_scene
 from refgi.scene.path import scenes_along
 from refgi.scene.pathfile import read_path
+from refgi.settings import of
 from refgi.splat import SiiSettings
 from refgi.splat.sii.sii import sii
 from refgi.sssil.temporal import Sequence, TemporalSettings
@@ -60,8 +61,8 @@ def test_frames_are_what_python_computes(way, tmp_path):
                                                               ("exr", "png")}
     scene = load_scene("cornell_box").with_camera(width=12, height=10)
     path, frames = read_path(way, scene)
-    steps = Sequence(scenes_along(scene, path, frames), SiiSettings(lights=16, seed=7), TemporalSettings(weight=0.5),
-                     method=sii, rsm_resolution=16)
+    steps = Sequence(scenes_along(scene, path, frames), of(SiiSettings, lights=16, seed=7),
+                     TemporalSettings(weight=0.5), method=sii, rsm_resolution=16)
     told = json.loads(result.stdout)
     assert told["temporal"]["weight"] == 0.5
     for number, (step, light) in enumerate(zip(steps, lights(tmp_path / "new", range(4)), strict=True)):
@@ -101,7 +102,7 @@ def test_an_interrupted_sequence_goes_on_to_the_bit(way, tmp_path, form):
     assert all(map(np.array_equal, whole, lights(tmp_path / "out", range(4))))
     assert "0 of 4 frames rendered" in run(*arguments, "--resume").stdout
     assert refused(run(*arguments, "--resume", "--set", "lights=32"), "way_00000.exr", "one of other settings",
-                   "(settings.lights)")
+                   "(settings.lights.count)")
 
 
 @pytest.mark.parametrize("left", [b"", b"\x76\x2f\x31\x01", bytes(500)], ids=["empty", "cut", "zeros"])

@@ -15,9 +15,10 @@ from refgi.lights.selection import choose_lights
 from refgi.pairs.irradiance import Receivers
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.truth.vpl import VplSettings, vpl
 
-SETTINGS = ValSettings(lights=96, map_resolution=64, target_error=0.1)
+SETTINGS = of(ValSettings, lights=96, map_resolution=64, target_error=0.1)
 ROUNDING = 1e-4  # of the error: float32 sums, and rays that graze an edge from either way of setting them up
 
 

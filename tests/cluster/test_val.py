@@ -11,6 +11,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.splat import SiiSettings, sii
 from refgi.stages import observe
 
@@ -35,8 +36,8 @@ def ball():
 def test_it_is_in_the_table_of_methods(ball):
     function, settings = find_method("val").load()
     assert (function, settings) == (val, ValSettings)
-    picture = render(ball.scene, "val", ValSettings(**SMALL), width=33, height=27, rsm_resolution=64)
-    np.testing.assert_array_equal(picture.irradiance, val(ball, ValSettings(**SMALL)))
+    picture = render(ball.scene, "val", of(ValSettings, **SMALL), width=33, height=27, rsm_resolution=64)
+    np.testing.assert_array_equal(picture.irradiance, val(ball, of(ValSettings, **SMALL)))
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -44,8 +45,8 @@ def test_it_is_in_the_table_of_methods(ball):
 def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
     """Oracle: `sii` without a cut, at equal lights."""
     at = frame(dtype=dtype)
-    plain = val(at, ValSettings(visibility="none", **SMALL))
-    full = sii(at, SiiSettings(lights=64, i_low=0))
+    plain = val(at, of(ValSettings, visibility="none", **SMALL))
+    full = sii(at, of(SiiSettings, lights=64, i_low=0))
     off = np.abs(plain - full).max() / full.max()
     assert off <= SUM[dtype]
     evidence(f"{np.dtype(dtype).name}: against sii {off:.1e} of the brightest pixel")
@@ -60,7 +61,7 @@ def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
     {"as_published": ("val_alpha", "val_search_solid_angle")}, {"as_published": ("val_alpha_over_pi",)},
 ], ids=str)
 def test_every_setting_gives_a_picture_between_darkness_and_the_unshadowed(ball, how):
-    settings = ValSettings(**SMALL | how)
+    settings = of(ValSettings, **SMALL | how)
     light = val(ball, settings)
     most = val(ball, dataclasses.replace(settings, visibility="none", behind="visible", target_error=None,
                                          interleaving=settings.interleaving))
@@ -76,7 +77,7 @@ def test_every_setting_gives_a_picture_between_darkness_and_the_unshadowed(ball,
 
 @pytest.mark.feature("REF-19")
 def test_threads_change_no_bit(evidence):
-    settings = ValSettings(interleaving=4, **SMALL)
+    settings = of(ValSettings, interleaving=4, **SMALL)
     pictures = []
     for count in (1, 2):
         with threads(count):
@@ -87,7 +88,7 @@ def test_threads_change_no_bit(evidence):
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (5, 1), (17, 9)])
 def test_pictures_of_any_size(size):
-    light = val(frame(width=size[0], height=size[1]), ValSettings(interleaving=8, **SMALL))
+    light = val(frame(width=size[0], height=size[1]), of(ValSettings, interleaving=8, **SMALL))
     assert light.shape == (3, size[1], size[0])
     assert np.isfinite(light).all()
 
@@ -102,8 +103,8 @@ def test_the_unit_of_length_does_not_matter(ball, scale):
     light = dataclasses.replace(scene.lights[0], position=tuple(scale * np.array(scene.lights[0].position)))
     large = Frame(dataclasses.replace(scene, geometry=shape, camera=camera, lights=(light,)), width=33, height=27,
                   rsm_resolution=64)
-    expected = val(ball, ValSettings(**SMALL)).astype(float)
-    got = val(large, ValSettings(**SMALL)).astype(float) * scale**2
+    expected = val(ball, of(ValSettings, **SMALL)).astype(float)
+    got = val(large, of(ValSettings, **SMALL)).astype(float) * scale**2
     off = np.abs(got - expected).max(axis=0)
     assert np.median(off) <= SCALED * expected.max()
     assert (off > SCALED * expected.max()).mean() < 0.01
@@ -113,23 +114,23 @@ def test_a_light_that_hits_nothing_gives_darkness(ball):
     light = dataclasses.replace(ball.scene.lights[0], position=(0.0, 1e4, 0.0), direction=(0.0, 1.0, 0.0))
     dark = Frame(ball.scene.with_lights(light), width=9, height=9, rsm_resolution=16)
     for how in ({}, {"interleaving": 8}, TO_AN_ERROR):
-        assert not val(dark, ValSettings(**SMALL | how)).any()
+        assert not val(dark, of(ValSettings, **SMALL | how)).any()
 
 
 def test_more_area_lights_than_lights_are_hard_shadows_of_each(ball):
-    each = val(ball, ValSettings(**SMALL | {"area_lights": 1000}))
-    hard = val(ball, ValSettings(**SMALL | {"area_lights": 64, "visibility": "hard"}))
+    each = val(ball, of(ValSettings, **SMALL | {"area_lights": 1000}))
+    hard = val(ball, of(ValSettings, **SMALL | {"area_lights": 64, "visibility": "hard"}))
     np.testing.assert_array_equal(each, hard)
 
 
 def test_what_is_not_needed_does_not_run(ball):
     """Full sums are not blurred, visibility by rays draws no maps, an empty convex room neither."""
     with observe() as log:
-        val(ball, ValSettings(**SMALL))
+        val(ball, of(ValSettings, **SMALL))
     assert log.status("cluster.blur") == ["skipped"]
     assert log.status("cluster.adaptive") == ["skipped"]
     with observe() as log:
-        val(ball, ValSettings(visibility="none", **SMALL))
+        val(ball, of(ValSettings, visibility="none", **SMALL))
     assert log.status("cluster.shadow_maps") == ["skipped"]
 
 
@@ -144,7 +145,7 @@ def test_what_is_not_needed_does_not_run(ball):
     ("axes", "x"), ("extent", "area")])
 def test_a_setting_that_cannot_be_is_named(key, value):
     with pytest.raises(InputError, match=key):
-        ValSettings(**{key: value})
+        of(ValSettings, **{key: value})
 
 
 @pytest.mark.parametrize(("key", "how"), [
@@ -153,4 +154,4 @@ def test_a_setting_that_cannot_be_is_named(key, value):
     ("visibility", {"visibility": "none", "target_error": 0.1})])
 def test_settings_that_do_not_go_together_are_refused(key, how):
     with pytest.raises(InputError, match=key):
-        ValSettings(**how)
+        of(ValSettings, **how)

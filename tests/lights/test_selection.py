@@ -11,13 +11,14 @@ from refgi.lights.openness_flux import roulette, scale_flux
 from refgi.rays import Tracer, openness
 from refgi.rsm import reflective_shadow_map
 from refgi.scene import Material, SpotLight, load_scene, material_table
+from refgi.settings import of
 from refgi.splat import PairSettings, Receivers, irradiance
 from tests.rsm.shapes import geometry
 
 ROUNDING = 1e-12
 STANDARD_ERRORS = 4.0  # of a mean: one in 16,000 means of unbiased estimates is farther off
 RADIUS = 2.0  # m, within which blockers count
-NEAR = PairSettings(clamp="distance", clamp_value=0.2)  # keeps single pairs from deciding a comparison
+NEAR = of(PairSettings, clamp="distance", clamp_value=0.2)  # keeps single pairs from deciding a comparison
 MATERIALS = material_table((Material(diffuse=(0.5, 0.6, 0.4)),
                             Material(diffuse=(0.1, 0.1, 0.1), specular=(0.6, 0.6, 0.6), exponent=40.0)))  # fmt: skip
 LIGHT = SpotLight((7.0, 7.0, 7.0), (-0.55, -0.9, -0.55), math.radians(30), math.radians(50), (100.0, 100.0, 100.0))

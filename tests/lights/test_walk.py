@@ -10,6 +10,7 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Material, PointLight, light_table, load_scene, material_table
+from refgi.settings import of
 from refgi.splat import SiiSettings, sii, walk_lights
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -24,9 +25,9 @@ def lights_of(scene, **settings):
 def test_first_bounce_has_the_mean_of_the_map(evidence):
     frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=512)
     clamp = {"clamp": "distance", "clamp_value": 0.05, "i_low": 0}
-    reference = sii(frame, SiiSettings(pattern="all", **clamp)).astype(float).mean(axis=(1, 2))
-    runs = np.array([sii(frame, SiiSettings(source="walk", lights=1000, seed=s, **clamp)).mean(axis=(1, 2), dtype=float)
-                     for s in range(1, 31)])
+    reference = sii(frame, of(SiiSettings, pattern="all", **clamp)).astype(float).mean(axis=(1, 2))
+    walks = (of(SiiSettings, source="walk", lights=1000, seed=s, **clamp) for s in range(1, 31))
+    runs = np.array([sii(frame, walk).mean(axis=(1, 2), dtype=float) for walk in walks])
     error = runs.std(axis=0) / math.sqrt(30)
     # the map's texels on silhouettes count whole: 1e-3 of the light at 512^2
     assert (np.abs(runs.mean(axis=0) - reference) < 4 * error + 1e-3 * reference).all()
@@ -70,7 +71,7 @@ def test_irradiance_of_all_bounces_in_a_sphere(evidence):
     rho, bounces = 0.5, 6
     scene = load_scene(f"integrating_sphere:faces=20000,albedo={rho}")
     frame = Frame(scene, width=16, height=16)
-    got = sii(frame, SiiSettings(source="walk", lights=3000, bounces=bounces, i_low=0))
+    got = sii(frame, of(SiiSettings, source="walk", lights=3000, bounces=bounces, i_low=0))
     light = scene.lights[0]
     half = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
     emitted = light.intensity[0] * 2 * math.pi * ((1 - half[0]) + 0.5 * (half[0] - half[1]))

@@ -11,6 +11,7 @@ from refgi.pairs.lobe_shape import CLAMPED, FULL_LOBE, NO_NORM, lobe_norm_factor
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.packing import pack_clamp, pack_lobes, pack_widening
 from refgi.pairs.pixel_lights import Range
+from refgi.settings import of
 from refgi.splat import PairSettings, Receivers, irradiance
 from tests.naive import eq2
 from tests.naive.radiometry import lobe_fraction
@@ -55,7 +56,7 @@ def flux_through(radius, exponent, degrees, real=np.float64, **settings):
     axis = axis_at(degrees)
     directions, weights = sphere_around(axis, exponent, degrees)
     light = sets.glossy(np.zeros((3, 1)), np.array([[0.0], [0], [1]]), axis, exponent, real=real)
-    got = irradiance(sets.receivers(radius * directions, -directions, real), light, PairSettings(**settings))
+    got = irradiance(sets.receivers(radius * directions, -directions, real), light, of(PairSettings, **settings))
     return radius**2 * float((got[0, 0].astype(np.float64) * weights).sum())
 
 
@@ -138,7 +139,7 @@ def test_exponents_up_to_a_million_stay_finite(real):
     for exponent in (0.0, 1e-3, 1.0, 1e3, 1e6):
         shiny = sets.glossy(lights.position, lights.normal, lights.normal, exponent, real=real)
         for widening in (0.0, 0.5):
-            got = irradiance(receivers, shiny, PairSettings(widening=widening))
+            got = irradiance(receivers, shiny, of(PairSettings, widening=widening))
             assert np.isfinite(got).all()
             assert (got >= 0).all()
 
@@ -153,7 +154,7 @@ def test_widened_lobes_keep_their_flux_on_every_sphere(evidence):
                 axis, here = axis_at(t), p * min(1.0, radius / a)
                 directions, weights = sphere_around(axis, here, t)
                 light = sets.glossy(np.zeros((3, 1)), np.array([[0.0], [0], [1]]), axis, p)
-                got = irradiance(sets.receivers(radius * directions, -directions), light, PairSettings(widening=a))
+                got = irradiance(sets.receivers(radius * directions, -directions), light, of(PairSettings, widening=a))
                 worst = max(worst, abs(radius**2 * float((got[0, 0] * weights).sum()) - 1))
     assert worst < 1e-8
     evidence(f"flux on spheres r = 1e-6 a .. 4 a, P = 1 .. 1000: Phi to {worst:.1e}")
@@ -167,9 +168,9 @@ def test_widened_exponent_is_whole_at_a_and_zero_at_the_light(evidence):
     directions = directions[:, (directions[2] > 0) & ((axis * directions).sum(axis=0) > 0)]
     for radius in (a, 2 * a):
         where = sets.receivers(radius * directions, -directions)
-        plain, widened = (irradiance(where, light, PairSettings(widening=w)) for w in (0.0, a))
+        plain, widened = (irradiance(where, light, of(PairSettings, widening=w)) for w in (0.0, a))
         np.testing.assert_allclose(widened, plain, rtol=1e-13)
-    near = irradiance(sets.receivers(1e-9 * directions, -directions), light, PairSettings(widening=a))[0, 0] * 1e-18
+    near = irradiance(sets.receivers(1e-9 * directions, -directions), light, of(PairSettings, widening=a))[0, 0] * 1e-18
     flat = 1 / (2 * math.pi * lobe_fraction(math.radians(40.0), 0.0))
     np.testing.assert_allclose(near, flat, rtol=1e-5)
     evidence("P'(a) = P; r^2 E at r = 2e-9 a is that of P' = 0 in all directions to 1e-5")
@@ -182,7 +183,7 @@ def test_widening_tames_the_spike_at_a_wall(evidence):
     wall = np.stack([np.full_like(z, 0.02), np.zeros_like(z), z])
     light = sets.glossy(np.zeros((3, 1)), np.array([[0.0], [0], [1]]), sets.unit(np.array([[1.0], [0], [0.1]])), 500.0)
     receivers = sets.receivers(wall, np.tile([[-1.0], [0], [0]], 400))
-    peaks = {a: irradiance(receivers, light, PairSettings(widening=a))[0].max() for a in (0.0, 0.1, 0.5, 2.0)}
+    peaks = {a: irradiance(receivers, light, of(PairSettings, widening=a))[0].max() for a in (0.0, 0.1, 0.5, 2.0)}
     assert all(np.isfinite(peak) for peak in peaks.values())
     assert peaks[0.0] > peaks[0.1] > peaks[0.5] > peaks[2.0]
     evidence("peak near the wall for a = 0, 0.1, 0.5, 2 m: " + ", ".join(f"{p:.0f}" for p in peaks.values()))
@@ -198,7 +199,7 @@ def test_published_widenings_by_their_own_formula(evidence):
         for radius in (0.1, 0.5, 1.0, 1.6, 4.0):
             w = sets.unit(np.array([[0.1], [0.2], [1.0]]))
             got = irradiance(sets.receivers(radius * w, -w), light,
-                             PairSettings(widening=a, as_published=frozenset({switch})))
+                             of(PairSettings, widening=a, as_published=frozenset({switch})))
             expected = c * float((axis * w).sum()) ** (p * share(radius)) / radius**2
             assert got[0, 0, 0] == pytest.approx(expected, rel=1e-9)
     evidence("P' = P min(1, r/a) and min(P, P/(r a)) without renormalisation, five distances each, to 1e-9")
@@ -225,7 +226,7 @@ def test_same_bits_for_any_threads_and_tiles(widening, evidence):
     receivers, lights = sets.room(rng, 700, np.float32)
     both = lights._replace(lobe_flux=lights.flux, lobe_axis=lights.normal,
                            lobe_exponent=rng.uniform(0, 50, 700).astype(np.float32))
-    how = PairSettings(widening=widening)
+    how = of(PairSettings, widening=widening)
     whole = irradiance(receivers, both, how)
     with threads(1):
         np.testing.assert_array_equal(irradiance(receivers, both, how), whole)
@@ -239,7 +240,7 @@ def test_same_bits_for_any_threads_and_tiles(widening, evidence):
 def test_the_switch_without_pi_is_pi_times_the_default(evidence):
     receivers, lights = sets.room(np.random.default_rng(8), 100)
     plain = irradiance(receivers, lights, PairSettings())
-    printed = irradiance(receivers, lights, PairSettings(as_published=frozenset({"sii_no_pi"})))
+    printed = irradiance(receivers, lights, of(PairSettings, as_published=frozenset({"sii_no_pi"})))
     ratio = printed.sum() / plain.sum()
     assert ratio == pytest.approx(math.pi, rel=1e-13)
     evidence(f"sii_no_pi: image ratio {ratio:.6f}")
@@ -271,7 +272,7 @@ def wall_and_lobes(real, count=300, side=64):
 
 def sum_of(wall, lights, reach=None, listed=None, order=None, **how):
     """Call the kernel on receivers in a given order and put the result back into theirs."""
-    settings, every = PairSettings(**how), np.ones(lights.position.shape[1], bool)
+    settings, every = of(PairSettings, **how), np.ones(lights.position.shape[1], bool)
     real = wall.position.dtype
     order = np.arange(wall.position.shape[2]) if order is None else order
     position, normal = (np.ascontiguousarray(part[:, 0, order]) for part in wall[:2])

@@ -16,6 +16,7 @@ from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.loss import sample_pixels
 from refgi.pairs.settings import PairSettings
 from refgi.scene import PointLight, load_scene
+from refgi.settings import of
 from refgi.splat import GatherSettings, MultiresSettings, SiiSettings, gather, multires, sii
 from refgi.splat.gather.gather_sum import disc_loss
 from refgi.stages import observe
@@ -55,7 +56,7 @@ def told(run, *args):
 @pytest.mark.parametrize("clamp", [{"clamp": "disc"}, {"clamp": "sphere"}, {"clamp": "distance", "clamp_value": 0.3},
                                    {"clamp": "geometry", "clamp_value": 8.0}])
 def test_what_a_clamp_takes_is_told(name, clamp):
-    at, settings = frame(name), SiiSettings(lights=LIGHTS, **clamp)
+    at, settings = frame(name), of(SiiSettings, lights=LIGHTS, **clamp)
     share = 100 * (1 - full(at, settings) / full(at, settings, PairSettings()))
     _, said = told(sii, at, settings)
     if share > 2 + NEAR:
@@ -69,11 +70,11 @@ def test_what_a_clamp_takes_is_told(name, clamp):
 
 def test_each_method_tells_of_its_clamp():
     at = frame("cornell_box")
-    for method, settings, name in ((multires, MultiresSettings(lights=LIGHTS), "multires"),
-                                   (multires, MultiresSettings(lights=LIGHTS, supersampled=True), "multires"),
-                                   (multires, MultiresSettings(lights=LIGHTS, per_light="light"), "multires"),
-                                   (multires, MultiresSettings(lights=LIGHTS, target_error=0.3), "multires"),
-                                   (val, ValSettings(lights=LIGHTS, clamp="disc", map_resolution=16), "val")):
+    for method, settings, name in ((multires, of(MultiresSettings, lights=LIGHTS), "multires"),
+                                   (multires, of(MultiresSettings, lights=LIGHTS, supersampled=True), "multires"),
+                                   (multires, of(MultiresSettings, lights=LIGHTS, per_light="light"), "multires"),
+                                   (multires, of(MultiresSettings, lights=LIGHTS, target_error=0.3), "multires"),
+                                   (val, of(ValSettings, lights=LIGHTS, clamp="disc", map_resolution=16), "val")):
         share = 100 * (1 - full(at, settings) / full(at, settings, PairSettings()))
         _, said = told(method, at, settings)
         assert said[0][0] == pytest.approx(share, abs=NEAR)
@@ -87,7 +88,7 @@ def test_each_method_tells_of_its_clamp():
     {"i_low": 0.05, "reference_length": 0.1, "as_published": {"per_light_ilow"}},
     {"irradiance_low": 0.5, "bound": "mesh", "mesh_faces": 8, "inflate": False}])
 def test_what_the_threshold_takes_is_told(cut):
-    at, settings = frame("cornell_box"), SiiSettings(lights=LIGHTS, **cut)
+    at, settings = frame("cornell_box"), of(SiiSettings, lights=LIGHTS, **cut)
     light, said = told(sii, at, settings)
     share = 100 * (1 - light.sum(dtype=float) / full(at, settings))
     assert share > 2 + NEAR
@@ -98,7 +99,7 @@ def test_what_the_threshold_takes_is_told(cut):
 
 
 def test_clamp_and_threshold_are_told_apart():
-    at, settings = frame("cornell_box"), SiiSettings(clamp="distance", clamp_value=0.2, irradiance_low=0.1)
+    at, settings = frame("cornell_box"), of(SiiSettings, clamp="distance", clamp_value=0.2, irradiance_low=0.1)
     light, said = told(sii, at, settings)
     clamped = full(at, settings)
     shares = 100 * (1 - clamped / full(at, settings, PairSettings())), 100 * (1 - light.sum(dtype=float) / clamped)
@@ -106,9 +107,9 @@ def test_clamp_and_threshold_are_told_apart():
 
 
 @pytest.mark.parametrize("settings", [
-    SiiSettings(lights=LIGHTS), SiiSettings(lights=LIGHTS, clamp="distance", clamp_value=1e-4),
-    SiiSettings(lights=LIGHTS, irradiance_low=1e-6), SiiSettings(irradiance_low=0.5, stochastic_range=True),
-    SiiSettings(lights=LIGHTS, stochastic_range=True, bound="quad")])
+    of(SiiSettings, lights=LIGHTS), of(SiiSettings, lights=LIGHTS, clamp="distance", clamp_value=1e-4),
+    of(SiiSettings, lights=LIGHTS, irradiance_low=1e-6), of(SiiSettings, irradiance_low=0.5, stochastic_range=True),
+    of(SiiSettings, lights=LIGHTS, stochastic_range=True, bound="quad")])
 def test_settings_that_take_little_or_nothing_in_the_mean_are_passed_over(settings):
     _, said = told(sii, frame("cornell_box"), settings)
     assert said == []
@@ -116,8 +117,8 @@ def test_settings_that_take_little_or_nothing_in_the_mean_are_passed_over(settin
 
 def test_nothing_is_summed_where_nothing_is_limited():
     with observe() as log:
-        sii(frame("cornell_box"), SiiSettings(lights=16))
-        multires(frame("cornell_box"), MultiresSettings(lights=16, clamp="none"))
+        sii(frame("cornell_box"), of(SiiSettings, lights=16))
+        multires(frame("cornell_box"), of(MultiresSettings, lights=16, clamp="none"))
     assert not [run.name for run in log.runs if run.name.endswith(("_loss", "reference_length"))]
 
 
@@ -126,7 +127,7 @@ def test_a_black_or_empty_picture_has_nothing_to_lose():
     away = BOX.with_camera(eye=(0.0, 50.0, 0.0), target=(0.0, 60.0, 0.1))
     for scene in (dark, away):
         at = Frame(scene, width=16, height=16, rsm_resolution=16)
-        for method, settings in ((sii, SiiSettings(i_low=0.05, clamp="disc")), (multires, MultiresSettings()),
+        for method, settings in ((sii, of(SiiSettings, i_low=0.05, clamp="disc")), (multires, MultiresSettings()),
                                  (gather, GatherSettings())):
             light, said = told(method, at, settings)
             assert np.isfinite(light).all()
@@ -134,13 +135,14 @@ def test_a_black_or_empty_picture_has_nothing_to_lose():
 
 
 def test_scaled_fluxes_are_told():
-    at, settings = frame("cornell_box"), SiiSettings(lights=LIGHTS, openness_flux="scale")
+    at, settings = frame("cornell_box"), of(SiiSettings, lights=LIGHTS, openness_flux="scale")
     _, said = told(sii, at, settings)
     kept, _ = told(choose_lights, at, settings)
-    share = 100 * (1 - kept.flux.sum(dtype=float) / choose_lights(at, SiiSettings(lights=LIGHTS)).flux.sum(dtype=float))
+    whole = choose_lights(at, LightSettings(LIGHTS)).flux.sum(dtype=float)
+    share = 100 * (1 - kept.flux.sum(dtype=float) / whole)
     assert said == [(pytest.approx(share, abs=0.5), said[0][1])]
     assert said[0][1].startswith("openness_flux 'scale' takes")
-    assert told(sii, at, SiiSettings(lights=LIGHTS, openness_flux="roulette"))[1] == []
+    assert told(sii, at, of(SiiSettings, lights=LIGHTS, openness_flux="roulette"))[1] == []
 
 
 def outside_share(at, radius):

@@ -7,6 +7,7 @@ import pytest
 
 from refgi.pairs.packing import HEADROOM, pack
 from refgi.pairs.pixel_lights import PixelLights
+from refgi.settings import of
 from refgi.splat.sii.reach.threshold import all_peaks, light_range, low_irradiance
 from refgi.splat.sii.settings import SplatSettings
 
@@ -33,7 +34,7 @@ def test_all_that_is_packed_is_finite(flux, exponent, axis, real):
     lights = odd_lights(flux, exponent, axis)
     for norm in NORMS:
         for options in SETTINGS:
-            settings = SplatSettings(lobe_norm=norm, **options)
+            settings = of(SplatSettings, lobe_norm=norm, **options)
             for footprint in (0.0, 3e38):
                 packed = pack(lights, settings, np.full(3, footprint), real)
                 assert np.isfinite(packed.diffuse).all()
@@ -47,14 +48,14 @@ def test_all_that_is_packed_is_finite(flux, exponent, axis, real):
 
 def test_peaks_within_the_dtype_are_as_the_equation_says():
     lights = odd_lights(2.0, 9.0, (0, 1, 0))
-    packed = pack(lights, SplatSettings(lobe_norm="full_lobe"), None, np.float64)
+    packed = pack(lights, of(SplatSettings, lobe_norm="full_lobe"), None, np.float64)
     assert packed.lobes.lights[10:13] == pytest.approx(np.full((3, 3), 2 * 10 / (2 * math.pi)), rel=1e-12)
-    beyond = pack(odd_lights(1e20, 1e20, (0, 1, 0)), SplatSettings(lobe_norm="full_lobe"), None, np.float32)
+    beyond = pack(odd_lights(1e20, 1e20, (0, 1, 0)), of(SplatSettings, lobe_norm="full_lobe"), None, np.float32)
     assert beyond.lobes.lights[10:13].max() == np.float32(np.finfo(np.float32).max / HEADROOM)
 
 
 def test_without_a_share_nothing_is_cut_for_any_light():
-    settings = SplatSettings(as_published={"per_light_ilow"}, i_low=0.0)
+    settings = of(SplatSettings, as_published={"per_light_ilow"}, i_low=0.0)
     reach = light_range(np.array([1.0, 0.0, 1e-30]), 0.0, settings, 0, np.float32)
     farthest = math.sqrt(np.finfo(np.float32).max)
     assert reach.square.tolist() == [np.float32(farthest), 0.0, np.float32(farthest)]

@@ -13,6 +13,7 @@ from refgi.jit import threads
 from refgi.pairs.packing import pack_diffuse
 from refgi.pairs.pair_sum import GROUP, TILE, geometry_term, sum_pairs
 from refgi.pairs.tiles import bound_tile, lights_in_reach
+from refgi.settings import of
 from refgi.splat import PairSettings, Receivers, irradiance
 from tests.naive import eq2
 from tests.pairs import sets
@@ -170,7 +171,7 @@ def test_same_bits_for_any_threads_tiles_and_neighbours(real, clamp, evidence):
     rng = np.random.default_rng(8)
     receivers, lights = sets.room(rng, 1111, real)
     footprint = rng.random(1111)
-    how = PairSettings(clamp=clamp, clamp_value=0.1 if clamp in ("distance", "geometry") else 0.0)
+    how = of(PairSettings, clamp=clamp, clamp_value=0.1 if clamp in ("distance", "geometry") else 0.0)
     whole = irradiance(receivers, lights, how, footprint)
     for count in range(1, numba.config.NUMBA_NUM_THREADS + 1):
         with threads(count):
@@ -269,7 +270,7 @@ def test_no_lights_and_no_pixels():
 ])
 def test_settings_are_checked(change, message):
     with pytest.raises(InputError, match=message):
-        PairSettings(**change)
+        of(PairSettings, **change)
 
 
 def test_arrays_are_checked():
@@ -282,4 +283,4 @@ def test_arrays_are_checked():
         irradiance(receivers._replace(normal=receivers.normal[:2]), lights, PLAIN)
     for clamp in ("disc", "sphere"):
         with pytest.raises(InputError, match=f"footprint: .* 4 lights for the clamp '{clamp}'"):
-            irradiance(receivers, lights, PairSettings(clamp=clamp))
+            irradiance(receivers, lights, of(PairSettings, clamp=clamp))

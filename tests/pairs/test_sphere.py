@@ -9,6 +9,7 @@ import pytest
 from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.pairs.sphere_pair import cone_term, cut_cone_term
+from refgi.settings import of
 from refgi.splat import PairSettings, irradiance
 from tests.naive import eq2
 from tests.naive.sphere import cone_integral, spherical_pair
@@ -26,7 +27,7 @@ CUT_SINGLE = 3e-4
 
 def spheres(position, normal, lights, radius, real=np.float64):
     area = np.full(lights.position.shape[1], math.pi * radius**2)
-    return irradiance(sets.receivers(position, normal, real), lights, PairSettings(clamp="sphere"), area)[:, 0]
+    return irradiance(sets.receivers(position, normal, real), lights, of(PairSettings, clamp="sphere"), area)[:, 0]
 
 
 def cones(rng, count):
@@ -157,10 +158,10 @@ def test_reaches_over_horizons_by_its_radius():
 def test_radius_follows_the_footprint():
     receivers, lights = sets.room(np.random.default_rng(5), 20)
     area = np.random.default_rng(6).uniform(0.01, 0.2, 20)
-    four = irradiance(receivers, lights, PairSettings(clamp="sphere", clamp_value=4.0), area)
-    np.testing.assert_array_equal(four, irradiance(receivers, lights, PairSettings(clamp="sphere"), 4 * area))
-    plain = irradiance(receivers, lights, PairSettings(clamp="sphere", clamp_value=1.0), area)
-    np.testing.assert_array_equal(plain, irradiance(receivers, lights, PairSettings(clamp="sphere"), area))
+    four = irradiance(receivers, lights, of(PairSettings, clamp="sphere", clamp_value=4.0), area)
+    np.testing.assert_array_equal(four, irradiance(receivers, lights, of(PairSettings, clamp="sphere"), 4 * area))
+    plain = irradiance(receivers, lights, of(PairSettings, clamp="sphere", clamp_value=1.0), area)
+    np.testing.assert_array_equal(plain, irradiance(receivers, lights, of(PairSettings, clamp="sphere"), area))
 
 
 def test_same_bits_for_any_number_of_threads():

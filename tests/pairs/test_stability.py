@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from refgi import Frame, load_scene
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight
+from refgi.settings import of
 from refgi.splat import PairSettings, SplatSettings, irradiance
 from refgi.splat.sii.splat import splat
 from tests.pairs import sets
@@ -60,7 +61,7 @@ def widened(receivers, lights):
 
 def off_by(receivers, lights, exponent):
     """Return errors of float32 terms over their bound; 0 at the edge of the hemispheres, where rounding may decide."""
-    how = PairSettings(lobe_norm="none")
+    how = of(PairSettings, lobe_norm="none")
     single = irradiance(receivers, lights, how)[0, 0].astype(float)
     exact, light = widened(receivers, lights)
     term = irradiance(exact, light, how)[0, 0]
@@ -119,7 +120,7 @@ def test_sums_lose_no_more_than_their_groups(evidence):
     for exponent in (0.5, 20.0, 1000.0):
         receivers, lights = sets.room(rng, 900, np.float32)
         shiny = sets.glossy(lights.position, lights.normal, lights.normal, exponent, real=np.float32)
-        how = PairSettings(lobe_norm="none")
+        how = of(PairSettings, lobe_norm="none")
         terms = np.zeros(900)
         for k in range(900):
             one = type(shiny)(*(None if part is None else np.ascontiguousarray(part[..., k : k + 1])
@@ -132,7 +133,7 @@ def test_sums_lose_no_more_than_their_groups(evidence):
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
-@pytest.mark.parametrize("how", [PairSettings(), PairSettings(widening=0.3), SplatSettings(i_low=0.05)])
+@pytest.mark.parametrize("how", [PairSettings(), of(PairSettings, widening=0.3), of(SplatSettings, i_low=0.05)])
 @pytest.mark.feature("SII-07")
 def test_no_place_no_exponent_and_no_size_leaves_the_numbers(how, real, evidence):
     """Lights on receivers, 1e-6 m off them, and at grazing angles both ways, in scenes of 1e-6, 1 and 1e6 m."""
@@ -160,9 +161,9 @@ def lit_room():
                                       lobe_exponent=(10 ** rng.uniform(-1, 6, 260)).astype(np.float32))
 
 
-@pytest.mark.parametrize("how", [PairSettings(), PairSettings(widening=0.5), SplatSettings(),
-                                 SplatSettings(i_low=0.05, reference_length=1.0),
-                                 SplatSettings(i_low=0.05, reference_length=1.0, stochastic_range=True)])
+@pytest.mark.parametrize("how", [PairSettings(), of(PairSettings, widening=0.5), SplatSettings(),
+                                 of(SplatSettings, i_low=0.05, reference_length=1.0),
+                                 of(SplatSettings, i_low=0.05, reference_length=1.0, stochastic_range=True)])
 @pytest.mark.parametrize("factor", [2.0, 4.0, 0.5, 1024.0])
 @pytest.mark.feature("REF-05")
 def test_powers_of_two_scale_to_the_bit(how, factor, evidence):

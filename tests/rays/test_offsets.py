@@ -14,6 +14,7 @@ from refgi.rays import MISS, Tracer, openness
 from refgi.rays.offsets import GRAIN, STEPS, far_offset, grain_of, ray_offset
 from refgi.rays.watertight import REACH, cut
 from refgi.scene import Camera, Geometry, Material, Mesh, SpotLight, light_table, material_table
+from refgi.settings import of
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 from refgi.truth.surfaces import height_above, lift, surfaces
 from tests.truth.scenes import rectangle, scene
@@ -76,7 +77,7 @@ def multires_by_rays(frame):
     from refgi.splat.multires.multires import multires
     from refgi.splat.multires.settings import MultiresSettings
 
-    return multires(frame, MultiresSettings(visibility="rays"))
+    return multires(frame, of(MultiresSettings, visibility="rays"))
 
 
 def shares_of_rays(frame):

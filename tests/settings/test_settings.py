@@ -26,7 +26,10 @@ class LightSettings(Settings):
 
 @dataclasses.dataclass(frozen=True)
 class Csm(Settings):
+    SWITCHES = frozenset({"alpha"})
+
     terms: int = setting(4, "terms", least=1, most=64)
+    as_published: frozenset[str] = setting(frozenset(), "printed forms", study=True)
     bias: float | None = setting(None, "bias", least=0.0, most=0.25)
 
 
@@ -153,10 +156,23 @@ def test_text_that_is_wrong_is_named(pairs, message):
     assert message in str(error.value)
 
 
+def test_printed_forms_go_to_the_parts_that_have_them():
+    settings = of(MethodSettings, as_published={"tan", "alpha"})
+    assert settings.as_published == {"tan"}
+    assert settings.shadow.as_published == {"alpha"}
+    assert replaced(settings, {"as_published": "no_pi"}).shadow.as_published == frozenset()
+    assert from_text(MethodSettings(), ["as_published=tan,alpha"]) == settings
+    with pytest.raises(InputError, match=r"names out of \['alpha', 'no_pi', 'tan'\], got \['x'\]"):
+        of(MethodSettings, as_published={"x"})
+    with pytest.raises(InputError, match=r"shadow\.as_published: not a setting of shadow=pcf"):
+        of(MethodSettings, shadow="pcf", as_published={"alpha"})
+
+
 def test_leaves_cover_every_choice():
     keys = [leaf.key for leaf in leaves(MethodSettings)]
     assert keys == ["lights.count", "lights.pattern", "lights.warp", "lights.warp.levels", "lights.warp.share",
-                    "shadow", "shadow.terms", "shadow.bias", "shadow.texels", "blur", "as_published"]
+                    "shadow", "shadow.terms", "shadow.as_published", "shadow.bias", "shadow.texels", "blur",
+                    "as_published"]
 
 
 def test_the_schema_describes_every_key():

@@ -11,6 +11,7 @@ from refgi.lights.warp import Warp
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.splat.sii.ledger_sides import pixel_areas
 from refgi.truth import TruthSettings, trace_truth
 
@@ -32,7 +33,7 @@ def on_floor(lights, x, z, height=0.0, **settings):
     shape = (3, -1, x.shape[-1])
     covered = np.ones(x.shape, np.bool_).reshape(shape[1:])
     return irradiance(Receivers(position.reshape(shape), normal.reshape(shape), covered), lights,
-                      PairSettings(**settings))[0].reshape(x.shape)
+                      of(PairSettings, **settings))[0].reshape(x.shape)
 
 
 class Picture:

@@ -9,6 +9,7 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 
 ROUNDING = 2e-5  # float32 sum of the full Eq. 2 against a float64 one: terms near edges carry float32 positions
@@ -50,7 +51,7 @@ def test_the_full_sum_without_visibility_is_that_of_sii_and_of_the_truth(evidenc
 
     frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=128)
     ours = vpl(frame, VplSettings(pattern="all", visibility=False))
-    theirs = sii(frame, SiiSettings(pattern="all", i_low=0))
+    theirs = sii(frame, of(SiiSettings, pattern="all", i_low=0))
     reference = trace_truth(frame, TruthSettings(samples=24 * 80, visibility=False))
     sums = np.abs(ours - theirs).max() / ours.max()
     mean = ours[:, frame.gbuffer.covered].mean() / reference.mean[:, frame.gbuffer.covered].mean()

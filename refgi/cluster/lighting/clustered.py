@@ -93,7 +93,7 @@ def clustered_irradiance(
            "lights", len(areas.of))
     expect(np.shape(facing) == np.shape(receivers.position), "facing", f"shape {np.shape(receivers.position)}",
            np.shape(facing))
-    packed = checked(receivers, lights, settings, footprint)
+    packed = checked(receivers, lights, settings.pairs, footprint)
     parts = subsets(np.asarray(receivers.covered, np.bool_), interleaving)
     subset = assigned_subsets(areas.of, interleaving, settings.assignment)
     members = member_lights(packed, areas.of, len(areas.members), subset, interleaving**2)

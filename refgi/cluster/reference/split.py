@@ -120,7 +120,7 @@ def split_error(
     InputError
         If the first picture has no light to be a share of.
     """
-    lights = choose_lights(frame, settings)
+    lights = choose_lights(frame, settings.lights)
     base = dataclasses.replace(settings, visibility="csm", prefilter="mip")
     areas, maps = cluster_lights(frame, lights, base)
     pictures = {} if truth is None else {"truth": truth}
@@ -185,7 +185,7 @@ def exact_shadows(frame: "Frame", lights: "PixelLights", settings: ValSettings) 
     single = AreaLights(position, normal, frames, none, frames[:, :2], none, none[0], none[0], np.ones(count, np.int64),
                         np.arange(count, dtype=np.int32))
     return clustered_irradiance(receivers_of(frame), face_normals(frame), lights, single, None, settings,
-                                footprint=footprints(frame, settings),
+                                footprint=footprints(frame, settings.lights, settings.pairs),
                                 visibility_of=vpl_visibility(frame, lights, single))
 
 

@@ -23,6 +23,7 @@ from refgi.lights.selection import choose_lights
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.papers.subjects import Subjects, seen_by
 from refgi.papers.val.scenes import BUILDERS
+from refgi.settings import of
 from refgi.truth.vpl import VplSettings, vpl
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def settings_of(bench: "Workbench", **changes: Any) -> ValSettings:
     lights = min(MOST_LIGHTS, max(FEWEST_LIGHTS, 2 * bench.scale.size))
     usual: dict[str, Any] = {"lights": lights, "area_lights": AREA_LIGHTS, "map_resolution": bench.scale.rsm_resolution,
                              "interleaving": 1}
-    return ValSettings(**(usual | changes))
+    return of(ValSettings, **(usual | changes))
 
 
 def clamped(bench: "Workbench", scene: "Scene", **changes: Any) -> ValSettings:

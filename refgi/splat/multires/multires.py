@@ -42,7 +42,7 @@ def multires(frame: "Frame", settings: MultiresSettings) -> Array:
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, linear RGB, without visibility unless by rays.
     """
-    lights = choose_lights(frame, settings)  # Sec. 3.1
+    lights = choose_lights(frame, settings.lights)  # Sec. 3.1
     footprint = _footprints(frame, lights, settings)
     if not settings.supersampled:
         return _indirect(frame, frame.gbuffer, lights, footprint, settings)
@@ -55,7 +55,8 @@ def _indirect(
 ) -> Array:
     """Light the pixels of one buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
     _resolve(buffer, settings)
-    warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), lights, settings, footprint, "multires")
+    receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
+    warn_of_clamp(receivers, lights, settings.effective_pairs, footprint, "multires")
     if settings.target_error is not None:
         light = error_driven(buffer, lights, settings, footprint).irradiance
     elif settings.per_light == "light":
@@ -106,7 +107,7 @@ def _upsampled(
         values = evaluate_visible(frame.tracer, frame.scene.geometry, buffer, subsplats, lights)
     else:
         points = at_subsplats(buffer, subsplats, settings.representative)
-        values = evaluate(*points, lights, settings, footprint)
+        values = evaluate(*points, lights, settings.effective_pairs, footprint)
     rho_in_splat = "ams_rho_in_splat" in settings.as_published
     if rho_in_splat:
         values = values * buffer.albedo.reshape(3, -1)[:, subsplats.pixel]
@@ -120,8 +121,8 @@ def _upsampled(
 def _footprints(frame: "Frame", lights: "PixelLights", settings: MultiresSettings) -> Array | None:
     """Return the area of each light: exact, or as the authors' demo has it."""
     if "ams_disc" not in settings.as_published:
-        return footprints(frame, settings)
-    return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings))
+        return footprints(frame, settings.lights, settings.effective_pairs)
+    return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings.lights))
 
 
 def _doubled(frame: "Frame") -> "GBuffer":

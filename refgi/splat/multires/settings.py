@@ -2,12 +2,13 @@
 
 import dataclasses
 import math
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from refgi.errors import expect
-from refgi.lights.settings import LightSettings, Pattern, expect_choices
-from refgi.pairs.settings import ClampMode, PairSettings
+from refgi.lights.settings import LightSettings, MapLights, expect_footprints
+from refgi.pairs.settings import AutoClamp, DiscClamp, PairSettings, SphereClamp
 from refgi.scene.values import BRIGHTEST, is_count
+from refgi.settings import Settings, setting
 
 Refinement = Literal["single_pass", "list"]
 PerLight = Literal["shared", "light", "shared_then_light"]
@@ -15,17 +16,11 @@ Threshold = Literal["absolute", "relative", "brightest"]
 Diagonal = Literal["off", "corner", "literal", "full8"]
 Upsampling = Literal["tent", "demo", "nearest", "naive_bilinear"]
 
-CRITERIA = frozenset({"depth", "derivative", "normal", "curvature"})
-CHOICES: dict[str, Any] = {
-    "normal_components": Literal["xyz", "xy"], "curvature": Literal["chord", "rate"], "diagonal": Diagonal,
-    "refinement": Refinement, "per_light": PerLight, "threshold_form": Threshold, "upsampling": Upsampling,
-    "representative": Literal["pixel", "mean"], "visibility": Literal["none", "rays"]}
 LEAST_TARGET = 1e-6  # about what rounding to float32 leaves of the full sum
 THRESHOLDS = ("depth_threshold", "derivative_threshold", "normal_threshold", "curvature_threshold", "light_threshold")
 # settings and printed forms that a mode would not heed: pairs with rays are those of `vpl`, an error sets its own cells
 UNHEEDED = {
-    "visibility": (("offset", "lobe_norm", "widening", "representative", "per_light", "target_error"),
-                   PairSettings.SWITCHES),
+    "visibility": (("representative", "per_light", "target_error"), frozenset()),
     "target_error": (("finest", "criteria", *THRESHOLDS, "normal_components", "curvature", "rim", "diagonal",
                       "refinement", "per_light", "threshold_form", "representative", "upsampling"),
                      {"ams_rho_in_splat", "ams_filter_all"}),
@@ -34,7 +29,7 @@ UNHEEDED = {
 
 
 @dataclasses.dataclass(frozen=True)
-class MultiresSettings(LightSettings):
+class MultiresSettings(Settings):
     """What `multires` can be set to; the defaults are the paper's, the authors' demo's where the paper is silent.
 
     `clamp` "auto" is the form factor of a disc: the paper clamps as well (Sec. 5), at a value that it does not give. It
@@ -57,23 +52,22 @@ class MultiresSettings(LightSettings):
     the pixels that tell. `supersampled` renders at twice the size (Sec. 4).
     """
 
-    lights: int = 256
-    pattern: Pattern = "grid"
-    clamp: ClampMode = "auto"
+    lights: LightSettings = setting(LightSettings(count=256, source=MapLights(pattern="grid")), "pixel lights")
+    pairs: PairSettings = setting(PairSettings(clamp=AutoClamp()), "how one light lights one subsplat")
     coarsest: int = 16
     finest: int = 0
-    criteria: frozenset[str] = frozenset({"depth", "normal"})
-    depth_threshold: float = 0.1
-    derivative_threshold: float = 0.05
-    normal_threshold: float = 0.25
+    criteria: frozenset[Literal["depth", "derivative", "normal", "curvature"]] = frozenset({"depth", "normal"})
+    depth_threshold: float = setting(0.1, "threshold", least=0.0, most=math.inf)
+    derivative_threshold: float = setting(0.05, "threshold", least=0.0, most=math.inf)
+    normal_threshold: float = setting(0.25, "threshold", least=0.0, most=math.inf)
     normal_components: Literal["xyz", "xy"] = "xyz"
-    curvature_threshold: float = 0.1
+    curvature_threshold: float = setting(0.1, "threshold", least=0.0, most=math.inf)
     curvature: Literal["chord", "rate"] = "chord"
     rim: int = 0
     diagonal: Diagonal = "corner"
     refinement: Refinement = "single_pass"
     per_light: PerLight = "shared"
-    light_threshold: float = 0.1
+    light_threshold: float = setting(0.1, "threshold", least=0.0, most=math.inf)
     threshold_form: Threshold = "relative"
     representative: Literal["pixel", "mean"] = "pixel"
     visibility: Literal["none", "rays"] = "none"
@@ -81,20 +75,18 @@ class MultiresSettings(LightSettings):
     detail: float = 0.0
     target_error: float | None = None
     supersampled: bool = False
+    as_published: frozenset[str] = setting(frozenset(), "forms to use as printed", study=True)
 
-    SWITCHES: ClassVar[frozenset[str]] = LightSettings.SWITCHES | {"ams_disc", "ams_rho_in_splat", "ams_filter_all"}
+    SWITCHES: ClassVar[frozenset[str]] = frozenset({"ams_disc", "ams_rho_in_splat", "ams_filter_all"})
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "criteria", frozenset(self.criteria))
-        expect(self.criteria <= CRITERIA, "criteria", f"names out of {sorted(CRITERIA)}", sorted(self.criteria))
+    def check(self) -> None:
+        """Check what fields ask of each other."""
         expect(is_count(self.coarsest) and 1 <= self.coarsest <= 65536, "coarsest", "1 to 65536 cells", self.coarsest)
         expect(is_count(self.finest) and 0 <= self.finest <= 16, "finest", "a level, 0 to 16", self.finest)
         expect(self.rim in (0, 1) and is_count(self.rim), "rim", "0 or 1 pixels", self.rim)
         for key in THRESHOLDS:
             expect(0 <= getattr(self, key) <= BRIGHTEST or getattr(self, key) == math.inf, key,
                    f"0 to {BRIGHTEST:g}, or inf", getattr(self, key))
-        expect_choices(self, CHOICES)
         expect(0 <= self.detail <= 1, "detail", "a share from 0 to 1", self.detail)
         expect(self.target_error is None or LEAST_TARGET <= self.target_error < math.inf, "target_error",
                f"none or a share of the mean from {LEAST_TARGET:g} on", self.target_error)
@@ -111,22 +103,26 @@ class MultiresSettings(LightSettings):
                        getattr(self, key))
             expect(self.as_published.isdisjoint(switches), "as_published",
                    f"none of {sorted(switches)} with {mode} {chosen!r}", sorted(self.as_published))
-        expect(self.effective_clamp == "none" or self.visibility == "none", "clamp",
-               f"'none' with visibility {self.visibility!r}", self.clamp)
-        expect(self.clamp != "sphere" or self.target_error is None, "clamp",
-               "another one with target_error, which takes peaks of points alone apart", self.clamp)
-        expect(self.effective_clamp == "disc" or "ams_disc" not in self.as_published, "as_published",
+        expect_footprints(self.lights, self.effective_pairs)
+        clamp = self.effective_pairs.clamp
+        if self.visibility == "rays":
+            bare = dataclasses.replace(PairSettings(), clamp=self.pairs.clamp)
+            expect(self.pairs == bare, "pairs", "defaults with visibility 'rays'", self.pairs)
+            expect(clamp is None, "pairs.clamp", "none with visibility 'rays'", clamp and clamp.name())
+        expect(not isinstance(clamp, SphereClamp) or self.target_error is None, "pairs.clamp",
+               "another one with target_error, which takes peaks of points alone apart", clamp and clamp.name())
+        expect(isinstance(clamp, DiscClamp) or "ams_disc" not in self.as_published, "as_published",
                "'ams_disc' with the clamp 'disc' alone", sorted(self.as_published))
 
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return super().traces_rays or self.visibility == "rays"
+        return self.lights.traces_rays or self.visibility == "rays"
 
     @property
-    def effective_clamp(self) -> ClampMode:
-        """The clamp in use: "auto" is "disc", and none where lights have no footprints or pairs are those of `vpl`."""
-        if self.clamp != "auto":
-            return self.clamp
-        bare = self.source == "walk" or self.openness_flux == "roulette" or self.visibility == "rays"
-        return "none" if bare else "disc"
+    def effective_pairs(self) -> PairSettings:
+        """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints or rays are traced."""
+        if not isinstance(self.pairs.clamp, AutoClamp):
+            return self.pairs
+        bare = not self.lights.has_footprints or self.visibility == "rays"
+        return dataclasses.replace(self.pairs, clamp=None if bare else DiscClamp())

@@ -40,7 +40,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.lights.selection import choose_lights, light_maps
+from refgi.lights.settings import MapLights, PathLights
 from refgi.radiometry import lobe_fraction
+from refgi.settings import replaced
 from refgi.splat.sii.ledger_sides import LightSide, light_side, screen_side
 from refgi.stages import stage
 
@@ -146,20 +148,21 @@ def energy_ledger(frame: "Frame", settings: "SiiSettings") -> Ledger:
 
 def _light_side(frame: "Frame", settings: "SiiSettings") -> LightSide:
     """Return the account of all lights together."""
-    maps = frame.rsms if settings.source == "walk" else light_maps(frame, settings)
+    source = settings.lights.source
+    maps = light_maps(frame, source) if isinstance(source, MapLights) else frame.rsms
     sides = [light_side(rsm, frame.scene.geometry, frame.materials) for rsm in maps]
     return LightSide(*(sum(line, np.zeros(3)) for line in zip(*sides, strict=True)))
 
 
 def _pixel_lights(frame: "Frame", settings: "SiiSettings") -> "tuple[Array, Array, PixelLights]":
     """Return the flux of the first bounce and of all bounces before openness, W, and the lights as `sii` has them."""
-    lights = choose_lights(frame, settings)
-    drawn = _flux(lights)
-    if settings.openness_flux != "none":
-        drawn = _flux(choose_lights(frame, dataclasses.replace(settings, openness_flux="none")))
-    if settings.bounces == 1:
+    lights = choose_lights(frame, settings.lights)
+    drawn, whole = _flux(lights), replaced(settings.lights, {"openness.flux": "none"})
+    if settings.lights.openness.flux != "none":
+        drawn = _flux(choose_lights(frame, whole))
+    if not isinstance(settings.lights.source, PathLights) or settings.lights.source.bounces == 1:
         return drawn, drawn, lights
-    once = dataclasses.replace(settings, openness_flux="none", bounces=1)
+    once = replaced(whole, {"source.bounces": 1})
     return _flux(choose_lights(frame, once)), drawn, lights
 
 
@@ -171,7 +174,7 @@ def _flux(lights: "PixelLights") -> Array:
 def _sent(lights: "PixelLights", settings: "SiiSettings") -> tuple[Array, Array, Array]:
     """Return what lights send above their surface and into it, and what printed norms leave out, W."""
     diffuse = lights.flux.sum(axis=1, dtype=np.float64)
-    scale = math.pi if "sii_no_pi" in settings.as_published else 1.0
+    scale = math.pi if "sii_no_pi" in settings.pairs.as_published else 1.0
     sent, inwards, printed = scale * diffuse, np.zeros(3), (1.0 - scale) * diffuse
     if lights.lobe_flux is not None:
         lobe, whole, above = np.asarray(lights.lobe_flux, np.float64), *_lobe_shares(lights, settings)
@@ -184,10 +187,10 @@ def _sent(lights: "PixelLights", settings: "SiiSettings") -> tuple[Array, Array,
 def _lobe_shares(lights: "PixelLights", settings: "SiiSettings") -> tuple[Array, Array]:
     """Return the integral of each lobe of unit flux over all directions and over those above the surface, (N,)."""
     count = lights.flux.shape[1]
-    if settings.lobe_norm == "clamped" or lights.lobe_axis is None or lights.lobe_exponent is None:
+    if settings.pairs.lobe.norm == "clamped" or lights.lobe_axis is None or lights.lobe_exponent is None:
         return np.ones(count), np.ones(count)  # what lies below the surface is never sent
     cosine = np.asarray((lights.normal * lights.lobe_axis).sum(axis=0), np.float64)
     exponent = np.asarray(lights.lobe_exponent, np.float64)
     kept = np.array([lobe_fraction(c, p) for c, p in zip(cosine, exponent, strict=True)])
-    whole = np.ones(count) if settings.lobe_norm == "full_lobe" else 2.0 * math.pi / (exponent + 1.0)
+    whole = np.ones(count) if settings.pairs.lobe.norm == "full_lobe" else 2.0 * math.pi / (exponent + 1.0)
     return whole, kept * whole

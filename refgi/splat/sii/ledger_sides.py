@@ -199,9 +199,9 @@ def screen_side(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") 
     screen = _Screen(frame, lights, settings)
     full, none = screen.pairs(), np.zeros(3)
     printed, clamped, interpolated = none, none, none
-    if settings.widening > 0 and settings.as_published & PRINTED_WIDENINGS:
+    if settings.pairs.lobe.widening > 0 and settings.pairs.as_published & PRINTED_WIDENINGS:
         printed = full - screen.pairs(widening=True)
-    if settings.effective_clamp != "none":
+    if settings.pairs.clamps:
         clamped = screen.pairs(widening=True) - screen.pairs(widening=True, clamp=True)
     arrived = screen.picture()
     if settings.half_resolution:
@@ -217,13 +217,13 @@ class _Screen:
         self.frame, self.lights, self.settings = frame, lights, settings
         self.receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
         self.area = pixel_areas(frame.gbuffer, frame.scene.geometry)
-        self.footprint = footprints(frame, settings)
+        self.footprint = footprints(frame, settings.lights, settings.pairs)
 
     def pairs(self, *, turned: bool = False, clamp: bool = False, widening: bool = False) -> Array:
         """Sum all pairs within any range: with receivers turned round, with the clamp, with widenings as printed."""
         settings = dataclasses.replace(
-            self.settings, clamp=self.settings.clamp if clamp else "none",
-            as_published=self.settings.as_published - (frozenset() if widening else PRINTED_WIDENINGS))
+            self.settings.pairs, clamp=self.settings.pairs.clamp if clamp else None,
+            as_published=self.settings.pairs.as_published - (frozenset() if widening else PRINTED_WIDENINGS))
         receivers = self.receivers._replace(normal=-self.receivers.normal) if turned else self.receivers
         return self._flux(irradiance(receivers, self.lights, settings, self.footprint))
 

@@ -34,8 +34,8 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, linear RGB, without visibility.
     """
-    lights = choose_lights(frame, settings)  # Sec. 3.1, 3.5 to 3.7
-    footprint = footprints(frame, settings)
+    lights = choose_lights(frame, settings.lights)  # Sec. 3.1, 3.5 to 3.7
+    footprint = footprints(frame, settings.lights, settings.pairs)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading
 
     reach = with_reference_length(receivers, lights, settings)
@@ -44,6 +44,6 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
         return splat(some, lights, reach, footprint, frame.gbuffer.projection)  # Eq. (2), Sec. 3.4
 
     light = half_resolution(receivers, lit) if settings.half_resolution else lit(receivers)
-    warn_of_clamp(receivers, lights, settings, footprint, "sii")
+    warn_of_clamp(receivers, lights, settings.pairs, footprint, "sii")
     warn_of_cut(light, receivers, lights, reach, footprint)
     return light

@@ -58,7 +58,7 @@ def splat(
     """
     if not settings.cuts:
         skip("splat.bins", "I_low is 0: every light reaches every pixel")
-        return irradiance(receivers, lights, settings, footprint)
+        return irradiance(receivers, lights, settings.pairs, footprint)
     return _splat(receivers, lights, settings, footprint, projection)
 
 
@@ -102,7 +102,7 @@ def _sum_in_range(
     receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None,
     projection: "Projection | None", *, outside: bool,
 ) -> Array:
-    packed = checked(receivers, lights, settings, footprint)
+    packed = checked(receivers, lights, settings.pairs, footprint)
     settings = with_reference_length(receivers, lights, settings)
     lists = Lists(packed, settings, outside, receivers.covered.shape[1], projection)
     weighed = outside or settings.stochastic_range

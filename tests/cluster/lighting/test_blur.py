@@ -7,6 +7,7 @@ from refgi.cluster.lighting.blur import blur
 from refgi.cluster.settings import ValSettings
 from refgi.jit import threads
 from refgi.pairs.irradiance import Receivers
+from refgi.settings import of
 from tests.naive.interleaving import blurred, window
 
 ROUNDING = 1e-12  # of means of some dozen float64 values, relative to the largest
@@ -43,7 +44,7 @@ def test_equals_the_twin(height, width, side, evidence):
     error = np.abs(result - expected).max()
     evidence(f"{width} x {height}, n = {side}: {error:.1e} off the loops")
     assert error < ROUNDING
-    box = blur(light, to, side, ValSettings(blur="box"), DIAGONAL)
+    box = blur(light, to, side, of(ValSettings, blur="box"), DIAGONAL)
     assert np.abs(box - blurred(light, *to, side, np.inf, -2.0)).max() < ROUNDING
 
 

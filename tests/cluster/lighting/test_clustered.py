@@ -18,6 +18,7 @@ from refgi.lights.selection import choose_lights
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
+from refgi.settings import of
 from tests.cluster.maps.lights import hard_visibility
 from tests.naive import eq2
 from tests.naive.interleaving import lights_of
@@ -25,7 +26,7 @@ from tests.pairs import sets
 
 ROUNDING = 1e-12  # of sums over some hundred lights in another order, relative to the largest
 ROUNDING_SINGLE = 2e-6  # the same in float32
-NOT_SHADOWED = ValSettings(visibility="none")
+NOT_SHADOWED = of(ValSettings, visibility="none")
 
 
 def picture(points, height, width):
@@ -57,7 +58,7 @@ def test_unshadowed_it_is_the_sum_over_all_lights(kind, real, evidence):
         axis = sets.random_directions(rng, 300)
         lights = lights._replace(lobe_flux=lights.flux[:, ::-1].copy(), lobe_axis=axis.astype(real),
                                  lobe_exponent=rng.uniform(0, 40, 300).astype(real))
-    settings = ValSettings(visibility="none", clamp="none" if kind == "lobes" else kind,
+    settings = of(ValSettings, visibility="none", clamp="none" if kind == "lobes" else kind,
                            clamp_value=0.2 if kind in ("distance", "geometry") else 0.0)
     footprint = rng.uniform(0, 0.1, 300)
     expected = irradiance(to, lights, settings, footprint)
@@ -79,7 +80,7 @@ def test_every_pixel_sums_its_lights_under_their_visibility(side, count, assignm
     to.covered[rng.random((17, 19)) < 0.2] = False
     lights = PixelLights(*(None if part is None else part[:, :count] for part in lights[:3]), None, None, None, count)
     of = rng.integers(0, 6, count)
-    settings = ValSettings(visibility="none", assignment=assignment)
+    settings = of(ValSettings, visibility="none", assignment=assignment)
     result = clustered_irradiance(to, to.normal, lights, grouped(of, 6), None, settings, visibility_of=striped,
                                   interleaving=side)
     expected = np.zeros_like(result)
@@ -118,7 +119,7 @@ def test_a_block_of_equal_pixels_has_the_full_sum_as_its_mean(real, assignment, 
     at = Receivers(*(np.ascontiguousarray(np.broadcast_to(part[:, :, :1], (3, 24, 16))) for part in to[:2]),
                    np.ones((24, 16), bool))
     areas = grouped(rng.integers(0, 30, 1024), 30)
-    settings = ValSettings(visibility="none", assignment=assignment)
+    settings = of(ValSettings, visibility="none", assignment=assignment)
     full, eighth = (clustered_irradiance(at, at.normal, lights, areas, None, settings, visibility_of=striped,
                                          interleaving=side) for side in (1, 8))
     means = np.stack([eighth[:, y : y + 8, x : x + 8].mean(axis=(1, 2), dtype=np.float64)
@@ -132,7 +133,7 @@ def test_a_block_of_equal_pixels_has_the_full_sum_as_its_mean(real, assignment, 
 @pytest.fixture(scope="module", params=[np.float32, np.float64])
 def scene(request):
     frame = Frame(load_scene("cornell_sphere:faces=200"), width=37, height=29, rsm_resolution=64, dtype=request.param)
-    settings = ValSettings(lights=48, map_resolution=32)
+    settings = of(ValSettings, lights=48, map_resolution=32)
     to = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     facing = facing_normals(frame.scene.geometry, frame.gbuffer.triangle_id, frame.gbuffer.normal)
     return frame, choose_lights(frame, settings), to, facing
@@ -150,9 +151,9 @@ def test_an_area_light_for_each_light_is_a_hard_shadow_for_each(scene, evidence)
     """M = N: the sum over lights, each under its own hard test."""
     frame, lights, to, facing = scene
     count = lights.position.shape[1]
-    areas, maps = shadowed(frame, lights, count, ValSettings(map_resolution=32))
+    areas, maps = shadowed(frame, lights, count, of(ValSettings, map_resolution=32))
     assert (areas.delta == 0).all()
-    result = clustered_irradiance(to, facing, lights, areas, maps, ValSettings(map_resolution=32))
+    result = clustered_irradiance(to, facing, lights, areas, maps, of(ValSettings, map_resolution=32))
     expected, shadows = np.zeros(to.position.shape), 0
     flat, up = to.position.reshape(3, -1), facing.reshape(3, -1)
     for i in range(count):
@@ -170,7 +171,7 @@ def test_an_area_light_for_each_light_is_a_hard_shadow_for_each(scene, evidence)
 def test_tile_by_tile_has_the_bits_of_lists_of_receivers(scene, mode):
     """Fast = slow: V through `visibility_of` takes the long way."""
     frame, lights, to, facing = scene
-    settings = ValSettings(map_resolution=32, visibility=mode)
+    settings = of(ValSettings, map_resolution=32, visibility=mode)
     areas, maps = shadowed(frame, lights, 5, settings)
     for side in (1, 3):
         fast = clustered_irradiance(to, facing, lights, areas, maps, settings, interleaving=side)

@@ -6,6 +6,7 @@ from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.evaluate import visibility
 from refgi.rsm.raster.projection import paraboloid_projection
+from refgi.settings import of
 
 
 def area_lights(center, normal, radius=0.0, members=None):
@@ -35,4 +36,4 @@ def surface_points(geometry, count, rng):
 
 def hard_visibility(maps, areas, m, points, facing):
     """V by one depth test."""
-    return visibility(maps, areas, m, points, facing, ValSettings(visibility="hard"))
+    return visibility(maps, areas, m, points, facing, of(ValSettings, visibility="hard"))

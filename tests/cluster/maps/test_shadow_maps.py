@@ -11,6 +11,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError
 from refgi.rays import Tracer
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.stages import observe
 from tests.cluster.maps.lights import area_lights, hard_visibility, surface_points
 from tests.cluster.maps.test_occluders import box, together
@@ -21,7 +22,7 @@ from tests.rsm.shapes import geometry, soup
 GRAZING = 2e-5
 ON_A_SILHOUETTE = 5e-4  # share of texels so near an edge that float32 sees another triangle, or so grazing
 IN_A_CORNER = 0.02  # share of points within a texel of a corner of the room, 48 texels across
-SMALL = ValSettings(map_resolution=48)
+SMALL = of(ValSettings, map_resolution=48)
 SCENE = load_scene("cornell_sphere:faces=1500").geometry
 LIGHTS = area_lights([[0.1, 0.3, 0.2], [0.4, 0.5, 0.1], [0.3, 0.05, 0.4], [0.25, 0.3, 0.3]],
                      [[1, 0.2, -0.3], [0, -1, 0], [-0.5, 0.8, 0.1], [0, 0.2, -1]], radius=0.09)

@@ -11,10 +11,11 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
+from refgi.settings import of
 from tests.naive import val as naive
 
 SIDE, MAP = 8, 16
-SETTINGS = ValSettings(lights=40, area_lights=5, map_resolution=MAP, interleaving=1, prefilter="brute")
+SETTINGS = of(ValSettings, lights=40, area_lights=5, map_resolution=MAP, interleaving=1, prefilter="brute")
 HULL = 1e-6  # of the diagonal: what lies beyond a plane by less is not beyond it
 # Sums of some dozen positive terms round by a few 1e-16. Whether a texel belongs to a disc could turn on the last bit
 # and change V by a texel's share: no such tie occurs here.

@@ -16,10 +16,11 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
+from refgi.settings import of
 from tests.naive import truth
 
 # nothing near six large clusters, so that rays to a rectangle and one view from its centre meet the same surfaces
-SETTINGS = ValSettings(lights=200, area_lights=6, map_resolution=128, near_geometry="planes", near_distance=1.0)
+SETTINGS = of(ValSettings, lights=200, area_lights=6, map_resolution=128, near_geometry="planes", near_distance=1.0)
 PAIRS = 150
 # rms over area lights and pixels: one view from the centre misses what hides behind the nearest surface, and patches
 # are a texel of 128 wide

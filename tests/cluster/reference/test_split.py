@@ -12,13 +12,14 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 # near pairs clamped at a twentieth of the scene's metre: else the error of sampling is that of a pixel beside a light
 # the scale of depths that the limits below were measured with
-SETTINGS = ValSettings(lights=128, area_lights=12, map_resolution=64, clamp="distance", clamp_value=0.1,
+SETTINGS = of(ValSettings, lights=128, area_lights=12, map_resolution=64, clamp="distance", clamp_value=0.1,
                        depth_scale="scene", near_distance=0.5)
 ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
 # the root of summed squares over the error of all six steps of visibility: 1 for independent ones, 6^-1/2 where all
@@ -30,7 +31,8 @@ MOST_ROOT = 2.0  # in the boxes, where blockers are simple
 
 @pytest.mark.feature("VAL-02", "VAL-27")
 def test_the_picture_of_exact_shadows_is_that_of_vpl(evidence):
-    frame, settings = Frame(load_scene("cornell_box"), width=20, height=20, rsm_resolution=64), ValSettings(lights=100)
+    frame = Frame(load_scene("cornell_box"), width=20, height=20, rsm_resolution=64)
+    settings = of(ValSettings, lights=100)
     exact = exact_shadows(frame, choose_lights(frame, settings), settings)
     reference = vpl(frame, VplSettings(lights=100))
     off = np.abs(exact - reference).max() / reference.max()
@@ -70,7 +72,7 @@ def test_errors_of_the_steps_add_up_plausibly(name, evidence):
 def test_errors_of_real_scenes(name, data_dir, evidence):
     found = load_scene(data_dir / f"{name}.json")
     frame = Frame(found, width=24, height=24, rsm_resolution=128)
-    settings = ValSettings(lights=256, clamp="distance", clamp_value=0.05 * found.geometry.diagonal)
+    settings = of(ValSettings, lights=256, clamp="distance", clamp_value=0.05 * found.geometry.diagonal)
     judge(name, frame, settings, 384, evidence)
 
 

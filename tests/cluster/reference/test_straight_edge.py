@@ -12,10 +12,11 @@ from refgi.cluster.reference import back_projection_visibility, rectangle_visibi
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
+from refgi.settings import of
 
 EDGE, RECEIVER = 1.0, 3.0  # distances of the edge and the receivers from the light, m
 PLACES = (0.0, 0.07, 0.19, 0.31)  # of the edge, m: 0 is where texels of all levels of a map meet
-SETTINGS = ValSettings(depth_scale="scene", near_distance=0.5, map_resolution=256)
+SETTINGS = of(ValSettings, depth_scale="scene", near_distance=0.5, map_resolution=256)
 # 256 points hide behind an edge along a side one by one
 RAYS = 1.01 / 256
 # half a texel of 256 by which patches reach over the edge, as a share of the penumbra on the map, and half a cell of 32

@@ -11,9 +11,10 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.scene import load_scene
+from refgi.settings import of
 from tests.naive import truth
 
-SETTINGS = ValSettings(lights=64)
+SETTINGS = of(ValSettings, lights=64)
 ROUNDING = 1e-6  # of the maximum: V times float64 terms against sums of float32 ones
 PAIRS = 400
 

@@ -18,6 +18,7 @@ from refgi.cluster.visibility.search_region import (
     scale_of,
 )
 from refgi.cluster.visibility.series import series
+from refgi.settings import of
 from tests.cluster.filters.sat import build_sat, sat_means, sats
 
 
@@ -87,7 +88,7 @@ def are_shares(values, dtype):
 
 def shadow_by_summed_areas(areas, maps, points, **settings):
     """V of the first area light by the series over boxes, which summed areas filter exactly."""
-    settings = ValSettings(**settings)
+    settings = of(ValSettings, **settings)
     constants, sizing = light_constants(maps, 0, float(areas.delta[0]), settings), filter_sizing(settings)
     scale, size, dtype = scale_of(maps, 0, settings), points.shape[1], maps.depth.dtype
     filters, points = sats(maps.depth.shape[1], settings.terms, dtype, mirrored=True), points.astype(dtype)

@@ -8,6 +8,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.evaluate import visibility
 from refgi.errors import InputError
 from refgi.rays import Tracer
+from refgi.settings import of
 from tests.cluster.maps.lights import hard_visibility
 from tests.cluster.visibility.plates import lit_by, map_of_plates, on_plane
 from tests.rsm.shapes import geometry
@@ -31,7 +32,7 @@ def test_shadow_breaks_off_at_the_light_s_plane(evidence):
     facing = np.repeat([[-1.0], [0.0], [0.0]], 41, axis=1)
     seen = {}
     for behind in ("visible", "dual_paraboloid", "raytrace"):
-        settings = ValSettings(behind=behind, visibility="pcss", map_resolution=128)
+        settings = of(ValSettings, behind=behind, visibility="pcss", map_resolution=128)
         maps = shadow_maps(scene, areas, settings, np.float64)
         tracer = Tracer(scene) if behind == "raytrace" else None
         seen[behind] = visibility(maps, areas, 0, points, facing, settings, tracer)
@@ -55,7 +56,8 @@ def test_no_light_leaks_in_over_the_rim(evidence):
     areas = areas._replace(frame=np.array([[[half, half, 0.0], [-half, half, 0.0], [0.0, 0.0, 1.0]]]))
     seen = {}
     for prefilter, dtype in (("brute", np.float64), ("mip", np.float32)):
-        settings = ValSettings(behind="dual_paraboloid", prefilter=prefilter, map_resolution=128, depth_scale="scene")
+        settings = of(ValSettings, behind="dual_paraboloid", prefilter=prefilter, map_resolution=128,
+                      depth_scale="scene")
         maps = shadow_maps(scene, areas, settings, np.float64)
         maps = maps._replace(depth=maps.depth.astype(dtype), behind=maps.behind.astype(dtype))
         seen[prefilter] = float(visibility(maps, areas, 0, points, -points, settings)[0])
@@ -67,11 +69,11 @@ def test_rays_are_asked_for():
     areas, maps = lit_by(map_of_plates(8, [], 2.0), 0.5, 4.0)
     points, normals = on_plane(2.0, 1.0, 2)
     with pytest.raises(InputError, match="tracer"):
-        visibility(maps, areas, 0, points, normals, ValSettings(behind="raytrace"))
+        visibility(maps, areas, 0, points, normals, of(ValSettings, behind="raytrace"))
     with pytest.raises(InputError, match="m: expected an area light"):
         visibility(maps, areas, 1, points, normals, ValSettings())
     with pytest.raises(InputError, match="visibility"):
-        visibility(maps, areas, 0, points, normals, ValSettings(visibility="rays_vpls"))
+        visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="rays_vpls"))
 
 
 def test_light_without_extent_casts_the_hard_shadow():
@@ -81,8 +83,8 @@ def test_light_without_extent_casts_the_hard_shadow():
     hard = hard_visibility(maps, areas, 0, points, normals)
     assert set(np.unique(hard)) == {0.0, 1.0}
     for mode in ("csm", "pcss", "pcf", "hard"):
-        assert np.array_equal(visibility(maps, areas, 0, points, normals, ValSettings(visibility=mode)), hard)
-    none = visibility(maps, areas, 0, points, normals, ValSettings(visibility="none"))
+        assert np.array_equal(visibility(maps, areas, 0, points, normals, of(ValSettings, visibility=mode)), hard)
+    none = visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="none"))
     unmapped = visibility(maps._replace(map_of=np.array([-1])), areas, 0, points, normals, ValSettings())
     assert (none == 1).all()
     assert (unmapped == 1).all()

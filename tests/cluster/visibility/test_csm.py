@@ -23,6 +23,7 @@ from refgi.cluster.visibility.search_region import (
     find_search_regions,
 )
 from refgi.cluster.visibility.series import above_half, first_lit, frequencies, series, weights
+from refgi.settings import of
 from tests.cluster.visibility.plates import (
     are_shares,
     lit_by,
@@ -47,7 +48,7 @@ def rmse(a, b):
 
 def shadow(areas, maps, points, normals, **settings):
     """V; on the scene's scale, whose bias is a known length, where the settings name none."""
-    return visibility(maps, areas, 0, points, normals, ValSettings(**{"depth_scale": "scene", **settings}))
+    return visibility(maps, areas, 0, points, normals, of(ValSettings, **{"depth_scale": "scene", **settings}))
 
 
 @pytest.mark.feature("VAL-12")
@@ -113,7 +114,7 @@ def test_mean_depth_stays_between_the_nearest_and_the_receiver():
 @pytest.mark.feature("VAL-18")
 @pytest.mark.parametrize("rescale", ["none", "scale2", "plateau"])
 def test_comparison_is_the_series(rescale):
-    chain = series(ValSettings(attenuation=1.0, rescale=rescale))
+    chain = series(of(ValSettings, attenuation=1.0, rescale=rescale))
     for blocker in (0.1, 0.45, 0.5, 0.55, 0.7):
         constants, scratch, means, pending, visible = scratch_arrays(1, 4)
         constants[[BIAS, GAIN]] = chain.bias, chain.gain

@@ -15,6 +15,7 @@ from refgi.cluster.visibility.search_region import (
     find_search_regions,
     light_constants,
 )
+from refgi.settings import of
 from tests.cluster.visibility.plates import (
     are_shares,
     lit_by,
@@ -38,7 +39,7 @@ METRES = DepthScale(False, 0.0, 1.0, 1.0)  # depths of the series are metres
 
 def shadow(areas, maps, points, normals, **settings):
     """V; on the scene's scale, whose bias is a known length, where the settings name none."""
-    return visibility(maps, areas, 0, points, normals, ValSettings(**{"depth_scale": "scene", **settings}))
+    return visibility(maps, areas, 0, points, normals, of(ValSettings, **{"depth_scale": "scene", **settings}))
 
 
 @pytest.mark.feature("VAL-12")
@@ -65,7 +66,7 @@ def test_mean_depth_is_that_of_the_blockers(evidence):
     depth = map_of_plates(48, [(-0.3, -0.06, -0.5, 0.5, 0.3)], 0.7)
     points, normals = on_plane(0.7, 0.15, 5)
     _, maps = lit_by(depth, 0.3, 2.0)
-    settings = ValSettings(visibility="pcss", cone=False)
+    settings = of(ValSettings, visibility="pcss", cone=False)
     constants, (_, scratch, _, pending, visible) = light_constants(maps, 0, 0.3, settings), scratch_arrays(25, 1)
     chosen, test = filter_sizing(settings), blocker_test(settings, METRES)
     count = find_search_regions(constants, chosen, points, 25, np.ones(25, np.bool_), pending, visible, scratch)
@@ -124,7 +125,7 @@ def test_blockers_near_the_light_escape_the_published_search(evidence):
     covers, found = {}, {}
     for name, switches, near in (("published", SEARCH, maps.near[0]), ("radial", frozenset(), maps.near[0]),
                                  ("axial", frozenset(), 0.2)):
-        settings = ValSettings(visibility="pcss", cone=False, as_published=switches)
+        settings = of(ValSettings, visibility="pcss", cone=False, as_published=switches)
         constants, (_, scratch, _, pending, visible) = light_constants(maps, 0, 1.0, settings), scratch_arrays(1, 1)
         constants[NEAREST] = near
         find_search_regions(constants, filter_sizing(settings), point, 1, np.ones(1, np.bool_), pending, visible,

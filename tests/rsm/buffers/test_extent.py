@@ -9,6 +9,7 @@ from refgi import Frame, load_scene, rays
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, Geometry, SpotLight
 from refgi.scene.model import Camera, Scene
+from refgi.settings import of
 from refgi.splat.sii.settings import SiiSettings
 from refgi.stages import observe
 
@@ -148,7 +149,7 @@ def test_rays_of_openness_are_a_tenth_of_what_lights_reach(monkeypatch):
         return openness(*args, radius=radius, **rest)
 
     monkeypatch.setattr(rays, "openness", noted)
-    render(scene, "sii", SiiSettings(lights=16, openness_flux="scale"), **SIZE)
+    render(scene, "sii", of(SiiSettings, lights=16, openness_flux="scale"), **SIZE)
     assert asked == [pytest.approx(Frame(scene, **SIZE).lit_extent.diagonal / 10)]
 
 

@@ -9,6 +9,7 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import DirectionalLight, PointLight, load_scene
+from refgi.settings import of
 from refgi.splat import GatherSettings, Receivers, SiiSettings, gather, sii
 from refgi.splat.gather.gather import gather_counted, gather_irradiance
 from refgi.splat.gather.gather_sum import disc_pattern
@@ -27,7 +28,7 @@ def box():
 
 @pytest.fixture(scope="module")
 def full_sum(box):
-    return sii(box, SiiSettings(pattern="all", i_low=0))
+    return sii(box, of(SiiSettings, pattern="all", i_low=0))
 
 
 def relative(image, reference):
@@ -108,7 +109,7 @@ def test_published_weight_loses_light(box, full_sum, evidence):
                                    DirectionalLight((0.3, -1.0, 0.4), (1.0, 1.0, 1.0))])
 def test_other_lights_converge_too(box, light):
     frame = Frame(box.scene.with_lights(light), width=16, height=16, rsm_resolution=32)
-    full = sii(frame, SiiSettings(pattern="all", i_low=0))
+    full = sii(frame, of(SiiSettings, pattern="all", i_low=0))
     got = gather(frame, GatherSettings(samples=200_000, radius=10.0 if isinstance(light, PointLight) else WHOLE_MAP,
                                        grid=0))
     assert full.mean() > 0

@@ -12,6 +12,7 @@ from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, PointLight, load_scene
+from refgi.settings import of
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
 from refgi.splat.multires.multires import _footprints, _halved
 from refgi.splat.multires.refinement.grid import representatives
@@ -43,7 +44,7 @@ def box():
 @pytest.mark.feature("AMS-10")
 def test_all_pixels_as_subsplats_are_the_full_sum(box, change, evidence):
     """Limit: with as many coarsest cells as pixels nothing is interpolated, and no bit differs."""
-    settings = MultiresSettings(lights=64, coarsest=4096, **change)
+    settings = of(MultiresSettings, lights=64, coarsest=4096, **change)
     np.testing.assert_array_equal(multires(box, settings), full_sum(box, settings))
     evidence(f"every pixel a subsplat, {change or 'defaults'}: the bits of the full sum")
 
@@ -51,7 +52,7 @@ def test_all_pixels_as_subsplats_are_the_full_sum(box, change, evidence):
 @pytest.mark.parametrize("mode", ["tent", "demo", "nearest", "naive_bilinear"])
 def test_fewer_subsplats_come_near_the_full_sum(box, mode):
     """Picture: on the box with the demo's clamp; the naive modes stay far (Fig. 7)."""
-    settings = MultiresSettings(lights=64, upsampling=mode, **DEMO_CLAMP)
+    settings = of(MultiresSettings, lights=64, upsampling=mode, **DEMO_CLAMP)
     covered, full = box.gbuffer.covered, full_sum(box, settings).astype(float)
     off = np.sqrt(((multires(box, settings) - full)[:, covered] ** 2).mean()) / full[:, covered].mean()
     assert len(shared_subsplats(box.gbuffer, settings).level) < 0.7 * covered.sum()
@@ -60,7 +61,7 @@ def test_fewer_subsplats_come_near_the_full_sum(box, mode):
 
 def test_a_supersampled_picture_is_the_mean_of_four(box):
     """Oracle: the method at twice the size, averaged over what shows a surface; uncovered pixels stay black."""
-    settings = MultiresSettings(lights=64, **DEMO_CLAMP)
+    settings = of(MultiresSettings, lights=64, **DEMO_CLAMP)
     large = frame(width=122, height=90)
     light, covered = multires(large, settings).astype(float), large.gbuffer.covered
     four = covered.reshape(45, 2, 61, 2).sum(axis=(1, 3))
@@ -74,7 +75,8 @@ def test_a_supersampled_picture_is_the_mean_of_four(box):
 @pytest.mark.feature("REF-20")
 def test_albedo_within_the_splat_is_albedo_twice_filtered(box, evidence):
     """Oracle: where the albedo does not change within the cells around, printed and default agree."""
-    settings = MultiresSettings(lights=64, coarsest=32, **DEMO_CLAMP)  # cells of 2 pixels: light travels less than 6
+    # cells of 2 pixels: light travels less than 6
+    settings = of(MultiresSettings, lights=64, coarsest=32, **DEMO_CLAMP)
     printed = multires(box, dataclasses.replace(settings, as_published={"ams_rho_in_splat"}))
     plain = multires(box, settings)
     alike = np.isclose(printed, plain, rtol=1e-5).all(axis=0) & box.gbuffer.covered
@@ -90,7 +92,7 @@ def test_albedo_within_the_splat_is_albedo_twice_filtered(box, evidence):
 @pytest.mark.feature("REF-20")
 def test_the_demos_disc_is_pi_over_its_frustum(box, evidence):
     """Closed form: L^2 cos cos / (1.5 N r^2 + L^2), one light, one receiver, by hand."""
-    settings = MultiresSettings(lights=1, clamp="disc", coarsest=4096, as_published={"ams_disc"})
+    settings = of(MultiresSettings, lights=1, clamp="disc", coarsest=4096, as_published={"ams_disc"})
     lights = choose_lights(box, settings)
     got = multires(box, settings)
     position, normal, covered = box.gbuffer.resolve("position", "normal", "covered")
@@ -114,7 +116,7 @@ def test_the_demos_disc_is_pi_over_its_frustum(box, evidence):
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 def test_odd_sizes_and_thread_counts(size, real):
     at = frame(width=size[0], height=size[1], rsm_resolution=16, dtype=real)
-    settings = MultiresSettings(lights=16, rim=1)
+    settings = of(MultiresSettings, lights=16, rim=1)
     light = multires(at, settings)
     assert light.shape == (3, size[1], size[0])
     assert light.dtype == real
@@ -131,7 +133,7 @@ def test_nothing_to_see_is_black():
     assert not at.gbuffer.covered.any()
     for how in ({}, {"supersampled": True}, {"target_error": 0.05}, {"per_light": "light"}, {"visibility": "rays"},
                 {"detail": 0.5}, {"representative": "mean"}):
-        assert not multires(at, MultiresSettings(lights=16, **how)).any()
+        assert not multires(at, of(MultiresSettings, lights=16, **how)).any()
 
 
 @pytest.mark.parametrize(("scene", "size", "change"), [
@@ -140,7 +142,7 @@ def test_nothing_to_see_is_black():
 def test_cells_that_look_dark_do_not_hold_an_error_up(scene, size, change):
     """Limit: where light is seen by samples but by no cell that could be split, every pixel is lit in the end."""
     at = frame(scene, *size, rsm_resolution=16)
-    settings = MultiresSettings(coarsest=1, **change)
+    settings = of(MultiresSettings, coarsest=1, **change)
     full, covered = full_sum(at, settings).astype(float), at.gbuffer.covered
     off = np.sqrt(((multires(at, settings) - full)[:, covered] ** 2).mean())
     assert off <= settings.target_error * full[:, covered].mean()
@@ -160,7 +162,7 @@ def test_slivers_between_doubled_pixels_take_the_light_around():
     ({"openness_flux": "roulette"}, "none"), ({"visibility": "rays"}, "none")])
 def test_near_pairs_are_clamped_where_that_is_possible(box, change, clamp):
     """Wiring: the picture is that of the clamp by its name, and another than that of the other."""
-    settings = MultiresSettings(lights=32, **change)
+    settings = of(MultiresSettings, lights=32, **change)
     light = multires(box, settings)
     np.testing.assert_array_equal(light, multires(box, dataclasses.replace(settings, clamp=clamp)))
     if clamp == "disc":
@@ -174,7 +176,7 @@ def test_the_default_clamp_keeps_subsplats_near_the_full_sum():
     """Picture: light beside lights grows without bound, and no coarse subsplat can follow it (Fig. 13)."""
     at, off = frame(width=96, height=96, rsm_resolution=256), {}
     for clamp in ("auto", "none"):
-        settings = MultiresSettings(clamp=clamp)
+        settings = of(MultiresSettings, clamp=clamp)
         light, full = multires(at, settings).astype(float), full_sum(at, settings).astype(float)
         off[clamp] = np.sqrt(((light - full)[:, at.gbuffer.covered] ** 2).mean()) / full[:, at.gbuffer.covered].mean()
     assert off["auto"] < FLOORS["tent"]
@@ -186,7 +188,7 @@ def test_the_demos_disc_counts_the_lights_of_each_map(box):
     spot = box.scene.lights[0]
     at = Frame(box.scene.with_lights(spot, PointLight((0.3, 0.3, 0.2), (1.0, 1.0, 1.0))), width=8, height=8,
                rsm_resolution=32)
-    settings = MultiresSettings(lights=256, as_published={"ams_disc"})
+    settings = of(MultiresSettings, lights=256, as_published={"ams_disc"})
     lights = choose_lights(at, settings)
     for index, (source, count) in enumerate(zip(at.scene.lights, (121, 150), strict=True)):
         here = lights.map_index == index
@@ -206,11 +208,11 @@ def test_cells_of_background_are_no_subsplats(box):
 
 
 def test_the_table_of_methods_knows_it():
-    picture = render("cornell_box", "multires", MultiresSettings(lights=16), width=16, height=16, rsm_resolution=16)
+    picture = render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
     assert np.isfinite(picture.radiance).all()
     assert not find_method("multires").visibility
     with observe() as log:
-        render("cornell_box", "multires", MultiresSettings(lights=16), width=16, height=16, rsm_resolution=16)
+        render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
     assert log.status("splat.refine") == ["ran"]
 
 
@@ -219,7 +221,7 @@ def test_the_table_of_methods_knows_it():
 def test_depth_is_computed_only_where_a_criterion_looks_at_it(change, asked):
     """Skip: the light is the same to the bit with the depth resolved beforehand."""
     at, other = frame(width=33, height=20), frame(width=33, height=20)
-    settings = MultiresSettings(lights=16, **change)
+    settings = of(MultiresSettings, lights=16, **change)
     light = multires(at, settings)
     assert ("depth" in at.gbuffer._channels) == asked
     other.gbuffer.resolve("depth")
@@ -244,4 +246,4 @@ def test_settings_are_checked():
                    {"as_published": {"ams_disc"}, "clamp": "none"},
                    {"as_published": {"ams_rho_in_splat"}, "per_light": "light"}):
         with pytest.raises(InputError, match=next(iter(change))):
-            MultiresSettings(**change)
+            of(MultiresSettings, **change)

@@ -13,6 +13,7 @@ from refgi.lights.selection import choose_lights
 from refgi.rsm.buffers.solid_angle import texel_solid_angles
 from refgi.rsm.raster.projection import PERSPECTIVE, Projection, spot_projection
 from refgi.scene import PointLight, SpotLight, load_scene
+from refgi.settings import of
 from refgi.splat.multires.multires import multires, shared_subsplats
 from refgi.splat.multires.settings import MultiresSettings
 from refgi.stages import observe
@@ -35,7 +36,7 @@ def box():
 
 
 def subsplats(frame, **changes):
-    return len(shared_subsplats(frame.gbuffer, MultiresSettings(**changes)).pixel)
+    return len(shared_subsplats(frame.gbuffer, of(MultiresSettings, **changes)).pixel)
 
 
 def rmse(image, reference, covered):
@@ -44,7 +45,7 @@ def rmse(image, reference, covered):
 
 
 def clamped(frame, share=0.02, **changes):
-    return MultiresSettings(clamp="distance", clamp_value=share * frame.scene.geometry.diagonal, **changes)
+    return of(MultiresSettings, clamp="distance", clamp_value=share * frame.scene.geometry.diagonal, **changes)
 
 
 @pytest.mark.feature("AMS-01")
@@ -53,7 +54,7 @@ def test_lights_stand_on_texel_centres_of_a_fixed_grid(box, evidence):
     every = multires(box, clamped(box, pattern="all", coarsest=EVERY_PIXEL))
     covered, found = box.gbuffer.covered, []
     for n in (16, 32, 64, 128):
-        lights = choose_lights(box, MultiresSettings(lights=n * n))
+        lights = choose_lights(box, of(MultiresSettings, lights=n * n))
         row, column = np.divmod(lights.texel, 128)
         grid = np.floor((np.arange(n) + 0.5) / n * 128)
         assert np.isin(row, grid).all()
@@ -69,7 +70,7 @@ def test_lights_stand_on_texel_centres_of_a_fixed_grid(box, evidence):
 
 @pytest.mark.feature("AMS-15")
 def test_supersampled_is_the_mean_of_four_pixels(box, evidence):
-    settings = MultiresSettings(lights=64, supersampled=True)
+    settings = of(MultiresSettings, lights=64, supersampled=True)
     fine = Frame(box.scene, width=2 * box.width, height=2 * box.height, rsm_resolution=128)
     light, seen = multires(fine, dataclasses.replace(settings, supersampled=False)), fine.gbuffer.covered
     blocks = (box.height, 2, box.width, 2)
@@ -139,7 +140,7 @@ def test_equal_solid_angles_in_a_cone(evidence):
 
 def test_equal_solid_angles_dim_the_middle(box):
     """The power is that of a cone of even light either way; where the middle of the spot shines, E falls."""
-    exact, equal = (choose_lights(box, MultiresSettings(pattern="all", as_published=names))
+    exact, equal = (choose_lights(box, of(MultiresSettings, pattern="all", as_published=names))
                     for names in (frozenset(), frozenset({"equal_solid_angle"})))
     change = equal.flux.sum(axis=0) / exact.flux.sum(axis=0)
     along = np.asarray(box.scene.lights[0].direction) @ (

@@ -8,6 +8,7 @@ from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import irradiance
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.splat import Receivers, SiiSettings
 from refgi.splat.sii.half_resolution import half_resolution
 
@@ -149,7 +150,7 @@ def test_error_and_cost_on_scenes(evidence):
     found = []
     for name in ("cornell_box", "stage", "atrium:faces=20000"):
         frame = Frame(load_scene(name), width=192, height=160, rsm_resolution=96)
-        settings = SiiSettings(i_low=0.0, lights=96, clamp="disc")
+        settings = of(SiiSettings, i_low=0.0, lights=96, clamp="disc")
         lights, area = choose_lights(frame, settings), footprints(frame, settings)
         receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
         counted = []

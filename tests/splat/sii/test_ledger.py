@@ -10,6 +10,7 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.rsm.raster.projection import CUBE_FORWARD, CUBE_UP
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
+from refgi.settings import of
 from refgi.splat import SiiSettings, sii
 from refgi.splat.sii.ledger import energy_ledger
 from refgi.splat.sii.ledger_sides import pixel_areas
@@ -25,7 +26,7 @@ FACETS = 4e-4  # of the lights' flux: 20,000 facets have 3.6e-4 less area than t
 RIM = 2e-4  # of a plate some 150 pixels wide: those on its rim count wholly or not
 GRAZING = 3e-3  # of what slanting lobes send: part of it runs along the light's own facet, 1.8e-3 of 80,000 facets
 TWIN = 1e-12  # of emitted: float64 sums in another order
-UNCUT = SiiSettings(i_low=0.0, lights=64)
+UNCUT = of(SiiSettings, i_low=0.0, lights=64)
 
 CASES = [
     ("cornell_box", {}),
@@ -62,7 +63,7 @@ def frames():
 def test_lines_sum_to_what_is_emitted(frames, evidence):
     worst = 0.0
     for name, settings in CASES:
-        ledger = energy_ledger(frames(name), SiiSettings(**{"lights": 200} | settings))
+        ledger = energy_ledger(frames(name), of(SiiSettings, **{"lights": 200} | settings))
         assert balance(ledger) < WHOLE, (name, settings)
         assert all(row.watts.shape == (3,) and row.watts.dtype == np.float64 for row in ledger.rows)
         worst = max(worst, balance(ledger))
@@ -75,7 +76,7 @@ def test_what_a_setting_does_is_on_its_line(frames):
     signed = ("sampling", "bounced", "scaled", "printed", "interpolated", "cut", "clamped")
 
     def lines(name, **settings):
-        ledger = energy_ledger(frames(name), SiiSettings(**{"lights": 200, "i_low": 0.0} | settings))
+        ledger = energy_ledger(frames(name), of(SiiSettings, **{"lights": 200, "i_low": 0.0} | settings))
         return {line: float(getattr(ledger, line)[1] / ledger.emitted[1]) for line in signed if line != "sampling"}
 
     still = dict.fromkeys(signed[1:], 0.0)
@@ -105,7 +106,7 @@ def pixels_of(frame):
 def test_each_line_is_that_of_the_twin(name, threshold, evidence):
     """Oracle: kept, cut, clamped and behind from loops over pixels and lights, and together the full sum."""
     frame = Frame(load_scene(name), width=11, height=8, rsm_resolution=64, dtype=np.float64)
-    settings = SiiSettings(lights=24, irradiance_low=threshold, clamp="distance", clamp_value=0.05)
+    settings = of(SiiSettings, lights=24, irradiance_low=threshold, clamp="distance", clamp_value=0.05)
     ledger = energy_ledger(frame, settings)
     expected = naive.screen(list(pixels_of(frame)), choose_lights(frame, settings), threshold, 0.05)
     error = {line: float(np.abs(getattr(ledger, line) - value).max() / ledger.emitted.max())
@@ -222,7 +223,7 @@ def test_cut_follows_the_law_of_the_range(evidence):
 @pytest.mark.feature("REF-04")
 def test_the_random_range_cuts_nothing_in_the_mean(frames, evidence):
     """Statistical: the signed cut over 64 seeds is 0 within four of its standard errors, the plain cut is not."""
-    settings = SiiSettings(lights=64, irradiance_low=0.05)
+    settings = of(SiiSettings, lights=64, irradiance_low=0.05)
     plain = energy_ledger(frames("cornell_box"), settings)
     lights = []
     for seed in range(64):
@@ -261,7 +262,7 @@ def test_emitted_and_missed_in_closed_form(evidence):
 def test_bounces_of_a_walk_are_a_geometric_series(evidence):
     """Analytic: in a closed sphere of albedo 1/2 three bounces send 1/2 + 1/4 + 1/8 of the light's power."""
     frame = Frame(load_scene("integrating_sphere"), width=8, height=8, rsm_resolution=32)
-    ledger = energy_ledger(frame, SiiSettings(source="walk", bounces=3, lights=100))
+    ledger = energy_ledger(frame, of(SiiSettings, source="walk", bounces=3, lights=100))
     shares = [float(line[0] / ledger.emitted[0]) for line in (ledger.reflected, ledger.bounced, ledger.lights)]
     assert shares[0] == pytest.approx(0.5, rel=1e-6)
     assert -shares[1] / (shares[2] + shares[1]) == pytest.approx(0.75, rel=1e-9)
@@ -285,7 +286,7 @@ def test_a_dark_scene_and_a_view_of_nothing_balance():
     black = dataclasses.replace(scene, materials=tuple(Material("black", (0.0,) * 3) for _ in scene.materials))
     away = scene.with_camera(eye=(0.0, 0.0, 50.0), target=(0.0, 0.0, 60.0))
     for one in (black, away):
-        ledger = energy_ledger(Frame(one, width=16, height=16, rsm_resolution=32), SiiSettings(lights=32))
+        ledger = energy_ledger(Frame(one, width=16, height=16, rsm_resolution=32), of(SiiSettings, lights=32))
         assert balance(ledger) < WHOLE
         assert not np.any([ledger.arrived, ledger.cut, ledger.behind])
     assert np.array_equal(ledger.off_screen, ledger.lights)
@@ -294,5 +295,5 @@ def test_a_dark_scene_and_a_view_of_nothing_balance():
 def test_who_does_not_ask_does_not_pay(frames):
     frame = frames("cornell_box")
     with observe() as log:
-        sii(frame, SiiSettings(lights=32, irradiance_low=0.1))
+        sii(frame, of(SiiSettings, lights=32, irradiance_low=0.1))
     assert not {"splat.ledger", "splat.cut"} & {run.name for run in log.runs}

@@ -10,12 +10,13 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.lights.selection import light_footprints, pixel_lights
 from refgi.scene import SpotLight, load_scene
+from refgi.settings import of
 from refgi.splat import SiiSettings, sii
 from refgi.stages import observe
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
-ALL = SiiSettings(pattern="all", i_low=0)  # the sum without a cut
+ALL = of(SiiSettings, pattern="all", i_low=0)  # the sum without a cut
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def test_irradiance_does_not_depend_on_the_number_of_lights(plates, evidence):
     """T/N: over 200 draws the mean is that of all texels, at every N; without it E would fall by 16 and 256."""
     reference, found = sii(plates, ALL).mean(), []
     for count in (16, 64, 256):
-        runs = np.array([sii(plates, SiiSettings(lights=count, pattern="random", seed=s, i_low=0)).mean()
+        runs = np.array([sii(plates, of(SiiSettings, lights=count, pattern="random", seed=s, i_low=0)).mean()
                          for s in range(200)])
         error = runs.std() / math.sqrt(200)
         assert abs(runs.mean() - reference) < 4 * error
@@ -73,7 +74,7 @@ def test_error_slopes_of_random_and_low_discrepancy_patterns(plates, evidence):
     slopes = {}
     for pattern in ("random", "halton", "grid"):
         seeds = range(100) if pattern != "grid" else range(1)
-        errors = [math.sqrt(np.mean([rms(sii(plates, SiiSettings(lights=n, pattern=pattern, seed=s, i_low=0)),
+        errors = [math.sqrt(np.mean([rms(sii(plates, of(SiiSettings, lights=n, pattern=pattern, seed=s, i_low=0)),
                                          reference) ** 2 for s in seeds])) for n in counts]
         slopes[pattern] = float(np.polyfit(np.log(counts), np.log(errors), 1)[0])
     assert slopes["random"] == pytest.approx(-0.5, abs=0.1)
@@ -87,7 +88,7 @@ def test_presets_come_nearer_to_the_sum_over_all_texels(box, evidence):
     clamp = {"clamp": "distance", "clamp_value": 0.05}  # else the nearest pair alone decides the error
     reference = sii(box, dataclasses.replace(ALL, **clamp))
     presets = (108, 256, 768, 1000, 4096)
-    errors = [math.sqrt(np.mean([rms(sii(box, SiiSettings(lights=n, seed=s, i_low=0, **clamp)), reference) ** 2
+    errors = [math.sqrt(np.mean([rms(sii(box, of(SiiSettings, lights=n, seed=s, i_low=0, **clamp)), reference) ** 2
                                  for s in range(1, 9)])) for n in presets]
     assert errors == sorted(errors, reverse=True)
     evidence("RMSE / mean: " + ", ".join(f"{n} lights {e:.3f}" for n, e in zip(presets, errors, strict=True)))
@@ -105,7 +106,7 @@ def test_filtered_flux_is_steadier_under_a_moving_light(box, evidence):
         moved = scene.with_lights(dataclasses.replace(light, direction=tuple(turned)))
         frame = Frame(moved, width=16, height=16, rsm_resolution=128)
         for filtered in means:
-            how = SiiSettings(lights=64, pattern="grid", filtered=filtered, clamp="distance", clamp_value=0.05,
+            how = of(SiiSettings, lights=64, pattern="grid", filtered=filtered, clamp="distance", clamp_value=0.05,
                               i_low=0)
             means[filtered].append(sii(frame, how).mean(axis=(1, 2)))
 
@@ -114,7 +115,7 @@ def test_filtered_flux_is_steadier_under_a_moving_light(box, evidence):
 
     plain, steady = unsteady(means[False]), unsteady(means[True])
     assert steady < plain / 2
-    sums = [pixel_lights(box.rsms, SiiSettings(lights=64, pattern="grid", filtered=True)).flux.sum(axis=1),
+    sums = [pixel_lights(box.rsms, of(SiiSettings, lights=64, pattern="grid", filtered=True)).flux.sum(axis=1),
             box.rsms[0].flux.sum(axis=(1, 2))]
     np.testing.assert_allclose(*sums, rtol=1e-5)  # float32 sums
     evidence(f"std of the second difference of E over 24 quarter-texel steps: {plain:.3%} unfiltered, "
@@ -145,8 +146,8 @@ def test_footprints_are_the_lit_area(plates):
     assert len(area) == pixel_lights(plates.rsms, ALL).position.shape[1]
     disc = math.pi * (light.position[1] * math.tan(light.outer_half_angle)) ** 2
     assert area.sum() == pytest.approx(disc, rel=0.03)  # whole texels on the rim
-    few = light_footprints(plates.rsms, SiiSettings(lights=256, seed=1))
-    assert len(few) == pixel_lights(plates.rsms, SiiSettings(lights=256, seed=1)).position.shape[1]
+    few = light_footprints(plates.rsms, of(SiiSettings, lights=256, seed=1))
+    assert len(few) == pixel_lights(plates.rsms, of(SiiSettings, lights=256, seed=1)).position.shape[1]
     assert few.sum() == pytest.approx(disc, rel=0.1)
 
 
@@ -175,7 +176,7 @@ def test_lobe_code_is_skipped_without_glossy_materials(box):
 def test_settings_work_together_and_again(box, change, lamps):
     light = box.scene.lights[0]
     frame = Frame(box.scene.with_lights(*[light] * lamps), width=13, height=9, rsm_resolution=32)
-    settings = SiiSettings(lights=50, i_low=0.05, reference_length=0.3, **change)
+    settings = of(SiiSettings, lights=50, i_low=0.05, reference_length=0.3, **change)
     picture = sii(frame, settings)
     assert np.isfinite(picture).all()
     assert picture.any()
@@ -184,11 +185,11 @@ def test_settings_work_together_and_again(box, change, lamps):
 
 
 def test_bounds_change_no_bit_of_the_picture(box):
-    pictures = [sii(box, SiiSettings(lights=100, i_low=0.05, reference_length=0.2, bound=bound))
+    pictures = [sii(box, of(SiiSettings, lights=100, i_low=0.05, reference_length=0.2, bound=bound))
                 for bound in ("full", "quad", "ellipsoid", "tangent", "mesh")]
     for picture in pictures[1:]:
         np.testing.assert_array_equal(picture, pictures[0])
-    assert pictures[0].sum() < 0.99 * sii(box, SiiSettings(lights=100, i_low=0)).sum()
+    assert pictures[0].sum() < 0.99 * sii(box, of(SiiSettings, lights=100, i_low=0)).sum()
 
 
 @pytest.mark.feature("REF-20")
@@ -196,7 +197,7 @@ def test_bounds_change_no_bit_of_the_picture(box):
 def test_without_the_weight_a_picture_has_its_lights_share_of_the_texels(box, lamps, evidence):
     """Section 0: what the paper leaves out is T/N."""
     frame = Frame(box.scene.with_lights(*[box.scene.lights[0]] * lamps), width=12, height=12, rsm_resolution=64)
-    printed, calibrated = (sii(frame, SiiSettings(lights=64, i_low=0, as_published=names)).astype(float)
+    printed, calibrated = (sii(frame, of(SiiSettings, lights=64, i_low=0, as_published=names)).astype(float)
                            for names in ({"sii_no_tn"}, ()))
     factor = printed.sum() / calibrated.sum()
     assert factor == pytest.approx(64 / (lamps * 64**2), rel=1e-6)
@@ -205,9 +206,9 @@ def test_without_the_weight_a_picture_has_its_lights_share_of_the_texels(box, la
 
 def test_scene_without_glass_is_not_searched_for_refraction(box):
     with observe() as log:
-        with_it = sii(box, SiiSettings(lights=64))
+        with_it = sii(box, of(SiiSettings, lights=64))
     assert log.status("rsm.refraction") == ["skipped"]
-    np.testing.assert_array_equal(with_it, sii(box, SiiSettings(lights=64, refraction="none")))
+    np.testing.assert_array_equal(with_it, sii(box, of(SiiSettings, lights=64, refraction="none")))
 
 
 def test_settings_are_checked():
@@ -225,4 +226,4 @@ def test_settings_are_checked():
                    {"bounces": 1.5, "source": "walk"}, {"seed": 1.5}, {"seed": 1 << 32},
                    {"openness_floor": 0, "openness_flux": "roulette"}, {"reference_length": 1e-300}):
         with pytest.raises(InputError, match=next(iter(change))):
-            SiiSettings(**change)
+            of(SiiSettings, **change)

@@ -13,6 +13,7 @@ from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
 from refgi.pairs.ranged_sum import LANES, range_factor
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.splat import PairSettings, Receivers, irradiance
 from refgi.splat.sii.reach.bounds import light_solids
 from refgi.splat.sii.reach.fragments import fragments, gather_bits
@@ -23,7 +24,7 @@ from refgi.splat.sii.splat import cut_irradiance, splat
 from tests.naive import bounds as naive
 from tests.pairs import sets
 
-CUT = SplatSettings(irradiance_low=0.05)
+CUT = of(SplatSettings, irradiance_low=0.05)
 BOUNDS = ("full", "quad", "ellipsoid", "tangent", "mesh")
 ROUNDING = {np.float32: 3e-6, np.float64: 1e-14}  # as of the full sum
 TOGETHER = 1e-6  # kept and cut are rounded by themselves, in float32, before they are added
@@ -66,8 +67,8 @@ def test_sum_is_that_of_the_twin(real, evidence):
 def test_kept_and_cut_make_the_full_sum(corner, clamp):
     receivers, lights, _ = corner
     footprint = np.full(lights.flux.shape[1], 1e-3)
-    how = SplatSettings(i_low=0.05, reference_length=0.1, **clamp)
-    full = irradiance(receivers, lights, PairSettings(**clamp), footprint)
+    how = of(SplatSettings, i_low=0.05, reference_length=0.1, **clamp)
+    full = irradiance(receivers, lights, of(PairSettings, **clamp), footprint)
     for settings in (how, dataclasses.replace(how, stochastic_range=True, seed=5)):
         kept = splat(receivers, lights, settings, footprint)
         cut = cut_irradiance(receivers, lights, settings, footprint)
@@ -83,10 +84,10 @@ def test_without_a_threshold_nothing_changes(corner, real):
     receivers = Receivers(receivers.position.astype(real), receivers.normal.astype(real), receivers.covered)
     full = irradiance(receivers, lights, PairSettings())
     for how in ({"i_low": 0.0}, {"irradiance_low": 0.0}, {"irradiance_low": 1e-20}, {"irradiance_low": 1e-300}):
-        np.testing.assert_array_equal(splat(receivers, lights, SplatSettings(**how)), full)
-    assert not cut_irradiance(receivers, lights, SplatSettings(i_low=0.0)).any()
-    assert not cut_irradiance(receivers, lights, SplatSettings(irradiance_low=1e-20)).any()
-    assert not splat(receivers, lights, SplatSettings(irradiance_low=1e20)).any()
+        np.testing.assert_array_equal(splat(receivers, lights, of(SplatSettings, **how)), full)
+    assert not cut_irradiance(receivers, lights, of(SplatSettings, i_low=0.0)).any()
+    assert not cut_irradiance(receivers, lights, of(SplatSettings, irradiance_low=1e-20)).any()
+    assert not splat(receivers, lights, of(SplatSettings, irradiance_low=1e20)).any()
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
@@ -95,7 +96,8 @@ def test_without_a_threshold_nothing_changes(corner, real):
 def test_every_bound_gives_the_same_picture(corner, real, glossy, evidence):
     receivers, lights, view = corner
     receivers = Receivers(receivers.position.astype(real), receivers.normal.astype(real), receivers.covered)
-    cases = [SplatSettings(irradiance_low=low_irradiance(lights, SplatSettings(i_low=0.05, reference_length=0.15)))]
+    five_percent = of(SplatSettings, i_low=0.05, reference_length=0.15)
+    cases = [of(SplatSettings, irradiance_low=low_irradiance(lights, five_percent))]
     if glossy:
         rng = np.random.default_rng(2)
         axis = sets.unit(lights.normal + 0.5 * sets.random_directions(rng, lights.flux.shape[1]))
@@ -124,7 +126,7 @@ def test_every_bound_gives_the_same_picture(corner, real, glossy, evidence):
 def test_fewer_pixels_are_drawn_by_tighter_bounds(corner, evidence):
     """Fragments that hardware would shade: the whole screen, quads, meshes of the ellipsoids, and those needed."""
     receivers, lights, view = corner
-    settings = SplatSettings(i_low=0.05, reference_length=0.1)
+    settings = of(SplatSettings, i_low=0.05, reference_length=0.1)
     square = lights.flux.max(axis=0) / math.pi / low_irradiance(lights, settings)
     top, bottom, left, right = screen_quads(view, lights.position, np.sqrt(square))
     row, column = np.mgrid[: view.height, : view.width][..., None] + 0.5
@@ -141,7 +143,7 @@ def test_fewer_pixels_are_drawn_by_tighter_bounds(corner, evidence):
 
 def test_meshes_that_are_not_inflated_lose_pixels(corner):
     receivers, lights, view = corner
-    how = SplatSettings(i_low=0.05, reference_length=0.02, bound="mesh", mesh_faces=8, inflate=False)
+    how = of(SplatSettings, i_low=0.05, reference_length=0.02, bound="mesh", mesh_faces=8, inflate=False)
     kept = splat(receivers, lights, how, None, view)
     whole = splat(receivers, lights, dataclasses.replace(how, inflate=True), None, view)
     assert (kept <= whole).all()
@@ -152,7 +154,7 @@ def test_meshes_that_are_not_inflated_lose_pixels(corner):
 def test_bits_do_not_depend_on_threads_or_neighbours(how):
     rng = np.random.default_rng(4)
     receivers, lights = sets.room(rng, 1111, np.float32)
-    settings = SplatSettings(irradiance_low=0.3, **how)
+    settings = of(SplatSettings, irradiance_low=0.3, **how)
     with threads(1):
         whole = splat(receivers, lights, settings)
     with threads(min(2, numba.config.NUMBA_NUM_THREADS)):
@@ -179,7 +181,7 @@ def test_range_scales_with_the_scene(length):
 
 def test_threshold_is_one_irradiance_for_all_lights():
     light = sets.lights(np.zeros((3, 3)), np.array([[0.0] * 3, [0] * 3, [1] * 3]), [[1.0, 2, 3], [9, 1, 0], [0, 0, 5]])
-    settings = SplatSettings(i_low=0.1, reference_length=2.0)
+    settings = of(SplatSettings, i_low=0.1, reference_length=2.0)
     assert low_irradiance(light, settings) == pytest.approx(0.1 * 9 / math.pi / 4)
     assert low_irradiance(light, dataclasses.replace(settings, irradiance_low=7.0)) == 7
     no_pi = dataclasses.replace(settings, as_published={"sii_no_pi"})
@@ -194,7 +196,7 @@ def test_threshold_is_one_irradiance_for_all_lights():
                                  {"i_low": 1e-320, "reference_length": 1.0, "as_published": {"per_light_ilow"}}])
 def test_thresholds_near_0_cut_nothing(how):
     receivers, lights = sets.room(np.random.default_rng(31), 50)
-    settings = SplatSettings(**how)
+    settings = of(SplatSettings, **how)
     np.testing.assert_array_equal(splat(receivers, lights, settings), irradiance(receivers, lights, settings))
     assert not cut_irradiance(receivers, lights, settings).any()
 
@@ -205,7 +207,7 @@ def test_range_of_a_light_is_that_of_its_flux():
     receivers = sets.receivers(np.stack([0 * z, 0 * z, z]), np.stack([0 * z, 0 * z, -1 + 0 * z]))
     two = sets.lights(np.zeros((3, 2)), np.array([[0.0, 0], [0, 0], [1, 1]]), [[1.0, 0.25], [0, 0], [0, 0]])
     for published, expected in ((set(), (4, 2)), ({"per_light_ilow"}, (4, 4))):
-        settings = SplatSettings(i_low=1 / 16, reference_length=1.0, as_published=published)
+        settings = of(SplatSettings, i_low=1 / 16, reference_length=1.0, as_published=published)
         overdraw = fragments(receivers, two, settings).overdraw[0]
         reach = [z[overdraw >= least].max() for least in (1, 2)]
         np.testing.assert_allclose(reach, expected, atol=2e-3)
@@ -231,7 +233,7 @@ def test_loss_follows_the_closed_form(evidence):
         for i, x in enumerate((0.01, 0.05, 0.07, 0.10)):
             for distance in (1.0, 0.5):
                 receivers, area = plane(distance)
-                settings = SplatSettings(i_low=x, reference_length=1.0)
+                settings = of(SplatSettings, i_low=x, reference_length=1.0)
                 full = (row(irradiance(receivers, light, settings))[0] * area).sum()
                 lost = (row(cut_irradiance(receivers, light, settings))[0] * area).sum() / full
                 expected = (distance * math.sqrt(x)) ** (2 * (exponent + 1) / (exponent + 2))
@@ -253,12 +255,12 @@ def test_fragments_grow_as_one_over_the_threshold_until_the_screen_is_full(corne
     receivers = sets.receivers(np.stack([x, 0 * x + 1e-3, z]), np.stack([0 * x, 0 * x - 1, 0 * x]))
     light = sets.lights(np.zeros((3, 1)), np.array([[0.0], [0], [1]]), 1.0)
     lows = np.array([8.0, 4, 2, 1])
-    cuts = [SplatSettings(i_low=low, reference_length=1.0) for low in lows]
+    cuts = [of(SplatSettings, i_low=low, reference_length=1.0) for low in lows]
     counts = np.array([fragments(receivers, light, cut).total for cut in cuts])
     np.testing.assert_allclose(counts * lows / (counts * lows)[-1], 1, rtol=0.02)
     room, lights, _ = corner
     shares = (0.1, 0.07, 0.05, 0.01, 1e-3, 1e-5, 1e-6)
-    means = [fragments(room, lights, SplatSettings(i_low=x, reference_length=0.1)).overdraw[room.covered].mean()
+    means = [fragments(room, lights, of(SplatSettings, i_low=x, reference_length=0.1)).overdraw[room.covered].mean()
              for x in shares]
     assert (np.diff(means) > 0).all()
     assert means[-1] < lights.flux.shape[1]  # what lies behind a light never counts
@@ -275,7 +277,7 @@ def test_fragments_grow_as_one_over_the_threshold_until_the_screen_is_full(corne
 @pytest.mark.feature("SII-23", "SII-24")
 def test_counts_and_traffic(corner, evidence):
     receivers, lights, view = corner
-    counted = fragments(receivers, lights, SplatSettings(i_low=0.05, reference_length=0.1), None, view)
+    counted = fragments(receivers, lights, of(SplatSettings, i_low=0.05, reference_length=0.1), None, view)
     assert counted.overdraw.sum() == counted.of_light.sum() == counted.total
     assert not counted.overdraw[~receivers.covered].any()
     assert counted.bits == 72 * counted.total
@@ -284,7 +286,7 @@ def test_counts_and_traffic(corner, evidence):
     assert pixels * 125 * 72 == 2_359_296_000
     assert gather_bits(pixels, 308) == pixels * 308 * 112
     assert round(pixels * 125 / 768, -2) == 42_700  # the caption of Fig. 8 cuts it to 42,600
-    off = fragments(receivers, lights, SplatSettings(i_low=0))
+    off = fragments(receivers, lights, of(SplatSettings, i_low=0))
     assert off.total == off.evaluated == np.count_nonzero(receivers.covered) * lights.flux.shape[1]
     evidence(f"map sums to {counted.total} fragments = sum over lights; {counted.bits} bits at 72 each; evaluated "
              f"{counted.evaluated / counted.total:.2f} a fragment; Fig. 8: 281 MB a frame, 308 samples: 1078 MiB")
@@ -297,7 +299,7 @@ def test_lobes_are_counted_as_the_twin_counts_them(widening, evidence):
     receivers, lights = sets.room(rng, 60)
     exponent, low = 6.0, 0.05
     lights = sets.glossy(lights.position, lights.normal, sets.random_directions(rng, 60), exponent)
-    how = SplatSettings(irradiance_low=low, lobe_norm="full_lobe", widening=widening)
+    how = of(SplatSettings, irradiance_low=low, lobe_norm="full_lobe", widening=widening)
     expected = np.zeros(60, int)
     for i, k in np.ndindex(60, 60):
         x, p = row(receivers.position)[:, i], lights.position[:, k]
@@ -318,7 +320,7 @@ def test_tiles_keep_to_the_fragments(data_dir, scene, length, evidence):
     frame = Frame(load_scene(data_dir / f"{scene}.json"), width=512, height=512)
     lights = choose_pixel_lights(frame.rsms, count=768, pattern="halton")
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
-    counted = fragments(receivers, lights, SplatSettings(i_low=0.05, reference_length=length))
+    counted = fragments(receivers, lights, of(SplatSettings, i_low=0.05, reference_length=length))
     mean = counted.overdraw[receivers.covered].mean()
     assert 100 < mean < 200
     assert counted.evaluated < FRAGMENTS * counted.total
@@ -332,7 +334,7 @@ def test_stochastic_range_has_the_mean_of_the_full_sum(glossy, evidence):
     receivers, lights = sets.room(rng, 48)
     if glossy:
         lights = sets.glossy(lights.position, lights.normal, lights.normal, 5.0)
-    settings = SplatSettings(irradiance_low=0.3, stochastic_range=True)
+    settings = of(SplatSettings, irradiance_low=0.3, stochastic_range=True)
     mean = np.mean([row(splat(receivers, lights, dataclasses.replace(settings, seed=seed)))[0] for seed in range(400)],
                    axis=0)
     # a pair with B < I_low is kept with the chance p = B / I_low, times 1 / p: its variance is E^2 (1 / p - 1)
@@ -370,14 +372,14 @@ def test_factor_of_a_pair():
 def test_bounds_on_the_screen_need_its_map(corner, bound):
     receivers, lights, _ = corner
     with pytest.raises(InputError, match=f"projection: expected the receivers' map for the bound '{bound}'"):
-        splat(receivers, lights, SplatSettings(i_low=0.05, bound=bound))
+        splat(receivers, lights, of(SplatSettings, i_low=0.05, bound=bound))
 
 
 def test_nothing_to_light_or_to_light_with():
     receivers, lights = sets.room(np.random.default_rng(8), 5)
     none = sets.PixelLights(*(part[:, :0] for part in lights[:3]), None, None, None, 0)
     dark = receivers._replace(covered=np.zeros((1, 5), bool))
-    for how in (CUT, SplatSettings(), SplatSettings(i_low=0.05, stochastic_range=True)):
+    for how in (CUT, SplatSettings(), of(SplatSettings, i_low=0.05, stochastic_range=True)):
         assert not splat(receivers, none, how).any()
         assert not splat(dark, lights, how).any()
         assert fragments(receivers, none, how).total == 0

@@ -224,7 +224,8 @@ def error_driven(
     expect(target is not None, "target_error", "a share of the mean above 0", target)
     assert target is not None
     receivers = Receivers(*map(np.ascontiguousarray, buffer.resolve("position", "normal", "covered")))
-    packed, samples = checked(receivers, lights, settings, footprint), stratified(receivers.covered, settings.seed)
+    packed, samples = checked(receivers, lights, settings.effective_pairs, footprint), stratified(
+        receivers.covered, settings.lights.seed)
     known = Known(receivers, packed)
     known.light(samples.pixel)
     seen = known.at(samples.pixel)

@@ -165,7 +165,7 @@ def _each_light(
 ) -> Iterator[tuple[Array, Array]]:
     points, normals = cells.points, cells.normals
     receivers = Receivers(points[:, None], normals[:, None], np.ones((1, points.shape[1]), np.bool_))
-    packed = checked(receivers, lights, settings, footprint)
+    packed = checked(receivers, lights, settings.effective_pairs, footprint)
     lobe_clamp, widening = (None, None) if packed.lobes is None else packed.lobes[1:]
     one_by_one, threshold = separate(packed), _threshold(cells, lights, settings, footprint)
     count = len(packed.shines)
@@ -200,7 +200,7 @@ def _threshold(
     if settings.threshold_form == "absolute":
         return given, zero
     roots = slice(cells.roots)
-    sums = evaluate(cells.points[:, roots], cells.normals[:, roots], lights, settings, footprint)
+    sums = evaluate(cells.points[:, roots], cells.normals[:, roots], lights, settings.effective_pairs, footprint)
     return given * sums.max(initial=zero) / real(max(1, lights.position.shape[1])), zero
 
 

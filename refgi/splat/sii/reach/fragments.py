@@ -94,7 +94,7 @@ def fragments(
         Overdraw and fragments depend on the threshold alone, pairs evaluated on the bound as well. Lobes are counted
         in float64: at the edge of their range a pair may be told apart from the sum's.
     """
-    packed = checked(receivers, lights, settings, footprint)
+    packed = checked(receivers, lights, settings.pairs, footprint)
     overdraw, of_light, evaluated = np.zeros(receivers.covered.shape, np.int32), np.zeros(len(packed.shines), int), 0
     if not settings.cuts:
         count = int(packed.shines.sum()) + int(packed.glossy.sum())

@@ -80,7 +80,8 @@ class Lists:
         assert self._packed.lobes is not None
         lights = self._packed.lobes.lights
         return light_solids(lights[:3], -lights[6:9], lights[9], _square(self.lobes), self._settings.bound,
-                            self._settings.widening, "sii_widening" in self._settings.as_published)
+                            self._settings.pairs.lobe.widening,
+                            "sii_widening" in self._settings.pairs.as_published)
 
     def _list(
         self, position: Array, normal: Array, places: Array, lights: Array, solids: Solids, nearest: bool

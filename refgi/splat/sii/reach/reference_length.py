@@ -151,7 +151,7 @@ def reference_length(receivers: Receivers, lights: "PixelLights", settings: Spla
     float
         Length, m; 1 where there is nothing to cut.
     """
-    packed = pack(lights, settings, np.zeros(lights.flux.shape[1]), np.float64)
+    packed = pack(lights, settings.pairs, np.zeros(lights.flux.shape[1]), np.float64)
     position = sample_for(receivers, lights, least=LEAST_SAMPLED).position.astype(np.float64)
     step = 1 + lights.flux.shape[1] * LEAST_SAMPLED // PAIRS
     strength = _strengths(packed, position, step)

@@ -51,7 +51,7 @@ def low_irradiance(lights: "PixelLights", settings: SplatSettings) -> float:
     Settings without a reference length get one from `with_reference_length`.
     With `per_light_ilow` this is the I_low of the brightest light.
     """
-    packed = pack(lights, settings, np.zeros(lights.flux.shape[1]), np.float64)
+    packed = pack(lights, settings.pairs, np.zeros(lights.flux.shape[1]), np.float64)
     return threshold(np.concatenate(all_peaks(packed)), settings)
 
 
@@ -165,7 +165,7 @@ def cut_loss(
     """
     sample = sample_for(receivers, lights)
     kept = light.reshape(3, -1)[:, sample.place]
-    whole = light_at(sample, lights, settings, footprint)
+    whole = light_at(sample, lights, settings.pairs, footprint)
     return lost_share(whole, float(kept.mean(dtype=np.float64))) if kept.size else 0.0
 
 

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from refgi.jit import threads
+from refgi.settings import of
 from refgi.splat.multires.refinement.changes import curvatures, depth_slopes
 from refgi.splat.multires.refinement.criteria import depth_ranges, needs, normal_ranges
 from refgi.splat.multires.refinement.grid import level_shape, top_level
@@ -94,7 +95,7 @@ def test_a_picture_without_surface_has_no_range_and_no_need():
     mip = depth_ranges(seen.depth, seen.covered, TOP)
     assert np.isposinf(mip.lows).all()
     assert np.isneginf(mip.highs).all()
-    every = MultiresSettings(criteria={"depth", "derivative", "normal", "curvature"}, depth_threshold=0)
+    every = of(MultiresSettings, criteria={"depth", "derivative", "normal", "curvature"}, depth_threshold=0)
     assert not any(level.any() for level in needs(seen, every, TOP))
 
 
@@ -150,7 +151,7 @@ def test_a_plane_seen_at_a_slant_is_split_by_the_range_alone(evidence):
     depth = plane()
     seen = Seen(depth, facing(depth.shape), facing(depth.shape), np.ones(depth.shape, bool))
     top = top_level(*depth.shape, 16)
-    split = {name: np.count_nonzero(needs(seen, MultiresSettings(criteria={name}), top)[top])
+    split = {name: np.count_nonzero(needs(seen, of(MultiresSettings, criteria={name}), top)[top])
              for name in ("depth", "derivative")}
     assert split["derivative"] == 0
     assert split["depth"] > 0
@@ -160,13 +161,13 @@ def test_a_plane_seen_at_a_slant_is_split_by_the_range_alone(evidence):
 
 @pytest.mark.feature("AMS-03")
 def test_the_derivative_misses_gentle_ramps(evidence):
-    settings = MultiresSettings(criteria={"derivative"})
+    settings = of(MultiresSettings, criteria={"derivative"})
     x = np.arange(64)
     missed, found = [], []
     for width in (1, 2, 4, 8, 10, 16, 32):
         depth = np.broadcast_to(1 + 0.5 * np.clip((x - 15.5 + width / 2) / width, 0, 1), (8, 64))
         seen = Seen(depth, facing((8, 64)), facing((8, 64)), np.ones((8, 64), bool))
-        range_too = any(level.any() for level in needs(seen, MultiresSettings(criteria={"depth"}), 5))
+        range_too = any(level.any() for level in needs(seen, of(MultiresSettings, criteria={"depth"}), 5))
         assert range_too
         (found if any(level.any() for level in needs(seen, settings, 5)) else missed).append(width)
     # a ramp of 0.5 m over `width` pixels from 1 m rises by 0.5 / width of the depth a pixel at its foot
@@ -184,7 +185,7 @@ def crease(one, other, size=8):
 
 
 def is_found(seen, **settings):
-    return bool(needs(seen, MultiresSettings(**settings), 3)[3].any())
+    return bool(needs(seen, of(MultiresSettings, **settings), 3)[3].any())
 
 
 @pytest.mark.feature("AMS-04")
@@ -238,14 +239,14 @@ def test_curvature_misses_a_sphere_and_finds_a_crease(evidence):
     inner = slice(5, 11)  # of 16 x 16 cells: those well within the disc
     lines = []
     for threshold in (0.1, 0.3):  # Fig. 12
-        bends = needs(seen, MultiresSettings(criteria={"curvature"}, curvature_threshold=threshold), top)[top]
+        bends = needs(seen, of(MultiresSettings, criteria={"curvature"}, curvature_threshold=threshold), top)[top]
         assert not bends[inner, inner].any()
         lines.append(f"{threshold}: {np.count_nonzero(bends)} cells of the limb")
         # a crease whose chord is 1.1 times the threshold
         half = math.asin(1.1 * threshold / 2)
         fold = crease(np.array([math.sin(half), 0, math.cos(half)]), np.array([-math.sin(half), 0, math.cos(half)]))
         assert is_found(fold, criteria={"curvature"}, curvature_threshold=threshold)
-    spreads = needs(seen, MultiresSettings(criteria={"normal"}, normal_threshold=0.1), top)[top]
+    spreads = needs(seen, of(MultiresSettings, criteria={"normal"}, normal_threshold=0.1), top)[top]
     assert spreads[inner, inner].all()
     evidence(f"sphere, 0 of its 36 inner cells at {', '.join(lines)}; all 36 by the normals' range of 0.1; "
              "creases 10 % above found")
@@ -262,8 +263,8 @@ def test_the_rate_of_a_sphere_is_the_inverse_of_its_radius(evidence, radius):
 
 def test_criteria_add_up_and_the_finest_level_is_never_refined():
     seen = scattered((37, 53), np.float32, 0.95)
-    together = needs(seen, MultiresSettings(criteria={"depth", "normal"}, finest=1), TOP)
-    alone = [needs(seen, MultiresSettings(criteria={name}, finest=1), TOP) for name in ("depth", "normal")]
+    together = needs(seen, of(MultiresSettings, criteria={"depth", "normal"}, finest=1), TOP)
+    alone = [needs(seen, of(MultiresSettings, criteria={name}, finest=1), TOP) for name in ("depth", "normal")]
     for level in range(TOP + 1):
         np.testing.assert_array_equal(together[level], alone[0][level] | alone[1][level])
         assert together[level].any() == (level > 1)
@@ -274,7 +275,7 @@ def test_needs_are_those_of_the_printed_tests(rim):
     seen = scattered((19, 23), np.float32, 0.6)
     seen.depth[:, 12:] = np.where(seen.covered[:, 12:], 2, np.inf)  # flat parts: some cells need nothing
     seen.normal[:, :, 12:] = facing((19, 11)) * seen.covered[:, 12:]
-    settings = MultiresSettings(rim=rim, normal_threshold=0.7, depth_threshold=0.4)
+    settings = of(MultiresSettings, rim=rim, normal_threshold=0.7, depth_threshold=0.4)
 
     def test(level, i, j):
         low, high = naive.span(seen.depth, seen.covered, level, i, j, rim)

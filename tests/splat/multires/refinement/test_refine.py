@@ -7,6 +7,7 @@ import pytest
 
 from refgi import Frame, load_scene
 from refgi.jit import threads
+from refgi.settings import of
 from refgi.splat.multires.refinement.criteria import needs
 from refgi.splat.multires.refinement.grid import level_picture, representative, top_level
 from refgi.splat.multires.refinement.refine import refine
@@ -65,7 +66,7 @@ def listed(subsplats):
 
 
 def refined(seen, top=None, **settings):
-    chosen = MultiresSettings(**settings)
+    chosen = of(MultiresSettings, **settings)
     top = top_level(*seen.covered.shape, chosen.coarsest) if top is None else top
     return refine(needs(seen, chosen, top), seen.covered, chosen)
 
@@ -76,7 +77,7 @@ def refined(seen, top=None, **settings):
 def test_subsplats_are_the_published_list(shape, rule):
     seen = busy(shape)
     for finest in (0, 2):
-        settings = MultiresSettings(diagonal=rule, coarsest=4, finest=finest)
+        settings = of(MultiresSettings, diagonal=rule, coarsest=4, finest=finest)
         top = top_level(*shape, 4)
         need = needs(seen, settings, top)
         subsplats = refine(need, seen.covered, settings)
@@ -108,7 +109,7 @@ def test_subsplats_tile_the_surfaces(rule):
 def test_six_passes_from_16_cells_to_1024_pixels(evidence):
     seen, counts = discs(1024), []
     for threshold in (0.02, 0.1, 0.5, 2.0, 8.0, 20.0):
-        settings = MultiresSettings(criteria={"depth"}, depth_threshold=threshold)
+        settings = of(MultiresSettings, criteria={"depth"}, depth_threshold=threshold)
         subsplats = refined(seen, depth_threshold=threshold, criteria={"depth"})
         counts.append(len(subsplats.level))
         assert subsplats.top == 6
@@ -146,7 +147,7 @@ def test_a_level_by_itself_gives_the_list_only_where_criteria_are_monotone(evide
     seen = busy((64, 64))
     shares = {}
     for rule in RULES:
-        settings = MultiresSettings(diagonal=rule, coarsest=4)
+        settings = of(MultiresSettings, diagonal=rule, coarsest=4)
         need = needs(seen, settings, 4)
         alone = naive.by_levels(need, seen.covered, rule)
         times = naive.times_covered(alone, seen.covered.shape)
@@ -170,7 +171,7 @@ def test_thresholds_that_rise_with_the_level_break_a_level_by_itself(evidence):
 
     need = tuple(naive.needs((64, 64), top, 0, test))
     times = naive.times_covered(naive.by_levels(need, seen.covered, "off"), (64, 64))
-    subsplats = refine(need, seen.covered, MultiresSettings(diagonal="off"))
+    subsplats = refine(need, seen.covered, of(MultiresSettings, diagonal="off"))
     assert (naive.times_covered(listed(subsplats), (64, 64)) == 1).all()
     assert sorted(listed(subsplats)) == sorted(naive.refine(need, seen.covered, "off"))
     share = (times > 1).mean()
@@ -213,7 +214,7 @@ def test_a_corner_is_refined_across_only_where_nothing_else_tells():
     covered = np.ones((16, 16), bool)
 
     def split(rule):
-        return refine(tuple(need), covered, MultiresSettings(diagonal=rule)).leaf[2]
+        return refine(tuple(need), covered, of(MultiresSettings, diagonal=rule)).leaf[2]
 
     assert np.argwhere(~split("off")).tolist() == [[0, 0]]
     assert np.argwhere(~split("corner")).tolist() == [[0, 0], [1, 1]]

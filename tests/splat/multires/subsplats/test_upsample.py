@@ -5,6 +5,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
+from refgi.settings import of
 from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import MultiresSettings
@@ -20,7 +21,7 @@ MODES = [*FILTERS, ("nearest", {}), ("naive_bilinear", {})]
 
 
 def leaves(need, covered, diagonal="off"):
-    return refine(need, covered, MultiresSettings(diagonal=diagonal))
+    return refine(need, covered, of(MultiresSettings, diagonal=diagonal))
 
 
 def ragged(height, width, share, finest=0, seed=4):

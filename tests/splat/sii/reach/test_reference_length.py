@@ -14,6 +14,7 @@ from refgi.lights.selection import choose_lights
 from refgi.pairs.settings import PairSettings
 from refgi.radiometry import lobe_fraction
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.splat import Receivers, SiiSettings, SplatSettings, cut_irradiance, irradiance, sii, splat
 from refgi.splat.sii.ledger import energy_ledger
 from refgi.splat.sii.reach.fragments import fragments
@@ -21,7 +22,7 @@ from refgi.splat.sii.reach.reference_length import reference_length, with_refere
 from refgi.splat.sii.reach.threshold import low_irradiance
 from refgi.stages import observe
 
-PAPER = SiiSettings(i_low=0.05)  # 768 lights
+PAPER = of(SiiSettings, i_low=0.05)  # 768 lights
 SHARE = 125 / 768
 SAMPLING = 0.05  # of the share: about 1400 of 4096 pixels, whose overdraw spreads by as much as its mean
 SAME = 2e-4  # relative, of float32 pictures in other units: pairs at the edge of the cut fall on either side
@@ -83,7 +84,7 @@ def test_the_papers_cut_leaves_the_papers_share_of_pairs(name):
     {}, {"i_low": 0.02}, {"stochastic_range": True}, {"bound": "quad"}, {"bound": "mesh", "mesh_faces": 20},
     {"as_published": {"per_light_ilow"}}, {"half_resolution": True}])
 def test_a_picture_is_that_of_its_length_given_by_hand(change):
-    at, settings = frame(), SiiSettings(**{"i_low": 0.05, "lights": 96} | change)
+    at, settings = frame(), of(SiiSettings, **{"i_low": 0.05, "lights": 96} | change)
     lights = choose_lights(at, settings)
     by_hand = dataclasses.replace(settings, reference_length=reference_length(receivers(at), lights, settings))
     with observe() as log:
@@ -109,8 +110,8 @@ def test_stages_without_a_length_choose_the_methods():
 
 def test_a_length_is_chosen_only_where_it_counts():
     at, lights = frame(), choose_lights(frame(), PAPER)
-    for settings in (SiiSettings(), SiiSettings(i_low=0.05, irradiance_low=0.1), SiiSettings(i_low=0.0),
-                     SiiSettings(i_low=0.05, reference_length=0.3)):
+    for settings in (SiiSettings(), of(SiiSettings, i_low=0.05, irradiance_low=0.1), of(SiiSettings, i_low=0.0),
+                     of(SiiSettings, i_low=0.05, reference_length=0.3)):
         assert with_reference_length(receivers(at), lights, settings) is settings
     assert low_irradiance(lights, SiiSettings()) == 0
 
@@ -127,7 +128,7 @@ def scaled(scene, unit):
 
 
 @pytest.mark.parametrize("unit", [1e3, 1e-3, 4.0 / 0.55 * 1e3])
-@pytest.mark.parametrize("settings", [SiiSettings(lights=96), SiiSettings(lights=96, i_low=0.05)])
+@pytest.mark.parametrize("settings", [of(SiiSettings, lights=96), of(SiiSettings, lights=96, i_low=0.05)])
 def test_a_scene_in_mm_m_or_km_gives_the_same_picture(settings, unit):
     """Property: E goes as the inverse square of lengths, and the last unit makes the box 4 m wide and read in mm."""
     scene, size = load_scene("cornell_box"), {"width": 40, "height": 40, "rsm_resolution": 64}
@@ -149,7 +150,7 @@ def test_lengths_scale_with_powers_of_two_to_the_bit(factor):
 def test_many_lights_have_the_length_of_few():
     """Property: of 25,600 lights every second is looked at, and the length is a scene's, not a number of lights'."""
     at = Frame(load_scene("cornell_box"), width=64, height=64, rsm_resolution=160)
-    every, few = SiiSettings(pattern="all", i_low=0.05), SiiSettings(i_low=0.05)
+    every, few = of(SiiSettings, pattern="all", i_low=0.05), of(SiiSettings, i_low=0.05)
     lengths = [reference_length(receivers(at), choose_lights(at, settings), settings) for settings in (every, few)]
     assert lengths[0] == pytest.approx(lengths[1], rel=SAMPLING)
 
@@ -176,7 +177,7 @@ def test_lights_that_reach_too_little_are_hardly_cut():
 
 def test_the_ledger_uses_the_same_length():
     at = frame()
-    settings = SiiSettings(lights=96, i_low=0.05)
+    settings = of(SiiSettings, lights=96, i_low=0.05)
     by_hand = with_reference_length(receivers(at), choose_lights(at, settings), settings)
     ledgers = [quietly(energy_ledger, at, one) for one in (settings, by_hand)]
     for row, other in zip(*(ledger.rows for ledger in ledgers), strict=True):
@@ -187,4 +188,4 @@ def test_the_ledger_uses_the_same_length():
 def test_settings_are_checked():
     for change in ({"reference_length": 0}, {"reference_length": -1.0}, {"reference_length": math.inf}):
         with pytest.raises(InputError, match="reference_length"):
-            SplatSettings(**change)
+            of(SplatSettings, **change)

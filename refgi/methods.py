@@ -59,7 +59,7 @@ METHODS = {
                "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes"),
         Method("val", "refgi.cluster.val:val", "ValSettings", True,
                "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights",
-               memory="refgi.cluster.memory:extra_bytes"),
+               memory="refgi.cluster.val:extra_bytes"),
         Method("hssil", "refgi.sssil.hssil:hssil", "HssilSettings", False,
                "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees",
                memory="refgi.sssil.memory:extra_bytes"),

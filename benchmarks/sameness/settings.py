@@ -14,7 +14,10 @@ SETS = ("as_published", "criteria")  # names joined by "+"
 VIEWS = {"cornell_side": Camera((0.5, 0.3, -0.6), (0.2, 0.2, 0.3)),
          "stage_side": Camera((0.9, 0.4, 0.9), (0.0, 0.1, 0.0))}
 # names of the ledger that are no short keys today, and values that have another name
-RENAMED: dict[str, dict[str, str]] = {"val": {"dealing": "assignment"}}
+RENAMED: dict[str, dict[str, str]] = {
+    "val": {"dealing": "interleaving.assignment", "area_lights": "clusters.count", "map_resolution": "maps.resolution",
+            "maps": "maps.renderer", "extent": "area.extent",
+            "receiver_plane": "visibility.constant_bias"}}
 RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {
     ("val", "visibility"): {"series": "csm", "step": "pcss", "rectangle": "rays_rectangle", "members": "rays_vpls"}}
 
@@ -28,7 +31,23 @@ def settings_of(method: str, **named: Any) -> Any:
     kind = _settings_class(method)
     if not issubclass(kind, Settings):
         return kind(**named)
+    if method == "val":
+        named = _val(named)
     return replaced(kind(), {_name(method, name): renamed_value(method, name, value) for name, value in named.items()})
+
+
+def _val(named: dict[str, Any]) -> dict[str, Any]:
+    """Return names of `val` with the choices that they stand for."""
+    made = dict(named)
+    if "target_error" in made:
+        made["clusters"] = "adaptive"
+        made.pop("area_lights", None)
+    if made.get("visibility") == "step":  # its bias is one of a scale, and only without the receiver's plane
+        bias = {"visibility.constant_bias.value": made.pop("bias", None) or 0.0,
+                "visibility.constant_bias.scale": made.pop("depth_scale", "log_map")}
+        if not made.pop("receiver_plane", True):
+            made |= {"visibility.constant_bias": "constant_bias"} | bias
+    return made
 
 
 def renamed_value(method: str, name: str, value: Any) -> Any:

@@ -21,6 +21,7 @@ from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.reference import reference_visibility, vpl_visibility
+from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters
 from refgi.draws import AREA_LIGHT_SAMPLES, draws
 from refgi.errors import RefgiWarning, expect
 from refgi.jit import threads
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-WITHOUT_MAPS = ("none", "rays_vpls", "rays_rectangle")  # kinds of visibility that read no map
 SAMPLES = 2048  # pixels: what one in a thousand adds is seen
 DEVIATIONS = 1.645  # standard errors from the estimate to its bound: 95 %
 MOST_TEXELS = 1 << 28  # of all maps together: 1 GB in float32
@@ -68,15 +68,17 @@ def group_lights(
     ShadowMaps or None
         What each sees; None where the kind of visibility does not ask.
     """
-    clusters = cluster(lights.position, lights.normal, count, distance=settings.distance,
-                       weights=(settings.position_weight, settings.normal_weight), diagonal=frame.lit_extent.diagonal,
-                       rounds=settings.rounds)
-    areas = area_lights(lights, clusters, settings, footprint)
-    if settings.visibility in WITHOUT_MAPS:
-        skip("cluster.shadow_maps", f"visibility {settings.visibility!r} looks at none")
+    kind = settings.clusters
+    clusters = cluster(lights.position, lights.normal, count, distance=kind.distance,
+                       weights=(kind.position_weight, kind.normal_weight), diagonal=frame.lit_extent.diagonal,
+                       rounds=kind.rounds)
+    areas = area_lights(lights, clusters, settings.area, footprint)
+    if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
+        chosen = "none" if settings.visibility is None else settings.visibility.name()
+        skip("cluster.shadow_maps", f"visibility {chosen!r} reads none")
         return areas, None
-    tracer = frame.tracer if settings.maps == "rays" else None
-    return areas, shadow_maps(frame.scene.geometry, areas, settings, frame.dtype, tracer, ends_of(frame, lights))
+    tracer = frame.tracer if settings.maps.renderer == "rays" else None
+    return areas, shadow_maps(frame.scene.geometry, areas, settings.maps, frame.dtype, tracer, ends_of(frame, lights))
 
 
 class Trial(NamedTuple):
@@ -127,7 +129,7 @@ def count_for_error(
     lights : PixelLights
         N lights.
     settings : ValSettings
-        `target_error`, and all that makes the visibility of an area light.
+        `clusters.target_error`, and all that makes the visibility of an area light.
     footprint : (N,) ndarray, optional
         Surface area of each light, m^2, where a cluster of one light is its footprint.
 
@@ -149,8 +151,9 @@ def count_for_error(
     M that was enough is tried. The error need not fall with every step, and at M = N that of the maps is left. What
     fewer than one pixel in 700 suffer, the singular light of a corner say, may be met by none of the samples.
     """
-    expect(settings.target_error is not None, "target_error", "a share of the mean", settings.target_error)
-    assert settings.target_error is not None
+    kind = settings.clusters
+    expect(isinstance(kind, AdaptiveClusters), "clusters", "adaptive", kind.name())
+    assert isinstance(kind, AdaptiveClusters)
     samples = _samples(frame, lights, settings)
     total = lights.position.shape[1]
 
@@ -158,10 +161,10 @@ def count_for_error(
         areas, maps, made = _light_samples(frame, lights, settings, footprint, samples, count)
         return Attempt(_estimate(made, samples, count), areas, maps)
 
-    most = max(1, min(total, MOST_TEXELS // settings.map_resolution**2))
-    best, trail = _double_and_step_back(attempt, most, settings.target_error)
-    if best.trial.bound > settings.target_error:
-        message = (f"no number of area lights tried has an error below {settings.target_error:g}: "
+    most = max(1, min(total, MOST_TEXELS // settings.maps.resolution**2))
+    best, trail = _double_and_step_back(attempt, most, kind.target_error)
+    if best.trial.bound > kind.target_error:
+        message = (f"no number of area lights tried has an error below {kind.target_error:g}: "
                 f"{best.trial.area_lights} of {total} come nearest, with {best.trial.error:.3g}")
         warnings.warn(RefgiWarning(message), stacklevel=2)
     return Adaptive(best.areas, best.maps, best.trial.error, tuple(trail))
@@ -191,7 +194,7 @@ def _light_samples(
     """Return area lights, their maps and the light at the samples."""
     areas, maps = group_lights(frame, lights, settings, count, footprint)
     visibility_of = reference_visibility(frame, lights, areas, maps, settings)
-    rays = frame.tracer if settings.behind == "raytrace" else None
+    rays = frame.tracer if settings.maps.behind == "raytrace" else None
     light = clustered_irradiance(samples.receivers, samples.facing, lights, areas, maps, settings,
                                  footprint=samples.footprint, visibility_of=visibility_of, rays=rays)
     return areas, maps, light[:, 0]
@@ -221,7 +224,7 @@ def _by_rays(
     """Return the light of all lights with a ray for each: every light is its own cluster."""
     alone = cluster(lights.position, lights.normal, max(1, lights.position.shape[1]),
                     diagonal=frame.lit_extent.diagonal)
-    areas = area_lights(lights, alone, dataclasses.replace(settings, single_light="point"))
+    areas = area_lights(lights, alone, dataclasses.replace(settings.area, single_light="point"))
     with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
         light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,
                                      visibility_of=vpl_visibility(frame, lights, areas, "even"))

@@ -2,15 +2,17 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numba
 import numpy.typing as npt
 
-from refgi.cluster.adaptive import count_for_error, group_lights
+from refgi.cluster.adaptive import MOST_TEXELS, count_for_error, group_lights
 from refgi.cluster.clustering.rectangle import AreaLights
+from refgi.cluster.filters.eight import EIGHT
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
 from refgi.lights.selection import choose_lights, footprints, light_footprints, light_maps
 from refgi.lights.settings import MapLights
 from refgi.pairs.irradiance import Receivers
@@ -26,6 +28,7 @@ Array = npt.NDArray[Any]
 
 PAIRS_IN_FULL = 1 << 30  # about a quarter of a second on two cores
 PUBLISHED_BLOCK = 8  # pixels
+LISTED_FLOATS = 24  # of a pixel, where receivers are gathered by lists: measured, and a fifth more
 
 
 def val(frame: "Frame", settings: ValSettings) -> Array:
@@ -47,10 +50,11 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     areas, maps = cluster_lights(frame, lights, settings)
     block = block_side(frame, lights, settings)
     light = light_pixels(frame, lights, areas, maps, settings, block)  # Sec. 4 and 6
-    if block == 1 or settings.blur == "none":
+    if block == 1 or settings.blur is None:
         skip("cluster.blur", "every pixel sums all lights" if block == 1 else "off in the settings")
         return light
-    return blur(light, receivers_of(frame), block, settings, frame.seen_extent.diagonal)  # Sec. 6, geometry-aware blur
+    # Sec. 6, geometry-aware blur
+    return blur(light, receivers_of(frame), block, settings.blur, frame.seen_extent.diagonal)
 
 
 def light_pixels(
@@ -83,7 +87,7 @@ def light_pixels(
     return clustered_irradiance(
         receivers_of(frame), face_normals(frame), lights, areas, maps, settings, footprint=footprint,
         visibility_of=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
-        rays=frame.tracer if settings.behind == "raytrace" else None)
+        rays=frame.tracer if settings.maps.behind == "raytrace" else None)
 
 
 def cluster_lights(
@@ -107,11 +111,11 @@ def cluster_lights(
     ShadowMaps or None
         What each sees; None where nothing asks for it.
     """
-    if settings.target_error is not None:
+    if isinstance(settings.clusters, AdaptiveClusters):
         chosen = count_for_error(frame, lights, settings, light_areas(frame, settings))
         return chosen.areas, chosen.maps
     skip("cluster.adaptive", "the number of area lights is set")
-    return group_lights(frame, lights, settings, settings.area_lights, light_areas(frame, settings))  # Sec. 5
+    return group_lights(frame, lights, settings, settings.clusters.count, light_areas(frame, settings))  # Sec. 5
 
 
 def light_areas(frame: "Frame", settings: ValSettings) -> Array | None:
@@ -129,7 +133,7 @@ def light_areas(frame: "Frame", settings: ValSettings) -> Array | None:
     (N,) ndarray or None
         Area, m^2.
     """
-    if settings.single_light == "point" or not isinstance(settings.lights.source, MapLights):
+    if settings.area.single_light == "point" or not isinstance(settings.lights.source, MapLights):
         return None
     return light_footprints(light_maps(frame, settings.lights.source), settings.lights)
 
@@ -151,8 +155,8 @@ def block_side(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> 
     int
         Pixels.
     """
-    if settings.interleaving is not None:
-        return settings.interleaving
+    if settings.interleaving.block is not None:
+        return settings.interleaving.block
     return 1 if frame.width * frame.height * lights.flux.shape[1] <= PAIRS_IN_FULL else PUBLISHED_BLOCK
 
 
@@ -187,3 +191,50 @@ def face_normals(frame: "Frame") -> Array:
     """
     buffer = frame.gbuffer
     return facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)
+
+
+def extra_bytes(settings: ValSettings, size: tuple[int, int], float_bytes: int) -> int:
+    """Estimate the memory that area lights add to a picture: shadow maps, and these filtered.
+
+    Parameters
+    ----------
+    settings : ValSettings
+        How many area lights, and what their maps are.
+    size : tuple of 2 ints
+        Width and height of the picture, pixels.
+    float_bytes : int
+        4 or 8.
+
+    Returns
+    -------
+    int
+        Bytes, rather too many than too few.
+    """
+    texels, count = settings.maps.resolution**2, _most_maps(settings)
+    sides = 2 if settings.maps.behind == "dual_paraboloid" else 1
+    depth = 2 * count * sides * texels * float_bytes  # twice: maps on which there is nothing are dropped by a copy
+    filtered = 0
+    if isinstance(settings.visibility, Csm):
+        at_once = min(count, numba.get_num_threads() + 1)  # one of them is read from
+        filtered = at_once * texels * _filtered_bytes(settings.visibility, float_bytes)
+    return depth + filtered + size[0] * size[1] * LISTED_FLOATS * float_bytes
+
+
+def _most_maps(settings: ValSettings) -> int:
+    if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
+        return 0
+    most, source = max(1, MOST_TEXELS // settings.maps.resolution**2), settings.lights.source
+    count = settings.clusters.count if isinstance(settings.clusters, Clusters) else most
+    if isinstance(source, MapLights):
+        return count if source.pattern == "all" else min(count, settings.lights.count)
+    return min(count, settings.lights.count * source.bounces)
+
+
+def _filtered_bytes(csm: Csm, float_bytes: int) -> int:
+    """Return the bytes of one filtered map for each of its texels."""
+    channels = 4 * csm.terms + 2  # basis, basis-z, mean depth, and the depth itself
+    if csm.prefilter == "brute":
+        return channels * float_bytes
+    basis = -(-2 * csm.terms // EIGHT) * EIGHT
+    above = 2 * basis + 3  # basis, basis-z, mean, least and most depth: a third of the texels lies above the map's own
+    return (1 + above // 3) * float_bytes

@@ -1,6 +1,5 @@
 """As many area lights as an error asks for: the estimate is the picture's error, and more are taken for less of it."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -15,10 +14,10 @@ from refgi.lights.selection import choose_lights
 from refgi.pairs.irradiance import Receivers
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.truth.vpl import VplSettings, vpl
 
-SETTINGS = of(ValSettings, lights=96, map_resolution=64, target_error=0.1)
+SETTINGS = of(ValSettings, lights=96, maps_resolution=64, clusters="adaptive", target_error=0.1)
 ROUNDING = 1e-4  # of the error: float32 sums, and rays that graze an edge from either way of setting them up
 
 
@@ -47,7 +46,7 @@ def error_of_picture(frame, lights, areas, maps, settings):
 def test_a_lower_target_takes_more_area_lights_and_is_met(frame, lights, evidence):
     chosen = []
     for target in (0.3, 0.1, 0.04):
-        settings = dataclasses.replace(SETTINGS, target_error=target)
+        settings = replaced(SETTINGS, {"target_error": target})
         found = count_for_error(frame, lights, settings)
         error = error_of_picture(frame, lights, found.areas, found.maps, settings)
         # 32 x 32 pixels are all looked at: the estimate is the picture's error
@@ -64,7 +63,7 @@ def test_a_sample_of_the_pixels_bounds_the_error_of_all(frame, lights, monkeypat
     monkeypatch.setattr("refgi.cluster.adaptive.SAMPLES", 200)
     met, figures = 0, []
     for seed in range(4):
-        found = count_for_error(frame, lights, dataclasses.replace(SETTINGS, target_error=0.3, seed=seed))
+        found = count_for_error(frame, lights, replaced(SETTINGS, {"target_error": 0.3, "seed": seed}))
         error = error_of_picture(frame, lights, found.areas, found.maps, SETTINGS)
         trial = found.trail[-1]
         met += error <= trial.bound
@@ -77,13 +76,13 @@ def test_a_sample_of_the_pixels_bounds_the_error_of_all(frame, lights, monkeypat
 def test_what_cannot_be_reached_comes_as_near_as_it_can(frame, lights):
     total = lights.position.shape[1]
     with pytest.warns(RefgiWarning, match=f"of {total} come nearest"):
-        found = count_for_error(frame, lights, dataclasses.replace(SETTINGS, target_error=1e-4))
+        found = count_for_error(frame, lights, replaced(SETTINGS, {"target_error": 1e-4}))
     assert [trial.area_lights for trial in found.trail] == [1, 2, 4, 8, 16, 32, 64, total]
     assert found.error == min(trial.error for trial in found.trail)
 
 
 def test_reruns_are_the_same_bits(frame, lights):
-    runs = [count_for_error(frame, lights, dataclasses.replace(SETTINGS, target_error=0.2)) for _ in range(2)]
+    runs = [count_for_error(frame, lights, replaced(SETTINGS, {"target_error": 0.2})) for _ in range(2)]
     assert runs[0].trail == runs[1].trail
     np.testing.assert_array_equal(runs[0].areas.of, runs[1].areas.of)
     np.testing.assert_array_equal(runs[0].maps.depth, runs[1].maps.depth)
@@ -92,7 +91,7 @@ def test_reruns_are_the_same_bits(frame, lights):
 def test_the_settings_of_the_picture_are_those_of_the_trials(frame, lights):
     trails = {}
     for key, value in (("behind", "visible"), ("behind", "raytrace"), ("visibility", "rays_vpls"), ("clamp", "disc")):
-        settings = dataclasses.replace(SETTINGS, **{key: value})
+        settings = replaced(SETTINGS, {key: value})
         trails[value] = [trial.error for trial in count_for_error(frame, lights, settings).trail]
     usual = trails.pop("visible")
     assert all(trail != usual for trail in trails.values())
@@ -100,8 +99,8 @@ def test_the_settings_of_the_picture_are_those_of_the_trials(frame, lights):
 
 
 def test_a_target_is_needed(frame, lights):
-    with pytest.raises(InputError, match="target_error: expected"):
-        count_for_error(frame, lights, dataclasses.replace(SETTINGS, target_error=None))
+    with pytest.raises(InputError, match="clusters: expected adaptive"):
+        count_for_error(frame, lights, replaced(SETTINGS, {"clusters": "fixed"}))
 
 
 def test_no_light_has_no_error(frame, lights):

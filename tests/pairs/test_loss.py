@@ -12,6 +12,7 @@ from refgi.cluster import ValSettings, val
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import LightSettings
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.loss import sample_pixels
 from refgi.pairs.settings import PairSettings
@@ -38,8 +39,9 @@ def receivers(at):
 
 
 def full(at, settings, pair=None):
-    lights = choose_lights(at, settings)
-    return float(irradiance(receivers(at), lights, pair or settings, footprints(at, settings)).sum(dtype=float))
+    lights, own = choose_lights(at, settings.lights), getattr(settings, "effective_pairs", settings.pairs)
+    footprint = footprints(at, settings.lights, own)
+    return float(irradiance(receivers(at), lights, pair or own, footprint).sum(dtype=float))
 
 
 def told(run, *args):
@@ -74,7 +76,7 @@ def test_each_method_tells_of_its_clamp():
                                    (multires, of(MultiresSettings, lights=LIGHTS, supersampled=True), "multires"),
                                    (multires, of(MultiresSettings, lights=LIGHTS, per_light="light"), "multires"),
                                    (multires, of(MultiresSettings, lights=LIGHTS, target_error=0.3), "multires"),
-                                   (val, of(ValSettings, lights=LIGHTS, clamp="disc", map_resolution=16), "val")):
+                                   (val, of(ValSettings, lights=LIGHTS, clamp="disc", maps_resolution=16), "val")):
         share = 100 * (1 - full(at, settings) / full(at, settings, PairSettings()))
         _, said = told(method, at, settings)
         assert said[0][0] == pytest.approx(share, abs=NEAR)
@@ -137,7 +139,7 @@ def test_a_black_or_empty_picture_has_nothing_to_lose():
 def test_scaled_fluxes_are_told():
     at, settings = frame("cornell_box"), of(SiiSettings, lights=LIGHTS, openness_flux="scale")
     _, said = told(sii, at, settings)
-    kept, _ = told(choose_lights, at, settings)
+    kept, _ = told(choose_lights, at, settings.lights)
     whole = choose_lights(at, LightSettings(LIGHTS)).flux.sum(dtype=float)
     share = 100 * (1 - kept.flux.sum(dtype=float) / whole)
     assert said == [(pytest.approx(share, abs=0.5), said[0][1])]

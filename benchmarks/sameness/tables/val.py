@@ -70,4 +70,7 @@ LIGHTING = [
 ]
 
 TABLE = Table({"lights": 96, "area_lights": 8, "map_resolution": 64},
-              [*PAIRS, *LIGHTS, *CLUSTERS, *MAPS, *VISIBILITY, *LIGHTING])
+              [*PAIRS, *LIGHTS, *CLUSTERS, *MAPS, *VISIBILITY, *LIGHTING],
+              {"clusters": "target_error chooses it", "visibility.constant_bias": "receiver_plane=False chooses it",
+               "visibility.constant_bias.value": "bias is it with visibility=step",
+               "visibility.constant_bias.scale": "depth_scale is it with visibility=step"})

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.clustering.kmeans import Clusters
-from refgi.cluster.settings import Axes, Extent, ValSettings
+from refgi.cluster.clustering.kmeans import Clustering
+from refgi.cluster.settings import AreaLightSettings, Axes, Extent
 from refgi.errors import expect
 from refgi.stages import stage
 
@@ -106,7 +106,7 @@ class AreaLights(NamedTuple):
 
 @stage("cluster.area_lights")
 def area_lights(
-    lights: "PixelLights", clusters: Clusters, settings: ValSettings, footprint: Array | None = None
+    lights: "PixelLights", clusters: Clustering, settings: AreaLightSettings, footprint: Array | None = None
 ) -> AreaLights:
     """Return the rectangle that stands for each cluster.
 
@@ -114,9 +114,9 @@ def area_lights(
     ----------
     lights : PixelLights
         N lights.
-    clusters : Clusters
+    clusters : Clustering
         Their clusters.
-    settings : ValSettings
+    settings : AreaLightSettings
         Axes, extent, correction for sampling, and what a single light is.
     footprint : (N,) ndarray, optional
         Surface area of each light, m^2; for single lights that are their footprint.
@@ -184,7 +184,7 @@ def map_frames(normal: Array) -> Array:
     return np.stack([right, np.cross(forward, right), forward], axis=1)
 
 
-def _grouped(position: Array, clusters: Clusters) -> tuple[Array, Array, Array]:
+def _grouped(position: Array, clusters: Clustering) -> tuple[Array, Array, Array]:
     """Return the clusters in use, the lights of each in turn from its centre, and where each begins."""
     order = np.argsort(clusters.of, kind="stable")
     used = np.flatnonzero(clusters.members)
@@ -192,7 +192,7 @@ def _grouped(position: Array, clusters: Clusters) -> tuple[Array, Array, Array]:
     return used, position[:, order] - clusters.center[:, clusters.of[order]], starts
 
 
-def _axes(away: Array, frames: Array, clusters: Clusters, axes: Axes) -> Array:
+def _axes(away: Array, frames: Array, clusters: Clustering, axes: Axes) -> Array:
     """Return the axes of every rectangle, (M, 2, 3)."""
     turned = np.ascontiguousarray(frames[:, :2])
     if axes == "fixed":

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from refgi.cluster.filters.brute import Brute, brute_means, brutes, build_brute
 from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.mip import Mip, build_mip, mip_means, mip_of, mips
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import Csm
 from refgi.jit import by_type
 
 Array = npt.NDArray[Any]
@@ -55,7 +55,7 @@ def _by_type(
     return call
 
 
-def build_filters(depth: Array, scale: DepthScale, settings: ValSettings, scratch: Any = None) -> Any:
+def build_filters(depth: Array, scale: DepthScale, settings: Csm, box: bool, scratch: Any = None) -> Any:
     """Filter one map as settings ask for.
 
     Parameters
@@ -64,8 +64,10 @@ def build_filters(depth: Array, scale: DepthScale, settings: ValSettings, scratc
         Radial distance, m; inf where the map is empty.
     scale : DepthScale
         From metres to the series' scale.
-    settings : ValSettings
-        `prefilter`, `terms` and `quantisation` count.
+    settings : Csm
+        Terms, filter and quantisation.
+    box : bool
+        Brute force filters over squares instead of discs.
     scratch : Mip or Brute, optional
         Of `allocate_filters` with the same settings; overwritten and returned.
 
@@ -74,12 +76,12 @@ def build_filters(depth: Array, scale: DepthScale, settings: ValSettings, scratc
     Mip or Brute
         In the dtype of `depth`.
     """
-    scratch = allocate_filters(len(depth), depth.dtype, settings) if scratch is None else scratch
+    scratch = allocate_filters(len(depth), depth.dtype, settings, box) if scratch is None else scratch
     BUILD[type(scratch)](depth, scale, scratch)
     return scratch
 
 
-def allocate_filters(n: int, dtype: npt.DTypeLike, settings: ValSettings) -> Any:
+def allocate_filters(n: int, dtype: npt.DTypeLike, settings: Csm, box: bool) -> Any:
     """Allocate the filters of one map.
 
     Parameters
@@ -88,8 +90,10 @@ def allocate_filters(n: int, dtype: npt.DTypeLike, settings: ValSettings) -> Any
         Texels along a side of the map.
     dtype : dtype
         Of the map.
-    settings : ValSettings
-        As in `build`.
+    settings : Csm
+        Terms, filter and quantisation.
+    box : bool
+        As in `build_filters`.
 
     Returns
     -------
@@ -104,4 +108,4 @@ def allocate_filters(n: int, dtype: npt.DTypeLike, settings: ValSettings) -> Any
     quantised = settings.quantisation == "published"
     if settings.prefilter == "mip":
         return mip_of(mips(1, n, settings.terms, dtype, shift=LEVEL_SHIFT, quantised=quantised, mirrored=True), 0)
-    return brutes(n, settings.terms, dtype, box="val_alpha_over_pi" in settings.as_published, quantised=quantised)
+    return brutes(n, settings.terms, dtype, box=box, quantised=quantised)

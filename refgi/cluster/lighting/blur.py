@@ -14,14 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.lighting.blur_tile import COLUMNS, END, FAR, TALL, WIDE, E, N, X, is_one_surface, load_pixels
-from refgi.cluster.settings import MOST_BLOCK
+from refgi.cluster.settings import MOST_BLOCK, GeometryBlur
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
 from refgi.stages import stage
 
 if TYPE_CHECKING:
-    from refgi.cluster.settings import ValSettings
+    from refgi.cluster.settings import BoxBlur
 
 Array = npt.NDArray[Any]
 
@@ -29,7 +29,9 @@ TASKS = 64  # parts that tiles are split into, whatever the number of threads
 
 
 @stage("cluster.blur")
-def blur(irradiance: Array, receivers: Receivers, size: int, settings: "ValSettings", diagonal: float) -> Array:
+def blur(
+    irradiance: Array, receivers: Receivers, size: int, settings: "BoxBlur | GeometryBlur", diagonal: float
+) -> Array:
     """Average irradiance over n x n pixels of the same surface.
 
     Parameters
@@ -40,8 +42,8 @@ def blur(irradiance: Array, receivers: Receivers, size: int, settings: "ValSetti
         Receivers; their dtype is that of the result.
     size : int
         n, 1 to 64: pixels along a side of the window.
-    settings : ValSettings
-        Says how far apart points of one surface may be and how their normals may differ; "box" does not ask.
+    settings : BoxBlur or GeometryBlur
+        How far apart points of one surface may be and how their normals may differ; a box asks neither.
     diagonal : float
         Of the scene, m.
 
@@ -67,9 +69,10 @@ def blur(irradiance: Array, receivers: Receivers, size: int, settings: "ValSetti
     expect(values.shape == position.shape, "irradiance", f"shape {position.shape}", values.shape)
     expect(1 <= size <= MOST_BLOCK, "size", f"1 to {MOST_BLOCK} pixels", size)
     real = position.dtype.type
-    everywhere = settings.blur == "box"
-    extent = FAR / 4 if everywhere else min(settings.blur_extent * diagonal, FAR / 4)
-    cosine = settings.blur_cosine if settings.blur_cosine > -1 and not everywhere else -np.inf
+    extent, cosine = FAR / 4, -np.inf
+    if isinstance(settings, GeometryBlur):
+        extent = min(settings.extent * diagonal, FAR / 4)
+        cosine = settings.cosine if settings.cosine > -1 else -np.inf
     result = np.empty_like(values)
     _blur(values, position, normal, covered, size, real(extent) ** 2, real(cosine), result)
     return result

@@ -27,9 +27,11 @@ from refgi.cluster.lighting.interleave import (
     scatter_pixels,
     subsets,
 )
+from refgi.cluster.settings import BY_MAPS, Csm
 from refgi.cluster.visibility.evaluate import visibility
 from refgi.cluster.visibility.search_region import scale_of
-from refgi.cluster.visibility.shadow import BY_MAPS, filter_channels, shadow_of
+from refgi.cluster.visibility.series import series
+from refgi.cluster.visibility.shadow import filter_channels, shadow_of
 from refgi.errors import expect
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.stages import report_progress, stage
@@ -62,7 +64,7 @@ def clustered_irradiance(
     areas : AreaLights
         The area lights; `of` says which is whose.
     maps : ShadowMaps or None
-        Their shadow maps; not read for visibility "none" or where `visibility_of` is there.
+        Their shadow maps; not read without visibility or where `visibility_of` is there.
     settings : ValSettings
         How one light lights one receiver, and how visibility is found.
     footprint : (N,) ndarray, optional
@@ -95,7 +97,7 @@ def clustered_irradiance(
            np.shape(facing))
     packed = checked(receivers, lights, settings.pairs, footprint)
     parts = subsets(np.asarray(receivers.covered, np.bool_), interleaving)
-    subset = assigned_subsets(areas.of, interleaving, settings.assignment)
+    subset = assigned_subsets(areas.of, interleaving, settings.interleaving.assignment)
     members = member_lights(packed, areas.of, len(areas.members), subset, interleaving**2)
     by_tiles = _goes_by_tiles(members, settings, visibility_of)
     tiles = _tiles(receivers, None if by_tiles and not _reads_facing(areas, settings) else facing, parts)
@@ -127,13 +129,15 @@ def _tiles(receivers: Receivers, facing: Array | None, parts: Subsets) -> Receiv
 def _goes_by_tiles(members: MemberLights, settings: "ValSettings", visibility_of: VisibilityFunction | None) -> bool:
     """Return whether one kernel can light and shadow tiles."""
     return (members.packed.spheres is None and members.packed.lobes is None and visibility_of is None
-            and settings.visibility in (*BY_MAPS, "none") and settings.behind == "visible")
+            and (settings.visibility is None or isinstance(settings.visibility, BY_MAPS))
+            and settings.maps.behind == "visible")
 
 
 def _reads_facing(areas: AreaLights, settings: "ValSettings") -> bool:
     """Return whether any area light's shadow reads the normals of triangles: all but CSM do."""
-    points = (areas.delta == 0) & (areas.members > 0)
-    return settings.visibility in ("hard", "pcf", "pcss") or (settings.visibility == "csm" and bool(points.any()))
+    if settings.visibility is None or not isinstance(settings.visibility, Csm):
+        return settings.visibility is not None
+    return bool(((areas.delta == 0) & (areas.members > 0)).any())
 
 
 def _with_lights(tiles: ReceiverTiles, start: Array) -> ReceiverTiles:
@@ -165,8 +169,8 @@ def _shadows(
     maps: "ShadowMaps | None", areas: AreaLights, shining: Array, settings: "ValSettings"
 ) -> Iterator[tuple[int, Any]]:
     """Return some area lights with their shadows; None for those that nothing occludes."""
-    map_of = np.full(len(areas.delta), -1) if maps is None or settings.visibility == "none" else maps.map_of
-    filtered = (map_of >= 0) & (areas.delta != 0) & (settings.visibility == "csm")
+    map_of = np.full(len(areas.delta), -1) if maps is None or settings.visibility is None else maps.map_of
+    filtered = (map_of >= 0) & (areas.delta != 0) & isinstance(settings.visibility, Csm)
     filters = _filters(maps, map_of[shining[filtered[shining]]], settings)
     for m in shining:
         if maps is None or map_of[m] < 0:
@@ -180,11 +184,13 @@ def _filters(maps: "ShadowMaps | None", chosen: Array, settings: "ValSettings") 
     if maps is None or len(chosen) == 0:
         return
     known, workers = maps, numba.get_num_threads()
-    buffers = [allocate_filters(known.depth.shape[1], known.depth.dtype, settings)
+    csm, box = settings.visibility, "val_alpha_over_pi" in settings.as_published
+    assert isinstance(csm, Csm)
+    buffers = [allocate_filters(known.depth.shape[1], known.depth.dtype, csm, box)
                for _ in range(min(workers, len(chosen)))]
 
     def build(k: int, buffer: Any) -> Any:
-        return build_filters(known.depth[k], scale_of(known, k, settings), settings, buffer)
+        return build_filters(known.depth[k], scale_of(known, k, csm.depth_scale, series(csm)), csm, box, buffer)
 
     with ThreadPoolExecutor(workers) as pool:
         for first in range(0, len(chosen), workers):  # what was filtered before is no longer in use
@@ -220,7 +226,7 @@ def _visibility(
         return visibility_of
 
     def by_maps(m: int, points: Array, facing: Array) -> Array:
-        if maps is None or settings.visibility == "none":
+        if maps is None or settings.visibility is None:
             return np.ones(points.shape[1], points.dtype)
         return visibility(maps, areas, m, points, facing, settings, rays)
 

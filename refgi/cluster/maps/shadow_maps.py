@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.maps.occluders import Blockers, Ends, blockers
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import ShadowMapSettings
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.extent import Extent
@@ -119,8 +119,8 @@ class ShadowMaps(NamedTuple):
 
 @stage("cluster.shadow_maps")
 def shadow_maps(
-    geometry: Geometry, areas: AreaLights, settings: ValSettings, dtype: npt.DTypeLike, tracer: "Tracer | None" = None,
-    ends: Ends | None = None,
+    geometry: Geometry, areas: AreaLights, settings: ShadowMapSettings, dtype: npt.DTypeLike,
+    tracer: "Tracer | None" = None, ends: Ends | None = None,
 ) -> ShadowMaps:
     """Draw a paraboloid map of distances for every area light that something may occlude.
 
@@ -130,12 +130,12 @@ def shadow_maps(
         The triangles.
     areas : AreaLights
         M area lights.
-    settings : ValSettings
+    settings : ShadowMapSettings
         Size and kind of the maps, and what is left out of them.
     dtype : dtype
         Float32 or float64.
     tracer : Tracer, optional
-        Rays against `geometry`, for ``maps == "rays"``; made where it is needed and absent.
+        Rays against `geometry`, for ``renderer == "rays"``; made where it is needed and absent.
     ends : Ends, optional
         Where light begins and ends; absent: anywhere in the scene.
 
@@ -203,15 +203,15 @@ def _without(maps: ShadowMaps, needed: Array) -> ShadowMaps:
 
 
 def _draw(
-    drawn: Blockers, center: Array, frame: Array, radius: Array, settings: ValSettings, dtype: npt.DTypeLike,
+    drawn: Blockers, center: Array, frame: Array, radius: Array, settings: ShadowMapSettings, dtype: npt.DTypeLike,
     tracer: "Tracer | None",
 ) -> tuple[Array, Array, Array]:
     """Return maps, the smallest distance on each, and how many triangles each leaves out."""
-    n = settings.map_resolution
+    n = settings.resolution
     projection = Projection(PARABOLOID, n, n, center, np.ascontiguousarray(frame), np.ones(2), np.inf)
     none = np.zeros_like(radius)
     rule = settings.near_geometry
     ignored = Ignored(radius if rule == "planes" else none, radius if rule == "ball" else none)
-    if settings.maps == "rays":
+    if settings.renderer == "rays":
         return traced_maps(projection, drawn, ignored, dtype, tracer)
     return distance_maps(projection, drawn.chunks, dtype, ignored)

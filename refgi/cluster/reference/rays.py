@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.maps.occluders import Blockers, Ends, blockers
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import ShadowMapSettings
 from refgi.rays import Tracer
 from refgi.sampling import halton
 from refgi.scene.model import Geometry
@@ -107,7 +107,7 @@ def _way_to(ball: Ball | None, at: Array, toward: Array) -> Any:
 
 
 def rectangle_visibility(
-    frame: "Frame", areas: AreaLights, settings: ValSettings, points: int = POINTS, ends: Ends | None = None
+    frame: "Frame", areas: AreaLights, settings: ShadowMapSettings, points: int = POINTS, ends: Ends | None = None
 ) -> VisibilityFunction:
     """Return V of an area light as the share of its rectangle that a receiver sees.
 
@@ -117,7 +117,7 @@ def rectangle_visibility(
         The scene.
     areas : AreaLights
         The area lights.
-    settings : ValSettings
+    settings : ShadowMapSettings
         What blocks near an area light, and what is seen from behind it.
     points : int
         Points on each rectangle, spread evenly.
@@ -181,7 +181,7 @@ def rectangle_points(areas: AreaLights, m: int, on_square: Array) -> Array:
 
 
 def tracer_without_near(
-    frame: "Frame", drawn: Blockers, areas: AreaLights, m: int, settings: ValSettings
+    frame: "Frame", drawn: Blockers, areas: AreaLights, m: int, settings: ShadowMapSettings
 ) -> Tracer:
     """Return rays against what an area light's map is drawn from.
 
@@ -195,7 +195,7 @@ def tracer_without_near(
         The area lights.
     m : int
         Which.
-    settings : ValSettings
+    settings : ShadowMapSettings
         Whether planes near the centre are left out.
 
     Returns

@@ -26,7 +26,16 @@ from refgi.cluster.clustering.rectangle import AreaLights, map_frames
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.reference.vpls import vpl_visibility
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import (
+    BackProjection,
+    Csm,
+    GeometryBlur,
+    Pcss,
+    RaysRectangle,
+    RaysVpls,
+    ValSettings,
+    Visibility,
+)
 from refgi.cluster.val import PUBLISHED_BLOCK, cluster_lights, face_normals, light_pixels, receivers_of
 from refgi.errors import expect
 from refgi.lights.selection import choose_lights, footprints
@@ -37,14 +46,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-STEPS: dict[str, dict[str, Any]] = {
-    "rays_vpls": {"visibility": "rays_vpls"},
-    "rays_rectangle": {"visibility": "rays_rectangle"},
-    "back_projection": {"visibility": "back_projection"},
-    "pcss": {"visibility": "pcss"},
-    "csm": {"visibility": "csm", "prefilter": "brute"},
-    "mip": {"visibility": "csm", "prefilter": "mip"},
-}
+STEPS = ("rays_vpls", "rays_rectangle", "back_projection", "pcss", "csm", "mip")
 
 
 class Step(NamedTuple):
@@ -104,7 +106,7 @@ def split_error(
     frame : Frame
         The scene with its buffers.
     settings : ValSettings
-        The method's; `visibility`, `prefilter` and `interleaving` are the steps'.
+        The method's; `visibility` and `interleaving` are the steps', with the series of `Csm` where it is chosen.
     truth : (3, h, w) ndarray, optional
         One-bounce irradiance, W/m^2, from which the first step starts; without, steps start from exact shadows.
     block : int
@@ -121,14 +123,19 @@ def split_error(
         If the first picture has no light to be a share of.
     """
     lights = choose_lights(frame, settings.lights)
-    base = dataclasses.replace(settings, visibility="csm", prefilter="mip")
+    csm = dataclasses.replace(settings.visibility, prefilter="mip") if isinstance(settings.visibility, Csm) else Csm()
+    base = dataclasses.replace(settings, visibility=csm)
     areas, maps = cluster_lights(frame, lights, base)
     pictures = {} if truth is None else {"truth": truth}
+    kinds: dict[str, Visibility] = {
+        "rays_vpls": RaysVpls(), "rays_rectangle": RaysRectangle(), "back_projection": BackProjection(),
+        "pcss": Pcss(), "csm": dataclasses.replace(csm, prefilter="brute"), "mip": csm}
     pictures["lights"] = exact_shadows(frame, lights, base)
-    for name, changes in STEPS.items():
-        pictures[name] = light_pixels(frame, lights, areas, maps, dataclasses.replace(base, **changes), 1)
+    for name in STEPS:
+        pictures[name] = light_pixels(frame, lights, areas, maps, dataclasses.replace(base, visibility=kinds[name]), 1)
     interleaved, receivers = light_pixels(frame, lights, areas, maps, base, block), receivers_of(frame)
-    pictures["interleaved"] = blur(interleaved, receivers, block, base, frame.seen_extent.diagonal)
+    pictures["interleaved"] = blur(interleaved, receivers, block, base.blur or GeometryBlur(),
+                                   frame.seen_extent.diagonal)
     covered = np.asarray(receivers.covered, np.bool_)
     return ErrorSplit(steps_between(pictures, covered), pictures, covered)
 

@@ -13,7 +13,7 @@ from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.reference.back_projection import back_projection_visibility
 from refgi.cluster.reference.rays import free_share, rectangle_visibility
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import BackProjection, RaysRectangle, RaysVpls, ValSettings
 
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
@@ -95,7 +95,7 @@ def reference_visibility(
     areas : AreaLights
         Their area lights.
     maps : ShadowMaps or None
-        What each area light sees; for "back_projection" alone.
+        Their shadow maps; for `BackProjection` alone.
     settings : ValSettings
         Says which.
 
@@ -104,10 +104,10 @@ def reference_visibility(
     callable or None
         ``(m, points (3, n), facing (3, n)) -> (n,)``; None where it is not by reference.
     """
-    if settings.visibility == "rays_vpls":
+    if isinstance(settings.visibility, RaysVpls):
         return vpl_visibility(frame, lights, areas)
-    projected = maps if settings.visibility == "back_projection" else None
+    projected = maps if isinstance(settings.visibility, BackProjection) else None
     rectangle = None
-    if settings.visibility == "rays_rectangle" or (projected is not None and settings.behind == "raytrace"):
-        rectangle = rectangle_visibility(frame, areas, settings, ends=ends_of(frame, lights))
+    if isinstance(settings.visibility, RaysRectangle) or (projected is not None and settings.maps.behind == "raytrace"):
+        rectangle = rectangle_visibility(frame, areas, settings.maps, ends=ends_of(frame, lights))
     return rectangle if projected is None else back_projection_visibility(areas, projected, rectangle)

@@ -8,9 +8,9 @@ import numpy.typing as npt
 from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference.rays import Ball, free_share, rectangle_points
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import BY_MAPS, ValSettings
 from refgi.cluster.visibility.search_region import SCRATCH_ROWS, Scratch
-from refgi.cluster.visibility.shadow import BY_MAPS, filter_channels, shadow_of, shadow_tile
+from refgi.cluster.visibility.shadow import filter_channels, shadow_of, shadow_tile
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.stages import stage
@@ -44,9 +44,9 @@ def visibility(
     facing : (3, n) ndarray
         Normals of their surfaces; on the lit side for rays, else on either.
     settings : ValSettings
-        `visibility` is "hard", "pcf", "pcss", "csm" or "none"; `behind` says what points behind the area light see.
+        `visibility` is one of `BY_MAPS` or None; `maps.behind` says what points behind the area light see.
     tracer : Tracer, optional
-        Rays against the scene, for points behind the area light and ``behind == "raytrace"``.
+        Rays against the scene, for points behind the area light and ``maps.behind == "raytrace"``.
 
     Returns
     -------
@@ -64,21 +64,22 @@ def visibility(
     map or rays to its rectangle say otherwise; nothing within `near_distance` of the centre blocks such rays.
     """
     expect(0 <= m < len(areas.members), "m", f"an area light, 0 to {len(areas.members) - 1}", m)
-    mode = settings.visibility
-    expect(mode in (*BY_MAPS, "none"), "visibility", "'hard', 'pcf', 'pcss', 'csm' or 'none'", mode)
-    traced = settings.behind == "raytrace" and mode != "none"
+    kind = settings.visibility
+    expect(kind is None or isinstance(kind, BY_MAPS), "visibility", "none, csm, pcss, pcf or hard",
+           kind and kind.name())
+    traced = settings.maps.behind == "raytrace" and kind is not None
     expect(not traced or tracer is not None, "tracer", "rays where behind is 'raytrace'", tracer)
     points = np.ascontiguousarray(points, maps.depth.dtype)
     facing = np.ascontiguousarray(facing, maps.depth.dtype)
     visible, k = np.ones(points.shape[1], points.dtype), int(maps.map_of[m])
-    if mode != "none" and k >= 0:  # the maps ahead and behind: each sees its own hemisphere alone
+    if kind is not None and k >= 0:  # the maps ahead and behind: each sees its own hemisphere alone
         for near, behind in ((maps.near, False), (maps.near_behind, True)):
             if near is not None and np.isfinite(near[k]):
                 shadow = shadow_of(maps, areas, m, settings, behind)
                 _shadow_tiles(shadow, filter_channels(shadow), points, facing, visible)
     if traced and tracer is not None:
         back = areas.normal[:, m] @ (points - areas.center[:, m, None]) <= 0
-        radius = settings.near_distance * float(areas.radius[m])
+        radius = settings.maps.near_distance * float(areas.radius[m])
         visible[back] = _by_rays(tracer, areas, m, radius, points[:, back], facing[:, back])
     return visible
 

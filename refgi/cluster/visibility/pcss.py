@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import Pcss
 from refgi.cluster.visibility.kernel_size import cone_tangent, disc, published_square, published_tangent
 from refgi.cluster.visibility.pcf import SLACK
 from refgi.cluster.visibility.search_region import (
@@ -57,11 +57,11 @@ class PcssShadow(NamedTuple):
     depth: Array  # (n, n) m; inf where the map is empty
 
 
-def blocker_test(settings: ValSettings, scale: DepthScale) -> BlockerTest:
+def blocker_test(settings: Pcss, scale: DepthScale) -> BlockerTest:
     """Return which texels count as blockers; a bias is a share of the scale, on a logarithmic one a factor."""
-    along = (settings.bias or 0.0) / scale.slope
+    along = (settings.constant_bias.value if settings.constant_bias else 0.0) / scale.slope
     moved = (2.0**-along, 0.0) if scale.logarithmic else (1.0, along)
-    return BlockerTest(settings.receiver_plane, settings.cone, *moved)
+    return BlockerTest(settings.constant_bias is None, settings.cone, *moved)
 
 
 @kernel

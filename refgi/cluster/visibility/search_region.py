@@ -11,14 +11,14 @@ import numpy.typing as npt
 
 from refgi.cluster.filters.depth_scale import DepthScale, depth_scale
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import DepthScaleName, ValSettings
 from refgi.cluster.visibility.kernel_size import (
     cone_tangent,
     disc,
     published_square,
     solid_angle_tangent,
 )
-from refgi.cluster.visibility.series import series
+from refgi.cluster.visibility.series import Series
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
@@ -58,7 +58,7 @@ def filter_sizing(settings: ValSettings) -> FilterSizing:
     Parameters
     ----------
     settings : ValSettings
-        Its switches `as_published` and `foreshortened` count.
+        `as_published` and `area.foreshortened` count.
 
     Returns
     -------
@@ -67,10 +67,12 @@ def filter_sizing(settings: ValSettings) -> FilterSizing:
     """
     published = settings.as_published
     return FilterSizing("val_alpha" in published, "val_alpha_over_pi" in published,
-                   "val_search_solid_angle" in published, settings.foreshortened)
+                   "val_search_solid_angle" in published, settings.area.foreshortened)
 
 
-def light_constants(maps: ShadowMaps, k: int, delta: float, settings: ValSettings, behind: bool = False) -> Array:
+def light_constants(
+    maps: ShadowMaps, k: int, delta: float, chain: Series | None = None, behind: bool = False
+) -> Array:
     """Return the constants of one area light and its map that kernels read.
 
     Parameters
@@ -78,11 +80,11 @@ def light_constants(maps: ShadowMaps, k: int, delta: float, settings: ValSetting
     maps : ShadowMaps
         The maps.
     k : int
-        Which one.
+        The map.
     delta : float
         Size of its area light, m.
-    settings : ValSettings
-        Series and bias.
+    chain : Series, optional
+        Its biases and gain, for convolution shadow maps.
     behind : bool
         Of the map of the hemisphere behind.
 
@@ -91,16 +93,17 @@ def light_constants(maps: ShadowMaps, k: int, delta: float, settings: ValSetting
     (CONSTANTS,) ndarray
         In the dtype of the maps; see the places named above.
     """
-    chain, constants = series(settings), np.zeros(CONSTANTS, maps.depth.dtype)
+    constants = np.zeros(CONSTANTS, maps.depth.dtype)
     near = maps.near if maps.near_behind is None or not behind else maps.near_behind
     constants[CENTER : CENTER + 3] = maps.center[k]
     constants[FRAME : FRAME + 9] = (BACKWARD @ maps.frame[k] if behind else maps.frame[k]).ravel()
     constants[DELTA], constants[NEAREST] = delta, near[k]
-    constants[SEARCH_BIAS], constants[BIAS], constants[GAIN] = chain.search_bias, chain.bias, chain.gain
+    if chain is not None:
+        constants[SEARCH_BIAS], constants[BIAS], constants[GAIN] = chain.search_bias, chain.bias, chain.gain
     return constants
 
 
-def scale_of(maps: ShadowMaps, k: int, settings: ValSettings, behind: bool = False) -> DepthScale:
+def scale_of(maps: ShadowMaps, k: int, kind: DepthScaleName, chain: Series, behind: bool = False) -> DepthScale:
     """Return the scale on which depths of one map are compared.
 
     Parameters
@@ -108,9 +111,11 @@ def scale_of(maps: ShadowMaps, k: int, settings: ValSettings, behind: bool = Fal
     maps : ShadowMaps
         The maps.
     k : int
-        Which one; it holds something.
-    settings : ValSettings
-        Series and `depth_scale`.
+        The map; it holds something.
+    kind : {"log_map", "map", "scene"}
+        As in `depth_scale`.
+    chain : Series
+        Its range of depths.
     behind : bool
         Of the map of the hemisphere behind.
 
@@ -122,8 +127,7 @@ def scale_of(maps: ShadowMaps, k: int, settings: ValSettings, behind: bool = Fal
     near, far = (maps.near_behind, maps.far_behind) if behind else (maps.near, maps.far)
     assert near is not None
     assert far is not None
-    chain = series(settings)
-    return depth_scale(settings.depth_scale, float(near[k]), float(far[k]), float(maps.scene_far[k]), chain.range)
+    return depth_scale(kind, float(near[k]), float(far[k]), float(maps.scene_far[k]), chain.range)
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import Csm
 
 Array = npt.NDArray[Any]
 
@@ -137,13 +137,13 @@ def _known(terms: int, attenuation: float, rescale: str, bias: float | None) -> 
     return Series(weight, first, search, final, 1.0 - first - max(first, search), gain)
 
 
-def series(settings: ValSettings) -> Series:
+def series(settings: Csm) -> Series:
     """Return the series that settings ask for.
 
     Parameters
     ----------
-    settings : ValSettings
-        `terms`, `attenuation`, `rescale` and `bias` count.
+    settings : Csm
+        Terms, attenuation, rescaling and bias.
 
     Returns
     -------

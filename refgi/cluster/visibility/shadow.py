@@ -7,6 +7,7 @@ import numpy.typing as npt
 from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.filters.prefilter import build_filters
 from refgi.cluster.maps.shadow_maps import ShadowMaps
+from refgi.cluster.settings import ConstantBias, Csm, Hard, Pcf, Pcss
 from refgi.cluster.visibility.csm import CsmShadow, csm_tile
 from refgi.cluster.visibility.pcf import PcfShadow, pcf_shadow, pcf_tile
 from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, pcss_tile
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-BY_MAPS = ("hard", "pcf", "pcss", "csm")  # kinds of visibility that tiles of receivers find by one map
 TILES: dict[Any, Any] = {PcfShadow: pcf_tile, PcssShadow: pcss_tile, CsmShadow: csm_tile}
 
 
@@ -37,31 +37,35 @@ def shadow_of(
     m : int
         One that has a map. Without extent, it casts a hard shadow.
     settings : ValSettings
-        `visibility` is "hard", "pcf", "pcss" or "csm".
+        `visibility` is one of `BY_MAPS`.
     behind : bool
         Of the map of the hemisphere behind.
     filters : Mip or Brute, optional
-        The filtered map of "csm"; made where absent.
+        The filtered map of `Csm`; made where absent.
 
     Returns
     -------
     PcfShadow, PcssShadow or CsmShadow
         What `shadow_tile` reads.
     """
-    k, delta = int(maps.map_of[m]), float(areas.delta[m])
-    if settings.visibility == "hard" or delta == 0.0:
+    k, delta, kind = int(maps.map_of[m]), float(areas.delta[m]), settings.visibility
+    if isinstance(kind, Hard) or delta == 0.0:
         return pcf_shadow(maps, k, 1, behind)
-    if settings.visibility == "pcf":
-        return pcf_shadow(maps, k, settings.texels, behind)
-    constants, scale = light_constants(maps, k, delta, settings, behind), scale_of(maps, k, settings, behind)
+    if isinstance(kind, Pcf):
+        return pcf_shadow(maps, k, kind.texels, behind)
     depth, sizing = (maps.behind if behind else maps.depth), filter_sizing(settings)
     assert depth is not None
-    if settings.visibility == "pcss":
-        return PcssShadow(constants, sizing, blocker_test(settings, scale), depth[k])
+    if isinstance(kind, Pcss):
+        bias = kind.constant_bias or ConstantBias()
+        scale = scale_of(maps, k, bias.scale, series(Csm(bias=bias.value)), behind)
+        return PcssShadow(light_constants(maps, k, delta, None, behind), sizing, blocker_test(kind, scale), depth[k])
+    assert isinstance(kind, Csm)
+    chain = series(kind)
+    scale = scale_of(maps, k, kind.depth_scale, chain, behind)
     if filters is None:
-        filters = build_filters(depth[k], scale, settings)
-    weight = series(settings).weight.astype(depth.dtype)
-    return CsmShadow(constants, sizing, scale, weight, filters)
+        filters = build_filters(depth[k], scale, kind, "val_alpha_over_pi" in settings.as_published)
+    constants = light_constants(maps, k, delta, chain, behind)
+    return CsmShadow(constants, sizing, scale, chain.weight.astype(depth.dtype), filters)
 
 
 def filter_channels(shadow: Any) -> int:

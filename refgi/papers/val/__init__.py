@@ -24,7 +24,7 @@ FIGURES = (
     Entry("fig1", "Figure 1", "One bounce, all moving", headline),
     Entry("fig4", "Figure 4", "Single soft shadows", figure4),
     Entry("fig5", "Figure 5", "What single soft shadows do wrong", figure5),
-    Entry("fig6", "Figure 6", "Clusters by position and by normals", figure6),
+    Entry("fig6", "Figure 6", "Clustering by position and by normals", figure6),
     Entry("fig8", "Figure 8", "A spot on its way to the ceiling", figure8),
     Entry("fig9", "Figure 9", "Shadows of single area lights", figure9),
     Entry("fig10", "Figure 10", "The number of area lights", figure10),

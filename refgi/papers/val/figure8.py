@@ -46,7 +46,7 @@ def figure8(bench: "Workbench") -> Figure:
     Returns
     -------
     Figure
-        Clusters with lights in each frame on the way to the ceiling and back, and pictures of both ends.
+        Clustering with lights in each frame on the way to the ceiling and back, and pictures of both ends.
     """
     there = max(9, 3 * bench.scale.repeats)
     frames = moved(bench, there)
@@ -66,11 +66,11 @@ def figure8(bench: "Workbench") -> Figure:
         facts=(scene_of(bench, HORSE).description, f"{len(frames)} frames, to the ceiling and back",
                f"{settings['raw'].lights} lights", f"{settings['raw'].area_lights} clusters"),
         pictures=_pictures(runs, frames, there), columns=4,
-        tables=(Table("Clusters with lights, and how far things move between two frames in % of the scene's diagonal",
+        tables=(Table("Clustering with lights, and how far things move between two frames in % of the scene's diagonal",
                       ("", "on the wall", "on the ceiling", "back on the wall", "lights, mean", "centres, mean",
                        "centres, 95 %", "centres, farthest"), rows),),
         plots=(Plot(drawn(curves, Axes("frame", "clusters with lights")),
-                    f"Clusters with lights in each frame; frame {there} is on the ceiling."),),
+                    f"Clustering with lights in each frame; frame {there} is on the ceiling."),),
         notes=_notes(runs, moves, off, there))
 
 
@@ -115,7 +115,7 @@ def clustered_along(frames: list[Frame], settings: ValSettings, *, warm: bool) -
     Returns
     -------
     Run
-        Clusters, and how many of them have lights.
+        Clustering, and how many of them have lights.
     """
     found: list[Clustered] = []
     for frame in frames:

@@ -1,4 +1,4 @@
-"""Clusters drawn on the surfaces that their lights stand on."""
+"""Clustering drawn on the surfaces that their lights stand on."""
 
 import colorsys
 from typing import TYPE_CHECKING, Any

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.clustering.kmeans import Clusters, cluster
+from refgi.cluster.clustering.kmeans import Clustering, cluster
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
@@ -48,7 +48,7 @@ class Clustered(NamedTuple):
     """Pixel lights and what stands for their visibility."""
 
     lights: "PixelLights"
-    clusters: Clusters
+    clusters: Clustering
     areas: AreaLights
 
 
@@ -114,7 +114,7 @@ def published(bench: "Workbench", scene: "Scene", **changes: Any) -> ValSettings
     return clamped(bench, scene, **({"interleaving": BLOCK} | changes))
 
 
-def clustered(frame: Frame, settings: ValSettings, start: Clusters | None = None) -> Clustered:
+def clustered(frame: Frame, settings: ValSettings, start: Clustering | None = None) -> Clustered:
     """Choose lights and group them.
 
     Parameters
@@ -123,8 +123,8 @@ def clustered(frame: Frame, settings: ValSettings, start: Clusters | None = None
         The scene, lit.
     settings : ValSettings
         How.
-    start : Clusters, optional
-        Clusters of another frame to start from.
+    start : Clustering, optional
+        Clustering of another frame to start from.
 
     Returns
     -------

@@ -133,7 +133,7 @@ def test_a_block_of_equal_pixels_has_the_full_sum_as_its_mean(real, assignment, 
 @pytest.fixture(scope="module", params=[np.float32, np.float64])
 def scene(request):
     frame = Frame(load_scene("cornell_sphere:faces=200"), width=37, height=29, rsm_resolution=64, dtype=request.param)
-    settings = of(ValSettings, lights=48, map_resolution=32)
+    settings = of(ValSettings, lights=48, maps_resolution=32)
     to = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     facing = facing_normals(frame.scene.geometry, frame.gbuffer.triangle_id, frame.gbuffer.normal)
     return frame, choose_lights(frame, settings), to, facing
@@ -142,8 +142,8 @@ def scene(request):
 def shadowed(frame, lights, count, settings):
     geometry = frame.scene.geometry
     clusters = cluster(lights.position, lights.normal, count, diagonal=geometry.diagonal)
-    areas = area_lights(lights, clusters, settings, None)
-    return areas, shadow_maps(geometry, areas, settings, frame.dtype)
+    areas = area_lights(lights, clusters, settings.area, None)
+    return areas, shadow_maps(geometry, areas, settings.maps, frame.dtype)
 
 
 @pytest.mark.feature("VAL-04")
@@ -151,9 +151,9 @@ def test_an_area_light_for_each_light_is_a_hard_shadow_for_each(scene, evidence)
     """M = N: the sum over lights, each under its own hard test."""
     frame, lights, to, facing = scene
     count = lights.position.shape[1]
-    areas, maps = shadowed(frame, lights, count, of(ValSettings, map_resolution=32))
+    areas, maps = shadowed(frame, lights, count, of(ValSettings, maps_resolution=32))
     assert (areas.delta == 0).all()
-    result = clustered_irradiance(to, facing, lights, areas, maps, of(ValSettings, map_resolution=32))
+    result = clustered_irradiance(to, facing, lights, areas, maps, of(ValSettings, maps_resolution=32))
     expected, shadows = np.zeros(to.position.shape), 0
     flat, up = to.position.reshape(3, -1), facing.reshape(3, -1)
     for i in range(count):
@@ -171,7 +171,7 @@ def test_an_area_light_for_each_light_is_a_hard_shadow_for_each(scene, evidence)
 def test_tile_by_tile_has_the_bits_of_lists_of_receivers(scene, mode):
     """Fast = slow: V through `visibility_of` takes the long way."""
     frame, lights, to, facing = scene
-    settings = of(ValSettings, map_resolution=32, visibility=mode)
+    settings = of(ValSettings, maps_resolution=32, visibility=mode)
     areas, maps = shadowed(frame, lights, 5, settings)
     for side in (1, 3):
         fast = clustered_irradiance(to, facing, lights, areas, maps, settings, interleaving=side)

@@ -1,6 +1,5 @@
 """What each approximation costs: steps that add up, from exact shadows to the published picture."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -12,14 +11,14 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 # near pairs clamped at a twentieth of the scene's metre: else the error of sampling is that of a pixel beside a light
 # the scale of depths that the limits below were measured with
-SETTINGS = of(ValSettings, lights=128, area_lights=12, map_resolution=64, clamp="distance", clamp_value=0.1,
+SETTINGS = of(ValSettings, lights=128, clusters_count=12, maps_resolution=64, clamp="distance", clamp_value=0.1,
                        depth_scale="scene", near_distance=0.5)
 ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
 # the root of summed squares over the error of all six steps of visibility: 1 for independent ones, 6^-1/2 where all
@@ -90,7 +89,7 @@ def test_steps_of_known_pictures():
 
 def test_without_truth_and_with_rays_behind():
     frame = Frame(load_scene("cornell_box"), width=8, height=8, rsm_resolution=32)
-    settings = dataclasses.replace(SETTINGS, lights=32, area_lights=3, map_resolution=16, behind="raytrace")
+    settings = replaced(SETTINGS, {"lights": 32, "clusters_count": 3, "maps_resolution": 16, "behind": "raytrace"})
     found = split_error(frame, settings, block=2)
     assert next(iter(found.pictures)) == "lights"
     assert all(np.isfinite(picture).all() and (picture >= 0).all() for picture in found.pictures.values())

@@ -1,6 +1,5 @@
 """A square light behind a straight edge: the penumbra is Delta (d - z) / z wide, and V across it is a ramp."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -12,11 +11,11 @@ from refgi.cluster.reference import back_projection_visibility, rectangle_visibi
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
-from refgi.settings import of
+from refgi.settings import of, replaced
 
 EDGE, RECEIVER = 1.0, 3.0  # distances of the edge and the receivers from the light, m
 PLACES = (0.0, 0.07, 0.19, 0.31)  # of the edge, m: 0 is where texels of all levels of a map meet
-SETTINGS = of(ValSettings, depth_scale="scene", near_distance=0.5, map_resolution=256)
+SETTINGS = of(ValSettings, depth_scale="scene", near_distance=0.5, maps_resolution=256)
 # 256 points hide behind an edge along a side one by one
 RAYS = 1.01 / 256
 # half a texel of 256 by which patches reach over the edge, as a share of the penumbra on the map, and half a cell of 32
@@ -79,8 +78,8 @@ def disc_ramp(u):
 def test_rays_and_the_map_projected_back_give_the_ramp(delta, evidence):
     frame, areas = Frame(scene(), dtype=np.float64), square_light(delta)
     points, facing, exact, width = receivers(delta)
-    traced = rectangle_visibility(frame, areas, SETTINGS)(0, points, facing)
-    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
+    traced = rectangle_visibility(frame, areas, SETTINGS.maps)(0, points, facing)
+    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)
     projected = back_projection_visibility(areas, maps)(0, points, facing)
     off = np.abs(traced - exact).max(), np.abs(projected - exact).max()
     evidence(f"Delta {delta}: penumbra {width:.2f} m, rays {width_of(points[0], traced):.3f}, map projected back "
@@ -98,9 +97,10 @@ def test_the_chain_follows_the_ramp(delta, evidence):
     areas, figures = square_light(delta), {}
     for edge in PLACES:
         points, facing, exact, width = receivers(delta, edge)
-        maps, disc = shadow_maps(scene(edge).geometry, areas, SETTINGS, np.float32), disc_ramp(2 * exact - 1)
+        maps, disc = shadow_maps(scene(edge).geometry, areas, SETTINGS.maps, np.float32), disc_ramp(2 * exact - 1)
         for mode, terms, prefilter in LIMITS:
-            settings = dataclasses.replace(SETTINGS, visibility=mode, terms=terms, prefilter=prefilter)
+            series = {"terms": terms, "prefilter": prefilter} if mode == "csm" else {}
+            settings = replaced(SETTINGS, {"visibility": mode} | series)
             v = visibility(maps, areas, 0, points, facing, settings)
             figures.setdefault((mode, terms, prefilter), []).append(
                 (width_of(points[0], v) / width, np.abs(v - exact).max(), np.abs(v - disc).max()))

@@ -32,7 +32,7 @@ def box():
 
 def areas_of(frame, lights, count):
     clusters = cluster(lights.position, lights.normal, count, diagonal=frame.scene.geometry.diagonal)
-    return area_lights(lights, clusters, SETTINGS)
+    return area_lights(lights, clusters, SETTINGS.area)
 
 
 def light_of_each(to, lights):

@@ -89,12 +89,14 @@ def are_shares(values, dtype):
 def shadow_by_summed_areas(areas, maps, points, **settings):
     """V of the first area light by the series over boxes, which summed areas filter exactly."""
     settings = of(ValSettings, **settings)
-    constants, sizing = light_constants(maps, 0, float(areas.delta[0]), settings), filter_sizing(settings)
-    scale, size, dtype = scale_of(maps, 0, settings), points.shape[1], maps.depth.dtype
-    filters, points = sats(maps.depth.shape[1], settings.terms, dtype, mirrored=True), points.astype(dtype)
+    csm = settings.visibility
+    chain = series(csm)
+    constants, sizing = light_constants(maps, 0, float(areas.delta[0]), chain), filter_sizing(settings)
+    scale, size, dtype = scale_of(maps, 0, csm.depth_scale, chain), points.shape[1], maps.depth.dtype
+    filters, points = sats(maps.depth.shape[1], csm.terms, dtype, mirrored=True), points.astype(dtype)
     build_sat(maps.depth[0], scale, filters)
-    weight = series(settings).weight.astype(dtype)
-    _, rows, means, pending, visible = scratch_arrays(size, settings.terms, dtype)
+    weight = chain.weight.astype(dtype)
+    _, rows, means, pending, visible = scratch_arrays(size, csm.terms, dtype)
     find_search_regions(constants, sizing, points, size, np.ones(size, np.bool_), pending, visible, rows)
     sat_means(filters, rows[S], rows[T], rows[RADIUS], pending, size, True, means)
     find_penumbra(constants, sizing, scale, weight, means, size, pending, rows)

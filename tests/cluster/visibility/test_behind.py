@@ -32,8 +32,8 @@ def test_shadow_breaks_off_at_the_light_s_plane(evidence):
     facing = np.repeat([[-1.0], [0.0], [0.0]], 41, axis=1)
     seen = {}
     for behind in ("visible", "dual_paraboloid", "raytrace"):
-        settings = of(ValSettings, behind=behind, visibility="pcss", map_resolution=128)
-        maps = shadow_maps(scene, areas, settings, np.float64)
+        settings = of(ValSettings, behind=behind, visibility="pcss", maps_resolution=128)
+        maps = shadow_maps(scene, areas, settings.maps, np.float64)
         tracer = Tracer(scene) if behind == "raytrace" else None
         seen[behind] = visibility(maps, areas, 0, points, facing, settings, tracer)
     middle = slice(18, 23)
@@ -56,9 +56,9 @@ def test_no_light_leaks_in_over_the_rim(evidence):
     areas = areas._replace(frame=np.array([[[half, half, 0.0], [-half, half, 0.0], [0.0, 0.0, 1.0]]]))
     seen = {}
     for prefilter, dtype in (("brute", np.float64), ("mip", np.float32)):
-        settings = of(ValSettings, behind="dual_paraboloid", prefilter=prefilter, map_resolution=128,
+        settings = of(ValSettings, behind="dual_paraboloid", prefilter=prefilter, maps_resolution=128,
                       depth_scale="scene")
-        maps = shadow_maps(scene, areas, settings, np.float64)
+        maps = shadow_maps(scene, areas, settings.maps, np.float64)
         maps = maps._replace(depth=maps.depth.astype(dtype), behind=maps.behind.astype(dtype))
         seen[prefilter] = float(visibility(maps, areas, 0, points, -points, settings)[0])
     assert max(seen.values()) < 0.02

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import Csm, ValSettings
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
 from refgi.cluster.visibility.evaluate import visibility
 from refgi.cluster.visibility.search_region import (
@@ -114,7 +114,7 @@ def test_mean_depth_stays_between_the_nearest_and_the_receiver():
 @pytest.mark.feature("VAL-18")
 @pytest.mark.parametrize("rescale", ["none", "scale2", "plateau"])
 def test_comparison_is_the_series(rescale):
-    chain = series(of(ValSettings, attenuation=1.0, rescale=rescale))
+    chain = series(Csm(attenuation=1.0, rescale=rescale))
     for blocker in (0.1, 0.45, 0.5, 0.55, 0.7):
         constants, scratch, means, pending, visible = scratch_arrays(1, 4)
         constants[[BIAS, GAIN]] = chain.bias, chain.gain

@@ -67,8 +67,8 @@ def test_mean_depth_is_that_of_the_blockers(evidence):
     points, normals = on_plane(0.7, 0.15, 5)
     _, maps = lit_by(depth, 0.3, 2.0)
     settings = of(ValSettings, visibility="pcss", cone=False)
-    constants, (_, scratch, _, pending, visible) = light_constants(maps, 0, 0.3, settings), scratch_arrays(25, 1)
-    chosen, test = filter_sizing(settings), blocker_test(settings, METRES)
+    constants, (_, scratch, _, pending, visible) = light_constants(maps, 0, 0.3), scratch_arrays(25, 1)
+    chosen, test = filter_sizing(settings), blocker_test(settings.visibility, METRES)
     count = find_search_regions(constants, chosen, points, 25, np.ones(25, np.bool_), pending, visible, scratch)
     compare_texels(PcssShadow(constants, chosen, test, depth), normals, 25, pending, visible, scratch)
     expected = [naive.step_shadow(depth.tolist(), p, (0, 0, -1), 0.3, cone=False) for p in points.T]
@@ -126,12 +126,12 @@ def test_blockers_near_the_light_escape_the_published_search(evidence):
     for name, switches, near in (("published", SEARCH, maps.near[0]), ("radial", frozenset(), maps.near[0]),
                                  ("axial", frozenset(), 0.2)):
         settings = of(ValSettings, visibility="pcss", cone=False, as_published=switches)
-        constants, (_, scratch, _, pending, visible) = light_constants(maps, 0, 1.0, settings), scratch_arrays(1, 1)
+        constants, (_, scratch, _, pending, visible) = light_constants(maps, 0, 1.0), scratch_arrays(1, 1)
         constants[NEAREST] = near
         find_search_regions(constants, filter_sizing(settings), point, 1, np.ones(1, np.bool_), pending, visible,
                             scratch)
         covers[name] = 0.2 * np.tan(2 * np.arctan(scratch[RADIUS, 0]))
-        pcss = PcssShadow(constants, filter_sizing(settings), blocker_test(settings, METRES), maps.depth[0])
+        pcss = PcssShadow(constants, filter_sizing(settings), blocker_test(settings.visibility, METRES), maps.depth[0])
         compare_texels(pcss, normal, 1, pending, visible, scratch)
         found[name] = bool(scratch[DEPTH, 0] > 0)
     assert covers["published"] == pytest.approx(0.025, abs=1e-6)

@@ -14,7 +14,8 @@ from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.settings import PRESETS, ValSettings
-from refgi.cluster.val import val
+from refgi.cluster.val import extra_bytes, val
+from refgi.method import Method
 
 __all__ = [
     "PRESETS",
@@ -29,3 +30,7 @@ __all__ = [
     "shadow_maps",
     "val",
 ]
+
+METHOD = Method(
+    "val", "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights", val, ValSettings,
+    visibility=True, memory=extra_bytes, presets=PRESETS)

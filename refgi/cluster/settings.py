@@ -29,8 +29,8 @@ class KMeansSettings(Settings):
 
     distance: Distance = setting(
         "normalised", "distance in shares of the scene's diagonal and of pi, as printed (raw), or squared", study=True)
-    position_weight: float = setting(0.7, "w_x", least=0.0, most=LARGEST_WEIGHT)
-    normal_weight: float = setting(0.3, "w_a", least=0.0, most=LARGEST_WEIGHT)
+    position_weight: float = setting(0.7, "w_x", least=0.0, most=LARGEST_WEIGHT, study=True)
+    normal_weight: float = setting(0.3, "w_a", least=0.0, most=LARGEST_WEIGHT, study=True)
     rounds: int = setting(50, "most rounds; fewer where no light changes its cluster", least=1, most=1000, study=True)
 
     def check(self) -> None:
@@ -81,7 +81,8 @@ class ShadowMapSettings(Settings):
     renderer: Literal["raster", "rays"] = setting("raster", "what finds the depths", study=True)
     near_geometry: Literal["keep", "planes", "ball"] = setting(
         "ball", "left out near the centre: nothing, planes that pass there, or hits within a ball", study=True)
-    near_distance: float = setting(0.6, "how near, as a share of the cluster's radius", least=0.0, most=100.0)
+    near_distance: float = setting(0.6, "how near, as a share of the cluster's radius", least=0.0, most=100.0,
+                                   study=True)
     occluders_alone: bool = setting(True, "leave out triangles that nothing lies behind", study=True)
     behind: Literal["visible", "dual_paraboloid", "raytrace"] = setting(
         "visible", "what receivers behind an area light see of it: all, or by a second map, or by rays")
@@ -93,10 +94,11 @@ class Csm(Settings):
 
     terms: int = setting(4, "M, terms of the series", least=1, most=MOST_TERMS)
     depth_scale: DepthScaleName = setting(
-        "log_map", "depths between what a map holds, by logarithm or in metres, or up to the scene's end")
+        "log_map", "depths between what a map holds, by logarithm or in metres, or up to the scene's end",
+        study=True)
     prefilter: Literal["mip", "brute"] = setting("mip", "mean over a disc: mip map, or every texel", study=True)
     bias: float | None = setting(None, "share of the depth range; none: where the series is 1 for the first time",
-                                 least=0.0, most=LARGEST_BIAS)
+                                 least=0.0, most=LARGEST_BIAS, study=True)
     attenuation: float = setting(0.0, "A of the terms' attenuation", least=0.0, most=100.0, study=True)
     rescale: Literal["none", "scale2", "plateau"] = setting("none", "what undoes the attenuation", study=True)
     quantisation: Literal["none", "published"] = setting("none", "8 and 16 bits of the published textures", study=True)

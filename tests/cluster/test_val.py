@@ -41,7 +41,8 @@ def ball():
 
 
 def test_it_is_in_the_table_of_methods(ball):
-    function, settings = find_method("val").load()
+    method = find_method("val")
+    function, settings = method.function, method.settings
     assert (function, settings) == (val, ValSettings)
     picture = render(ball.scene, "val", small({}), width=33, height=27, rsm_resolution=64)
     np.testing.assert_array_equal(picture.irradiance, val(ball, small({})))
@@ -149,7 +150,8 @@ IN = {"target_error": {"clusters": "adaptive"}, "cone": {"visibility": "pcss"}, 
     ("terms", 0), ("terms", 65), ("maps_resolution", 0), ("rounds", 0),
     ("distance", "euclid"), ("visibility", "soft"), ("prefilter", "gauss"), ("bias", -0.1), ("bias", float("nan")),
     ("position_weight", -1), ("normal_weight", float("inf")), ("attenuation", -1), ("interleaving_block", 0),
-    ("interleaving_block", 65), ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0), ("target_error", float("nan")),
+    ("interleaving_block", 65), ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0),
+    ("target_error", float("nan")),
     ("position_weight", "much"), ("bias", "some"), ("cone", None), ("occluders_alone", "no"), ("near_distance", -1),
     ("as_published", {"val_beta"}), ("assignment", "cards"), ("texels", 4), ("texels", 0),
     ("behind", "mirror"), ("near_geometry", "some"),

@@ -16,6 +16,7 @@ from refgi.jit import threads
 from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights
 from refgi.pairs.irradiance import Receivers, irradiance
+from refgi.pairs.settings import PairSettings
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from refgi.settings import of
@@ -58,10 +59,10 @@ def test_unshadowed_it_is_the_sum_over_all_lights(kind, real, evidence):
         axis = sets.random_directions(rng, 300)
         lights = lights._replace(lobe_flux=lights.flux[:, ::-1].copy(), lobe_axis=axis.astype(real),
                                  lobe_exponent=rng.uniform(0, 40, 300).astype(real))
-    settings = of(ValSettings, visibility="none", clamp="none" if kind == "lobes" else kind,
-                           clamp_value=0.2 if kind in ("distance", "geometry") else 0.0)
+    clamp = {"clamp_value": 0.2} if kind in ("distance", "geometry") else {}
+    settings = of(ValSettings, visibility="none", clamp="none" if kind == "lobes" else kind, **clamp)
     footprint = rng.uniform(0, 0.1, 300)
-    expected = irradiance(to, lights, settings, footprint)
+    expected = irradiance(to, lights, settings.pairs, footprint)
     areas = grouped(rng.integers(0, 7, 300), 9)
     result = clustered_irradiance(to, to.normal, lights, areas, None, settings, footprint=footprint)
     error = np.abs(result - expected).max() / expected.max()
@@ -136,7 +137,7 @@ def scene(request):
     settings = of(ValSettings, lights=48, maps_resolution=32)
     to = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     facing = facing_normals(frame.scene.geometry, frame.gbuffer.triangle_id, frame.gbuffer.normal)
-    return frame, choose_lights(frame, settings), to, facing
+    return frame, choose_lights(frame, settings.lights), to, facing
 
 
 def shadowed(frame, lights, count, settings):
@@ -159,7 +160,7 @@ def test_an_area_light_for_each_light_is_a_hard_shadow_for_each(scene, evidence)
     for i in range(count):
         one = PixelLights(*(part[:, i : i + 1] for part in lights[:3]), None, None, None, 1)
         visible = hard_visibility(maps, areas, int(areas.of[i]), flat, up).reshape(to.covered.shape)
-        expected += irradiance(to, one, ValSettings()) * visible
+        expected += irradiance(to, one, PairSettings()) * visible
         shadows += (visible == 0).sum()
     assert shadows > 0
     error = np.abs(result - expected).max() / expected.max()
@@ -198,7 +199,7 @@ def test_visibility_is_asked_for_where_there_is_light_alone():
     clustered_irradiance(to, to.normal, lights, grouped(of, 5), None, NOT_SHADOWED, visibility_of=given)
     for m in range(4):
         some = PixelLights(*(part[:, of == m] for part in lights[:3]), None, None, None, 1)
-        assert asked[m] == irradiance(to, some, ValSettings()).any(axis=0).sum()
+        assert asked[m] == irradiance(to, some, PairSettings()).any(axis=0).sum()
     assert 4 not in asked
 
 
@@ -215,7 +216,7 @@ def test_odd_pictures_and_no_lights():
         assert not dark.any()
         pixel = Receivers(to.position[:, :, :1], to.normal[:, :, :1], to.covered[:, :1])
         single = clustered_irradiance(pixel, pixel.normal, one, grouped([0], 1), None, NOT_SHADOWED, interleaving=side)
-        expected = irradiance(pixel, one, ValSettings()) * side**2
+        expected = irradiance(pixel, one, PairSettings()) * side**2
         np.testing.assert_allclose(single, expected, rtol=ROUNDING)
 
 

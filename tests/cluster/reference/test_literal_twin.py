@@ -42,7 +42,7 @@ def lit_points(frame):
 
 def twin(frame, settings, block=1):
     """Return the picture by loops, (3, h, w)."""
-    lights, geometry = choose_lights(frame, settings), frame.scene.geometry
+    lights, geometry = choose_lights(frame, settings.lights), frame.scene.geometry
     positions, normals, fluxes = (a.T.astype(float).tolist() for a in (lights.position, lights.normal, lights.flux))
     triangles = geometry.vertices[geometry.faces].tolist()
     pixels, corners = pixels_of(frame), geometry.vertices[geometry.faces]

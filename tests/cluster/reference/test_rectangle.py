@@ -30,7 +30,7 @@ ONE_VIEW = 0.12
 def box():
     """Return frame, lights, area lights, and the surface points with the normals of their triangles."""
     frame = Frame(load_scene("cornell_box"), width=24, height=24, rsm_resolution=64, dtype=np.float64)
-    lights = choose_lights(frame, SETTINGS)
+    lights = choose_lights(frame, SETTINGS.lights)
     clusters = cluster(lights.position, lights.normal, 6, diagonal=frame.scene.geometry.diagonal)
     buffer = frame.gbuffer
     facing = facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)

@@ -23,7 +23,7 @@ PAIRS = 400
 def box():
     """Return frame, lights, receivers and the sum that `vpl` takes."""
     frame = Frame(load_scene("cornell_box"), width=20, height=20, rsm_resolution=64)
-    lights = choose_lights(frame, SETTINGS)
+    lights = choose_lights(frame, SETTINGS.lights)
     lights = lights._replace(flux=np.broadcast_to(lights.flux.mean(axis=0), lights.flux.shape))  # all of one colour
     buffer = frame.gbuffer
     to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.settings import Csm, ValSettings
+from refgi.cluster.settings import ConstantBias, Csm, ValSettings
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
 from refgi.cluster.visibility.evaluate import visibility
 from refgi.cluster.visibility.search_region import (
@@ -48,7 +48,8 @@ def rmse(a, b):
 
 def shadow(areas, maps, points, normals, **settings):
     """V; on the scene's scale, whose bias is a known length, where the settings name none."""
-    return visibility(maps, areas, 0, points, normals, of(ValSettings, **{"depth_scale": "scene", **settings}))
+    scale = {} if "visibility" in settings else {"depth_scale": "scene"}
+    return visibility(maps, areas, 0, points, normals, of(ValSettings, **scale | settings))
 
 
 @pytest.mark.feature("VAL-12")
@@ -129,7 +130,7 @@ def test_more_terms_tend_to_comparing_every_texel(evidence):
     depth = map_of_plates(48, PLATES)  # no plane: nothing shadows itself
     points, normals = on_plane(3.0, 1.8, 12)
     areas, maps = lit_by(depth, 0.5, FAR)
-    every = shadow(areas, maps, points, normals, visibility="pcss", receiver_plane=False, cone=False)
+    every = shadow(areas, maps, points, normals, visibility="pcss", constant_bias=ConstantBias(), cone=False)
     off = [rmse(shadow(areas, maps, points, normals, prefilter="brute", terms=m), every) for m in (1, 2, 4, 8, 16, 64)]
     assert off[0] > off[1] > off[2] > off[3] > off[4] > off[5]
     assert off[5] < 0.03

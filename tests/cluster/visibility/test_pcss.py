@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import ConstantBias, ValSettings
 from refgi.cluster.visibility.evaluate import visibility
 from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, compare_texels
 from refgi.cluster.visibility.search_region import (
@@ -39,7 +39,8 @@ METRES = DepthScale(False, 0.0, 1.0, 1.0)  # depths of the series are metres
 
 def shadow(areas, maps, points, normals, **settings):
     """V; on the scene's scale, whose bias is a known length, where the settings name none."""
-    return visibility(maps, areas, 0, points, normals, of(ValSettings, **{"depth_scale": "scene", **settings}))
+    scale = {} if "visibility" in settings else {"depth_scale": "scene"}
+    return visibility(maps, areas, 0, points, normals, of(ValSettings, **scale | settings))
 
 
 @pytest.mark.feature("VAL-12")
@@ -53,11 +54,12 @@ def test_pcss_is_its_literal_twin(plane, cone):
     normals[:] = -slope[:, None]
     for delta in (0.3, 1.2):
         areas, maps = lit_by(depth, delta, FAR)
-        got = shadow(areas, maps, points, normals, visibility="pcss", receiver_plane=plane, cone=cone)
+        kind = {"visibility": "pcss", "cone": cone, "constant_bias": None if plane else ConstantBias()}
+        got = shadow(areas, maps, points, normals, **kind)
         expected = [naive.step_shadow(depth.tolist(), p, -slope, delta, cone, plane)[0] for p in points.T]
         assert np.abs(got - expected).max() < ROUNDING
         assert np.array_equal(
-            got, shadow(areas, maps, points, -normals, visibility="pcss", receiver_plane=plane, cone=cone))
+            got, shadow(areas, maps, points, -normals, **kind))
 
 
 @pytest.mark.feature("VAL-13")
@@ -87,7 +89,7 @@ def table(delta):
     areas, maps = lit_by(map_of_plates(256, PLATES, 3.0, dtype=np.float32), delta, FAR)
     truth = square_share(points, delta, PLATES, 24)
     rows = {
-        "constant bias": {"visibility": "pcss", "receiver_plane": False, "cone": False},
+        "constant bias": {"visibility": "pcss", "constant_bias": ConstantBias(), "cone": False},
         "plane": {"visibility": "pcss", "cone": False},
         "plane, cone": {"visibility": "pcss"},
         "plane, published kernels": {"visibility": "pcss", "cone": False, "as_published": PUBLISHED},
@@ -178,7 +180,7 @@ def test_a_lone_plane_sees_the_whole_light(dtype, evidence):
     flat = map_of_plates(64, [], 2.0, dtype=dtype)
     areas, maps = lit_by(flat, 2.0, 12.0)
     points, normals = on_plane(2.0, 4.0, 9)
-    without = shadow(areas, maps, points, normals, visibility="pcss", receiver_plane=False, cone=False)
+    without = shadow(areas, maps, points, normals, visibility="pcss", constant_bias=ConstantBias(), cone=False)
     assert without.min() < 0.6
     evidence(f"V = 1 exactly, {np.dtype(dtype).name}; without the plane's test down to {without.min():.2f}")
 
@@ -195,6 +197,7 @@ def test_any_receiver_sees_a_share(dtype):
         depth = map_of_plates(17, plates, plane, dtype=dtype)
         for delta in (0.0, 1e-9, 0.5, 1e6):
             areas, maps = lit_by(depth, delta, FAR)
-            for extra in ({}, {"cone": False, "as_published": PUBLISHED}, {"receiver_plane": False, "bias": 0.25}):
+            for extra in ({}, {"cone": False, "as_published": PUBLISHED},
+                          {"constant_bias": ConstantBias(0.25, "scene")}):
                 got = shadow(areas, maps, points, normals, visibility="pcss", **extra)
                 assert are_shares(got, dtype)

@@ -70,7 +70,7 @@ def group_lights(
     """
     kind = settings.clusters
     clusters = cluster(lights.position, lights.normal, count, distance=kind.distance,
-                       weights=(kind.position_weight, kind.normal_weight), diagonal=frame.lit_extent.diagonal,
+                       weights=(kind.position_weight, kind.normal_weight), diagonal=frame.illuminated_extent.diagonal,
                        rounds=kind.rounds)
     areas = area_lights(lights, clusters, settings.area, footprint)
     if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
@@ -223,7 +223,7 @@ def _by_rays(
 ) -> Array:
     """Return the light of all lights with a ray for each: every light is its own cluster."""
     alone = cluster(lights.position, lights.normal, max(1, lights.position.shape[1]),
-                    diagonal=frame.lit_extent.diagonal)
+                    diagonal=frame.illuminated_extent.diagonal)
     areas = area_lights(lights, alone, dataclasses.replace(settings.area, single_light="point"))
     with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
         light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,

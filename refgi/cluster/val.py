@@ -54,7 +54,7 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
         skip("cluster.blur", "every pixel sums all lights" if block == 1 else "off in the settings")
         return light
     # Sec. 6, geometry-aware blur
-    return blur(light, receivers_of(frame), block, settings.blur, frame.seen_extent.diagonal)
+    return blur(light, receivers_of(frame), block, settings.blur, frame.visible_extent.diagonal)
 
 
 def light_pixels(

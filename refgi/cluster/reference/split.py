@@ -135,7 +135,7 @@ def split_error(
         pictures[name] = light_pixels(frame, lights, areas, maps, dataclasses.replace(base, visibility=kinds[name]), 1)
     interleaved, receivers = light_pixels(frame, lights, areas, maps, base, block), receivers_of(frame)
     pictures["interleaved"] = blur(interleaved, receivers, block, base.blur or GeometryBlur(),
-                                   frame.seen_extent.diagonal)
+                                   frame.visible_extent.diagonal)
     covered = np.asarray(receivers.covered, np.bool_)
     return ErrorSplit(steps_between(pictures, covered), pictures, covered)
 

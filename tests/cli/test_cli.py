@@ -218,7 +218,7 @@ def test_explain_warns_of_the_frame_asked_for_alone(tmp_path):
 
 def test_explain_refuses_maps_that_do_not_fit(monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
-    told = run("explain", "cornell_box", *TINY, "--method", "val", "--set", "map_resolution=4096")
+    told = run("explain", "cornell_box", *TINY, "--method", "val", "--set", "maps.resolution=4096")
     assert told.exit_code == 2
     assert "for the settings of val" in told.stderr
 

@@ -40,8 +40,8 @@ def draw() -> None:
             axes.add_patch(FancyBboxPatch((left, low), wide, HEIGHT, boxstyle="round,pad=0,rounding_size=0.08",
                                           facecolor=plt.cm.YlGnBu(0.12 + 0.5 * number / len(rows)), edgecolor="0.3"))
             files, lines = size(package)
-            axes.text(left + wide / 2, low + HEIGHT / 2, f"{package}  {files} files, {lines:,} lines" if files > 1 else
-                      f"{package}  {lines} lines", ha="center", va="center", fontsize=8)
+            axes.text(left + wide / 2, low + HEIGHT / 2, f"{package}\n{files} files, {lines:,} lines" if files > 1 else
+                      f"{package}\n{lines} lines", ha="center", va="center", fontsize=7)
         if number:
             axes.annotate("", (WIDTH / 2, low + HEIGHT), (WIDTH / 2, low + HEIGHT + GAP),
                           arrowprops={"arrowstyle": "->", "color": "0.3"})

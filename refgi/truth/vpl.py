@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from refgi.method import Method
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, receivers, shadowed_sum
 from refgi.settings import Settings, setting
@@ -78,3 +79,6 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(frame.tracer, points, lights,
                                                               visibility=settings.visibility, batch=settings.batch)
     return irradiance
+
+
+METHOD = Method("vpl", "the same pixel lights with ray-traced visibility", vpl, VplSettings, visibility=True)

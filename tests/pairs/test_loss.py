@@ -12,6 +12,7 @@ from refgi.cluster import ValSettings, val
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import LightSettings
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.loss import sample_pixels
 from refgi.pairs.settings import PairSettings
@@ -38,8 +39,9 @@ def receivers(at):
 
 
 def full(at, settings, pair=None):
-    lights = choose_lights(at, settings)
-    return float(irradiance(receivers(at), lights, pair or settings, footprints(at, settings)).sum(dtype=float))
+    lights, own = choose_lights(at, settings.lights), getattr(settings, "effective_pairs", settings.pairs)
+    footprint = footprints(at, settings.lights, own)
+    return float(irradiance(receivers(at), lights, pair or own, footprint).sum(dtype=float))
 
 
 def told(run, *args):
@@ -137,7 +139,7 @@ def test_a_black_or_empty_picture_has_nothing_to_lose():
 def test_scaled_fluxes_are_told():
     at, settings = frame("cornell_box"), of(SiiSettings, lights=LIGHTS, openness_flux="scale")
     _, said = told(sii, at, settings)
-    kept, _ = told(choose_lights, at, settings)
+    kept, _ = told(choose_lights, at, settings.lights)
     whole = choose_lights(at, LightSettings(LIGHTS)).flux.sum(dtype=float)
     share = 100 * (1 - kept.flux.sum(dtype=float) / whole)
     assert said == [(pytest.approx(share, abs=0.5), said[0][1])]

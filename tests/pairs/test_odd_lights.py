@@ -7,6 +7,7 @@ import pytest
 
 from refgi.pairs.packing import HEADROOM, pack
 from refgi.pairs.pixel_lights import PixelLights
+from refgi.pairs.settings import PairSettings
 from refgi.settings import of
 from refgi.splat.sii.reach.threshold import all_peaks, light_range, low_irradiance
 from refgi.splat.sii.settings import SplatSettings
@@ -36,7 +37,7 @@ def test_all_that_is_packed_is_finite(flux, exponent, axis, real):
         for options in SETTINGS:
             settings = of(SplatSettings, lobe_norm=norm, **options)
             for footprint in (0.0, 3e38):
-                packed = pack(lights, settings, np.full(3, footprint), real)
+                packed = pack(lights, settings.pairs, np.full(3, footprint), real)
                 assert np.isfinite(packed.diffuse).all()
                 assert packed.lobes is None or np.isfinite(packed.lobes.lights).all()
                 assert packed.spheres is None or np.isfinite(packed.spheres).all()
@@ -48,9 +49,9 @@ def test_all_that_is_packed_is_finite(flux, exponent, axis, real):
 
 def test_peaks_within_the_dtype_are_as_the_equation_says():
     lights = odd_lights(2.0, 9.0, (0, 1, 0))
-    packed = pack(lights, of(SplatSettings, lobe_norm="full_lobe"), None, np.float64)
+    packed = pack(lights, of(PairSettings, lobe_norm="full_lobe"), None, np.float64)
     assert packed.lobes.lights[10:13] == pytest.approx(np.full((3, 3), 2 * 10 / (2 * math.pi)), rel=1e-12)
-    beyond = pack(odd_lights(1e20, 1e20, (0, 1, 0)), of(SplatSettings, lobe_norm="full_lobe"), None, np.float32)
+    beyond = pack(odd_lights(1e20, 1e20, (0, 1, 0)), of(PairSettings, lobe_norm="full_lobe"), None, np.float32)
     assert beyond.lobes.lights[10:13].max() == np.float32(np.finfo(np.float32).max / HEADROOM)
 
 

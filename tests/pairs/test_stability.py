@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from refgi import Frame, load_scene
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import PairSettings, SplatSettings, irradiance
 from refgi.splat.sii.splat import splat
 from tests.pairs import sets
@@ -150,7 +150,7 @@ def test_no_place_no_exponent_and_no_size_leaves_the_numbers(how, real, evidence
                 got = (splat if isinstance(how, SplatSettings) else irradiance)(here, lights, how)
                 assert np.isfinite(got).all()
                 assert (got >= 0).all()
-    evidence(f"{np.dtype(real).name}, {type(how).__name__}, a = {how.widening}: 60 sets of 120 x 120 pairs finite")
+    evidence(f"{np.dtype(real).name}, {how}: 60 sets of 120 x 120 pairs finite")
 
 
 @cache
@@ -172,13 +172,14 @@ def test_powers_of_two_scale_to_the_bit(how, factor, evidence):
     once = add(receivers, lights, how)
     more = lights._replace(flux=lights.flux * np.float32(factor), lobe_flux=lights.lobe_flux * np.float32(factor))
     np.testing.assert_array_equal(add(receivers, more, how), once * np.float32(factor))
-    there = {"widening": how.widening * factor}
+    widening = (how.pairs if isinstance(how, SplatSettings) else how).lobe.widening
+    there = {"widening": widening * factor}
     if isinstance(how, SplatSettings) and how.cuts:
         there["reference_length"] = how.reference_length * factor
     longer = add(receivers._replace(position=receivers.position * np.float32(factor)),
-                 lights._replace(position=lights.position * np.float32(factor)), dataclasses.replace(how, **there))
+                 lights._replace(position=lights.position * np.float32(factor)), replaced(how, there))
     np.testing.assert_array_equal(longer, once / np.float32(factor**2))
-    evidence(f"{type(how).__name__}, a = {how.widening}: flux x {factor:g} gives E x {factor:g}, "
+    evidence(f"{type(how).__name__}, a = {widening}: flux x {factor:g} gives E x {factor:g}, "
              f"lengths x {factor:g} give E / {factor**2:g}, to the bit")
 
 
@@ -205,7 +206,7 @@ def at_the_origin(method):
 
 
 def draw(scene, method, **how):
-    return render(scene, method, of(find_method(method).load()[1], **METHODS[method], **how), **SIZE)
+    return render(scene, method, of(find_method(method).settings, **METHODS[method], **how), **SIZE)
 
 
 def apart(picture, reference):

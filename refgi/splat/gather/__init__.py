@@ -4,9 +4,13 @@
 `interpolation` carries the light of a coarse grid of pixels to the others.
 """
 
+from refgi.method import Method
 from refgi.splat.gather.gather import GatherSettings, gather
 
 __all__ = [
     "GatherSettings",
     "gather",
 ]
+
+METHOD = Method("gather", "Reflective Shadow Maps (2005): gathering around the projected point", gather, GatherSettings,
+                visibility=False)

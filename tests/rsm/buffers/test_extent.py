@@ -67,7 +67,7 @@ def made_of(scene, **changes):
 
 
 def settings_of(method, changes):
-    kind = find_method(method).load()[1]
+    kind = find_method(method).settings
     return of(kind, **changes) if issubclass(kind, Settings) else kind(**changes)
 
 
@@ -145,7 +145,8 @@ def test_an_extent_asks_for_no_buffer_that_it_does_not_need(which, not_run):
 
 def test_screen_space_visibility_needs_no_rsm():
     frame = Frame(room(), **SIZE, shadows="exact")
-    run, kind = find_method("hssil").load()
+    method = find_method("hssil")
+    run, kind = method.function, method.settings
     with observe() as log:
         run(frame, kind(visibility="bitmask"))
     assert "rsm.reflective_shadow_map" not in {run.name for run in log.runs}

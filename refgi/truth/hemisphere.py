@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS, STEPS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
@@ -58,7 +58,7 @@ def cosine_direction(u: float, v: float) -> tuple[float, float, float]:
 
 
 @kernel(parallel=True)
-def send(receivers: Receivers, span: tuple[int, int], points: Array, seed: int, reach: float, paths: Paths) -> None:
+def send(receivers: RayReceivers, span: tuple[int, int], points: Array, seed: int, reach: float, paths: Paths) -> None:
     """Send one ray for each point of the set from each receiver of a span.
 
     `span`: first receiver and one past the last. `points` (s, 2) uint32: the pass's point set. `seed`: random shift: a
@@ -71,7 +71,7 @@ def send(receivers: Receivers, span: tuple[int, int], points: Array, seed: int, 
 
 
 @kernel
-def _send(receivers: Receivers, first: int, span: tuple[int, int], points: Array, seed: int, reach: float,
+def _send(receivers: RayReceivers, first: int, span: tuple[int, int], points: Array, seed: int, reach: float,
           paths: Paths) -> None:
     origins, directions, reaches, travelled, cosines, _, _, weights = paths
     pixel, _, normals, facing, starts = receivers

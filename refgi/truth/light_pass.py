@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.truth.camera_visibility import visible_vertices
 from refgi.truth.light_grid import Density, cell_centres, density_of, rays_through, stratified_sets
 from refgi.truth.light_side import pick, tiles
@@ -112,7 +112,7 @@ def _subset(task: Task) -> Task:
     """Return the task for a random subset of its receivers, which all pick from one set."""
     count = len(task.receivers.pixel)
     chosen = np.sort(np.random.default_rng(0).choice(count, min(count, RECEIVERS), replace=False))
-    receivers = Receivers(*(np.ascontiguousarray(field[..., chosen]) for field in task.receivers))
+    receivers = RayReceivers(*(np.ascontiguousarray(field[..., chosen]) for field in task.receivers))
     return task._replace(receivers=receivers, set_of=np.zeros(len(chosen), np.int64))
 
 

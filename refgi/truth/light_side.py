@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.truth.light_vertices import BLOCK, LightVertices
@@ -129,7 +129,7 @@ def _lobe_term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
 
 
 @kernel
-def _aim(points: LightVertices, j: int, receivers: Receivers, r: int, grain: Any, origins: Array, directions: Array,
+def _aim(points: LightVertices, j: int, receivers: RayReceivers, r: int, grain: Any, origins: Array, directions: Array,
          ray: int) -> Any:
     """Write the shadow segment to a picked point and return its reach: 1, or 0 where a face is seen from behind."""
     real = np.float32
@@ -161,7 +161,7 @@ def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
 
 
 @kernel(parallel=True)
-def pick(points: LightVertices, starts: Array, receivers: Receivers, tiles: tuple[Array, Array],
+def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: tuple[Array, Array],
          sampling: tuple[int, int, int, Any], rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Pick light vertices for each receiver of some tiles; write shadow rays and their contributions.
 
@@ -195,7 +195,7 @@ def pick(points: LightVertices, starts: Array, receivers: Receivers, tiles: tupl
 
 
 @kernel
-def _pick_all(points: LightVertices, receivers: Receivers, members: Array, tile: Array,
+def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, tile: Array,
               sampling: tuple[int, int, int, Any], sums: tuple[tuple[int, int], Array, Array],
               rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.lobes import inverse_fraction, lobe_direction
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
 from refgi.truth.camera_visibility import aim_paths
@@ -53,7 +53,7 @@ def _pass_through(surfaces: Surfaces, grain: float, paths: Paths, ray: int) -> N
 
 
 @kernel(parallel=True)
-def scatter(surfaces: Surfaces, grain: float, seed: int, receivers: Receivers, first: int, per_receiver: int,
+def scatter(surfaces: Surfaces, grain: float, seed: int, receivers: RayReceivers, first: int, per_receiver: int,
             paths: Paths) -> None:
     """Send each path on from the surface it hit, by that surface's BRDF.
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.pairs.shadow_rays import Receivers, add_free
+from refgi.pairs.shadow_rays import RayReceivers, add_unoccluded
 from refgi.rays import Tracer
 from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
@@ -26,7 +26,7 @@ class Task(NamedTuple):
     tracer: Tracer
     surfaces: Surfaces
     lights: LightTable
-    receivers: Receivers
+    receivers: RayReceivers
     set_of: Array  # (r,) which set of light vertices each receiver picks from
     caustics: Film | None = None
     view: Projection | None = None  # only surfaces visible in it emit; None: all do
@@ -68,4 +68,4 @@ def add_unblocked(task: Task, rays: Shadows, first: int, per_receiver: int, sums
         task.tracer.fill_occluded(rays.origin, rays.direction, rays.reach, rays.blocked)
     else:
         np.less_equal(rays.reach, 0, out=rays.blocked)
-    add_free(sums, first, len(rays.reach) // per_receiver, per_receiver, rays.blocked, rays.contribution)
+    add_unoccluded(sums, first, len(rays.reach) // per_receiver, per_receiver, rays.blocked, rays.contribution)

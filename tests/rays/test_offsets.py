@@ -70,7 +70,7 @@ def small(scene, shadows="map"):
 def hssil_by_rays(frame):
     from refgi.sssil import HssilSettings, hssil
 
-    return hssil(frame, HssilSettings(visibility="rays"))
+    return hssil(frame, of(HssilSettings, visibility="rays"))
 
 
 def multires_by_rays(frame):
@@ -93,12 +93,12 @@ def shares_of_rays(frame):
 
 
 def cameras_sight(frame):
-    from refgi.sssil.camera_transport import free
+    from refgi.sssil.camera_transport import unoccluded
 
     position, normal = (part[:, frame.gbuffer.covered].T.astype(float)
                         for part in (frame.gbuffer.position, frame.gbuffer.normal))
     lifted = position + frame.tracer.offsets(position)[:, None] * normal
-    return free(frame.tracer, lifted, np.roll(lifted, 7, axis=0)).astype(float)
+    return unoccluded(frame.tracer, lifted, np.roll(lifted, 7, axis=0)).astype(float)
 
 
 def walked_lights(frame):

@@ -30,7 +30,7 @@ def cells(covered, level):
 @pytest.mark.parametrize("level", [0, 2])
 def test_subsplats_get_the_bits_of_vpl(box, level):
     """Oracle: `vpl` with the same lights, which lights every pixel."""
-    lights = choose_lights(box, of(MultiresSettings, lights=64))
+    lights = choose_lights(box, of(MultiresSettings, lights=64).lights)
     some = cells(box.gbuffer.covered, level)
     ours = evaluate_visible(box.tracer, box.scene.geometry, box.gbuffer, some, lights)
     full = vpl(box, of(VplSettings, lights=64, pattern="grid"))
@@ -42,6 +42,6 @@ def test_subsplats_get_the_bits_of_vpl(box, level):
 
 
 def test_no_subsplats_trace_no_rays(box):
-    lights = choose_lights(box, of(MultiresSettings, lights=16))
+    lights = choose_lights(box, of(MultiresSettings, lights=16).lights)
     nothing = cells(np.zeros((27, 33), bool), 1)
     assert evaluate_visible(box.tracer, box.scene.geometry, box.gbuffer, nothing, lights).shape == (3, 0)

@@ -14,7 +14,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from refgi.scene.health import mean_face_normals
 
 from benchmarks.papers.records import Array
 from benchmarks.papers.val.subjects import atrium, horse
@@ -27,6 +26,7 @@ from refgi.scene.builtin.atrium_pieces import shrub
 from refgi.scene.builtin.cornell import cornell_box
 from refgi.scene.builtin.surfaces import patch, rectangle
 from refgi.scene.model import merge
+from refgi.scene.repair import mean_face_normals
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 from refgi.truth import TruthResult

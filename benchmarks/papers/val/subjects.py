@@ -39,6 +39,7 @@ from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, load_scene
 from refgi.scene.builtin.cornell import CAMERA, cornell_box, shell
 from refgi.scene.builtin.metaballs import HALF_SIZE, MIDDLE, Balls, blob, metaballs
 from refgi.scene.model import merge
+from refgi.settings import of
 from refgi.truth.vpl import VplSettings, vpl
 
 HORSE, CORNER, BOX, ATRIUM, BLOB, MARCH = "horse", "corner", "plain box", "atrium", "blob", "march"
@@ -194,7 +195,7 @@ def clustered(frame: Frame, settings: ValSettings, start: Clusters | None = None
     lights = choose_lights(frame, settings)
     found = cluster(lights.position, lights.normal, settings.area_lights, distance=settings.distance,
                     weights=(settings.position_weight, settings.normal_weight),
-                    diagonal=frame.lit_extent.diagonal, rounds=settings.rounds, start=start)
+                    diagonal=frame.illuminated_extent.diagonal, rounds=settings.rounds, start=start)
     return Clustered(lights, found, area_lights(lights, found, settings))
 
 
@@ -222,8 +223,8 @@ def lit_by(frame: Frame, found: Clustered, settings: ValSettings, maps: ShadowMa
 
 def shadowed(bench: Workbench, frame: Frame, settings: ValSettings) -> Array:
     """Return the same lights with a shadow ray each: what more and more area lights converge to."""
-    lights = settings.lights
-    return bench.once(("shadowed", frame, lights), lambda: vpl(frame, VplSettings(lights=lights)))
+    lights = settings.lights.count
+    return bench.once(("shadowed", frame, lights), lambda: vpl(frame, of(VplSettings, lights=lights)))
 
 
 def rays_to(frame: Frame, lights: PixelLights) -> Array:

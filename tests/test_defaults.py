@@ -1,6 +1,5 @@
 """Every method at its defaults: on every number and kind of lights, and where direct light's shadows come from."""
 
-import dataclasses
 import functools
 import subprocess
 import sys
@@ -13,8 +12,9 @@ from refgi.cluster import ValSettings
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS, find_method, render, usual_shadows
+from refgi.pairs.settings import DiscClamp
 from refgi.scene import DirectionalLight, PointLight, load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import GatherSettings, MultiresSettings, SiiSettings
 from refgi.sssil import HssilSettings
 from refgi.truth import TruthSettings, VplSettings
@@ -66,7 +66,7 @@ def test_shadows_are_exact_where_the_method_traces_rays_anyway(settings, rays):
 
 @pytest.mark.parametrize("method", ["truth", "vpl", "sii"])
 def test_a_picture_has_the_shadows_of_its_method(method):
-    settings = FEW.get(method, find_method(method).load()[1](**({} if method in FEW else {"lights": 16})))
+    settings = FEW[method] if method in FEW else of(find_method(method).settings, lights=16)
     frames = {shadows: Frame(BOX, shadows=shadows, **TINY) for shadows in ("map", "exact")}
     assert (frames["map"].direct != frames["exact"].direct).any()
     usual = "map" if method == "sii" else "exact"
@@ -91,10 +91,11 @@ def test_methods_without_rays_load_none(method):
 
 def test_settings_of_multires_change_one_by_one_without_its_clamp_in_the_way():
     for change in ({"source": "walk"}, {"openness_flux": "roulette"}, {"visibility": "rays"}):
-        for settings in (of(MultiresSettings, **change), dataclasses.replace(MultiresSettings(), **change)):
-            assert settings.effective_clamp == "none"
-            assert dataclasses.replace(settings, clamp="none").effective_clamp == "none"
-    assert MultiresSettings().effective_clamp == "disc"
-    assert of(MultiresSettings, openness_flux="scale").effective_clamp == "disc"
-    assert of(MultiresSettings, target_error=0.1).effective_clamp == "disc"
-    assert of(SiiSettings, clamp="auto").effective_clamp == ValSettings().effective_clamp == "none"
+        settings = of(MultiresSettings, **change)
+        assert settings.effective_pairs.clamp is None
+        assert replaced(settings, {"clamp": "none"}).effective_pairs.clamp is None
+    for settings in (MultiresSettings(), of(MultiresSettings, openness_flux="scale"),
+                     of(MultiresSettings, subsplats="error")):
+        assert settings.effective_pairs.clamp == DiscClamp()
+    assert not of(SiiSettings, clamp="auto").pairs.clamps
+    assert not ValSettings().pairs.clamps

@@ -92,7 +92,7 @@ def test_frames_of_an_animation_share_what_did_not_change(scene, moves):
 
 def test_several_lights_add_up(scene):
     others = (PointLight((0.1, 0.3, 0.1), (0.05, 0.04, 0.03)), DirectionalLight((0.1, -0.2, 1.0), (0.2, 0.2, 0.2)))
-    settings = of(SiiSettings, pattern="all", i_low=0)
+    settings = of(SiiSettings, pattern="all")
     options = {"width": 24, "height": 16, "rsm_resolution": 16, "dtype": np.float64}
     lights = (*scene.lights, *others)
     together = sii(Frame(scene.with_lights(*lights), **options), settings)
@@ -154,7 +154,8 @@ def test_render_takes_a_path_and_refuses_what_is_no_scene(tmp_path):
 
 def test_methods_are_found_by_name_or_refused():
     for name in METHODS:
-        function, settings = find_method(name).load()
+        method = find_method(name)
+        function, settings = method.function, method.settings
         assert callable(function)
         assert dataclasses.is_dataclass(settings())
     with pytest.raises(InputError, match="method: expected one of sii, "):

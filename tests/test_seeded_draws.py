@@ -17,9 +17,9 @@ from refgi.sampling import halton, sobol_owen
 from refgi.scene import PointLight, load_scene
 from refgi.settings import of
 from refgi.splat.gather.gather_sum import disc_pattern
-from refgi.splat.multires.error_target.error_driven import stratified
+from refgi.splat.multires.error_target.error_driven import draw_samples
 from refgi.splat.sii.reach.threshold import light_range
-from refgi.splat.sii.settings import SplatSettings
+from refgi.splat.sii.settings import SiiSettings
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.pattern import offsets_at
 from refgi.sssil.visibility.slices import slice_counts, slice_offsets
@@ -132,9 +132,9 @@ def test_roulette_keeps_light_k_by_draw_k(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_xi_of_the_stochastic_range(seed):
-    settings = of(SplatSettings, stochastic_range=True, seed=seed)
+    settings = of(SiiSettings, stochastic=True, seed=seed)
     for part in (0, 1):
-        scale = light_range(np.ones(50), 0.1, settings, part, np.float64).scale
+        scale = light_range(np.ones(50), 0.1, settings.reach, part, np.float64).scale
         assert scale.tolist() == [1 - draw(seed, 3 + 256 * part, k) for k in range(50)]
 
 
@@ -151,7 +151,7 @@ def test_samples_of_the_error_target_of_multires(seed):
             if here:
                 y, x = here[math.floor(draw(seed, 4, i * across + j) * len(here))]
                 expected.append(y * 151 + x)
-    assert stratified(covered, seed).pixel.tolist() == expected
+    assert draw_samples(covered, seed).pixel.tolist() == expected
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -13,7 +13,6 @@ import dataclasses
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, R
 from refgi.compare.provenance import environment
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
-from refgi.methods import METHODS, Method, find_method
+from refgi.methods import METHODS, find_method
 from refgi.provenance import estimate_record
 from refgi.scene import Scene, load_scene
 
@@ -83,7 +82,7 @@ def compare(
     settings = _settings(names, truth_settings, method_settings or {})
     runner = _Runner(scene, {"width": width, "height": height, "shadows": "exact", **frame_options}, progress)
     if out is not None:
-        _require_folder(Path(out))
+        require_folder(Path(out))
     references = {TRUTH: runner.reference(TRUTH, settings[TRUTH])}
     if any(not METHODS[name].visibility for name in names):
         references[UNOCCLUDED] = runner.reference(UNOCCLUDED, _without_visibility(settings[TRUTH]))
@@ -99,24 +98,6 @@ def compare(
     if out is not None:
         _write(comparison, Path(out), progress)
     return comparison
-
-
-def find_ledger(method: Method) -> Callable[[Frame, Any], Any] | None:
-    """Return the function that accounts for the power of the lights under a method.
-
-    Parameters
-    ----------
-    method : Method
-        A row of `METHODS`.
-
-    Returns
-    -------
-    callable or None
-        Takes frame and settings; its result has `rows` and `difference` as those of
-        `refgi.splat.sii.ledger.Ledger`. None for a method without one.
-    """
-    module, _, function = method.ledger.partition(":")
-    return getattr(import_module(module), function) if module else None
 
 
 class _Runner:
@@ -144,7 +125,7 @@ class _Runner:
         self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool
     ) -> MethodResult:
         method = METHODS[name]
-        function, _ = method.load()
+        function = method.function
         self._warm_up(function, settings)
         irradiance, seconds, runs = self._timed(name, lambda frame: function(frame, settings))
         radiance, covered = self.frame.radiance(irradiance), self.frame.gbuffer.covered
@@ -152,7 +133,7 @@ class _Runner:
         against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered,
                               references[j].mean_variance) for j in judges}
         seen = flip(radiance, references[TRUTH].radiance, covered)
-        account = find_ledger(method) if accounts else None
+        account = method.ledger if accounts else None
         ledger = account(self.frame, settings) if account else None
         return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen, ledger)
 
@@ -194,7 +175,7 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
         expect(name in names, "method_settings", f"methods of this comparison ({', '.join(names)})", name)
     settings = {}
     for name in (*names, TRUTH):
-        wanted = METHODS[name].load()[1]
+        wanted = METHODS[name].settings
         value = truth if name == TRUTH else given.get(name)
         value = wanted() if value is None else value
         expect(isinstance(value, wanted), f"settings of {name}", wanted.__name__, type(value).__name__)
@@ -207,7 +188,19 @@ def _without_visibility(settings: Any) -> Any:
     return dataclasses.replace(settings, visibility=False, checkpoint=checkpoint)
 
 
-def _require_folder(folder: Path) -> None:
+def require_folder(folder: Path) -> None:
+    """Make a folder where it is missing.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -66,7 +66,7 @@ def replaced(settings: S, values: Mapping[str, Any]) -> S:
         except InputError as error:
             errors.append(error)
     made: S = _rebuilt(settings, _nested(found), "", errors)
-    raise_all(errors, type(settings))
+    raise_all(errors)
     return made
 
 
@@ -93,23 +93,19 @@ def _printed_forms(settings: Settings, names: Any) -> dict[str, Any]:
     return {key: chosen for key, chosen in own if chosen or (there.get(key))}
 
 
-def raise_all(errors: Iterable[InputError], kind: type[Settings]) -> None:
+def raise_all(errors: Iterable[InputError]) -> None:
     """Raise one error for all, if there are any.
 
     Parameters
     ----------
     errors : iterable of InputError
         What is wrong with settings.
-    kind : type
-        Their class, whose keys the message lists.
     """
     errors = list(errors)
     if not errors:
         return
     keys = dict.fromkeys(error.key for error in errors if error.key)
-    known = ", ".join(dict.fromkeys(leaf.key for leaf in leaves(kind)))
-    raise InputError(f"{first_faults(list(dict.fromkeys(map(str, errors))), '; ')} (settings: {known})",
-                     key=", ".join(keys))
+    raise InputError(first_faults(list(dict.fromkeys(map(str, errors))), "; "), key=", ".join(keys))
 
 
 def find_key(settings: Settings, key: str) -> Leaf:
@@ -170,6 +166,7 @@ def _principals(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
 
 def _hint(key: str, tree: list[Leaf]) -> str:
     whole = {name: leaf.key for leaf in tree for name in (leaf.key.rpartition(".")[2], leaf.key)}
+    whole |= {part: part for leaf in tree for part in leaf.key.split(".")[:-1]}
     near = difflib.get_close_matches(key, whole, n=1)
     return f"; did you mean {whole[near[0]]!r}?" if near else ""
 

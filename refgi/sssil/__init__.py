@@ -7,11 +7,14 @@ and far away at low resolution.
 blends frames, `cameras` adds surfaces outside the picture, `visibility` tests what lies between receiver and sample.
 """
 
+from refgi.method import Method
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.hssil import hssil
+from refgi.sssil.memory import extra_bytes
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import (
+    PRESETS,
     Bilateral,
     Bilinear,
     Bitmask,
@@ -25,6 +28,7 @@ from refgi.sssil.settings import (
 from refgi.sssil.upsampling.upsample import Guide, upsample
 
 __all__ = [
+    "PRESETS",
     "Bilateral",
     "Bilinear",
     "Bitmask",
@@ -41,3 +45,7 @@ __all__ = [
     "pyramid",
     "upsample",
 ]
+
+METHOD = Method(
+    "hssil", "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees", hssil,
+    HssilSettings, visibility=False, memory=extra_bytes, presets=PRESETS)

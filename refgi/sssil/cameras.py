@@ -61,7 +61,7 @@ def place_cameras(frame: Frame, count: int) -> tuple[Camera, ...]:
     placed for light that would pass through walls. Eyes lie on free lines from the middle of a free segment between a
     visible surface and a sender: never inside a wall. Nothing is random.
     """
-    tracer, diagonal = frame.tracer, frame.seen_extent.diagonal
+    tracer, diagonal = frame.tracer, frame.visible_extent.diagonal
     receivers, (senders, flux) = visible_points(frame), equal_flux_points(frame)
     passing = transport(tracer, receivers, senders, flux, NEAREST * diagonal)
     shown = sampling_quality(tracer, _own_view(frame), senders, COARSEST * diagonal) > 0

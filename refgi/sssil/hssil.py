@@ -97,7 +97,7 @@ def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettin
     if settings.senders.only_level not in (None, index):
         return np.zeros_like(level.radiance)
     if isinstance(settings.visibility, Bitmask):
-        return bitmask_gather(level, index, settings, frame.seen_extent.diagonal)
+        return bitmask_gather(level, index, settings, frame.visible_extent.diagonal)
     if isinstance(settings.visibility, Rays):
         return ray_gather(level, index, settings, frame)
     return gather(level, index, settings)

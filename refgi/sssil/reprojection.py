@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import PERSPECTIVE, Projection
 from refgi.scene.values import Vector
 from refgi.sssil.settings import Fetch

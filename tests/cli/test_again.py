@@ -1,6 +1,5 @@
 """`refgi render --again`: a picture made again to the bit from what its file says, and what stands in the way of it."""
 
-import dataclasses
 import json
 import math
 import shutil
@@ -13,6 +12,7 @@ from click.testing import CliRunner
 from refgi.cli.group import VerbGroup
 from refgi.image import read_exr, read_png_attributes, write_exr
 from refgi.methods import METHODS
+from refgi.settings import flat
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 TINY = ["--size", "12x10", "--rsm-resolution", "16"]
@@ -74,7 +74,7 @@ def test_every_method_is_made_again_to_the_bit(method, tmp_path):
     result = run("cornell_box", *TINY, *VIEW, "--method", method, *pairs(method), "--exposure", "2.5", "--out", file)
     assert result.exit_code == 0, result.output
     record = read_exr(file)[1]
-    assert set(record["settings"]) == {field.name for field in dataclasses.fields(METHODS[method].load()[1])}
+    assert set(record["settings"]) == set(flat(METHODS[method].settings()))
     assert read_exr(file)[0]["irradiance.R"].any()
     assert made_again(file) == file.read_bytes()
 

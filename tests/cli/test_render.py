@@ -57,7 +57,7 @@ def plate(tmp_path):
 def test_shadows_are_exact_where_the_method_traces_rays(tmp_path, method, asked, used):
     assert run("cornell_box", *TINY, "--method", method, *asked, "--out", tmp_path / "a.exr").exit_code == 0
     scene = load_scene("cornell_box").with_camera(width=12, height=10)
-    settings = find_method(method).load()[1](lights=16)
+    settings = of(find_method(method).settings, lights=16)
     picture = render(scene, method, settings, shadows=used, rsm_resolution=16)
     channels = read_exr(tmp_path / "a.exr")[0]
     np.testing.assert_array_equal(np.stack([channels[c] for c in "RGB"]), picture.radiance)
@@ -72,7 +72,7 @@ def test_an_exr_holds_what_python_computes(tmp_path):
         assert np.array_equal(channels[name], picture.radiance[index])
         assert np.array_equal(channels[f"irradiance.{name}"], picture.irradiance[index])
     assert attributes["method"] == "sii"
-    assert attributes["settings"]["lights"] == 16
+    assert attributes["settings"]["lights.count"] == 16
     assert attributes["versions"]["numpy"] == np.__version__
 
 
@@ -93,7 +93,7 @@ def test_files_in_a_folder_are_named_like_the_mesh(name, stem, plate, tmp_path):
 def test_json_is_the_only_thing_on_stdout(tmp_path):
     result = run("cornell_box", *TINY, "--out", tmp_path / "a.exr", "--json", "--seed", "7")
     content = json.loads(result.stdout)
-    assert content["settings"]["seed"] == 7
+    assert content["settings"]["lights.seed"] == 7
     assert content["files"] == [str(tmp_path / "a.exr")]
     assert content["non_finite_pixels"] == 0
     assert content["warnings"] == []

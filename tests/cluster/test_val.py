@@ -34,7 +34,8 @@ def ball():
 
 
 def test_it_is_in_the_table_of_methods(ball):
-    function, settings = find_method("val").load()
+    method = find_method("val")
+    function, settings = method.function, method.settings
     assert (function, settings) == (val, ValSettings)
     picture = render(ball.scene, "val", of(ValSettings, **SMALL), width=33, height=27, rsm_resolution=64)
     np.testing.assert_array_equal(picture.irradiance, val(ball, of(ValSettings, **SMALL)))
@@ -46,7 +47,7 @@ def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
     """Oracle: `sii` without a cut, at equal lights."""
     at = frame(dtype=dtype)
     plain = val(at, of(ValSettings, visibility="none", **SMALL))
-    full = sii(at, of(SiiSettings, lights=64, i_low=0))
+    full = sii(at, of(SiiSettings, lights=64))
     off = np.abs(plain - full).max() / full.max()
     assert off <= SUM[dtype]
     evidence(f"{np.dtype(dtype).name}: against sii {off:.1e} of the brightest pixel")

@@ -6,6 +6,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.lights.footprints import texel_areas
 from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import LightSettings
 from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.settings import of
 from refgi.splat import SiiSettings
@@ -54,7 +55,7 @@ def test_each_light_has_its_texels_area_times_the_texels_it_stands_for(pattern):
     """By hand, on a spot's and a point light's map: 121 and 150 of 256 under the grid."""
     frame = Frame(BOX.with_lights(LAMPS["spot"], LAMPS["cube"]), rsm_resolution=40)
     settings = of(SiiSettings, lights=256, pattern=pattern, clamp="disc")
-    lights, area = choose_lights(frame, settings), footprints(frame, settings)
+    lights, area = choose_lights(frame, settings.lights), footprints(frame, settings.lights, settings.pairs)
     for index, (rsm, drawn) in enumerate(zip(frame.rsms, (121, 150) if pattern == "grid" else (128, 128), strict=True)):
         here = lights.map_index == index
         expected = texel_areas(rsm).ravel()[lights.texel[here]] * rsm.texels / drawn
@@ -63,7 +64,7 @@ def test_each_light_has_its_texels_area_times_the_texels_it_stands_for(pattern):
 
 def test_lights_without_their_weight_have_their_texels_flux_under_a_rounded_grid():
     frame = Frame(BOX.with_lights(LAMPS["spot"], LAMPS["cube"]), rsm_resolution=40)
-    lights = choose_lights(frame, of(SiiSettings, lights=256, pattern="grid", as_published={"sii_no_tn"}))
+    lights = choose_lights(frame, of(LightSettings, count=256, pattern="grid", as_published={"sii_no_tn"}))
     for index, rsm in enumerate(frame.rsms):
         here = lights.map_index == index
         np.testing.assert_allclose(lights.flux[:, here], rsm.flux.reshape(3, -1)[:, lights.texel[here]], rtol=ROUNDING)

@@ -83,7 +83,8 @@ def test_wedge(evidence):
 ])
 def test_clamps_are_those_of_the_twin(clamp, value, twin):
     receivers, lights = sets.room(np.random.default_rng(1), 30)
-    got = irradiance(receivers, lights, of(PairSettings, clamp=clamp, clamp_value=value), np.full(30, 0.07))[:, 0]
+    how = of(PairSettings, clamp=clamp, **({"clamp_value": value} if value else {}))
+    got = irradiance(receivers, lights, how, np.full(30, 0.07))[:, 0]
     expected = eq2.irradiance(receivers.position[:, 0], receivers.normal[:, 0], lights,
                               lambda *pair: eq2.clamped_pair(*pair, **twin))
     np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-14)
@@ -94,7 +95,8 @@ def test_clamps_are_those_of_the_twin(clamp, value, twin):
 def test_clamps_out_of_reach_change_no_bit_or_only_rounding(clamp):
     receivers, lights = sets.room(np.random.default_rng(2), 60)
     value = {"distance": 1e-9, "geometry": 1e12, "disc": 0.0, "sphere": 1.0}[clamp]
-    got = irradiance(receivers, lights, of(PairSettings, clamp=clamp, clamp_value=value), np.zeros(60))
+    how = of(PairSettings, clamp=clamp, **({"clamp_value": value} if value else {}))
+    got = irradiance(receivers, lights, how, np.zeros(60))
     # the clamped term divides twice where the plain one multiplies by an inverse
     np.testing.assert_allclose(got, irradiance(receivers, lights, PairSettings()), rtol=1e-14)
 

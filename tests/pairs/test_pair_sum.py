@@ -171,7 +171,7 @@ def test_same_bits_for_any_threads_tiles_and_neighbours(real, clamp, evidence):
     rng = np.random.default_rng(8)
     receivers, lights = sets.room(rng, 1111, real)
     footprint = rng.random(1111)
-    how = of(PairSettings, clamp=clamp, clamp_value=0.1 if clamp in ("distance", "geometry") else 0.0)
+    how = of(PairSettings, clamp=clamp, **({"clamp_value": 0.1} if clamp in ("distance", "geometry") else {}))
     whole = irradiance(receivers, lights, how, footprint)
     for count in range(1, numba.config.NUMBA_NUM_THREADS + 1):
         with threads(count):
@@ -263,10 +263,10 @@ def test_no_lights_and_no_pixels():
 
 
 @pytest.mark.parametrize(("change", "message"), [
-    ({"clamp": "soft"}, "clamp: expected"), ({"clamp": "distance"}, "clamp_value: expected"),
-    ({"clamp": "geometry", "clamp_value": math.inf}, "clamp_value"), ({"offset": math.nan}, "offset"),
-    ({"clamp_value": 1e19, "clamp": "sphere"}, "clamp_value"),
-    ({"widening": -1.0}, "widening"), ({"lobe_norm": "x"}, "lobe_norm"), ({"as_published": {"no_pi"}}, "as_published"),
+    ({"clamp": "soft"}, "clamp: expected"), ({"clamp": "distance"}, "clamp.value: expected"),
+    ({"clamp": "geometry", "clamp_value": math.inf}, "clamp.value"), ({"offset": math.nan}, "offset"),
+    ({"clamp_value": 1e19, "clamp": "sphere"}, "clamp.value"),
+    ({"widening": -1.0}, "widening"), ({"lobe_norm": "x"}, "lobe.norm"), ({"as_published": {"no_pi"}}, "as_published"),
 ])
 def test_settings_are_checked(change, message):
     with pytest.raises(InputError, match=message):

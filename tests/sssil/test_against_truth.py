@@ -19,7 +19,7 @@ from tests.form_factors import polygon_form_factor
 from tests.truth.scenes import corner_room
 
 SIGMAS = 5.0  # Student's t of 8 passes
-FEW_PASSES = {"emitters": "seen", "picks": 64, "directions": 32, "light_grid": 64, "samples": 8 * 96}
+FEW_PASSES = {"emitters": "visible", "picks": 64, "directions": 32, "light_grid": 64, "samples": 8 * 96}
 LAMP = PointLight((0.2, 1.1, 0.3), (0.6, 0.5, 0.4))
 VIEW = {"eye": (1.7, 1.4, 1.5), "target": (-0.4, 0.35, -0.5), "vfov": math.radians(60)}
 

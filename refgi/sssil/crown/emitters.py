@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.sssil.pyramid.view import Level
 
 Array = npt.NDArray[Any]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.sssil.settings import Bilateral, HssilSettings, Nearest
 from refgi.sssil.upsampling.bilateral import fill_bilateral
 from refgi.sssil.upsampling.lines import PAD

@@ -101,7 +101,7 @@ def _judged(bench: Workbench, name: str) -> Judged:
     settings = {key: replaced(base, {"visibility": key}) for key in NAMES}
     many = {key: replaced(one, {"samples": MANY}) for key, one in settings.items()}
     light, usual = ({key: light_of(frame, one) for key, one in ways.items()} for ways in (many, settings))
-    truth, covered = bench.traced(frame, emitters="seen"), frame.gbuffer.covered
+    truth, covered = bench.traced(frame, emitters="visible"), frame.gbuffer.covered
     off, off_usual = ({key: errors_of(one, truth.mean, covered) for key, one in made.items()}
                       for made in (light, usual))
     seconds = interleaved({key: partial(light_of, frame, one) for key, one in settings.items()}, bench.few)
@@ -208,8 +208,8 @@ def split(bench: Workbench, scenes: tuple[str, ...], shown: tuple[str, ...],
 def _split(bench: Workbench, name: str, variants: Mapping[str, Mapping[str, Any]]) -> Split:
     frame = frame_of(bench, name, JUDGED)
     truth = bench.traced(frame)
-    made = {"truth": truth.mean, "seen": bench.traced(frame, emitters="seen").mean,
-            "open": bench.traced(frame, emitters="seen", visibility=False).mean}
+    made = {"truth": truth.mean, "seen": bench.traced(frame, emitters="visible").mean,
+            "open": bench.traced(frame, emitters="visible", visibility=False).mean}
     made |= {key: light_of(frame, settings) for key, settings in chain(frame).items()}
     varied = {title: light_of(frame, smaller(frame, **changes)) for title, changes in variants.items()
               if title != FRAMES} | {FRAMES: expected_light(frame, smaller(frame), 19)}

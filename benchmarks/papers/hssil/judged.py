@@ -33,8 +33,8 @@ NAMES = {POINT: "Eq. 3, 64 samples", DISC: "Eq. 4, 64 samples", POINT_LIMIT: "Eq
 SEEN, OPEN, ALL = "seen", "open", "all"
 TRUTHS: dict[str, tuple[str, str, dict[str, Any]]] = {
     OPEN: ("path tracing, v = 1", "what the camera sees shines, nothing blocks",
-           {"emitters": "seen", "visibility": False}),
-    SEEN: ("path tracing, seen emitters", "what the camera sees shines", {"emitters": "seen"}),
+           {"emitters": "visible", "visibility": False}),
+    SEEN: ("path tracing, seen emitters", "what the camera sees shines", {"emitters": "visible"}),
     ALL: ("path tracing", "everything shines", {})}
 ONE, SIDES, PLACED, MORE = "one", "sides", "placed", "more"
 CAMERAS = {ONE: "one camera", SIDES: "two side views besides", PLACED: "one camera placed besides",

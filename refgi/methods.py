@@ -1,13 +1,19 @@
-"""The table of methods. A new method is one package and one line here."""
+"""The table of methods: those of refgi, and those that other packages register by the entry point `refgi.methods`.
 
-from collections.abc import Callable
+A method declares itself by a `Method` in its package; here stands only where it is. It is imported when it is used.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cache
 from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy.typing as npt
 
 from refgi.errors import InputError
+from refgi.method import Method
 
 if TYPE_CHECKING:
     from refgi.frame import Frame, Shadows
@@ -15,63 +21,55 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-
-class Method(NamedTuple):
-    """A method by name; its code is imported when it is loaded."""
-
-    name: str
-    home: str  # module and function
-    settings: str  # name of the settings class in the same module
-    visibility: bool  # whether it knows what blocks indirect light
-    summary: str
-    ledger: str = ""  # module and function that accounts for the power of the lights; empty: the method keeps none
-    estimate: str = ""  # module and function that gives the picture with its own error; empty: the method knows none
-    memory: str = ""  # module and function that says what settings add to a picture's memory; empty: next to nothing
-
-    def load(self) -> tuple[Callable[["Frame", Any], Array], type]:
-        """Return the method's function and its settings class."""
-        module, _, function = self.home.partition(":")
-        loaded = import_module(module)
-        return getattr(loaded, function), getattr(loaded, self.settings)
-
-    def compute(self, frame: "Frame", settings: Any) -> tuple[Array, Any]:
-        """Return the indirect irradiance in the frame's dtype, and the estimate it is the mean of, if it is one."""
-        if not self.estimate:
-            return self.load()[0](frame, settings), None
-        module, _, function = self.estimate.partition(":")
-        estimate = getattr(import_module(module), function)(frame, settings)
-        return estimate.mean.astype(frame.dtype), estimate
-
-    def extra_bytes(self, settings: Any, size: tuple[int, int], float_bytes: int) -> int:
-        """Return what settings add to the memory of a picture of some width and height and floats of 4 or 8 bytes."""
-        module, _, function = self.memory.partition(":")
-        added: int = getattr(import_module(module), function)(settings, size, float_bytes) if module else 0
-        return added
-
-
-METHODS = {
-    method.name: method
-    for method in (
-        Method("sii", "refgi.splat.sii:sii", "SiiSettings", False,
-               "Splatting Indirect Illumination (2006): pixel lights shine where they are significant",
-               "refgi.splat.sii.ledger:energy_ledger"),
-        Method("multires", "refgi.splat.multires:multires", "MultiresSettings", False,
-               "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes"),
-        Method("val", "refgi.cluster.val:val", "ValSettings", True,
-               "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights",
-               memory="refgi.cluster.memory:extra_bytes"),
-        Method("hssil", "refgi.sssil.hssil:hssil", "HssilSettings", False,
-               "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees",
-               memory="refgi.sssil.memory:extra_bytes"),
-        Method("gather", "refgi.splat.gather:gather", "GatherSettings", False,
-               "Reflective Shadow Maps (2005): gathering around the projected point"),
-        Method("vpl", "refgi.truth.vpl:vpl", "VplSettings", True,
-               "the same pixel lights with ray-traced visibility"),
-        Method("truth", "refgi.truth.truth:truth", "TruthSettings", True,
-               "one-bounce path tracing with a standard error for every pixel",
-               estimate="refgi.truth.truth:trace_truth"),
-    )
+GROUP = "refgi.methods"  # of entry points
+BUILT_IN = {
+    "sii": "refgi.splat.sii:METHOD",
+    "multires": "refgi.splat.multires:METHOD",
+    "val": "refgi.cluster:METHOD",
+    "hssil": "refgi.sssil:METHOD",
+    "gather": "refgi.splat.gather:METHOD",
+    "vpl": "refgi.truth.vpl:METHOD",
+    "truth": "refgi.truth.truth:METHOD",
 }
+
+
+class Methods(Mapping[str, Method]):
+    """Every method there is, by name."""
+
+    def __getitem__(self, name: str) -> Method:
+        """Import a method."""
+        return _load(_places()[name])
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the names: refgi's own, then those of other packages."""
+        return iter(_places())
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(_places())
+
+
+METHODS = Methods()
+
+
+@cache
+def _places() -> dict[str, EntryPoint]:
+    own = {name: EntryPoint(name, value, GROUP) for name, value in BUILT_IN.items()}
+    others = {entry.name: entry for entry in entry_points(group=GROUP)}
+    return own | {name: entry for name, entry in others.items() if name not in own}
+
+
+@cache
+def _load(entry: EntryPoint) -> Method:
+    try:
+        module, _, name = entry.value.partition(":")
+        method = getattr(import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"method {entry.name}: {entry.value} cannot be imported: {error}", key="method") from error
+    if not isinstance(method, Method) or method.name != entry.name:
+        raise InputError(f"method {entry.name}: expected a refgi.method.Method of that name at {entry.value}, "
+                         f"got {method!r}", key="method")
+    return method
 
 
 class Picture(NamedTuple):
@@ -168,12 +166,12 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
     from refgi.frame import Frame
     from refgi.scene import load_scene
 
-    settings_class = find_method(method).load()[1]
-    if settings is not None and not isinstance(settings, settings_class):
-        raise InputError(f"settings: expected {settings_class.__name__}, got {type(settings).__name__}")
-    settings = settings_class() if settings is None else settings
+    known = find_method(method)
+    if settings is not None and not isinstance(settings, known.settings):
+        raise InputError(f"settings: expected {known.settings.__name__}, got {type(settings).__name__}")
+    settings = known.settings() if settings is None else settings
     if frame_options.get("shadows") is None:
         frame_options["shadows"] = usual_shadows(settings)
     frame = Frame(load_scene(scene) if isinstance(scene, str | Path) else scene, **frame_options)
-    irradiance, estimate = METHODS[method].compute(frame, settings)
+    irradiance, estimate = known.compute(frame, settings)
     return Picture(frame, irradiance, frame.radiance(irradiance), estimate)

@@ -154,7 +154,8 @@ def test_render_takes_a_path_and_refuses_what_is_no_scene(tmp_path):
 
 def test_methods_are_found_by_name_or_refused():
     for name in METHODS:
-        function, settings = find_method(name).load()
+        method = find_method(name)
+        function, settings = method.function, method.settings
         assert callable(function)
         assert dataclasses.is_dataclass(settings())
     with pytest.raises(InputError, match="method: expected one of sii, "):

@@ -95,4 +95,4 @@ def _names_of_fields(kind: Any) -> dict[str, set[Any]]:
 
 
 def _settings_class(method: str) -> Any:
-    return TemporalSettings if method == "temporal" else METHODS[method].load()[1]
+    return TemporalSettings if method == "temporal" else METHODS[method].settings

@@ -17,7 +17,8 @@ def main() -> None:
     frame = Frame(scene, width=480, height=480, rsm_resolution=1024, shadows="exact")
     panels = [frame.radiance()]
     for name, changes in (("sii", {"lights": 1024}), ("vpl", {"lights": 1024}), ("truth", {})):
-        function, settings = METHODS[name].load()
+        method = METHODS[name]
+        function, settings = method.function, method.settings
         panels.append(frame.radiance(function(frame, settings(**changes)).astype(frame.dtype)))
     white = np.full((3, frame.height, GAP), 1e3, frame.dtype)
     strip = np.concatenate([part for panel in panels for part in (white, panel)][1:], axis=2)

@@ -6,6 +6,7 @@ import click
 
 from refgi.cli.options import machine, shadows, speech, view, writing
 from refgi.cli.session import FAILED, Session, say, table
+from refgi.cli.settings import preset
 
 if TYPE_CHECKING:
     from refgi.compare import Comparison
@@ -16,6 +17,7 @@ SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ss
 @click.command("compare")
 @view
 @click.option("--methods", metavar="A,B", help="Methods to compare; all where absent.")
+@preset
 @click.option("--set", "pairs", multiple=True, metavar="METHOD.KEY=VALUE",
               help="A setting of a method or of truth, such as truth.samples=64; repeatable.")
 @machine
@@ -24,8 +26,8 @@ SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ss
 @writing
 @speech
 @click.pass_obj
-def _compare(session: Session, /, methods: str | None, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
-            shadows: str, threads: int | None, seed: int | None, out: str | None, parents: bool, force: bool,
+def _compare(session: Session, /, methods: str | None, preset: str, pairs: tuple[str, ...], dtype: str,
+            rsm_resolution: int, shadows: str, threads: int | None, seed: int | None, out: str | None, parents: bool, force: bool,
             **options: Any) -> int:
     """Judge methods on SCENE by path tracing: errors, times, a page.
 
@@ -38,15 +40,17 @@ def _compare(session: Session, /, methods: str | None, pairs: tuple[str, ...], d
     from refgi.cli.options import on_threads
     from refgi.cli.session import progress
     from refgi.cli.view import View
+    from refgi.cli.warm import warm_up
     from refgi.compare import compare
     from refgi.compare.results import file_names
 
-    names, settings = _asked(methods, pairs, seed)
+    names, settings = _asked(methods, preset, pairs, seed)
     scene = View(**options).load()
     if out is not None:
         folder(out, Permission(parents, force), file_names(names))
     require_memory(scene, dtype, rsm_resolution, traced=True, compared=len(names) + 2, settings=settings)
     with on_threads(threads), progress() as tell:
+        warm_up([*names, "truth"], dtype, tell)
         comparison = compare(scene, names, truth_settings=settings.pop("truth"), method_settings=settings, out=out,
                              progress=tell, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)
     _report(session, comparison, out)
@@ -56,9 +60,12 @@ def _compare(session: Session, /, methods: str | None, pairs: tuple[str, ...], d
 command = _compare
 
 
-def _asked(methods: str | None, pairs: tuple[str, ...], seed: int | None) -> tuple[list[str], dict[str, Any]]:
-    from refgi.cli.settings import by_method, read_settings
+def _asked(
+    methods: str | None, preset: str, pairs: tuple[str, ...], seed: int | None
+) -> tuple[list[str], dict[str, Any]]:
+    from refgi.cli.settings import by_method, has_seed, settings_for
     from refgi.errors import InputError
+    from refgi.method import DEFAULT
     from refgi.methods import METHODS, find_method
 
     names = [name.strip() for name in methods.split(",")] if methods is not None else list(METHODS)
@@ -66,11 +73,13 @@ def _asked(methods: str | None, pairs: tuple[str, ...], seed: int | None) -> tup
     if not names:
         raise InputError("--methods: expected a method besides truth, got none")
     texts = by_method(pairs, [*names, "truth"])
+    having = [name for name in names if preset == DEFAULT or preset in METHODS[name].presets]
+    if not having:
+        raise InputError(f"--preset: expected one that a method compared here has, got {preset!r}", key="preset")
     settings = {}
     for name, own in texts.items():
-        wanted = METHODS[name].load()[1]
-        seeded = seed if "seed" in getattr(wanted, "__dataclass_fields__", {}) else None
-        settings[name] = read_settings(wanted, own, seeded, name)
+        start = preset if name in having else DEFAULT
+        settings[name] = settings_for(name, own, seed if has_seed(name) else None, start)
     return names, settings
 
 

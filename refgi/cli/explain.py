@@ -11,6 +11,7 @@ import click
 
 from refgi.cli.options import machine, shadows, speech, view
 from refgi.cli.session import Session, table
+from refgi.cli.settings import preset
 
 if TYPE_CHECKING:
     from refgi.scene import Light, Scene
@@ -27,12 +28,13 @@ ROWS = {  # SII Table 1
 @click.command("explain")
 @view
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
+@preset
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
 @shadows("auto")
 @speech
 @click.pass_obj
-def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
+def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
             shadows: str | None, threads: int | None, seed: int | None, **options: Any) -> None:
     """Show what a method runs, skips and reuses, and where light goes.
 
@@ -41,17 +43,18 @@ def _explain(session: Session, /, method: str, pairs: tuple[str, ...], dtype: st
     from refgi.cli.memory import require_memory
     from refgi.cli.options import on_threads
     from refgi.cli.session import progress
-    from refgi.cli.settings import read_settings
+    from refgi.cli.settings import settings_for
     from refgi.cli.view import View
+    from refgi.cli.warm import warm_up
     from refgi.compare.results import ledger_json
     from refgi.errors import RefgiWarning
-    from refgi.methods import find_method
 
-    settings = read_settings(find_method(method).load()[1], pairs, seed, method)
+    settings = settings_for(method, pairs, seed, preset)
     scene = _small(View(**options).load())
     require_memory(scene, dtype, rsm_resolution, traced=method == "truth", settings={method: settings})
     frame_options = {"dtype": dtype, "rsm_resolution": rsm_resolution, "shadows": shadows}
     with on_threads(threads), progress() as tell:
+        warm_up([method], dtype, tell)
         first = _watch(scene, method, settings, frame_options, None)
         tell(method, 0.2)
         animation = {}
@@ -154,11 +157,10 @@ def _moved(light: "Light", step: float) -> "Light":
 
 def _ledger(scene: "Scene", method: str, settings: Any, options: dict[str, Any]) -> Any:
     """Return the method's account of the lights' power, or None where it keeps none."""
-    from refgi.compare.comparison import find_ledger
     from refgi.frame import Frame
     from refgi.methods import find_method
 
-    account = find_ledger(find_method(method))
+    account = find_method(method).ledger
     return account(Frame(scene, **options), settings) if account else None
 
 

@@ -35,13 +35,12 @@ def asked(options: dict[str, Any]) -> "Job":
     """
     import dataclasses
 
-    from refgi.cli.settings import read_settings
+    from refgi.cli.settings import settings_for
     from refgi.cli.view import View
-    from refgi.methods import find_method
     from refgi.provenance import Job
 
     method = options["method"]
-    settings = read_settings(find_method(method).load()[1], options["pairs"], options["seed"], method)
+    settings = settings_for(method, options["pairs"], options["seed"], options["preset"])
     scene = View(**{field.name: options[field.name] for field in dataclasses.fields(View)}).load()
     frame = {key: options[key] for key in ("dtype", "rsm_resolution", "shadows")}
     return Job(scene, method, settings, frame, scene.exposure)

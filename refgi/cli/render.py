@@ -8,6 +8,7 @@ import click
 
 from refgi.cli.options import machine, seen, shadows, speech, writing
 from refgi.cli.session import DONE, FAILED, Session, say
+from refgi.cli.settings import preset
 
 if TYPE_CHECKING:
     from refgi.cli.destination import Pictures
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 @click.argument("scene", required=False)
 @seen
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
+@preset
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
 @shadows("auto")
@@ -63,8 +65,11 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     from refgi.cli.job import differences, require_view
     from refgi.cli.options import on_threads
     from refgi.cli.session import progress
+    from refgi.cli.warm import warm_up
     from refgi.methods import render
 
+    with progress() as tell:
+        warm_up([job.method], str(job.options["dtype"]), tell)
     started = time.perf_counter()
     with on_threads(options["threads"]), progress() as tell, stages.observe(progress=tell) as log:
         if job.frame is None:

@@ -10,6 +10,7 @@ import click
 
 from refgi.cli.options import machine, shadows, speech, view, writing
 from refgi.cli.session import DONE, FAILED, Session, say
+from refgi.cli.settings import preset
 
 if TYPE_CHECKING:
     from refgi.cli.frame_files import FrameFiles
@@ -28,6 +29,7 @@ KINDS = {"both": (".exr", ".png"), "exr": (".exr",), "png": (".png",)}
 @click.argument("path")
 @click.option("--frames", type=click.IntRange(1, 100_000), help="How many; as PATH says where absent.")
 @click.option("--method", default="hssil", show_default=True, help="Short name of a method.")
+@preset
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @click.option("--temporal", "filtering", multiple=True, metavar="KEY=VALUE",
               help="A setting of the temporal filter, such as weight=0.8; repeatable.")
@@ -57,7 +59,8 @@ def _sequence(session: Session, /, **options: Any) -> int:
     from refgi.cli.memory import require_memory
     from refgi.cli.options import on_threads
     from refgi.cli.session import progress
-    from refgi.cli.settings import read_settings
+    from refgi.cli.settings import settings_for
+    from refgi.cli.warm import warm_up
     from refgi.methods import KeepingEstimate, find_method, usual_shadows
     from refgi.provenance import method_record, scene_record
     from refgi.provenance.frames import frame_record, path_record, require_repeatable
@@ -69,9 +72,9 @@ def _sequence(session: Session, /, **options: Any) -> int:
     permission = Permission(*_taken(options, "parents", "force"))
     (allow_empty,) = _taken(options, "allow_empty")
     _expect_usable(exposure, kind, resume)
-    method, pairs, seed = _taken(options, "method", "pairs", "seed")
+    method, preset, pairs, seed = _taken(options, "method", "preset", "pairs", "seed")
     light = KeepingEstimate(find_method(method))
-    settings = read_settings(find_method(method).load()[1], pairs, seed, method)
+    settings = settings_for(method, pairs, seed, preset)
     require_repeatable(settings)
     temporal = _temporal(method, *_taken(options, "filtering", "unfiltered"))
     frame_options = dict(zip(FRAME, _taken(options, *FRAME), strict=True))
@@ -87,6 +90,7 @@ def _sequence(session: Session, /, **options: Any) -> int:
     folder(out, permission, files.kept(frames, resume=resume))
     sequence = Sequence(scenes_along(scene, way, frames), settings, temporal, method=light, **frame_options)
     with on_threads(threads), progress() as tell:
+        warm_up([method], frame_options["dtype"], tell)
         done = files.done(frames) if resume else 0
         if not allow_empty:
             require_view(_sees_surface(scenes_along(scene, way, frames), frame_options), scene.name, allowed=False)
@@ -113,15 +117,14 @@ def _expect_usable(exposure: float | None, kind: str, resume: bool) -> None:
 
 
 def _temporal(method: str, pairs: tuple[str, ...], unfiltered: bool) -> "TemporalSettings | None":
-    from refgi.cli.settings import read_settings
     from refgi.errors import expect
+    from refgi.settings import from_text
     from refgi.sssil.temporal import TemporalSettings
 
     expect(not (pairs and unfiltered), "--temporal", "nothing beside --no-temporal", " ".join(pairs))
     if unfiltered or not (pairs or method == "hssil"):
         return None
-    settings: TemporalSettings = read_settings(TemporalSettings, pairs, owner="the temporal filter")
-    return settings
+    return from_text(TemporalSettings(), pairs)
 
 
 def _scene_and_way(path: str, frames: int | None, options: dict[str, Any]) -> "tuple[Scene, Way, int]":

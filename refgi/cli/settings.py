@@ -1,67 +1,69 @@
-"""`--set key=value`: text checked against a settings dataclass, all errors at once."""
+"""--preset and --set: a method's settings from text, and `refgi settings`, which lists them."""
 
-import json
-import math
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
+import click
+
+from refgi.cli.options import speech
+from refgi.cli.session import Session, table
 from refgi.errors import InputError, first_faults
-from refgi.scene.files import did_you_mean
-from refgi.scene.values import is_number
-from refgi.settings import Settings, from_text
 
-ABSENT = frozenset({"none", "null", ""})
+preset = click.option("--preset", default="default", show_default=True, metavar="NAME",
+                      help="Named settings to start from: default, or paper for the values printed.")
 
 
-def read_settings(
-    wanted: type[Any], pairs: Iterable[str], seed: int | None = None, owner: str = "", base: Any = None
-) -> Any:
+def settings_for(method: str, pairs: Iterable[str], seed: int | None = None, preset: str = "default") -> Any:
     """Make a method's settings from text.
 
     Parameters
     ----------
-    wanted : type
-        The settings class, a dataclass.
+    method : str
+        Its short name.
     pairs : iterable of str
-        Such as ``lights=1024``, ``pattern=grid``, ``as_published=sii_no_pi,sii_widening`` or ``seconds=none``.
+        Such as ``lights=1024``, ``visibility=csm`` or ``as_published=sii_no_pi,sii_widening``.
     seed : int, optional
         Value of the key ``seed``.
-    owner : str
-        The method, for messages.
-    base : object, optional
-        What to start from; the defaults where absent.
+    preset : str
+        Named settings to start from.
 
     Returns
     -------
-    object
-        An instance of `wanted`.
+    Settings
+        Of the method.
 
     Raises
     ------
     InputError
         If a key is unknown or a value not usable; names all of them.
     """
-    if issubclass(wanted, Settings):
-        return from_text(base or wanted(), [*pairs, *([] if seed is None else [f"seed={seed}"])])
-    hints = get_type_hints(wanted)
-    known = [field.name for field in fields(wanted)]
-    values: dict[str, Any] = {}
-    errors: list[InputError] = []
-    for pair in [*pairs, *([] if seed is None else [f"seed={seed}"])]:
-        key, equals, text = pair.partition("=")
-        if not equals:
-            errors.append(InputError(f"{pair!r} is not key=value", key="--set"))
-        elif key not in known:
-            errors.append(InputError(_unknown(key, known, owner), key=key))
-        elif (problem := _read(values, key, text, hints[key])) is not None:
-            errors.append(InputError(problem, key=key))
-    made, refused = _make(wanted, values)
-    if errors := errors + refused:
-        keys = dict.fromkeys(error.key for error in errors if error.key)
-        texts = first_faults([str(error) for error in errors], "; ")
-        raise InputError(f"{texts} (settings: {', '.join(known)})", key=", ".join(keys))
-    return made
+    from refgi.methods import find_method
+    from refgi.settings import from_text
+
+    known = find_method(method)
+    try:
+        return from_text(known.preset(preset), [*pairs, *([] if seed is None else [f"seed={seed}"])])
+    except InputError as error:
+        raise InputError(f"{error} (`refgi settings {method}` lists the keys)", key=error.key) from error
+
+
+def has_seed(method: str) -> bool:
+    """Return whether a method draws random numbers.
+
+    Parameters
+    ----------
+    method : str
+        Its short name.
+
+    Returns
+    -------
+    bool
+        Whether any of its settings is a seed.
+    """
+    from refgi.methods import find_method
+    from refgi.settings import leaves
+
+    return any(leaf.key.rpartition(".")[2] == "seed" for leaf in leaves(find_method(method).settings))
 
 
 def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[str]]:
@@ -84,6 +86,8 @@ def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[st
     InputError
         If a method is missing or unknown; names all of them.
     """
+    from refgi.scene.files import did_you_mean
+
     sorted_pairs: dict[str, list[str]] = {name: [] for name in methods}
     errors = []
     for pair in pairs:
@@ -100,59 +104,42 @@ def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[st
     return sorted_pairs
 
 
-def _unknown(key: str, known: list[str], owner: str) -> str:
-    of = f" of {owner}" if owner else ""
-    return f"{key!r} is not a setting{of}" + did_you_mean(key, known)
+@click.command("settings")
+@click.argument("method")
+@preset
+@click.option("--all", "everything", is_flag=True, help="Also keys of other choices, and those for studies.")
+@speech
+@click.pass_obj
+def _settings(session: Session, /, method: str, preset: str, everything: bool) -> None:
+    """List what METHOD can be set to: keys for --set, values, what they take and what they are.
+
+    A key may be shortened to what tells it apart from the others: terms for visibility.terms.
+    """
+    from refgi.methods import find_method
+    from refgi.settings import flat, schema
+
+    known = find_method(method)
+    values = flat(known.preset(preset))
+    rows = _rows(known.settings, values, everything)
+    head = f"{method}: {known.summary}\npresets: {', '.join(['default', *known.presets])}"
+    hidden = "" if everything else "\n\n--all also shows the keys of other choices, and those for studies"
+    content = {"method": method, "preset": preset, "values": values, "schema": schema(known.settings),
+               "presets": {name: flat(settings) for name, settings in known.presets.items()}}
+    session.result(f"{head}\n\n{table([('key', 'value', 'takes', 'what it is'), *rows])}{hidden}", content)
 
 
-def _read(values: dict[str, Any], key: str, text: str, hint: Any) -> str | None:
-    from pydantic import ConfigDict, TypeAdapter, ValidationError
-
-    adapter = TypeAdapter(hint, config=ConfigDict(extra="forbid"))
-    first: ValidationError | None = None
-    for candidate in _candidates(text, hint):
-        try:
-            values[key] = adapter.validate_python(candidate)
-        except ValidationError as error:
-            first = first or error
-        else:
-            return None
-    assert first is not None
-    reasons = dict.fromkeys(_reason(error) for error in first.errors() if error["type"] != "none_required")
-    return f"{key}: {' or '.join(reasons)}, got {text!r}"
+command = _settings
 
 
-def _reason(error: Any) -> str:
-    of = f"{error['loc'][-1]}: " if error["type"] in ("missing", "unexpected_keyword_argument") else ""
-    text = error["msg"].removeprefix("Value error, ")
-    return f"{of}{text[:1].lower()}{text[1:]}"
+def _rows(kind: Any, values: Mapping[str, Any], everything: bool) -> list[tuple[str, ...]]:
+    from refgi.provenance import plain
+    from refgi.settings import leaves
 
-
-def _candidates(text: str, hint: Any) -> list[Any]:
-    """Return what a text may stand for: None, itself, JSON, a list with commas."""
-    if text.lower() in ABSENT and type(None) in get_args(hint):
-        return [None]
-    try:
-        read = json.loads(text, object_hook=_in_radians)
-    except ValueError:
-        return [text, [part.strip() for part in text.split(",") if part.strip()]]
-    return [read, text] if isinstance(read, list | dict) else [text, read]  # what was meant is tried, and blamed, first
-
-
-def _in_radians(entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an object with its angles in radians: `vfov_deg`, as in a scene file, is a camera's `vfov`."""
-    return {key.removesuffix("_deg"): math.radians(value) if key.endswith("_deg") and is_number(value) else value
-            for key, value in entry.items()}
-
-
-def _make(wanted: type, values: Mapping[str, Any]) -> tuple[Any, list[InputError]]:
-    try:
-        return wanted(**values), []
-    except InputError as error:
-        alone = {}
-        for key, value in values.items():
-            try:
-                wanted(**{key: value})
-            except InputError as other:
-                alone[str(other)] = other
-        return None, list(alone.values()) or [error]
+    rows: list[tuple[str, ...]] = []
+    for leaf in {leaf.key: leaf for leaf in leaves(kind)}.values():
+        if not everything and (leaf.is_for_study or leaf.key not in values):
+            continue
+        value = plain(values[leaf.key]) if leaf.key in values else "-"
+        shown = "none" if value is None else ",".join(value) if isinstance(value, list) else str(value)
+        rows.append((leaf.key, shown, leaf.expected, leaf.about))
+    return rows

@@ -13,8 +13,10 @@ from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
+from refgi.cluster.memory import extra_bytes
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
+from refgi.method import Method
 
 __all__ = [
     "AreaLights",
@@ -28,3 +30,7 @@ __all__ = [
     "shadow_maps",
     "val",
 ]
+
+METHOD = Method(
+    "val", "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights", val, ValSettings,
+    visibility=True, memory=extra_bytes)

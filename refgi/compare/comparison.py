@@ -13,7 +13,6 @@ import dataclasses
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, R
 from refgi.compare.provenance import environment
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
-from refgi.methods import METHODS, Method, find_method
+from refgi.methods import METHODS, find_method
 from refgi.provenance import estimate_record
 from refgi.scene import Scene, load_scene
 
@@ -101,24 +100,6 @@ def compare(
     return comparison
 
 
-def find_ledger(method: Method) -> Callable[[Frame, Any], Any] | None:
-    """Return the function that accounts for the power of the lights under a method.
-
-    Parameters
-    ----------
-    method : Method
-        A row of `METHODS`.
-
-    Returns
-    -------
-    callable or None
-        Takes frame and settings; its result has `rows` and `difference` as those of
-        `refgi.splat.sii.ledger.Ledger`. None for a method without one.
-    """
-    module, _, function = method.ledger.partition(":")
-    return getattr(import_module(module), function) if module else None
-
-
 class _Runner:
     """Runs methods on frames of one scene and view."""
 
@@ -144,7 +125,7 @@ class _Runner:
         self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool
     ) -> MethodResult:
         method = METHODS[name]
-        function, _ = method.load()
+        function = method.function
         self._warm_up(function, settings)
         irradiance, seconds, runs = self._timed(name, lambda frame: function(frame, settings))
         radiance, covered = self.frame.radiance(irradiance), self.frame.gbuffer.covered
@@ -152,7 +133,7 @@ class _Runner:
         against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered,
                               references[j].mean_variance) for j in judges}
         seen = flip(radiance, references[TRUTH].radiance, covered)
-        account = find_ledger(method) if accounts else None
+        account = method.ledger if accounts else None
         ledger = account(self.frame, settings) if account else None
         return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen, ledger)
 
@@ -194,7 +175,7 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
         expect(name in names, "method_settings", f"methods of this comparison ({', '.join(names)})", name)
     settings = {}
     for name in (*names, TRUTH):
-        wanted = METHODS[name].load()[1]
+        wanted = METHODS[name].settings
         value = truth if name == TRUTH else given.get(name)
         value = wanted() if value is None else value
         expect(isinstance(value, wanted), f"settings of {name}", wanted.__name__, type(value).__name__)

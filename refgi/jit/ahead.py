@@ -72,11 +72,16 @@ def missing(wanted: Iterable[Specialisation]) -> list[Specialisation]:
     list of Specialisation
         What calls would have to compile first.
     """
-    return [one for one in wanted if not _is_kept(*one.find())]
+    return [one for one in wanted if not _is_kept(one)]
 
 
-def _is_kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
-    kept: bool = kernel._cache.path(arguments).exists()
+def _is_kept(one: Specialisation) -> bool:
+    """Return whether a specialisation is on disk, or cannot be made from this list any more."""
+    try:
+        kernel, arguments = one.find()
+        kept: bool = kernel._cache.path(arguments).exists()
+    except (ImportError, AttributeError, TypeError, NameError):
+        return True
     return kept
 
 

@@ -100,7 +100,7 @@ def job_of(record: Mapping[str, Any], path: Path, scene: str | None = None) -> J
     with blame(file=str(path)):
         _warn_of_other_versions(record, path)
         try:
-            wanted = find_method(record["method"]).load()[1]
+            wanted = find_method(record["method"]).settings
             return Job(_same_scene(record["scene"], path, scene), record["method"],
                        _settings(wanted, record["settings"], path), dict(record["options"]), record["exposure"],
                        record.get("estimate", {}).get("passes"), _frame(record, path))

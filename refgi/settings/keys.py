@@ -62,22 +62,23 @@ def replaced(settings: S, values: Mapping[str, Any]) -> S:
     found: dict[str, Any] = {}
     for key, value in values.items():
         try:
-            found |= _shared(settings, key, value, values) or {find_key(settings, key).key: value}
+            shared = _shared(settings, key, value, values)
+            found |= {find_key(settings, key).key: value} if shared is None else shared
         except InputError as error:
             errors.append(error)
     made: S = _rebuilt(settings, _nested(found), "", errors)
-    raise_all(errors, type(settings))
+    raise_all(errors)
     return made
 
 
-def _shared(settings: Settings, key: str, value: Any, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a key sets that is meant for every part of a tree: the seed, and printed forms."""
+def _shared(settings: Settings, key: str, value: Any, values: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return what a key sets that is meant for every part of a tree, the seed or printed forms; None for other keys."""
     if key == PRINTED and not any(other.endswith(f".{PRINTED}") for other in values):
         return _printed_forms(settings, value)
     if key == SEED and not any(other.endswith(f".{SEED}") for other in values):
         return {leaf.key: value for leaf in leaves(type(settings)) if leaf.key.rpartition(".")[2] == SEED
-                and leaf.key in flat(settings)}
-    return {}
+                and leaf.key in flat(settings)} or None
+    return None
 
 
 def _printed_forms(settings: Settings, names: Any) -> dict[str, Any]:
@@ -93,23 +94,19 @@ def _printed_forms(settings: Settings, names: Any) -> dict[str, Any]:
     return {key: chosen for key, chosen in own if chosen or (there.get(key))}
 
 
-def raise_all(errors: Iterable[InputError], kind: type[Settings]) -> None:
+def raise_all(errors: Iterable[InputError]) -> None:
     """Raise one error for all, if there are any.
 
     Parameters
     ----------
     errors : iterable of InputError
         What is wrong with settings.
-    kind : type
-        Their class, whose keys the message lists.
     """
     errors = list(errors)
     if not errors:
         return
     keys = dict.fromkeys(error.key for error in errors if error.key)
-    known = ", ".join(dict.fromkeys(leaf.key for leaf in leaves(kind)))
-    raise InputError(f"{first_faults(list(dict.fromkeys(map(str, errors))), '; ')} (settings: {known})",
-                     key=", ".join(keys))
+    raise InputError(first_faults(list(dict.fromkeys(map(str, errors))), "; "), key=", ".join(keys))
 
 
 def find_key(settings: Settings, key: str) -> Leaf:

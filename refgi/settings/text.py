@@ -58,7 +58,7 @@ def from_text(base: S, pairs: Iterable[str]) -> S:
         if not errors:
             raise
         errors.append(error)
-    raise_all(errors, type(base))
+    raise_all(errors)
     return made
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
+from refgi.method import Method
 from refgi.pairs.shadow_rays import receivers
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene
@@ -215,3 +216,7 @@ def _fingerprint(task: Task, shape: tuple[int, ...]) -> bytes:
     for array in (*task.surfaces, *task.lights, *task.to, *seen_by, *film):
         digest.update(repr((array.shape, array.dtype.str)).encode() + np.ascontiguousarray(array).data)
     return digest.digest()
+
+
+METHOD = Method("truth", "one-bounce path tracing with a standard error for every pixel", truth, TruthSettings,
+                visibility=True, estimate=trace_truth)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.method import Method
 from refgi.pairs.shadow_rays import BATCH, receivers, shadowed_sum
 
 if TYPE_CHECKING:
@@ -76,3 +77,6 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     irradiance.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, lights, visibility=settings.visibility,
                                                            batch=settings.batch)
     return irradiance
+
+
+METHOD = Method("vpl", "the same pixel lights with ray-traced visibility", vpl, VplSettings, visibility=True)

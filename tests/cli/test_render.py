@@ -57,7 +57,7 @@ def plate(tmp_path):
 def test_shadows_are_exact_where_the_method_traces_rays(tmp_path, method, asked, used):
     assert run("cornell_box", *TINY, "--method", method, *asked, "--out", tmp_path / "a.exr").exit_code == 0
     scene = load_scene("cornell_box").with_camera(width=12, height=10)
-    settings = of(find_method(method).load()[1], lights=16)
+    settings = of(find_method(method).settings, lights=16)
     picture = render(scene, method, settings, shadows=used, rsm_resolution=16)
     channels = read_exr(tmp_path / "a.exr")[0]
     np.testing.assert_array_equal(np.stack([channels[c] for c in "RGB"]), picture.radiance)

@@ -81,7 +81,7 @@ def test_frames_have_exact_shadows_where_the_method_traces_rays(way, tmp_path, m
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["shadows"] == used
     scene = load_scene("cornell_box").with_camera(width=12, height=10)
-    settings = of(find_method(method).load()[1], lights=4)
+    settings = of(find_method(method).settings, lights=4)
     picture = render(scene, method, settings, shadows=used, rsm_resolution=16)
     radiance = read_exr(tmp_path / "out" / "way_00000.exr")[0]
     np.testing.assert_array_equal(np.stack([radiance[c] for c in "RGB"]), picture.radiance)

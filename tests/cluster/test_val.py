@@ -34,7 +34,8 @@ def ball():
 
 
 def test_it_is_in_the_table_of_methods(ball):
-    function, settings = find_method("val").load()
+    method = find_method("val")
+    function, settings = method.function, method.settings
     assert (function, settings) == (val, ValSettings)
     picture = render(ball.scene, "val", of(ValSettings, **SMALL), width=33, height=27, rsm_resolution=64)
     np.testing.assert_array_equal(picture.irradiance, val(ball, of(ValSettings, **SMALL)))

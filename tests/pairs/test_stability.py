@@ -206,7 +206,7 @@ def at_the_origin(method):
 
 
 def draw(scene, method, **how):
-    return render(scene, method, of(find_method(method).load()[1], **METHODS[method], **how), **SIZE)
+    return render(scene, method, of(find_method(method).settings, **METHODS[method], **how), **SIZE)
 
 
 def apart(picture, reference):

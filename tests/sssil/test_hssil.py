@@ -31,7 +31,8 @@ def changed(**changes):
 
 
 def test_it_is_in_the_table_of_methods(ball):
-    function, settings = find_method("hssil").load()
+    method = find_method("hssil")
+    function, settings = method.function, method.settings
     assert (function, settings) == (hssil, HssilSettings)
     picture = render(ball.scene, "hssil", SMALL, width=49, height=35, rsm_resolution=64)
     np.testing.assert_array_equal(picture.irradiance, hssil(ball, SMALL))

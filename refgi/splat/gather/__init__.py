@@ -4,6 +4,7 @@
 `interpolation` carries the light of a coarse grid of pixels to the others.
 """
 
+from refgi.method import Method
 from refgi.splat.gather.gather import PRESETS, DiscSettings, GatherSettings, Interpolation, gather
 
 __all__ = [
@@ -13,3 +14,6 @@ __all__ = [
     "Interpolation",
     "gather",
 ]
+
+METHOD = Method("gather", "Reflective Shadow Maps (2005): gathering around the projected point", gather, GatherSettings,
+                visibility=False, presets=PRESETS)

@@ -5,6 +5,7 @@
 until an error is met. Unlike in the paper subsplats keep what was evaluated for them.
 """
 
+from refgi.method import Method
 from refgi.splat.multires.multires import multires, shared_subsplats
 from refgi.splat.multires.settings import MultiresSettings
 
@@ -13,3 +14,7 @@ __all__ = [
     "multires",
     "shared_subsplats",
 ]
+
+METHOD = Method(
+    "multires", "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes",
+    multires, MultiresSettings, visibility=False)

@@ -7,6 +7,8 @@ Phong lobes conserve their flux above the surface, and the picture is that of th
 the pixels.
 """
 
+from refgi.method import Method
+from refgi.splat.sii.ledger import energy_ledger
 from refgi.splat.sii.settings import (
     PRESETS,
     AbsoluteCut,
@@ -36,3 +38,7 @@ __all__ = [
     "sii",
     "splat",
 ]
+
+METHOD = Method(
+    "sii", "Splatting Indirect Illumination (2006): pixel lights shine where they are significant", sii, SiiSettings,
+    visibility=False, ledger=energy_ledger, presets=PRESETS)

@@ -67,7 +67,7 @@ def made_of(scene, **changes):
 
 @pytest.mark.parametrize(("method", "changes"), CASES, ids=lambda value: str(value))
 def test_a_plane_that_nobody_sees_changes_no_pixel(method, changes, evidence):
-    settings = of(find_method(method).load()[1], **changes)
+    settings = of(find_method(method).settings, **changes)
     plain, off = render(room(), method, settings, **SIZE).irradiance.astype(float), {}
     for half in HALVES:
         with_plane = render(room(half), method, settings, **SIZE).irradiance
@@ -83,7 +83,7 @@ def test_the_plane_is_not_what_the_settings_refer_to():
     for method, changes, key in (("val", {**VAL, "interleaving": 4, "blur_extent": 0.05}, "blur_extent"),
                                  ("hssil", {"visibility": "bitmask"}, "thickness"),
                                  ("gather", {"samples": 64, "grid": 6, "reach": 0.1}, "reach")):
-        settings = of(find_method(method).load()[1], **changes)
+        settings = of(find_method(method).settings, **changes)
         smaller = dataclasses.replace(settings, **{key: getattr(settings, key) / 10})
         one, other = (render(room(), method, s, **SIZE).irradiance for s in (settings, smaller))
         assert np.abs(one - other).max() > 1e3 * CHANGE * one.mean()
@@ -135,7 +135,8 @@ def test_an_extent_asks_for_no_buffer_that_it_does_not_need(which, not_run):
 
 def test_screen_space_visibility_needs_no_rsm():
     frame = Frame(room(), **SIZE, shadows="exact")
-    run, kind = find_method("hssil").load()
+    method = find_method("hssil")
+    run, kind = method.function, method.settings
     with observe() as log:
         run(frame, kind(visibility="bitmask"))
     assert "rsm.reflective_shadow_map" not in {run.name for run in log.runs}

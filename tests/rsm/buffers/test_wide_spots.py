@@ -49,7 +49,7 @@ def test_a_perspective_map_of_a_half_space_is_refused_with_the_maps_that_suit(ro
 
 @pytest.mark.parametrize("method", ["sii", "val", "vpl", "hssil", "truth"])
 def test_ninety_degrees_light_as_the_angles_just_below(room, method):
-    settings_class = find_method(method).load()[1]
+    settings_class = find_method(method).settings
     settings = settings_class(lights=256) if method in ("sii", "val", "vpl") else settings_class()
     below, wide = (render(room.with_lights(dataclasses.replace(room.lights[0], inner_half_angle=0.5,
                                                                outer_half_angle=angle)), method, settings)

@@ -16,12 +16,13 @@ from benchmarks.harness import Row, ratio, seconds
 from refgi import Frame, load_scene
 from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import Scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
-from refgi.splat.multires.refinement.criteria import needs
+from refgi.splat.multires import ByError, ByGeometry
+from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import top_level
 from refgi.splat.multires.refinement.refine import refine
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 
 DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -63,7 +64,7 @@ def _frames(name: str, size: int, repeats: int, paper: int) -> Iterator[Row]:
     note = ", ".join(f"{part} {1e3 * taken:.1f} ms" for part, taken in parts.items())
     yield Row(f"{name}: mips and upsampling in a frame", (parts["mips"] + parts["upsampling"]) / whole, "share",
               "<= 0.3", note)
-    leaves = len(shared_subsplats(still.gbuffer, settings).level)
+    leaves = len(shared_subsplats(still.gbuffer, ByGeometry()).level)
     yield Row(f"{name}: refinement", 1e9 * parts["refinement"] / leaves, "ns a leaf", "<= 10", f"{leaves} leaves")
 
 
@@ -76,34 +77,40 @@ def _moved(scene: Scene, step: float) -> Scene:
 
 def _parts(frame: Frame, settings: MultiresSettings, repeats: int) -> dict[str, float]:
     """Seconds of each step of the method on buffers that rest."""
-    buffer, lights, area = frame.gbuffer, choose_lights(frame, settings), footprints(frame, settings)
+    subsplats, pairs = settings.subsplats, settings.effective_pairs
+    assert isinstance(subsplats, ByGeometry)
+    criteria = subsplats.criteria
+    buffer, lights = frame.gbuffer, choose_lights(frame, settings.lights)
+    area = footprints(frame, settings.lights, pairs)
     buffer.resolve("position", "normal", "depth", "covered")
-    top = top_level(buffer.height, buffer.width, settings.coarsest)
-    need = needs(buffer, settings, top)
-    leaves = refine(need, buffer.covered, settings)
-    points = at_subsplats(buffer, leaves)
-    values = evaluate(*points, lights, settings, area)
-    return {"mips": seconds(lambda: needs(buffer, settings, top), repeats),
-            "refinement": seconds(lambda: refine(need, buffer.covered, settings), repeats),
-            "fetching": seconds(lambda: at_subsplats(buffer, leaves), repeats),
-            "lighting": seconds(lambda: evaluate(*points, lights, settings, area), repeats),
+    top = top_level(buffer.height, buffer.width, subsplats.coarsest)
+    discontinuous = discontinuities(buffer, criteria, top)
+    leaves = refine(discontinuous, buffer.covered)
+    points = representative_points(buffer, leaves)
+    values = evaluate(*points, lights, pairs, area)
+    return {"mips": seconds(lambda: discontinuities(buffer, criteria, top), repeats),
+            "refinement": seconds(lambda: refine(discontinuous, buffer.covered), repeats),
+            "fetching": seconds(lambda: representative_points(buffer, leaves), repeats),
+            "lighting": seconds(lambda: evaluate(*points, lights, pairs, area), repeats),
             "upsampling": seconds(lambda: upsample(values, leaves, buffer.covered), repeats)}
 
 
 def _errors(name: str, frame: Frame, settings: MultiresSettings, repeats: int) -> Iterator[Row]:
     """Speed over the full sum at the error that thresholds or a target lead to."""
-    lights, area = choose_lights(frame, settings), footprints(frame, settings)
+    pairs = settings.effective_pairs
+    lights, area = choose_lights(frame, settings.lights), footprints(frame, settings.lights, pairs)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
 
     def everywhere() -> Any:
-        return irradiance(receivers, choose_lights(frame, settings), settings, footprints(frame, settings))
+        return irradiance(receivers, choose_lights(frame, settings.lights), pairs,
+                          footprints(frame, settings.lights, pairs))
 
-    full = irradiance(receivers, lights, settings, area).astype(np.float64)
+    full = irradiance(receivers, lights, pairs, area).astype(np.float64)
     for threshold in (0.1, 0.25, 0.5, 1.4):
-        how = dataclasses.replace(settings, normal_threshold=threshold)
+        how = replaced(settings, {"normal.threshold": threshold})
         yield _against(f"{name}: normal threshold {threshold}", "", frame, how, everywhere, full, repeats)
     for target in TARGETS:
-        how = dataclasses.replace(settings, target_error=target)
+        how = replaced(settings, {"subsplats": ByError(target)})
         aim = ">= 8" if target == TARGETS[-1] else ""
         yield _against(f"{name}: target {target:.0%}", aim, frame, how, everywhere, full, min(3, repeats))
 
@@ -125,9 +132,10 @@ def _sweep(size: int, repeats: int) -> Iterator[Row]:
     for count in (64, 256, 1024):
         for threshold in (0.25, 1.4):
             settings = of(MultiresSettings, lights=count, clamp="none", normal_threshold=threshold)
-            leaves = shared_subsplats(frame.gbuffer, settings)
-            points, lights = at_subsplats(frame.gbuffer, leaves), choose_lights(frame, settings)
-            taken = seconds(lambda p=points, x=lights, s=settings: evaluate(*p, x, s), repeats)
+            assert isinstance(settings.subsplats, ByGeometry)
+            leaves = shared_subsplats(frame.gbuffer, settings.subsplats)
+            points, lights = representative_points(frame.gbuffer, leaves), choose_lights(frame, settings.lights)
+            taken = seconds(lambda p=points, x=lights, s=settings.pairs: evaluate(*p, x, s), repeats)
             pairs = points[0].shape[1] * lights.position.shape[1]
             yield Row(f"{count} lights, normal threshold {threshold}", 1e9 * taken / pairs, "ns a pair", "",
                       f"{points[0].shape[1]} subsplats, {1e3 * taken:.2f} ms")

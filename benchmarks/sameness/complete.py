@@ -1,7 +1,7 @@
 """Whether the tables have every setting of every method, and of each every name."""
 
 from benchmarks.sameness.rows import Table
-from benchmarks.sameness.settings import choice_of, key_of, names_of, renamed
+from benchmarks.sameness.settings import SETS, TRANSLATIONS, choice_of, key_of, names_of, translated
 from benchmarks.sameness.tables import TABLES
 
 
@@ -15,12 +15,12 @@ def _gaps_of(method: str, table: Table) -> list[str]:
     tried: dict[str, set[object]] = {}
     for row in table.rows:
         for value in row.values:
-            several = row.field in ("as_published", "criteria")
-            name, value = (row.field, value) if several else renamed(method, row.field, value)
-            key = key_of(method, name)
-            tried.setdefault(key, set()).update(value.split("+") if several else [value])
-            if chosen := choice_of(method, key):
-                tried.setdefault(chosen[0], set()).add(chosen[1])
+            companions = row.companions if method in TRANSLATIONS else {}
+            for name, one in translated(method, companions | {row.field: value}).items():
+                key = key_of(method, name)
+                tried.setdefault(key, set()).update(one.split("+") if name in SETS else [one])
+                if chosen := choice_of(method, key):
+                    tried.setdefault(chosen[0], set()).add(chosen[1])
     excluded = {key_of(method, name) for name in table.excluded}
     found = [f"{method}: no case has {name}" for name in wanted if name not in tried and name not in excluded]
     found += [f"{method}: {name} is no setting" for name in (*tried, *excluded) if name not in wanted]

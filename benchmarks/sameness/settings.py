@@ -1,8 +1,9 @@
 """Where the names of a case become settings: names of a ledger stay as they are when settings are renamed."""
 
-import dataclasses
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from collections.abc import Callable
+from typing import Any, Literal, get_args, get_origin
 
+from benchmarks.sameness.multires_keys import multires_keys
 from refgi.methods import METHODS
 from refgi.scene import Camera
 from refgi.settings import Settings, choices_of, flat, leaves, replaced
@@ -20,19 +21,25 @@ RENAMED: dict[str, dict[str, str]] = {
 }
 # single values that are another key's value today
 RENAMED_CASES: dict[tuple[str, str, Any], tuple[str, Any]] = {("gather", "grid", 0): ("interpolation", "none")}
-RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {}
+RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {("truth", "emitters"): {"seen": "visible"}}
+# of methods whose names became choices: what names together are today
+TRANSLATIONS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {"multires": multires_keys}
 
 
 def settings_of(method: str, **named: Any) -> Any:
     """Return the settings of a method, of which some differ from the default; "temporal" is the temporal filter."""
+    named = translated(method, named)
     for name in named.keys() & set(SETS):
         named[name] = frozenset(filter(None, named[name].split("+")))
     if "views" in named:
         named["views"] = (VIEWS[named["views"]],)
-    kind = _settings_class(method)
-    if not issubclass(kind, Settings):
-        return kind(**named)
-    return replaced(kind(), dict(renamed(method, name, value) for name, value in named.items()))
+    return replaced(_settings_class(method)(), named)
+
+
+def translated(method: str, named: dict[str, Any]) -> dict[str, Any]:
+    """Return what names and values of the ledger are today."""
+    named = TRANSLATIONS[method](named) if method in TRANSLATIONS else named
+    return dict(renamed(method, name, value) for name, value in named.items())
 
 
 def renamed(method: str, name: str, value: Any) -> tuple[str, Any]:
@@ -46,16 +53,15 @@ def renamed(method: str, name: str, value: Any) -> tuple[str, Any]:
 
 def key_of(method: str, name: str) -> str:
     """Return the whole key that a name means."""
-    kind = _settings_class(method)
-    if not issubclass(kind, Settings) or name in (PRINTED, SEED):
+    if name in (PRINTED, SEED):
         return name
-    return find_key(kind(), RENAMED.get(method, {}).get(name, name)).key
+    return find_key(_settings_class(method)(), RENAMED.get(method, {}).get(name, name)).key
 
 
 def choice_of(method: str, key: str) -> tuple[str, str] | None:
     """Return the choice that has a setting, and its name; None for a setting that is always there."""
     kind = _settings_class(method)
-    found = [leaf for leaf in leaves(kind) if leaf.key == key] if issubclass(kind, Settings) else []
+    found = [leaf for leaf in leaves(kind) if leaf.key == key]
     above = [leaf for leaf in leaves(kind) if leaf.key == key.rpartition(".")[0]] if len(found) == 1 else []
     return (above[0].key, found[0].owner.name()) if above else None
 
@@ -63,8 +69,6 @@ def choice_of(method: str, key: str) -> tuple[str, str] | None:
 def names_of(method: str) -> dict[str, set[Any]]:
     """Return every setting of a method, each with the values that a ledger must have beside the default."""
     kind = _settings_class(method)
-    if not issubclass(kind, Settings):
-        return _names_of_fields(kind)
     wanted: dict[str, set[Any]] = {}
     defaults = flat(kind())
     for leaf in leaves(kind):
@@ -82,17 +86,5 @@ def names_of(method: str) -> dict[str, set[Any]]:
     return wanted
 
 
-def _names_of_fields(kind: Any) -> dict[str, set[Any]]:
-    types = get_type_hints(kind)
-    wanted: dict[str, set[Any]] = {}
-    for field in dataclasses.fields(kind):
-        names = get_args(types[field.name]) if get_origin(types[field.name]) is Literal else ()
-        wanted[field.name] = {name for name in names if name != field.default}
-        if types[field.name] is bool:
-            wanted[field.name] = {not field.default}
-    wanted.get("as_published", set()).update(getattr(kind, "SWITCHES", ()))
-    return wanted
-
-
-def _settings_class(method: str) -> Any:
+def _settings_class(method: str) -> type[Settings]:
     return TemporalSettings if method == "temporal" else METHODS[method].settings

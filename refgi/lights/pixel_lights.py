@@ -23,7 +23,7 @@ from refgi.lights.footprints import cell_sums, cells_of_grid, cells_of_nearest, 
 from refgi.lights.importance import importance as importance_of
 from refgi.lights.warp import Warp, texel_of, warp_stacked
 from refgi.pairs.pixel_lights import PixelLights
-from refgi.rsm.buffers.gbuffer import taken
+from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.sampling import grid, halton
 from refgi.stages import skip, stage
@@ -193,7 +193,7 @@ def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array) -> PixelLigh
     """Return the texels as lights with T/N, or T/N w, times their flux."""
     (flux,) = rsm.at(texel, "flux")
     scale = np.asarray(weight).astype(flux.dtype)
-    lobe = None if rsm.lobe_flux is None else taken(rsm.lobe_flux, texel) * scale
+    lobe = None if rsm.lobe_flux is None else values_at(rsm.lobe_flux, texel) * scale
     return _lights(rsm, texel, flux * scale, lobe)
 
 
@@ -215,8 +215,8 @@ def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None) -> PixelLig
         normal,
         flux[:, has_flux],
         None if lobe is None else lobe[:, has_flux],
-        None if rsm.lobe_axis is None else taken(rsm.lobe_axis, chosen),
-        None if rsm.lobe_exponent is None else taken(rsm.lobe_exponent, chosen),
+        None if rsm.lobe_axis is None else values_at(rsm.lobe_axis, chosen),
+        None if rsm.lobe_exponent is None else values_at(rsm.lobe_exponent, chosen),
         len(texel),
         chosen.astype(np.int32),
     )

@@ -22,8 +22,8 @@ def grid(shape, level):
 def span(channel, covered, level, i, j, rim=0):
     """Least and largest value of a cell over the pixels that show a surface."""
     cell = pixels_of(covered.shape, level, i, j, rim)
-    seen = channel[cell][covered[cell]]
-    return (min(seen), max(seen)) if len(seen) else (math.inf, -math.inf)
+    values = channel[cell][covered[cell]]
+    return (min(values), max(values)) if len(values) else (math.inf, -math.inf)
 
 
 def neighbours(shape, i, j):
@@ -59,7 +59,7 @@ def curvature(normal, position, covered, i, j, rate=False):
     return max(pairs)
 
 
-def needs(shape, top, finest, test):
+def discontinuities(shape, top, finest, test):
     """For each level, where `test(level, i, j)` says that a cell must be refined."""
     found = []
     for level in range(top + 1):

@@ -59,7 +59,7 @@ def tent(leaves, covered, top, *, filter_all=False, corner_rule=True):
 
 
 def demo(leaves, covered, top, *, filter_all=False):
-    """As the authors' demo: neighbours are coarse texels where there are such, else texels lit at this level."""
+    """As the authors' demo: neighbours are coarse texels where there are such, else texels evaluated at this level."""
     above = {place[1:]: value for place, value in leaves.items() if place[0] == top}
     for level in range(top - 1, -1, -1):
         height, width = shape(covered, level)

@@ -20,6 +20,7 @@ from refgi.scene import PointLight, load_scene
 from refgi.settings import of
 from refgi.splat import GatherSettings, MultiresSettings, SiiSettings, gather, multires, sii
 from refgi.splat.gather.gather_sum import disc_loss
+from refgi.splat.multires import ByError
 from refgi.stages import observe
 
 # points of 100, besides the rounding of the words: without a clamp the sum has a standard deviation of 0.8 to 2.2 of
@@ -74,8 +75,8 @@ def test_each_method_tells_of_its_clamp():
     at = frame("cornell_box")
     for method, settings, name in ((multires, of(MultiresSettings, lights=LIGHTS), "multires"),
                                    (multires, of(MultiresSettings, lights=LIGHTS, supersampled=True), "multires"),
-                                   (multires, of(MultiresSettings, lights=LIGHTS, per_light="light"), "multires"),
-                                   (multires, of(MultiresSettings, lights=LIGHTS, target_error=0.3), "multires"),
+                                   (multires, of(MultiresSettings, lights=LIGHTS, subsplats="irradiance"), "multires"),
+                                   (multires, of(MultiresSettings, lights=LIGHTS, subsplats=ByError(0.3)), "multires"),
                                    (val, of(ValSettings, lights=LIGHTS, clamp="disc", map_resolution=16), "val")):
         share = 100 * (1 - full(at, settings) / full(at, settings, PairSettings()))
         _, said = told(method, at, settings)

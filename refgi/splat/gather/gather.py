@@ -124,7 +124,7 @@ def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
     first = np.zeros_like(buffer.covered)
     first[np.ix_(*coarse)] = True
     coarse_light = gather_irradiance(receivers._replace(covered=buffer.covered & first), frame.rsms, disc)
-    limits = SimilarityLimits(coarsely.least_cosine, coarsely.reach * frame.seen_extent.diagonal)
+    limits = SimilarityLimits(coarsely.least_cosine, coarsely.reach * frame.visible_extent.diagonal)
     result, interpolated = interpolate(receivers, coarse_light, coarse, limits)
     rest = receivers._replace(covered=buffer.covered & ~interpolated)
     total = result + gather_irradiance(rest, frame.rsms, disc)

@@ -11,12 +11,12 @@ from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
 from refgi.splat.multires.error_target.error_driven import error_driven
 from refgi.splat.multires.light_lists.per_light import per_light
-from refgi.splat.multires.refinement.criteria import needs
+from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.refinement.refine import refine
-from refgi.splat.multires.settings import MultiresSettings
+from refgi.splat.multires.settings import ByError, ByGeometry, ByIrradiance, MultiresSettings
 from refgi.splat.multires.subsplats.detail import surface_detail
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate, evaluate_visible
+from refgi.splat.multires.subsplats.evaluate import evaluate, evaluate_visible, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 
 if TYPE_CHECKING:
@@ -28,14 +28,14 @@ Array = npt.NDArray[Any]
 
 
 def multires(frame: "Frame", settings: MultiresSettings) -> Array:
-    """Light every pixel by pixel lights that are evaluated at subsplats.
+    """Compute indirect irradiance from pixel lights that are evaluated at subsplats.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        Scene, camera and buffers.
     settings : MultiresSettings
-        Which lights, where subsplats are refined and how they become a picture.
+        Lights, refinement of subsplats and upsampling.
 
     Returns
     -------
@@ -45,49 +45,52 @@ def multires(frame: "Frame", settings: MultiresSettings) -> Array:
     lights = choose_lights(frame, settings.lights)  # Sec. 3.1
     footprint = _footprints(frame, lights, settings)
     if not settings.supersampled:
-        return _indirect(frame, frame.gbuffer, lights, footprint, settings)
+        return _irradiance(frame, frame.gbuffer, lights, footprint, settings)
     double = _doubled(frame)  # Sec. 4: rendered at 2048^2 for 1024^2
-    return _halved(_indirect(frame, double, lights, footprint, settings), double.covered, frame.gbuffer.covered)
+    return _halved(_irradiance(frame, double, lights, footprint, settings), double.covered, frame.gbuffer.covered)
 
 
-def _indirect(
+def _irradiance(
     frame: "Frame", buffer: "GBuffer", lights: "PixelLights", footprint: Array | None, settings: MultiresSettings
 ) -> Array:
-    """Light the pixels of one buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
-    _resolve(buffer, settings)
-    receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
-    warn_of_clamp(receivers, lights, settings.effective_pairs, footprint, "multires")
-    if settings.target_error is not None:
-        light = error_driven(buffer, lights, settings, footprint).irradiance
-    elif settings.per_light == "light":
-        light = per_light(buffer, lights, settings, footprint, None)  # Sec. 3.3.1
-    elif settings.per_light == "shared_then_light":
-        start = shared_subsplats(buffer, settings)
-        light = per_light(buffer, lights, settings, footprint, start)  # Sec. 6
+    """Return the irradiance at the pixels of one G-buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
+    subsplats, pairs = settings.subsplats, settings.effective_pairs
+    filter_all = "ams_filter_all" in settings.as_published
+    _resolve_channels(buffer, subsplats)
+    warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), lights, pairs, footprint, "multires")
+    if isinstance(subsplats, ByError):
+        irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed).irradiance
+    elif isinstance(subsplats, ByIrradiance):
+        start = None if subsplats.start is None else shared_subsplats(buffer, subsplats.start)  # Sec. 6
+        irradiance = per_light(buffer, lights, subsplats, pairs, footprint, start, filter_all=filter_all)  # Sec. 3.3.1
     else:
-        subsplats = shared_subsplats(buffer, settings)  # Sec. 3.2, 3.3
-        light = _upsampled(frame, buffer, subsplats, lights, footprint, settings)  # Sec. 3.4, 3.5
+        shared = shared_subsplats(buffer, subsplats)  # Sec. 3.2, 3.3
+        values = _evaluated(frame, buffer, shared, lights, footprint, settings)  # Sec. 3.4
+        irradiance = upsample(values, shared, buffer.covered, subsplats.upsampling, filter_all=filter_all)  # Sec. 3.5
+        if "ams_rho_in_splat" in settings.as_published:  # the picture's albedo is multiplied in again later
+            albedo = buffer.albedo
+            irradiance = np.divide(irradiance, albedo, out=np.zeros_like(irradiance), where=albedo > 0)
     if settings.detail == 0:
-        return light
+        return irradiance
     eye = frame.scene.camera.eye
-    return surface_detail(light, buffer.position, buffer.normal, buffer.covered, eye, settings.detail)  # Eq. (3)
+    return surface_detail(irradiance, buffer.position, buffer.normal, buffer.covered, eye, settings.detail)  # Eq. (3)
 
 
-def _resolve(buffer: "GBuffer", settings: MultiresSettings) -> None:
-    """Compute in one pass what the steps will ask for one by one; depth only where a criterion looks at it."""
-    by_geometry = settings.target_error is None and settings.per_light != "light"
-    looks_at_depth = by_geometry and not settings.criteria.isdisjoint({"depth", "derivative"})
-    buffer.resolve("position", "normal", *(("depth",) if looks_at_depth else ()))
+def _resolve_channels(buffer: "GBuffer", subsplats: ByGeometry | ByIrradiance | ByError) -> None:
+    """Compute in one pass the channels that the steps need; depth only where a criterion uses it."""
+    criteria = None if isinstance(subsplats, ByError) else subsplats.criteria
+    uses_depth = criteria is not None and (criteria.depth, criteria.derivative) != (None, None)
+    buffer.resolve("position", "normal", *(("depth",) if uses_depth else ()))
 
 
-def shared_subsplats(buffer: "GBuffer", settings: MultiresSettings) -> Subsplats:
+def shared_subsplats(buffer: "GBuffer", settings: ByGeometry) -> Subsplats:
     """Refine by geometry, once for all lights (Sec. 3.2 and 3.3).
 
     Parameters
     ----------
     buffer : GBuffer
-        What the camera sees.
-    settings : MultiresSettings
+        The camera's G-buffer.
+    settings : ByGeometry
         Criteria, thresholds, coarsest and finest level.
 
     Returns
@@ -95,54 +98,53 @@ def shared_subsplats(buffer: "GBuffer", settings: MultiresSettings) -> Subsplats
     Subsplats
         The leaves.
     """
-    top = top_level(buffer.height, buffer.width, settings.coarsest)
-    return refine(needs(buffer, settings, top), buffer.covered, settings)
+    top, criteria = top_level(buffer.height, buffer.width, settings.coarsest), settings.criteria
+    discontinuous = discontinuities(buffer, criteria, top, settings.finest)
+    return refine(discontinuous, buffer.covered, criteria.diagonal, criteria.traversal)
 
 
-def _upsampled(
-    frame: "Frame", buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights", footprint: Array | None,
+def _evaluated(
+    frame: "Frame", buffer: "GBuffer", shared: Subsplats, lights: "PixelLights", footprint: Array | None,
     settings: MultiresSettings,
 ) -> Array:
-    if settings.visibility == "rays":
-        values = evaluate_visible(frame.tracer, frame.scene.geometry, buffer, subsplats, lights)
+    """Return the irradiance at the subsplats, (3, n), W/m^2; times their albedo if that is asked for as published."""
+    subsplats = settings.subsplats
+    assert isinstance(subsplats, ByGeometry)
+    if subsplats.visibility is not None:
+        values = evaluate_visible(frame.tracer, frame.scene.geometry, buffer, shared, lights)
     else:
-        points = at_subsplats(buffer, subsplats, settings.representative)
+        points = representative_points(buffer, shared, subsplats.representative)
         values = evaluate(*points, lights, settings.effective_pairs, footprint)
-    rho_in_splat = "ams_rho_in_splat" in settings.as_published
-    if rho_in_splat:
-        values = values * buffer.albedo.reshape(3, -1)[:, subsplats.pixel]
-    light = upsample(values, subsplats, buffer.covered, settings.upsampling,
-                     filter_all="ams_filter_all" in settings.as_published)
-    if rho_in_splat:  # the picture's albedo is multiplied in again later
-        light = np.divide(light, buffer.albedo, out=np.zeros_like(light), where=buffer.albedo > 0)
-    return light
+    if "ams_rho_in_splat" in settings.as_published:
+        values = values * buffer.albedo.reshape(3, -1)[:, shared.pixel]
+    return values
 
 
 def _footprints(frame: "Frame", lights: "PixelLights", settings: MultiresSettings) -> Array | None:
-    """Return the area of each light: exact, or as the authors' demo has it."""
+    """Return the footprint of each light, m^2: exact, or as the authors' demo has it."""
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings.lights, settings.effective_pairs)
     return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings.lights))
 
 
 def _doubled(frame: "Frame") -> "GBuffer":
-    """Return what the camera sees at twice the width and height."""
+    """Return the camera's G-buffer at twice the width and height."""
     from refgi.rsm import gbuffer
 
     scene = frame.scene
     return gbuffer(scene.geometry, frame.materials, scene.camera, 2 * frame.width, 2 * frame.height, frame.dtype)
 
 
-def _halved(light: Array, fine: Array, covered: Array) -> Array:
-    """Return means over those of four pixels that show a surface, at pixels that do."""
+def _halved(irradiance: Array, fine: Array, covered: Array) -> Array:
+    """Return means over those of four finer pixels that show a surface, at pixels that do."""
     height, width = covered.shape
     four = (3, height, 2, width, 2)
-    shown = fine.reshape(four[1:]).sum(axis=(1, 3))
-    mean = light.reshape(four).sum(axis=(2, 4)) / np.maximum(shown, 1).astype(light.dtype)
-    halved: Array = np.where(covered, mean, light.dtype.type(0))
-    for i, j in zip(*np.nonzero(covered & (shown == 0)), strict=True):  # slivers: as the pixels around them
-        around = np.s_[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
-        lit = shown[around] > 0
-        if lit.any():
-            halved[:, i, j] = mean[:, *around][:, lit].mean(axis=1)
+    covered_count = fine.reshape(four[1:]).sum(axis=(1, 3))
+    mean = irradiance.reshape(four).sum(axis=(2, 4)) / np.maximum(covered_count, 1).astype(irradiance.dtype)
+    halved: Array = np.where(covered, mean, irradiance.dtype.type(0))
+    for i, j in zip(*np.nonzero(covered & (covered_count == 0)), strict=True):  # slivers: as the pixels around them
+        window = np.s_[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
+        has_surface = covered_count[window] > 0
+        if has_surface.any():
+            halved[:, i, j] = mean[:, *window][:, has_surface].mean(axis=1)
     return halved

@@ -1,4 +1,7 @@
-"""What `multires` can be set to (Nichols and Wyman 2009)."""
+"""Settings of `multires`: lights, pairs and how subsplats are refined (Nichols and Wyman 2009).
+
+The defaults are the paper's, the authors' demo's where the paper is silent; `PRESETS` has the printed values.
+"""
 
 import dataclasses
 import math
@@ -7,122 +10,214 @@ from typing import ClassVar, Literal
 from refgi.errors import expect
 from refgi.lights.settings import LightSettings, MapLights, expect_footprints
 from refgi.pairs.settings import AutoClamp, DiscClamp, PairSettings, SphereClamp
-from refgi.scene.values import BRIGHTEST, is_count
-from refgi.settings import Settings, setting
+from refgi.scene.values import BRIGHTEST
+from refgi.settings import Settings, of, setting
 
-Refinement = Literal["single_pass", "list"]
-PerLight = Literal["shared", "light", "shared_then_light"]
-Threshold = Literal["absolute", "relative", "brightest"]
 Diagonal = Literal["off", "corner", "literal", "full8"]
+Traversal = Literal["single_pass", "list"]
+Representative = Literal["pixel", "mean"]
 Upsampling = Literal["tent", "demo", "nearest", "naive_bilinear"]
 
 LEAST_TARGET = 1e-6  # about what rounding to float32 leaves of the full sum
-THRESHOLDS = ("depth_threshold", "derivative_threshold", "normal_threshold", "curvature_threshold", "light_threshold")
-# settings and printed forms that a mode would not heed: pairs with rays are those of `vpl`, an error sets its own cells
-UNHEEDED = {
-    "visibility": (("representative", "per_light", "target_error"), frozenset()),
-    "target_error": (("finest", "criteria", *THRESHOLDS, "normal_components", "curvature", "rim", "diagonal",
-                      "refinement", "per_light", "threshold_form", "representative", "upsampling"),
-                     {"ams_rho_in_splat", "ams_filter_all"}),
-    "per_light": ((), {"ams_rho_in_splat"}),
-}
+MOST_CELLS = 65536  # along the longer side
+FINEST = 16  # level
+
+
+def _threshold(default: float, about: str, *, unit: str = "", study: bool = False) -> float:
+    value: float = setting(default, about, least=0.0, most=math.inf, unit=unit, study=study)
+    return value
+
+
+def _expect_threshold(threshold: float) -> None:
+    expect(threshold <= BRIGHTEST or threshold == math.inf, "threshold", f"0 to {BRIGHTEST:g}, or inf", threshold)
+
+
+@dataclasses.dataclass(frozen=True)
+class Criterion(Settings):
+    """A mipmap whose cells are discontinuous beyond a threshold."""
+
+    threshold: float = _threshold(0.1, "cells beyond it are refined")
+
+    def check(self) -> None:
+        """Check that the threshold is a number in float32 as well."""
+        _expect_threshold(self.threshold)
+
+
+@dataclasses.dataclass(frozen=True)
+class DepthRange(Criterion):
+    """Min-max mipmap of depth (Sec. 3.2.1)."""
+
+    NAME = "range"
+
+    threshold: float = _threshold(0.1, "max - min of the depth over min")
+
+
+@dataclasses.dataclass(frozen=True)
+class DepthSlope(Criterion):
+    """Max mipmap of the depth derivative (Sec. 3.2.1)."""
+
+    NAME = "slope"
+
+    threshold: float = _threshold(0.05, "change of the depth a pixel over the depth", unit="1/pixel", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class NormalRange(Criterion):
+    """Min-max mipmap of the normals' components (Sec. 3.2.2)."""
+
+    NAME = "range"
+
+    threshold: float = _threshold(0.25, "max - min of a component of the normals, up to 2")
+    components: Literal["xyz", "xy"] = setting("xyz", "components that count; the authors' demo: x and y", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Chord(Criterion):
+    """Max mipmap of Eq. 1: the chord between neighbouring normals."""
+
+    threshold: float = _threshold(0.1, "chord between neighbouring normals, up to 2", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Rate(Criterion):
+    """Max mipmap of Eq. 1 over the distance of the two points: a curvature."""
+
+    threshold: float = _threshold(0.1, "chord between neighbouring normals over their distance", unit="1/m", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Criteria(Settings):
+    """What makes a cell discontinuous, for all lights (Sec. 3.2 and 5.2)."""
+
+    NAME = "geometry"
+
+    depth: DepthRange | None = setting(DepthRange(), "min-max mipmap of depth", study=True)
+    derivative: DepthSlope | None = setting(None, "max mipmap of the depth derivative", study=True)
+    normal: NormalRange | None = setting(NormalRange(), "min-max mipmap of normals", study=True)
+    curvature: Chord | Rate | None = setting(None, "max mipmap of Eq. 1, or of it over the distance", study=True)
+    rim: Literal[0, 1] = setting(0, "pixels around a cell whose depths and normals count in it (Fig. 15 top)")
+    diagonal: Diagonal = setting("corner", "neighbours across a corner that count (Fig. 15 bottom)", study=True)
+    traversal: Traversal = setting("single_pass", "depth first, or pass by pass as published: same list", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Rays(Settings):
+    """Visibility by a shadow ray from each subsplat to each light."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ByGeometry(Settings):
+    """Subsplats for all lights, refined where depth or normals change (Sec. 3.2 and 3.3)."""
+
+    NAME = "geometry"
+
+    coarsest: int = setting(16, "cells of the coarsest level along the longer side", least=1, most=MOST_CELLS)
+    finest: int = setting(0, "finest level: cells of 2^finest pixels", least=0, most=FINEST, study=True)
+    criteria: Criteria = setting(Criteria(), "discontinuities")
+    representative: Representative = setting("pixel", "where a subsplat is evaluated: one pixel, or the mean surface",
+                                             study=True)
+    visibility: Rays | None = setting(None, "shadow rays from subsplats to lights, the pairs of vpl")
+    upsampling: Upsampling = setting("tent", "filter from subsplats to pixels (Sec. 3.5, Fig. 7)", study=True)
+
+    def check(self) -> None:
+        """Check that shadow rays start on a triangle."""
+        expect(self.visibility is None or self.representative == "pixel", "representative",
+               "'pixel' with visibility 'rays'", self.representative)
+
+
+@dataclasses.dataclass(frozen=True)
+class ByIrradiance(Settings):
+    """Subsplats of each light's own, refined where its irradiance changes (Sec. 3.3.1)."""
+
+    NAME = "irradiance"
+
+    coarsest: int = setting(16, "cells of the coarsest level along the longer side", least=1, most=MOST_CELLS)
+    finest: int = setting(0, "finest level: cells of 2^finest pixels", least=0, most=FINEST, study=True)
+    threshold: float = _threshold(0.1, "T: max - min over a cell's quadrants, see form")
+    form: Literal["relative", "absolute", "brightest"] = setting(
+        "relative", "T over this light's largest irradiance; W/m^2; or over the largest sum of all lights / N",
+        study=True)
+    criteria: Criteria | None = setting(None, "begin with the list that geometry refines (Sec. 6)", study=True)
+    representative: Representative = setting("pixel", "where a subsplat is evaluated: one pixel, or the mean surface",
+                                             study=True)
+    upsampling: Upsampling = setting("tent", "filter from subsplats to pixels (Sec. 3.5, Fig. 7)", study=True)
+
+    def check(self) -> None:
+        """Check that the threshold is a number in float32 as well."""
+        _expect_threshold(self.threshold)
+
+    @property
+    def start(self) -> ByGeometry | None:
+        """The shared list that each light goes on to refine, if any."""
+        return None if self.criteria is None else ByGeometry(self.coarsest, self.finest, self.criteria)
+
+
+@dataclasses.dataclass(frozen=True)
+class ByError(Settings):
+    """Subsplats refined until the picture is as near to the full sum as asked for; beyond the paper."""
+
+    NAME = "error"
+    PRINCIPAL = "target"
+
+    target: float = setting(0.05, "RMSE to the full sum over its mean", least=LEAST_TARGET)
+    coarsest: int = setting(16, "cells of the coarsest level along the longer side", least=1, most=MOST_CELLS)
 
 
 @dataclasses.dataclass(frozen=True)
 class MultiresSettings(Settings):
-    """What `multires` can be set to; the defaults are the paper's, the authors' demo's where the paper is silent.
+    """Settings of adaptive multiresolution splatting.
 
-    `clamp` "auto" is the form factor of a disc: the paper clamps as well (Sec. 5), at a value that it does not give. It
-    is none for lights that have no footprints (`source` "walk", `openness_flux` "roulette") and with `visibility`.
-
-    Subsplats: from `coarsest` cells along the longer side down to cells of 2^`finest` pixels. A cell is refined where
-    one of the `criteria` says so: "depth", (max - min) / min over `depth_threshold`; "derivative", its change a pixel
-    over `derivative_threshold` of the depth; "normal", the range of a component (`normal_components`) over
-    `normal_threshold`; "curvature", the chord between neighbouring normals (or "rate": over their distance, 1/m) over
-    `curvature_threshold`. Ranges take in `rim` pixels around a cell, `diagonal` says what neighbours across a corner
-    do, `refinement` whether cells are classified in a single pass or in the published list.
-
-    `per_light`: refine by the geometry once for all lights ("shared"), for each light by its own irradiance
-    ("light"), or so from the shared list on. `light_threshold` is then "absolute" (W/m^2), "relative" to what this
-    light was seen to reach, or a share of the "brightest" sum over all lights, over N. A subsplat is lit at its
-    `representative` pixel, or at the mean over its surface, with `visibility` by shadow rays or without. `upsampling`
-    makes a picture of the subsplats; `detail` is a of Eq. 3.
-
-    `target_error` refines until the picture is that near to the full sum, as a share of its mean (RMSE); `seed` draws
-    the pixels that tell. `supersampled` renders at twice the size (Sec. 4).
+    `pairs.clamp` "auto" is the form factor of a disc: the paper clamps as well (Sec. 5), at a value that it does not
+    give. It is none for lights that have no footprints (`source` "walk", `openness.flux` "roulette") and with shadow
+    rays. `lights.seed` also draws the samples that estimate the error of subsplats "error".
     """
-
-    lights: LightSettings = setting(LightSettings(count=256, source=MapLights(pattern="grid")), "pixel lights")
-    pairs: PairSettings = setting(PairSettings(clamp=AutoClamp()), "how one light lights one subsplat")
-    coarsest: int = 16
-    finest: int = 0
-    criteria: frozenset[Literal["depth", "derivative", "normal", "curvature"]] = frozenset({"depth", "normal"})
-    depth_threshold: float = setting(0.1, "threshold", least=0.0, most=math.inf)
-    derivative_threshold: float = setting(0.05, "threshold", least=0.0, most=math.inf)
-    normal_threshold: float = setting(0.25, "threshold", least=0.0, most=math.inf)
-    normal_components: Literal["xyz", "xy"] = "xyz"
-    curvature_threshold: float = setting(0.1, "threshold", least=0.0, most=math.inf)
-    curvature: Literal["chord", "rate"] = "chord"
-    rim: int = 0
-    diagonal: Diagonal = "corner"
-    refinement: Refinement = "single_pass"
-    per_light: PerLight = "shared"
-    light_threshold: float = setting(0.1, "threshold", least=0.0, most=math.inf)
-    threshold_form: Threshold = "relative"
-    representative: Literal["pixel", "mean"] = "pixel"
-    visibility: Literal["none", "rays"] = "none"
-    upsampling: Upsampling = "tent"
-    detail: float = 0.0
-    target_error: float | None = None
-    supersampled: bool = False
-    as_published: frozenset[str] = setting(frozenset(), "forms to use as printed", study=True)
 
     SWITCHES: ClassVar[frozenset[str]] = frozenset({"ams_disc", "ams_rho_in_splat", "ams_filter_all"})
 
-    def check(self) -> None:
-        """Check what fields ask of each other."""
-        expect(is_count(self.coarsest) and 1 <= self.coarsest <= 65536, "coarsest", "1 to 65536 cells", self.coarsest)
-        expect(is_count(self.finest) and 0 <= self.finest <= 16, "finest", "a level, 0 to 16", self.finest)
-        expect(self.rim in (0, 1) and is_count(self.rim), "rim", "0 or 1 pixels", self.rim)
-        for key in THRESHOLDS:
-            expect(0 <= getattr(self, key) <= BRIGHTEST or getattr(self, key) == math.inf, key,
-                   f"0 to {BRIGHTEST:g}, or inf", getattr(self, key))
-        expect(0 <= self.detail <= 1, "detail", "a share from 0 to 1", self.detail)
-        expect(self.target_error is None or LEAST_TARGET <= self.target_error < math.inf, "target_error",
-               f"none or a share of the mean from {LEAST_TARGET:g} on", self.target_error)
-        self._expect_heeded()
+    lights: LightSettings = setting(LightSettings(count=256, source=MapLights(pattern="grid")), "pixel lights")
+    pairs: PairSettings = setting(PairSettings(clamp=AutoClamp()), "how one light lights one subsplat")
+    subsplats: ByGeometry | ByIrradiance | ByError = setting(ByGeometry(), "what subsplats are refined by")
+    detail: float = setting(0.0, "a of Eq. 3: darkens what turns away from the camera", least=0.0, most=1.0, study=True)
+    supersampled: bool = setting(False, "rendered at twice the width and height (Sec. 4)")
+    as_published: frozenset[str] = setting(frozenset(), "forms of the method to use as printed", study=True)
 
-    def _expect_heeded(self) -> None:
-        left = {field.name: field.default for field in dataclasses.fields(self)}
-        for mode, (keys, switches) in UNHEEDED.items():
-            chosen = getattr(self, mode)
-            if chosen == left[mode]:
-                continue
-            for key in keys:
-                expect(getattr(self, key) == left[key], key, f"{left[key]!r} with {mode} {chosen!r}",
-                       getattr(self, key))
-            expect(self.as_published.isdisjoint(switches), "as_published",
-                   f"none of {sorted(switches)} with {mode} {chosen!r}", sorted(self.as_published))
-        expect_footprints(self.lights, self.effective_pairs)
+    def check(self) -> None:
+        """Check what lights, pairs and subsplats ask of each other."""
         clamp = self.effective_pairs.clamp
-        if self.visibility == "rays":
-            bare = dataclasses.replace(PairSettings(), clamp=self.pairs.clamp)
+        chosen = clamp and clamp.name()
+        expect_footprints(self.lights, self.effective_pairs)
+        if self._has_shadow_rays:
+            bare = PairSettings(clamp=self.pairs.clamp)
             expect(self.pairs == bare, "pairs", "defaults with visibility 'rays'", self.pairs)
-            expect(clamp is None, "pairs.clamp", "none with visibility 'rays'", clamp and clamp.name())
-        expect(not isinstance(clamp, SphereClamp) or self.target_error is None, "pairs.clamp",
-               "another one with target_error, which takes peaks of points alone apart", clamp and clamp.name())
-        expect(isinstance(clamp, DiscClamp) or "ams_disc" not in self.as_published, "as_published",
-               "'ams_disc' with the clamp 'disc' alone", sorted(self.as_published))
+            expect(clamp is None, "pairs.clamp", "none with visibility 'rays'", chosen)
+        by_error = isinstance(self.subsplats, ByError)
+        expect(not (by_error and isinstance(clamp, SphereClamp)), "pairs.clamp",
+               "another one with subsplats 'error', which splits the peaks of points off", chosen)
+        allowed = {"ams_disc": isinstance(clamp, DiscClamp), "ams_filter_all": not by_error,
+                   "ams_rho_in_splat": isinstance(self.subsplats, ByGeometry)}
+        wrong = sorted(name for name in self.as_published if not allowed[name])
+        expect(not wrong, "as_published",
+               f"no {' or '.join(wrong)} with the clamp {chosen!r} and subsplats {self.subsplats.name()!r}",
+               sorted(self.as_published))
 
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return self.lights.traces_rays or self.visibility == "rays"
+        return self.lights.traces_rays or self._has_shadow_rays
+
+    @property
+    def _has_shadow_rays(self) -> bool:
+        return isinstance(self.subsplats, ByGeometry) and self.subsplats.visibility is not None
 
     @property
     def effective_pairs(self) -> PairSettings:
         """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints or rays are traced."""
         if not isinstance(self.pairs.clamp, AutoClamp):
             return self.pairs
-        bare = not self.lights.has_footprints or self.visibility == "rays"
+        bare = not self.lights.has_footprints or self._has_shadow_rays
         return dataclasses.replace(self.pairs, clamp=None if bare else DiscClamp())
+
+
+# Sec. 3.3, 4, 5.2 and Fig. 11 a: pictures of 2048^2 shown at 1024^2, all diagonal neighbours, lists pass by pass
+PRESETS = {"paper": of(MultiresSettings, lights=256, pattern="grid", coarsest=16, normal_threshold=0.25,
+                       diagonal="literal", traversal="list", supersampled=True)}

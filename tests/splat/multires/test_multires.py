@@ -1,7 +1,7 @@
 """The method as a whole: its limit, its switches, odd pictures, bad settings."""
 
-import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,13 +12,16 @@ from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, PointLight, load_scene
-from refgi.settings import of
+from refgi.settings import changed, leaves, of, replaced
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
+from refgi.splat.multires import ByError
 from refgi.splat.multires.multires import _footprints, _halved
 from refgi.splat.multires.refinement.grid import representatives
+from refgi.splat.multires.settings import PRESETS
 from refgi.stages import observe
+from tests.splat.multires.choices import only
 
-pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
 
 DEMO_CLAMP = {"clamp": "distance", "clamp_value": math.sqrt(0.2)}  # r^2 >= 0.2 in the demo's unit
 # relative RMSE that each mode keeps below at 61 x 45: geometry does not say where light bends, and cells of 4 pixels of
@@ -32,7 +35,8 @@ def frame(name="cornell_box", width=61, height=45, **options):
 
 def full_sum(at, settings):
     receivers = Receivers(*at.gbuffer.resolve("position", "normal", "covered"))
-    return irradiance(receivers, choose_lights(at, settings), settings, footprints(at, settings))
+    pairs = settings.effective_pairs
+    return irradiance(receivers, choose_lights(at, settings.lights), pairs, footprints(at, settings.lights, pairs))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +59,7 @@ def test_fewer_subsplats_come_near_the_full_sum(box, mode):
     settings = of(MultiresSettings, lights=64, upsampling=mode, **DEMO_CLAMP)
     covered, full = box.gbuffer.covered, full_sum(box, settings).astype(float)
     off = np.sqrt(((multires(box, settings) - full)[:, covered] ** 2).mean()) / full[:, covered].mean()
-    assert len(shared_subsplats(box.gbuffer, settings).level) < 0.7 * covered.sum()
+    assert len(shared_subsplats(box.gbuffer, settings.subsplats).level) < 0.7 * covered.sum()
     assert off < FLOORS[mode]
 
 
@@ -66,7 +70,7 @@ def test_a_supersampled_picture_is_the_mean_of_four(box):
     light, covered = multires(large, settings).astype(float), large.gbuffer.covered
     four = covered.reshape(45, 2, 61, 2).sum(axis=(1, 3))
     mean = light.reshape(3, 45, 2, 61, 2).sum(axis=(2, 4)) / np.maximum(four, 1)
-    got = multires(box, dataclasses.replace(settings, supersampled=True))
+    got = multires(box, replaced(settings, {"supersampled": True}))
     inside = box.gbuffer.covered & (four > 0)
     np.testing.assert_allclose(got[:, inside], mean[:, inside], rtol=3e-7)  # one rounding of a mean of four
     assert not got[:, ~box.gbuffer.covered].any()
@@ -77,23 +81,24 @@ def test_albedo_within_the_splat_is_albedo_twice_filtered(box, evidence):
     """Oracle: where the albedo does not change within the cells around, printed and default agree."""
     # cells of 2 pixels: light travels less than 6
     settings = of(MultiresSettings, lights=64, coarsest=32, **DEMO_CLAMP)
-    printed = multires(box, dataclasses.replace(settings, as_published={"ams_rho_in_splat"}))
+    printed = multires(box, replaced(settings, {"as_published": {"ams_rho_in_splat"}}))
     plain = multires(box, settings)
-    alike = np.isclose(printed, plain, rtol=1e-5).all(axis=0) & box.gbuffer.covered
+    agrees = np.isclose(printed, plain, rtol=1e-5).all(axis=0) & box.gbuffer.covered
     albedo = np.pad(box.gbuffer.albedo, ((0, 0), (6, 6), (6, 6)), mode="edge")
     around = np.lib.stride_tricks.sliding_window_view(albedo, (13, 13), axis=(1, 2))
     constant = (np.ptp(around, axis=(3, 4)) == 0).all(axis=0) & box.gbuffer.covered
     assert constant.sum() > 100
-    assert alike[constant].all()
-    assert not alike[box.gbuffer.covered].all()
-    evidence(f"ams_rho_in_splat: factor 1 on constant albedo; {1 - alike.sum() / box.gbuffer.covered.sum():.0%} differ")
+    assert agrees[constant].all()
+    assert not agrees[box.gbuffer.covered].all()
+    differ = 1 - agrees.sum() / box.gbuffer.covered.sum()
+    evidence(f"ams_rho_in_splat: factor 1 on constant albedo; {differ:.0%} differ")
 
 
 @pytest.mark.feature("REF-20")
 def test_the_demos_disc_is_pi_over_its_frustum(box, evidence):
     """Closed form: L^2 cos cos / (1.5 N r^2 + L^2), one light, one receiver, by hand."""
     settings = of(MultiresSettings, lights=1, clamp="disc", coarsest=4096, as_published={"ams_disc"})
-    lights = choose_lights(box, settings)
+    lights = choose_lights(box, settings.lights)
     got = multires(box, settings)
     position, normal, covered = box.gbuffer.resolve("position", "normal", "covered")
     away = position - lights.position[:, :1, None]
@@ -131,25 +136,25 @@ def test_nothing_to_see_is_black():
     away = scene.with_camera(target=tuple(2 * a - b for a, b in zip((x, y, z), target, strict=True)))
     at = Frame(away, width=20, height=12, rsm_resolution=16)
     assert not at.gbuffer.covered.any()
-    for how in ({}, {"supersampled": True}, {"target_error": 0.05}, {"per_light": "light"}, {"visibility": "rays"},
-                {"detail": 0.5}, {"representative": "mean"}):
+    for how in ({}, {"supersampled": True}, {"subsplats": ByError(0.05)}, {"subsplats": "irradiance"},
+                {"visibility": "rays"}, {"detail": 0.5}, {"representative": "mean"}):
         assert not multires(at, of(MultiresSettings, lights=16, **how)).any()
 
 
 @pytest.mark.parametrize(("scene", "size", "change"), [
-    ("parallel_plates", (161, 97), {"lights": 16, "pattern": "random", "seed": 630, "target_error": 0.1}),
-    ("ring", (200, 200), {"lights": 4, "target_error": 0.01})])
+    ("parallel_plates", (161, 97), {"lights": 16, "pattern": "random", "seed": 630, "subsplats": ByError(0.1, 1)}),
+    ("ring", (200, 200), {"lights": 4, "subsplats": ByError(0.01, 1)})])
 def test_cells_that_look_dark_do_not_hold_an_error_up(scene, size, change):
-    """Limit: where light is seen by samples but by no cell that could be split, every pixel is lit in the end."""
+    """Limit: where samples have irradiance but no cell that could be split, every pixel is evaluated in the end."""
     at = frame(scene, *size, rsm_resolution=16)
-    settings = of(MultiresSettings, coarsest=1, **change)
+    settings = of(MultiresSettings, **change)
     full, covered = full_sum(at, settings).astype(float), at.gbuffer.covered
     off = np.sqrt(((multires(at, settings) - full)[:, covered] ** 2).mean())
-    assert off <= settings.target_error * full[:, covered].mean()
+    assert off <= settings.subsplats.target * full[:, covered].mean()
 
 
 def test_slivers_between_doubled_pixels_take_the_light_around():
-    """By hand: a pixel with a surface whose four finer ones show none is the mean of its lit neighbours."""
+    """By hand: a pixel with a surface whose four finer ones show none is the mean of its covered neighbours."""
     covered, fine = np.ones((1, 3), bool), np.ones((2, 6), bool)
     fine[:, 2:4] = False
     light = np.where(fine, np.array([1.0, 1, 9, 9, 3, 3]), 0)[None].repeat(3, axis=0)
@@ -157,19 +162,19 @@ def test_slivers_between_doubled_pixels_take_the_light_around():
 
 
 @pytest.mark.parametrize(("change", "clamp"), [
-    ({}, "disc"), ({"pattern": "halton", "warp": "A"}, "disc"), ({"target_error": 0.3}, "disc"),
-    ({"per_light": "light"}, "disc"), ({"supersampled": True}, "disc"), ({"source": "walk"}, "none"),
+    ({}, "disc"), ({"pattern": "halton", "warp": "A"}, "disc"), ({"subsplats": ByError(0.3)}, "disc"),
+    ({"subsplats": "irradiance"}, "disc"), ({"supersampled": True}, "disc"), ({"source": "walk"}, "none"),
     ({"openness_flux": "roulette"}, "none"), ({"visibility": "rays"}, "none")])
 def test_near_pairs_are_clamped_where_that_is_possible(box, change, clamp):
     """Wiring: the picture is that of the clamp by its name, and another than that of the other."""
     settings = of(MultiresSettings, lights=32, **change)
     light = multires(box, settings)
-    np.testing.assert_array_equal(light, multires(box, dataclasses.replace(settings, clamp=clamp)))
+    np.testing.assert_array_equal(light, multires(box, replaced(settings, {"clamp": clamp})))
     if clamp == "disc":
-        assert (light != multires(box, dataclasses.replace(settings, clamp="none"))).any()
+        assert (light != multires(box, replaced(settings, {"clamp": "none"}))).any()
     else:
         with pytest.raises(InputError, match="clamp"):
-            dataclasses.replace(settings, clamp="disc")
+            replaced(settings, {"clamp": "disc"})
 
 
 def test_the_default_clamp_keeps_subsplats_near_the_full_sum():
@@ -189,7 +194,7 @@ def test_the_demos_disc_counts_the_lights_of_each_map(box):
     at = Frame(box.scene.with_lights(spot, PointLight((0.3, 0.3, 0.2), (1.0, 1.0, 1.0))), width=8, height=8,
                rsm_resolution=32)
     settings = of(MultiresSettings, lights=256, as_published={"ams_disc"})
-    lights = choose_lights(at, settings)
+    lights = choose_lights(at, settings.lights)
     for index, (source, count) in enumerate(zip(at.scene.lights, (121, 150), strict=True)):
         here = lights.map_index == index
         square = ((lights.position[:, here].T - np.asarray(source.position)) ** 2).sum(axis=1)
@@ -200,9 +205,9 @@ def test_cells_of_background_are_no_subsplats(box):
     covered = np.zeros((40, 50), bool)
     covered[7, 11] = True  # a silhouette of one pixel
     settings = MultiresSettings()
-    one = dataclasses.replace(settings, coarsest=4)
+    one = replaced(settings, {"coarsest": 4})
     assert [places.max() for places in representatives(covered, 3)] == [7 * 50 + 11] * 4
-    leaves = shared_subsplats(box.gbuffer, one)
+    leaves = shared_subsplats(box.gbuffer, one.subsplats)
     assert leaves.level.max() <= leaves.top
     assert box.gbuffer.covered.reshape(-1)[leaves.pixel].all()
 
@@ -217,7 +222,7 @@ def test_the_table_of_methods_knows_it():
 
 
 @pytest.mark.parametrize(("change", "asked"), [
-    ({}, True), ({"criteria": {"normal"}}, False), ({"target_error": 0.1}, False), ({"per_light": "light"}, False)])
+    ({}, True), (only("normal"), False), ({"subsplats": ByError(0.1)}, False), ({"subsplats": "irradiance"}, False)])
 def test_depth_is_computed_only_where_a_criterion_looks_at_it(change, asked):
     """Skip: the light is the same to the bit with the depth resolved beforehand."""
     at, other = frame(width=33, height=20), frame(width=33, height=20)
@@ -228,22 +233,51 @@ def test_depth_is_computed_only_where_a_criterion_looks_at_it(change, asked):
     np.testing.assert_array_equal(multires(other, settings), light)
 
 
-def test_settings_are_checked():
-    for change in ({"coarsest": 0}, {"coarsest": 1.5}, {"finest": -1}, {"finest": 17}, {"criteria": {"colour"}},
-                   {"depth_threshold": -1}, {"normal_threshold": math.nan}, {"curvature_threshold": 1e39},
-                   {"normal_components": "z"},
-                   {"curvature": "arc"}, {"rim": 2}, {"diagonal": "on"}, {"refinement": "twice"},
-                   {"per_light": "both"}, {"light_threshold": -0.1}, {"threshold_form": "half"},
-                   {"representative": "corner"}, {"visibility": "map"}, {"upsampling": "cubic"}, {"detail": 1.5},
-                   {"target_error": 0}, {"clamp": "sphere", "target_error": 0.1},
-                   {"target_error": math.inf}, {"lights": 0}, {"pattern": "spiral"},
-                   {"visibility": "rays", "clamp": "disc"}, {"visibility": "rays", "target_error": 0.1},
-                   {"visibility": "rays", "offset": 0.1}, {"visibility": "rays", "representative": "mean"},
-                   {"visibility": "rays", "as_published": {"sii_no_pi"}}, {"target_error": 0.1, "rim": 1},
-                   {"target_error": 0.1, "criteria": {"depth"}}, {"target_error": 0.1, "normal_threshold": 1},
-                   {"target_error": 0.1, "as_published": {"ams_filter_all"}},
-                   {"per_light": "light", "target_error": 0.1}, {"as_published": {"ams_luck"}},
-                   {"as_published": {"ams_disc"}, "clamp": "none"},
-                   {"as_published": {"ams_rho_in_splat"}, "per_light": "light"}):
-        with pytest.raises(InputError, match=next(iter(change))):
-            of(MultiresSettings, **change)
+BAD = {
+    "subsplats.coarsest": [{"coarsest": 0}, {"coarsest": 1.5}],
+    "subsplats.finest": [{"finest": -1}, {"finest": 17}, {"subsplats": "error", "subsplats.finest": 1}],
+    "subsplats.criteria.depth": [{"depth": "slope"}, {"depth.threshold": -1}],
+    "subsplats.criteria.normal.threshold": [{"normal_threshold": math.nan},
+                                            {"subsplats": "error", "subsplats.criteria.normal.threshold": 1}],
+    "subsplats.criteria.normal.components": [{"normal_components": "z"}],
+    "subsplats.criteria.curvature": [{"curvature": "arc"}, {"curvature": "chord", "curvature_threshold": 1e39}],
+    "subsplats.criteria.rim": [{"rim": 2}, {"subsplats": "error", "subsplats.criteria.rim": 1}],
+    "subsplats.criteria.diagonal": [{"diagonal": "on"}],
+    "subsplats.criteria.traversal": [{"traversal": "twice"}],
+    "subsplats": [{"subsplats": "both"}],
+    "subsplats.threshold": [{"subsplats": "irradiance", "subsplats.threshold": -0.1}, {"subsplats.threshold": 0.1}],
+    "subsplats.form": [{"subsplats": "irradiance", "form": "half"}],
+    "subsplats.representative": [{"representative": "corner"}, {"visibility": "rays", "representative": "mean"}],
+    "subsplats.visibility": [{"visibility": "map"}, {"subsplats": "error", "subsplats.visibility": "rays"},
+                             {"subsplats": "irradiance", "subsplats.visibility": "rays"}],
+    "subsplats.upsampling": [{"upsampling": "cubic"}],
+    "subsplats.target": [{"subsplats": "error", "target": 0}, {"subsplats": "error", "target": math.inf},
+                         {"target": 0.1}],
+    "detail": [{"detail": 1.5}],
+    "lights.count": [{"lights": 0}],
+    "lights.source.pattern": [{"pattern": "spiral"}],
+    "pairs.clamp": [{"visibility": "rays", "clamp": "disc"}, {"subsplats": "error", "clamp": "sphere"}],
+    "pairs": [{"visibility": "rays", "offset": 0.1}, {"visibility": "rays", "as_published": {"sii_no_pi"}}],
+    "as_published": [{"as_published": {"ams_luck"}}, {"as_published": {"ams_disc"}, "clamp": "none"},
+                     {"as_published": {"ams_rho_in_splat"}, "subsplats": "irradiance"},
+                     {"as_published": {"ams_filter_all"}, "subsplats": "error"}],
+}
+
+
+@pytest.mark.parametrize(("key", "change"), [(key, change) for key, changes in BAD.items() for change in changes])
+def test_settings_are_checked(key, change):
+    with pytest.raises(InputError, match=re.escape(key)):
+        of(MultiresSettings, **change)
+
+
+def test_printed_values_are_a_preset():
+    paper = PRESETS["paper"]
+    assert changed(paper) == {"subsplats.criteria.diagonal": "literal", "subsplats.criteria.traversal": "list",
+                              "supersampled": True}
+    assert (paper.lights.count, paper.subsplats.coarsest, paper.subsplats.criteria.normal.threshold) == (256, 16, 0.25)
+
+
+def test_the_page_shows_few_keys():
+    shown = {leaf.key for leaf in leaves(MultiresSettings) if not leaf.is_for_study}
+    own = [key for key in shown if not key.startswith(("lights.", "pairs."))]
+    assert len(own) == 9

@@ -1,6 +1,6 @@
-"""Refinement until the picture is as near to the full sum as asked for; beyond Nichols and Wyman.
+"""Refinement until an error target is met; beyond Nichols and Wyman.
 
-`error_driven` seeks the threshold and says from samples how near the picture is, `trial` refines by one;
-`interpolate` weighs what the surfaces of levels have in common and `descent` carries light down by it; `near` is what
-no interpolation holds.
+`error_driven` searches the threshold and estimates the error from samples, `trial` refines by one threshold.
+`interpolate` computes blend weights between levels by the similarity of their surfaces, `descent` carries irradiance
+down the levels by them, and `near` sums the unbounded part of near pairs at every pixel.
 """

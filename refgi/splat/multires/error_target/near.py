@@ -1,8 +1,9 @@
-"""Light that no interpolation holds: what near pixel lights give beyond a bound on each one's share, and lobes.
+"""The unbounded part of near pairs, summed at every pixel, and glossy lobes: what no interpolation can carry.
 
-E = sum (Phi / pi) min(g, b) + sum (Phi / pi) max(0, g - b): the first sum is bounded and smooth, fit for subsplats; the
-second, which is summed here, is not 0 only where r^2 < 1 / b, since g <= 1 / r^2. Tiles that no light is near to cost
-a test of their box a light. Lobes can be as narrow as a pixel at any distance, so they are summed here as a whole.
+E = sum (Phi / pi) min(g, b) + sum (Phi / pi) max(0, g - b), with g the geometry term and b its bound: the first sum is
+bounded and smooth, fit for subsplats; the second, summed here, is not 0 only where r^2 < 1 / b, since g <= 1 / r^2.
+(Bias compensation splits the clamped sum in the same way: Kollig and Keller 2006.) Tiles without near lights cost one
+box test a light. Lobes can be as narrow as a pixel at any distance, so they are summed here as a whole.
 """
 
 from typing import Any, NamedTuple
@@ -16,7 +17,7 @@ from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.packing import Packed
 from refgi.pairs.pair_sum import NX, SUM, Clamp, X, clamped_term, geometry_term
 from refgi.pairs.tiles import block_by_block, put, taken
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.splat.multires.refinement.grid import level_shape
 from refgi.stages import stage
 
@@ -27,30 +28,17 @@ ROWS = 9  # of its tile: position, normal and sums
 
 
 class NearLight(NamedTuple):
-    """Light of few pixels, by squares of `SIDE` x `SIDE`."""
+    """Irradiance of near pairs, by squares of `SIDE` x `SIDE` pixels."""
 
-    light: Array  # (3, h, w), W/m^2; of any content in squares that are not touched
-    touched: Array  # (rows, columns) bool
-    pairs: int  # of light and point that were looked at
+    irradiance: Array  # (3, h, w), W/m^2; of any content in squares that are not touched
+    has_near: Array  # (rows, columns) bool
+    pairs: int  # of light and point that were evaluated
 
 
 @kernel
-def near_at(light: Array, touched: Array, c: int, row: int, column: int) -> Any:
-    """Return what is near a pixel.
-
-    Parameters
-    ----------
-    light, touched : ndarray
-        Of `NearLight`.
-    c, row, column : int
-        Channel and pixel.
-
-    Returns
-    -------
-    float
-        W/m^2.
-    """
-    return light[c, row, column] if touched[row // SIDE, column // SIDE] else light.dtype.type(0.0)
+def near_irradiance_at(irradiance: Array, has_near: Array, c: int, row: int, column: int) -> Any:
+    """Return channel c of the near irradiance at a pixel, W/m^2; 0 in squares that have none."""
+    return irradiance[c, row, column] if has_near[row // SIDE, column // SIDE] else irradiance.dtype.type(0.0)
 
 
 @stage("splat.near")
@@ -60,7 +48,7 @@ def near_light(receivers: Receivers, packed: Packed, most: float) -> NearLight:
     Parameters
     ----------
     receivers : Receivers
-        Points that are lit; contiguous.
+        The picture's points; contiguous.
     packed : Packed
         Lights, of `checked`.
     most : float
@@ -76,65 +64,65 @@ def near_light(receivers: Receivers, packed: Packed, most: float) -> NearLight:
     Virtual spherical lights have another term, which is bounded by itself: their excess counts as 0.
     """
     position, normal, covered = receivers
-    light, pairs = plane(position.shape, position.dtype), 0
-    touched = np.zeros(level_shape(covered.shape[0], covered.shape[1], SIDE.bit_length() - 1), np.bool_)
+    irradiance, pairs = plane(position.shape, position.dtype), 0
+    has_near = np.zeros(level_shape(covered.shape[0], covered.shape[1], SIDE.bit_length() - 1), np.bool_)
     if packed.lobes is not None:
         places = block_by_block(covered)
         sums = np.zeros((3, len(places)), position.dtype)
         add_lobes(taken(position, places), taken(normal, places), *packed.lobes, None, None, sums)
-        light[:], touched[:] = 0, True
-        put(light, places, sums)
+        irradiance[:], has_near[:] = 0, True
+        put(irradiance, places, sums)
         pairs = len(places) * packed.lobes.lights.shape[1]
     if packed.spheres is None and packed.diffuse.shape[1] > 1 and most > 0:
         bound = (most / packed.diffuse[6:, :-1].astype(np.float64).max(axis=0)).astype(position.dtype)
-        looked = np.zeros(touched.shape, np.int64)
-        _add_excess(position, normal, covered, packed.diffuse, packed.clamp, bound, light, touched, looked)
-        pairs += int(looked.sum())
-    return NearLight(light, touched, pairs)
+        pair_counts = np.zeros(has_near.shape, np.int64)
+        _add_excess(position, normal, covered, packed.diffuse, packed.clamp, bound, irradiance, has_near, pair_counts)
+        pairs += int(pair_counts.sum())
+    return NearLight(irradiance, has_near, pairs)
 
 
 @kernel(parallel=True)
 def _add_excess(
-    position: Array, normal: Array, covered: Array, lights: Array, clamp: Clamp | None, bound: Array, light: Array,
-    touched: Array, pairs: Array,
+    position: Array, normal: Array, covered: Array, lights: Array, clamp: Clamp | None, bound: Array, irradiance: Array,
+    has_near: Array, pairs: Array,
 ) -> None:
-    rows, columns = touched.shape
+    rows, columns = has_near.shape
     for k in prange(rows * columns):
         i, j = k // columns, k % columns
         near, low, high = np.empty(len(bound), np.bool_), np.empty(3, position.dtype), np.empty(3, position.dtype)
         tile = np.zeros((ROWS, SIDE * SIDE), position.dtype)
-        there = _load(position, covered, i * SIDE, j * SIDE, tile)
-        _bound(tile, low, high)
-        if there and _mark_near(lights, bound, low, high, near):
-            _face(normal, covered, i * SIDE, j * SIDE, tile)
+        covered_count = _load_positions(position, covered, i * SIDE, j * SIDE, tile)
+        _bounding_box(tile, low, high)
+        if covered_count and _mark_near(lights, bound, low, high, near):
+            _load_normals(normal, covered, i * SIDE, j * SIDE, tile)
             _sum_near(tile, lights, clamp, bound, near)
-            pairs[i, j] = there * np.count_nonzero(near)
-            _put(tile, touched[i, j], i * SIDE, j * SIDE, light)
-            touched[i, j] = True
+            pairs[i, j] = covered_count * np.count_nonzero(near)
+            _store(tile, has_near[i, j], i * SIDE, j * SIDE, irradiance)
+            has_near[i, j] = True
 
 
 @kernel
-def _load(position: Array, covered: Array, top: int, left: int, tile: Array) -> int:
-    """Load the positions of a square of pixels, a copy of one for others without surface; return how many have one."""
-    count, kept = 0, 0
+def _load_positions(position: Array, covered: Array, top: int, left: int, tile: Array) -> int:
+    """Load a square's positions, for pixels without surface a copy of one that has; return how many have one."""
+    count, last_covered = 0, 0
     for y in range(top, min(top + SIDE, covered.shape[0])):
-        there, first = covered[y, left : left + SIDE], (y - top) * SIDE
+        row_covered, first = covered[y, left : left + SIDE], (y - top) * SIDE
         for c in range(3):
-            _copy(position[c, y, left:], tile[X + c, first : first + len(there)])
-        for x in range(len(there)):
-            if there[x]:
-                count, kept = count + 1, first + x
+            _copy(position[c, y, left:], tile[X + c, first : first + len(row_covered)])
+        for x in range(len(row_covered)):
+            if row_covered[x]:
+                count, last_covered = count + 1, first + x
     for k in range(SIDE * SIDE if 0 < count < SIDE * SIDE else 0):
         y, x = top + k // SIDE, left + k % SIDE
         if y >= covered.shape[0] or x >= covered.shape[1] or not covered[y, x]:
             for c in range(3):
-                tile[X + c, k] = tile[X + c, kept]
+                tile[X + c, k] = tile[X + c, last_covered]
     return count
 
 
 @kernel
-def _face(normal: Array, covered: Array, top: int, left: int, tile: Array) -> None:
-    """Load the normals of a square of pixels; those without a surface face nothing and stay dark."""
+def _load_normals(normal: Array, covered: Array, top: int, left: int, tile: Array) -> None:
+    """Load the normals of a square of pixels; 0 without a surface, so that nothing reaches it."""
     for y in range(top, min(top + SIDE, covered.shape[0])):
         for x in range(left, min(left + SIDE, covered.shape[1])):
             for c in range(3):
@@ -142,8 +130,8 @@ def _face(normal: Array, covered: Array, top: int, left: int, tile: Array) -> No
 
 
 @kernel
-def _bound(tile: Array, low: Array, high: Array) -> None:
-    """Bound the positions of a square, whose rows are the lanes."""
+def _bounding_box(tile: Array, low: Array, high: Array) -> None:
+    """Compute the bounding box of a square's positions, whose rows are the lanes."""
     for axis in range(3):
         at = tile[X + axis]
         least, most = at[:SIDE].copy(), at[:SIDE].copy()
@@ -163,7 +151,7 @@ def _copy(pixels: Array, row: Array) -> None:
 
 @kernel
 def _sum_near(tile: Array, lights: Array, clamp: Clamp | None, bound: Array, near: Array) -> None:
-    """Sum what lights that are marked give beyond their bounds."""
+    """Sum (Phi / pi) max(0, g - b) over the lights that are marked."""
     zero = tile.dtype.type(0.0)
     at = np.empty((ROWS, SIDE * SIDE), tile.dtype)  # of a known shape: else the loop below would not run in lanes
     at[:] = tile
@@ -180,7 +168,7 @@ def _sum_near(tile: Array, lights: Array, clamp: Clamp | None, bound: Array, nea
                 g = geometry_term(dx, dy, dz, lx, ly, lz, nx, ny, nz)
             else:
                 g = clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, clamp, k)
-            over = g - b if g > b else zero
+            over = g - b if g > b else zero  # max(0, g - b)
             at[SUM, i] += over * red
             at[SUM + 1, i] += over * green
             at[SUM + 2, i] += over * blue
@@ -188,19 +176,19 @@ def _sum_near(tile: Array, lights: Array, clamp: Clamp | None, bound: Array, nea
 
 
 @kernel
-def _put(tile: Array, add: bool, top: int, left: int, light: Array) -> None:
+def _store(tile: Array, add: bool, top: int, left: int, irradiance: Array) -> None:
     """Store a square's sums, or add them to what is there."""
-    zero = light.dtype.type(0.0)
+    zero = irradiance.dtype.type(0.0)
     for c in range(3):
-        for y in range(top, min(top + SIDE, light.shape[1])):
-            for x in range(left, min(left + SIDE, light.shape[2])):
+        for y in range(top, min(top + SIDE, irradiance.shape[1])):
+            for x in range(left, min(left + SIDE, irradiance.shape[2])):
                 more = tile[SUM + c, (y - top) * SIDE + x - left]
-                light[c, y, x] = more + (light[c, y, x] if add else zero)
+                irradiance[c, y, x] = more + (irradiance[c, y, x] if add else zero)
 
 
 @kernel
 def _mark_near(lights: Array, bound: Array, low: Array, high: Array, near: Array) -> bool:
-    """Mark the lights that some point of a box is nearer to than 1 / sqrt(bound), on their lit side, if any."""
+    """Mark the lights within 1 / sqrt(bound) of some point of a box on their front side; return whether any is."""
     real = lights.dtype.type
     zero, one = real(0.0), real(1.0)
     ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]

@@ -1,5 +1,5 @@
-"""Subsplats that each light refines for itself, by its own light (Nichols and Wyman 2009, Sec. 3.3.1).
+"""Refinement by illumination: subsplats of each light's own (Nichols and Wyman 2009, Sec. 3.3.1).
 
-`per_light` sums the lights' pictures, `lists` refines for a batch of them over the `tree` of cells, `one_light` is what
-one light gives one cell.
+`per_light` sums the pictures of all lights, `lists` refines a batch of lights over the `tree` of cells, `one_light`
+evaluates one light at cells.
 """

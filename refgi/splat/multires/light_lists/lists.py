@@ -1,8 +1,8 @@
-"""A list of subsplats for each light by itself, refined where its own light differs (Sec. 3.3.1).
+"""Refinement of a list of subsplats for each light by its own irradiance (Nichols and Wyman 2009, Sec. 3.3.1).
 
 Per light the list is a queue of cells, level after level. A level's cells are tested together: their children are
-appended and lit, at their representatives, and only the children of the cells that are split are kept. So each cell
-is lit once, as a sample of its parent, and that is also its light as a subsplat.
+appended and evaluated, at their representatives, and only the children of the cells that are split stay. So each cell
+is evaluated once, as a sample of its parent, and that is also its irradiance as a subsplat.
 
 Symbols: T threshold on max - min over a cell's children of any channel, W/m^2.
 """
@@ -15,15 +15,15 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.pair_sum import SUM, TILE, Clamp
-from refgi.splat.multires.light_lists.one_light import TILE_ROWS, Separate, light_tile, load_cells
+from refgi.splat.multires.light_lists.one_light import TILE_ROWS, SingleLights, add_light, load_cells
 
 Array = npt.NDArray[Any]
 
 DEEPEST = 64  # cells that wait while a tree of up to 20 levels is walked depth first
 
 
-class Cells(NamedTuple):
-    """The tree that lists are cut out of, and where its cells are lit."""
+class ReceiverTree(NamedTuple):
+    """Cells that lists are cut out of, with the points at which they are evaluated."""
 
     first: Array  # (n + 1,) int32, of `Tree`
     roots: int
@@ -32,56 +32,31 @@ class Cells(NamedTuple):
     refined: Array  # (n,) bool: cells that the shared list refines; none without such a list
 
 
-class Lists(NamedTuple):
-    """Room for the queues of B lights: entries of a tree of n cells."""
+class SubsplatLists(NamedTuple):
+    """Queues of B lights: entries of a tree of n cells."""
 
     cell: Array  # (B, n) int32, index in the tree
     child: Array  # (B, n) int32, entry of the first child; -1: a leaf
-    light: Array  # (B, 3, n) W/m^2
+    irradiance: Array  # (B, 3, n) W/m^2
     entries: Array  # (B,) int64, how many are in use
     largest: Array  # (B,) the largest channel of all samples, W/m^2
 
 
-def room_for(lights: int, cells: int, dtype: npt.DTypeLike) -> Lists:
-    """Return room for the lists of some lights.
-
-    Parameters
-    ----------
-    lights, cells : int
-        B and n.
-    dtype : dtype
-        Of irradiance.
-
-    Returns
-    -------
-    Lists
-        Not filled.
-    """
-    return Lists(np.empty((lights, cells), np.int32), np.empty((lights, cells), np.int32),
-                 np.empty((lights, 3, cells), dtype), np.empty(lights, np.int64), np.empty(lights, dtype))
+def empty_lists(lights: int, cells: int, dtype: npt.DTypeLike) -> SubsplatLists:
+    """Return uninitialised lists of some lights over a tree of some cells."""
+    return SubsplatLists(np.empty((lights, cells), np.int32), np.empty((lights, cells), np.int32),
+                         np.empty((lights, 3, cells), dtype), np.empty(lights, np.int64), np.empty(lights, dtype))
 
 
 @kernel(parallel=True)
 def refine_for_lights(
-    cells: Cells, lights: Separate, clamp: Clamp | None, spheres: Array | None, lobe_clamp: Clamp | None,
-    widening: Widening | None, begin: int, threshold: tuple[float, float], lists: Lists,
+    cells: ReceiverTree, lights: SingleLights, clamp: Clamp | None, spheres: Array | None, lobe_clamp: Clamp | None,
+    widening: Widening | None, begin: int, threshold: tuple[float, float], lists: SubsplatLists,
 ) -> None:
-    """Refine the cells of a tree for each light by itself.
+    """Refine the cells of a tree for the B lights from `begin` on, each by itself, and fill `lists`.
 
-    Parameters
-    ----------
-    cells : Cells
-        The tree.
-    lights : Separate
-        All lights.
-    clamp, spheres, lobe_clamp, widening : None or what they are
-        As for `light_tile`.
-    begin : int
-        The first light; B of them are taken.
-    threshold : tuple of 2 floats
-        (a, b): T = a + b times the largest channel of all samples of this light at a level and above.
-    lists : Lists
-        Filled.
+    threshold: (a, b), T = a + b times the largest channel of all samples of this light at a level and above; clamp,
+    spheres, lobe_clamp and widening are those of `add_light`.
     """
     for b in prange(len(lists.entries)):
         _refine(cells, lights, begin + b, clamp, spheres, lobe_clamp, widening, threshold, lists, b)
@@ -89,80 +64,67 @@ def refine_for_lights(
 
 @kernel
 def _refine(
-    cells: Cells, lights: Separate, k: int, clamp: Clamp | None, spheres: Array | None, lobe_clamp: Clamp | None,
-    widening: Widening | None, threshold: tuple[float, float], lists: Lists, b: int,
+    cells: ReceiverTree, lights: SingleLights, k: int, clamp: Clamp | None, spheres: Array | None,
+    lobe_clamp: Clamp | None, widening: Widening | None, threshold: tuple[float, float], lists: SubsplatLists, b: int,
 ) -> None:
-    cell, child, light = lists.cell[b], lists.child[b], lists.light[b]
-    tile = np.zeros((TILE_ROWS, TILE), light.dtype)
+    cell, child, irradiance = lists.cell[b], lists.child[b], lists.irradiance[b]
+    tile = np.zeros((TILE_ROWS, TILE), irradiance.dtype)
     for n in range(cells.roots):
         cell[n], child[n] = n, -1
     start = last = 0
     stop = cells.roots
-    most = np.zeros(TILE, light.dtype)
-    largest = most[0]
+    lane_max = np.zeros(TILE, irradiance.dtype)
+    largest = lane_max[0]
     while last < stop:
         for first in range(last, stop, TILE):
             size = min(TILE, stop - first)
             load_cells(tile, cells.points, cells.normals, cell[first : first + size])
-            light_tile(tile, size, lights, k, clamp, spheres, lobe_clamp, widening)
-            _unload(tile, size, light, first, most)
-        end, largest = stop, most.max()
+            add_light(tile, size, lights, k, clamp, spheres, lobe_clamp, widening)
+            _store_sums(tile, size, irradiance, first, lane_max)
+        end, largest = stop, lane_max.max()
         if last > 0:
-            end = _keep(cells, cell, child, light, start, last, threshold[0] + threshold[1] * largest)
+            end = _keep_split(cells, cell, child, irradiance, start, last, threshold[0] + threshold[1] * largest)
         start, last = last, end
         stop = _append_children(cells.first, cell, start, last)
     lists.entries[b], lists.largest[b] = last, largest
 
 
 @kernel
-def leaves(first: Array, roots: int, cell: Array, child: Array, light: Array, cells: Array, values: Array) -> int:
-    """Read the leaves of one light's list, depth first.
+def read_leaves(
+    first: Array, roots: int, cell: Array, child: Array, irradiance: Array, cells: Array, values: Array
+) -> int:
+    """Read the leaves of one light's list, depth first; return how many there are.
 
-    Parameters
-    ----------
-    first : (n + 1,) ndarray of int32
-        Children of each cell.
-    roots : int
-        Cells the list began with.
-    cell, child, light : ndarray
-        One light's part of `Lists`.
-    cells : (<= n,) ndarray of int32
-        Filled with cells.
-    values : (3, <= n) ndarray
-        Filled with their light, W/m^2.
-
-    Returns
-    -------
-    int
-        How many there are.
+    first, roots: of `ReceiverTree`; cell, child, irradiance: one light's part of `SubsplatLists`. Fills cells, (<= n,),
+    and values, (3, <= n) W/m^2.
     """
-    waiting = np.empty(DEEPEST, np.int64)
+    stack = np.empty(DEEPEST, np.int64)
     found = 0
     for root in range(roots):
-        waiting[0], left = root, 1
-        while left > 0:
-            left -= 1
-            n = waiting[left]
+        stack[0], depth = root, 1
+        while depth > 0:
+            depth -= 1
+            n = stack[depth]
             if child[n] < 0:
                 cells[found] = cell[n]
                 for c in range(3):
-                    values[c, found] = light[c, n]
+                    values[c, found] = irradiance[c, n]
                 found += 1
             else:
                 for i in range(first[cell[n] + 1] - first[cell[n]] - 1, -1, -1):
-                    waiting[left] = child[n] + i
-                    left += 1
+                    stack[depth] = child[n] + i
+                    depth += 1
     return found
 
 
 @kernel
-def _unload(tile: Array, size: int, light: Array, first: int, most: Array) -> None:
-    """Store the sums of a tile, and keep the largest that each of its places has held."""
+def _store_sums(tile: Array, size: int, irradiance: Array, first: int, lane_max: Array) -> None:
+    """Store the sums of a tile, and update the largest value of each of its lanes."""
     for c in range(3):
         for i in range(size):
             value = tile[SUM + c, i]
-            light[c, first + i] = value
-            most[i] = value if value > most[i] else most[i]
+            irradiance[c, first + i] = value
+            lane_max[i] = value if value > lane_max[i] else lane_max[i]
 
 
 @kernel
@@ -177,33 +139,34 @@ def _append_children(first: Array, cell: Array, start: int, last: int) -> int:
 
 
 @kernel
-def _keep(
-    cells: Cells, cell: Array, child: Array, light: Array, start: int, last: int, threshold: Any
+def _keep_split(
+    cells: ReceiverTree, cell: Array, child: Array, irradiance: Array, start: int, last: int, threshold: Any
 ) -> int:
     """Drop the appended children of the entries that need no split; return where the list ends."""
-    kept = sample = last
+    end = sample = last
     for n in range(start, last):
         size = cells.first[cell[n] + 1] - cells.first[cell[n]]
-        if size > 0 and (cells.refined[cell[n]] or _spread(light, sample, size) > threshold):
-            child[n] = kept
+        if size > 0 and (cells.refined[cell[n]] or _sample_range(irradiance, sample, size) > threshold):
+            child[n] = end
             for i in range(size):
-                cell[kept], child[kept] = cell[sample + i], -1
+                cell[end], child[end] = cell[sample + i], -1
                 for c in range(3):
-                    light[c, kept] = light[c, sample + i]
-                kept += 1
+                    irradiance[c, end] = irradiance[c, sample + i]
+                end += 1
         sample += size
-    return kept
+    return end
 
 
 @kernel
-def _spread(light: Array, sample: int, size: int) -> Any:
-    """Return the largest max - min of a channel over some entries (the paper's SamplesDiffer)."""
-    spread = light.dtype.type(0.0)
+def _sample_range(irradiance: Array, sample: int, size: int) -> Any:
+    """Return the largest max - min of a channel over some entries (SamplesDiffer of Sec. 3.3.1)."""
+    spread = irradiance.dtype.type(0.0)
     for c in range(3):
-        upper = lower = light[c, sample]
+        upper = lower = irradiance[c, sample]
         for i in range(1, size):
-            value = light[c, sample + i]
+            value = irradiance[c, sample + i]
             upper = value if value > upper else upper
             lower = value if value < lower else lower
+        # Sec. 3.3.1, SamplesDiffer: max - min over the quadrants
         spread = upper - lower if upper - lower > spread else spread
     return spread

@@ -1,7 +1,7 @@
-"""One pixel light at a tile of receivers: the pair terms of Eq. 2 and of lobes, for lights that are taken one by one.
+"""One pixel light at a tile of receivers: Eq. 2 and Phong lobes, for lights that are evaluated one by one.
 
-`pair_sum` and its sisters run all lights past a tile. Where each light lights points of its own, the same terms are
-called light by light; the result is that of `irradiance` for this light alone, to the bit.
+`pair_sum` and its sisters sum all lights over a tile. Here each light has receivers of its own, and the same pair terms
+are summed light by light; the result is that of `irradiance` for this light alone, to the bit.
 """
 
 from typing import Any, NamedTuple
@@ -23,63 +23,36 @@ TILE_ROWS = ROWS + 5  # what lobes need
 DIFFUSE, LOBE = 0, 1  # rows of the places
 
 
-class Separate(NamedTuple):
-    """Packed lights that are taken one by one."""
+class SingleLights(NamedTuple):
+    """Packed lights that are evaluated one by one."""
 
-    places: Array  # (2, N) int32, index among diffuse lights and among lobes; -1: it is not there
+    packed_index: Array  # (2, N) int32, index among diffuse lights and among lobes; -1: it is not there
     diffuse: Array  # (9, M + 1), of `Packed`
     lobes: Array  # (13, K), of `PackedLobes`
     limits: Array  # (K,), from which 1 - cos on each lobe is 0
 
 
-def separate(packed: Packed) -> Separate:
-    """Say where each light stands among the packed ones.
-
-    Parameters
-    ----------
-    packed : Packed
-        The lights.
-
-    Returns
-    -------
-    Separate
-        The same lights.
-    """
-    places = np.full((2, len(packed.shines)), -1, np.int32)
-    for row, there in zip(places, (packed.shines, packed.glossy), strict=True):
-        row[there] = np.arange(np.count_nonzero(there))
+def single_lights(packed: Packed) -> SingleLights:
+    """Return packed lights with the index of each among the diffuse ones and among the lobes."""
+    packed_index = np.full((2, len(packed.shines)), -1, np.int32)
+    for row, is_packed in zip(packed_index, (packed.shines, packed.glossy), strict=True):
+        row[is_packed] = np.arange(np.count_nonzero(is_packed))
     diffuse = np.ascontiguousarray(packed.diffuse)  # of one layout, or kernels are compiled for each
     lobes = np.empty((13, 0), diffuse.dtype) if packed.lobes is None else np.ascontiguousarray(packed.lobes.lights)
-    return Separate(places, diffuse, lobes, bound_lobes(lobes[9], -1.0)[LIMIT])
+    return SingleLights(packed_index, diffuse, lobes, bound_lobes(lobes[9], -1.0)[LIMIT])
 
 
 @kernel
-def light_tile(
-    tile: Array, size: int, lights: Separate, k: int, clamp: Clamp | None, spheres: Array | None,
+def add_light(
+    tile: Array, size: int, lights: SingleLights, k: int, clamp: Clamp | None, spheres: Array | None,
     lobe_clamp: Clamp | None, widening: Widening | None,
 ) -> None:
-    """Add what one light gives to the sums of a tile.
+    """Add the irradiance of light k to the sums of a tile of receivers, W/m^2 (Eq. 2, and its lobe).
 
-    Parameters
-    ----------
-    tile : (TILE_ROWS, TILE) ndarray
-        Receivers of `load_cells`; rows SUM are added to, W/m^2.
-    size : int
-        How many of them count.
-    lights : Separate
-        All lights.
-    k : int
-        Which light.
-    clamp : Clamp or None
-        How near pairs are kept finite.
-    spheres : (M,) ndarray or None
-        Squares of radii, m^2, where diffuse lights are virtual spheres.
-    lobe_clamp : Clamp or None
-        How near pairs of lobes are kept finite; None where no light is glossy.
-    widening : Widening or None
-        How exponents of lobes fall near the light.
+    tile: (TILE_ROWS, TILE) of `load_cells`, of which `size` lanes count; clamp: of diffuse pairs; spheres: (M,) squared
+    radii, m^2, where diffuse lights are virtual spherical lights; lobe_clamp: None where no light is glossy.
     """
-    diffuse, lobe = lights.places[DIFFUSE, k], lights.places[LOBE, k]
+    diffuse, lobe = lights.packed_index[DIFFUSE, k], lights.packed_index[LOBE, k]
     if diffuse >= 0:
         _add_diffuse(tile, size, lights.diffuse, diffuse, clamp, spheres)
     if lobe_clamp is not None and lobe >= 0:
@@ -104,6 +77,7 @@ def _add_diffuse(tile: Array, size: int, lights: Array, k: int, clamp: Clamp | N
             else:
                 tile[TERM, i] = clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, clamp, k)
     for i in range(size):
+        # Eq. (2): E += (Phi / pi) g
         tile[SUM, i] += tile[TERM, i] * red
         tile[SUM + 1, i] += tile[TERM, i] * green
         tile[SUM + 2, i] += tile[TERM, i] * blue
@@ -111,16 +85,9 @@ def _add_diffuse(tile: Array, size: int, lights: Array, k: int, clamp: Clamp | N
 
 @kernel
 def load_cells(tile: Array, points: Array, normals: Array, cells: Array) -> None:
-    """Put some points into a tile and clear its sums.
+    """Load points and normals of some cells (<= TILE indices) into rows X and NX of a tile, and clear its sums.
 
-    Parameters
-    ----------
-    tile : (TILE_ROWS, TILE) ndarray
-        Filled in rows X, NX and SUM.
-    points, normals : (3, n) ndarray
-        Points, m, and unit vectors.
-    cells : (<= TILE,) ndarray of int
-        Which of them.
+    points, normals: (3, n), m and unit vectors.
     """
     for axis in range(3):
         for i in range(len(cells)):

@@ -1,4 +1,4 @@
-"""All cells that show a surface as one tree, and the lists of subsplats that are cut out of it.
+"""The tree of all cells that show a surface, out of which lists of subsplats are cut.
 
 Cells follow level by level from the coarsest, the children of a cell next to each other in Morton order. A list that
 refines cell after cell therefore reads positions and normals of neighbours from neighbouring places.
@@ -15,7 +15,7 @@ from refgi.splat.multires.refinement.grid import Subsplats, level_shape, represe
 Array = npt.NDArray[Any]
 
 
-class Tree(NamedTuple):
+class CellTree(NamedTuple):
     """The n cells that show a surface, of levels `top` down to the finest."""
 
     first: Array  # (n + 1,) int32, children of cell k are first[k] to first[k + 1] - 1
@@ -29,53 +29,29 @@ class Tree(NamedTuple):
     shape: tuple[int, int]  # (h, w) of the picture
 
 
-def cell_tree(covered: Array, top: int, finest: int) -> Tree:
-    """Link the cells that show a surface.
-
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    top, finest : int
-        Coarsest and finest level; no cell is finer than the coarsest.
-
-    Returns
-    -------
-    Tree
-        The cells.
-    """
-    places = representatives(covered, top)
+def cell_tree(covered: Array, top: int, finest: int) -> CellTree:
+    """Return the tree of the cells of levels `top` to `finest`, or of `top` alone if `finest` is coarser."""
+    representative = representatives(covered, top)
     least = min(finest, top)
-    count = sum(int((place >= 0).sum()) for place in places[least:])
+    count = sum(int((pixels >= 0).sum()) for pixels in representative[least:])
     first, cells = np.empty(count + 1, np.int32), np.empty((4, count), np.int32)
     pixel = np.empty(count, np.int64)
-    offsets = np.cumsum([0, *(place.size for place in places)])
-    row, column = np.nonzero(places[top] >= 0)
+    offsets = np.cumsum([0, *(pixels.size for pixels in representative)])
+    row, column = np.nonzero(representative[top] >= 0)
     roots = done = len(row)
-    cells[:, :roots] = np.full_like(row, top), row, column, offsets[top] + row * places[top].shape[1] + column
-    pixel[:roots] = places[top][row, column]
+    masks = offsets[top] + row * representative[top].shape[1] + column
+    cells[:, :roots] = np.full_like(row, top), row, column, masks
+    pixel[:roots] = representative[top][row, column]
     begin = 0
     for level in range(top - 1, least - 1, -1):
-        begin, done = done, _grow(places[level], level, int(offsets[level]), begin, done, first, cells, pixel)
+        begin, done = done, _append_level(representative[level], level, int(offsets[level]), begin, done, first, cells,
+                                          pixel)
     first[begin:] = count
-    return Tree(first, cells[0].astype(np.uint8), cells[1], cells[2], pixel, cells[3], roots, top, covered.shape)
+    return CellTree(first, cells[0].astype(np.uint8), cells[1], cells[2], pixel, cells[3], roots, top, covered.shape)
 
 
-def cut(tree: Tree, cells: Array) -> Subsplats:
-    """Return cells of the tree as a list of subsplats.
-
-    Parameters
-    ----------
-    tree : Tree
-        All cells.
-    cells : (n,) ndarray of int32
-        Leaves: every pixel with a surface in exactly one; depth first.
-
-    Returns
-    -------
-    Subsplats
-        The list.
-    """
+def subsplats_of_leaves(tree: CellTree, cells: Array) -> Subsplats:
+    """Return cells of the tree (every covered pixel in exactly one, depth first) as a list of subsplats."""
     sizes = [level_shape(*tree.shape, level) for level in range(tree.top + 1)]
     flat = np.zeros(sum(h * w for h, w in sizes), np.bool_)
     flat[tree.mask[cells]] = True
@@ -84,49 +60,36 @@ def cut(tree: Tree, cells: Array) -> Subsplats:
     return Subsplats(tree.level[cells], tree.row[cells], tree.column[cells], tree.pixel[cells], leaf, tree.shape)
 
 
-def above_leaves(tree: Tree, subsplats: Subsplats) -> Array:
-    """Tell which cells a list of subsplats refines.
-
-    Parameters
-    ----------
-    tree : Tree
-        All cells.
-    subsplats : Subsplats
-        A list of the same picture and levels.
-
-    Returns
-    -------
-    (n,) ndarray of bool
-        True for the cells that have leaves below them.
-    """
+def interior_cells(tree: CellTree, subsplats: Subsplats) -> Array:
+    """Return which cells of the tree a list of subsplats refines, (n,) bool: those with leaves below them."""
     leaf = np.concatenate([mask.ravel() for mask in subsplats.leaf])[tree.mask]
-    above = np.zeros(len(leaf), np.bool_)
-    _descend(tree.first, leaf, tree.roots, above)
-    return above
+    interior = np.zeros(len(leaf), np.bool_)
+    _mark_interior(tree.first, leaf, tree.roots, interior)
+    return interior
 
 
 @kernel
-def _grow(
-    place: Array, level: int, offset: int, begin: int, end: int, first: Array, cells: Array, pixel: Array
+def _append_level(
+    pixels: Array, level: int, offset: int, begin: int, end: int, first: Array, cells: Array, pixel: Array
 ) -> int:
     """Append the children, at `level`, of the cells begin to end - 1; return where they end."""
-    height, width = place.shape
+    height, width = pixels.shape
     done = end
     for k in range(begin, end):
         first[k] = done
         for quadrant in range(4):
             i, j = 2 * cells[1, k] + quadrant // 2, 2 * cells[2, k] + quadrant % 2
-            if i < height and j < width and place[i, j] >= 0:
+            if i < height and j < width and pixels[i, j] >= 0:
                 cells[0, done], cells[1, done], cells[2, done] = level, i, j
                 cells[3, done] = offset + i * width + j
-                pixel[done] = place[i, j]
+                pixel[done] = pixels[i, j]
                 done += 1
     return done
 
 
 @kernel
-def _descend(first: Array, leaf: Array, roots: int, above: Array) -> None:
-    above[:roots] = ~leaf[:roots]
+def _mark_interior(first: Array, leaf: Array, roots: int, interior: Array) -> None:
+    interior[:roots] = ~leaf[:roots]
     for k in range(len(leaf)):
         for child in range(first[k], first[k + 1]):
-            above[child] = above[k] and not leaf[child]
+            interior[child] = interior[k] and not leaf[child]

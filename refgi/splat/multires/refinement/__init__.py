@@ -1,6 +1,7 @@
-"""Which cells of the picture are subsplats (Nichols and Wyman 2009, Sec. 3.2 and 3.3).
+"""Refinement of subsplats by geometry (Nichols and Wyman 2009, Sec. 3.2 and 3.3).
 
-`grid` names the cells and draws them (Fig. 5), `changes` and `criteria` find those that hold a discontinuity, by mips
-of pictures of any size (`pyramid`), `cells` says what neighbours across a corner do to that, `refine` lists the
-subsplats, in one visit or pass by pass.
+`grid` defines cells, subsplats and their representative pixels (Fig. 5). `mipmap` holds min-max and max mipmaps of
+pictures of any size, `derivatives` builds those of depth slopes and of curvatures (Eq. 1), `criteria` builds those of
+depth and normal ranges and compares all of them with their thresholds. `cells` adds the rules for diagonal neighbours
+and `refine` lists the subsplats, in a single pass or pass by pass as published.
 """

@@ -1,30 +1,31 @@
-"""Which cells are refined: by their own discontinuity or for their neighbours' sake (Nichols and Wyman 2009, Sec. 5.2).
+"""Classification of cells: empty, fine enough or refined (Nichols and Wyman 2009, Sec. 3.3 and 5.2).
 
-Discontinuities just across a cell's corner leave artefacts (Fig. 15 bottom), so neighbours can count, at the same
-level; outside the screen there is no discontinuity::
+A cell is refined for its own discontinuity or for its neighbours'. Discontinuities just across a cell's corner leave
+artefacts (Fig. 15 bottom), so neighbours at the same level can count; outside the screen there is no discontinuity::
 
-    off        its own alone
-    corner     a diagonal neighbour has one and the two cells that touch both have none: no other rule would tell
+    off        the cell's own discontinuity alone
+    corner     a diagonal neighbour has one and the two cells that touch both have none: no other rule would see it
     literal    any diagonal neighbour has one, as the paper says
     full8      any of the eight neighbours has one
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.splat.multires.refinement.pyramid import layout, room, views
+from refgi.splat.multires.refinement.mipmap import element_count, layout, level_views
+from refgi.splat.multires.settings import Diagonal
 
 Array = npt.NDArray[Any]
 
-RULES = ("off", "corner", "literal", "full8")
+RULES = get_args(Diagonal)
 EMPTY, ENOUGH, REFINED = range(3)  # states of a cell
 
 
-class Cells(NamedTuple):
-    """What is known of the cells of all levels."""
+class CellStates(NamedTuple):
+    """States of the cells of all levels."""
 
     covered: Array  # (h, w) bool
     state: Array  # (n,) uint8: EMPTY (no surface), ENOUGH or REFINED, levels 1 to top
@@ -32,42 +33,31 @@ class Cells(NamedTuple):
     leaf_sizes: Array  # (top + 1, 3): layout with level 0
 
 
-def classified(need: tuple[Array, ...], covered: Array, diagonal: str) -> Cells:
-    """Return the state of every cell.
+def classify_cells(discontinuous: tuple[Array, ...], covered: Array, diagonal: Diagonal) -> CellStates:
+    """Return the state of every cell: REFINED if it, or by the rule a neighbour, is discontinuous.
 
-    Parameters
-    ----------
-    need : tuple of (h_l, w_l) ndarray of bool
-        Which cells hold a discontinuity, for levels 0 to top; level 0 is never refined.
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    diagonal : str
-        One of `RULES`.
-
-    Returns
-    -------
-    Cells
-        REFINED is what shows a surface and has a need or, by the rule, neighbours that do.
+    discontinuous: levels 0 to top of (h_l, w_l) bool, of which level 0 is never refined; covered: (h, w) bool, where
+    the picture shows a surface; diagonal: one of `RULES`.
     """
     rule = RULES.index(diagonal)
     height, width = covered.shape
-    top = len(need) - 1
+    top = len(discontinuous) - 1
     sizes, leaf_sizes = layout(height, width, top, first=1), layout(height, width, top)
-    state = np.empty(room(sizes) if top else 0, np.uint8)
-    levels = views(state, sizes, first=1)
+    state = np.empty(element_count(sizes) if top else 0, np.uint8)
+    levels = level_views(state, sizes, first=1)
     finer = covered.view(np.uint8)
     for cells in levels:
-        _fill(finer, cells)
+        _mark_covered(finer, cells)
         finer = cells
     for level, cells in enumerate(levels, start=1):
         framed = np.zeros((cells.shape[0] + 2, cells.shape[1] + 2), np.uint8)
-        framed[1:-1, 1:-1] = need[level]
+        framed[1:-1, 1:-1] = discontinuous[level]
         _classify(framed, rule, cells)
-    return Cells(covered, state, sizes, leaf_sizes)
+    return CellStates(covered, state, sizes, leaf_sizes)
 
 
 @kernel
-def _fill(finer: Array, cells: Array) -> None:
+def _mark_covered(finer: Array, cells: Array) -> None:
     """Store whether any of the finer cells (0 or not) within each cell shows a surface."""
     columns = finer.shape[1]
     pairs = columns // 2
@@ -92,6 +82,7 @@ def _classify_row(up: Array, here: Array, down: Array, rule: int, cells: Array) 
         refined = here[j + 1]
         if rule == 1:
             left, right, above, below = here[j], here[j + 2], up[j + 1], down[j + 1]
+            # Sec. 5.2: diagonal neighbours
             refined |= up[j] & ~(above | left) | up[j + 2] & ~(above | right)
             refined |= down[j] & ~(below | left) | down[j + 2] & ~(below | right)
         if rule >= 2:

@@ -1,12 +1,9 @@
-"""Which cells hold a discontinuity (Nichols and Wyman 2009, Sec. 3.2 and 4.1): mips against thresholds.
+"""Discontinuities within cells: min-max mipmaps against thresholds (Nichols and Wyman 2009, Sec. 3.2 and 4.1).
 
-A cell needs to be refined where any criterion asked for says so. Criteria not asked for are not built.
-
-Min-max mips that find discontinuities (Nichols and Wyman 2009, Sec. 3.2): ranges of depth and of normals.
-
-Each cell of each level holds the least and the largest value of its pixels. Only those that show a surface count, so a
-silhouette against nothing is no discontinuity. A picture of any size has such a mip: cells at its border are cut.
-Differences between neighbours have max mips in `changes`.
+A cell is discontinuous where any of the criteria says so; mipmaps of other criteria are not built. Each cell of a
+min-max mipmap holds the least and the largest value of its pixels. Only pixels that show a surface count, so a
+silhouette against the background is no discontinuity. `derivatives` has the max mipmaps of differences between
+neighbours.
 """
 
 import math
@@ -16,13 +13,23 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.multires.refinement.changes import curvatures, depth_slopes
-from refgi.splat.multires.refinement.pyramid import COLUMNS, ROWS, START, Mip, coarsen, layout, room, rows_of, views
+from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
+from refgi.splat.multires.refinement.mipmap import (
+    COLUMNS,
+    ROWS,
+    START,
+    Mipmap,
+    coarsen,
+    element_count,
+    layout,
+    level_views,
+    rows_of,
+)
 from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.rsm import GBuffer
-    from refgi.splat.multires.settings import MultiresSettings
+    from refgi.splat.multires.settings import Chord, Criteria, DepthRange, DepthSlope, NormalRange, Rate
 
 Array = npt.NDArray[Any]
 CHANNELS = {"depth": ("depth",), "derivative": ("depth",), "normal": ("normal",), "curvature": ("normal", "position")}
@@ -30,7 +37,7 @@ CHUNK = 4096  # cells that a thread takes at once
 
 
 @stage("splat.depth_ranges")
-def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mip:
+def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mipmap:
     """Return the least and largest depth within each cell (Sec. 3.2.1).
 
     Parameters
@@ -51,11 +58,11 @@ def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mip:
     """
     mip = _ranges(np.ascontiguousarray(depth)[None], covered, top, rim)
     low, high = (tuple(level[0] for level in side) for side in (mip.low, mip.high))
-    return Mip(low, high, mip.lows, mip.highs)
+    return Mipmap(low, high, mip.lows, mip.highs)
 
 
 @stage("splat.normal_ranges")
-def normal_ranges(normal: Array, covered: Array, top: int, rim: int = 0) -> Mip:
+def normal_ranges(normal: Array, covered: Array, top: int, rim: int = 0) -> Mipmap:
     """Return the least and largest of each component of the normals within each cell (Sec. 3.2.2).
 
     Parameters
@@ -77,18 +84,18 @@ def normal_ranges(normal: Array, covered: Array, top: int, rim: int = 0) -> Mip:
     return _ranges(np.ascontiguousarray(normal), covered, top, rim)
 
 
-def _ranges(plane: Array, covered: Array, top: int, rim: int) -> Mip:
-    """Return the min-max mip of the channels (c, h, w) of a picture."""
+def _ranges(plane: Array, covered: Array, top: int, rim: int) -> Mipmap:
+    """Return the min-max mipmap of the channels of a picture, (c, h, w)."""
     height, width = covered.shape
     sizes = layout(height, width, top, first=1)
-    cells = room(sizes) if top else 0
+    cells = element_count(sizes) if top else 0
     lows, highs = np.empty((len(plane), cells), plane.dtype), np.empty((len(plane), cells), plane.dtype)
     if top:
         strips, across = sizes[top, ROWS], 2 * sizes[1, COLUMNS] + 2 * rim
         rows = np.empty((strips, 2, across), plane.dtype)
         _build_ranges(plane, np.ascontiguousarray(covered), rim, sizes, rows, lows, highs)
-    low, high = ((plane, *views(side, sizes, first=1)) for side in (lows, highs))
-    return Mip(low, high, lows, highs)
+    low, high = ((plane, *level_views(side, sizes, first=1)) for side in (lows, highs))
+    return Mipmap(low, high, lows, highs)
 
 
 @kernel(parallel=True)
@@ -143,97 +150,109 @@ def _over_columns(least: Array, most: Array, rim: int, low: Array, high: Array) 
 
 
 @stage("splat.criteria")
-def needs(buffer: "GBuffer", settings: "MultiresSettings", top: int) -> tuple[Array, ...]:
+def discontinuities(buffer: "GBuffer", criteria: "Criteria", top: int, finest: int = 0) -> tuple[Array, ...]:
     """Return which cells of each level hold a discontinuity.
 
     Parameters
     ----------
     buffer : GBuffer
-        What the camera sees.
-    settings : MultiresSettings
-        Criteria, their thresholds, `rim` and the level that is `finest`.
-    top : int
-        Coarsest level.
+        The camera's G-buffer.
+    criteria : Criteria
+        Mipmaps to build, their thresholds and the `rim`.
+    top, finest : int
+        Coarsest and finest level.
 
     Returns
     -------
     tuple of (h_l, w_l) ndarray of bool
-        For levels 0 to `top`; False at levels up to `finest`, which is never refined, and where no surface is.
+        Levels 0 to `top`; False at levels up to `finest`, which is never refined, and where a cell shows no surface.
     """
     height, width = buffer.covered.shape
     sizes = layout(height, width, top, first=1)
-    need = np.zeros(room(sizes) if top else 0, np.bool_)
-    begin = sizes[settings.finest + 1, START] if settings.finest < top else len(need)
-    if begin < len(need):
-        buffer.resolve(*(name for criterion in sorted(settings.criteria) for name in CHANNELS[criterion]))
-        for criterion in sorted(settings.criteria):
-            _JUDGES[criterion](buffer, settings, top, need, begin)
-    return (np.zeros((height, width), np.bool_), *views(need, sizes, first=1))
+    discontinuous = np.zeros(element_count(sizes) if top else 0, np.bool_)
+    begin = sizes[finest + 1, START] if finest < top else len(discontinuous)
+    if begin < len(discontinuous):
+        chosen = [name for name in sorted(_MARK_BY) if getattr(criteria, name) is not None]
+        buffer.resolve(*(channel for name in chosen for channel in CHANNELS[name]))
+        for name in chosen:
+            _MARK_BY[name](buffer, getattr(criteria, name), criteria.rim, top, discontinuous, begin)
+    return (np.zeros((height, width), np.bool_), *level_views(discontinuous, sizes, first=1))
 
 
-def _judge_depth(buffer: "GBuffer", settings: "MultiresSettings", top: int, need: Array, begin: int) -> None:
-    mip = depth_ranges(buffer.depth, buffer.covered, top, settings.rim)
-    _mark_depths(mip.lows[0], mip.highs[0], buffer.depth.dtype.type(settings.depth_threshold), begin, need)
+def _mark_by_depth(
+    buffer: "GBuffer", settings: "DepthRange", rim: int, top: int, discontinuous: Array, begin: int
+) -> None:
+    mip = depth_ranges(buffer.depth, buffer.covered, top, rim)
+    _mark_depths(mip.lows[0], mip.highs[0], buffer.depth.dtype.type(settings.threshold), begin, discontinuous)
 
 
-def _judge_derivative(buffer: "GBuffer", settings: "MultiresSettings", top: int, need: Array, begin: int) -> None:
+def _mark_by_derivative(
+    buffer: "GBuffer", settings: "DepthSlope", _: int, top: int, discontinuous: Array, begin: int
+) -> None:
     mip = depth_slopes(buffer.depth, buffer.covered, top)
-    _mark_maxima(mip.highs[0], buffer.depth.dtype.type(settings.derivative_threshold), begin, need)
+    _mark_maxima(mip.highs[0], buffer.depth.dtype.type(settings.threshold), begin, discontinuous)
 
 
-def _judge_normal(buffer: "GBuffer", settings: "MultiresSettings", top: int, need: Array, begin: int) -> None:
-    components = buffer.normal if settings.normal_components == "xyz" else buffer.normal[:2]
-    mip = normal_ranges(components, buffer.covered, top, settings.rim)
-    _mark_normals(mip.lows, mip.highs, buffer.normal.dtype.type(settings.normal_threshold), begin, need)
+def _mark_by_normal(
+    buffer: "GBuffer", settings: "NormalRange", rim: int, top: int, discontinuous: Array, begin: int
+) -> None:
+    components = buffer.normal if settings.components == "xyz" else buffer.normal[:2]
+    mip = normal_ranges(components, buffer.covered, top, rim)
+    _mark_normals(mip.lows, mip.highs, buffer.normal.dtype.type(settings.threshold), begin, discontinuous)
 
 
-def _judge_curvature(buffer: "GBuffer", settings: "MultiresSettings", top: int, need: Array, begin: int) -> None:
-    mip = curvatures(buffer.normal, buffer.position, buffer.covered, top, settings.curvature == "rate")
-    _mark_maxima(mip.highs[0], buffer.normal.dtype.type(settings.curvature_threshold), begin, need)
+def _mark_by_curvature(
+    buffer: "GBuffer", settings: "Chord | Rate", _: int, top: int, discontinuous: Array, begin: int
+) -> None:
+    mip = curvatures(buffer.normal, buffer.position, buffer.covered, top, settings.name() == "rate")
+    _mark_maxima(mip.highs[0], buffer.normal.dtype.type(settings.threshold), begin, discontinuous)
 
 
-_JUDGES = {"depth": _judge_depth, "derivative": _judge_derivative, "normal": _judge_normal,
-           "curvature": _judge_curvature}
+_MARK_BY: dict[str, Any] = {"depth": _mark_by_depth, "derivative": _mark_by_derivative, "normal": _mark_by_normal,
+            "curvature": _mark_by_curvature}
 
 
 @kernel(parallel=True)
-def _mark_depths(low: Array, high: Array, threshold: Any, begin: int, need: Array) -> None:
+def _mark_depths(low: Array, high: Array, threshold: Any, begin: int, discontinuous: Array) -> None:
     """Mark cells whose depths spread by more than a share of the nearest."""
-    for chunk in prange((len(need) - begin + CHUNK - 1) // CHUNK):
-        a, b = begin + chunk * CHUNK, min(begin + (chunk + 1) * CHUNK, len(need))
-        _mark_depths_of_chunk(low[a:b], high[a:b], threshold, need[a:b])
+    for chunk in prange((len(discontinuous) - begin + CHUNK - 1) // CHUNK):
+        a, b = begin + chunk * CHUNK, min(begin + (chunk + 1) * CHUNK, len(discontinuous))
+        _mark_depths_of_chunk(low[a:b], high[a:b], threshold, discontinuous[a:b])
 
 
 @kernel
-def _mark_depths_of_chunk(low: Array, high: Array, threshold: Any, need: Array) -> None:
-    for k in range(len(need)):
-        need[k] |= high[k] - low[k] > threshold * low[k]
+def _mark_depths_of_chunk(low: Array, high: Array, threshold: Any, discontinuous: Array) -> None:
+    for k in range(len(discontinuous)):
+        # Sec. 3.2.1, depth threshold: max - min of depth over a share of the least
+        discontinuous[k] |= high[k] - low[k] > threshold * low[k]
 
 
 @kernel(parallel=True)
-def _mark_normals(low: Array, high: Array, threshold: Any, begin: int, need: Array) -> None:
+def _mark_normals(low: Array, high: Array, threshold: Any, begin: int, discontinuous: Array) -> None:
     """Mark cells in which any component of the normals spreads by more than the threshold (Sec. 3.2.2)."""
-    for chunk in prange((len(need) - begin + CHUNK - 1) // CHUNK):
-        a, b = begin + chunk * CHUNK, min(begin + (chunk + 1) * CHUNK, len(need))
+    for chunk in prange((len(discontinuous) - begin + CHUNK - 1) // CHUNK):
+        a, b = begin + chunk * CHUNK, min(begin + (chunk + 1) * CHUNK, len(discontinuous))
         for c in range(len(low)):
-            _mark_spreads_of_chunk(low[c, a:b], high[c, a:b], threshold, need[a:b])
+            _mark_spreads_of_chunk(low[c, a:b], high[c, a:b], threshold, discontinuous[a:b])
 
 
 @kernel
-def _mark_spreads_of_chunk(low: Array, high: Array, threshold: Any, need: Array) -> None:
-    for k in range(len(need)):
-        need[k] |= high[k] - low[k] > threshold
+def _mark_spreads_of_chunk(low: Array, high: Array, threshold: Any, discontinuous: Array) -> None:
+    for k in range(len(discontinuous)):
+        # Sec. 3.2.2, normal threshold: max - min of a component
+        discontinuous[k] |= high[k] - low[k] > threshold
 
 
 @kernel(parallel=True)
-def _mark_maxima(high: Array, threshold: Any, begin: int, need: Array) -> None:
+def _mark_maxima(high: Array, threshold: Any, begin: int, discontinuous: Array) -> None:
     """Mark cells whose largest value exceeds the threshold."""
-    for chunk in prange((len(need) - begin + CHUNK - 1) // CHUNK):
-        a, b = begin + chunk * CHUNK, min(begin + (chunk + 1) * CHUNK, len(need))
-        _mark_maxima_of_chunk(high[a:b], threshold, need[a:b])
+    for chunk in prange((len(discontinuous) - begin + CHUNK - 1) // CHUNK):
+        a, b = begin + chunk * CHUNK, min(begin + (chunk + 1) * CHUNK, len(discontinuous))
+        _mark_maxima_of_chunk(high[a:b], threshold, discontinuous[a:b])
 
 
 @kernel
-def _mark_maxima_of_chunk(high: Array, threshold: Any, need: Array) -> None:
-    for k in range(len(need)):
-        need[k] |= high[k] > threshold
+def _mark_maxima_of_chunk(high: Array, threshold: Any, discontinuous: Array) -> None:
+    for k in range(len(discontinuous)):
+        # Eq. (1), curvature threshold, and depth derivatives
+        discontinuous[k] |= high[k] > threshold

@@ -1,9 +1,7 @@
-"""The cells that subsplats cover: levels of the picture, the pixel that stands for a cell, the list of subsplats.
+"""Cells of a picture's levels, their representative pixels and the list of subsplats (Nichols and Wyman 2009).
 
 Level l has cells of 2^l x 2^l pixels, level 0 is the picture itself. Pictures of any size have such levels: cells at
-the right and lower border are cut by the picture. A cell without any surface is never refined and never lit.
-
-A picture of the subsplats (Nichols and Wyman 2009, Fig. 5): the finer, the brighter.
+the right and lower border are cut. A cell without any surface is never refined and never evaluated.
 """
 
 from typing import Any, NamedTuple
@@ -45,19 +43,7 @@ class Subsplats(NamedTuple):
 
 
 def level_shape(height: int, width: int, level: int) -> tuple[int, int]:
-    """Return rows and columns of a level.
-
-    Parameters
-    ----------
-    height, width : int
-        Size of the picture.
-    level : int
-        0 or more.
-
-    Returns
-    -------
-    tuple of 2 ints
-        Cells, those cut by the border counted in.
+    """Return rows and columns of a level, cells cut by the border included.
 
     Examples
     --------
@@ -68,19 +54,7 @@ def level_shape(height: int, width: int, level: int) -> tuple[int, int]:
 
 
 def top_level(height: int, width: int, coarsest: int) -> int:
-    """Return the coarsest level: the first whose longer side has no more cells than asked for.
-
-    Parameters
-    ----------
-    height, width : int
-        Size of the picture.
-    coarsest : int
-        Cells, 1 or more; the paper's is 16.
-
-    Returns
-    -------
-    int
-        Level.
+    """Return the coarsest level: the first whose longer side has at most `coarsest` cells (16 in the paper).
 
     Examples
     --------
@@ -95,23 +69,11 @@ def top_level(height: int, width: int, coarsest: int) -> int:
 
 @kernel
 def representative(covered: Array, level: int, i: int, j: int) -> int:
-    """Return the pixel that stands for a cell: the one right and below of its centre, or the nearest with a surface.
+    """Return a cell's representative pixel: the one right and below of its centre, or the nearest that shows a surface.
 
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    level, i, j : int
-        The cell.
+    covered: (h, w) bool; level, i, j: the cell. Returns a flat index, -1 where the cell shows no surface.
 
-    Returns
-    -------
-    int
-        Flat index; -1 where the cell shows no surface.
-
-    Notes
-    -----
-    The paper does not say where a coarse subsplat is lit; a cell of an even side has no pixel in its centre.
+    The paper does not say where a coarse subsplat is evaluated; a cell of an even side has no pixel in its centre.
     """
     height, width = covered.shape
     side, half = 1 << level, (1 << level) >> 1
@@ -131,12 +93,12 @@ def representative(covered: Array, level: int, i: int, j: int) -> int:
 
 @stage("splat.representatives")
 def representatives(covered: Array, top: int) -> tuple[Array, ...]:
-    """Return the pixel that stands for each cell of each level.
+    """Return the representative pixel of each cell of each level.
 
     Parameters
     ----------
     covered : (h, w) ndarray of bool
-        Whether there is a surface.
+        Whether a pixel shows a surface.
     top : int
         Coarsest level.
 
@@ -148,31 +110,22 @@ def representatives(covered: Array, top: int) -> tuple[Array, ...]:
     height, width = covered.shape
     places = tuple(np.empty(level_shape(height, width, level), np.int32) for level in range(top + 1))
     for level, place in enumerate(places):
-        _fill(covered, level, place)
+        _fill_representatives(covered, level, place)
     return places
 
 
 @kernel(parallel=True)
-def _fill(covered: Array, level: int, place: Array) -> None:
+def _fill_representatives(covered: Array, level: int, place: Array) -> None:
     for i in prange(place.shape[0]):
         for j in range(place.shape[1]):
             place[i, j] = representative(covered, level, i, j)
 
 
 def level_picture(subsplats: Subsplats, *, edges: bool = True) -> Array:
-    """Return the picture of which level lights each pixel.
+    """Return the picture of the level each pixel is evaluated at, (h, w) float32: the finer, the brighter (Fig. 5).
 
-    Parameters
-    ----------
-    subsplats : Subsplats
-        The leaves.
-    edges : bool
-        Darken the upper and left edge of cells of 4 x 4 pixels and more.
-
-    Returns
-    -------
-    (h, w) ndarray of float32
-        1 where pixels are lit one by one, less by equal steps for every coarser level, 0 where nothing is lit.
+    1 where pixels are evaluated one by one, less by equal steps for every coarser level, 0 without surface; `edges`
+    darken the upper and left edge of cells of 4 x 4 pixels and more.
     """
     height, width = subsplats.shape
     picture = np.zeros((height, width), np.float32)

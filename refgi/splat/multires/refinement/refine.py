@@ -1,51 +1,36 @@
-"""The list of subsplats (Nichols and Wyman 2009, Sec. 3.3): cells are split until none needs it or the finest is met.
+"""The list of subsplats (Nichols and Wyman 2009, Sec. 3.3): cells are split until none is REFINED or the finest is met.
 
-The paper refines a list pass by pass (`pass_by_pass`). Visiting the cells of the coarsest level one by one, depth
-first, and going down only where a cell is refined gives the same subsplats in one visit, whatever the criteria. To
-read a level off by itself ("own level enough, level above not", as the authors' demo does) gives them only where all
-cells around a refined one are refined too: true of ranges with thresholds that do not rise with the level and of the
-rules "off" and "full8", not of "corner" and "literal".
-
-The list of subsplats as the paper refines it (Nichols and Wyman 2009, Sec. 3.3): the whole list, pass by pass.
+The paper refines a list pass by pass (`pass_by_pass`). A depth-first visit of the coarsest cells, which goes down only
+where a cell is refined, gives the same subsplats in a single pass, whatever the criteria. To read a level off by itself
+("own level enough, level above not", as the authors' demo does) gives them only where all cells around a refined one
+are refined too: true of ranges with thresholds that do not rise with the level and of the rules "off" and "full8", not
+of "corner" and "literal".
 """
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.multires.refinement.cells import EMPTY, ENOUGH, REFINED, Cells, classified
+from refgi.splat.multires.refinement.cells import EMPTY, ENOUGH, REFINED, CellStates, classify_cells
 from refgi.splat.multires.refinement.grid import Subsplats, representative
-from refgi.splat.multires.refinement.pyramid import COLUMNS, ROWS, START, room, views
+from refgi.splat.multires.refinement.mipmap import COLUMNS, ROWS, START, element_count, level_views
+from refgi.splat.multires.settings import Diagonal, Traversal
 from refgi.stages import stage
-
-if TYPE_CHECKING:
-    from refgi.splat.multires.settings import MultiresSettings
 
 Array = npt.NDArray[Any]
 
 
-def pass_by_pass(cells: Cells) -> Subsplats:
-    """Refine the list of the coarsest cells until each subsplat had a chance to become pixels.
+def pass_by_pass(cells: CellStates) -> Subsplats:
+    """Refine the list of the coarsest cells pass by pass, as published.
 
-    Parameters
-    ----------
-    cells : Cells
-        All cells and which of them are refined.
-
-    Returns
-    -------
-    Subsplats
-        Put in order: cells of the coarsest level row by row, depth first within them.
-
-    Notes
-    -----
-    As printed, every pass tests every subsplat at its own level again, and those that stay fail each time. The order
-    of the printed list, children of a pass behind each other, means nothing to the picture.
+    As printed, every pass tests every subsplat at its own level again, and those that stay fail each time. The result
+    is sorted: cells of the coarsest level row by row, depth first within them; the order of the printed list, children
+    of a pass behind each other, means nothing to the picture.
     """
     top, sizes = len(cells.sizes) - 1, cells.sizes
-    grids = (cells.covered.view(np.uint8), *views(cells.state, sizes, first=1))
+    grids = (cells.covered.view(np.uint8), *level_views(cells.state, sizes, first=1))
     rows, columns = np.nonzero(grids[top])
     listed = np.stack([np.full(len(rows), top), rows, columns])
     for _ in range(top):
@@ -55,7 +40,7 @@ def pass_by_pass(cells: Cells) -> Subsplats:
             state[here] = grids[level][listed[1, here], listed[2, here]]
         split = state == REFINED
         listed = np.concatenate([listed[:, ~split], _children(listed[:, split], grids)], axis=1)
-    listed = listed[:, np.argsort(_place(listed, sizes))]
+    listed = listed[:, np.argsort(_morton_order(listed, sizes))]
     return _subsplats(listed, cells)
 
 
@@ -71,8 +56,8 @@ def _children(parents: Array, grids: tuple[Array, ...]) -> Array:
     return children[:, shown]
 
 
-def _place(listed: Array, sizes: Array) -> Array:
-    """Return the place of each subsplat's first pixel: cells of the coarsest level by row, Morton order within."""
+def _morton_order(listed: Array, sizes: Array) -> Array:
+    """Return sort keys: cells of the coarsest level by row, Morton order of each subsplat's first pixel within."""
     top = len(sizes) - 1
     row, column = listed[1] << listed[0], listed[2] << listed[0]
     place = (row >> top) * sizes[top, COLUMNS] + (column >> top)
@@ -81,25 +66,25 @@ def _place(listed: Array, sizes: Array) -> Array:
     return np.asarray(place)
 
 
-def _subsplats(listed: Array, cells: Cells) -> Subsplats:
+def _subsplats(listed: Array, cells: CellStates) -> Subsplats:
     count = listed.shape[1]
     level, row, column = listed[0].astype(np.uint8), listed[1].astype(np.int32), listed[2].astype(np.int32)
     pixel = np.empty(count, np.int64)
-    _represent(cells.covered, level, row, column, pixel)
-    leaf = np.zeros(room(cells.leaf_sizes), np.bool_)
+    _fill_pixels(cells.covered, level, row, column, pixel)
+    leaf = np.zeros(element_count(cells.leaf_sizes), np.bool_)
     starts, _, columns = cells.leaf_sizes[listed[0]].T
     leaf[starts + listed[1] * columns + listed[2]] = True
-    return Subsplats(level, row, column, pixel, views(leaf, cells.leaf_sizes), cells.covered.shape)
+    return Subsplats(level, row, column, pixel, level_views(leaf, cells.leaf_sizes), cells.covered.shape)
 
 
 @kernel
-def _represent(covered: Array, level: Array, row: Array, column: Array, pixel: Array) -> None:
+def _fill_pixels(covered: Array, level: Array, row: Array, column: Array, pixel: Array) -> None:
     for k in range(len(pixel)):
         pixel[k] = representative(covered, int(level[k]), int(row[k]), int(column[k]))
 
 
-class _List(NamedTuple):
-    """Where the subsplats are written."""
+class _Columns(NamedTuple):
+    """Columns of the list that the depth-first visit writes."""
 
     level: Array
     row: Array
@@ -109,50 +94,55 @@ class _List(NamedTuple):
 
 
 @stage("splat.refine")
-def refine(need: tuple[Array, ...], covered: Array, settings: "MultiresSettings") -> Subsplats:
+def refine(
+    discontinuous: tuple[Array, ...], covered: Array, diagonal: Diagonal = "corner",
+    traversal: Traversal = "single_pass",
+) -> Subsplats:
     """Return the subsplats that cover every surface of the picture once.
 
     Parameters
     ----------
-    need : tuple of (h_l, w_l) ndarray of bool
+    discontinuous : tuple of (h_l, w_l) ndarray of bool
         Which cells hold a discontinuity, for levels 0 to top; level 0 is never refined.
     covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    settings : MultiresSettings
-        `diagonal`, and `refinement`: "single_pass", depth first, or "list", as published; both give the same.
+        Whether a pixel shows a surface.
+    diagonal : str
+        Neighbours across a corner that count: "off", "corner", "literal" or "full8"; see `cells`.
+    traversal : str
+        "single_pass", depth first, or "list", as published; both give the same.
 
     Returns
     -------
     Subsplats
         Cells of the coarsest level row by row, depth first within them.
     """
-    cells = classified(need, np.ascontiguousarray(covered), settings.diagonal)
-    return pass_by_pass(cells) if settings.refinement == "list" else _depth_first(cells)
+    cells = classify_cells(discontinuous, np.ascontiguousarray(covered), diagonal)
+    return pass_by_pass(cells) if traversal == "list" else _depth_first(cells)
 
 
-def _depth_first(cells: Cells) -> Subsplats:
-    """Return the subsplats from one visit: count those of each cell of the coarsest level, then write them."""
+def _depth_first(cells: CellStates) -> Subsplats:
+    """Return the subsplats in a single pass: count those of each cell of the coarsest level, then write them."""
     counts = np.zeros(cells.leaf_sizes[-1, ROWS] * cells.leaf_sizes[-1, COLUMNS], np.int64)
     _count(cells, counts)
     ends = np.cumsum(counts)
     total = int(ends[-1])
-    out = _List(np.empty(total, np.uint8), np.empty(total, np.int32), np.empty(total, np.int32),
-                np.empty(total, np.int64), np.zeros(room(cells.leaf_sizes), np.bool_))
+    out = _Columns(np.empty(total, np.uint8), np.empty(total, np.int32), np.empty(total, np.int32),
+                   np.empty(total, np.int64), np.zeros(element_count(cells.leaf_sizes), np.bool_))
     _write(cells, ends - counts, out)
-    return Subsplats(*out[:4], views(out.leaf, cells.leaf_sizes), cells.covered.shape)
+    return Subsplats(*out[:4], level_views(out.leaf, cells.leaf_sizes), cells.covered.shape)
 
 
 @kernel(parallel=True)
-def _count(cells: Cells, counts: Array) -> None:
+def _count(cells: CellStates, counts: Array) -> None:
     rows, columns = cells.leaf_sizes[-1, ROWS], cells.leaf_sizes[-1, COLUMNS]
     for k in prange(len(counts)):
-        # column by column: threads take contiguous shares, and left and right are more alike than top and bottom
+        # column by column: threads take contiguous shares, and left and right cost more evenly than top and bottom
         i, j = k % rows, k // rows
         counts[i * columns + j] = _count_in(cells, i, j)
 
 
 @kernel(parallel=True)
-def _write(cells: Cells, begins: Array, out: _List) -> None:
+def _write(cells: CellStates, begins: Array, out: _Columns) -> None:
     rows, columns = cells.leaf_sizes[-1, ROWS], cells.leaf_sizes[-1, COLUMNS]
     for k in prange(len(begins)):
         i, j = k % rows, k // rows
@@ -160,7 +150,7 @@ def _write(cells: Cells, begins: Array, out: _List) -> None:
 
 
 @kernel
-def _state(cells: Cells, level: int, i: int, j: int) -> int:
+def _state_of(cells: CellStates, level: int, i: int, j: int) -> int:
     """Return the state of a cell; EMPTY outside the picture."""
     rows, columns = cells.sizes[level, ROWS], cells.sizes[level, COLUMNS]
     if i >= rows or j >= columns:
@@ -169,7 +159,7 @@ def _state(cells: Cells, level: int, i: int, j: int) -> int:
 
 
 @kernel
-def _next(level: int, i: int, j: int, top: int) -> tuple[int, int, int]:
+def _next_cell(level: int, i: int, j: int, top: int) -> tuple[int, int, int]:
     """Return the cell after one and all inside it, depth first; its level is above `top` where there is none."""
     while level < top and i & 1 and j & 1:
         level, i, j = level + 1, i >> 1, j >> 1
@@ -179,7 +169,7 @@ def _next(level: int, i: int, j: int, top: int) -> tuple[int, int, int]:
 
 
 @kernel
-def _blocks_in(cells: Cells, level: int, i: int, j: int) -> tuple[int, int, int, int]:
+def _blocks_in(cells: CellStates, level: int, i: int, j: int) -> tuple[int, int, int, int]:
     """Return the first and last + 1 of the rows and columns of level 1 in a cell of level 1 or 2."""
     along = level - 1
     rows, columns = cells.sizes[1, ROWS], cells.sizes[1, COLUMNS]
@@ -187,12 +177,12 @@ def _blocks_in(cells: Cells, level: int, i: int, j: int) -> tuple[int, int, int,
 
 
 @kernel
-def _count_in(cells: Cells, i: int, j: int) -> int:
+def _count_in(cells: CellStates, i: int, j: int) -> int:
     """Return the subsplats in a cell of the coarsest level."""
     top = len(cells.sizes) - 1
     level, count = top, 0
     while level <= top:
-        state = _state(cells, level, i, j)
+        state = _state_of(cells, level, i, j)
         if state == REFINED and level > 2:
             level, i, j = level - 1, 2 * i, 2 * j
             continue
@@ -203,12 +193,12 @@ def _count_in(cells: Cells, i: int, j: int) -> int:
                     count += _count_of_block(cells, y, x)
         else:
             count += state == ENOUGH
-        level, i, j = _next(level, i, j, top)
+        level, i, j = _next_cell(level, i, j, top)
     return count
 
 
 @kernel
-def _count_of_block(cells: Cells, i: int, j: int) -> int:
+def _count_of_block(cells: CellStates, i: int, j: int) -> int:
     """Return the subsplats in a cell of level 1, whose level above is refined."""
     covered = cells.covered
     y, x = min(2 * i + 1, covered.shape[0] - 1), min(2 * j + 1, covered.shape[1] - 1)
@@ -220,14 +210,14 @@ def _count_of_block(cells: Cells, i: int, j: int) -> int:
 
 
 @kernel
-def _write_in(cells: Cells, i: int, j: int, at: int, out: _List) -> None:
+def _write_in(cells: CellStates, i: int, j: int, at: int, out: _Columns) -> None:
     """Write the subsplats in a cell of the coarsest level, from place `at` of the list on."""
     covered, _, sizes, leaf_sizes = cells
     levels, rows, columns, pixels, leaf = out
     top = len(sizes) - 1
     level = top
     while level <= top:
-        state = _state(cells, level, i, j)
+        state = _state_of(cells, level, i, j)
         if state == REFINED and level > 1:
             level, i, j = level - 1, 2 * i, 2 * j
             continue
@@ -243,4 +233,4 @@ def _write_in(cells: Cells, i: int, j: int, at: int, out: _List) -> None:
                         levels[at], rows[at], columns[at], pixels[at] = 0, y, x, y * covered.shape[1] + x
                         leaf[y * covered.shape[1] + x] = True
                         at += 1
-        level, i, j = _next(level, i, j, top)
+        level, i, j = _next_cell(level, i, j, top)

@@ -1,5 +1,5 @@
-"""What becomes of subsplats (Nichols and Wyman 2009, Sec. 3.4, 3.5 and 4.3).
+"""Evaluation of subsplats and upsampling to pixels (Nichols and Wyman 2009, Sec. 3.4, 3.5 and 4.3).
 
-`evaluate` lights them, by shadow rays or without; `upsample` makes a picture of the illumination buffer's layers by the
-masked filter of `tent`, as the authors' demo does or naively; `detail` darkens it by Eq. 3.
+`evaluate` sums Eq. 2 at subsplats, with shadow rays or without. `upsample` turns the layers of the illumination buffer
+into a picture, by the masked filter of `tent`, as the authors' demo does or naively. `detail` is Eq. 3.
 """

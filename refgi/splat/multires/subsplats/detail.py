@@ -1,4 +1,4 @@
-"""Surface detail that coarse subsplats lost, put back ad hoc (Nichols and Wyman 2009, Sec. 4.3, Eq. 3)."""
+"""Surface detail restored ad hoc by <V, N> (Nichols and Wyman 2009, Sec. 4.3, Eq. 3)."""
 
 import math
 from typing import Any
@@ -24,7 +24,7 @@ def surface_detail(
     irradiance : (3, h, w) ndarray
         Indirect irradiance, W/m^2.
     position, normal : (3, h, w) ndarray
-        World space, m; unit normal on the side that is seen.
+        World space, m; unit normal on the camera's side.
     covered : (h, w) ndarray of bool
         Whether there is a surface.
     eye : (3,) array_like

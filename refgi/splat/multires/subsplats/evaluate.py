@@ -1,12 +1,11 @@
-"""Light at the subsplats alone, by the same sum over pairs as at every pixel (Sec. 3.4, Eq. 2).
+"""Irradiance at subsplats: the sum of Eq. 2 over all pixel lights (VPLs), with visibility by shadow rays or without.
 
-Light at the subsplats with visibility: the pairs of `vpl` at the pixels that stand for subsplats, a shadow ray each.
-
-No paper on splatting knows what blocks indirect light. With rays at subsplats alone the picture converges to `vpl` as
-they become fine, and to the truth as lights become many, at the subsplats' share of the rays.
+Without visibility the pairs are those of `irradiance` at every pixel (Nichols and Wyman 2009, Sec. 3.4). With it they
+are those of `vpl`, a shadow ray each: the picture converges to `vpl` as subsplats become fine, and to path tracing as
+lights become many, at the subsplats' share of the rays.
 """
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +18,7 @@ from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.pairs.tiles import taken
 from refgi.scene import Geometry
 from refgi.splat.multires.refinement.grid import Subsplats
+from refgi.splat.multires.settings import Representative
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
@@ -27,23 +27,22 @@ if TYPE_CHECKING:
     from refgi.rsm import GBuffer
 
 Array = npt.NDArray[Any]
-Representative = Literal["pixel", "mean"]
 
 
 @stage("splat.representative_points")
-def at_subsplats(
+def representative_points(
     buffer: "GBuffer", subsplats: Subsplats, representative: Representative = "pixel"
 ) -> tuple[Array, Array]:
-    """Return where each subsplat is lit.
+    """Return the point at which each subsplat is evaluated.
 
     Parameters
     ----------
     buffer : GBuffer
-        What the camera sees.
+        The camera's G-buffer.
     subsplats : Subsplats
-        The subsplats.
+        The n subsplats.
     representative : {"pixel", "mean"}
-        Position and normal of the pixel that stands for the cell, or the mean over the cell's surface.
+        Position and normal of the cell's representative pixel, or the mean over the cell's surface.
 
     Returns
     -------
@@ -69,9 +68,9 @@ def evaluate(
     points, normals : (3, n) ndarray
         World space, m, and unit vectors; neighbours should follow each other.
     lights : PixelLights
-        Lights to sum.
+        The lights to sum.
     settings : PairSettings
-        How one light lights one receiver.
+        Clamp, offset and lobes of a pair of light and receiver.
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
 
@@ -98,6 +97,7 @@ def evaluate(
     for first in range(0, count, step):
         part = slice(first, first + step)
         sums = np.zeros_like(np.ascontiguousarray(points[:, part]))
+        # Eq. (2)
         add_lights(np.ascontiguousarray(points[:, part]), np.ascontiguousarray(normals[:, part]), packed, sums)
         result[:, part] = sums
         report_progress(min(1.0, (first + step) / count))
@@ -134,20 +134,20 @@ def _average_cell(
 def evaluate_visible(
     tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights"
 ) -> Array:
-    """Sum the irradiance that reaches each subsplat's pixel from every pixel light.
+    """Sum the irradiance that reaches each subsplat's representative pixel from every pixel light, by shadow rays.
 
     Parameters
     ----------
     tracer : Tracer
-        The scene's rays.
+        The scene's Embree tracer.
     geometry : Geometry
-        The triangles that the buffer shows.
+        The triangles that the G-buffer's ids refer to.
     buffer : GBuffer
-        What the camera sees.
+        The camera's G-buffer.
     subsplats : Subsplats
-        The subsplats.
+        The n subsplats.
     lights : PixelLights
-        Lights to sum.
+        The lights to sum.
 
     Returns
     -------
@@ -162,6 +162,7 @@ def evaluate_visible(
     counterpart here.
     """
     position, normal, triangle_id = buffer.resolve("position", "normal", "triangle_id")
-    seen = triangle_id.reshape(-1)[subsplats.pixel]
-    to = receivers(geometry, taken(position, subsplats.pixel), taken(normal, subsplats.pixel), seen, tracer.grain)
-    return shadowed_sum(tracer, to, lights).astype(np.asarray(position).dtype)
+    triangle = triangle_id.reshape(-1)[subsplats.pixel]
+    points = receivers(geometry, taken(position, subsplats.pixel), taken(normal, subsplats.pixel), triangle,
+                       tracer.grain)
+    return shadowed_sum(tracer, points, lights).astype(np.asarray(position).dtype)

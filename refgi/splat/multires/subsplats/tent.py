@@ -1,21 +1,18 @@
-"""One pass of the masked upsampling: a level from the next coarser one and from what was lit at the level itself.
+"""One level of the masked upsampling, from the next coarser level and the subsplats of the level itself (Sec. 3.5).
 
-A texel takes the mean of the 3 x 3 texels C around it, those of the coarser level each repeated 2 x 2 (P7)::
+`tent_pass`: a texel is the mean of the 3 x 3 texels C around it, those of the coarser level each repeated 2 x 2::
 
     out = C_0 + sum_k m_k w_k (C_k - C_0) / sum_k m_k w_k,    w = (1, 2, 1) x (1, 2, 1),
 
-m = 1 where a texel was lit, here or at any coarser level, so that nothing enters from or spreads into empty ones. The
-differences to the texel itself leave constants as they are, to the bit. A texel across a corner counts only if one of
-the two beside it is there (E-AMS-09). Outside the picture lies a copy of its outermost texels: a pass over texels that
-all came from the coarser level is then its bilinear interpolation, at any size.
+m = 1 where a texel was evaluated, at this or any coarser level, so that nothing enters from or spreads into empty
+texels. The differences to the texel itself leave constants as they are, to the bit. A diagonal texel counts only if one
+of the two beside it has m = 1. The border is clamped to the edge: where all texels came from the coarser level a pass
+is then its bilinear interpolation, at any size. A task filters a band of rows and holds three rows of C and m.
 
-Work goes by bands of rows. A task keeps three rows of C and m, and writes the one between.
-
-One pass of the upsampling as the authors' demo does it (GPU Pro, 2010), which is not quite what the paper says.
-
-A texel looks at the 3 x 3 texels of the coarser level around the one it lies in, with weights (1 - f, 1, f)/2 along
-each axis, f the place of its centre in that texel: a wider filter than the tent. Only where the coarser level holds
-nothing is the neighbour at the texel's own level taken. Across a corner as in `tent`, which took its rule from here.
+`demo_pass`, as the authors' demo does it (GPU Pro, 2010), which is not quite what the paper says: the taps are the 3 x
+3 texels of the coarser level around the one that a texel lies in, with weights (1 - f, 1, f)/2 along each axis, f the
+place of its centre in that texel: a wider filter than the tent. Only where the coarser level holds nothing is the
+neighbour at the texel's own level the tap. Diagonal taps count as in `tent_pass`, which took the rule from here.
 """
 
 from typing import Any
@@ -36,28 +33,12 @@ def tent_pass(
     values: Array, order: Array, starts: Array, column: Array, coarse: Array, coarse_mask: Array, filled: Array,
     filter_all: bool, corner: float, result: Array, mask: Array,
 ) -> None:
-    """Fill a level.
+    """Fill a level by the masked tent filter.
 
-    Parameters
-    ----------
-    values : (3, n) ndarray
-        Irradiance of all subsplats.
-    order : (n,) ndarray of int64
-        Subsplats row by row.
-    starts : (h_l + 1,) ndarray of int64
-        Where each row of this level starts in `order`.
-    column : (n,) ndarray of int32
-        Columns of all subsplats.
-    coarse, coarse_mask : (3, h', w') and (h', w') ndarray
-        The level above and where it has texels.
-    filled : (h_l, w_l) ndarray of bool
-        Whether a cell shows a surface.
-    filter_all : bool
-        Filter the texels lit at this level too.
-    corner : float
-        Share of a texel across a corner that counts where neither of the two beside it is there, 0 or 1.
-    result, mask : (3, h_l, w_l) and (h_l, w_l) ndarray
-        Filled: irradiance, 0 where there is none, and whether there is any.
+    values: (3, n), irradiance of all subsplats, W/m^2; order, starts: of `_sorted_by_row`; column: (n,) columns of all
+    subsplats; coarse, coarse_mask: (3, h', w') and (h', w'), the level above and where it has texels; filled: (h_l,
+    w_l), cells that show a surface; filter_all: also texels evaluated at this level; corner: 0, or 1 to count diagonal
+    texels always. Fills result, (3, h_l, w_l) W/m^2, and its mask.
     """
     height, width = filled.shape
     for band in prange((height + BAND - 1) // BAND):
@@ -66,29 +47,29 @@ def tent_pass(
         for step in range(last - first + 2):
             i = min(max(first + step - 1, 0), height - 1)
             row = rows[step % 3]
-            _inherit(coarse, coarse_mask, filled, i, row)
-            _insert(values, order[starts[i] : starts[i + 1]], column, filter_all, row)
+            _double_coarse_row(coarse, coarse_mask, filled, i, row)
+            _insert_leaves(values, order[starts[i] : starts[i + 1]], column, filter_all, row)
             if step >= 2:
                 here = rows[(step - 1) % 3]
                 _filter(rows[(step - 2) % 3], here, row, values.dtype.type(corner), first + step - 2, result)
-                _mark(here[MASK, 1:], mask[first + step - 2])
+                _store_mask(here[MASK, 1:], mask[first + step - 2])
 
 
 @kernel
-def _inherit(coarse: Array, coarse_mask: Array, filled: Array, i: int, row: Array) -> None:
-    """Repeat the coarse texels along row i twice each, where there is a surface."""
+def _double_coarse_row(coarse: Array, coarse_mask: Array, filled: Array, i: int, row: Array) -> None:
+    """Repeat the coarse texels along row i twice each, where cells show a surface."""
     for c in range(3):
         _double(coarse[c, i >> 1], row[c, 1:])
-    there, share, surface = row[MASK, 1:], row[SHARE, 1:], filled[i]
-    _double(coarse_mask[i >> 1], there)
+    row_mask, share, surface = row[MASK, 1:], row[SHARE, 1:], filled[i]
+    _double(coarse_mask[i >> 1], row_mask)
     for j in range(len(surface)):
-        there[j] *= surface[j]
+        row_mask[j] *= surface[j]
     for j in range(len(surface)):
-        share[j] = there[j]
+        share[j] = row_mask[j]
     for c in range(3):
         channel = row[c, 1:]
         for j in range(len(surface)):
-            channel[j] *= there[j]
+            channel[j] *= row_mask[j]
 
 
 @kernel
@@ -99,8 +80,8 @@ def _double(coarse: Array, fine: Array) -> None:
 
 
 @kernel
-def _insert(values: Array, members: Array, column: Array, filter_all: bool, row: Array) -> None:
-    """Put the texels of a row that were lit at this level, and copies of the outermost texels beside them."""
+def _insert_leaves(values: Array, members: Array, column: Array, filter_all: bool, row: Array) -> None:
+    """Insert the texels of a row that were evaluated at this level, and clamp the border to the edge."""
     for k in members:
         j = column[k] + 1
         for c in range(3):
@@ -129,14 +110,15 @@ def _filter(above: Array, here: Array, below: Array, corner: Any, i: int, result
         nw, ne = mnw[j] * max(mn[j], mw[j], corner), mne[j] * max(mn[j], me[j], corner)
         sw, se = msw[j] * max(ms[j], mw[j], corner), mse[j] * max(ms[j], me[j], corner)
         weights = nw, n, ne, w, e, sw, s, se
+        # Sec. 3.5: sum m w C / sum m w
         scale = share[j] / (four + ((n + s) + (w + e)) + ((nw + ne) + (sw + se)))
-        red[j] = h0[j + 1] + scale * _pull(a0, h0, b0, j, weights)
-        green[j] = h1[j + 1] + scale * _pull(a1, h1, b1, j, weights)
-        blue[j] = h2[j + 1] + scale * _pull(a2, h2, b2, j, weights)
+        red[j] = h0[j + 1] + scale * _weighted_differences(a0, h0, b0, j, weights)
+        green[j] = h1[j + 1] + scale * _weighted_differences(a1, h1, b1, j, weights)
+        blue[j] = h2[j + 1] + scale * _weighted_differences(a2, h2, b2, j, weights)
 
 
 @kernel
-def _pull(above: Array, here: Array, below: Array, j: int, weights: Any) -> Any:
+def _weighted_differences(above: Array, here: Array, below: Array, j: int, weights: Any) -> Any:
     """Return the weighted sum of the differences of a texel's neighbours to it."""
     nw, n, ne, w, e, sw, s, se = weights
     x = here[j + 1]
@@ -146,56 +128,46 @@ def _pull(above: Array, here: Array, below: Array, j: int, weights: Any) -> Any:
 
 
 @kernel
-def _mark(there: Array, mask: Array) -> None:
+def _store_mask(row_mask: Array, mask: Array) -> None:
     for j in range(len(mask)):
-        mask[j] = there[j] != 0
+        mask[j] = row_mask[j] != 0
 
 
 @kernel(parallel=True)
 def demo_pass(
-    lit: Array, leaf: Array, coarse: Array, coarse_mask: Array, filled: Array, filter_all: bool, result: Array,
+    layer: Array, leaf: Array, coarse: Array, coarse_mask: Array, filled: Array, filter_all: bool, result: Array,
     mask: Array,
 ) -> None:
-    """Fill a level.
+    """Fill a level by the filter of the authors' demo.
 
-    Parameters
-    ----------
-    lit, leaf : (3, h_l, w_l) and (h_l, w_l) ndarray
-        What was lit at this level and where.
-    coarse, coarse_mask : (3, h', w') and (h', w') ndarray
-        The level above and where it has texels.
-    filled : (h_l, w_l) ndarray of bool
-        Whether a cell shows a surface.
-    filter_all : bool
-        Filter the texels lit at this level too.
-    result, mask : (3, h_l, w_l) and (h_l, w_l) ndarray
-        Filled: irradiance, 0 where there is none, and whether there is any.
+    layer, leaf: (3, h_l, w_l) W/m^2 and (h_l, w_l), what was evaluated at this level and where; the others are those of
+    `tent_pass`.
     """
     height, width = filled.shape
     for i in prange(height):
         for j in range(width):
             mask[i, j] = leaf[i, j] or (filled[i, j] and coarse_mask[i >> 1, j >> 1])
             if mask[i, j] and (filter_all or not leaf[i, j]):
-                red, green, blue = _filtered(lit, leaf, coarse, coarse_mask, i, j)
+                red, green, blue = _filtered(layer, leaf, coarse, coarse_mask, i, j)
             else:
-                red, green, blue = lit[0, i, j], lit[1, i, j], lit[2, i, j]
+                red, green, blue = layer[0, i, j], layer[1, i, j], layer[2, i, j]
             result[0, i, j], result[1, i, j], result[2, i, j] = red, green, blue
 
 
 @kernel
-def _filtered(lit: Array, leaf: Array, coarse: Array, coarse_mask: Array, i: int, j: int) -> Any:
+def _filtered(layer: Array, leaf: Array, coarse: Array, coarse_mask: Array, i: int, j: int) -> Any:
     """Return the weighted mean of the taps around a texel, by differences to the tap in the middle."""
-    real = lit.dtype.type
+    real = layer.dtype.type
     down, across = _weights(real, i), _weights(real, j)
-    vertical = _holds(leaf, coarse_mask, i, j, -1, 0), True, _holds(leaf, coarse_mask, i, j, 1, 0)
-    horizontal = _holds(leaf, coarse_mask, i, j, 0, -1), True, _holds(leaf, coarse_mask, i, j, 0, 1)
-    x, y, z = _tap(lit, coarse, coarse_mask, i, j, 0, 0)
+    vertical = _has_irradiance(leaf, coarse_mask, i, j, -1, 0), True, _has_irradiance(leaf, coarse_mask, i, j, 1, 0)
+    horizontal = _has_irradiance(leaf, coarse_mask, i, j, 0, -1), True, _has_irradiance(leaf, coarse_mask, i, j, 0, 1)
+    x, y, z = _tap(layer, coarse, coarse_mask, i, j, 0, 0)
     total, red, green, blue = real(0.0), real(0.0), real(0.0), real(0.0)
     for k in range(9):
         di, dj = k // 3 - 1, k % 3 - 1
         beside = vertical[di + 1] or horizontal[dj + 1]  # of the taps that touch a corner
-        if beside and _holds(leaf, coarse_mask, i, j, di, dj):
-            r, g, b = _tap(lit, coarse, coarse_mask, i, j, di, dj)
+        if beside and _has_irradiance(leaf, coarse_mask, i, j, di, dj):
+            r, g, b = _tap(layer, coarse, coarse_mask, i, j, di, dj)
             weight = down[di + 1] * across[dj + 1]
             total += weight
             red, green, blue = red + weight * (r - x), green + weight * (g - y), blue + weight * (b - z)
@@ -210,8 +182,8 @@ def _weights(real: Any, i: int) -> Any:
 
 
 @kernel
-def _holds(leaf: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) -> Any:
-    """Return whether there is light one texel further, of the coarser level or of this one."""
+def _has_irradiance(leaf: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) -> Any:
+    """Return whether the texel at an offset holds irradiance, of the coarser level or of this one."""
     row, column = _inside(coarse_mask, (i >> 1) + di, (j >> 1) + dj)
     if coarse_mask[row, column]:
         return True
@@ -220,13 +192,13 @@ def _holds(leaf: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) ->
 
 
 @kernel
-def _tap(lit: Array, coarse: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) -> Any:
-    """Return the light one texel further, of the coarser level where that has any."""
+def _tap(layer: Array, coarse: Array, coarse_mask: Array, i: int, j: int, di: int, dj: int) -> Any:
+    """Return the irradiance of the texel at an offset, of the coarser level where that holds any."""
     row, column = _inside(coarse_mask, (i >> 1) + di, (j >> 1) + dj)
     if coarse_mask[row, column]:
         return coarse[0, row, column], coarse[1, row, column], coarse[2, row, column]
-    row, column = _inside(lit[0], i + di, j + dj)
-    return lit[0, row, column], lit[1, row, column], lit[2, row, column]
+    row, column = _inside(layer[0], i + di, j + dj)
+    return layer[0, row, column], layer[1, row, column], layer[2, row, column]
 
 
 @kernel

@@ -1,13 +1,11 @@
-"""From subsplats to pixels (Nichols and Wyman 2009, Sec. 3.5).
+"""Upsampling from subsplats to pixels (Nichols and Wyman 2009, Sec. 3.5).
 
-Each level of the illumination buffer holds all light of its texels or none, so that plain interpolation of it makes
-halos and rings (Fig. 7). Instead the coarsest level is doubled, put together with the next one, filtered among the
-texels that hold light and doubled again, down to the pixels.
-
-The layers of the illumination buffer: what was lit at each level, and which cells can hold light at all.
+Each layer of the illumination buffer holds the whole irradiance of its texels or none, so that plain interpolation of
+it makes halos and rings (Fig. 7). Instead the coarsest level is doubled, merged with the next layer, filtered among the
+texels that hold irradiance and doubled again, down to the pixels.
 """
 
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -15,53 +13,25 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel, prange, threads
 from refgi.splat.multires.refinement.grid import Subsplats, level_shape
+from refgi.splat.multires.settings import Upsampling
 from refgi.splat.multires.subsplats.tent import demo_pass, tent_pass
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
-Mode = Literal["tent", "demo", "nearest", "naive_bilinear"]
 
 FEW_TEXELS = 1 << 16  # of a level, that one thread fills before others are awake
 
 
-def layer(values: Array, subsplats: Subsplats, level: int) -> Array:
-    """Return what was lit at one level.
-
-    Parameters
-    ----------
-    values : (3, n) ndarray
-        Irradiance at the subsplats.
-    subsplats : Subsplats
-        Where they are.
-    level : int
-        Which level.
-
-    Returns
-    -------
-    (3, h_l, w_l) ndarray
-        Irradiance; 0 where there is no subsplat of this level.
-    """
+def _layer(values: Array, subsplats: Subsplats, level: int) -> Array:
+    """Return the layer of one level, (3, h_l, w_l) W/m^2: irradiance at its subsplats, 0 elsewhere."""
     plane = np.zeros((3, *subsplats.leaf[level].shape), values.dtype)
     of_level = np.flatnonzero(subsplats.level == level)
     plane[:, subsplats.row[of_level], subsplats.column[of_level]] = values[:, of_level]
     return plane
 
 
-def filled_cells(covered: Array, top: int) -> list[Array]:
-    """Return which cells show any surface.
-
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    top : int
-        Coarsest level.
-
-    Returns
-    -------
-    list of (h_l, w_l) ndarray of bool
-        Levels 0 to `top`.
-    """
+def _filled_cells(covered: Array, top: int) -> list[Array]:
+    """Return which cells of levels 0 to `top` show any surface, (h_l, w_l) bool each."""
     levels = [covered]
     for level in range(1, top + 1):
         levels.append(np.empty(level_shape(covered.shape[0], covered.shape[1], level), np.bool_))
@@ -69,20 +39,11 @@ def filled_cells(covered: Array, top: int) -> list[Array]:
     return levels
 
 
-def sorted_by_row(subsplats: Subsplats) -> tuple[list[Array], Array]:
-    """Return the subsplats level by level and row by row.
+def _sorted_by_row(subsplats: Subsplats) -> tuple[list[Array], Array]:
+    """Return the subsplats sorted by level and row.
 
-    Parameters
-    ----------
-    subsplats : Subsplats
-        In any order.
-
-    Returns
-    -------
-    starts : list of (h_l + 1,) ndarray of int64
-        For each level where its rows start in `order`, and where the last one ends.
-    order : (n,) ndarray of int64
-        Which subsplat is next.
+    starts: for each level (h_l + 1,) int64, where its rows start in `order` and where the last one ends; order: (n,)
+    int64.
     """
     heights = [len(leaf) for leaf in subsplats.leaf]
     bases = np.cumsum([0, *heights])
@@ -119,45 +80,44 @@ def _sort(level: Array, row: Array, bases: Array, starts: Array, order: Array) -
 
 @stage("splat.upsample")
 def upsample(
-    values: Array, subsplats: Subsplats, covered: Array, mode: Mode = "tent", *, filter_all: bool = False,
+    values: Array, subsplats: Subsplats, covered: Array, mode: Upsampling = "tent", *, filter_all: bool = False,
     corner_rule: bool = True,
 ) -> Array:
-    """Make a picture of what was lit at the subsplats.
+    """Interpolate the irradiance of subsplats at every pixel.
 
     Parameters
     ----------
     values : (3, n) ndarray
         Irradiance at the subsplats, W/m^2.
     subsplats : Subsplats
-        Which texels of which levels these are.
+        The n subsplats.
     covered : (h, w) ndarray of bool
-        Whether there is a surface.
+        Whether a pixel shows a surface.
     mode : str
-        "tent": each texel is the mean of the 3 x 3 around it that hold light; "demo": of the coarser texels around,
-        as in the authors' demo; "nearest": each pixel has the light of its subsplat; "naive_bilinear": the sum of all
-        levels, each interpolated as if it were black where it holds no light.
+        "tent": each texel is the weighted mean of the 3 x 3 around it that hold irradiance; "demo": of the coarser
+        texels around, as in the authors' demo; "nearest": each pixel has the irradiance of its subsplat;
+        "naive_bilinear": the sum of all layers, each interpolated as if it were black where it holds nothing.
     filter_all : bool
-        Filter texels that were lit at a level as well, not only those that come from a coarser one ("tent", "demo").
+        Filter texels that were evaluated at a level as well, not only those from a coarser one ("tent", "demo").
     corner_rule : bool
-        Count a texel across a corner only where one of the two beside it holds light ("tent").
+        Count a diagonal texel only where one of the two beside it holds irradiance ("tent").
 
     Returns
     -------
     (3, h, w) ndarray
-        Irradiance, W/m^2; 0 where there is no surface.
+        Irradiance, W/m^2; 0 where a pixel shows no surface.
 
     Raises
     ------
     InputError
         If the mode is unknown or shapes do not belong together.
 
-    Notes
-    -----
-    The paper gives no weights; those of "tent" interpolate bilinearly where all texels hold light. It filters every
-    texel, even those of the finest level, which blurs pixels that were lit one by one; `filter_all` and no
-    `corner_rule` are the paper to the letter. A constant stays that constant to the bit, but for "naive_bilinear".
+    Notes ----- The paper gives no weights; those of "tent" interpolate bilinearly where all texels hold irradiance. It
+    filters every texel, even those of the finest level, which blurs pixels that were evaluated one by one; `filter_all`
+    and no `corner_rule` are the paper to the letter. A constant stays that constant to the bit, but for
+    "naive_bilinear".
     """
-    expect(mode in get_args(Mode), "mode", " or ".join(map(repr, get_args(Mode))), mode)
+    expect(mode in get_args(Upsampling), "mode", " or ".join(map(repr, get_args(Upsampling))), mode)
     expect(values.shape == (3, len(subsplats.level)), "values", f"shape (3, {len(subsplats.level)})", values.shape)
     expect(covered.shape == subsplats.shape, "covered", f"shape {subsplats.shape}", covered.shape)
     values, covered = np.ascontiguousarray(values), np.ascontiguousarray(covered)
@@ -167,21 +127,21 @@ def upsample(
         return _demo(values, subsplats, covered, filter_all)
     result = np.zeros((3, *covered.shape), values.dtype)
     if mode == "nearest":
-        _spread(values, subsplats.level, subsplats.row, subsplats.column, covered, result)
+        _fill_nearest(values, subsplats.level, subsplats.row, subsplats.column, covered, result)
         return result
     for level in map(int, np.flatnonzero(subsplats.counts)):
-        _add_bilinear(layer(values, subsplats, level), level, covered, result)
+        _add_level(_layer(values, subsplats, level), level, covered, result)
     return result
 
 
 def _tent(values: Array, subsplats: Subsplats, covered: Array, filter_all: bool, corner_rule: bool) -> Array:
-    starts, order = sorted_by_row(subsplats)
-    filled = filled_cells(covered, subsplats.top)
+    starts, order = _sorted_by_row(subsplats)
+    filled = _filled_cells(covered, subsplats.top)
     corner = 0.0 if corner_rule else 1.0
-    result, mask = _nothing(-(-np.array(filled[-1].shape) // 2), values.dtype)
+    result, mask = _black_level(-(-np.array(filled[-1].shape) // 2), values.dtype)
     for level in range(subsplats.top, -1, -1):
         coarse, coarse_mask = result, mask
-        result, mask = _room(filled[level], values.dtype)
+        result, mask = _empty_level(filled[level], values.dtype)
         with threads(1 if mask.size <= FEW_TEXELS else None):
             tent_pass(values, order, starts[level], subsplats.column, coarse, coarse_mask, filled[level], filter_all,
                       corner, result, mask)
@@ -189,29 +149,29 @@ def _tent(values: Array, subsplats: Subsplats, covered: Array, filter_all: bool,
 
 
 def _demo(values: Array, subsplats: Subsplats, covered: Array, filter_all: bool) -> Array:
-    filled = filled_cells(covered, subsplats.top)
-    result, mask = layer(values, subsplats, subsplats.top), subsplats.leaf[-1]
+    filled = _filled_cells(covered, subsplats.top)
+    result, mask = _layer(values, subsplats, subsplats.top), subsplats.leaf[-1]
     for level in range(subsplats.top - 1, -1, -1):
         coarse, coarse_mask = result, mask
-        result, mask = _room(filled[level], values.dtype)
-        demo_pass(layer(values, subsplats, level), subsplats.leaf[level], coarse, coarse_mask, filled[level],
+        result, mask = _empty_level(filled[level], values.dtype)
+        demo_pass(_layer(values, subsplats, level), subsplats.leaf[level], coarse, coarse_mask, filled[level],
                   filter_all, result, mask)
     return result
 
 
-def _room(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
-    """Return irradiance and mask of a level, not yet filled in."""
+def _empty_level(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
+    """Return uninitialised irradiance and mask of a level."""
     return np.empty((3, *filled.shape), dtype), np.empty(filled.shape, np.bool_)
 
 
-def _nothing(shape: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
+def _black_level(shape: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
     """Return irradiance and mask of a level without texels."""
     return np.zeros((3, *shape), dtype), np.zeros(shape, np.bool_)
 
 
 @kernel(parallel=True)
-def _spread(values: Array, level: Array, row: Array, column: Array, covered: Array, result: Array) -> None:
-    """Give the pixels of each subsplat its light."""
+def _fill_nearest(values: Array, level: Array, row: Array, column: Array, covered: Array, result: Array) -> None:
+    """Write each subsplat's irradiance to its pixels."""
     height, width = covered.shape
     for k in prange(len(level)):
         side = 1 << np.int64(level[k])
@@ -223,22 +183,22 @@ def _spread(values: Array, level: Array, row: Array, column: Array, covered: Arr
                         result[c, y, x] = values[c, k]
 
 
-def _add_bilinear(texels: Array, level: int, covered: Array, result: Array) -> None:
-    """Add a level, interpolated between the centres of its texels."""
-    rows, columns = (_between(*sizes, level, result.dtype)
+def _add_level(texels: Array, level: int, covered: Array, result: Array) -> None:
+    """Add a layer, interpolated bilinearly between the centres of its texels."""
+    rows, columns = (_bilinear_taps(*sizes, level, result.dtype)
                      for sizes in zip(covered.shape, texels.shape[1:], strict=True))
-    _add_between(texels, *rows, *columns, covered, result)
+    _add_interpolated(texels, *rows, *columns, covered, result)
 
 
-def _between(pixels: int, texels: int, level: int, dtype: np.dtype[Any]) -> tuple[Array, Array, Array]:
-    """Return the texels before and behind each pixel of a row or column, and how far from one to the other it is."""
+def _bilinear_taps(pixels: int, texels: int, level: int, dtype: np.dtype[Any]) -> tuple[Array, Array, Array]:
+    """Return the texels before and behind each pixel of a row or column, and how far between them it lies."""
     place = (np.arange(pixels) + 0.5) / 2**level - 0.5
     before = np.floor(place).astype(np.int64)
     return np.maximum(before, 0), np.minimum(before + 1, texels - 1), (place - before).astype(dtype)
 
 
 @kernel(parallel=True)
-def _add_between(
+def _add_interpolated(
     texels: Array, above: Array, below: Array, down: Array, left: Array, right: Array, across: Array, covered: Array,
     result: Array,
 ) -> None:

@@ -1,7 +1,6 @@
 """Refinement to an error: the promise on several scenes, what it costs, and each part against closed forms."""
 
 import math
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,14 +16,12 @@ from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.multires.error_target import error_driven as module
 from refgi.splat.multires.error_target import trial as trial_module
-from refgi.splat.multires.error_target.descent import assemble, begin, descend
-from refgi.splat.multires.error_target.error_driven import error_driven, estimate, mean_of, stratified
-from refgi.splat.multires.error_target.interpolate import blends, levels_of
+from refgi.splat.multires.error_target.descent import fill_coarsest, fill_level, fill_picture
+from refgi.splat.multires.error_target.error_driven import draw_samples, error_driven, estimate_error, estimate_mean
+from refgi.splat.multires.error_target.interpolate import blend_weights, surface_levels
 from refgi.splat.multires.error_target.near import near_light
-from refgi.splat.multires.settings import MultiresSettings
 from refgi.stages import observe
-
-unclamped = partial(MultiresSettings, clamp="none")  # near pairs as they are: what these tests sum pair by pair
+from tests.splat.multires.choices import by_error, unclamped
 
 ROUNDING = 1e-5  # float32 sums of 64 terms, the largest many times the rest
 LINEAR = 1e-5  # of values up to 10: float32 means of four
@@ -32,14 +29,18 @@ TARGETS = (0.2, 0.05, 0.02)
 SCENES = ("cornell_box", "metaballs", "stage", "atrium")
 
 
-def seen(name, width=120, height=90):
+def frame_of(name, width=120, height=90):
     return Frame(load_scene(name), width=width, height=height, rsm_resolution=64)
 
 
 def full_sum(frame, settings):
-    buffer, lights, area = frame.gbuffer, choose_lights(frame, settings), footprints(frame, settings)
-    full = irradiance(Receivers(*buffer.resolve("position", "normal", "covered")), lights, settings, area)
-    return lights, area, full
+    lights, area = choose_lights(frame, settings.lights), footprints(frame, settings.lights, settings.effective_pairs)
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    return lights, area, irradiance(receivers, lights, settings.effective_pairs, area)
+
+
+def driven(buffer, lights, settings, area):
+    return error_driven(buffer, lights, settings.subsplats, settings.effective_pairs, area, settings.lights.seed)
 
 
 class Blank(NamedTuple):
@@ -62,37 +63,37 @@ def relative_error(picture, full, covered):
 
 @pytest.fixture(scope="module")
 def box():
-    return seen("cornell_box")
+    return frame_of("cornell_box")
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_every_promise_is_kept_against_the_full_sum(name):
     """Picture: the error measured at all pixels, floor 0."""
-    frame = seen(name)
+    frame = frame_of(name)
     covered = frame.gbuffer.covered
     for clamp in ("none", "disc") if name == "cornell_box" else ("none",):
         lights, area, full = full_sum(frame, unclamped(lights=64, clamp=clamp))
         for target in TARGETS:
             for seed in (0, 1):
-                settings = unclamped(lights=64, clamp=clamp, target_error=target, seed=seed)
-                found = error_driven(frame.gbuffer, lights, settings, area)
+                settings = by_error(target, lights=64, clamp=clamp, seed=seed)
+                found = driven(frame.gbuffer, lights, settings, area)
                 assert relative_error(found.irradiance, full, covered) <= target
                 assert found.low <= found.error <= found.high <= target
                 assert found.pairs <= 2 * found.full_pairs
 
 
 def test_pairs_are_saved_and_all_counted(monkeypatch):
-    frame = seen("cornell_box", 300, 300)
-    settings = unclamped(lights=64, target_error=0.05)
+    frame = frame_of("cornell_box", 300, 300)
+    settings = by_error(0.05, lights=64)
     lights, area, full = full_sum(frame, settings)
-    lit, near, add_lights, near_light = [], [], trial_module.add_lights, module.near_light
-    monkeypatch.setattr(trial_module, "add_lights", lambda p, *how: lit.append(p.T) or add_lights(p, *how))
+    evaluated, near, add_lights, near_light = [], [], trial_module.add_lights, module.near_light
+    monkeypatch.setattr(trial_module, "add_lights", lambda p, *how: evaluated.append(p.T) or add_lights(p, *how))
     monkeypatch.setattr(module, "near_light", lambda *how: near.append(near_light(*how)) or near[-1])
     with observe() as log:
-        found = error_driven(frame.gbuffer, lights, settings, area)
+        found = driven(frame.gbuffer, lights, settings, area)
     said = next(run.reason for run in log.runs if run.name == "splat.full_sum")
     assert said.startswith(f"{found.pairs / found.full_pairs:.1%} of its pairs")
-    points = np.concatenate(lit)
+    points = np.concatenate(evaluated)
     assert len(np.unique(points, axis=0)) == len(points)  # no pixel twice
     count = lights.flux.shape[1]
     assert found.pairs == count * len(points) + near[0].pairs
@@ -102,65 +103,64 @@ def test_pairs_are_saved_and_all_counted(monkeypatch):
 
 
 def test_subsplats_are_the_pictures(box):
-    settings = unclamped(lights=64, target_error=0.05)
+    settings = by_error(0.05, lights=64)
     lights, area, full = full_sum(box, settings)
-    found = error_driven(box.gbuffer, lights, settings, area)
+    found = driven(box.gbuffer, lights, settings, area)
     times = sum(np.kron(leaf, np.ones((1 << level, 1 << level)))[:90, :120]
                 for level, leaf in enumerate(found.subsplats.leaf))
     assert (times[box.gbuffer.covered] == 1).all()
     pixels = found.subsplats.leaf[0]
     assert pixels.any()
     np.testing.assert_array_equal(found.irradiance[:, pixels], full[:, pixels])
-    finer = error_driven(box.gbuffer, lights, unclamped(lights=64, target_error=0.02), area)
+    finer = driven(box.gbuffer, lights, by_error(0.02, lights=64), area)
     assert len(finer.subsplats.level) > len(found.subsplats.level)
     assert finer.pairs > found.pairs
 
 
 def test_no_error_at_all_is_the_full_sum_to_the_bit(box):
-    settings = unclamped(lights=64, target_error=1e-6)
+    settings = by_error(1e-6, lights=64)
     lights, area, full = full_sum(box, settings)
-    found = error_driven(box.gbuffer, lights, settings, area)
+    found = driven(box.gbuffer, lights, settings, area)
     np.testing.assert_array_equal(found.irradiance, full)
     assert found.error == found.high == 0
     assert found.subsplats.counts[1:].sum() == 0
 
 
 def test_threads_change_no_bit(box):
-    settings = unclamped(lights=64, target_error=0.05)
+    settings = by_error(0.05, lights=64)
     lights, area, _ = full_sum(box, settings)
-    found = error_driven(box.gbuffer, lights, settings, area)
+    found = driven(box.gbuffer, lights, settings, area)
     with threads(1):
-        alone = error_driven(box.gbuffer, lights, settings, area)
+        alone = driven(box.gbuffer, lights, settings, area)
     np.testing.assert_array_equal(found.irradiance, alone.irradiance)
-    assert found[4:] == alone[4:]
+    assert found[3:] == alone[3:]
 
 
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 40), (33, 1), (17, 40)])
 def test_small_pictures(width, height):
-    frame = seen("metaballs", width, height)
-    settings = unclamped(lights=64, target_error=0.1, coarsest=4)
+    frame = frame_of("metaballs", width, height)
+    settings = by_error(0.1, lights=64, coarsest=4)
     lights, area, full = full_sum(frame, settings)
-    found = error_driven(frame.gbuffer, lights, settings, area)
+    found = driven(frame.gbuffer, lights, settings, area)
     assert np.isfinite(found.irradiance).all()
     assert relative_error(found.irradiance, full, frame.gbuffer.covered) <= 0.1
 
 
 def test_nothing_to_see_and_no_light(box):
-    settings = unclamped(lights=64, target_error=0.1)
+    settings = by_error(0.1, lights=64)
     lights, area, _ = full_sum(box, settings)
-    dark = error_driven(box.gbuffer, lights._replace(flux=np.zeros_like(lights.flux)), settings, area)
+    dark = driven(box.gbuffer, lights._replace(flux=np.zeros_like(lights.flux)), settings, area)
     assert (dark.irradiance == 0).all()
     assert dark.error == dark.high == 0
     buffer = Blank(np.zeros((3, 20, 30), np.float32), np.zeros((3, 20, 30), np.float32), np.zeros((20, 30), bool))
-    empty = error_driven(buffer, lights, settings, area)
+    empty = driven(buffer, lights, settings, area)
     assert (empty.irradiance == 0).all()
     assert empty.error == empty.pairs == len(empty.subsplats.level) == 0
 
 
-def test_a_target_is_needed(box):
-    lights = choose_lights(box, unclamped(lights=16))
-    with pytest.raises(InputError, match="target_error"):
-        error_driven(box.gbuffer, lights, unclamped())
+def test_a_target_is_needed():
+    with pytest.raises(InputError, match=r"subsplats\.target"):
+        by_error(0.0)
 
 
 def plane(height, width, turn=None):
@@ -178,19 +178,19 @@ def plane(height, width, turn=None):
 
 def from_level(top, image, position, normal, covered):
     """Interpolate a picture's values at the pixels of one level down to all."""
-    levels, exact = levels_of(position, normal, covered, top), np.stack([image] * 3)
-    made, squares = blends(levels), [-(-side // 16) for side in image.shape]
+    levels, exact = surface_levels(position, normal, covered, top), np.stack([image] * 3)
+    made, squares = blend_weights(levels), [-(-side // 16) for side in image.shape]
     none = np.zeros((3, 0, 0), np.float32), np.zeros(squares, bool)
     light = np.zeros((3, *levels[top].covered.shape), np.float32)
-    begin(levels[top].place, exact, *none, light)
+    fill_coarsest(levels[top].representative_pixel, exact, *none, light)
     for k in range(top - 1, -1, -1):
         shape, unsplit = levels[k].covered.shape, np.zeros(levels[k + 1].covered.shape, bool)
         fine, blend = np.full((3, *shape), np.nan, np.float32), made[k]
         if k:
-            descend(light, blend.weight, blend.across, unsplit, levels[k].place, exact, *none, fine,
-                    np.zeros(shape, bool), np.zeros(shape, np.float32))
+            fill_level(light, blend.weight, blend.across, unsplit, levels[k].representative_pixel, exact, *none, fine,
+                       np.zeros(shape, bool), np.zeros(shape, np.float32))
         else:
-            assemble(light, blend.weight, blend.across, unsplit, covered, exact, *none, fine)
+            fill_picture(light, blend.weight, blend.across, unsplit, covered, exact, *none, fine)
         light = fine
     return light[0]
 
@@ -201,7 +201,7 @@ def test_light_linear_on_a_plane_is_interpolated_exactly():
     image = (0.7 * position[0] + 0.3 * position[2] + 1).astype(np.float32)
     got = from_level(2, image, position, normal, np.ones((48, 64), bool))
     np.testing.assert_allclose(got[4:-4, 4:-4], image[4:-4, 4:-4], atol=LINEAR)
-    assert np.abs(got - image).max() > 10 * LINEAR  # the border does tell
+    assert np.abs(got - image).max() > 10 * LINEAR  # the border differs
 
 
 def test_light_does_not_cross_an_edge_nor_come_from_empty_pixels():
@@ -231,9 +231,10 @@ def test_residuals_are_those_of_the_interpolated_normals():
     """Analytic: none on a plane; a pixel turned by 90 degrees against all around is off by sqrt 2."""
     position, normal = plane(16, 16)
     covered = np.ones((16, 16), bool)
-    assert max(blend.rest.max() for blend in blends(levels_of(position, normal, covered, 2))) < 1e-12
+    blends = blend_weights(surface_levels(position, normal, covered, 2))
+    assert max(blend.normal_error.max() for blend in blends) < 1e-12
     normal[:, 4, 6] = 1, 0, 0  # an even row and column: it stands for no coarser cell
-    one, two = (blend.rest for blend in blends(levels_of(position, normal, covered, 2)))
+    one, two = (blend.normal_error for blend in blend_weights(surface_levels(position, normal, covered, 2)))
     assert one[2, 3] == pytest.approx(2, rel=1e-5)
     assert two[1, 1] == pytest.approx(2, rel=1e-5)
     assert two.sum() == pytest.approx(2, rel=1e-5)
@@ -249,12 +250,12 @@ def test_near_light_is_what_exceeds_the_bound(clamp):
     covered = rng.random((23, 37)) < 0.9
     most, settings = 2.0, unclamped(**clamp)
     receivers = Receivers(position, normal, covered)
-    near = near_light(receivers, checked(receivers, lights, settings, None), most)
-    got = np.where(np.kron(near.touched, np.ones((16, 16), bool))[:23, :37], near.light, np.float32(0))
+    near = near_light(receivers, checked(receivers, lights, settings.effective_pairs, None), most)
+    got = np.where(np.kron(near.has_near, np.ones((16, 16), bool))[:23, :37], near.irradiance, np.float32(0))
     away = at.astype(np.float32).astype(float)[:, None, None] - position[..., None]
     square = (away**2).sum(axis=0)
-    kept = np.maximum(square, 0.05**2) if clamp else square
-    term = np.maximum(away[1], 0) ** 2 / (square * kept)
+    clamped_square = np.maximum(square, 0.05**2) if clamp else square
+    term = np.maximum(away[1], 0) ** 2 / (square * clamped_square)
     bound = most * math.pi / lights.flux.max(axis=0)
     excess = (lights.flux[:, None, None] / math.pi * np.maximum(0, term - bound)).sum(axis=-1) * covered
     assert excess.max() > 10 * most
@@ -270,12 +271,12 @@ def test_samples_stand_for_all_covered_pixels_and_bound_the_error():
     picture = full + (0.02 * rng.standard_t(4, full.shape)).astype(np.float32)
     error = relative_error(picture, full, covered)
     for seed in range(20):
-        samples = stratified(covered, seed)
+        samples = draw_samples(covered, seed)
         assert covered.reshape(-1)[samples.pixel].all()
         assert samples.share.sum() == pytest.approx(1)
         assert len(np.unique(samples.pixel)) == len(samples.pixel) < covered.sum() / 8
         light, exact = (part.reshape(3, -1)[:, samples.pixel] for part in (picture, full))
-        mean, doubt = mean_of(samples, exact)
-        assert abs(mean - full[:, covered].mean(dtype=float)) < doubt
-        found = estimate(samples, exact - light, (mean, doubt))
+        mean, uncertainty = estimate_mean(samples, exact)
+        assert abs(mean - full[:, covered].mean(dtype=float)) < uncertainty
+        found = estimate_error(samples, exact - light, (mean, uncertainty))
         assert found.low < error < found.high < 1.4 * error

@@ -1,7 +1,6 @@
 """Subsplats that each light refines for itself: the published lists, Table 1, Fig. 6, and the full sum at the limit."""
 
 import dataclasses
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,21 +10,21 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
 from refgi.scene import load_scene
+from refgi.settings import replaced
 from refgi.splat import Receivers, irradiance
 from refgi.splat.multires.light_lists import per_light as module
 from refgi.splat.multires.light_lists.per_light import per_light, per_light_counts
-from refgi.splat.multires.refinement.criteria import needs
+from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.refinement.refine import refine
-from refgi.splat.multires.settings import MultiresSettings
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.settings import Criteria
+from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 from tests.naive import eq2
 from tests.naive import per_light as naive
 from tests.naive import upsample as naive_upsample
 from tests.pairs import sets
-
-unclamped = partial(MultiresSettings, clamp="none")  # near pairs as they are: what these tests sum pair by pair
+from tests.splat.multires.choices import by_irradiance, unclamped
 
 TWIN = 1e-12  # float64 against unit vectors and printed terms; a lobe of exponent 20 takes 20 roundings to its power
 ROUNDING = 2.0**-24  # float32; a compensated sum of terms >= 0 is off by 2 of these, lobes are added to it at last
@@ -33,7 +32,7 @@ WIDENING = 0.8  # m, of lobes in float64
 COUNTS = 0.25  # of Table 1's shares: of another scene, with the threshold that comes nearest
 
 
-class Seen(SimpleNamespace):
+class FakeBuffer(SimpleNamespace):
     """What a camera saw, without a camera."""
 
     def resolve(self, *names):
@@ -49,7 +48,7 @@ def wall(height, width, real=np.float64, holes=0.0, bumps=0.0):
     position = np.stack([*np.broadcast_arrays(x[None], y[:, None]), np.zeros((height, width))])
     normal = sets.unit(np.array([0, 0, 1.0])[:, None, None] + bumps * rng.normal(size=position.shape))
     covered = rng.random((height, width)) >= holes
-    return Seen(position=np.ascontiguousarray(position * covered, real), normal=(normal * covered).astype(real),
+    return FakeBuffer(position=np.ascontiguousarray(position * covered, real), normal=(normal * covered).astype(real),
                 covered=covered, dtype=np.dtype(real), depth=np.where(covered, 1, np.inf).astype(real))
 
 
@@ -68,33 +67,47 @@ def alone(lights, k):
     return lights._replace(**{key: getattr(lights, key)[..., k : k + 1] for key in lights._fields[:6]})
 
 
-def full_sum(seen, lights, settings, footprint=None):
-    return irradiance(Receivers(*seen.resolve("position", "normal", "covered")), lights, settings, footprint)
+def full_sum(buffer, lights, settings, footprint=None):
+    receivers = Receivers(*buffer.resolve("position", "normal", "covered"))
+    return irradiance(receivers, lights, settings.effective_pairs, footprint)
 
 
 def shared_list(buffer, settings):
-    top = top_level(*buffer.covered.shape, settings.coarsest)
-    return refine(needs(buffer, settings, top), buffer.covered, settings)
+    criteria = settings.subsplats.criteria or Criteria()
+    top = top_level(*buffer.covered.shape, settings.subsplats.coarsest)
+    return refine(discontinuities(buffer, criteria, top), buffer.covered, criteria.diagonal)
+
+
+def summed(buffer, lights, settings, *how):
+    return per_light(buffer, lights, settings.subsplats, settings.effective_pairs, *how)
+
+
+def counted(buffer, lights, settings, *how):
+    return per_light_counts(buffer, lights, settings.subsplats, settings.effective_pairs, *how)
+
+
+def leaf_lists(buffer, lights, settings, *how):
+    return module._leaf_lists(buffer, lights, settings.subsplats, settings.effective_pairs, *how)
 
 
 def relative_rmse(picture, full, covered):
     return float(np.sqrt(((picture - full)[:, covered] ** 2).mean()) / full[:, covered].mean())
 
 
-def by_hand(seen, lights, settings, threshold, shared=None):
+def by_hand(buffer, lights, settings, threshold, shared=None):
     """Return picture and counts of the naive lists, upsampled light by light."""
-    covered = seen.covered
-    top = top_level(*covered.shape, settings.coarsest)
+    covered = buffer.covered
+    top = top_level(*covered.shape, settings.subsplats.coarsest)
     total, counts = np.zeros((3, *covered.shape)), np.zeros(top + 1, int)
     for k in range(lights.position.shape[1]):
         one = [part[:, k] for part in (lights.position, lights.normal, lights.flux, lights.lobe_axis, lights.lobe_flux)]
 
-        def lit_at(pixel, one=one, k=k):
-            x, n = seen.position[:, *pixel], seen.normal[:, *pixel]
+        def irradiance_at(pixel, one=one, k=k):
+            x, n = buffer.position[:, *pixel], buffer.normal[:, *pixel]
             return (eq2.pair(x, n, *one[:3])
                     + eq2.lobe_pair(x, n, *one[:2], one[3], lights.lobe_exponent[k], one[4], widening=WIDENING))
 
-        cells = naive.subsplats(covered, lit_at, top, settings.finest, threshold, shared)
+        cells = naive.subsplats(covered, irradiance_at, top, settings.subsplats.finest, threshold, shared)
         for level, _, _ in cells:
             counts[level] += 1
         for pixel, value in naive_upsample.tent(cells, covered.tolist(), top).items():
@@ -102,138 +115,138 @@ def by_hand(seen, lights, settings, threshold, shared=None):
     return total, counts
 
 
-def brightest_sum(seen, lights, top):
+def brightest_sum(buffer, lights, top):
     """Return the largest sum of all lights at the coarsest cells."""
-    rows, columns = level_shape(*seen.covered.shape, top)
-    places = [naive.representative(seen.covered, top, i, j) for i in range(rows) for j in range(columns)]
+    rows, columns = level_shape(*buffer.covered.shape, top)
+    places = [naive.representative(buffer.covered, top, i, j) for i in range(rows) for j in range(columns)]
     at = tuple(np.array([place for place in places if place]).T)
-    points = sets.receivers(seen.position[:, *at], seen.normal[:, *at])
-    return float(irradiance(points, lights, unclamped(widening=WIDENING)).max())
+    points = sets.receivers(buffer.position[:, *at], buffer.normal[:, *at])
+    return float(irradiance(points, lights, unclamped(widening=WIDENING).effective_pairs).max())
 
 
 @pytest.mark.parametrize("finest", [0, 1])
 @pytest.mark.parametrize("form", ["absolute", "relative", "brightest"])
 def test_lists_are_the_published_ones(form, finest):
     """Oracle: the paper's pseudo-code in float64, for each form of the threshold (E-AMS-07)."""
-    seen, lights = wall(21, 30, holes=0.15, bumps=0.1), lamps(5)
-    given = {"absolute": 0.02, "relative": 0.15, "brightest": 0.3}[form]
-    settings = unclamped(coarsest=4, finest=finest, light_threshold=given, threshold_form=form,
-                                widening=WIDENING)
-    fixed = given if form == "absolute" else given * brightest_sum(seen, lights, 3) / 5
-    expected, counts = by_hand(seen, lights, settings, lambda most: given * most if form == "relative" else fixed)
-    assert 0 < counts[finest] < counts.sum() < 5 * seen.covered.sum()
-    np.testing.assert_array_equal(per_light_counts(seen, lights, settings), counts)
-    np.testing.assert_allclose(per_light(seen, lights, settings), expected, rtol=TWIN, atol=TWIN * expected.max())
+    buffer, lights = wall(21, 30, holes=0.15, bumps=0.1), lamps(5)
+    threshold = {"absolute": 0.02, "relative": 0.15, "brightest": 0.3}[form]
+    settings = by_irradiance(coarsest=4, finest=finest, subsplats_threshold=threshold, form=form,
+                             widening=WIDENING)
+    fixed = threshold if form == "absolute" else threshold * brightest_sum(buffer, lights, 3) / 5
+    expected, counts = by_hand(buffer, lights, settings, lambda most: threshold * most if form == "relative" else fixed)
+    assert 0 < counts[finest] < counts.sum() < 5 * buffer.covered.sum()
+    np.testing.assert_array_equal(counted(buffer, lights, settings), counts)
+    np.testing.assert_allclose(summed(buffer, lights, settings), expected, rtol=TWIN, atol=TWIN * expected.max())
 
 
 def test_lists_go_on_from_the_shared_one():
-    """Oracle: the pseudo-code that is told which cells the shared list refines."""
-    seen, lights = wall(21, 30, holes=0.15), lamps(5)
-    settings = unclamped(coarsest=4, light_threshold=0.4, diagonal="off", widening=WIDENING)
+    """Oracle: the pseudo-code with the cells that the shared list refines."""
+    buffer, lights = wall(21, 30, holes=0.15), lamps(5)
+    settings = by_irradiance(coarsest=4, subsplats_threshold=0.4, widening=WIDENING)
     rng = np.random.default_rng(11)
     need = tuple(rng.random(level_shape(21, 30, level)) < 0.5 * (level > 0) for level in range(4))
-    start = refine(need, seen.covered, settings)
+    start = refine(need, buffer.covered, "off")
     refined = {(int(level) + up, int(i) >> up, int(j) >> up)
                for level, i, j in zip(start.level, start.row, start.column, strict=True)
                for up in range(1, 4 - int(level))}
-    expected, counts = by_hand(seen, lights, settings, lambda most: 0.4 * most, refined)
+    expected, counts = by_hand(buffer, lights, settings, lambda most: 0.4 * most, refined)
     assert 5 * len(start.level) < counts.sum()
-    np.testing.assert_array_equal(per_light_counts(seen, lights, settings, None, start), counts)
-    np.testing.assert_allclose(per_light(seen, lights, settings, None, start), expected, rtol=TWIN,
+    np.testing.assert_array_equal(counted(buffer, lights, settings, None, start), counts)
+    np.testing.assert_allclose(summed(buffer, lights, settings, None, start), expected, rtol=TWIN,
                                atol=TWIN * expected.max())
 
 
 def test_lights_that_split_nothing_stay_with_the_shared_list():
-    """Oracle: the shared list lit by all lights at once."""
-    seen, lights = wall(40, 64, np.float32, bumps=0.2), lamps(7, np.float32)
-    settings = unclamped(coarsest=4, light_threshold=10.0, normal_threshold=1.0)
-    start = shared_list(seen, settings)
-    expected = upsample(evaluate(*at_subsplats(seen, start), lights, settings), start, seen.covered)
-    np.testing.assert_array_equal(per_light_counts(seen, lights, settings, None, start), 7 * start.counts)
-    tree, lists = module._lists(seen, lights, settings, None, start)
-    for mine, theirs in zip(module.cut(tree, next(lists)[0]), start, strict=True):
+    """Oracle: the shared list evaluated for all lights at once."""
+    buffer, lights = wall(40, 64, np.float32, bumps=0.2), lamps(7, np.float32)
+    settings = by_irradiance(coarsest=4, subsplats_threshold=10.0, normal_threshold=1.0)
+    start = shared_list(buffer, settings)
+    expected = upsample(evaluate(*representative_points(buffer, start), lights, settings.pairs), start, buffer.covered)
+    np.testing.assert_array_equal(counted(buffer, lights, settings, None, start), 7 * start.counts)
+    tree, lists = leaf_lists(buffer, lights, settings, None, start)
+    for mine, theirs in zip(module.subsplats_of_leaves(tree, next(lists)[0]), start, strict=True):
         for one, other in zip(mine, theirs, strict=True):
             np.testing.assert_array_equal(one, other)  # fields and their order, masks
-    np.testing.assert_allclose(per_light(seen, lights, settings, None, start), expected, rtol=8 * ROUNDING)
+    np.testing.assert_allclose(summed(buffer, lights, settings, None, start), expected, rtol=8 * ROUNDING)
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 1), (33, 20)])
 def test_threshold_0_is_the_full_sum(shape):
-    """Limit: every cell is split, so every pixel is lit by itself; a light alone to the bit."""
-    seen, lights = wall(*shape, np.float32, holes=0.2, bumps=0.3), lamps(40, np.float32)
-    seen.covered[0, 0] = True
-    settings = unclamped(coarsest=2, light_threshold=0.0)
-    np.testing.assert_array_equal(per_light_counts(seen, lights, settings)[1:], 0)
-    np.testing.assert_allclose(per_light(seen, lights, settings), full_sum(seen, lights, settings), rtol=5 * ROUNDING)
+    """Limit: every cell is split, so every pixel is evaluated by itself; a light alone to the bit."""
+    buffer, lights = wall(*shape, np.float32, holes=0.2, bumps=0.3), lamps(40, np.float32)
+    buffer.covered[0, 0] = True
+    settings = by_irradiance(coarsest=2, subsplats_threshold=0.0)
+    np.testing.assert_array_equal(counted(buffer, lights, settings)[1:], 0)
+    np.testing.assert_allclose(summed(buffer, lights, settings), full_sum(buffer, lights, settings), rtol=5 * ROUNDING)
     one = alone(lights, 1)
     assert one.flux.any()
     assert one.lobe_flux.any()
-    np.testing.assert_array_equal(per_light(seen, one, settings), full_sum(seen, one, settings))
+    np.testing.assert_array_equal(summed(buffer, one, settings), full_sum(buffer, one, settings))
 
 
 @pytest.mark.parametrize("change", [{"clamp": "sphere", "clamp_value": 8.0},
                                     {"clamp": "disc", "offset": 0.1}])
 def test_pairs_are_those_of_the_full_sum(change):
     """Limit, with each kind of pair: the same terms, to the bit for a light alone."""
-    seen, lights = wall(9, 12, np.float32, bumps=0.3), lamps(2, np.float32)
+    buffer, lights = wall(9, 12, np.float32, bumps=0.3), lamps(2, np.float32)
     one = alone(lights, 1)
     if change["clamp"] == "sphere":
         one = one._replace(lobe_flux=None)
-    settings, area = unclamped(coarsest=2, light_threshold=0.0, **change), np.array([0.05], np.float32)
-    np.testing.assert_array_equal(per_light(seen, one, settings, area), full_sum(seen, one, settings, area))
-    assert not np.array_equal(per_light(seen, one, settings, area), full_sum(seen, one, unclamped()))
+    settings, area = by_irradiance(coarsest=2, subsplats_threshold=0.0, **change), np.array([0.05], np.float32)
+    np.testing.assert_array_equal(summed(buffer, one, settings, area), full_sum(buffer, one, settings, area))
+    assert not np.array_equal(summed(buffer, one, settings, area), full_sum(buffer, one, by_irradiance()))
 
 
 def test_bits_do_not_depend_on_threads_and_batches(monkeypatch):
-    seen, lights = wall(50, 70, np.float32, holes=0.1, bumps=0.1), lamps(9, np.float32)
-    settings = unclamped(coarsest=8)
-    whole = per_light(seen, lights, settings)
-    monkeypatch.setattr(module, "ROOM", 1)  # a light a thread
-    np.testing.assert_array_equal(per_light(seen, lights, settings), whole)
+    buffer, lights = wall(50, 70, np.float32, holes=0.1, bumps=0.1), lamps(9, np.float32)
+    settings = by_irradiance(coarsest=8)
+    whole = summed(buffer, lights, settings)
+    monkeypatch.setattr(module, "BATCH_BYTES", 1)  # a light a thread
+    np.testing.assert_array_equal(summed(buffer, lights, settings), whole)
     with threads(1):
-        np.testing.assert_array_equal(per_light(seen, lights, settings), whole)
+        np.testing.assert_array_equal(summed(buffer, lights, settings), whole)
 
 
-def test_room_is_bounded_whatever_the_number_of_lights(monkeypatch):
-    """Property: rooms are of one size, and no larger than asked for, at 10 and at 10,000 lights."""
+def test_memory_is_bounded_whatever_the_number_of_lights(monkeypatch):
+    """Property: batches have one size, and no larger than asked for, at 10 and at 10,000 lights."""
     points = np.empty((3, 5000), np.float32)
-    monkeypatch.setattr(module, "ROOM", 1 << 20)
+    monkeypatch.setattr(module, "BATCH_BYTES", 1 << 20)
     for lights in (10, 10_000):
-        assert sum(part.nbytes for part in module._room(lights, points)) <= module.ROOM * 1.001
-    assert len(module._room(10, points).entries) == 10
+        assert sum(part.nbytes for part in module._batch_lists(lights, points)) <= module.BATCH_BYTES * 1.001
+    assert len(module._batch_lists(10, points).entries) == 10
 
 
 def test_nothing_seen_nothing_lit():
     """Stability: no surface, no lights, a light in a receiver, lights behind the wall."""
-    seen, lights = wall(9, 12, np.float32), lamps(3, np.float32)
-    settings = unclamped(coarsest=4)
-    for start in (None, shared_list(seen, settings)):
+    buffer, lights = wall(9, 12, np.float32), lamps(3, np.float32)
+    settings = by_irradiance(coarsest=4)
+    for start in (None, shared_list(buffer, settings)):
         behind = lights._replace(position=-lights.position)
-        assert not per_light(seen, behind, settings, None, start).any()
-    lights.position[:, 0] = seen.position[:, 4, 6]
-    assert np.isfinite(per_light(seen, lights, settings)).all()
+        assert not summed(buffer, behind, settings, None, start).any()
+    lights.position[:, 0] = buffer.position[:, 4, 6]
+    assert np.isfinite(summed(buffer, lights, settings)).all()
     none = lights._replace(**{key: getattr(lights, key)[..., :0] for key in lights._fields[:6]})
     for form in ("relative", "brightest"):
-        assert not per_light(seen, none, unclamped(coarsest=4, threshold_form=form)).any()
-    seen.covered[:] = False
-    assert not per_light(seen, lights, settings).any()
-    assert not per_light_counts(seen, lights, settings).any()
+        assert not summed(buffer, none, by_irradiance(coarsest=4, form=form)).any()
+    buffer.covered[:] = False
+    assert not summed(buffer, lights, settings).any()
+    assert not counted(buffer, lights, settings).any()
 
 
 def test_levels_of_two_lights_cannot_be_added_before_upsampling():
     """Property: where one light's subsplats are finer, copying them (as upsampling does) drops the other's light."""
-    seen, lights = wall(32, 32), lamps(4)
+    buffer, lights = wall(32, 32), lamps(4)
     both = lights._replace(**{key: getattr(lights, key)[..., 1::2] for key in lights._fields[:6]})
-    settings = unclamped(coarsest=4, light_threshold=0.2, widening=WIDENING)
-    together, merged = per_light(seen, both, settings), {}
+    settings = by_irradiance(coarsest=4, subsplats_threshold=0.2, widening=WIDENING)
+    together, merged = summed(buffer, both, settings), {}
     for k in range(2):
-        tree, lists = module._lists(seen, alone(both, k), settings, None, None)
+        tree, lists = leaf_lists(buffer, alone(both, k), settings, None, None)
         cells, values = next(lists)
         for c, value in zip(cells, values[0], strict=True):
             place = int(tree.level[c]), int(tree.row[c]), int(tree.column[c])
             merged[place] = merged.get(place, 0.0) + value
-    np.testing.assert_allclose(together, sum(per_light(seen, alone(both, k), settings) for k in range(2)), rtol=TWIN)
-    added_before = sum(naive_upsample.tent(merged, seen.covered.tolist(), 3).values())
+    np.testing.assert_allclose(together, sum(summed(buffer, alone(both, k), settings) for k in range(2)), rtol=TWIN)
+    added_before = sum(naive_upsample.tent(merged, buffer.covered.tolist(), 3).values())
     assert added_before < 0.95 * together[0].sum()
 
 
@@ -252,8 +265,10 @@ def test_counts_are_those_of_table_1(buddha, evidence):
     printed = np.array([0.46, 0.21, 0.10])
     for count in (64, 144, 256):
         lights = choose_pixel_lights(buddha.rsms, count=count, pattern="grid")
-        rows = [int(per_light_counts(buddha.gbuffer, lights, unclamped(
-            clamp="geometry", clamp_value=25.0, light_threshold=0.02, finest=finest)).sum()) for finest in (3, 2, 1, 0)]
+        rows = []
+        for finest in (3, 2, 1, 0):
+            settings = by_irradiance(clamp="geometry", clamp_value=25.0, subsplats_threshold=0.02, finest=finest)
+            rows.append(int(counted(buddha.gbuffer, lights, settings).sum()))
         number = lights.position.shape[1]
         assert rows[0] == 256 * number
         share = np.array(rows[1:]) / (number * 256 * 4.0 ** np.arange(1, 4))
@@ -267,15 +282,15 @@ def test_counts_are_those_of_table_1(buddha, evidence):
 @pytest.mark.feature("AMS-08")
 def test_narrow_highlights_are_missed_between_samples(evidence):
     """Property, as the paper warns: a lobe narrower than the samples' spacing is not seen; a wide one is."""
-    seen = wall(128, 128, np.float32)
-    settings = unclamped(coarsest=8, light_threshold=0.1, threshold_form="absolute")
+    buffer = wall(128, 128, np.float32)
+    settings = by_irradiance(coarsest=8, subsplats_threshold=0.1, form="absolute")
     for exponent, missed in ((3000.0, True), (50.0, False)):
-        aim = np.array([[seen.position[0, 0, 64]], [seen.position[1, 64, 0]], [0.0]])
+        aim = np.array([[buffer.position[0, 0, 64]], [buffer.position[1, 64, 0]], [0.0]])
         place = np.array([[0.1], [0.2], [1.0]])
         lights = sets.glossy(place, np.array([[0], [0], [-1.0]]), sets.unit(aim - place), exponent, real=np.float32)
-        full = full_sum(seen, lights, settings)
-        found = per_light(seen, lights, settings)
-        count = int(per_light_counts(seen, lights, settings).sum())
+        full = full_sum(buffer, lights, settings)
+        found = summed(buffer, lights, settings)
+        count = int(counted(buffer, lights, settings).sum())
         share = float(found.max() / full.max())
         assert (count == 64) == missed
         assert share < 0.01 if missed else 0.9 < share < 1.1
@@ -286,15 +301,15 @@ def test_narrow_highlights_are_missed_between_samples(evidence):
 def test_highlights_of_phong_emitters_are_found(buddha, evidence):
     """Picture: of Fig. 6; the shared list blurs highlights, per-light lists find them, both together cost far less."""
     buffer, lights = buddha.gbuffer, choose_pixel_lights(buddha.rsms, count=64, pattern="grid")
-    settings = unclamped(coarsest=8, clamp="geometry", clamp_value=25.0, light_threshold=0.05)
+    settings = by_irradiance(coarsest=8, clamp="geometry", clamp_value=25.0, subsplats_threshold=0.05)
     full, start = full_sum(buffer, lights, settings), shared_list(buffer, settings)
-    shared = upsample(evaluate(*at_subsplats(buffer, start), lights, settings), start, buffer.covered)
-    tight = dataclasses.replace(settings, light_threshold=0.003)
+    shared = upsample(evaluate(*representative_points(buffer, start), lights, settings.pairs), start, buffer.covered)
+    tight = replaced(settings, {"subsplats.threshold": 0.003})
     count, error = {"shared": lights.position.shape[1] * len(start.level)}, {}
     error["shared"] = relative_rmse(shared, full, buffer.covered)
     for name, how, first in (("light", settings, None), ("light, tight", tight, None), ("both", settings, start)):
-        count[name] = int(per_light_counts(buffer, lights, how, None, first).sum())
-        error[name] = relative_rmse(per_light(buffer, lights, how, None, first), full, buffer.covered)
+        count[name] = int(counted(buffer, lights, how, None, first).sum())
+        error[name] = relative_rmse(summed(buffer, lights, how, None, first), full, buffer.covered)
     assert error["light"] < 0.6 * error["shared"]
     assert error["both"] < 0.5 * min(error["light"], error["light, tight"])
     assert count["both"] < 0.4 * count["light, tight"]
@@ -304,15 +319,15 @@ def test_highlights_of_phong_emitters_are_found(buddha, evidence):
 
 @pytest.mark.feature("AMS-13")
 def test_a_highlight_on_a_flat_wall(evidence):
-    """Picture: nothing but light tells that a flat wall needs refinement."""
-    seen, lights = wall(128, 128, np.float32), lamps(6, np.float32, exponent=50.0)
+    """Picture: only irradiance shows that a flat wall needs refinement."""
+    buffer, lights = wall(128, 128, np.float32), lamps(6, np.float32, exponent=50.0)
     lights = lights._replace(flux=np.zeros_like(lights.flux))
-    settings = unclamped(coarsest=8, light_threshold=0.05)
-    full, start = full_sum(seen, lights, settings), shared_list(seen, settings)
+    settings = by_irradiance(coarsest=8, subsplats_threshold=0.05)
+    full, start = full_sum(buffer, lights, settings), shared_list(buffer, settings)
     assert len(start.level) == 64
-    shared = upsample(evaluate(*at_subsplats(seen, start), lights, settings), start, seen.covered)
-    found = per_light(seen, lights, settings)
-    errors = relative_rmse(shared, full, seen.covered), relative_rmse(found, full, seen.covered)
+    shared = upsample(evaluate(*representative_points(buffer, start), lights, settings.pairs), start, buffer.covered)
+    found = summed(buffer, lights, settings)
+    errors = relative_rmse(shared, full, buffer.covered), relative_rmse(found, full, buffer.covered)
     assert errors[1] < 0.1 * errors[0]
     evidence(f"RMSE {100 * errors[0]:.0f} % of the shared list, {100 * errors[1]:.1f} % refined by each light with "
-             f"{int(per_light_counts(seen, lights, settings).sum())} of {6 * seen.covered.size} pairs")
+             f"{int(counted(buffer, lights, settings).sum())} of {6 * buffer.covered.size} pairs")

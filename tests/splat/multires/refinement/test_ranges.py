@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 
 from refgi.jit import threads
 from refgi.settings import of
-from refgi.splat.multires.refinement.changes import curvatures, depth_slopes
-from refgi.splat.multires.refinement.criteria import depth_ranges, needs, normal_ranges
+from refgi.splat.multires.refinement.criteria import depth_ranges, discontinuities, normal_ranges
+from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
 from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.settings import MultiresSettings
 from tests.naive import refinement as naive
 from tests.pairs.sets import random_directions, unit
+from tests.splat.multires.choices import only
 
 SIZES = ((1, 1), (1, 9), (7, 1), (16, 16), (37, 53))
 TOP = 3
@@ -25,7 +26,7 @@ THRESHOLDS = (0.2, 0.25, 1.4, 1.5)  # Fig. 11 and 12
 
 
 @dataclasses.dataclass
-class Seen:
+class FakeBuffer:
     """A picture with the channels of a G-buffer."""
 
     depth: np.ndarray
@@ -47,7 +48,7 @@ def scattered(shape, real=np.float64, share=0.7, seed=1):
     covered = rng.random(shape) < share
     depth = np.where(covered, rng.uniform(1, 3, shape), np.inf).astype(real)
     normal = random_directions(rng, covered.size).reshape(3, *shape).astype(real) * covered
-    return Seen(depth, normal, rng.normal(size=(3, *shape)).astype(real) * covered, covered)
+    return FakeBuffer(depth, normal, rng.normal(size=(3, *shape)).astype(real) * covered, covered)
 
 
 def sphere(size=64, radius=2.0, share=0.9):
@@ -56,7 +57,7 @@ def sphere(size=64, radius=2.0, share=0.9):
     covered = x * x + y * y < 1
     normal = np.stack([x, -y, np.sqrt(np.maximum(0, 1 - x * x - y * y))]) * covered
     depth = np.where(covered, 100 - radius * normal[2], np.inf)
-    return Seen(depth, normal, radius * normal, covered)
+    return FakeBuffer(depth, normal, radius * normal, covered)
 
 
 @pytest.mark.feature("AMS-02")
@@ -64,26 +65,26 @@ def sphere(size=64, radius=2.0, share=0.9):
 def test_ranges_are_those_of_the_pixels_with_a_surface(evidence, real):
     cells = 0
     for shape in SIZES:
-        seen = scattered(shape, real)
+        buffer = scattered(shape, real)
         for rim in (0, 1):
-            depth = depth_ranges(seen.depth, seen.covered, TOP, rim)
-            normal = normal_ranges(seen.normal, seen.covered, TOP, rim)
+            depth = depth_ranges(buffer.depth, buffer.covered, TOP, rim)
+            normal = normal_ranges(buffer.normal, buffer.covered, TOP, rim)
             for level in range(1, TOP + 1):
                 assert depth.low[level].shape == level_shape(*shape, level)
                 for i, j in np.ndindex(depth.low[level].shape):
                     found = depth.low[level][i, j], depth.high[level][i, j]
-                    assert found == naive.span(seen.depth, seen.covered, level, i, j, rim)
+                    assert found == naive.span(buffer.depth, buffer.covered, level, i, j, rim)
                     for c in range(3):
                         found = normal.low[level][c, i, j], normal.high[level][c, i, j]
-                        assert found == naive.span(seen.normal[c], seen.covered, level, i, j, rim)
+                        assert found == naive.span(buffer.normal[c], buffer.covered, level, i, j, rim)
                     cells += 1
     evidence(f"{cells} cells of pictures of {len(SIZES)} sizes: depth and normal ranges equal those of their pixels")
 
 
 @pytest.mark.feature("AMS-02")
 def test_a_range_contains_those_of_the_cells_inside():
-    seen = scattered((37, 53))
-    mip = depth_ranges(seen.depth, seen.covered, 5, 1)
+    buffer = scattered((37, 53))
+    mip = depth_ranges(buffer.depth, buffer.covered, 5, 1)
     for level in range(1, 5):
         for i, j in np.ndindex(mip.low[level].shape):
             assert mip.low[level + 1][i // 2, j // 2] <= mip.low[level][i, j]
@@ -91,30 +92,31 @@ def test_a_range_contains_those_of_the_cells_inside():
 
 
 def test_a_picture_without_surface_has_no_range_and_no_need():
-    seen = scattered((21, 5), share=0)
-    mip = depth_ranges(seen.depth, seen.covered, TOP)
+    buffer = scattered((21, 5), share=0)
+    mip = depth_ranges(buffer.depth, buffer.covered, TOP)
     assert np.isposinf(mip.lows).all()
     assert np.isneginf(mip.highs).all()
-    every = of(MultiresSettings, criteria={"depth", "derivative", "normal", "curvature"}, depth_threshold=0)
-    assert not any(level.any() for level in needs(seen, every, TOP))
+    every = of(MultiresSettings, **only("depth", "derivative", "normal", "curvature"), depth_threshold=0)
+    assert not any(level.any() for level in discontinuities(buffer, every.subsplats.criteria, TOP))
 
 
 def test_a_mip_of_a_single_level_is_the_picture():
-    seen = scattered((3, 4))
-    (level,) = depth_ranges(seen.depth, seen.covered, 0).low
-    np.testing.assert_array_equal(level, seen.depth)
-    (need,) = needs(seen, MultiresSettings(), 0)
+    buffer = scattered((3, 4))
+    (level,) = depth_ranges(buffer.depth, buffer.covered, 0).low
+    np.testing.assert_array_equal(level, buffer.depth)
+    (need,) = discontinuities(buffer, MultiresSettings().subsplats.criteria, 0)
     assert need.shape == (3, 4)
     assert not need.any()
 
 
 def test_mips_are_the_same_for_any_number_of_threads():
-    seen = scattered((37, 53), np.float32)
+    buffer = scattered((37, 53), np.float32)
 
     def all_of_them():
-        one, two = seen.depth, seen.normal
-        mips = (depth_ranges(one, seen.covered, TOP, 1), normal_ranges(two, seen.covered, TOP),
-                depth_slopes(one, seen.covered, TOP), curvatures(two, seen.position, seen.covered, TOP, rate=True))
+        one, two = buffer.depth, buffer.normal
+        mips = (depth_ranges(one, buffer.covered, TOP, 1), normal_ranges(two, buffer.covered, TOP),
+                depth_slopes(one, buffer.covered, TOP),
+                curvatures(two, buffer.position, buffer.covered, TOP, rate=True))
         return [level.tobytes() for mip in mips for level in (*mip.low, *mip.high)]
 
     with threads(1):
@@ -124,18 +126,22 @@ def test_mips_are_the_same_for_any_number_of_threads():
 
 @pytest.mark.parametrize("shape", SIZES)
 def test_slopes_and_curvatures_are_the_largest_of_their_pixels(shape):
-    seen = scattered(shape)
-    slopes = depth_slopes(seen.depth, seen.covered, TOP)
+    buffer = scattered(shape)
+    slopes = depth_slopes(buffer.depth, buffer.covered, TOP)
     for rate in (False, True):
-        bends = curvatures(seen.normal, seen.position, seen.covered, TOP, rate)
+        bends = curvatures(buffer.normal, buffer.position, buffer.covered, TOP, rate)
         for i, j in np.ndindex(shape):
-            expected = naive.curvature(seen.normal, seen.position, seen.covered, i, j, rate)
+            expected = naive.curvature(buffer.normal, buffer.position, buffer.covered, i, j, rate)
             assert bends.high[0][i, j] == pytest.approx(expected, abs=ARC_COSINE, rel=ROUNDING)
-            assert slopes.high[0][i, j] == pytest.approx(naive.slope(seen.depth, seen.covered, i, j), rel=ROUNDING)
+            assert slopes.high[0][i, j] == pytest.approx(naive.slope(buffer.depth, buffer.covered, i, j), rel=ROUNDING)
         for mip in (slopes, bends):
             for level in range(1, TOP + 1):
                 for i, j in np.ndindex(mip.high[level].shape):
                     assert mip.high[level][i, j] == mip.high[0][naive.pixels_of(shape, level, i, j)].max()
+
+
+def found_by(buffer, top, finest=0, **settings):
+    return discontinuities(buffer, of(MultiresSettings, **settings).subsplats.criteria, top, finest)
 
 
 def plane(size=128, lean=50.0, vertical_fov=60.0):
@@ -149,9 +155,9 @@ def plane(size=128, lean=50.0, vertical_fov=60.0):
 @pytest.mark.feature("AMS-03")
 def test_a_plane_seen_at_a_slant_is_split_by_the_range_alone(evidence):
     depth = plane()
-    seen = Seen(depth, facing(depth.shape), facing(depth.shape), np.ones(depth.shape, bool))
+    buffer = FakeBuffer(depth, facing(depth.shape), facing(depth.shape), np.ones(depth.shape, bool))
     top = top_level(*depth.shape, 16)
-    split = {name: np.count_nonzero(needs(seen, of(MultiresSettings, criteria={name}), top)[top])
+    split = {name: np.count_nonzero(found_by(buffer, top, **only(name))[top])
              for name in ("depth", "derivative")}
     assert split["derivative"] == 0
     assert split["depth"] > 0
@@ -161,17 +167,17 @@ def test_a_plane_seen_at_a_slant_is_split_by_the_range_alone(evidence):
 
 @pytest.mark.feature("AMS-03")
 def test_the_derivative_misses_gentle_ramps(evidence):
-    settings = of(MultiresSettings, criteria={"derivative"})
+    settings = of(MultiresSettings, **only("derivative")).subsplats.criteria
     x = np.arange(64)
     missed, found = [], []
     for width in (1, 2, 4, 8, 10, 16, 32):
         depth = np.broadcast_to(1 + 0.5 * np.clip((x - 15.5 + width / 2) / width, 0, 1), (8, 64))
-        seen = Seen(depth, facing((8, 64)), facing((8, 64)), np.ones((8, 64), bool))
-        range_too = any(level.any() for level in needs(seen, of(MultiresSettings, criteria={"depth"}), 5))
+        buffer = FakeBuffer(depth, facing((8, 64)), facing((8, 64)), np.ones((8, 64), bool))
+        range_too = any(level.any() for level in found_by(buffer, 5, **only("depth")))
         assert range_too
-        (found if any(level.any() for level in needs(seen, settings, 5)) else missed).append(width)
+        (found if any(level.any() for level in discontinuities(buffer, settings, 5)) else missed).append(width)
     # a ramp of 0.5 m over `width` pixels from 1 m rises by 0.5 / width of the depth a pixel at its foot
-    assert found == [width for width in (1, 2, 4, 8, 10, 16, 32) if 0.5 / width > settings.derivative_threshold]
+    assert found == [width for width in (1, 2, 4, 8, 10, 16, 32) if 0.5 / width > settings.derivative.threshold]
     evidence(f"1 m to 1.5 m at a threshold of 0.05 a pixel: found over {found} pixels, missed over {missed}; "
              "the range finds all")
 
@@ -181,11 +187,11 @@ def crease(one, other, size=8):
     normal = np.empty((3, size, size))
     normal[..., : size // 2 - 1], normal[..., size // 2 - 1 :] = one[:, None, None], other[:, None, None]
     flat = np.ones((size, size))
-    return Seen(flat, normal, facing((size, size)), flat.astype(bool))
+    return FakeBuffer(flat, normal, facing((size, size)), flat.astype(bool))
 
 
-def is_found(seen, **settings):
-    return bool(needs(seen, of(MultiresSettings, **settings), 3)[3].any())
+def is_found(buffer, **settings):
+    return bool(found_by(buffer, 3, **settings)[3].any())
 
 
 @pytest.mark.feature("AMS-04")
@@ -199,7 +205,7 @@ def test_the_threshold_of_normals_is_an_angle_between_two_bounds(evidence):
             one = random_directions(rng, 1)[:, 0]
             across = unit(np.cross(one, rng.normal(size=3)))
             other = math.cos(angle) * one + math.sin(angle) * across
-            found = is_found(crease(one, other), criteria={"normal"}, normal_threshold=threshold)
+            found = is_found(crease(one, other), **only("normal"), normal_threshold=threshold)
             assert found == (np.abs(one - other).max() > threshold)
             assert found or angle <= surely or threshold > 2 / math.sqrt(3)
             assert not found or angle >= never
@@ -207,18 +213,18 @@ def test_the_threshold_of_normals_is_an_angle_between_two_bounds(evidence):
         lines.append(f"{threshold}: none below {math.degrees(never):.1f} deg, {both}")
     # opposite normals along the diagonal of the axes: the range of each component is 2 / sqrt(3) = 1.155
     fold = np.full(3, 1 / math.sqrt(3))
-    assert not is_found(crease(fold, -fold), criteria={"normal"}, normal_threshold=1.4)
+    assert not is_found(crease(fold, -fold), **only("normal"), normal_threshold=1.4)
     evidence("; ".join(lines) + "; above 1.155 even a fold of 180 deg can be missed")
 
 
 @pytest.mark.feature("AMS-04")
 def test_two_components_do_not_see_a_fold_about_the_third():
     one, other = unit(np.array([0.6, 0.0, 0.8])), unit(np.array([0.6, 0.0, -0.8]))
-    seen = crease(one, other)
-    assert is_found(seen, criteria={"normal"}, normal_components="xyz")
-    assert not is_found(seen, criteria={"normal"}, normal_components="xy")
+    buffer = crease(one, other)
+    assert is_found(buffer, **only("normal"), normal_components="xyz")
+    assert not is_found(buffer, **only("normal"), normal_components="xy")
     turned = crease(one, unit(np.array([0.0, 0.6, 0.8])))
-    assert is_found(turned, criteria={"normal"}, normal_components="xy")
+    assert is_found(turned, **only("normal"), normal_components="xy")
 
 
 @pytest.mark.feature("AMS-04")
@@ -235,18 +241,19 @@ def test_the_largest_range_of_a_component_is_near_the_chord(seed, angle):
 
 @pytest.mark.feature("AMS-05")
 def test_curvature_misses_a_sphere_and_finds_a_crease(evidence):
-    seen, top = sphere(256), 4
+    buffer, top = sphere(256), 4
     inner = slice(5, 11)  # of 16 x 16 cells: those well within the disc
     lines = []
     for threshold in (0.1, 0.3):  # Fig. 12
-        bends = needs(seen, of(MultiresSettings, criteria={"curvature"}, curvature_threshold=threshold), top)[top]
+        settings = of(MultiresSettings, **only("curvature"), curvature_threshold=threshold)
+        bends = discontinuities(buffer, settings.subsplats.criteria, top)[top]
         assert not bends[inner, inner].any()
         lines.append(f"{threshold}: {np.count_nonzero(bends)} cells of the limb")
         # a crease whose chord is 1.1 times the threshold
         half = math.asin(1.1 * threshold / 2)
         fold = crease(np.array([math.sin(half), 0, math.cos(half)]), np.array([-math.sin(half), 0, math.cos(half)]))
-        assert is_found(fold, criteria={"curvature"}, curvature_threshold=threshold)
-    spreads = needs(seen, of(MultiresSettings, criteria={"normal"}, normal_threshold=0.1), top)[top]
+        assert is_found(fold, **only("curvature"), curvature_threshold=threshold)
+    spreads = found_by(buffer, top, **only("normal"), normal_threshold=0.1)[top]
     assert spreads[inner, inner].all()
     evidence(f"sphere, 0 of its 36 inner cells at {', '.join(lines)}; all 36 by the normals' range of 0.1; "
              "creases 10 % above found")
@@ -255,16 +262,17 @@ def test_curvature_misses_a_sphere_and_finds_a_crease(evidence):
 @pytest.mark.feature("AMS-05")
 @pytest.mark.parametrize("radius", [0.01, 2.0, 300.0])
 def test_the_rate_of_a_sphere_is_the_inverse_of_its_radius(evidence, radius):
-    seen = sphere(48, radius)
-    rates = curvatures(seen.normal, seen.position, seen.covered, 2, rate=True).high[0][seen.covered]
+    buffer = sphere(48, radius)
+    rates = curvatures(buffer.normal, buffer.position, buffer.covered, 2, rate=True).high[0][buffer.covered]
     np.testing.assert_allclose(rates, 1 / radius, rtol=ROUNDING)
     evidence(f"R = {radius:g} m: 1/R to {np.abs(rates * radius - 1).max():.0e}")
 
 
 def test_criteria_add_up_and_the_finest_level_is_never_refined():
-    seen = scattered((37, 53), np.float32, 0.95)
-    together = needs(seen, of(MultiresSettings, criteria={"depth", "normal"}, finest=1), TOP)
-    alone = [needs(seen, of(MultiresSettings, criteria={name}, finest=1), TOP) for name in ("depth", "normal")]
+    buffer = scattered((37, 53), np.float32, 0.95)
+    together = found_by(buffer, TOP, 1, **only("depth", "normal"))
+    alone = [found_by(buffer, TOP, 1, **only(name))
+             for name in ("depth", "normal")]
     for level in range(TOP + 1):
         np.testing.assert_array_equal(together[level], alone[0][level] | alone[1][level])
         assert together[level].any() == (level > 1)
@@ -272,15 +280,16 @@ def test_criteria_add_up_and_the_finest_level_is_never_refined():
 
 @pytest.mark.parametrize("rim", [0, 1])
 def test_needs_are_those_of_the_printed_tests(rim):
-    seen = scattered((19, 23), np.float32, 0.6)
-    seen.depth[:, 12:] = np.where(seen.covered[:, 12:], 2, np.inf)  # flat parts: some cells need nothing
-    seen.normal[:, :, 12:] = facing((19, 11)) * seen.covered[:, 12:]
+    buffer = scattered((19, 23), np.float32, 0.6)
+    buffer.depth[:, 12:] = np.where(buffer.covered[:, 12:], 2, np.inf)  # flat parts: some cells need nothing
+    buffer.normal[:, :, 12:] = facing((19, 11)) * buffer.covered[:, 12:]
     settings = of(MultiresSettings, rim=rim, normal_threshold=0.7, depth_threshold=0.4)
 
     def test(level, i, j):
-        low, high = naive.span(seen.depth, seen.covered, level, i, j, rim)
-        spans = [naive.span(seen.normal[c], seen.covered, level, i, j, rim) for c in range(3)]
+        low, high = naive.span(buffer.depth, buffer.covered, level, i, j, rim)
+        spans = [naive.span(buffer.normal[c], buffer.covered, level, i, j, rim) for c in range(3)]
         return high - low > np.float32(0.4) * low or any(b - a > np.float32(0.7) for a, b in spans)
 
-    for found, expected in zip(needs(seen, settings, 4), naive.needs((19, 23), 4, 0, test), strict=True):
+    twin = naive.discontinuities((19, 23), 4, 0, test)
+    for found, expected in zip(discontinuities(buffer, settings.subsplats.criteria, 4), twin, strict=True):
         np.testing.assert_array_equal(found, expected)

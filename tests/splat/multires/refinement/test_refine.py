@@ -8,11 +8,12 @@ import pytest
 from refgi import Frame, load_scene
 from refgi.jit import threads
 from refgi.settings import of
-from refgi.splat.multires.refinement.criteria import needs
+from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import level_picture, representative, top_level
 from refgi.splat.multires.refinement.refine import refine
-from refgi.splat.multires.settings import MultiresSettings
+from refgi.splat.multires.settings import Criteria, MultiresSettings
 from tests.naive import refinement as naive
+from tests.splat.multires.choices import only
 
 RULES = ("off", "corner", "literal", "full8")
 DISCS = 12
@@ -21,7 +22,7 @@ NEAR = 0.1  # how far counts of other discs, drawn by another hand, may be off t
 
 
 @dataclasses.dataclass
-class Seen:
+class FakeBuffer:
     """A picture with the channels of a G-buffer."""
 
     depth: np.ndarray
@@ -37,7 +38,7 @@ def flat(depth, covered=None):
     covered = np.ones(depth.shape, bool) if covered is None else covered
     normal = np.zeros((3, *depth.shape), np.float32)
     normal[2] = covered
-    return Seen(np.where(covered, depth, np.inf).astype(np.float32), normal, covered)
+    return FakeBuffer(np.where(covered, depth, np.inf).astype(np.float32), normal, covered)
 
 
 def discs(size, seed=3):
@@ -65,58 +66,58 @@ def listed(subsplats):
     return list(zip(*(part.tolist() for part in subsplats[:3]), strict=True))
 
 
-def refined(seen, top=None, **settings):
-    chosen = of(MultiresSettings, **settings)
-    top = top_level(*seen.covered.shape, chosen.coarsest) if top is None else top
-    return refine(needs(seen, chosen, top), seen.covered, chosen)
+def refined(buffer, top=None, **settings):
+    chosen = of(MultiresSettings, **settings).subsplats
+    top = top_level(*buffer.covered.shape, chosen.coarsest) if top is None else top
+    discontinuous = discontinuities(buffer, chosen.criteria, top, chosen.finest)
+    return refine(discontinuous, buffer.covered, chosen.criteria.diagonal, chosen.criteria.traversal)
 
 
 @pytest.mark.feature("AMS-06")
 @pytest.mark.parametrize("shape", [(1, 1), (1, 13), (9, 1), (6, 5), (32, 32), (37, 53)])
 @pytest.mark.parametrize("rule", RULES)
 def test_subsplats_are_the_published_list(shape, rule):
-    seen = busy(shape)
+    buffer = busy(shape)
     for finest in (0, 2):
-        settings = of(MultiresSettings, diagonal=rule, coarsest=4, finest=finest)
         top = top_level(*shape, 4)
-        need = needs(seen, settings, top)
-        subsplats = refine(need, seen.covered, settings)
-        expected = naive.refine(need, seen.covered, rule)
+        need = discontinuities(buffer, Criteria(), top, finest)
+        subsplats = refine(need, buffer.covered, rule)
+        expected = naive.refine(need, buffer.covered, rule)
         assert listed(subsplats) == naive.in_order(expected, top, need[top].shape[1])
-        by_list = refine(need, seen.covered, dataclasses.replace(settings, refinement="list"))
+        by_list = refine(need, buffer.covered, rule, "list")
         for one, other in zip((*subsplats[:4], *subsplats.leaf), (*by_list[:4], *by_list.leaf), strict=True):
             np.testing.assert_array_equal(one, other)
             assert one.dtype == other.dtype
         for pixel, one in zip(subsplats.pixel, listed(subsplats), strict=True):
-            assert pixel == representative(seen.covered, *one)
+            assert pixel == representative(buffer.covered, *one)
 
 
 @pytest.mark.feature("AMS-06")
 @pytest.mark.parametrize("rule", RULES)
 def test_subsplats_tile_the_surfaces(rule):
-    seen = busy((37, 53), share=0.3)
-    subsplats = refined(seen, diagonal=rule, coarsest=4)
-    times = naive.times_covered(listed(subsplats), seen.covered.shape)
-    assert (times[seen.covered] == 1).all()
+    buffer = busy((37, 53), share=0.3)
+    subsplats = refined(buffer, diagonal=rule, coarsest=4)
+    times = naive.times_covered(listed(subsplats), buffer.covered.shape)
+    assert (times[buffer.covered] == 1).all()
     assert times.max() == 1
     for level, leaf in enumerate(subsplats.leaf):
-        assert leaf.shape == naive.grid(seen.covered.shape, level)
+        assert leaf.shape == naive.grid(buffer.covered.shape, level)
         assert set(map(tuple, np.argwhere(leaf))) == {(i, j) for one, i, j in listed(subsplats) if one == level}
     assert subsplats.counts.sum() == len(subsplats.level)
 
 
 @pytest.mark.feature("AMS-06")
 def test_six_passes_from_16_cells_to_1024_pixels(evidence):
-    seen, counts = discs(1024), []
+    buffer, counts = discs(1024), []
     for threshold in (0.02, 0.1, 0.5, 2.0, 8.0, 20.0):
-        settings = of(MultiresSettings, criteria={"depth"}, depth_threshold=threshold)
-        subsplats = refined(seen, depth_threshold=threshold, criteria={"depth"})
+        settings = of(MultiresSettings, **only("depth"), depth_threshold=threshold)
+        subsplats = refined(buffer, depth_threshold=threshold, **only("depth"))
         counts.append(len(subsplats.level))
         assert subsplats.top == 6
         if threshold == 0.1:
             assert subsplats.leaf[0].any()
             assert subsplats.leaf[6].any()
-            need = needs(seen, settings, 6)
+            need = discontinuities(buffer, settings.subsplats.criteria, 6)
             assert not any((one & leaf).any() for one, leaf in zip(need, subsplats.leaf, strict=True))
             evidence(f"12 discs at 1024 x 1024: {subsplats.counts.tolist()} subsplats of levels 0 to 6, "
                      "none above its threshold but pixels")
@@ -129,8 +130,8 @@ def test_six_passes_from_16_cells_to_1024_pixels(evidence):
 def test_edges_double_with_every_level_and_noise_quadruples(evidence):
     rng = np.random.default_rng(1)
     levels = np.arange(7)[::-1]
-    for name, seen in (("12 discs", discs(1024)), ("noise", flat(rng.uniform(1, 2, (1024, 1024))))):
-        counts = [len(refined(seen, diagonal="off", finest=finest).level) for finest in levels]
+    for name, buffer in (("12 discs", discs(1024)), ("noise", flat(rng.uniform(1, 2, (1024, 1024))))):
+        counts = [len(refined(buffer, diagonal="off", finest=finest).level) for finest in levels]
         split, growth = np.diff(counts) / 3, np.divide(counts[1:], counts[:-1])
         if name == "noise":
             assert (growth[:-1] == 4).all()
@@ -144,16 +145,15 @@ def test_edges_double_with_every_level_and_noise_quadruples(evidence):
 
 @pytest.mark.feature("AMS-09")
 def test_a_level_by_itself_gives_the_list_only_where_criteria_are_monotone(evidence):
-    seen = busy((64, 64))
+    buffer = busy((64, 64))
     shares = {}
     for rule in RULES:
-        settings = of(MultiresSettings, diagonal=rule, coarsest=4)
-        need = needs(seen, settings, 4)
-        alone = naive.by_levels(need, seen.covered, rule)
-        times = naive.times_covered(alone, seen.covered.shape)
-        shares[rule] = (times[seen.covered] > 1).mean()
+        need = discontinuities(buffer, Criteria(), 4)
+        alone = naive.by_levels(need, buffer.covered, rule)
+        times = naive.times_covered(alone, buffer.covered.shape)
+        shares[rule] = (times[buffer.covered] > 1).mean()
         if rule in ("off", "full8"):
-            assert sorted(alone) == sorted(listed(refine(need, seen.covered, settings)))
+            assert sorted(alone) == sorted(listed(refine(need, buffer.covered, rule)))
     assert shares["off"] == shares["full8"] == 0
     assert shares["literal"] > 0
     evidence("share of pixels covered more than once where each level is read by itself: "
@@ -163,17 +163,17 @@ def test_a_level_by_itself_gives_the_list_only_where_criteria_are_monotone(evide
 @pytest.mark.feature("AMS-09")
 def test_thresholds_that_rise_with_the_level_break_a_level_by_itself(evidence):
     rng = np.random.default_rng(2)
-    seen, top = flat(1 + rng.random((64, 64)) * np.linspace(0, 0.5, 64)), 4
+    buffer, top = flat(1 + rng.random((64, 64)) * np.linspace(0, 0.5, 64)), 4
 
     def test(level, i, j):
-        low, high = naive.span(seen.depth, seen.covered, level, i, j)
+        low, high = naive.span(buffer.depth, buffer.covered, level, i, j)
         return high - low > 0.13 * level * low
 
-    need = tuple(naive.needs((64, 64), top, 0, test))
-    times = naive.times_covered(naive.by_levels(need, seen.covered, "off"), (64, 64))
-    subsplats = refine(need, seen.covered, of(MultiresSettings, diagonal="off"))
+    need = tuple(naive.discontinuities((64, 64), top, 0, test))
+    times = naive.times_covered(naive.by_levels(need, buffer.covered, "off"), (64, 64))
+    subsplats = refine(need, buffer.covered, "off")
     assert (naive.times_covered(listed(subsplats), (64, 64)) == 1).all()
-    assert sorted(listed(subsplats)) == sorted(naive.refine(need, seen.covered, "off"))
+    assert sorted(listed(subsplats)) == sorted(naive.refine(need, buffer.covered, "off"))
     share = (times > 1).mean()
     assert share > 0.5
     evidence(f"threshold 0.13 times the level, noise that grows from left to right: {share:.0%} of the pixels covered "
@@ -182,8 +182,8 @@ def test_thresholds_that_rise_with_the_level_break_a_level_by_itself(evidence):
 
 @pytest.mark.feature("AMS-12")
 def test_what_the_rules_for_neighbours_cost(evidence):
-    seen = discs(1024)
-    counts = {rule: len(refined(seen, diagonal=rule).level) for rule in RULES}
+    buffer = discs(1024)
+    counts = {rule: len(refined(buffer, diagonal=rule).level) for rule in RULES}
     factor = {rule: counts[rule] / counts["off"] for rule in RULES}
     # E-AMS-10: factors of another drawing of 12 discs at this size
     for rule, known in (("corner", 1.4), ("literal", 3.4), ("full8", 3.8)):
@@ -196,8 +196,8 @@ def test_what_the_rules_for_neighbours_cost(evidence):
 def test_an_edge_between_two_cells_is_found_with_a_rim(evidence):
     depth = np.ones((64, 64))
     depth[32:] = 2
-    seen = flat(depth)
-    without, within = refined(seen, diagonal="off", coarsest=4), refined(seen, diagonal="off", coarsest=4, rim=1)
+    buffer = flat(depth)
+    without, within = refined(buffer, diagonal="off", coarsest=4), refined(buffer, diagonal="off", coarsest=4, rim=1)
     assert without.counts.tolist() == [0, 0, 0, 0, 16]
     beside = np.repeat(np.arange(64)[:, None] // 2 == 15, 64, axis=1) | (np.arange(64)[:, None] // 2 == 16)
     picture = level_picture(within, edges=False)
@@ -214,7 +214,7 @@ def test_a_corner_is_refined_across_only_where_nothing_else_tells():
     covered = np.ones((16, 16), bool)
 
     def split(rule):
-        return refine(tuple(need), covered, of(MultiresSettings, diagonal=rule)).leaf[2]
+        return refine(tuple(need), covered, rule).leaf[2]
 
     assert np.argwhere(~split("off")).tolist() == [[0, 0]]
     assert np.argwhere(~split("corner")).tolist() == [[0, 0], [1, 1]]
@@ -224,7 +224,7 @@ def test_a_corner_is_refined_across_only_where_nothing_else_tells():
     assert np.argwhere(~split("full8")).tolist() == [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2]]
     covered[4:8, 8:12] = False  # nothing to see there
     assert np.argwhere(~split("corner")).tolist() == [[0, 0], [0, 1], [1, 2]]
-    assert listed(refine(tuple(need), covered, MultiresSettings())).count((2, 1, 2)) == 0
+    assert listed(refine(tuple(need), covered, "corner")).count((2, 1, 2)) == 0
 
 
 def test_background_is_never_lit_and_thin_silhouettes_are():
@@ -241,10 +241,10 @@ def test_background_is_never_lit_and_thin_silhouettes_are():
 
 
 def test_the_list_is_the_same_for_any_number_of_threads():
-    seen = busy((203, 131))
+    buffer = busy((203, 131))
     with threads(1):
-        alone = refined(seen)
-    for one, other in zip((*alone[:4], *alone.leaf), (*(again := refined(seen))[:4], *again.leaf), strict=True):
+        alone = refined(buffer)
+    for one, other in zip((*alone[:4], *alone.leaf), (*(again := refined(buffer))[:4], *again.leaf), strict=True):
         np.testing.assert_array_equal(one, other)
 
 

@@ -1,6 +1,5 @@
-"""Light at subsplats: the bits of the full sum, and where a subsplat is lit."""
+"""Irradiance at subsplats: the bits of the full sum, and representative points."""
 
-from functools import partial
 
 import numpy as np
 import pytest
@@ -11,10 +10,8 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
 from refgi.splat.multires.refinement.grid import Subsplats, level_shape, representatives
-from refgi.splat.multires.settings import MultiresSettings
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
-
-unclamped = partial(MultiresSettings, clamp="none")  # near pairs as they are: what these tests sum pair by pair
+from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
+from tests.splat.multires.choices import unclamped
 
 MEAN_ERROR = 1e-6  # a float32 mean over at most 64 positions below 1 m and unit normals
 
@@ -38,26 +35,26 @@ def cells(covered, level):
 def test_points_get_the_bits_of_the_full_sum(box, change):
     """Oracle: `irradiance` at the same pixels, in another order and on one thread."""
     settings = unclamped(lights=64, **change)
-    lights, area = choose_lights(box, settings), footprints(box, settings)
-    buffer = box.gbuffer
-    full = irradiance(Receivers(buffer.position, buffer.normal, buffer.covered), lights, settings, area)
+    lights, buffer, pairs = choose_lights(box, settings.lights), box.gbuffer, settings.pairs
+    area = footprints(box, settings.lights, pairs)
+    full = irradiance(Receivers(buffer.position, buffer.normal, buffer.covered), lights, pairs, area)
     some = cells(buffer.covered, 2)
-    points = at_subsplats(buffer, some)
-    np.testing.assert_array_equal(evaluate(*points, lights, settings, area), full.reshape(3, -1)[:, some.pixel])
+    points = representative_points(buffer, some)
+    np.testing.assert_array_equal(evaluate(*points, lights, pairs, area), full.reshape(3, -1)[:, some.pixel])
     with threads(1):
-        np.testing.assert_array_equal(evaluate(*points, lights, settings, area), full.reshape(3, -1)[:, some.pixel])
+        np.testing.assert_array_equal(evaluate(*points, lights, pairs, area), full.reshape(3, -1)[:, some.pixel])
 
 
 def test_no_points_get_no_light(box):
-    lights = choose_lights(box, unclamped(lights=16))
-    assert evaluate(np.zeros((3, 0), np.float32), np.zeros((3, 0), np.float32), lights, unclamped()).size == 0
+    lights = choose_lights(box, unclamped(lights=16).lights)
+    assert evaluate(np.zeros((3, 0), np.float32), np.zeros((3, 0), np.float32), lights, unclamped().pairs).size == 0
 
 
 def test_means_are_those_of_the_cells_surface(box):
     """Oracle: means over slices, cut at the border and by what is not covered."""
     position, normal, covered = box.gbuffer.resolve("position", "normal", "covered")
     some = cells(covered, 3)
-    points, normals = at_subsplats(box.gbuffer, some, "mean")
+    points, normals = representative_points(box.gbuffer, some, "mean")
     for k, (i, j) in enumerate(zip(some.row, some.column, strict=True)):
         inside = np.s_[8 * i : 8 * i + 8, 8 * j : 8 * j + 8]
         mask = covered[inside]
@@ -65,5 +62,6 @@ def test_means_are_those_of_the_cells_surface(box):
         np.testing.assert_allclose(points[:, k], position[:, *inside][:, mask].mean(axis=1), atol=MEAN_ERROR)
         np.testing.assert_allclose(normals[:, k], mean / np.linalg.norm(mean), atol=MEAN_ERROR)
     one = cells(covered, 0)
-    for mean, own in zip(at_subsplats(box.gbuffer, one, "mean"), at_subsplats(box.gbuffer, one), strict=True):
+    means, pixels = representative_points(box.gbuffer, one, "mean"), representative_points(box.gbuffer, one)
+    for mean, own in zip(means, pixels, strict=True):
         np.testing.assert_array_equal(mean, own)

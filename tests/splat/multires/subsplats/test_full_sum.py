@@ -1,7 +1,6 @@
 """Subsplats against the full sum, against clamps, and against gathering, shadowed lights and the truth (Fig. 13)."""
 
 import math
-from functools import partial
 
 import numpy as np
 import pytest
@@ -13,10 +12,8 @@ from refgi.settings import of
 from refgi.splat import Receivers, irradiance
 from refgi.splat.gather.gather import GatherSettings, gather
 from refgi.splat.multires.multires import multires
-from refgi.splat.multires.settings import MultiresSettings
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
-
-unclamped = partial(MultiresSettings, clamp="none")  # near pairs as they are: what these tests sum pair by pair
+from tests.splat.multires.choices import unclamped
 
 ALL_FINEST = {"coarsest": 65536}  # the coarsest level is the picture's
 FILTER = 2e-6  # of the maximum: a float32 mean of nine
@@ -33,7 +30,7 @@ def box():
 def every_pixel(frame, settings):
     buffer = frame.gbuffer
     receivers = Receivers(*buffer.resolve("position", "normal", "covered"))
-    return irradiance(receivers, choose_lights(frame, settings), settings)
+    return irradiance(receivers, choose_lights(frame, settings.lights), settings.effective_pairs)
 
 
 def tent(picture, covered):
@@ -68,7 +65,7 @@ def test_all_finest_subsplats_are_the_full_sum(box, evidence):
 def test_all_finest_subsplats_with_rays_are_vpl(box):
     """Oracle: `vpl` with the same lights, to the bit."""
     ours = multires(box, unclamped(lights=64, visibility="rays", **ALL_FINEST))
-    np.testing.assert_array_equal(ours, vpl(box, VplSettings(lights=64, pattern="grid")))
+    np.testing.assert_array_equal(ours, vpl(box, of(VplSettings, lights=64, pattern="grid")))
 
 
 @pytest.mark.feature("AMS-17")
@@ -81,7 +78,7 @@ def test_a_clamp_takes_light_from_around_the_lights_alone(box, evidence):
     mean = all_free[:, covered].mean()
     lost, all_lost = (1 - float(b[:, covered].mean() / a[:, covered].mean())
                       for a, b in ((free, clamped), (all_free, all_clamped)))
-    place = choose_lights(box, unclamped(**few)).position.astype(np.float32)
+    place = choose_lights(box, unclamped(**few).lights).position.astype(np.float32)
     away = box.gbuffer.position[:, :, :, None] - place[:, None, None]
     near = ((away**2).sum(axis=0) < LEAST_SQUARE).any(axis=-1)
     map_of_loss = (free - clamped).sum(axis=0) / free.sum(axis=0, where=covered, initial=1e-9)
@@ -108,7 +105,7 @@ def test_against_gathering_shadowed_lights_and_truth(box, evidence):
         "multires": {False: multires(box, light),
                      True: multires(box, unclamped(lights=1024, visibility="rays"))},
         "full sum": {False: every_pixel(box, light)},
-        "vpl": {True: vpl(box, VplSettings(lights=1024, pattern="grid"))},
+        "vpl": {True: vpl(box, of(VplSettings, lights=1024, pattern="grid"))},
         "gather": {False: gather(box, of(GatherSettings, samples=4096, radius=WHOLE_MAP, interpolation="none"))},
         "gather within 0.3 maps": {False: gather(box, of(GatherSettings, interpolation="none"))}}
     table = {}

@@ -5,23 +5,21 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
-from refgi.settings import of
 from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.refinement.refine import refine
-from refgi.splat.multires.settings import MultiresSettings
 from refgi.splat.multires.subsplats.upsample import upsample
 from tests.naive import upsample as naive
 
 ROUNDING = 1e-15  # values up to 1: up to five passes, each the mean of 9, or the sum of as many levels
 ONE_PASS = 1e-15  # of values up to 1: the bound asked for of one doubling in float64
-ALIKE = 5e-4  # half of the last digit of the published table
+TABLE_DIGIT = 5e-4  # half of the last digit of the published table
 FILTERS = [("tent", {"filter_all": a, "corner_rule": b}) for a in (False, True) for b in (False, True)]
 FILTERS += [("demo", {"filter_all": a}) for a in (False, True)]
 MODES = [*FILTERS, ("nearest", {}), ("naive_bilinear", {})]
 
 
 def leaves(need, covered, diagonal="off"):
-    return refine(need, covered, of(MultiresSettings, diagonal=diagonal))
+    return refine(need, covered, diagonal)
 
 
 def ragged(height, width, share, finest=0, seed=4):
@@ -55,8 +53,8 @@ def discontinuities(image, top, rim=0):
     return tuple(need)
 
 
-def lit(image, subsplats):
-    """The values of a picture at the subsplats' pixels, in three channels."""
+def values_at(image, subsplats):
+    """Values of a picture at the subsplats' pixels, in three channels."""
     return np.stack([image.reshape(-1)[subsplats.pixel]] * 3)
 
 
@@ -126,7 +124,7 @@ def test_a_doubling_of_a_coarse_picture_is_its_bilinear_interpolation(size, evid
 
 @pytest.mark.feature("AMS-11")
 def test_a_fully_refined_picture_is_kept_to_the_bit(evidence):
-    """Property: pixels lit one by one are copied; the published filter blurs them."""
+    """Property: pixels evaluated one by one are copied; the published filter blurs them."""
     subsplats, covered = uniform(20, 30, 0)
     values = np.random.default_rng(3).random((3, 600))
     whole = values[:, np.argsort(subsplats.pixel)].reshape(3, 20, 30)
@@ -151,8 +149,8 @@ def test_the_table_of_the_step(evidence):
     ):
         subsplats = leaves(need, covered, rule)
         assert len(subsplats.level) == count
-        found[name] = rmse(upsample(lit(image, subsplats), subsplats, covered, **options)[0], image)
-        assert abs(found[name] - published) < ALIKE
+        found[name] = rmse(upsample(values_at(image, subsplats), subsplats, covered, **options)[0], image)
+        assert abs(found[name] - published) < TABLE_DIGIT
     evidence("RMSE " + ", ".join(f"{name} {value:.4f}" for name, value in found.items()))
 
 
@@ -163,7 +161,7 @@ def test_naive_interpolation_rings_and_the_tent_does_not(evidence):
     covered = np.ones(image.shape, bool)
     subsplats = leaves(discontinuities(image, 4), covered)
     for mode in ("tent", "demo", "nearest", "naive_bilinear"):
-        got = upsample(lit(image, subsplats), subsplats, covered, mode)
+        got = upsample(values_at(image, subsplats), subsplats, covered, mode)
         beyond[mode] = float(got.max()) - 3.0, 1.0 - float(got.min())
     one = upsample(np.ones((3, len(subsplats.level))), subsplats, covered, "naive_bilinear")
     evidence("above 3 and below 1: " + ", ".join(f"{mode} {a:.3f} and {b:.3f}" for mode, (a, b) in beyond.items())
@@ -183,7 +181,7 @@ def test_energy_across_an_edge_by_the_rules_of_refinement(evidence):
     for name, image in (("boundary", boundary), ("disc", disc(256))):
         for rim, rule in ((0, "off"), (0, "corner"), (0, "literal"), (0, "full8"), (1, "off"), (1, "corner")):
             subsplats = leaves(discontinuities(image, 4, rim), covered, rule)
-            got = upsample(lit(image, subsplats), subsplats, covered)[0]
+            got = upsample(values_at(image, subsplats), subsplats, covered)[0]
             across[name, rim, rule] = float(np.abs(got - image).sum() / image.sum())
             counts[name, rim, rule] = len(subsplats.level)
     for name in ("boundary", "disc"):

@@ -221,14 +221,14 @@ def test_motion_pairs_lights_of_one_texel():
 
 
 def _moved_by(shift, texels):
-    from refgi.cluster.clustering.kmeans import Clusters
+    from refgi.cluster.clustering.kmeans import Clustering
 
     place = np.array([[0.0, 1.0, 2.0], [0.0] * 3, [0.0] * 3])
     up = np.array([[0.0] * 3, [1.0] * 3, [0.0] * 3])
     lights = PixelLights(place + np.array([[shift], [0], [0]]), up, np.ones((3, 3)), None, None, None, 3,
                          np.array(texels, np.int32))
     center = np.array([[shift, 7.0], [0.0, 0.0], [0.0, 0.0]])  # the second has no lights and does not count
-    clusters = Clusters(center, up[:, :2], np.array([3, 0]), np.zeros(3, np.int32), 1, np.zeros(2))
+    clusters = Clustering(center, up[:, :2], np.array([3, 0]), np.zeros(3, np.int32), 1, np.zeros(2))
     return Clustered(lights, clusters, None)
 
 

@@ -1,6 +1,7 @@
 """Run the benchmarks: `python -m benchmarks [--quick] [--out DIR] [topic ...]`.
 
 Every figure is a ratio within one run, or reported without an aim. Results: a table here, results.json in --out.
+`python -m benchmarks paper NAME --out DIR` makes a paper's figures and tables again.
 """
 
 import argparse
@@ -30,6 +31,8 @@ def topics() -> list[str]:
 
 
 def main() -> int:
+    if sys.argv[1:2] == ["paper"]:
+        return importlib.import_module("benchmarks.papers.runner").main(sys.argv[2:])
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("topics", nargs="*", metavar="topic", help=f"of {', '.join(topics())}; all if none")
     parser.add_argument("--quick", action="store_true", help="smaller sizes, fewer repeats")

@@ -15,10 +15,11 @@ from numba import njit, prange
 
 from benchmarks.harness import Row, ratio, seconds
 from refgi.jit import threads
+from refgi.settings import of
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.add import ROWS, WIDE, add_two, term
 from refgi.sssil.crown.gather import gather
-from refgi.sssil.level import Level
+from refgi.sssil.pyramid.view import Level
 
 SAMPLES = 64
 
@@ -61,17 +62,17 @@ def rows(quick: bool) -> Iterator[Row]:
     height, width, repeats = (180, 320, 9) if quick else (360, 640, 25)
     for dtype in (np.float32, np.float64):
         yield _against_fastmath(dtype, repeats)
-    level, settings = room(height, width, np.float32), HssilSettings(samples=SAMPLES)
+    level, settings = room(height, width, np.float32), of(HssilSettings, samples=SAMPLES)
     whole = partial(gather, level, 0, settings)
     taken = seconds(whole, repeats)
-    pairs = height * width * (SAMPLES + settings.inner)
+    pairs = height * width * (SAMPLES + settings.sampling.inner)
     yield Row(f"first level, {width} x {height}, {SAMPLES} samples", taken * 1e3, "ms",
               note=f"{pairs / taken / 1e9:.2f} G pairs/s")
     scaling = ratio(partial(_on_threads, 1, whole), whole, repeats)
     yield Row(f"one thread over {numba.get_num_threads()}", scaling.median, "ratio",
               ">= 1.8" if numba.get_num_threads() > 1 and not quick else "", f"{scaling.low:.2f} to {scaling.high:.2f}")
     yield from _cost_shape(height, width, repeats)
-    own = HssilSettings(samples=SAMPLES, pattern="pixel")
+    own = of(HssilSettings, samples=SAMPLES, pattern="pixel")
     yield Row("samples of each pixel's own, time over shared", ratio(partial(gather, level, 0, own), whole, 3).median,
               "ratio")
 
@@ -91,7 +92,7 @@ def _against_fastmath(dtype: type, repeats: int) -> Row:
 
 def _cost_shape(height: int, width: int, repeats: int) -> Iterator[Row]:
     """Time by level, as in Fig. 7: each a quarter of the one before, the first with its disc."""
-    settings = HssilSettings(samples=SAMPLES)
+    settings = of(HssilSettings, samples=SAMPLES)
     taken = [seconds(partial(gather, room(height >> k, width >> k, np.float32), k, settings), repeats)
              for k in range(5)]
     four = sum(taken[:4])

@@ -5,7 +5,6 @@ machine, for the whole indirect pass: from the G-buffer and direct light to irra
 The game's levels are not published: a built-in hall stands in, or the atrium of REFGI_DATA where that names its folder.
 """
 
-import dataclasses
 import os
 import warnings
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from refgi import Frame, load_scene
 from refgi.errors import RefgiWarning
 from refgi.frame import compose
 from refgi.scene import Scene
+from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 from refgi.stages import observe
@@ -36,7 +36,7 @@ def rows(quick: bool) -> Iterator[Row]:
     width, height, repeats = (640, 360, 5) if quick else (1280, 720, 15)
     frame = _seen("sponza", width, height)
     for (start, levels, samples), (_, fast) in PAPER.items():
-        settings = HssilSettings(start=start, levels=levels, samples=samples)
+        settings = of(HssilSettings, start=start, levels=levels, samples=samples)
         yield _time(frame, f"{start}, {levels} levels, {samples} samples", settings, repeats, fast)
     yield from _fifth_level(frame, repeats)
     for name in STAND_INS:
@@ -77,7 +77,7 @@ def _breakdown(draw: Any, repeats: int) -> str:
 
 def _fifth_level(frame: Frame, repeats: int) -> Iterator[Row]:
     """The fifth level's cost; the paper's text says about 1 %, its samples are 0.3 % of all."""
-    four, five = (HssilSettings(levels=levels) for levels in (4, 5))
+    four, five = (of(HssilSettings, levels=levels) for levels in (4, 5))
     found = ratio(lambda: hssil(frame, five), lambda: hssil(frame, four), repeats)
     yield Row("a fifth level: time beside four", found.median, "", "<= 1.01", f"{found.low:.3f} to {found.high:.3f}")
 
@@ -85,15 +85,15 @@ def _fifth_level(frame: Frame, repeats: int) -> Iterator[Row]:
 def _errors(name: str, size: int) -> Iterator[Row]:
     """Error against every texel of the crowns, and time, by samples."""
     frame = _seen(name, size, size)
-    limit = hssil(frame, HssilSettings(pattern="all")).astype(np.float64)
+    limit = hssil(frame, of(HssilSettings, pattern="all")).astype(np.float64)
     for pattern in ("row", "pixel"):
         for samples in (16, 64, 256):
-            settings = HssilSettings(pattern=pattern, samples=samples)
+            settings = of(HssilSettings, pattern=pattern, samples=samples)
             found = hssil(frame, settings)
             error = float(np.sqrt(np.mean((found - limit) ** 2)) / limit.mean())
 
             def draw(how: HssilSettings = settings) -> None:
-                hssil(frame, dataclasses.replace(how, seed=1))
+                hssil(frame, replaced(how, {"seed": 1}))
 
             yield Row(f"{name}: {samples} samples by {pattern}, RMSE / mean", error, "", "",
                       f"{1e3 * seconds(draw, 5):.1f} ms at {size}^2")

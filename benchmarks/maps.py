@@ -1,7 +1,7 @@
 """Paraboloid depth maps of area lights against Embree's rays through the same texels, and what leaving out saves.
 
 Embree traces over a hierarchy built beforehand, rays made beforehand: one thread is one `EmbreeScene.run` in its
-default mode, all threads are the project's own door to Embree in its robust mode. The maps start from the scene's
+default mode, all threads are the project's own backend of Embree in its robust mode. The maps start from the scene's
 triangles each time.
 """
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.harness import Row, seconds
 from refgi.scene import load_scene
-from refgi.scene.meshfile import read_mesh_file
+from refgi.scene.scenefile import read_mesh_file
 
 
 def rows(quick: bool) -> Iterator[Row]:

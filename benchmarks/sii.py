@@ -15,15 +15,15 @@ from refgi.lights.selection import choose_lights
 from refgi.rsm import rasterize
 from refgi.sampling import halton
 from refgi.scene import Scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.reach.fragments import fragments
 from refgi.stages import Memory, observe
 
 ROOM = "cornell_sphere:faces=17000"
 # a sixth of the pairs count, as in Fig. 8: 125 of 768
-FIVE_PERCENT = of(SiiSettings, i_low=0.05, reference_length=0.171)
-CAUSTIC = of(SiiSettings, lights=4096, warp="B", importance="peak", i_low=0.05, reference_length=1.0)
+FIVE_PERCENT = of(SiiSettings, cut_share=0.05, reference_length=0.171)
+CAUSTIC = of(SiiSettings, lights=4096, warp="B", importance="peak", cut_share=0.05, reference_length=1.0)
 
 
 def rows(quick: bool) -> Iterator[Row]:
@@ -39,7 +39,7 @@ def rows(quick: bool) -> Iterator[Row]:
 def _frames(name: str, scene: Scene, settings: SiiSettings, size: int, repeats: int, paper: float) -> Iterator[Row]:
     """Frames a second: with still buffers, as the paper timed its figures, and with light and camera moving."""
     still = Frame(scene, width=size, height=size)
-    lights, receivers = choose_lights(still, settings), _receivers(still)
+    lights, receivers = choose_lights(still, settings.lights), _receivers(still)
     drawn = fragments(receivers, lights, settings)
     splatting = seconds(lambda: sii(still, settings), repeats)  # choosing the lights included
     note = f"paper {paper:.0f}; overdraw {drawn.total / receivers.covered.sum():.0f}"
@@ -72,8 +72,8 @@ def _culling(size: int) -> Iterator[Row]:
     for name, length in scenes.items():
         frame = Frame(load_scene(name), width=size, height=size)
         for bound in ("tangent", "ellipsoid", "quad", "full"):
-            how = of(SiiSettings, i_low=0.05, reference_length=length, bound=bound)
-            drawn = fragments(_receivers(frame), choose_lights(frame, how), how, None, frame.gbuffer.projection)
+            how = of(SiiSettings, cut_share=0.05, reference_length=length, bound=bound)
+            drawn = fragments(_receivers(frame), choose_lights(frame, how.lights), how, None, frame.gbuffer.projection)
             yield Row(f"{name}, {bound}: pairs evaluated over fragments", drawn.evaluated / drawn.total, "ratio",
                       "<= 1.3" if bound == "tangent" else "",
                       f"overdraw {drawn.total / frame.gbuffer.covered.sum():.0f} of 768")
@@ -82,13 +82,13 @@ def _culling(size: int) -> Iterator[Row]:
 def _headline(scene: Scene, size: int, repeats: int) -> Iterator[Row]:
     """The full sum of 1024 lights, and what the cut of as many loses and saves."""
     frame = Frame(scene, width=size, height=size)
-    full = dataclasses.replace(FIVE_PERCENT, lights=1024, i_low=0.0)
+    full = replaced(FIVE_PERCENT, {"lights": 1024, "cut": "none"})
     whole = sii(frame, full).astype(np.float64)
     first = seconds(lambda: sii(frame, full), repeats)
     yield Row("full sum of 1024 lights", 1 / first, "frames/s", "",
               f"{1e3 * first:.0f} ms; the paper's splat of 768 cut at 5 % took 21 ms")
     for share in (0.01, 0.05, 0.07, 0.10):
-        cut = dataclasses.replace(full, i_low=share)
+        cut = replaced(full, {"cut_share": share})
         picture = sii(frame, cut).astype(np.float64)
         saved = ratio(lambda: sii(frame, full), lambda how=cut: sii(frame, how), repeats)
         error = np.sqrt(((picture - whole) ** 2).mean()) / whole.mean()

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from benchmarks.harness import Row, ratio
 from refgi.frame import Frame
 from refgi.rays import Tracer
-from refgi.rays.embree import RunDoor
+from refgi.rays.embree import RunBackend
 from refgi.scene import Geometry, load_scene
 from refgi.truth import TruthSettings
 from refgi.truth.passes import one_pass
@@ -49,11 +49,11 @@ def rows(quick: bool) -> Iterator[Row]:
     for name in scenes:
         frame = Frame(load_scene(name), width=size, height=size)
         for estimator in ESTIMATORS:
-            task = _task(frame, TruthSettings(estimator))
+            task = _task(frame, TruthSettings(estimator=estimator))
             yield _ray_rate(frame, task, name, 3 if quick else 5)
     frame = Frame(load_scene("cornell_box"), width=size, height=size)
     for estimator in ESTIMATORS:
-        yield from _time_to_error(_task(frame, TruthSettings(estimator)), 4 if quick else 10)
+        yield from _time_to_error(_task(frame, TruthSettings(estimator=estimator)), 4 if quick else 10)
 
 
 def _task(frame: Frame, settings: TruthSettings) -> Task:
@@ -65,7 +65,7 @@ def _ray_rate(frame: Frame, task: Task, name: str, repeats: int) -> Row:
     """Time the rays of a pass alone, by embreex's run on two Python threads, against the whole pass."""
     recorder = Recorder(frame.scene.geometry)
     one_pass(task._replace(tracer=recorder), 0)
-    scene = RunDoor(frame.scene.geometry.vertices, frame.scene.geometry.faces)._scene
+    scene = RunBackend(frame.scene.geometry.vertices, frame.scene.geometry.faces)._scene
     count = sum(len(batch[0]) for batch in (*recorder.nearest, *recorder.shadows))
     # contiguous pieces made beforehand, ids or hit flags alone: nothing but `run` is timed
     jobs = [(query, *(np.ascontiguousarray(part[i : i + PIECE]) for part in batch))
@@ -83,7 +83,7 @@ def _ray_rate(frame: Frame, task: Task, name: str, repeats: int) -> Row:
 
 def _time_to_error(task: Task, passes: int) -> Iterator[Row]:
     """Take relMSE from the spread of passes: it falls as 1 / passes, as the estimators are unbiased."""
-    moments, seconds = no_passes(len(task.to.pixel)), []
+    moments, seconds = no_passes(len(task.receivers.pixel)), []
     one_pass(task, passes)
     for number in range(passes):
         started = time.perf_counter()

@@ -88,8 +88,8 @@ def _breakdown(frame: Any, repeats: int) -> str:
 def _errors(name: str, size: int) -> Iterator[Row]:
     """Error against a shadow ray for each pair at equal lights."""
     frame = Frame(_scene(name), width=size, height=size)
-    truth = vpl(frame, VplSettings(lights=1024)).astype(np.float64)
-    unshadowed = vpl(frame, VplSettings(lights=1024, visibility=False))
+    truth = vpl(frame, of(VplSettings, lights=1024)).astype(np.float64)
+    unshadowed = vpl(frame, of(VplSettings, lights=1024, visibility=False))
     yield Row(f"{name}: no visibility", *_relative(unshadowed, truth, frame), "")
     for label, settings in (("every light", of(ValSettings, interleaving=1)),
                             ("8 x 8", of(ValSettings, interleaving=8)),

@@ -27,7 +27,7 @@ from refgi.sampling import hash_bits
 
 Array = npt.NDArray[Any]
 
-# uses; docs/conventions.md tells what each draws
+# uses; docs/conventions.md lists what each draws
 PIXEL_LIGHTS, LIGHT_PATHS, ROULETTE, RANGE, ERROR_SAMPLES, GATHERING, AREA_LIGHT_SAMPLES = range(7)
 PARTS = 1 << 24  # of one use
 

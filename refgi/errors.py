@@ -1,4 +1,4 @@
-"""The two ways refgi speaks of trouble: an error that stops, a warning that counts.
+"""Exceptions and warnings.
 
 Every error that a user can cause is an `InputError`; its message names the file, the key and the value, and the
 command line prints it as one line. What a renderer sensibly passes over (zero-area faces, say) is a `RefgiWarning`
@@ -8,7 +8,7 @@ that says how many.
 import contextlib
 from collections.abc import Iterator, Sequence
 
-MOST_FAULTS = 20  # told of one file; more say no more, and a generated file can have as many as it has keys
+MOST_FAULTS = 20  # reported of one file; a generated file can have as many as it has keys
 LONGEST_VALUE = 400  # characters of a value in an error
 
 
@@ -50,7 +50,7 @@ def expect(condition: bool, parameter: str, expected: str, got: object) -> None:
     expected : str
         What would have been right.
     got : object
-        What was given; only the start of a long value is shown.
+        The value; only the start of a long value is shown.
     """
     if not condition:
         raise InputError(f"{parameter}: expected {expected}, got {shortened(repr(got))}", key=parameter)
@@ -58,7 +58,7 @@ def expect(condition: bool, parameter: str, expected: str, got: object) -> None:
 
 @contextlib.contextmanager
 def blame(*, key: str | None = None, file: str | None = None) -> Iterator[None]:
-    """Say which file or key an `InputError` from inside the block is about, unless it says so itself.
+    """Set file and key of an `InputError` raised inside the block, unless it has them.
 
     Parameters
     ----------

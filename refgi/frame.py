@@ -1,4 +1,4 @@
-"""A scene seen and lit once: its buffers are computed when first asked for, then kept.
+"""Frame: one view of one scene; its buffers are computed on first use, then cached.
 
 A `Frame` computes nothing on construction. A method that works in screen space alone never causes an RSM, a question
 about the light never causes a G-buffer, and Embree is loaded only when rays are traced. Every buffer comes from a
@@ -32,7 +32,7 @@ class Frame:
     Parameters
     ----------
     scene : Scene
-        What is seen.
+        The scene.
     width, height : int, optional
         Picture size in pixels; the camera's own where absent.
     dtype : dtype
@@ -46,7 +46,7 @@ class Frame:
     Attributes
     ----------
     scene : Scene
-        What is seen; moved near the origin if it was many times its size away (`near_origin`).
+        The scene; moved near the origin if it was many times its size away (`near_origin`).
     origin : tuple of 3 floats
         Where the origin of `scene` and of all positions in buffers lies, m; 0 unless the scene was moved.
 
@@ -94,7 +94,7 @@ class Frame:
 
     @cached_property
     def gbuffer(self) -> "GBuffer":
-        """What the camera sees; its channels are resolved when first asked for."""
+        """The camera's G-buffer; its channels are resolved on first use."""
         from refgi.rsm import gbuffer
 
         camera = self.scene.camera
@@ -102,7 +102,7 @@ class Frame:
 
     @cached_property
     def rsms(self) -> "tuple[Rsm, ...]":
-        """What each light sees, one reflective shadow map a light."""
+        """One reflective shadow map a light."""
         from refgi.rsm import reflective_shadow_map
 
         return tuple(
@@ -111,25 +111,25 @@ class Frame:
         )
 
     @cached_property
-    def seen_extent(self) -> "Extent":
-        """The box of what the camera sees; of all triangles where it sees nothing."""
-        from refgi.rsm.buffers.extent import seen_extent
+    def visible_extent(self) -> "Extent":
+        """Bounding box of visible surfaces; of all triangles where none is visible."""
+        from refgi.rsm.buffers.extent import visible_extent
 
-        return seen_extent(self.gbuffer).or_whole(self.scene.geometry)
+        return visible_extent(self.gbuffer).or_whole(self.scene.geometry)
 
     @cached_property
-    def lit_extent(self) -> "Extent":
-        """The box of what lights reach; of all triangles where that is nothing."""
-        from refgi.rsm.buffers.extent import lit_extent
+    def illuminated_extent(self) -> "Extent":
+        """Bounding box of surfaces that reflect direct light; of all triangles where there are none."""
+        from refgi.rsm.buffers.extent import illuminated_extent
 
-        return lit_extent(self.rsms).or_whole(self.scene.geometry)
+        return illuminated_extent(self.rsms).or_whole(self.scene.geometry)
 
     @cached_property
     def extent(self) -> "Extent":
-        """The scene's extent: the box of what the camera sees and of what lights reach."""
+        """The scene's extent: bounding box of visible and illuminated surfaces."""
         from refgi.rsm.buffers.extent import joined
 
-        return joined(self.seen_extent, self.lit_extent)
+        return joined(self.visible_extent, self.illuminated_extent)
 
     @cached_property
     def tracer(self) -> "Tracer":
@@ -181,7 +181,7 @@ def compose(direct: Array, indirect: Array | None, buffer: "GBuffer", materials:
     indirect : (3, h, w) ndarray, optional
         Indirect irradiance, W/m^2.
     buffer : GBuffer
-        What the camera sees.
+        The camera's G-buffer.
     materials : MaterialTable
         The scene's materials; only their emission is used here.
 
@@ -195,12 +195,12 @@ def compose(direct: Array, indirect: Array | None, buffer: "GBuffer", materials:
     return leaving_radiance(direct, indirect, buffer, materials)
 
 
-def _dtype(given: npt.DTypeLike) -> np.dtype[Any]:
+def _dtype(requested: npt.DTypeLike) -> np.dtype[Any]:
     try:
-        dtype: np.dtype[Any] | None = np.dtype(given)
+        dtype: np.dtype[Any] | None = np.dtype(requested)
     except TypeError:
         dtype = None
-    expect(dtype in (np.float32, np.float64), "dtype", "float32 or float64", dtype.name if dtype else given)
+    expect(dtype in (np.float32, np.float64), "dtype", "float32 or float64", dtype.name if dtype else requested)
     assert dtype is not None
     return dtype
 

@@ -59,6 +59,7 @@ def lobe_norm(cos_theta: Any, exponent: Any) -> Any:
         1/sr, of the type of `cos_theta`; 0 for a lobe of which nothing leaves the surface.
     """
     real = type(cos_theta)
+    # (P + 1) / (2 pi K): SII Eq. (3) normalised to unit flux above the surface
     return (exponent + real(1.0)) * real(1.0 / (2.0 * math.pi)) * inverse_fraction(cos_theta, exponent)
 
 

@@ -153,7 +153,7 @@ def radiant_intensity(lights: Any, k: int, wx: Any, wy: Any, wz: Any) -> Any:
 
 @kernel
 def incident_light(lights: Any, k: int, x: Any, y: Any, z: Any) -> Any:
-    """Return where a light is seen from a point and the unshadowed irradiance it gives there: I(w) / d^2.
+    """Return the direction and distance to a light from a point, and its unshadowed irradiance there: I(w) / d^2.
 
     Parameters
     ----------
@@ -176,8 +176,8 @@ def incident_light(lights: Any, k: int, x: Any, y: Any, z: Any) -> Any:
     """
     zero = 0.0
     if lights.kind[k] == DIRECTIONAL:
-        axis, given = lights.direction, lights.intensity
-        return -axis[k, 0], -axis[k, 1], -axis[k, 2], np.inf, given[k, 0], given[k, 1], given[k, 2]
+        axis, irradiance = lights.direction, lights.intensity
+        return -axis[k, 0], -axis[k, 1], -axis[k, 2], np.inf, irradiance[k, 0], irradiance[k, 1], irradiance[k, 2]
     dx = lights.position[k, 0] - np.float64(x)
     dy = lights.position[k, 1] - np.float64(y)
     dz = lights.position[k, 2] - np.float64(z)

@@ -56,7 +56,7 @@ RAYS = [
     (of(ValSettings, visibility="rectangle"), True), (of(ValSettings, visibility="members"), True),
     (of(ValSettings, source="walk"), True), (of(ValSettings, visibility="back_projection"), False),
     (HssilSettings(), False),
-    (HssilSettings(visibility="rays"), True), (HssilSettings(visibility="bitmask"), False), (object(), False)]
+    (of(HssilSettings, visibility="rays"), True), (of(HssilSettings, visibility="bitmask"), False), (object(), False)]
 
 
 @pytest.mark.parametrize(("settings", "rays"), RAYS)
@@ -66,7 +66,7 @@ def test_shadows_are_exact_where_the_method_traces_rays_anyway(settings, rays):
 
 @pytest.mark.parametrize("method", ["truth", "vpl", "sii"])
 def test_a_picture_has_the_shadows_of_its_method(method):
-    settings = FEW.get(method, of(find_method(method).settings, **({} if method in FEW else {"lights": 16})))
+    settings = FEW[method] if method in FEW else of(find_method(method).settings, lights=16)
     frames = {shadows: Frame(BOX, shadows=shadows, **TINY) for shadows in ("map", "exact")}
     assert (frames["map"].direct != frames["exact"].direct).any()
     usual = "map" if method == "sii" else "exact"

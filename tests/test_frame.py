@@ -92,7 +92,7 @@ def test_frames_of_an_animation_share_what_did_not_change(scene, moves):
 
 def test_several_lights_add_up(scene):
     others = (PointLight((0.1, 0.3, 0.1), (0.05, 0.04, 0.03)), DirectionalLight((0.1, -0.2, 1.0), (0.2, 0.2, 0.2)))
-    settings = of(SiiSettings, pattern="all", i_low=0)
+    settings = of(SiiSettings, pattern="all")
     options = {"width": 24, "height": 16, "rsm_resolution": 16, "dtype": np.float64}
     lights = (*scene.lights, *others)
     together = sii(Frame(scene.with_lights(*lights), **options), settings)

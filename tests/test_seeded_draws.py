@@ -19,10 +19,10 @@ from refgi.settings import of
 from refgi.splat.gather.gather_sum import disc_pattern
 from refgi.splat.multires.error_target.error_driven import draw_samples
 from refgi.splat.sii.reach.threshold import light_range
-from refgi.splat.sii.settings import SplatSettings
+from refgi.splat.sii.settings import SiiSettings
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.pattern import offsets_at
-from refgi.sssil.visibility.slices import slice_offsets, steps_of
+from refgi.sssil.visibility.slices import slice_counts, slice_offsets
 from tests.naive.draws import draw, draw_bits, mix32
 from tests.rsm.shapes import geometry
 
@@ -132,9 +132,9 @@ def test_roulette_keeps_light_k_by_draw_k(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_xi_of_the_stochastic_range(seed):
-    settings = of(SplatSettings, stochastic_range=True, seed=seed)
+    settings = of(SiiSettings, stochastic=True, seed=seed)
     for part in (0, 1):
-        scale = light_range(np.ones(50), 0.1, settings, part, np.float64).scale
+        scale = light_range(np.ones(50), 0.1, settings.reach, part, np.float64).scale
         assert scale.tolist() == [1 - draw(seed, 3 + 256 * part, k) for k in range(50)]
 
 
@@ -202,8 +202,8 @@ def place(radius, near, u, angle):
 @pytest.mark.parametrize("index", [0, 1])
 @pytest.mark.parametrize("pattern", ["row", "pixel"])
 def test_samples_of_a_receiver(pattern, index, seed):
-    settings = HssilSettings(radius=6.5, samples=13, inner_samples=5, pattern=pattern, seed=seed)
-    inner = settings.inner if index == 0 else 0
+    settings = of(HssilSettings, radius=6.5, samples=13, inner_samples=5, pattern=pattern, seed=seed)
+    inner = settings.sampling.inner if index == 0 else 0
     for row, column in ((0, 0), (3, 6), (17, 41)):
         key = level_key(seed, 2)
         n = 2 * row + column % 2
@@ -216,15 +216,15 @@ def test_samples_of_a_receiver(pattern, index, seed):
                 u = ((0.5 + j * A) % 1 + s + n * 13 * A) % 1
                 v = (0.5 + j * B) % 1 + t + n * 13 * B
                 expected.append(place(6.5, near, u, 2 * math.pi * v))
-        assert offsets_at(settings, index, 2, row, column).tolist() == [list(offset) for offset in expected]
+        assert offsets_at(settings.sampling, index, 2, row, column).tolist() == [list(offset) for offset in expected]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_fixed_samples_are_mirror_images(seed):
-    settings = HssilSettings(radius=6.5, samples=13, inner_samples=5, pattern="fixed", seed=seed)
+    settings = of(HssilSettings, radius=6.5, samples=13, inner_samples=5, pattern="fixed", seed=seed)
     s, t = pair_of(level_key(seed, 1))
     pairs, middles = [], []
-    for near, count in ((0, settings.inner), (1, 13)):
+    for near, count in ((0, settings.sampling.inner), (1, 13)):
         for j in range((count + 1) // 2):
             u, v = (0.5 + j * A + s) % 1, (0.5 + j * B + t) % 1
             x, y = place(6.5, near, u, math.pi * (v - 0.5))
@@ -233,19 +233,19 @@ def test_fixed_samples_are_mirror_images(seed):
             else:
                 length = 6.5 * math.sqrt(near + (1 + 2 * near) * u)
                 middles.append((0, math.floor(math.copysign(length, v - 0.5) + 0.5)))
-    assert sorted(map(tuple, offsets_at(settings, 0, 1, 0, 0).tolist())) == sorted(pairs + middles)
+    assert sorted(map(tuple, offsets_at(settings.sampling, 0, 1, 0, 0).tolist())) == sorted(pairs + middles)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_slices_of_the_bitmask(seed):
-    settings = HssilSettings(radius=8.0, samples=16, inner_samples=4, visibility="bitmask", seed=seed)
-    steps = steps_of(settings, 0, 8.0)
-    offsets, _ = slice_offsets(settings, steps, 1, 4)
+    settings = of(HssilSettings, radius=8.0, samples=16, inner_samples=4, visibility="bitmask", seed=seed)
+    steps = slice_counts(settings.sampling, settings.visibility, 0, 8.0)
+    offsets, _ = slice_offsets(settings.sampling, steps, 1, 4)
     for row in range(4):
         s, t = pair_of(row_key(level_key(seed, 1), row))
         for k in range(steps.slices):
             angle, shift = 2 * math.pi * (k + s) / steps.slices, (t + 0.6180339887498949 * k) % 1
-            lengths = [8.0 * (j + shift) / steps.blockers for j in range(steps.blockers)]
+            lengths = [8.0 * (j + shift) / steps.occluders for j in range(steps.occluders)]
             lengths += [8.0 * math.sqrt((j + shift) / steps.disc) for j in range(steps.disc)]
             lengths += [8.0 * math.sqrt(1 + 3 * (j + shift) / steps.crown) for j in range(steps.crown)]
             expected = [[math.floor(far * math.sin(angle) + 0.5), math.floor(far * math.cos(angle) + 0.5)]

@@ -1,7 +1,7 @@
 """Whether the tables have every setting of every method, and of each every name."""
 
 from benchmarks.sameness.rows import Table
-from benchmarks.sameness.settings import TRANSLATIONS, key_of, names_of, renamed_value, translated
+from benchmarks.sameness.settings import SETS, TRANSLATIONS, choice_of, key_of, names_of, translated
 from benchmarks.sameness.tables import TABLES
 
 
@@ -17,9 +17,10 @@ def _gaps_of(method: str, table: Table) -> list[str]:
         for value in row.values:
             companions = row.companions if method in TRANSLATIONS else {}
             for name, one in translated(method, companions | {row.field: value}).items():
-                several = name in ("as_published", "criteria")
-                values = one.split("+") if several else [renamed_value(method, name, one)]
-                tried.setdefault(key_of(method, name), set()).update(values)
+                key = key_of(method, name)
+                tried.setdefault(key, set()).update(one.split("+") if name in SETS else [one])
+                if chosen := choice_of(method, key):
+                    tried.setdefault(chosen[0], set()).add(chosen[1])
     excluded = {key_of(method, name) for name in table.excluded}
     found = [f"{method}: no case has {name}" for name in wanted if name not in tried and name not in excluded]
     found += [f"{method}: {name} is no setting" for name in (*tried, *excluded) if name not in wanted]

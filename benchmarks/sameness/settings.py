@@ -1,8 +1,7 @@
 """Where the names of a case become settings: names of a ledger stay as they are when settings are renamed."""
 
-import dataclasses
 from collections.abc import Callable
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin
 
 from benchmarks.sameness.multires_keys import multires_keys
 from refgi.methods import METHODS
@@ -16,8 +15,13 @@ SETS = ("as_published", "criteria")  # names joined by "+"
 VIEWS = {"cornell_side": Camera((0.5, 0.3, -0.6), (0.2, 0.2, 0.3)),
          "stage_side": Camera((0.9, 0.4, 0.9), (0.0, 0.1, 0.0))}
 # names of the ledger that are no short keys today, and values that have another name
-RENAMED: dict[str, dict[str, str]] = {}
-RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {}
+RENAMED: dict[str, dict[str, str]] = {
+    "sii": {"i_low": "reach.cut.share", "irradiance_low": "reach.cut.irradiance", "mesh_faces": "reach.bound.faces",
+            "stochastic_range": "reach.stochastic"},
+}
+# single values that are another key's value today
+RENAMED_CASES: dict[tuple[str, str, Any], tuple[str, Any]] = {("gather", "grid", 0): ("interpolation", "none")}
+RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {("truth", "emitters"): {"seen": "visible"}}
 # of methods whose names became choices: what names together are today
 TRANSLATIONS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {"multires": multires_keys}
 
@@ -29,35 +33,42 @@ def settings_of(method: str, **named: Any) -> Any:
         named[name] = frozenset(filter(None, named[name].split("+")))
     if "views" in named:
         named["views"] = (VIEWS[named["views"]],)
-    kind = _settings_class(method)
-    if not issubclass(kind, Settings):
-        return kind(**named)
-    return replaced(kind(), {_name(method, name): renamed_value(method, name, value) for name, value in named.items()})
+    return replaced(_settings_class(method)(), named)
 
 
 def translated(method: str, named: dict[str, Any]) -> dict[str, Any]:
-    """Return what names of the ledger are today."""
-    return TRANSLATIONS[method](named) if method in TRANSLATIONS else named
+    """Return what names and values of the ledger are today."""
+    named = TRANSLATIONS[method](named) if method in TRANSLATIONS else named
+    return dict(renamed(method, name, value) for name, value in named.items())
 
 
-def renamed_value(method: str, name: str, value: Any) -> Any:
-    """Return what a value of the ledger is called today."""
-    return RENAMED_VALUES.get((method, name), {}).get(value, value) if isinstance(value, str) else value
+def renamed(method: str, name: str, value: Any) -> tuple[str, Any]:
+    """Return what a name and a value of the ledger are called today."""
+    if isinstance(value, str):
+        value = RENAMED_VALUES.get((method, name), {}).get(value, value)
+    elif (method, name, value) in RENAMED_CASES:
+        return RENAMED_CASES[method, name, value]
+    return RENAMED.get(method, {}).get(name, name), value
 
 
 def key_of(method: str, name: str) -> str:
-    """Return the whole key that a name of the ledger means."""
-    kind = _settings_class(method)
-    if not issubclass(kind, Settings) or name in (PRINTED, SEED):
+    """Return the whole key that a name means."""
+    if name in (PRINTED, SEED):
         return name
-    return find_key(kind(), _name(method, name)).key
+    return find_key(_settings_class(method)(), RENAMED.get(method, {}).get(name, name)).key
+
+
+def choice_of(method: str, key: str) -> tuple[str, str] | None:
+    """Return the choice that has a setting, and its name; None for a setting that is always there."""
+    kind = _settings_class(method)
+    found = [leaf for leaf in leaves(kind) if leaf.key == key]
+    above = [leaf for leaf in leaves(kind) if leaf.key == key.rpartition(".")[0]] if len(found) == 1 else []
+    return (above[0].key, found[0].owner.name()) if above else None
 
 
 def names_of(method: str) -> dict[str, set[Any]]:
     """Return every setting of a method, each with the values that a ledger must have beside the default."""
     kind = _settings_class(method)
-    if not issubclass(kind, Settings):
-        return _names_of_fields(kind)
     wanted: dict[str, set[Any]] = {}
     defaults = flat(kind())
     for leaf in leaves(kind):
@@ -75,21 +86,5 @@ def names_of(method: str) -> dict[str, set[Any]]:
     return wanted
 
 
-def _name(method: str, name: str) -> str:
-    return RENAMED.get(method, {}).get(name, name)
-
-
-def _names_of_fields(kind: Any) -> dict[str, set[Any]]:
-    types = get_type_hints(kind)
-    wanted: dict[str, set[Any]] = {}
-    for field in dataclasses.fields(kind):
-        names = get_args(types[field.name]) if get_origin(types[field.name]) is Literal else ()
-        wanted[field.name] = {name for name in names if name != field.default}
-        if types[field.name] is bool:
-            wanted[field.name] = {not field.default}
-    wanted.get("as_published", set()).update(getattr(kind, "SWITCHES", ()))
-    return wanted
-
-
-def _settings_class(method: str) -> Any:
+def _settings_class(method: str) -> type[Settings]:
     return TemporalSettings if method == "temporal" else METHODS[method].settings

@@ -27,8 +27,8 @@ SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ss
 @speech
 @click.pass_obj
 def _compare(session: Session, /, methods: str | None, preset: str, pairs: tuple[str, ...], dtype: str,
-            rsm_resolution: int, shadows: str, threads: int | None, seed: int | None, out: str | None, parents: bool, force: bool,
-            **options: Any) -> int:
+            rsm_resolution: int, shadows: str, threads: int | None, seed: int | None, out: str | None, parents: bool,
+            force: bool, **options: Any) -> int:
     """Judge methods on SCENE by path tracing: errors, times, a page.
 
     Writes pictures, error maps, results.json and index.html to --out.

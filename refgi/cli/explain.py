@@ -135,7 +135,7 @@ def _second_frame(scene: "Scene", method: str, settings: Any, options: dict[str,
     from refgi.frame import Frame
     from refgi.stages import Memory
 
-    memory, step = Memory(), STEP * Frame(scene, **options).seen_extent.diagonal
+    memory, step = Memory(), STEP * Frame(scene, **options).visible_extent.diagonal
     _watch(scene, method, settings, options, memory)
     if light:
         scene = scene.with_lights(*(_moved(one, step) for one in scene.lights))

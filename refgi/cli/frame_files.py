@@ -16,8 +16,8 @@ from refgi.image import is_from_refgi, read_exr, write_exr
 from refgi.provenance import Record, estimate_record
 from refgi.provenance.frames import same_sequence
 from refgi.scene.model import Scene
-from refgi.sssil.temporal.filter import History, remember
-from refgi.sssil.temporal.sequence import Sequence, Step, seeded
+from refgi.sssil.temporal.filter import History, history_of
+from refgi.sssil.temporal.sequence import Sequence, SequenceFrame, seeded
 
 Array = npt.NDArray[Any]
 
@@ -45,7 +45,7 @@ class FrameFiles(NamedTuple):
         """Return the record of a frame."""
         return {**self.record, **self.moving(number)}
 
-    def write(self, step: Step, number: int, estimate: Any = None) -> None:
+    def write(self, step: SequenceFrame, number: int, estimate: Any = None) -> None:
         """Write a frame, each file whole or not at all, the EXR last: where it is, so are the others."""
         record = self.record_of(number)
         spread: tuple[Any, ...] = ()
@@ -110,7 +110,7 @@ def _is_damaged(file: Path) -> bool:
     return False  # another program's
 
 
-def resumed(sequence: Sequence, scenes: Iterable[Scene], files: FrameFiles, done: int) -> Iterator[Step]:
+def resumed(sequence: Sequence, scenes: Iterable[Scene], files: FrameFiles, done: int) -> Iterator[SequenceFrame]:
     """Render the frames of a sequence that are not there yet, to the bit as if it had not been interrupted.
 
     Parameters
@@ -147,6 +147,6 @@ def _history_after(sequence: Sequence, scene: Scene, files: FrameFiles, number: 
         return None
     frame = Frame(scene, **sequence.frame_options)
     if sequence.temporal.form == "printed":  # needs the light before it was filtered
-        return remember(frame, scene.geometry, sequence.method(frame, seeded(sequence.settings, number)))
+        return history_of(frame, scene.geometry, sequence.method(frame, seeded(sequence.settings, number)))
     expect(frame.dtype == np.float32, "dtype", "float32 to go on from, which an EXR holds whole", frame.dtype.name)
-    return remember(frame, scene.geometry, files.light(number))
+    return history_of(frame, scene.geometry, files.light(number))

@@ -32,10 +32,10 @@ command = _info
 def _embree() -> str:
     import numpy as np
 
-    from refgi.rays.embree import RunDoor, open_door
+    from refgi.rays.embree import RunBackend, open_backend
 
-    door = open_door(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
-    return "embreex's run" if isinstance(door, RunDoor) else "by address"
+    backend = open_backend(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
+    return "embreex's run" if isinstance(backend, RunBackend) else "by address"
 
 
 def _text(facts: dict[str, Any]) -> str:

@@ -69,8 +69,8 @@ def grouped(
         What each sees; None where the kind of visibility does not ask.
     """
     clusters = cluster(lights.position, lights.normal, count, distance=settings.distance,
-                       weights=(settings.position_weight, settings.normal_weight), diagonal=frame.lit_extent.diagonal,
-                       rounds=settings.rounds)
+                       weights=(settings.position_weight, settings.normal_weight),
+                       diagonal=frame.illuminated_extent.diagonal, rounds=settings.rounds)
     areas = area_lights(lights, clusters, settings, footprint)
     if settings.visibility in WITHOUT_MAPS:
         skip("cluster.shadow_maps", f"visibility {settings.visibility!r} looks at none")
@@ -220,7 +220,7 @@ def _by_rays(
 ) -> Array:
     """Return the light of all lights with a ray for each: every light is its own cluster."""
     alone = cluster(lights.position, lights.normal, max(1, lights.position.shape[1]),
-                    diagonal=frame.lit_extent.diagonal)
+                    diagonal=frame.illuminated_extent.diagonal)
     areas = area_lights(lights, alone, dataclasses.replace(settings, single_light="point"))
     with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
         light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,

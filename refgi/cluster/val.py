@@ -50,7 +50,7 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     if block == 1 or settings.blur == "none":
         skip("cluster.blur", "every pixel sums all lights" if block == 1 else "left out by the settings")
         return light
-    return blur(light, surface(frame), block, settings, frame.seen_extent.diagonal)  # Sec. 6, geometry-aware blur
+    return blur(light, surface(frame), block, settings, frame.visible_extent.diagonal)  # Sec. 6, geometry-aware blur
 
 
 def lit(

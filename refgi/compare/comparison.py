@@ -82,7 +82,7 @@ def compare(
     settings = _settings(names, truth_settings, method_settings or {})
     runner = _Runner(scene, {"width": width, "height": height, "shadows": "exact", **frame_options}, progress)
     if out is not None:
-        _require_folder(Path(out))
+        require_folder(Path(out))
     references = {TRUTH: runner.reference(TRUTH, settings[TRUTH])}
     if any(not METHODS[name].visibility for name in names):
         references[UNOCCLUDED] = runner.reference(UNOCCLUDED, _without_visibility(settings[TRUTH]))
@@ -188,7 +188,19 @@ def _without_visibility(settings: Any) -> Any:
     return dataclasses.replace(settings, visibility=False, checkpoint=checkpoint)
 
 
-def _require_folder(folder: Path) -> None:
+def require_folder(folder: Path) -> None:
+    """Make a folder where it is missing.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -21,6 +21,7 @@ DIVERGING, SEQUENTIAL = "RdBu_r", "inferno"
 NO_SURFACE = (128, 128, 128)
 SCALE_PERCENTILE = 95.0  # of all methods' absolute errors: a few fireflies do not wash out the maps
 FALSE_COLOUR_STOPS = 6.0  # below the brightest 0.5 %
+INDIRECT_WHITE = 0.9  # what the brightest 1 % of the reference's irradiance shows as
 
 
 class Scale(NamedTuple):
@@ -49,6 +50,27 @@ def luminance(rgb: Array) -> Array:
     weights = np.array(LUMINANCE)
     weighted: Array = np.einsum("c,chw->hw", weights, rgb.astype(np.float64))
     return weighted
+
+
+def indirect_exposure(reference: Array, covered: Array) -> float:
+    """Return the exposure at which a reference's irradiance just fits.
+
+    Parameters
+    ----------
+    reference : (3, h, w) ndarray
+        Irradiance, W/m^2.
+    covered : (h, w) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    float
+        Factor before the sRGB curve; 1 for a black picture.
+    """
+    values = luminance(reference)[covered]
+    values = values[np.isfinite(values)]
+    bright = float(np.percentile(values, 99)) if values.size else 0.0
+    return INDIRECT_WHITE / bright if bright > 0 else 1.0
 
 
 def error_scale(errors: list[Array], covered: Array) -> Scale:

@@ -32,9 +32,9 @@ def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = N
     dict of str to (h, w) ndarray
         Planes by channel.
     """
-    planes = _planes("", radiance) | _planes("irradiance.", irradiance)
+    planes = rgb_planes("", radiance) | rgb_planes("irradiance.", irradiance)
     if variance is not None:
-        planes |= _planes("variance.", variance)
+        planes |= rgb_planes("variance.", variance)
     if samples is not None:
         planes["samples"] = np.asarray(samples, np.float32)
     return planes
@@ -60,5 +60,19 @@ def write_preview(path: Path, radiance: Array, record: Record) -> None:
     write_png(path, np.moveaxis(radiance, 0, -1), record["exposure"], record)
 
 
-def _planes(prefix: str, rgb: Array) -> dict[str, Array]:
+def rgb_planes(prefix: str, rgb: Array) -> dict[str, Array]:
+    """Return the float32 planes of one quantity.
+
+    Parameters
+    ----------
+    prefix : str
+        What its channels' names start with.
+    rgb : (3, h, w) ndarray
+        The quantity.
+
+    Returns
+    -------
+    dict of str to (h, w) ndarray
+        Planes by channel.
+    """
     return {f"{prefix}{channel}": np.asarray(plane, np.float32) for channel, plane in zip("RGB", rgb, strict=True)}

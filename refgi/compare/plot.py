@@ -1,12 +1,16 @@
-"""Run time against error as an SVG that lives inside the page and takes its colours."""
+"""Plots as SVG that lives inside a page and takes its colours: run time against error, and curves over an axis."""
 
+import hashlib
 import io
 import math
 import re
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 INK, LINE, CARD = "#010203", "#010204", "#010205"  # stand-ins, replaced by the page's own colours
 METHOD_COLOURS = [f"#0102{16 + i:02x}" for i in range(6)]
+MARKERS = "os^Dvp"
+MOST_MARKED = 64  # points of a curve that are marked; more would hide it
 
 
 class Point(NamedTuple):
@@ -16,6 +20,24 @@ class Point(NamedTuple):
     seconds: float
     error: float
     filled: bool  # against the truth itself
+
+
+class Curve(NamedTuple):
+    """One curve: its name and its points."""
+
+    name: str
+    x: Sequence[float]
+    y: Sequence[float]
+    dashed: bool = False
+
+
+class Axes(NamedTuple):
+    """Labels of both axes and whether they are logarithmic."""
+
+    x: str
+    y: str
+    log_x: bool = False
+    log_y: bool = False
 
 
 def time_against_error(points: list[Point], noise: float, error_name: str = "relMSE") -> str:
@@ -35,58 +57,120 @@ def time_against_error(points: list[Point], noise: float, error_name: str = "rel
     str
         An ``<svg>`` element without references to anything outside; the same for equal input.
     """
+    axes = Axes("run time, s", f"{error_name} of indirect irradiance", log_x=True, log_y=True)
+    shown = [p for p in points if _drawable(p.seconds, p.error, axes)]
+    return _svg(lambda plot: _draw_points(plot, shown, noise), axes, 7.6, "Run time against error")
+
+
+def curves_plot(curves: Sequence[Curve], axes: Axes) -> str:
+    """Draw curves with a legend beside them.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        Points that are not finite, or not positive on a logarithmic axis, are left out.
+    axes : Axes
+        Labels and scales.
+
+    Returns
+    -------
+    str
+        An ``<svg>`` element without references to anything outside; the same for equal input.
+    """
+    return _svg(lambda plot: _draw_curves(plot, curves, axes), axes, 9.2, f"{axes.y} over {axes.x}")
+
+
+def _svg(draw: Callable[[Any], None], axes: Axes, width: float, label: str) -> str:
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    style: Any = {"svg.hashsalt": "refgi", "svg.fonttype": "none", "font.family": "sans-serif",
-                             "text.color": INK, "axes.labelcolor": INK, "axes.edgecolor": LINE, "xtick.color": INK,
-                             "ytick.color": INK, "xtick.minor.size": 0, "ytick.minor.size": 0}
+    style: Any = {"svg.hashsalt": "refgi", "svg.fonttype": "none", "font.family": "sans-serif", "text.color": INK,
+                  "axes.labelcolor": INK, "axes.edgecolor": LINE, "xtick.color": INK, "ytick.color": INK,
+                  "xtick.minor.size": 0, "ytick.minor.size": 0}
     with matplotlib.rc_context(style):
-        figure = Figure(figsize=(7.6, 4.3), layout="constrained")
+        figure = Figure(figsize=(width, 4.3), layout="constrained")
         figure.patch.set_alpha(0)
-        _draw(figure.add_subplot(), [p for p in points if _drawable(p)], noise, error_name)
+        plot = figure.add_subplot()
+        plot.patch.set_alpha(0)
+        plot.set(xlabel=axes.x, ylabel=axes.y)
+        plot.spines[["top", "right"]].set_visible(False)
+        plot.grid(True, which="major", color=LINE, linewidth=0.8)
+        plot.set_axisbelow(True)
+        draw(plot)
         stream = io.StringIO()
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(stream, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-    return _inlined(stream.getvalue())
+    return _inlined(stream.getvalue(), label)
 
 
-def _draw(axes: Any, points: list[Point], noise: float, error_name: str) -> None:
+def _draw_points(plot: Any, points: list[Point], noise: float) -> None:
     names = list(dict.fromkeys(point.name for point in points))
-    axes.patch.set_alpha(0)
-    axes.set(xscale="log", yscale="log", xlabel="run time, s", ylabel=f"{error_name} of indirect irradiance")
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(True, which="major", color=LINE, linewidth=0.8)
-    axes.set_axisbelow(True)
-    axes.margins(x=0.18, y=0.15)
+    plot.set(xscale="log", yscale="log")
+    plot.xaxis.set_major_formatter("{x:g}")
+    plot.margins(x=0.18, y=0.15)
     for point in points:
         colour = METHOD_COLOURS[names.index(point.name) % len(METHOD_COLOURS)]
-        axes.plot([point.seconds], [point.error], "o", markersize=9, color=colour, markeredgewidth=1.8,
+        plot.plot([point.seconds], [point.error], "o", markersize=9, color=colour, markeredgewidth=1.8,
                   markerfacecolor=colour if point.filled else CARD)
-        axes.annotate(point.name, (point.seconds, point.error), (9, 0), textcoords="offset points", va="center",
+        plot.annotate(point.name, (point.seconds, point.error), (9, 0), textcoords="offset points", va="center",
                       fontsize=10)
     if noise > 0:
-        axes.axhline(noise, color=INK, linewidth=1, linestyle=(0, (4, 4)), alpha=0.6)
+        plot.axhline(noise, color=INK, linewidth=1, linestyle=(0, (4, 4)), alpha=0.6)
     if len(points) < 2 or len({point.seconds for point in points}) < 2:
-        axes.set_xlim(*_decade_around([point.seconds for point in points] or [1.0]))
+        plot.set_xlim(*_decade_around([point.seconds for point in points] or [1.0]))
 
 
 def _decade_around(values: list[float]) -> tuple[float, float]:
     return min(values) / 10**0.5, max(values) * 10**0.5
 
 
-def _drawable(point: Point) -> bool:
-    return all(math.isfinite(value) and value > 0 for value in (point.seconds, point.error))
+def _draw_curves(plot: Any, curves: Sequence[Curve], axes: Axes) -> None:
+    from matplotlib.ticker import LogLocator
+
+    for number, curve in enumerate(curves):
+        colour = METHOD_COLOURS[number % len(METHOD_COLOURS)]
+        points = [(x, y) for x, y in zip(curve.x, curve.y, strict=True) if _drawable(x, y, axes)]
+        marked = {"marker": MARKERS[number % len(MARKERS)], "markersize": 5, "markerfacecolor": colour,
+                  "linewidth": 1.6}
+        plot.plot([x for x, _ in points], [y for _, y in points], color=colour, label=curve.name,
+                  **(marked if len(points) <= MOST_MARKED else {"linewidth": 1.1}),
+                  linestyle=(0, (4, 3)) if curve.dashed else "-")
+    plot.set(xscale="log" if axes.log_x else "linear", yscale="log" if axes.log_y else "linear")
+    for axis in (plot.xaxis, plot.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
+    if axes.log_x:
+        plot.set_xticks(_steps(curves))
+    if axes.log_y:
+        plot.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    else:
+        plot.set_ylim(bottom=0)
+    plot.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=9, facecolor=CARD)
 
 
-def _inlined(svg: str) -> str:
+def _steps(curves: Sequence[Curve]) -> list[float]:
+    """Return the places along a logarithmic axis that are named: those of the points, or powers of two."""
+    places = sorted({x for curve in curves for x in curve.x if x > 0})
+    if len(places) <= 10:
+        return places
+    low, high = (math.log2(x) for x in (places[0], places[-1]))
+    return [2.0**n for n in range(math.ceil(low), math.floor(high) + 1)]
+
+
+def _drawable(x: float, y: float, axes: Axes) -> bool:
+    finite = math.isfinite(x) and math.isfinite(y)
+    return finite and (x > 0 or not axes.log_x) and (y > 0 or not axes.log_y)
+
+
+def _inlined(svg: str, label: str) -> str:
     svg = svg[svg.index("<svg"):]
-    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", svg, flags=re.DOTALL)
+    own = hashlib.sha256(svg.encode()).hexdigest()[:8]  # names are unique on a page of several plots
+    svg = re.sub(r'( id="|url\(#|href="#)', rf"\g<1>p{own}_", svg)
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg)
-    svg = re.sub(r'<svg [^>]*viewBox="([^"]*)"[^>]*>',
-                 r'<svg viewBox="\1" role="img" aria-label="Run time against error">', svg, count=1)
+    svg = re.sub(r'<svg [^>]*viewBox="([^"]*)"[^>]*>', rf'<svg viewBox="\1" role="img" aria-label="{label}">', svg,
+                 count=1)
     colours = {INK: "currentColor", LINE: "var(--line)", CARD: "var(--card)"}
     colours |= {colour: f"var(--c{i})" for i, colour in enumerate(METHOD_COLOURS)}
     return re.sub("|".join(colours), lambda match: colours[match[0]], svg)

@@ -2,6 +2,7 @@
 
 import base64
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,6 @@ Array = npt.NDArray[Any]
 
 PAGE = Path(__file__).with_name("page")
 MINUS, DASH, TIMES = "\N{MINUS SIGN}", "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
-INDIRECT_WHITE = 0.9  # what the brightest 1 % of the truth's irradiance shows as
 JUDGES = {TRUTH: "truth", UNOCCLUDED: "truth without visibility"}
 LABELS = {TRUTH: "Truth", UNOCCLUDED: "Truth without visibility"}
 COLUMNS = {
@@ -52,13 +52,13 @@ def write_report(comparison: Comparison, folder: Path) -> None:
     write_text(Path(folder) / "index.html", page(comparison))
 
 
-def templates(folder: Path) -> "jinja2.Environment":
+def templates(*folders: Path) -> "jinja2.Environment":
     """Return the templates of a page: everything escaped, and nothing left out in silence.
 
     Parameters
     ----------
-    folder : Path
-        Where they lie.
+    *folders : Path
+        Where they lie, besides those of this package, among them `base.html.j2`.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def templates(folder: Path) -> "jinja2.Environment":
     """
     import jinja2
 
-    return jinja2.Environment(loader=jinja2.FileSystemLoader(folder), autoescape=True, trim_blocks=True,
+    return jinja2.Environment(loader=jinja2.FileSystemLoader([*folders, PAGE]), autoescape=True, trim_blocks=True,
                               lstrip_blocks=True, undefined=jinja2.StrictUndefined)
 
 
@@ -88,16 +88,18 @@ def page(comparison: Comparison) -> str:
 
     pictures = _pictures(comparison)
     names = [picture["name"] for picture in pictures]
-    return templates(PAGE).get_template("report.html.j2").render(
-        style=Markup((PAGE / "style.css").read_text("utf-8")), viewer=Markup((PAGE / "viewer.js").read_text("utf-8")),
-        title=comparison.scene.name, description=comparison.scene.description, facts=_facts(comparison),
-        verdict=_verdict(comparison), failures=comparison.failures, width=comparison.width, height=comparison.height,
+    return templates().get_template("report.html.j2").render(
+        style=Markup((PAGE / "style.css").read_text("utf-8")), script=Markup((PAGE / "viewer.js").read_text("utf-8")),
+        kind="comparison", title=comparison.scene.name, lead=comparison.scene.description, facts=_facts(comparison),
+        verdict=_verdict(comparison),
+        failures=[(name, f"gave no picture: {reason}") for name, reason in comparison.failures.items()],
+        width=comparison.width, height=comparison.height,
         quantities=_quantities(comparison), pictures=pictures, left=names[0], right=TRUTH,
         columns=[{"label": label, "about": about} for label, about in (*COLUMNS.values(), ("FLIP", "of the picture"))],
         rows=_rows(comparison), notes=_notes(comparison), plot=Markup(_plot(comparison)), made=_made(comparison),
         ledgers=[_ledger(result) for result in comparison.results.values() if result.ledger is not None],
         provenance=provenance_rows(comparison.record),
-        versions=comparison.environment["versions"], machine=_machine(comparison.environment),
+        versions=comparison.environment["versions"], machine=machine(comparison.environment),
     )
 
 
@@ -130,6 +132,40 @@ def number(value: float) -> str:
         return f"{float(mantissa):g}e{int(exponent)}".replace("-", MINUS)
     rounded = float(f"{value:.3g}")
     return f"{rounded:.10f}".rstrip("0").rstrip(".").replace("-", MINUS)
+
+
+def data_uri(rgb: Array, exposure: float = 1.0) -> str:
+    """Return a picture as the source of an ``img`` element.
+
+    Parameters
+    ----------
+    rgb : (h, w, 3) ndarray
+        Display colours in bytes, or linear values.
+    exposure : float
+        Factor of linear values before the sRGB curve.
+
+    Returns
+    -------
+    str
+        A PNG in a data URI.
+    """
+    return "data:image/png;base64," + base64.b64encode(png_bytes(rgb, exposure)).decode("ascii")
+
+
+def machine(environment: Mapping[str, Any]) -> str:
+    """Return what a result was made on, in a line.
+
+    Parameters
+    ----------
+    environment : mapping
+        What `refgi.compare.environment.environment` gave.
+
+    Returns
+    -------
+    str
+        Platform, processor, threads.
+    """
+    return f"{environment['platform']}, {environment['cpu']}, {environment['threads']} threads"
 
 
 def ledger_cells(ledger: Any) -> list[tuple[str, ...]]:
@@ -215,9 +251,9 @@ def _pictures(comparison: Comparison) -> list[dict[str, Any]]:
     def shown(made: Reference | MethodResult, painted: dict[str, maps.Pixels]) -> dict[str, str]:
         painted["false"] = maps.paint(maps.luminance(made.irradiance), comparison.covered, brightness)
         lit = {"picture": (made.radiance, comparison.scene.exposure),
-               "indirect": (made.irradiance, _indirect_exposure(comparison))}
-        return {key: _data_uri(np.moveaxis(rgb, 0, -1), exposure) for key, (rgb, exposure) in lit.items()} | {
-            key: _data_uri(pixels, 1.0) for key, pixels in painted.items()}
+               "indirect": (made.irradiance, maps.indirect_exposure(comparison.truth.irradiance, comparison.covered))}
+        return {key: data_uri(np.moveaxis(rgb, 0, -1), exposure) for key, (rgb, exposure) in lit.items()} | {
+            key: data_uri(pixels, 1.0) for key, pixels in painted.items()}
 
     pictures = []
     for result in comparison.results.values():
@@ -234,16 +270,6 @@ def _pictures(comparison: Comparison) -> list[dict[str, Any]]:
         pictures.append({"name": reference.name, "label": LABELS[reference.name], "images": shown(reference, painted),
                          "said": _seconds(reference.seconds), "without": "A reference: see its standard error."})
     return pictures
-
-
-def _indirect_exposure(comparison: Comparison) -> float:
-    values = maps.luminance(comparison.truth.irradiance)[comparison.covered]
-    bright = float(np.percentile(values[np.isfinite(values)], 99)) if np.isfinite(values).any() else 0.0
-    return INDIRECT_WHITE / bright if bright > 0 else 1.0
-
-
-def _data_uri(rgb: Array, exposure: float) -> str:
-    return "data:image/png;base64," + base64.b64encode(png_bytes(rgb, exposure)).decode("ascii")
 
 
 def _rows(comparison: Comparison) -> list[dict[str, Any]]:
@@ -301,7 +327,3 @@ def _ledger(result: MethodResult) -> dict[str, Any]:
 def _stage(run: stages.Run) -> dict[str, Any]:
     said = f"{number(1e3 * run.seconds)} ms" if run.status == "ran" else f"{run.status}: {run.reason}"
     return {"name": run.name, "status": run.status, "depth": run.depth, "said": said}
-
-
-def _machine(environment: Any) -> str:
-    return f"{environment['platform']}, {environment['cpu']}, {environment['threads']} threads"

@@ -19,15 +19,7 @@ DIGITS = 60  # of decimal arithmetic, for what is computed once
 def sine_cosine_digits(angle: float) -> tuple[decimal.Decimal, decimal.Decimal]:
     """Return sine and cosine, off by less than 1e-58.
 
-    Parameters
-    ----------
-    angle : float
-        0 to pi/2, rad; taken as the exact number it is.
-
-    Returns
-    -------
-    tuple of 2 Decimal
-        Sine and cosine.
+    `angle`: 0 to pi/2, rad; taken as the exact number it is.
     """
     with decimal.localcontext(prec=DIGITS):
         x = decimal.Decimal(angle)
@@ -42,15 +34,7 @@ def sine_cosine_digits(angle: float) -> tuple[decimal.Decimal, decimal.Decimal]:
 def twofold(value: decimal.Decimal) -> Pair:
     """Return a number as a pair.
 
-    Parameters
-    ----------
-    value : Decimal
-        The number.
-
-    Returns
-    -------
-    high, low : float
-        The nearest float64, and the float64 nearest to the rest.
+    Returns `high, low`: the nearest float64, and the float64 nearest to the rest.
     """
     with decimal.localcontext(prec=DIGITS):
         high = float(value)
@@ -61,15 +45,7 @@ def twofold(value: decimal.Decimal) -> Pair:
 def two_sum(a: float, b: float) -> Pair:
     """Return a + b as a pair.
 
-    Parameters
-    ----------
-    a, b : float
-        Float64.
-
-    Returns
-    -------
-    high, low : float
-        The rounded sum, and what rounding took; exact.
+    Returns `high, low`: the rounded sum, and what rounding took; exact.
     """
     total = a + b
     part = total - a
@@ -80,15 +56,7 @@ def two_sum(a: float, b: float) -> Pair:
 def two_product(a: float, b: float) -> Pair:
     """Return a b as a pair.
 
-    Parameters
-    ----------
-    a, b : float
-        Float64, below 1e300.
-
-    Returns
-    -------
-    high, low : float
-        The rounded product, and what rounding took; exact where it does not underflow.
+    Returns `high, low`: the rounded product, and what rounding took; exact where it does not underflow.
     """
     s, t = SPLITTER * a, SPLITTER * b
     a_head, b_head = s - (s - a), t - (t - b)
@@ -101,15 +69,7 @@ def two_product(a: float, b: float) -> Pair:
 def add(x: Pair, y: Pair) -> Pair:
     """Return the sum of two pairs.
 
-    Parameters
-    ----------
-    x, y : tuple of 2 floats
-        The pairs.
-
-    Returns
-    -------
-    high, low : float
-        Their sum, to some 2^-100 of the larger.
+    Returns `high, low`: their sum, to some 2^-100 of the larger.
     """
     high, low = two_sum(x[0], y[0])
     return two_sum(high, low + (x[1] + y[1]))
@@ -119,15 +79,7 @@ def add(x: Pair, y: Pair) -> Pair:
 def multiply(x: Pair, y: Pair) -> Pair:
     """Return the product of two pairs.
 
-    Parameters
-    ----------
-    x, y : tuple of 2 floats
-        The pairs.
-
-    Returns
-    -------
-    high, low : float
-        Their product, to some 2^-100 of it.
+    Returns `high, low`: their product, to some 2^-100 of it.
     """
     high, low = two_product(x[0], y[0])
     return two_sum(high, low + (x[0] * y[1] + x[1] * y[0]))
@@ -137,15 +89,7 @@ def multiply(x: Pair, y: Pair) -> Pair:
 def root(x: Pair) -> Pair:
     """Return the square root of a pair.
 
-    Parameters
-    ----------
-    x : tuple of 2 floats
-        The pair, 0 or more.
-
-    Returns
-    -------
-    high, low : float
-        Its root, to some 2^-100 of it.
+    `x`: the pair, 0 or more. Returns `high, low`: its root, to some 2^-100 of it.
     """
     high = math.sqrt(x[0])
     if high == 0.0:
@@ -158,15 +102,7 @@ def root(x: Pair) -> Pair:
 def length_along(d: Vector, axis: Vector) -> Pair:
     """Return the dot product of two vectors as a pair.
 
-    Parameters
-    ----------
-    d, axis : tuple of 3 floats
-        Float64.
-
-    Returns
-    -------
-    high, low : float
-        To some 2^-100 of the product of both lengths.
+    Returns `high, low`: to some 2^-100 of the product of both lengths.
     """
     return add(add(two_product(d[0], axis[0]), two_product(d[1], axis[1])), two_product(d[2], axis[2]))
 
@@ -175,15 +111,7 @@ def length_along(d: Vector, axis: Vector) -> Pair:
 def length_across(d: Vector, axis: Vector) -> Pair:
     """Return the length of the cross product of two vectors as a pair.
 
-    Parameters
-    ----------
-    d, axis : tuple of 3 floats
-        Float64.
-
-    Returns
-    -------
-    high, low : float
-        To some 2^-100 of the product of both lengths.
+    Returns `high, low`: to some 2^-100 of the product of both lengths.
     """
     x = add(two_product(d[1], axis[2]), two_product(-d[2], axis[1]))
     y = add(two_product(d[2], axis[0]), two_product(-d[0], axis[2]))

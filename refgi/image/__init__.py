@@ -1,9 +1,8 @@
-"""Pictures in files: EXR for every bit, PNG for looking at, each written whole or not at all and marked as refgi's."""
+"""Image files: EXR (lossless) and PNG (tone-mapped), written atomically and marked as refgi's."""
 
 from refgi.image.exr import read_exr, write_exr
 from refgi.image.png import NOT_FINITE, png_bytes, read_png_attributes, tone_map, write_encoded, write_png
-from refgi.image.recognise import is_from_refgi
-from refgi.image.whole import MARK, canonical_json, is_text, whole_file, write_text
+from refgi.image.whole import MARK, canonical_json, is_from_refgi, is_text, whole_file, write_text
 
 __all__ = [
     "MARK", "NOT_FINITE", "canonical_json", "is_from_refgi", "is_text", "png_bytes", "read_exr",

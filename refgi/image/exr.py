@@ -1,4 +1,4 @@
-"""EXR in and out: every bit kept, and checked.
+"""Read and write EXR files, lossless and verified.
 
 An EXR written here holds contiguous float32 planes (ids as uint32), ZIP compressed, and one string attribute: a
 canonical JSON object with whatever the caller says (settings, units, versions) and a SHA-256 of everything. The file
@@ -34,7 +34,7 @@ def write_exr(path: str | Path, channels: Mapping[str, Array], attributes: Mappi
     path : str or Path
         A name that ends in ``.exr``.
     channels : mapping of str to (h, w) ndarray
-        Planes of one size, float32 or uint32. Every bit is kept, NaN and infinity included.
+        Planes of one size, float32 or uint32. Every bit is stored, NaN and infinity included.
     attributes : mapping, optional
         Settings, units, versions: finite JSON values.
 
@@ -73,7 +73,7 @@ def read_exr(path: str | Path) -> tuple[Channels, dict[str, Any]]:
     channels : dict of str to (h, w) ndarray
         One contiguous plane a channel: float32, uint32 or (never ours) float16.
     attributes : dict
-        What `write_exr` was given; empty for another program's file.
+        The attributes passed to `write_exr`; empty for another program's file.
 
     Raises
     ------
@@ -114,10 +114,10 @@ def _verified(text: Any, channels: Channels, path: Path) -> dict[str, Any]:
         return {}
     try:
         attributes = json.loads(text)
-        told = attributes.pop(DIGEST)
+        recorded = attributes.pop(DIGEST)
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise InputError(f"{path}: damaged: its {MARK!r} attribute is not what refgi writes") from error
-    if told != _digest(attributes, channels):
+    if recorded != _digest(attributes, channels):
         raise InputError(f"{path}: damaged: the pixels or attributes differ from what was written ({DIGEST})")
     return dict(attributes)
 

@@ -1,4 +1,4 @@
-"""PNG files, for looking at: 8 bits, sRGB curve, an exposure factor.
+"""Tone-mapped PNG files: 8 bits, sRGB curve, an exposure factor.
 
 A pixel that is not finite is magenta and counted in a warning, never black.
 """
@@ -52,7 +52,7 @@ def tone_map(rgb: Array, exposure: float = 1.0) -> npt.NDArray[np.uint8]:
 
 
 def write_png(path: str | Path, rgb: Array, exposure: float = 1.0, attributes: Mapping[str, Any] | None = None) -> None:
-    """Write a picture to look at.
+    """Write a tone-mapped PNG.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def write_png(path: str | Path, rgb: Array, exposure: float = 1.0, attributes: M
     exposure : float
         Factor before the sRGB curve.
     attributes : mapping, optional
-        Settings, units, versions: finite JSON values, kept in the file.
+        Settings, units, versions: finite JSON values, stored in the file.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def write_encoded(path: str | Path, encoded: bytes, attributes: Mapping[str, Any
     encoded : bytes
         A PNG file's content.
     attributes : mapping, optional
-        Finite JSON values, kept in a tEXt chunk.
+        Finite JSON values, stored in a tEXt chunk.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def write_encoded(path: str | Path, encoded: bytes, attributes: Mapping[str, Any
 
 
 def read_png_attributes(path: str | Path) -> dict[str, Any] | None:
-    """Return what `write_png` was told.
+    """Return the attributes passed to `write_png`.
 
     Parameters
     ----------

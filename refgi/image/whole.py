@@ -1,8 +1,7 @@
-"""The one way refgi writes a file: whole, or not at all.
+"""Atomic file writes (whole or not at all), and the mark by which files of refgi are recognised.
 
-What refgi writes into each of its files, so that it is known again: one JSON object under one name.
-
-An EXR has it as an attribute, a PNG as a tEXt chunk, a JSON file as a key; a page has a `generator` of that name.
+The mark is a JSON object under one name: an attribute of an EXR, a tEXt chunk of a PNG, a key of a JSON file; a page
+has a `generator` of that name.
 """
 
 import contextlib
@@ -17,6 +16,8 @@ from refgi.errors import InputError
 
 LONGEST_STEM = 48  # characters of a file's name that its temporary name keeps
 MARK = "refgi"
+START_OF_PAGE = 4096  # bytes that hold a page's head
+GENERATOR = f'<meta name="generator" content="{MARK}'
 
 
 @contextlib.contextmanager
@@ -131,3 +132,48 @@ def canonical_json(value: Any) -> str:
         return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except (TypeError, ValueError) as error:
         raise InputError(f"attributes: expected finite JSON values, {error}") from error
+
+
+def is_from_refgi(path: str | Path) -> bool:
+    """Return whether a file carries refgi's mark, so that it may be overwritten.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file.
+
+    Returns
+    -------
+    bool
+        False where the file is another program's, or so damaged that its mark is lost.
+    """
+    path = Path(path)
+    has_mark = {".exr": _exr, ".png": _png, ".json": _json, ".html": _page}.get(path.suffix.lower())
+    try:
+        return has_mark is not None and has_mark(path)
+    except Exception:  # a damaged header makes OpenEXR raise nearly anything
+        return False
+
+
+def _exr(path: Path) -> bool:
+    import OpenEXR
+
+    with OpenEXR.File(str(path), header_only=True) as file:
+        header: dict[str, Any] = file.header()
+        return MARK in header
+
+
+def _png(path: Path) -> bool:
+    from refgi.image.png import read_png_attributes
+
+    return read_png_attributes(path) is not None
+
+
+def _json(path: Path) -> bool:
+    content = json.loads(path.read_text("utf-8"))
+    return isinstance(content, dict) and MARK in content
+
+
+def _page(path: Path) -> bool:
+    with path.open("rb") as file:
+        return GENERATOR.encode() in file.read(START_OF_PAGE)

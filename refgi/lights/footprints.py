@@ -1,11 +1,11 @@
-"""Footprints of pixel lights: a partition of a map's texels into one cell per chosen texel, and sums over cells.
+"""Cells and footprints of pixel lights: sums of flux over cells of texels, and the surface area behind each texel.
 
-The surface that each texel of a reflective shadow map shows its light: A = O d^2 / cos.
+`cells_of_grid` and `cells_of_nearest` partition a map's texels into one cell per chosen texel, for filtered flux
+(SII Sec. 4). `texel_areas` is the surface behind each texel, A = O d^2 / cos (m^2), O its solid angle (sr).
 
-Reflective shadow maps whose texels are taken to subtend the same solid angle, as the papers print it.
-
-A texel at the centre of a square 90 degree frustum subtends 1.910 times the mean, one in its corner 0.368 times, so
-with equal ones lights come out too dim inside and too bright outside (Nichols and Wyman 2009, Fig. 13).
+`with_equal_solid_angles` is the map whose texels all subtend the same solid angle, as the papers print it. A texel at
+the centre of a square 90 degree frustum subtends 1.910 times the mean, one in its corner 0.368 times, so with equal
+ones lights come out too dim inside and too bright outside (Nichols and Wyman 2009, Fig. 13).
 """
 
 import math
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-EQUALLY_NEAR = 8  # chosen texels looked at for ties
-LEAST_COSINE = 1e-3  # surfaces seen from the side would be endless
+EQUALLY_NEAR = 8  # chosen texels tested for ties
+LEAST_COSINE = 1e-3  # at grazing angles areas would grow without limit
 DEMO_CONSTANT = 1.5  # pi over the 2 pi / 3 sr of a square 90 degree frustum
 
 
@@ -111,8 +111,8 @@ def cell_sums(flux: Array, cell: Array, count: int) -> Array:
     return np.stack(sums).astype(flux.dtype)
 
 
-def lit_texels(texel: Array, cell: Array, lit: Array) -> Array:
-    """Return the texel that stands for each cell: the chosen one, or where that is dark the nearest lit one.
+def texels_with_flux(texel: Array, cell: Array, has_flux: Array) -> Array:
+    """Return the texel that stands for each cell: the chosen one, or where that is dark the nearest one with flux.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def lit_texels(texel: Array, cell: Array, lit: Array) -> Array:
         Chosen texels.
     cell : (H * W,) ndarray of int
         Cell of each texel.
-    lit : (H, W) ndarray of bool
+    has_flux : (H, W) ndarray of bool
         Which texels have flux.
 
     Returns
@@ -128,9 +128,9 @@ def lit_texels(texel: Array, cell: Array, lit: Array) -> Array:
     (N,) ndarray of int
         As `texel` where the whole cell is dark; of equally near texels the first.
     """
-    width = lit.shape[1]
-    shines = lit.reshape(-1)
-    candidates = np.flatnonzero(shines & ~shines[texel][cell])
+    width = has_flux.shape[1]
+    emits = has_flux.reshape(-1)
+    candidates = np.flatnonzero(emits & ~emits[texel][cell])
     own = texel[cell[candidates]]
     square = (candidates // width - own // width) ** 2 + (candidates % width - own % width) ** 2
     order = np.lexsort((candidates, square, cell[candidates]))
@@ -222,7 +222,7 @@ def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]", shares: "
     Returns
     -------
     (N',) ndarray
-        Area, m^2: that of equal shares of a square 90 degree frustum, seen from the front.
+        Area, m^2: that of equal shares of a square 90 degree frustum, at normal incidence.
 
     Raises
     ------

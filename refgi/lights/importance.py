@@ -4,11 +4,10 @@ A texel's importance is the largest channel of Phi_diffuse + g(P) Phi_lobe. The 
 of the flux is, so no flux is out of reach. g(P) = (P + 1) / 2 is the peak of a normalised Phong lobe over that of a
 diffuse light, 1 for P = 1; the paper takes P.
 
-Sums of an importance map over ever larger cells, for any size of map.
-
-Level l has 2^l x 2^l cells with borders at rows floor(i H / 2^l) and columns floor(j W / 2^l): every border of a level
-is one of the next, and for powers of two the cells are squares. On the last level, L = ceil(log2(max(H, W))), a cell
-holds one texel or none, and the map itself takes the place of the sums.
+`importance_pyramid` sums the map over ever larger cells, a mipmap for any size of map: level l has 2^l x 2^l cells with
+borders at rows floor(i H / 2^l) and columns floor(j W / 2^l), so every border of a level is one of the next, and for
+powers of two the cells are squares. On the last level, L = ceil(log2(max(H, W))), a cell holds one texel or none, and
+the map itself takes the place of the sums.
 """
 
 import math
@@ -30,7 +29,7 @@ Kind = Literal["flux", "peak", "openness"]
 def importance(
     rsm: Rsm, kind: Kind = "flux", openness: Array | None = None, floor: float = 0.05, defensive: float = 0.0
 ) -> Array:
-    """Return what each texel is worth to `warp_samples`.
+    """Return the importance of each texel for `warp_samples`.
 
     Parameters
     ----------
@@ -61,7 +60,7 @@ def importance(
 
     With method A a texel's density is at least beta of the uniform one on every level, so for any f the mean of
     (w Phi f)^2 is at most 1 / beta times that of uniform samples, and the variance at most
-    1 / beta Var + (1 / beta - 1) mean^2. Uniform over the map, not over its lit texels alone, because a cell's
+    1 / beta Var + (1 / beta - 1) mean^2. Uniform over the map, not over texels with flux alone, because a cell's
     samples spread over all of its texels unless the warp goes down to them. Method B takes products of marginals:
     there the share keeps every texel within reach but gives no such bound.
     """
@@ -70,29 +69,29 @@ def importance(
     expect(0 <= defensive <= 1, "defensive", "0 to 1", defensive)
     real = rsm.flux.dtype.type
     if rsm.lobe_flux is None or rsm.lobe_exponent is None:
-        worth: Array = rsm.flux.max(axis=0)
+        result: Array = rsm.flux.max(axis=0)
     else:
-        worth = np.empty_like(rsm.flux[0])
-        _add_lobes(rsm.flux, rsm.lobe_flux, rsm.lobe_exponent, kind != "flux", worth)
+        result = np.empty_like(rsm.flux[0])
+        _add_lobes(rsm.flux, rsm.lobe_flux, rsm.lobe_exponent, kind != "flux", result)
     if kind == "openness":
-        worth = worth * _hidden(rsm, openness, real(floor))
+        result = result * _hidden(rsm, openness, real(floor))
     if defensive:
-        worth = real(1 - defensive) * worth + real(defensive * worth.mean(dtype=np.float64))
-    return worth
+        result = real(1 - defensive) * result + real(defensive * result.mean(dtype=np.float64))
+    return result
 
 
 @kernel
-def _add_lobes(flux: Array, lobe_flux: Array, exponent: Array, by_peak: bool, worth: Array) -> None:
+def _add_lobes(flux: Array, lobe_flux: Array, exponent: Array, by_peak: bool, result: Array) -> None:
     """Fill the largest channel of Phi_diffuse + g(P) Phi_lobe; g = 1 unless `by_peak`."""
-    real = worth.dtype.type
+    real = result.dtype.type
     one, half = real(1), real(0.5)
-    for row in range(worth.shape[0]):
-        for column in range(worth.shape[1]):
+    for row in range(result.shape[0]):
+        for column in range(result.shape[1]):
             peak = half * (exponent[row, column] + one) if by_peak else one
             most = real(0)
             for c in range(3):
                 most = max(most, flux[c, row, column] + peak * lobe_flux[c, row, column])
-            worth[row, column] = most
+            result[row, column] = most
 
 
 def _hidden(rsm: Rsm, openness: Array | None, floor: Any) -> Array:
@@ -174,22 +173,7 @@ def packed(pyramid: tuple[Array, ...], levels: int) -> Levels:
 
 @kernel
 def border(index: int, level: int, size: int) -> int:
-    """Return the first row or column of a cell.
-
-    Parameters
-    ----------
-    index : int
-        Row or column of the cell, up to 2^level.
-    level : int
-        Level of the pyramid.
-    size : int
-        Texels along the side.
-
-    Returns
-    -------
-    int
-        The floor of index * size / 2^level.
-    """
+    """Return the first row or column of a cell, floor(index size / 2^level)."""
     return (index * size) >> level
 
 
@@ -220,22 +204,7 @@ def _sum_quarters(below: Array, sums: Array) -> None:
 
 @kernel
 def cell_sum(levels: Levels, level: int, i: int, j: int) -> Any:
-    """Return the importance of a cell.
-
-    Parameters
-    ----------
-    levels : Levels
-        The pyramid.
-    level : int
-        One of those packed.
-    i, j : int
-        Row and column of the cell.
-
-    Returns
-    -------
-    float
-        S_level[i, j]; 0 for a cell without texels.
-    """
+    """Return the importance S_level[i, j] of a cell of a packed level; 0 for a cell without texels."""
     if level < levels.depth:
         return levels.coarse[((1 << (2 * level)) - 1) // 3 + (i << level) + j]
     height, width = levels.finest.shape

@@ -1,8 +1,8 @@
-"""Pixel lights in the open made smaller or fewer (SII Sec. 3.6): near nothing, they light little but cost as much.
+"""Openness scaling and Russian roulette of pixel lights (SII Sec. 3.6): lights near nothing cost as much as others.
 
 The paper scales the flux "by the ambient occlusion term" on an unwarped pattern. With O the share of free directions
 the intended factor is 1 - O: `scale_flux` darkens lights in the open and so loses energy, the sum of Phi O. `roulette`
-instead removes them at random and lets the survivors make up for it, so the mean is kept.
+instead removes them at random and lets the survivors make up for it, so the mean stays the same.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -44,10 +44,10 @@ def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Ar
         If openness does not fit.
     """
     _check(lights, openness)
-    kept = (1 - openness).astype(lights.flux.dtype)
-    scaled = lights._replace(flux=lights.flux * kept)
+    factor = (1 - openness).astype(lights.flux.dtype)
+    scaled = lights._replace(flux=lights.flux * factor)
     if lights.lobe_flux is not None:
-        scaled = scaled._replace(lobe_flux=lights.lobe_flux * kept)
+        scaled = scaled._replace(lobe_flux=lights.lobe_flux * factor)
     return scaled, power(lights) - power(scaled)
 
 
@@ -79,11 +79,11 @@ def roulette(lights: "PixelLights", openness: Array, floor: float, seed: int) ->
     _check(lights, openness)
     expect(0 < floor <= 1, "floor", "above 0, up to 1", floor)
     chance = np.maximum(1 - np.asarray(openness, np.float64), floor)
-    kept = draws(seed, ROULETTE, len(chance)) < chance
-    gain = (1 / chance[kept]).astype(lights.flux.dtype)
-    taken: dict[str, Any] = {name: part[..., kept] for name, part in lights._asdict().items()
+    survives = draws(seed, ROULETTE, len(chance)) < chance
+    gain = (1 / chance[survives]).astype(lights.flux.dtype)
+    parts: dict[str, Any] = {name: part[..., survives] for name, part in lights._asdict().items()
                              if isinstance(part, np.ndarray)}
-    survivors = lights._replace(**taken)
+    survivors = lights._replace(**parts)
     survivors = survivors._replace(flux=survivors.flux * gain)
     if survivors.lobe_flux is not None:
         survivors = survivors._replace(lobe_flux=survivors.lobe_flux * gain)

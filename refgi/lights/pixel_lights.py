@@ -1,4 +1,4 @@
-"""Pixel lights: texels of reflective shadow maps taken as point lights (docs/radiometry).
+"""Pixel lights (VPLs) chosen from the texels of reflective shadow maps (SII Sec. 3.1; docs/radiometry).
 
 N texels of a map of T are chosen with equal chance, so each stands for T/N texels: Phi_i = Phi_t T / N. Texels
 without flux count in N but are dropped from the list. With a `warp` texels are drawn after their importance, and each
@@ -19,11 +19,11 @@ import numpy.typing as npt
 
 from refgi.draws import PIXEL_LIGHTS, draws
 from refgi.errors import expect
-from refgi.lights.footprints import cell_sums, cells_of_grid, cells_of_nearest, lit_texels
+from refgi.lights.footprints import cell_sums, cells_of_grid, cells_of_nearest, texels_with_flux
 from refgi.lights.importance import importance as importance_of
 from refgi.lights.warp import Warp, texel_of, warp_stacked
 from refgi.pairs.pixel_lights import PixelLights
-from refgi.rsm.buffers.gbuffer import taken
+from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.sampling import grid, halton
 from refgi.stages import skip, stage
@@ -93,8 +93,8 @@ def choose_pixel_lights(
         if warp is None:
             texel, weight = _choose(rsm, share, pattern, seed, index), None
         else:
-            worth = importance_of(rsm) if importance is None else importance[index]
-            texel, weight = _warped(rsm, _points(rsm, share, pattern, seed, index), worth, warp)
+            texel_importance = importance_of(rsm) if importance is None else importance[index]
+            texel, weight = _warped(rsm, _points(rsm, share, pattern, seed, index), texel_importance, warp)
             weight = weight * (share / weight.sum()) if renormalise else weight
         if filtered and pattern != "all":
             part = _filtered_lights(rsm, texel, on_grid=pattern == "grid" and warp is None)
@@ -204,7 +204,7 @@ def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array) -> PixelLigh
     """Return the texels as lights with T/N, or T/N w, times their flux."""
     (flux,) = rsm.at(texel, "flux")
     scale = np.asarray(weight).astype(flux.dtype)
-    lobe = None if rsm.lobe_flux is None else taken(rsm.lobe_flux, texel) * scale
+    lobe = None if rsm.lobe_flux is None else values_at(rsm.lobe_flux, texel) * scale
     return _lights(rsm, texel, flux * scale, lobe)
 
 
@@ -213,23 +213,23 @@ def _filtered_lights(rsm: Rsm, texel: Array, on_grid: bool) -> PixelLights:
     flux = cell_sums(rsm.flux, cell, len(texel))
     lobe = None if rsm.lobe_flux is None else cell_sums(rsm.lobe_flux, cell, len(texel))
     power = rsm.flux.sum(axis=0) if rsm.lobe_flux is None else (rsm.flux + rsm.lobe_flux).sum(axis=0)
-    return _lights(rsm, lit_texels(texel, cell, power > 0), flux, lobe)
+    return _lights(rsm, texels_with_flux(texel, cell, power > 0), flux, lobe)
 
 
 def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None) -> PixelLights:
     """Gather the chosen texels, leaving out those without flux."""
-    lit = flux.any(axis=0) if lobe is None else flux.any(axis=0) | lobe.any(axis=0)
-    kept = texel[lit]
-    position, normal = rsm.at(kept, "position", "normal")
+    has_flux = flux.any(axis=0) if lobe is None else flux.any(axis=0) | lobe.any(axis=0)
+    chosen = texel[has_flux]
+    position, normal = rsm.at(chosen, "position", "normal")
     return PixelLights(
         position,
         normal,
-        flux[:, lit],
-        None if lobe is None else lobe[:, lit],
-        None if rsm.lobe_axis is None else taken(rsm.lobe_axis, kept),
-        None if rsm.lobe_exponent is None else taken(rsm.lobe_exponent, kept),
+        flux[:, has_flux],
+        None if lobe is None else lobe[:, has_flux],
+        None if rsm.lobe_axis is None else values_at(rsm.lobe_axis, chosen),
+        None if rsm.lobe_exponent is None else values_at(rsm.lobe_exponent, chosen),
         len(texel),
-        kept.astype(np.int32),
+        chosen.astype(np.int32),
     )
 
 

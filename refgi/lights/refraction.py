@@ -1,4 +1,4 @@
-"""Light through glass as pixel lights: the lobes that glass texels of a reflective shadow map send out behind the body.
+"""Refraction through glass: glass texels of a reflective shadow map become pixel lights with lobes (SII Fig. 4).
 
 The 2006 paper draws a glass figure with "refraction only at the back-facing surface" and says no more (SII Fig. 4).
 Here, in mode "back_face", light crosses the front face unbent and is refracted where it leaves the body, at the
@@ -13,7 +13,7 @@ Phi = I(w) O T with Fresnel's unpolarised transmittance T of both faces.
 Symbols: d direction of light, n normal on the side that light goes to, eta index of refraction over that of the far
 side, T share that is not reflected.
 
-Smooth interfaces between clear media: Snell's law and Fresnel's, for light without polarisation.
+`refract` bends rays at smooth interfaces by Snell's law, with Fresnel's transmittance for unpolarised light.
 """
 
 from typing import Any, Literal, NamedTuple, Protocol, get_args
@@ -65,14 +65,14 @@ def refract(direction: Array, normal: Array, eta: Array) -> tuple[Array, Array]:
     return np.where(passes, bent, direction), np.where(passes, 1 - (along**2 + across**2) / 2, 0)
 
 
-class Rays(Protocol):
+class RayTracer(Protocol):
     """What finds the nearest triangle along rays, such as `refgi.rays.Tracer`."""
 
     def offsets(self, points: Array) -> Array:
         """Return how far a ray must start from a surface not to hit it at points (n, 3), m."""
 
     def closest(self, origins: Array, directions: Array) -> Any:
-        """Return `triangle_id` (-1: none) and `distance` of the nearest hits of rays given as (n, 3)."""
+        """Return `triangle_id` (-1: none) and `distance` of the nearest hits of rays, (n, 3) each."""
 
 
 class Exits(NamedTuple):
@@ -88,7 +88,7 @@ class Exits(NamedTuple):
 
 def refracted(
     rsm: Rsm, geometry: Geometry, materials: MaterialTable, mode: Mode = "back_face", exponent: float = 3000.0, *,
-    tracer: Rays | None = None, fresnel: bool = True,
+    tracer: RayTracer | None = None, fresnel: bool = True,
 ) -> Rsm:
     """Let the glass texels of a map send on the light that they take in.
 
@@ -105,7 +105,7 @@ def refracted(
     exponent : float
         Phong exponent P of the lobes around the refracted rays; the paper states none. A lobe is about a way / sqrt(P)
         wide where it lands, which should be near the distance between lights on the glass: 3000 suits 4096 lights.
-    tracer : Rays, optional
+    tracer : RayTracer, optional
         Traces rays through `geometry`; "two_interface" needs it where a material is glass.
     fresnel : bool
         Leave out what the faces reflect; False lets all through that is not totally reflected.
@@ -139,11 +139,11 @@ def refracted(
 
 @stage("rsm.refraction")
 def _refracted(
-    rsm: Rsm, geometry: Geometry, materials: MaterialTable, exponent: float, tracer: Rays | None, fresnel: bool
+    rsm: Rsm, geometry: Geometry, materials: MaterialTable, exponent: float, tracer: RayTracer | None, fresnel: bool
 ) -> Rsm:
     """Find the exits of the light through glass texels and put lobes there."""
     glass = materials.ior[geometry.material_of_face] > 0
-    texel = np.flatnonzero(np.append(glass, False)[rsm.triangle_id.reshape(-1)])  # the last for -1, nothing seen
+    texel = np.flatnonzero(np.append(glass, False)[rsm.triangle_id.reshape(-1)])  # the last for -1, no surface
     if not len(texel):
         return rsm
     away = _looks_away(rsm, geometry, glass)
@@ -177,10 +177,10 @@ def _straight_exits(rsm: Rsm, behind: Geometry, materials: MaterialTable, front:
     eta = np.append(materials.ior, 0)[material[0]]  # -1: nothing
     exits = front._replace(position=position.astype(np.float64), normal=-inward.astype(np.float64),
                            eta=eta.astype(np.float64), share=np.where(enters, share, 1))
-    return _taken(exits, eta > 0)
+    return _select(exits, eta > 0)
 
 
-def _bent_exits(geometry: Geometry, materials: MaterialTable, front: Exits, enters: Array, tracer: Rays) -> Exits:
+def _bent_exits(geometry: Geometry, materials: MaterialTable, front: Exits, enters: Array, tracer: RayTracer) -> Exits:
     """Refract at the front and trace to the next glass face from within."""
     bent, share = refract(front.direction, front.normal, 1 / front.eta)
     start = front.position + tracer.offsets(front.position.T) * bent
@@ -190,17 +190,17 @@ def _bent_exits(geometry: Geometry, materials: MaterialTable, front: Exits, ente
     normal = _outward_normals(geometry, triangle, position)
     eta = materials.ior[geometry.material_of_face[triangle]].astype(np.float64)
     found = enters & (hits.triangle_id >= 0) & (eta > 0) & ((bent * normal).sum(axis=0) > 0)
-    far = _taken(Exits(front.texel, position, normal, bent, eta, share), found)
-    at_once = _taken(front, ~enters)
+    far = _select(Exits(front.texel, position, normal, bent, eta, share), found)
+    at_once = _select(front, ~enters)
     return Exits(*(np.concatenate(parts, axis=-1) for parts in zip(far, at_once, strict=True)))
 
 
-def _taken(exits: Exits, chosen: Array) -> Exits:
+def _select(exits: Exits, chosen: Array) -> Exits:
     return Exits(*(part[..., chosen] for part in exits))
 
 
 def _looks_away(rsm: Rsm, geometry: Geometry, glass: Array) -> Array:
-    """Tell which triangles are glass whose outer side looks away from the light."""
+    """Return which triangles are glass whose outer side looks away from the light."""
     away = np.zeros(len(glass), np.bool_)
     place = geometry.vertices[geometry.faces[glass, 0]].T
     away[glass] = (_face_cross(geometry, np.flatnonzero(glass)) * _light_direction(rsm, place)).sum(axis=0) > 0
@@ -213,8 +213,9 @@ def _without_fronts(geometry: Geometry, glass: Array, away: Array) -> Geometry:
     # one bit a side of the glass's box: a triangle whose corners share one lies outside
     beyond = np.concatenate([geometry.vertices < corner.min(axis=0), geometry.vertices > corner.max(axis=0)], axis=1)
     side = np.packbits(beyond, axis=1)[:, 0][geometry.faces]
-    kept = away | (~glass & (side[:, 0] & side[:, 1] & side[:, 2] == 0))
-    return Geometry(geometry.vertices, geometry.faces[kept], geometry.material_of_face[kept], geometry.vertex_normals)
+    chosen = away | (~glass & (side[:, 0] & side[:, 1] & side[:, 2] == 0))
+    return Geometry(geometry.vertices, geometry.faces[chosen], geometry.material_of_face[chosen],
+                    geometry.vertex_normals)
 
 
 def _light_direction(rsm: Rsm, position: Array) -> Array:
@@ -254,8 +255,8 @@ def _unit(vectors: Array) -> Array:
 def _with_lobes(rsm: Rsm, exits: Exits, axis: Array, share: Array, exponent: float) -> Rsm:
     """Return the map with lobes of the given axes and shares of the incident flux at the exits."""
     incident = incident_flux(rsm.light, rsm.projection, rsm.solid_angle, rsm.flux.dtype)
-    lit = share > 0
-    texel = exits.texel[lit]
+    transmits = share > 0
+    texel = exits.texel[transmits]
     if rsm.lobe_flux is None or rsm.lobe_axis is None or rsm.lobe_exponent is None:
         dark = np.zeros_like(rsm.flux)
         rsm = rsm._replace(lobe_flux=dark, lobe_axis=dark, lobe_exponent=dark[0])
@@ -266,7 +267,8 @@ def _with_lobes(rsm: Rsm, exits: Exits, axis: Array, share: Array, exponent: flo
         return changed
 
     return rsm._replace(
-        position=replaced(rsm.position, exits.position[:, lit]), normal=replaced(rsm.normal, exits.normal[:, lit]),
-        lobe_flux=replaced(rsm.lobe_flux, incident.reshape(3, -1)[:, texel] * share[lit]),
-        lobe_axis=replaced(rsm.lobe_axis, axis[:, lit]), lobe_exponent=replaced(rsm.lobe_exponent, exponent),
+        position=replaced(rsm.position, exits.position[:, transmits]),
+        normal=replaced(rsm.normal, exits.normal[:, transmits]),
+        lobe_flux=replaced(rsm.lobe_flux, incident.reshape(3, -1)[:, texel] * share[transmits]),
+        lobe_axis=replaced(rsm.lobe_axis, axis[:, transmits]), lobe_exponent=replaced(rsm.lobe_exponent, exponent),
     )

@@ -140,7 +140,7 @@ def _openness(
 ) -> Array:
     from refgi.rays import openness
 
-    radius = settings.openness.radius or frame.lit_extent.diagonal / 10
+    radius = settings.openness.radius or frame.illuminated_extent.diagonal / 10
     return openness(frame.tracer, position, normal, covered, radius=radius, rays=settings.openness.rays,
                     seed=settings.seed)
 

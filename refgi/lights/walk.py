@@ -30,7 +30,7 @@ BASES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53)  # a pair f
 MOST_BOUNCES = len(BASES) // 2 - 1
 
 
-class Rays(NamedTuple):
+class PathRays(NamedTuple):
     """Where paths go next."""
 
     origin: Array  # (n, 3) m
@@ -39,11 +39,11 @@ class Rays(NamedTuple):
     numbers: Array  # (n, d) its coordinates: two for the light, two for each bounce
 
 
-class Left(NamedTuple):
-    """What paths left at one bounce: a pixel light each."""
+class PathVertices(NamedTuple):
+    """Where paths met a surface at one bounce: a pixel light each."""
 
     position: Array  # (n, 3) m
-    normal: Array  # (n, 3) unit vectors on the lit side
+    normal: Array  # (n, 3) unit vectors on the incident side
     flux: Array  # (n, 3) W, reflected diffusely
     lobe_flux: Array  # (n, 3) W
     lobe_axis: Array  # (n, 3) mirror directions
@@ -96,38 +96,38 @@ def walk_lights(
     expect(1 <= bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", bounces)
     used = 2 + 2 * bounces
     shift = draws(seed, LIGHT_PATHS, used).tolist() if seed else None
-    left: list[Left] = []
+    vertices: list[PathVertices] = []
     for k, share in enumerate(equal_shares(paths, count)):
         numbers = halton(share, BASES[:used], shift, start=1)
         rays = _emit(lights, k, numbers, geometry)
         # a lamp may lie in a surface
         rays = rays._replace(origin=rays.origin + tracer.offsets(rays.origin)[:, None] * rays.direction)
-        left += _paths(tracer, geometry, materials, rays, bounces)
-    return _pixel_lights(left, paths * bounces)
+        vertices += _paths(tracer, geometry, materials, rays, bounces)
+    return _pixel_lights(vertices, paths * bounces)
 
 
 def _paths(
-    tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", rays: Rays, bounces: int
-) -> list[Left]:
-    """Follow paths and return what they leave at each bounce."""
-    left = []
+    tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", rays: PathRays, bounces: int
+) -> list[PathVertices]:
+    """Follow paths and return their vertices at each bounce."""
+    vertices = []
     for bounce in range(bounces):
         hits = tracer.closest(rays.origin, rays.direction)
         met = np.flatnonzero(hits.triangle_id >= 0)
-        rays = Rays(*(part[met] for part in rays))
+        rays = PathRays(*(part[met] for part in rays))
         position, normal, material = _surface(geometry, hits.triangle_id[met], hits.distance[met], rays)
         opaque = (materials.ior[material] == 0)[:, None]
         power = np.where(opaque, rays.power, 0)
         mirror = rays.direction - 2 * (rays.direction * normal).sum(axis=1, keepdims=True) * normal
-        left.append(Left(position, normal, power * materials.diffuse[material], power * materials.specular[material],
-                         mirror, materials.exponent[material]))
+        vertices.append(PathVertices(position, normal, power * materials.diffuse[material],
+                                     power * materials.specular[material], mirror, materials.exponent[material]))
         u, v = rays.numbers[:, 2 + 2 * bounce], rays.numbers[:, 3 + 2 * bounce]
         start = position + tracer.offsets(position)[:, None] * normal
-        rays = Rays(start, _cosine_directions(normal, u, v), left[-1].flux, rays.numbers)
-    return left
+        rays = PathRays(start, _cosine_directions(normal, u, v), vertices[-1].flux, rays.numbers)
+    return vertices
 
 
-def _emit(lights: "LightTable", k: int, numbers: Array, geometry: "Geometry") -> Rays:
+def _emit(lights: "LightTable", k: int, numbers: Array, geometry: "Geometry") -> PathRays:
     """Return the first rays of light k: each carries I / (density of its direction) / paths."""
     count = len(numbers)
     direction, power = np.empty((count, 3)), np.empty((count, 3))
@@ -139,9 +139,9 @@ def _emit(lights: "LightTable", k: int, numbers: Array, geometry: "Geometry") ->
         origin = (low + high) / 2 - 1.001 * radius * lights.direction[k] + disc @ across
         direction[:] = lights.direction[k]
         power[:] = lights.intensity[k] * (math.pi * radius**2 / count)
-        return Rays(origin, direction, power, numbers)
+        return PathRays(origin, direction, power, numbers)
     _emit_from_point(lights, k, numbers, direction, power)
-    return Rays(np.repeat(lights.position[k][None], count, axis=0), direction, power, numbers)
+    return PathRays(np.repeat(lights.position[k][None], count, axis=0), direction, power, numbers)
 
 
 @kernel
@@ -177,7 +177,7 @@ def _turn(share: Array) -> Array:
     return np.stack([np.cos(2 * math.pi * share), np.sin(2 * math.pi * share)], axis=1)
 
 
-def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: Rays) -> tuple[Array, Array, Array]:
+def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: PathRays) -> tuple[Array, Array, Array]:
     """Return position, unit normal on the side the ray came from, and material of each hit."""
     position = rays.origin + distance[:, None] * rays.direction
     faces = geometry.faces[triangle]
@@ -194,13 +194,14 @@ def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: Rays)
     return position, normal, geometry.material_of_face[triangle]
 
 
-def _pixel_lights(left: list[Left], drawn: int) -> "PixelLights":
+def _pixel_lights(vertices: list[PathVertices], drawn: int) -> "PixelLights":
     from refgi.pairs.pixel_lights import PixelLights
 
-    position, normal, flux, lobe_flux, axis, exponent = (np.concatenate(parts).T for parts in zip(*left, strict=True))
+    joined = (np.concatenate(parts).T for parts in zip(*vertices, strict=True))
+    position, normal, flux, lobe_flux, axis, exponent = joined
     glossy: Array = (lobe_flux != 0).any(axis=0)
-    kept: Array = glossy | (flux != 0).any(axis=0)
-    lights = PixelLights(position[:, kept], normal[:, kept], flux[:, kept], None, None, None, drawn)
+    emits: Array = glossy | (flux != 0).any(axis=0)
+    lights = PixelLights(position[:, emits], normal[:, emits], flux[:, emits], None, None, None, drawn)
     if not glossy.any():
         return lights
-    return lights._replace(lobe_flux=lobe_flux[:, kept], lobe_axis=axis[:, kept], lobe_exponent=exponent[kept])
+    return lights._replace(lobe_flux=lobe_flux[:, emits], lobe_axis=axis[:, emits], lobe_exponent=exponent[emits])

@@ -3,7 +3,7 @@
 The map is halved in rows and columns again and again. On each level a sample goes to one half of its cell in
 proportion to the half's importance and its local coordinate is stretched over that half, first in y, then in x:
 method A by the columns of the half it has chosen, method B by the columns of the whole cell. Its weight w is what
-uniform samples would be worth there, 1 / density, so that (T/N) sum w_i Phi(s_i) is unbiased for every level.
+uniform samples would count there, 1 / density, so that (T/N) sum w_i Phi(s_i) is unbiased for every level.
 
 Sides need not be powers of two. Halves may then differ by a texel (or one be empty), and the halves' shares a and
 1 - a of the cell's texels take the place of the 1/2 in Eq. (5) and (6). No sample is lost to padding.
@@ -69,15 +69,15 @@ def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tup
     pyramids = [importance_pyramid(one) for one in np.split(np.asarray(importance), maps)]
     if maps == 1:
         return warp_samples(points, pyramids[0], warp.levels, warp.method)
-    given = _checked(points)
-    chosen, v, weights = _choose_map(given[:, 1], np.array([float(pyramid[0].sum()) for pyramid in pyramids]))
-    warped = np.stack([given[:, 0], v], axis=1)
+    samples = _checked(points)
+    chosen, v, weights = _choose_map(samples[:, 1], np.array([float(pyramid[0].sum()) for pyramid in pyramids]))
+    warped = np.stack([samples[:, 0], v], axis=1)
     height = len(importance) // maps
     for k in np.unique(chosen):
         here = chosen == k
         on_map, its_weights = warp_samples(warped[here], pyramids[k], warp.levels, warp.method)
         row = k * height + on_map[:, 1] * height
-        warped[here] = np.stack([on_map[:, 0], _kept_in_texel(row, maps * height)], axis=1)
+        warped[here] = np.stack([on_map[:, 0], _clamped_to_texel(row, maps * height)], axis=1)
         weights[here] *= its_weights
     return warped, weights
 
@@ -115,10 +115,10 @@ def warp_samples(points: Array, pyramid: tuple[Array, ...], levels: int, method:
     samples as they are; none gets there with method A unless the whole map is black, some do with method B.
     """
     Warp(method, levels)
-    given = _checked(points)
+    samples = _checked(points)
     used = min(levels, len(pyramid) - 1)
-    warped, weights = np.empty_like(given), np.empty(len(given))
-    _warp(given, packed(pyramid, used), used, method == "A", warped, weights)
+    warped, weights = np.empty_like(samples), np.empty(len(samples))
+    _warp(samples, packed(pyramid, used), used, method == "A", warped, weights)
     return warped, weights
 
 
@@ -141,10 +141,10 @@ def texel_of(coordinate: Array, size: int) -> Array:
 
 
 def _checked(points: Array) -> Array:
-    given = np.ascontiguousarray(points, np.float64)
-    expect(given.ndim == 2 and given.shape[1] == 2, "points", "shape (n, 2)", given.shape)
-    expect(bool(((given >= 0) & (given < 1)).all()), "points", "coordinates in [0, 1)", "others")
-    return given
+    samples = np.ascontiguousarray(points, np.float64)
+    expect(samples.ndim == 2 and samples.shape[1] == 2, "points", "shape (n, 2)", samples.shape)
+    expect(bool(((samples >= 0) & (samples < 1)).all()), "points", "coordinates in [0, 1)", "others")
+    return samples
 
 
 def _choose_map(v: Array, sums: Array) -> tuple[Array, Array, Array]:
@@ -157,7 +157,7 @@ def _choose_map(v: Array, sums: Array) -> tuple[Array, Array, Array]:
     return chosen, np.clip((v - starts[chosen]) / width, 0, BELOW_1), 1 / (len(sums) * width)
 
 
-def _kept_in_texel(row: Array, rows: int) -> Array:
+def _clamped_to_texel(row: Array, rows: int) -> Array:
     """Return row / rows, by a rounding step off where needed, so that `texel_of` finds the same row."""
     v = row / rows
     v = np.where(np.floor(v * rows) < np.floor(row), np.nextafter(v, 1), v)
@@ -168,11 +168,14 @@ def _kept_in_texel(row: Array, rows: int) -> Array:
 def _halve(y: float, first: float, second: float, share: float) -> Any:
     """Return which half y goes to, its coordinate there and the factor of its weight; `share` is 1/2 in the paper."""
     total = first + second
-    r = first / total if total > 0 else share  # Eq. (4)
+    # Eq. (4)
+    r = first / total if total > 0 else share
     if y < r:
         stretch = total / first if total > 0 else 1 / share
-        return 0, min(y * stretch, BELOW_1), share * stretch  # Eq. (5), (6)
+        # Eq. (5), (6)
+        return 0, min(y * stretch, BELOW_1), share * stretch
     stretch = total / second if total > 0 else 1 / (1 - share)
+    # Eq. (5), (6)
     return 1, min((y - r) * stretch, BELOW_1), (1 - share) * stretch
 
 

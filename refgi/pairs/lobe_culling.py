@@ -1,12 +1,12 @@
-"""Which lobes can light which part of a tile of receivers: what adds exactly 0 need not be summed.
+"""Culling of glossy lights per tile and part of a tile: what adds exactly 0 is not summed.
 
-A tile and each of its PARTS, 64 receivers, are bounded by balls around the positions. A lobe is passed over when the
-ball lies behind the light's surface; or so far off the lobe's axis that (1 - h)^P is below the smallest normal number,
-which `exp2` makes 0, or that B < xi I_low everywhere in the ball (procedure P3). Each by more than rounding, so that
-the kernel itself would add 0 and the sum is the same to the bit.
+A tile and each of its PARTS, 64 receivers, have bounding spheres. A lobe is culled when the sphere lies behind the
+light's surface, or so far off the lobe's axis that (1 - h)^P is below the smallest normal number, which `exp2` makes 0,
+or where B < xi I_low everywhere in the sphere (procedure P3). Each by more than rounding, so that the kernel itself
+would add 0 and the sum is the same to the bit.
 
-Symbols: d vector from the ball's centre to the light, r its length, rho the ball's radius, h = 1 - cos of the angle to
-the lobe's axis.
+Symbols: d vector from the sphere's centre to the light, r its length, rho the sphere's radius, h = 1 - cos of the angle
+to the lobe's axis.
 """
 
 import math
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel
-from refgi.pairs.pair_sum import TILE, X
+from refgi.pairs.pair_sum import TILE, X, load_light
 
 Array = npt.NDArray[Any]
 
@@ -27,26 +27,16 @@ MARGIN = 1e-3  # on the root of B: the kernel's own test is off by less
 VANISHED = 1.03  # times the logarithm of the smallest normal number
 NEAR = 1e-3  # share of the range within which a threshold narrows no lobe: near - 1 must keep the digits of MARGIN
 LIMIT, ROOT, SHARE, WHOLE, BOUNDS = range(5)  # rows of the lobes' bounds
-ABOVE, NEAREST, GAP, RANGED, PASSED, MEASURES = range(BOUNDS, BOUNDS + 6)  # rows of a room, after those
-CENTER, RADIUS = 0, 3  # rows of balls
+ABOVE, NEAREST, GAP, RANGED, PASSED, MEASURES = range(BOUNDS, BOUNDS + 6)  # further rows of the scratch array
+CENTER, RADIUS = 0, 3  # rows of bounding spheres
 
 
 @kernel
 def bound_lobes(exponent: Array, distance: float) -> Array:
-    """Say from which h on each lobe is 0.
+    """Return per lobe (BOUNDS, N): from which h on it is 0, and how that depends on distance.
 
-    Parameters
-    ----------
-    exponent : (N,) ndarray
-        P.
-    distance : float
-        Nearer than this (m) exponents are smaller; infinite where they may be anywhere.
-
-    Returns
-    -------
-    (BOUNDS, N) ndarray
-        LIMIT: from this h on, at most 1, the lobe is 0 where its exponent is whole; ROOT: 2 / P; SHARE: 0, for B of any
-        size (`bound_range`); WHOLE: `distance`.
+    LIMIT: from this h on, at most 1, the lobe is 0 where its exponent is whole; ROOT: 2 / P; SHARE: 0, for B of any
+    size (`bound_range`); WHOLE: `distance` (m), within which exponents are widened; infinite: they may be anywhere.
     """
     real = exponent.dtype.type
     smallest = -87.33654 if np.finfo(exponent.dtype).eps > 1e-10 else -708.3964  # ln of the smallest normal number
@@ -61,104 +51,68 @@ def bound_lobes(exponent: Array, distance: float) -> Array:
 
 @kernel
 def bound_range(bounds: Array, square: Array, scale: Array) -> None:
-    """Add which pairs a threshold leaves out.
-
-    Parameters
-    ----------
-    bounds : (BOUNDS, N) ndarray
-        Row SHARE is filled: at the distance r nothing below (SHARE r)^2 of the lobe's peak counts, 1/m.
-    square, scale : (N,) ndarray
-        Those of `Range`.
-    """
+    """Fill row SHARE (1/m) from R_0^2 and xi of `Range`: at distance r nothing below (SHARE r)^2 of the peak counts."""
     real = bounds.dtype.type
     for k in range(len(square)):
         bounds[SHARE, k] = math.sqrt(scale[k] / square[k]) * real(1.0 - MARGIN)
 
 
 @kernel
-def bound_by_balls(tile: Array, size: int, balls: Array) -> bool:
-    """Bound the parts of a tile, and in the last column all of it.
+def bound_parts(tile: Array, size: int, spheres: Array) -> bool:
+    """Fill the bounding spheres (4, PARTS + 1), centres and radii in m, of a tile's parts and, last, of the whole tile.
 
-    Parameters
-    ----------
-    tile : (>= 3, TILE) ndarray
-        Receivers: position first.
-    size : int
-        How many of them count.
-    balls : (4, PARTS + 1) ndarray
-        Filled with centres and radii, m. Parts without receivers lie in the first one.
-
-    Returns
-    -------
-    bool
-        Whether the parts are much smaller than the whole.
+    The first `size` receivers count; parts without any lie in the first one. Return whether the parts are much smaller
+    than the whole.
     """
     lanes = TILE // PARTS
     total = 0.0
     for part in range(PARTS):
         first = part * lanes if part * lanes < size else 0
-        _bound(tile, first, min(first + lanes, size), balls, part)
-        total += balls[RADIUS, part]
-    _bound(tile, 0, size, balls, PARTS)
-    return bool(total < 0.7 * PARTS * balls[RADIUS, PARTS])
+        _bound(tile, first, min(first + lanes, size), spheres, part)
+        total += spheres[RADIUS, part]
+    _bound(tile, 0, size, spheres, PARTS)
+    return bool(total < 0.7 * PARTS * spheres[RADIUS, PARTS])
 
 
 @kernel
-def _bound(tile: Array, first: int, last: int, balls: Array, column: int) -> None:
+def _bound(tile: Array, first: int, last: int, spheres: Array, column: int) -> None:
     real = tile.dtype.type
     for axis in range(3):
         low = high = tile[X + axis, first]
         for i in range(first + 1, last):
             low, high = min(low, tile[X + axis, i]), max(high, tile[X + axis, i])
-        balls[CENTER + axis, column] = low + real(0.5) * (high - low)
-    x, y, z = balls[CENTER, column], balls[CENTER + 1, column], balls[CENTER + 2, column]
+        spheres[CENTER + axis, column] = low + real(0.5) * (high - low)
+    x, y, z = spheres[CENTER, column], spheres[CENTER + 1, column], spheres[CENTER + 2, column]
     largest = real(0.0)
     for i in range(first, last):
         dx, dy, dz = tile[X, i] - x, tile[X + 1, i] - y, tile[X + 2, i] - z
         largest = max(largest, dx * dx + dy * dy + dz * dz)
-    balls[RADIUS, column] = math.sqrt(largest) * real(1.0001)
+    spheres[RADIUS, column] = math.sqrt(largest) * real(1.0001)
 
 
 @kernel
 def lobes_in_reach(
-    lights: Array, bounds: Array, first: int, last: int, balls: Array, listed: Array | None, room: Array, chosen: Array
+    lights: Array, bounds: Array, first: int, last: int, spheres: Array, listed: Array | None, scratch: Array,
+    chosen: Array,
 ) -> int:
-    """List the lights of a group whose lobe may light a tile.
+    """List the lobes first to last - 1 that may light a tile, rising, in `chosen`, and return how many.
 
-    Parameters
-    ----------
-    lights : (13, N) ndarray
-        Packed lights: position, reversed normal, reversed axis first.
-    bounds : (BOUNDS, N) ndarray
-        Those of `bound_lobes`.
-    first, last : int
-        The group: lights first to last - 1.
-    balls : (4, PARTS + 1) ndarray
-        Around the tile's receivers.
-    listed : (N,) ndarray of bool or None
-        Lights that come into question; None: all, and the whole tile's ball decides.
-    room : (MEASURES, >= last - first) ndarray
-        To work in.
-    chosen : (>= last - first,) ndarray of int64
-        Filled with indices of lights, rising.
-
-    Returns
-    -------
-    int
-        How many were listed.
+    `lights` (13, N) hold position, reversed normal and reversed axis first, `bounds` come from `bound_lobes`, `spheres`
+    bound the tile. `listed` (N,) is the tile's light list; without it the whole tile's sphere decides. `scratch` is
+    (MEASURES, >= last - first).
     """
     count = 0
     if listed is None:
-        ball = balls[0, PARTS], balls[1, PARTS], balls[2, PARTS], balls[3, PARTS]
+        sphere = spheres[0, PARTS], spheres[1, PARTS], spheres[2, PARTS], spheres[3, PARTS]
         for k in range(first, last):
             i = k - first
-            room[ABOVE, i], room[NEAREST, i], room[GAP, i] = _measure(_cone(lights, k), ball)
+            scratch[ABOVE, i], scratch[NEAREST, i], scratch[GAP, i] = _measure(load_light(lights, k), sphere)
             for row in range(BOUNDS):
-                room[row, i] = bounds[row, k]
-        _judge(room, last - first)
+                scratch[row, i] = bounds[row, k]
+        _test_reach(scratch, last - first)
         for k in range(first, last):
             chosen[count] = k
-            count += room[PASSED, k - first] > 0
+            count += scratch[PASSED, k - first] > 0
     else:
         for k in range(first, last):
             chosen[count] = k
@@ -167,51 +121,28 @@ def lobes_in_reach(
 
 
 @kernel
-def parts_in_reach(lights: Array, bounds: Array, k: int, balls: Array, room: Array) -> Any:
-    """Find the parts of a tile that a lobe may light.
-
-    Parameters
-    ----------
-    lights, bounds : ndarray
-        As for `lobes_in_reach`.
-    k : int
-        The light.
-    balls : (4, PARTS + 1) ndarray
-        Around the parts.
-    room : (MEASURES, >= PARTS) ndarray
-        To work in.
-
-    Returns
-    -------
-    tuple of 2 int
-        The first of them and the one after the last; equal where there is none.
-    """
-    cone = _cone(lights, k)
+def parts_in_reach(lights: Array, bounds: Array, k: int, spheres: Array, scratch: Array) -> Any:
+    """Return the first part of a tile that lobe k may light and the one after the last; equal where there is none."""
+    cone = load_light(lights, k)
     for i in range(PARTS):
-        ball = balls[0, i], balls[1, i], balls[2, i], balls[3, i]
-        room[ABOVE, i], room[NEAREST, i], room[GAP, i] = _measure(cone, ball)
+        sphere = spheres[0, i], spheres[1, i], spheres[2, i], spheres[3, i]
+        scratch[ABOVE, i], scratch[NEAREST, i], scratch[GAP, i] = _measure(cone, sphere)
         for row in range(BOUNDS):
-            room[row, i] = bounds[row, k]
-    _judge(room, PARTS)
+            scratch[row, i] = bounds[row, k]
+    _test_reach(scratch, PARTS)
     first, last = 0, PARTS
-    while first < last and not room[PASSED, first] > 0:
+    while first < last and not scratch[PASSED, first] > 0:
         first += 1
-    while last > first and not room[PASSED, last - 1] > 0:
+    while last > first and not scratch[PASSED, last - 1] > 0:
         last -= 1
     return first, last
 
 
 @kernel
-def _cone(lights: Array, k: int) -> Any:
-    return (lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k], lights[6, k],
-            lights[7, k], lights[8, k])
-
-
-@kernel
-def _measure(cone: Any, ball: Any) -> Any:
+def _measure(cone: Any, sphere: Any) -> Any:
     """Return how far at most receivers lie before the light's plane, the cosine of their least angle, r - rho."""
     px, py, pz, lx, ly, lz, ax, ay, az = cone
-    x, y, z, rho = ball
+    x, y, z, rho = sphere
     real = type(px)
     zero, one = real(0.0), real(1.0)
     slack = real(ROUNDING) * real(np.finfo(real).eps)
@@ -219,27 +150,27 @@ def _measure(cone: Any, ball: Any) -> Any:
     r = math.sqrt(dx * dx + dy * dy + dz * dz)
     above = dx * lx + dy * ly + dz * lz + rho + slack * (r + rho)
     inverse = one / (r if r > rho else one)
-    cosine, sine_ball = (dx * ax + dy * ay + dz * az) * inverse, rho * inverse
+    cosine, sine_sphere = (dx * ax + dy * ay + dz * az) * inverse, rho * inverse
     sine = math.sqrt(max(one - cosine * cosine, zero))
-    cosine_ball = math.sqrt(max(one - sine_ball * sine_ball, zero))
-    # the least angle to the axis is that to the centre less the ball's
-    nearest = one if cosine >= cosine_ball else cosine * cosine_ball + sine * sine_ball
+    cosine_sphere = math.sqrt(max(one - sine_sphere * sine_sphere, zero))
+    # the least angle to the axis is that to the centre less the sphere's
+    nearest = one if cosine >= cosine_sphere else cosine * cosine_sphere + sine * sine_sphere
     return above, nearest if r > rho else one, r - rho
 
 
 @kernel
-def _judge(room: Array, count: int) -> None:
-    """Fill row PASSED with 1 where a lobe may light a ball, else with 0; apart from the measures it runs in lanes."""
-    real = room.dtype.type
+def _test_reach(scratch: Array, count: int) -> None:
+    """Fill row PASSED with 1 where a lobe may light a sphere, else with 0; apart from the measures it runs in lanes."""
+    real = scratch.dtype.type
     zero, one = real(0.0), real(1.0)
-    slack = real(ROUNDING) * real(np.finfo(room.dtype).eps)
+    slack = real(ROUNDING) * real(np.finfo(scratch.dtype).eps)
     for i in range(count):
-        near = room[SHARE, i] * room[GAP, i]  # its square is s of the weakest pair that counts, where that is nearest
+        near = scratch[SHARE, i] * scratch[GAP, i]  # its square is s of the weakest pair that counts
         # log2p1 makes -127 (float64: -1023) of -1, which leaves LIMIT to decide
-        room[RANGED, i] = one - exp2(room[ROOT, i] * log2p1((near if near > real(NEAR) else zero) - one))
+        scratch[RANGED, i] = one - exp2(scratch[ROOT, i] * log2p1((near if near > real(NEAR) else zero) - one))
     for i in range(count):
-        whole = room[GAP, i] > room[WHOLE, i]
-        limit = min(room[LIMIT, i], room[RANGED, i])
+        whole = scratch[GAP, i] > scratch[WHOLE, i]
+        limit = min(scratch[LIMIT, i], scratch[RANGED, i])
         limit = limit if whole else one
-        inside = (one - room[NEAREST, i] < limit + slack) & (room[SHARE, i] * room[GAP, i] < one)
-        room[PASSED, i] = one if inside & (room[ABOVE, i] > zero) else zero
+        inside = (one - scratch[NEAREST, i] < limit + slack) & (scratch[SHARE, i] * scratch[GAP, i] < one)
+        scratch[PASSED, i] = one if inside & (scratch[ABOVE, i] > zero) else zero

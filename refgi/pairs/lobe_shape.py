@@ -1,4 +1,4 @@
-"""Phong lobes as kernels have them: their norm, and how their exponent falls near the light (SII Eq. 3, Sec. 3.3).
+"""Norm of Phong lobes and widening of their exponent near the light (SII Eq. 3, Sec. 3.3).
 
 Symbols: P exponent, P' the widened one, th angle between lobe axis and surface normal, a the distance from which on the
 exponent is whole.
@@ -29,23 +29,12 @@ class Widening(NamedTuple):
 
 @kernel
 def lobe_norm_factor(cos_theta: Any, exponent: Any, norm: int) -> Any:
-    """Return c(P): the peak intensity of a lobe of unit flux.
+    """Return c(P), the peak intensity of a lobe of unit flux, 1/sr; 0 for a lobe of which nothing leaves the surface.
 
-    Parameters
-    ----------
-    cos_theta : float
-        Cosine between lobe axis and surface normal.
-    exponent : float
-        P.
-    norm : int
-        NO_NORM: 1 as printed in Eq. 3; FULL_LOBE: (P + 1) / 2 pi; CLAMPED: (P + 1) / (2 pi K(th, P)).
-
-    Returns
-    -------
-    float
-        1/sr, of the type of `cos_theta`; 0 for a lobe of which nothing leaves the surface.
+    NO_NORM: 1 as printed in Eq. 3; FULL_LOBE: (P + 1) / 2 pi; CLAMPED: (P + 1) / (2 pi K(th, P)).
     """
     real = type(cos_theta)
+    # Eq. (3), normalised
     if norm == NO_NORM:
         return real(1.0)
     if norm == FULL_LOBE:
@@ -54,34 +43,16 @@ def lobe_norm_factor(cos_theta: Any, exponent: Any, norm: int) -> Any:
 
 
 @kernel
-def widened(square: Any, exponent: Any, whole: Any, widening: Widening, k: int, lit: bool) -> tuple[Any, Any]:
-    """Return P' and c(P') / c(P) at a receiver (Sec. 3.3).
+def widened(square: Any, exponent: Any, whole: Any, widening: Widening, k: int, reached: bool) -> tuple[Any, Any]:
+    """Return P' and c(P') / c(P) at a receiver of light k, r^2 = `square` (m^2) away, with c(P) = `whole` (Sec. 3.3).
 
-    Parameters
-    ----------
-    square : float
-        Square of its distance, m^2.
-    exponent : float
-        P.
-    whole : float
-        c(P), 1/sr.
-    widening : Widening
-        How exponents fall.
-    k : int
-        Which light.
-    lit : bool
-        Whether the light reaches it; the ratio is not needed elsewhere and then 1.
-
-    Returns
-    -------
-    tuple of 2 floats
-        Exponent and ratio, of the type of `square`.
+    The ratio is 1 where the light does not reach the receiver, which does not need it.
     """
     real = type(square)
     one = real(1.0)
     r = math.sqrt(square)
     share = r / widening.distance if widening.slope == CORRECTED else one / (r * widening.distance)
     fallen = exponent * (share if share < one else one)
-    if widening.norm >= 0 and share < one and lit and whole > real(0.0):
+    if widening.norm >= 0 and share < one and reached and whole > real(0.0):
         return fallen, lobe_norm_factor(widening.cos_theta[k], fallen, widening.norm) / whole
     return fallen, one

@@ -21,8 +21,8 @@ from refgi.pairs.lobe_culling import (
     LIMIT,
     MEASURES,
     PARTS,
-    bound_by_balls,
     bound_lobes,
+    bound_parts,
     bound_range,
     lobes_in_reach,
     parts_in_reach,
@@ -33,7 +33,21 @@ from refgi.pairs.lobe_shape import (
     lobe_norm_factor,
     widened,
 )
-from refgi.pairs.pair_sum import GROUP, LEAST_SQUARE, LOST, NX, ROWS, SUM, TILE, TOTAL, Clamp, X, load_tile
+from refgi.pairs.pair_sum import (
+    COMPENSATION,
+    GROUP,
+    LEAST_SQUARE,
+    NX,
+    ROWS,
+    SUM,
+    TILE,
+    TOTAL,
+    Clamp,
+    X,
+    load_light,
+    load_tile,
+    pair_cosines,
+)
 from refgi.pairs.pixel_lights import Range
 
 Array = npt.NDArray[Any]
@@ -55,7 +69,7 @@ def add_lobes(
     lights : (13, N) ndarray
         Packed lights: position, reversed normal, reversed lobe axis, exponent, flux times norm.
     clamp : Clamp
-        How near pairs are kept finite; the bound applies to c_x / r^2.
+        Clamp of near pairs; the bound applies to c_x / r^2.
     widening : Widening or None
         How exponents fall near the light; None keeps them.
     reach : Range or None
@@ -103,17 +117,17 @@ def _add_lights(
     reach: Range | None, listed: Array | None,
 ) -> None:
     """Add all lights to the totals of a tile, group by group and in their order."""
-    balls = np.empty((4, PARTS + 1), tile.dtype)
-    by_parts = bound_by_balls(tile, size, balls)
-    room, chosen = np.empty((MEASURES, GROUP), tile.dtype), np.empty(GROUP, np.int64)
+    spheres = np.empty((4, PARTS + 1), tile.dtype)
+    by_parts = bound_parts(tile, size, spheres)
+    scratch, chosen = np.empty((MEASURES, GROUP), tile.dtype), np.empty(GROUP, np.int64)
     for group in range(0, lights.shape[1], GROUP):
         end = min(group + GROUP, lights.shape[1])
-        found = lobes_in_reach(lights, bounds, group, end, balls, listed, room, chosen)
+        found = lobes_in_reach(lights, bounds, group, end, spheres, listed, scratch, chosen)
         low, high = PARTS, 0
         for i in range(found):
             k, first, last = chosen[i], 0, PARTS
             if by_parts:
-                first, last = parts_in_reach(lights, bounds, k, balls, room)
+                first, last = parts_in_reach(lights, bounds, k, spheres, scratch)
             if first < last:
                 low, high = min(low, first), max(high, last)
                 lanes = np.uint64(first * (TILE // PARTS)), np.uint64(last * (TILE // PARTS))
@@ -127,52 +141,31 @@ def add_lobe(
     tile: Array, lanes: Any, lights: Array, k: int, limit: Any, clamp: Clamp, widening: Widening | None,
     reach: Range | None,
 ) -> None:
-    """Add flux s c_x / r^2 of one light to the group's sum (Eq. 3, whose norm is part of the flux).
+    """Add flux s c_x / r^2 of light k to the group's sum over lanes[0] to lanes[1] - 1 (Eq. 3).
 
-    Parameters
-    ----------
-    tile : (ROWS, TILE) ndarray
-        Receivers and their sums.
-    lanes : tuple of 2 unsigned ints
-        First lane and one past the last.
-    lights : (13, N) ndarray
-        Packed lobes, of `pack_lobes`.
-    k : int
-        The light.
-    limit : float
-        Height of the lobe beyond which it counts as 0; not used where it is widened.
-    clamp : Clamp
-        How near pairs are kept finite.
-    widening : Widening or None
-        How exponents fall near the lights.
-    reach : Range or None
-        How far lights reach; None: everywhere.
+    The norm is part of the flux. From h = `limit` on the lobe counts as 0, unless it is widened.
     """
     if widening is not None:
         limit = type(limit)(1.0)
-    if not _shine(tile, lanes, _light(lights, k), limit, clamp.least, clamp.softness[k], clamp.bound):
+    if not _fill_terms(tile, lanes, load_light(lights, k), limit, clamp.least, clamp.softness[k], clamp.bound):
         return
-    _take_logarithm(tile, lanes)
+    _fill_logarithm(tile, lanes)
+    # Eq. (3)
     if widening is None:
-        _raise(tile, lanes, lights[9, k])
+        _raise_to_power(tile, lanes, lights[9, k])
     else:
         _widen(tile, lanes, lights[9, k], widening, k)
-        _raise_each(tile, lanes)
+        _raise_to_powers(tile, lanes)
     if reach is None:
-        _weigh(tile, lanes)
+        _weight(tile, lanes)
     else:
-        _weigh_in_range(tile, lanes, reach.square[k], reach.scale[k], reach.outside)
+        _weight_in_range(tile, lanes, reach.square[k], reach.scale[k], reach.outside)
+    # Eq. (2)
     _sum_up(tile, lanes, lights[10, k], lights[11, k], lights[12, k])
 
 
 @kernel
-def _light(lights: Array, k: int) -> Any:
-    return (lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k], lights[6, k],
-            lights[7, k], lights[8, k])
-
-
-@kernel
-def _shine(tile: Array, lanes: Any, light: Any, limit: Any, least: Any, softness: Any, bound: Any) -> bool:
+def _fill_terms(tile: Array, lanes: Any, light: Any, limit: Any, least: Any, softness: Any, bound: Any) -> bool:
     """Fill rows H with 1 - r . w, TERM with c_x / r^2 where the lobe reaches (both 0 elsewhere) and SQUARE with r^2.
 
     Return whether any TERM is not 0.
@@ -182,62 +175,61 @@ def _shine(tile: Array, lanes: Any, light: Any, limit: Any, least: Any, softness
     x, y, z, lx, ly, lz, ax, ay, az = light
     for i in range(lanes[0], lanes[1]):
         dx, dy, dz = x - tile[X, i], y - tile[X + 1, i], z - tile[X + 2, i]
-        square = dx * dx + dy * dy + dz * dz
+        square, cl, cx = pair_cosines(dx, dy, dz, lx, ly, lz, tile[NX, i], tile[NX + 1, i], tile[NX + 2, i])
         square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
         inverse = one / math.sqrt(square)
-        cx = (dx * tile[NX, i] + dy * tile[NX + 1, i] + dz * tile[NX + 2, i]) * inverse
+        cx = cx * inverse
         ox, oy, oz = ax - dx * inverse, ay - dy * inverse, az - dz * inverse
         h = half * (ox * ox + oy * oy + oz * oz)
-        kept = (square if square > least else least) + softness
-        term = (cx if cx > zero else zero) / kept
+        softened = (square if square > least else least) + softness
+        term = (cx if cx > zero else zero) / softened
         term = term if term < bound else bound
-        above = dx * lx + dy * ly + dz * lz
-        away = h if above > zero else one
+        away = h if cl > zero else one
         tile[H, i] = away if away < limit else zero
         tile[TERM, i] = term if away < limit else zero
         tile[SQUARE, i] = square
-    lit = np.int32(0)
+    reached = np.int32(0)
     for i in range(lanes[0], lanes[1]):  # apart: with the terms it would cost half as much as they do
-        lit |= np.int32(tile[TERM, i] > zero)
-    return bool(lit)
+        reached |= np.int32(tile[TERM, i] > zero)
+    return bool(reached)
 
 
 @kernel
-def _take_logarithm(tile: Array, lanes: Any) -> None:
+def _fill_logarithm(tile: Array, lanes: Any) -> None:
     for i in range(lanes[0], lanes[1]):
         tile[H, i] = log2p1(-tile[H, i])
 
 
 @kernel
-def _raise(tile: Array, lanes: Any, exponent: Any) -> None:
+def _raise_to_power(tile: Array, lanes: Any, exponent: Any) -> None:
     for i in range(lanes[0], lanes[1]):
         tile[H, i] = exp2(exponent * tile[H, i])
 
 
 @kernel
-def _raise_each(tile: Array, lanes: Any) -> None:
+def _raise_to_powers(tile: Array, lanes: Any) -> None:
     for i in range(lanes[0], lanes[1]):
         tile[H, i] = exp2(tile[EXPONENT, i] * tile[H, i]) * tile[RATIO, i]
 
 
 @kernel
 def _widen(tile: Array, lanes: Any, exponent: Any, widening: Widening, k: int) -> None:
-    """Fill rows EXPONENT and RATIO for the receivers that are lit."""
+    """Fill rows EXPONENT and RATIO for the receivers that are reached."""
     real = tile.dtype.type
     whole = lobe_norm_factor(widening.cos_theta[k], exponent, widening.norm)
     for i in range(lanes[0], lanes[1]):
-        lit = tile[TERM, i] > real(0.0)
-        tile[EXPONENT, i], tile[RATIO, i] = widened(tile[SQUARE, i], exponent, whole, widening, k, lit)
+        reached = tile[TERM, i] > real(0.0)
+        tile[EXPONENT, i], tile[RATIO, i] = widened(tile[SQUARE, i], exponent, whole, widening, k, reached)
 
 
 @kernel
-def _weigh(tile: Array, lanes: Any) -> None:
+def _weight(tile: Array, lanes: Any) -> None:
     for i in range(lanes[0], lanes[1]):
         tile[TERM, i] *= tile[H, i]
 
 
 @kernel
-def _weigh_in_range(tile: Array, lanes: Any, square_range: Any, scale: Any, outside: bool) -> None:
+def _weight_in_range(tile: Array, lanes: Any, square_range: Any, scale: Any, outside: bool) -> None:
     """Multiply TERM by s and max(1, I_low / B) where B >= xi I_low, by 0 elsewhere; or by 1 less that factor."""
     real = tile.dtype.type
     zero, one = real(0.0), real(1.0)
@@ -266,9 +258,9 @@ def _close_group(tile: Array, lanes: Any) -> None:
     zero = tile.dtype.type(0.0)
     for c in range(3):
         for i in range(lanes[0], lanes[1]):
-            part = tile[SUM + c, i] - tile[LOST + c, i]
+            part = tile[SUM + c, i] - tile[COMPENSATION + c, i]
             total = tile[TOTAL + c, i] + part
             lost = (total - tile[TOTAL + c, i]) - part
-            tile[LOST + c, i] = lost if tile[SUM + c, i] != zero else tile[LOST + c, i]
+            tile[COMPENSATION + c, i] = lost if tile[SUM + c, i] != zero else tile[COMPENSATION + c, i]
             tile[TOTAL + c, i] = total if tile[SUM + c, i] != zero else tile[TOTAL + c, i]
             tile[SUM + c, i] = zero

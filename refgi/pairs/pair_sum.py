@@ -25,11 +25,11 @@ GROUP = 64  # lights summed before they are added to the total
 LEAST_SQUARE = 1e-30  # m^2; stands in for r^2 = 0, where both cosines are 0 as well
 
 ROWS = 15
-X, NX, SUM, TOTAL, LOST = 0, 3, 6, 9, 12  # first rows of a tile: position, normal, sum of the group, sum of all
+X, NX, SUM, TOTAL, COMPENSATION = 0, 3, 6, 9, 12  # first rows of a tile: position, normal, sum of the group, sum of all
 
 
 class Clamp(NamedTuple):
-    """How the geometry term is kept finite: c_l c_x / (r^2 (max(r^2, least) + softness)), at most `bound`."""
+    """Clamp of the geometry term: c_l c_x / (r^2 (max(r^2, least) + softness)), at most `bound`."""
 
     least: Any  # square of the minimum distance, m^2
     softness: Array  # (N,) footprint area / pi of each light, m^2
@@ -37,29 +37,26 @@ class Clamp(NamedTuple):
 
 
 @kernel
+def pair_cosines(dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, nx: Any, ny: Any, nz: Any) -> Any:
+    """Return r^2 (m^2), c_l and c_x (m, signed) of one pair: d, reversed normal of the light, normal of the receiver.
+
+    Every sum over pairs takes distance and cosines from here.
+    """
+    square = dx * dx + dy * dy + dz * dz
+    return square, dx * lx + dy * ly + dz * lz, dx * nx + dy * ny + dz * nz
+
+
+@kernel
 def geometry_term(dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, nx: Any, ny: Any, nz: Any) -> Any:
-    """Return g = c_l c_x / r^4 of one pair, 0 where either faces away.
+    """Return g = c_l c_x / r^4 of one pair, 1/m^2; 0 where either faces away.
 
-    Parameters
-    ----------
-    dx, dy, dz : float
-        Vector from the receiver to the light, m, not normalised.
-    lx, ly, lz : float
-        Reversed unit normal of the light.
-    nx, ny, nz : float
-        Unit normal of the receiver.
-
-    Returns
-    -------
-    float
-        1/m^2. Divides each cosine by r^2 by itself: r^4 would leave the range of float32 first.
+    Divides each cosine by r^2 by itself: r^4 would leave the range of float32 first.
     """
     real = type(dx)
     zero = real(0.0)
-    square = dx * dx + dy * dy + dz * dz
+    square, cl, cx = pair_cosines(dx, dy, dz, lx, ly, lz, nx, ny, nz)
     inverse = real(1.0) / (square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE))
-    cl = dx * lx + dy * ly + dz * lz
-    cx = dx * nx + dy * ny + dz * nz
+    # Eq. (2), without the intensity
     return ((cl if cl > zero else zero) * inverse) * ((cx if cx > zero else zero) * inverse)
 
 
@@ -67,31 +64,32 @@ def geometry_term(dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, nx: Any,
 def clamped_term(
     dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, nx: Any, ny: Any, nz: Any, clamp: Clamp, k: int
 ) -> Any:
-    """Return the geometry term of one pair as a clamp keeps it finite.
-
-    Parameters
-    ----------
-    dx, dy, dz, lx, ly, lz, nx, ny, nz : float
-        As in `geometry_term`.
-    clamp : Clamp
-        Minimum distance, softness and bound; those not in use change nothing.
-    k : int
-        Index of the light.
-
-    Returns
-    -------
-    float
-        1/m^2.
-    """
+    """Return the geometry term of one pair with light k as a clamp keeps it finite, 1/m^2."""
     real = type(dx)
     zero = real(0.0)
-    square = dx * dx + dy * dy + dz * dz
+    square, cl, cx = pair_cosines(dx, dy, dz, lx, ly, lz, nx, ny, nz)
     square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
-    kept = (square if square > clamp.least else clamp.least) + clamp.softness[k]
-    cl = dx * lx + dy * ly + dz * lz
-    cx = dx * nx + dy * ny + dz * nz
-    term = ((cl if cl > zero else zero) / square) * ((cx if cx > zero else zero) / kept)
+    softened = (square if square > clamp.least else clamp.least) + clamp.softness[k]
+    term = ((cl if cl > zero else zero) / square) * ((cx if cx > zero else zero) / softened)
     return term if term < clamp.bound else clamp.bound
+
+
+@kernel
+def pair_term(light: Any, receiver: Any, clamp: Clamp | None, k: int) -> Any:
+    """Return the geometry term of packed light k and a receiver (position, normal), clamped or not, 1/m^2."""
+    x, y, z, nx, ny, nz = receiver
+    dx, dy, dz = light[0] - x, light[1] - y, light[2] - z
+    lx, ly, lz = light[3], light[4], light[5]
+    if clamp is None:
+        return geometry_term(dx, dy, dz, lx, ly, lz, nx, ny, nz)
+    return clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, clamp, k)
+
+
+@kernel
+def load_light(lights: Array, k: int) -> Any:
+    """Return rows 0 to 8 of packed light k: position, reversed normal, then flux / pi or a lobe's reversed axis."""
+    return (lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k], lights[6, k],
+            lights[7, k], lights[8, k])
 
 
 @kernel(parallel=True)
@@ -105,7 +103,7 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
     lights : (9, N) ndarray
         Packed lights: position, reversed normal, flux / pi. The last one is black and stands in for an odd partner.
     clamp : Clamp or None
-        How near pairs are kept finite; None sums the plain term.
+        Clamp of near pairs; None sums the plain term.
     irradiance : (3, n) ndarray
         Filled with W/m^2; without albedo/pi and visibility.
     """
@@ -129,29 +127,19 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
 
 @kernel
 def add_listed(tile: Array, lights: Array, clamp: Clamp | None, chosen: Array, listed: int) -> None:
-    """Add the listed lights of a group to the totals of a tile.
+    """Add the first `listed` lights of `chosen`, rising indices of one group, to the totals of a tile.
 
-    Parameters
-    ----------
-    tile : (>= ROWS, TILE) ndarray
-        Receivers; rows SUM hold 0, rows TOTAL and LOST what was added before.
-    lights : (9, N) ndarray
-        Packed lights; the last one is black.
-    clamp : Clamp or None
-        How near pairs are kept finite.
-    chosen : (> listed,) ndarray of int64
-        Indices of lights, rising; the entry after them is overwritten.
-    listed : int
-        How many there are.
+    Rows SUM of the tile (>= ROWS, TILE) hold 0 before. The entry of `chosen` after the last is overwritten with the
+    black light, which stands in for an odd partner.
     """
     chosen[listed] = lights.shape[1] - 1
     for pair in range(0, listed, 2):
         a, b = chosen[pair], chosen[pair + 1]
-        one, two = _light(lights, a), _light(lights, b)
+        one, two = load_light(lights, a), load_light(lights, b)
         for i in range(TILE):
             receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-            g1, g2 = _term(one, receiver, clamp, a), _term(two, receiver, clamp, b)  # Eq. (2)
-            # written out: a loop over the channels would cost the compiler its even split into lanes
+            g1, g2 = pair_term(one, receiver, clamp, a), pair_term(two, receiver, clamp, b)
+            # Eq. (2); written out: a loop over the channels would cost the compiler its even split into lanes
             tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
             tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
             tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8]
@@ -160,16 +148,9 @@ def add_listed(tile: Array, lights: Array, clamp: Clamp | None, chosen: Array, l
 
 @kernel
 def load_tile(tile: Array, position: Array, normal: Array, first: int, size: int) -> None:
-    """Copy receivers into a tile; lanes beyond them keep their zeros and receive nothing.
+    """Copy positions and normals of receivers first to first + size - 1 into rows X and NX of a tile.
 
-    Parameters
-    ----------
-    tile : (>= 6, >= size) ndarray
-        Filled in rows X and NX.
-    position, normal : (3, n) ndarray
-        Receivers.
-    first, size : int
-        Which receivers.
+    Lanes beyond them keep their zeros and receive nothing.
     """
     start = np.uint64(first)  # unsigned, which needs no check for places counted from the end
     for axis in range(3):
@@ -180,39 +161,16 @@ def load_tile(tile: Array, position: Array, normal: Array, first: int, size: int
 
 @kernel
 def close_group(tile: Array) -> None:
-    """Add the sum of a group of lights to the total, with what the addition before rounded off (Kahan 1965).
+    """Add rows SUM to rows TOTAL by Kahan's compensated summation (1965) and clear them.
 
-    Parameters
-    ----------
-    tile : (>= ROWS, n) ndarray
-        Rows SUM are added to rows TOTAL and cleared; rows LOST keep the rounding.
-
-    Notes
-    -----
     A sum of 0 changes nothing, so that a group which reaches no receiver of a tile may as well be left out.
     """
     zero = tile.dtype.type(0.0)
     for c in range(3):
         for i in range(tile.shape[1]):
-            added, old, lost = tile[SUM + c, i], tile[TOTAL + c, i], tile[LOST + c, i]
+            added, old, lost = tile[SUM + c, i], tile[TOTAL + c, i], tile[COMPENSATION + c, i]
             part = added - lost
             total = old + part
-            tile[LOST + c, i] = lost if added == zero else (total - old) - part
+            tile[COMPENSATION + c, i] = lost if added == zero else (total - old) - part
             tile[TOTAL + c, i] = old if added == zero else total
             tile[SUM + c, i] = zero
-
-
-@kernel
-def _light(lights: Array, k: int) -> Any:
-    return (lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k], lights[6, k],
-            lights[7, k], lights[8, k])
-
-
-@kernel
-def _term(light: Any, receiver: Any, clamp: Clamp | None, k: int) -> Any:
-    x, y, z, nx, ny, nz = receiver
-    dx, dy, dz = light[0] - x, light[1] - y, light[2] - z
-    lx, ly, lz = light[3], light[4], light[5]
-    if clamp is None:
-        return geometry_term(dx, dy, dz, lx, ly, lz, nx, ny, nz)
-    return clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, clamp, k)

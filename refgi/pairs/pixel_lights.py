@@ -1,4 +1,4 @@
-"""Pixel lights as every sum takes them, and how far they reach.
+"""Pixel lights (VPLs) as arrays, and their ranges.
 
 The range says which pairs of light and receiver the threshold I_low keeps (SII Sec. 3.4, appendix). A pair counts where
 B >= xi I_low. B = I(w) / r^2 is the irradiance that the light causes at most (the receiver's cosine taken as 1), I_low
@@ -23,7 +23,7 @@ class PixelLights(NamedTuple):
     lobe_exponent: Array | None  # (N',)
     drawn: int  # N: those without flux included
     texel: Array | None = None  # (N',) int32: row * W + column on the stacked maps; None: not from a map
-    map_index: Array | None = None  # (N',) int32: which of the given maps
+    map_index: Array | None = None  # (N',) int32: which of the maps
 
 
 class Range(NamedTuple):
@@ -34,4 +34,4 @@ class Range(NamedTuple):
 
     square: Array  # (N,) R_0^2 = I_0 / I_low, m^2, of the largest channel; a lobe's I_0 is its flux times norm
     scale: Array  # (N,) xi in (0, 1]: pairs are kept where B >= xi I_low, times max(1, I_low / B); 1 is the plain cut
-    outside: bool  # sum what the cut loses in its place: each term times 1 - its factor in the kept sum
+    outside: bool  # sum what the cut removes instead: each term times 1 less its factor

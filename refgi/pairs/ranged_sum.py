@@ -22,10 +22,11 @@ from refgi.pairs.pair_sum import (
     TOTAL,
     Clamp,
     X,
-    clamped_term,
     close_group,
-    geometry_term,
+    load_light,
     load_tile,
+    pair_cosines,
+    pair_term,
 )
 from refgi.pairs.pixel_lights import Range
 
@@ -35,29 +36,19 @@ LANES = 64  # receivers a list of lights belongs to
 
 
 @kernel
-def reached(dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, square_range: Any) -> Any:
-    """Tell whether B >= xi I_low for one pair.
-
-    Parameters
-    ----------
-    dx, dy, dz : float
-        Vector from the receiver to the light, m, not normalised.
-    lx, ly, lz : float
-        Reversed unit normal of the light.
-    square_range : float
-        I_0 / (xi I_low), m^2.
-
-    Returns
-    -------
-    bool
-        Whether the pair counts; never behind the light.
-    """
+def _peak_ratio(dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, square_range: Any) -> Any:
+    """Return r^2 (m^2) and s = R_0^2 c_l / r^2 (m), for which B / I_low = s / r; 0 behind the light."""
     real = type(dx)
     zero = real(0.0)
-    square = dx * dx + dy * dy + dz * dz
+    square, cl, _ = pair_cosines(dx, dy, dz, lx, ly, lz, zero, zero, zero)
     square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
-    cl = dx * lx + dy * ly + dz * lz
-    s = square_range * ((cl if cl > zero else zero) * (real(1.0) / square))
+    return square, square_range * ((cl if cl > zero else zero) * (real(1.0) / square))
+
+
+@kernel
+def reached(dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, square_range: Any) -> Any:
+    """Return whether B >= xi I_low for one pair, with `square_range` I_0 / (xi I_low), m^2; never behind the light."""
+    square, s = _peak_ratio(dx, dy, dz, lx, ly, lz, square_range)
     return s * s >= square
 
 
@@ -65,30 +56,13 @@ def reached(dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, square_range: 
 def range_factor(
     dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, square_range: Any, scale: Any, outside: bool
 ) -> Any:
-    """Return what a pair's term is multiplied by: max(1, I_low / B) where B >= xi I_low, else 0 (E = sum of factor g).
+    """Return what a pair's term is multiplied by: max(1, I_low / B) where B >= xi I_low, else 0.
 
-    Parameters
-    ----------
-    dx, dy, dz, lx, ly, lz : float
-        As in `reached`.
-    square_range : float
-        I_0 / I_low, m^2.
-    scale : float
-        The light's xi.
-    outside : bool
-        Return 1 minus the factor.
-
-    Returns
-    -------
-    float
-        The factor; exactly 0 or 1 for xi = 1.
+    `square_range` is I_0 / I_low (m^2) and `scale` xi; exactly 0 or 1 for xi = 1. With `outside`, 1 less that factor.
     """
     real = type(dx)
     zero, one = real(0.0), real(1.0)
-    square = dx * dx + dy * dy + dz * dz
-    square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
-    cl = dx * lx + dy * ly + dz * lz
-    s = square_range * ((cl if cl > zero else zero) * (one / square))
+    square, s = _peak_ratio(dx, dy, dz, lx, ly, lz, square_range)
     factor = one if s * s >= square else np.sqrt(square) / s
     factor = factor if reached(dx, dy, dz, lx, ly, lz, square_range / scale) else zero
     return one - factor if outside else factor
@@ -127,16 +101,17 @@ def sum_pairs_in_range(
             end = min(group + GROUP, black)
             if not any_listed(listed, block, group, end):
                 continue
-            found = _chosen(listed, block, group, end, chosen)
+            found = _list_chosen(listed, block, group, end, chosen)
             chosen[found] = black
             for pair in range(0, found, 2):
                 a, b = chosen[pair], chosen[pair + 1]
-                one, two = _light(lights, a), _light(lights, b)
+                one, two = load_light(lights, a), load_light(lights, b)
                 square_a, square_b = reach.square[a], reach.square[b]
                 for i in range(LANES):
                     receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-                    g1, g2 = _kept(one, receiver, clamp, a, square_a), _kept(two, receiver, clamp, b, square_b)
-                    # written out: a loop over the channels would cost the compiler its even split into lanes
+                    g1 = _term_in_range(one, receiver, clamp, a, square_a)
+                    g2 = _term_in_range(two, receiver, clamp, b, square_b)
+                    # Eq. (2); written out: a loop over the channels would cost the compiler its even split into lanes
                     tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
                     tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
                     tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8]
@@ -147,25 +122,12 @@ def sum_pairs_in_range(
 
 
 @kernel(parallel=True)
-def sum_weighed_pairs(
+def sum_weighted_pairs(
     position: Array, normal: Array, lights: Array, clamp: Clamp | None, reach: Range, listed: Array, irradiance: Array
 ) -> None:
-    """Add up E = sum over lights of (Phi / pi) g times the factor of `range_factor`, for every receiver.
+    """Fill irradiance with E = sum over lights of (Phi / pi) g times the factor of `range_factor`, W/m^2.
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        As for `sum_pairs_in_range`.
-    lights : (9, N + 1) ndarray
-        As there.
-    clamp : Clamp or None
-        As there.
-    reach : Range
-        Of all packed lights, with xi.
-    listed : (ceil(n / LANES), N) ndarray of bool
-        As there; outside the range every light must be listed.
-    irradiance : (3, n) ndarray
-        Filled with W/m^2.
+    Arguments as for `sum_pairs_in_range`; outside the range every light must be listed.
     """
     count = position.shape[1]
     for block in prange((count + LANES - 1) // LANES):
@@ -176,11 +138,11 @@ def sum_weighed_pairs(
         for group in range(0, lights.shape[1] - 1, GROUP):
             for k in range(group, min(group + GROUP, lights.shape[1] - 1)):
                 if listed[block, k]:
-                    one, square, xi = _light(lights, k), reach.square[k], reach.scale[k]
+                    one, square, xi = load_light(lights, k), reach.square[k], reach.scale[k]
                     for i in range(LANES):
                         x, y, z, nx, ny, nz = (tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i],
                                                tile[NX + 1, i], tile[NX + 2, i])
-                        g = _weighed(one, (x, y, z, nx, ny, nz), clamp, k, square, xi, reach.outside)
+                        g = _weighted_term(one, (x, y, z, nx, ny, nz), clamp, k, square, xi, reach.outside)
                         tile[SUM, i] = tile[SUM, i] + g * one[6]
                         tile[SUM + 1, i] = tile[SUM + 1, i] + g * one[7]
                         tile[SUM + 2, i] = tile[SUM + 2, i] + g * one[8]
@@ -192,22 +154,7 @@ def sum_weighed_pairs(
 
 @kernel
 def any_listed(listed: Array, block: int, first: int, last: int) -> bool:
-    """Tell whether a tile's list holds any light of a group.
-
-    Parameters
-    ----------
-    listed : (m, N) ndarray of bool
-        Lists of tiles.
-    block : int
-        Which tile.
-    first, last : int
-        The group: lights first to last - 1.
-
-    Returns
-    -------
-    bool
-        Whether there is one.
-    """
+    """Return whether the light list (m, N) of tile `block` holds any of the lights first to last - 1."""
     some = False
     for k in range(first, last):
         some |= listed[block, k]
@@ -215,7 +162,7 @@ def any_listed(listed: Array, block: int, first: int, last: int) -> bool:
 
 
 @kernel
-def _chosen(listed: Array, block: int, first: int, last: int, chosen: Array) -> int:
+def _list_chosen(listed: Array, block: int, first: int, last: int, chosen: Array) -> int:
     count = 0
     for k in range(first, last):
         chosen[count] = k
@@ -224,31 +171,16 @@ def _chosen(listed: Array, block: int, first: int, last: int, chosen: Array) -> 
 
 
 @kernel
-def _light(lights: Array, k: int) -> Any:
-    return (lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k], lights[6, k],
-            lights[7, k], lights[8, k])
-
-
-@kernel
-def _kept(light: Any, receiver: Any, clamp: Clamp | None, k: int, square_range: Any) -> Any:
+def _term_in_range(light: Any, receiver: Any, clamp: Clamp | None, k: int, square_range: Any) -> Any:
     dx, dy, dz = light[0] - receiver[0], light[1] - receiver[1], light[2] - receiver[2]
-    term = _term(dx, dy, dz, light, receiver, clamp, k)
+    term = pair_term(light, receiver, clamp, k)
     return term if reached(dx, dy, dz, light[3], light[4], light[5], square_range) else type(dx)(0.0)
 
 
 @kernel
-def _weighed(
+def _weighted_term(
     light: Any, receiver: Any, clamp: Clamp | None, k: int, square_range: Any, scale: Any, outside: bool
 ) -> Any:
     dx, dy, dz = light[0] - receiver[0], light[1] - receiver[1], light[2] - receiver[2]
-    term = _term(dx, dy, dz, light, receiver, clamp, k)
+    term = pair_term(light, receiver, clamp, k)
     return term * range_factor(dx, dy, dz, light[3], light[4], light[5], square_range, scale, outside)
-
-
-@kernel
-def _term(dx: Any, dy: Any, dz: Any, light: Any, receiver: Any, clamp: Clamp | None, k: int) -> Any:
-    lx, ly, lz = light[3], light[4], light[5]
-    nx, ny, nz = receiver[3], receiver[4], receiver[5]
-    if clamp is None:
-        return geometry_term(dx, dy, dz, lx, ly, lz, nx, ny, nz)
-    return clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, clamp, k)

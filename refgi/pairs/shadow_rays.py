@@ -1,9 +1,13 @@
-"""A shadow ray for each pair of receiver and pixel light, and the sum of what is not blocked.
+"""Irradiance of pixel lights with ray-traced visibility: one shadow ray for each pair (SII Eq. 2 and 3, calibrated).
 
-E(x) = sum_i Phi_i / pi <n_i.w> <n_x.-w> / r^2 V(x, x_i), and the same with a lobe (papers' Eq. 2 and 3, calibrated).
-A ray is traced for each pair whose unshadowed term is not zero. Pairs are made in batches and never all held.
+    E(x) = sum_i Phi_i / pi <n_i . w> <n_x . -w> / r^2 V(x, x_i),
 
-The points that rays light: where they lie, which way they face and where their shadow rays start.
+and the same with a lobe. A ray is traced for each pair whose unshadowed term is not zero. Pairs are made in batches and
+never all held.
+
+`RayReceivers` are the points to light: position, shading normal, face normal and the origin of their shadow rays.
+
+Symbols: d vector from receiver to light, c_l and c_x cosines of light and receiver, not divided by |d|, V visibility.
 """
 
 import math
@@ -14,6 +18,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.lobes import lobe_gap, lobe_norm, lobe_power
+from refgi.pairs.pair_sum import pair_cosines
 from refgi.rays import STEPS, Tracer, far_offset, ray_offset
 from refgi.scene import Geometry
 from refgi.stages import report_progress, stage
@@ -28,8 +33,8 @@ LIGHTS_AT_A_TIME = 1024
 BATCH = 1 << 18  # pairs held at a time
 
 
-class Receivers(NamedTuple):
-    """The points whose irradiance is asked for, without the pixels that see nothing."""
+class RayReceivers(NamedTuple):
+    """Points to light by shadow rays, without the pixels that see no surface."""
 
     pixel: Array  # (r,) int64, flat index into the picture
     position: Array  # (3, r) float32, m
@@ -38,8 +43,8 @@ class Receivers(NamedTuple):
     origin: Array  # (3, r) float32: where rays start, lifted off the face, m
 
 
-def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: Array, grain: float) -> Receivers:
-    """Take the covered pixels of a G-buffer, or any choice of them, as receivers.
+def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: Array, grain: float) -> RayReceivers:
+    """Return the covered pixels of a G-buffer, or any choice of them, as receivers of shadow rays.
 
     Parameters
     ----------
@@ -54,7 +59,7 @@ def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: A
 
     Returns
     -------
-    Receivers
+    RayReceivers
         In picture order; `pixel` counts through the given points.
     """
     pixel = np.flatnonzero(triangle_id.reshape(-1) >= 0)
@@ -63,11 +68,11 @@ def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: A
     corner = geometry.vertices[geometry.faces[triangle_id.reshape(-1)[pixel]]]
     face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]).T
     face *= np.where((face * up).sum(axis=0) < 0, -1.0, 1.0) / np.linalg.norm(face, axis=0)
-    # what the rasterizer's rounding moved off the face is taken back
+    # undo what the rasterizer's rounding moved off the face
     size = np.abs(at).sum(axis=0) + grain
     height = ((at - corner[:, 0].T) * face).sum(axis=0)
     lift = STEPS * size - np.where(np.abs(height) < ROUNDED * size, height, 0)
-    return Receivers(pixel, *(np.ascontiguousarray(a, np.float32) for a in (at, up, face, at + lift * face)))
+    return RayReceivers(pixel, *(np.ascontiguousarray(a, np.float32) for a in (at, up, face, at + lift * face)))
 
 
 class Senders(NamedTuple):
@@ -84,7 +89,7 @@ class Senders(NamedTuple):
 
 @stage("shadowed.sum")
 def shadowed_sum(
-    tracer: Tracer, to: Receivers, lights: "PixelLights", *, visibility: bool = True, batch: int = BATCH
+    tracer: Tracer, to: RayReceivers, lights: "PixelLights", *, visibility: bool = True, batch: int = BATCH
 ) -> Array:
     """Sum the irradiance of every pixel light at every receiver, each pair with its visibility.
 
@@ -92,8 +97,8 @@ def shadowed_sum(
     ----------
     tracer : Tracer
         The scene's rays.
-    to : Receivers
-        Receivers.
+    to : RayReceivers
+        RayReceivers.
     lights : PixelLights
         The lights.
     visibility : bool
@@ -117,89 +122,77 @@ def shadowed_sum(
     return total
 
 
-def _add_lights(tracer: Tracer, to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int],
-                visibility: bool, total: Array) -> None:
+def _add_lights(tracer: Tracer, to: RayReceivers, receivers: tuple[int, int], senders: Senders,
+                lights: tuple[int, int], visibility: bool, total: Array) -> None:
     count = lights[1] - lights[0]
     pairs = (receivers[1] - receivers[0]) * count
-    origin, direction, worth = (np.empty((pairs, 3), np.float32) for _ in range(3))
-    reach, blocked = np.empty(pairs, np.float32), np.empty(pairs, np.bool_)
-    aim(to, receivers, senders, lights, tracer.grain, (origin, direction, reach, worth))
+    origin, direction, contribution = (np.empty((pairs, 3), np.float32) for _ in range(3))
+    reach, occluded = np.empty(pairs, np.float32), np.empty(pairs, np.bool_)
+    fill_shadow_rays(to, receivers, senders, lights, tracer.grain, (origin, direction, reach, contribution))
     if visibility:
-        tracer.fill_occluded(origin, direction, reach, blocked)
+        tracer.fill_occluded(origin, direction, reach, occluded)
     else:
-        np.less_equal(reach, 0, out=blocked)
-    add_free(total, receivers[0], receivers[1] - receivers[0], count, blocked, worth)
+        np.less_equal(reach, 0, out=occluded)
+    add_unoccluded(total, receivers[0], receivers[1] - receivers[0], count, occluded, contribution)
 
 
 @kernel(parallel=True)
-def aim(to: Receivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int], grain: float,
-        rays: tuple[Array, Array, Array, Array]) -> None:
-    """Write the shadow ray of each pair of a block, and what the pair is worth.
+def fill_shadow_rays(to: RayReceivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int],
+                     grain: float, rays: tuple[Array, Array, Array, Array]) -> None:
+    """Fill the shadow ray of each pair of a block of receivers and lights (first, one past the last) and its light.
 
-    Parameters
-    ----------
-    to : Receivers
-        Receivers.
-    receivers : tuple of 2 ints
-        First receiver of the block and one past the last.
-    senders : Senders
-        Pixel lights.
-    lights : tuple of 2 ints
-        First sender of the block and one past the last.
-    grain : float
-        The tracer's: segments end above the sender by `ray_offset` and `far_offset`, m.
-    rays : tuple of 4 arrays
-        Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2, float32, light by light for each receiver;
-        the reach is 0 where a pair has nothing to give.
+    `rays` are origins and directions (n, 3), reach (n,) and contribution (n, 3), W/m^2, float32, light by light for
+    each receiver. Segments end above the sender by `ray_offset(grain)` and `far_offset`, m; the reach is 0 where a
+    pair contributes nothing.
     """
     count = lights[1] - lights[0]
     for i in prange(receivers[1] - receivers[0]):
-        _aim_all(to, receivers[0] + i, senders, lights, grain, rays, i * count)
+        _fill_rays_of(to, receivers[0] + i, senders, lights, grain, rays, i * count)
 
 
 @kernel
-def _aim_all(to: Receivers, r: int, senders: Senders, lights: tuple[int, int], grain: float,
-             rays: tuple[Array, Array, Array, Array], ray: int) -> None:
+def _fill_rays_of(to: RayReceivers, r: int, senders: Senders, lights: tuple[int, int], grain: float,
+                  rays: tuple[Array, Array, Array, Array], ray: int) -> None:
     for k in range(lights[0], lights[1]):
-        _aim(to, r, senders, k, grain, rays, ray + k - lights[0])
+        _fill_ray(to, r, senders, k, grain, rays, ray + k - lights[0])
 
 
 @kernel
-def _aim(to: Receivers, r: int, senders: Senders, j: int, grain: float, rays: tuple[Array, Array, Array, Array],
-         ray: int) -> None:
-    origins, directions, reach, worth = rays
+def _fill_ray(to: RayReceivers, r: int, senders: Senders, j: int, grain: float,
+              rays: tuple[Array, Array, Array, Array], ray: int) -> None:
+    origins, directions, reach, contribution = rays
     reach[ray] = 0
     dx, dy = senders.position[0, j] - to.position[0, r], senders.position[1, j] - to.position[1, r]
+    dz = senders.position[2, j] - to.position[2, r]
     offset = (ray_offset(senders.position[0, j], senders.position[1, j], senders.position[2, j], grain)
-              + far_offset(dx, dy, senders.position[2, j] - to.position[2, r]))
-    r2, cos_x, cos_y, above = 0.0, 0.0, 0.0, 0.0
+              + far_offset(dx, dy, dz))
     for c in range(3):
-        d = senders.position[c, j] - to.position[c, r]
-        r2 += d * d
-        cos_x += to.normal[c, r] * d
-        cos_y -= senders.normal[c, j] * d
-        above += to.facing[c, r] * d
         origins[ray, c] = to.origin[c, r]
         directions[ray, c] = senders.position[c, j] + offset * senders.normal[c, j] - to.origin[c, r]
-    if cos_x <= 0 or cos_y <= 0 or above <= 0:
+    square, cl, cx = pair_cosines(dx, dy, dz, -senders.normal[0, j], -senders.normal[1, j], -senders.normal[2, j],
+                                  to.normal[0, r], to.normal[1, r], to.normal[2, r])
+    above = to.facing[0, r] * dx + to.facing[1, r] * dy + to.facing[2, r] * dz
+    if cx <= 0 or cl <= 0 or above <= 0:
         return
-    diffuse, lobe = cos_x * cos_y / (np.pi * r2 * r2), 0.0
+    # Eq. (2)
+    diffuse, lobe = cx * cl / (np.pi * square * square), 0.0
     if senders.lobe_exponent.shape[0] > 0:
-        lobe = _lobe(to, r, senders, j) * cos_x / (r2 * math.sqrt(r2))
+        lobe = _lobe(to, r, senders, j) * cx / (square * math.sqrt(square))
     for c in range(3):
-        worth[ray, c] = senders.flux[c, j] * diffuse
+        contribution[ray, c] = senders.flux[c, j] * diffuse
         if senders.lobe_exponent.shape[0] > 0:
-            worth[ray, c] += senders.lobe_flux[c, j] * lobe
-        if worth[ray, c] > 0:
+            contribution[ray, c] += senders.lobe_flux[c, j] * lobe
+        if contribution[ray, c] > 0:
             reach[ray] = 1
 
 
 @kernel
-def _lobe(to: Receivers, r: int, senders: Senders, j: int) -> Any:
+def _lobe(to: RayReceivers, r: int, senders: Senders, j: int) -> Any:
     """Return c(P) <r.w>^P for the direction from sender j to receiver r (Eq. 3, normalised)."""
     dx, dy = to.position[0, r] - senders.position[0, j], to.position[1, r] - senders.position[1, j]
     dz = to.position[2, r] - senders.position[2, j]
     gap = lobe_gap(senders.lobe_axis[0, j], senders.lobe_axis[1, j], senders.lobe_axis[2, j], dx, dy, dz)
+    # Eq. (3)
     return senders.lobe_norm[j] * lobe_power(gap, senders.lobe_exponent[j])
 
 
@@ -224,26 +217,15 @@ def _fill_norms(cos_theta: Array, exponent: Array, norm: Array) -> None:
 
 
 @kernel(parallel=True)
-def add_free(sums: Array, first: int, receivers: int, per_receiver: int, blocked: Array, worth: Array) -> None:
-    """Add to each receiver what its unblocked rays are worth, in their order.
+def add_unoccluded(
+    sums: Array, first: int, receivers: int, per_receiver: int, occluded: Array, contribution: Array
+) -> None:
+    """Add to each receiver the contributions (n, 3), W/m^2, of its unoccluded rays, in their order.
 
-    Parameters
-    ----------
-    sums : (3, r) float64 ndarray
-        Added to.
-    first : int
-        Receiver of the first ray.
-    receivers : int
-        How many receivers the rays belong to.
-    per_receiver : int
-        Rays of each.
-    blocked : (n,) bool ndarray
-        Which rays are blocked.
-    worth : (n, 3) float32 ndarray
-        What each is worth, W/m^2.
+    `sums` (3, r) is float64; `first` is the receiver of the first ray, and each receiver has `per_receiver` rays.
     """
     for r in prange(receivers):
         for ray in range(r * per_receiver, (r + 1) * per_receiver):
-            if not blocked[ray]:
+            if not occluded[ray]:
                 for c in range(3):
-                    sums[c, first + r] += worth[ray, c]
+                    sums[c, first + r] += contribution[ray, c]

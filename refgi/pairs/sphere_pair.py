@@ -1,7 +1,7 @@
 """One virtual spherical light and one receiver (Hasan, Krivanek, Walter and Bala 2009), for diffuse lights.
 
 A pixel light of flux Phi becomes a sphere of radius r. The receiver sees it in the cone sin a = min(1, r / |d|), over
-which both cosines are integrated instead of taken at its axis:
+which both cosines are integrated instead of evaluated on its axis:
 
     E = Phi / (pi^2 r^2) integral over the cone of <l . w> <n_x . w> dw,    l = -n_p.
 
@@ -39,23 +39,9 @@ WEIGHT = np.round(_w * (_x + 1.0) / 2.0, 14)
 def cone_term(cl: Any, cx: Any, facing: Any, ratio: Any) -> Any:
     """Return the mean of <l . w> <n_x . w> over a cone above both horizons, times solid angle / (pi sin^2 a).
 
-    Parameters
-    ----------
-    cl, cx : float
-        Cosines of the cone's axis with l and n_x.
-    facing : float
-        l . n_x.
-    ratio : float
-        sin^2 a.
-
-    Returns
-    -------
-    float
-        cl cx for a narrow cone. Free of cancellation: 1 - cos a is written sin^2 a / (1 + cos a).
-
-    Notes
-    -----
-    The moments are B = 2 pi/3 (1 - cos^3 a) along the axis and A = pi (2/3 - cos a + cos^3 a / 3) across it.
+    `cl` and `cx` are the cosines of the cone's axis with l and n_x, `facing` is l . n_x, `ratio` sin^2 a. The moments
+    are B = 2 pi/3 (1 - cos^3 a) along the axis and A = pi (2/3 - cos a + cos^3 a / 3) across it, written without
+    cancellation by 1 - cos a = sin^2 a / (1 + cos a). A narrow cone gives cl cx.
     """
     real = type(cl)
     one = real(1.0)
@@ -69,21 +55,10 @@ def cone_term(cl: Any, cx: Any, facing: Any, ratio: Any) -> Any:
 
 @kernel
 def cut_cone_term(w: Any, light: Any, normal: Any, ratio: Any) -> Any:
-    """Return the integral of <l . w>+ <n_x . w>+ over a cone, divided by pi sin^2 a.
+    """Return the integral of <l . w>+ <n_x . w>+ over a cone that a horizon may cut, divided by pi sin^2 a.
 
-    Parameters
-    ----------
-    w : tuple of 3 floats
-        Axis of the cone, unit vector from the receiver to the light.
-    light, normal : tuple of 3 floats
-        Unit vectors l (the light's normal reversed) and n_x.
-    ratio : float
-        sin^2 a, `LEAST_RATIO` to 1.
-
-    Returns
-    -------
-    float
-        As `cone_term`, where a horizon may cut the cone.
+    `w` is the cone's axis, from receiver to light; `light` and `normal` are the unit vectors l (the light's normal
+    reversed) and n_x; `ratio` is sin^2 a, `LEAST_RATIO` to 1.
     """
     real = type(ratio)
     zero, half = real(0.0), real(0.5)

@@ -11,7 +11,19 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.pair_sum import GROUP, LEAST_SQUARE, NX, ROWS, SUM, TILE, TOTAL, X, close_group, load_tile
+from refgi.pairs.pair_sum import (
+    GROUP,
+    LEAST_SQUARE,
+    NX,
+    ROWS,
+    SUM,
+    TILE,
+    TOTAL,
+    X,
+    close_group,
+    load_tile,
+    pair_cosines,
+)
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import range_factor
 from refgi.pairs.sphere_pair import LEAST_RATIO, cone_term, cut_cone_term
@@ -25,24 +37,11 @@ TERM, RATIO = range(ROWS, ROWS + 2)  # further rows of a tile: of one light, 1/m
 def sum_spheres(
     position: Array, normal: Array, lights: Array, square_radius: Array, reach: Range | None, irradiance: Array
 ) -> None:
-    """Add up the irradiance of every spherical light at every receiver (Hasan et al. 2009).
+    """Fill irradiance (3, n), W/m^2, with the sum of every spherical light at every receiver (Hasan et al. 2009).
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers, world space; m and unit vectors.
-    lights : (9, N) ndarray
-        Packed lights: position, reversed normal, flux / pi; the last one is black and is left out.
-    square_radius : (N,) ndarray
-        Squares of the lights' radii, m^2.
-    reach : Range or None
-        Which pairs count, and how much, by the point light in the middle of the sphere; None: all.
-    irradiance : (3, n) ndarray
-        Filled with W/m^2; without albedo/pi and visibility.
-
-    Notes
-    -----
-    No light is passed over: one behind a horizon still reaches over it by its radius.
+    Arguments as for `pair_sum.sum_pairs`, with `square_radius` (N,) the squares of the lights' radii, m^2, and `reach`
+    by the point light in the middle of the sphere. No light is culled: one behind a horizon still reaches over it by
+    its radius.
     """
     count = position.shape[1]
     for block in prange((count + TILE - 1) // TILE):
@@ -56,7 +55,7 @@ def sum_spheres(
                 whole_cones(tile, light, square_radius[k])
                 cut_cones(tile, light, square_radius[k], size)
                 if reach is not None:
-                    _weigh(tile, light, reach.square[k], reach.scale[k], reach.outside)
+                    _weight(tile, light, reach.square[k], reach.scale[k], reach.outside)
                 for i in range(TILE):
                     tile[SUM, i] += tile[TERM, i] * lights[6, k]
                     tile[SUM + 1, i] += tile[TERM, i] * lights[7, k]
@@ -69,16 +68,9 @@ def sum_spheres(
 
 @kernel
 def whole_cones(tile: Array, light: Any, square_radius: Any) -> None:
-    """Fill row TERM where no horizon cuts the cone, and mark the other receivers in row RATIO.
+    """Fill row TERM (1/m^2) where no horizon cuts the cone, and mark the other receivers in row RATIO.
 
-    Parameters
-    ----------
-    tile : (>= RATIO + 1, TILE) ndarray
-        Receivers.
-    light : tuple of 6 floats
-        Position and reversed normal.
-    square_radius : float
-        Of the sphere, m^2.
+    `light` is position and reversed normal, `square_radius` that of its sphere, m^2.
     """
     real = tile.dtype.type
     one, zero = real(1.0), real(0.0)
@@ -86,34 +78,22 @@ def whole_cones(tile: Array, light: Any, square_radius: Any) -> None:
     for i in range(TILE):
         dx, dy, dz = px - tile[X, i], py - tile[X + 1, i], pz - tile[X + 2, i]
         nx, ny, nz = tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-        exact = dx * dx + dy * dy + dz * dz
+        exact, cl, cx = pair_cosines(dx, dy, dz, lx, ly, lz, nx, ny, nz)
         square = exact if exact > real(LEAST_SQUARE) else real(LEAST_SQUARE)
-        kept = square if square > square_radius else square_radius
-        ratio = square_radius / kept
+        clamped = square if square > square_radius else square_radius
+        ratio = square_radius / clamped
         inverse = one / math.sqrt(square)
-        cl, cx = (dx * lx + dy * ly + dz * lz) * inverse, (dx * nx + dy * ny + dz * nz) * inverse
+        cl, cx = cl * inverse, cx * inverse
         low = cl if cl < cx else cx
         sin_a = math.sqrt(ratio) if ratio >= real(LEAST_RATIO) else zero
-        term = cone_term(cl, cx, lx * nx + ly * ny + lz * nz, ratio) / kept
+        term = cone_term(cl, cx, lx * nx + ly * ny + lz * nz, ratio) / clamped
         tile[TERM, i] = term if (low >= sin_a) & (low > zero) else zero
         tile[RATIO, i] = ratio if (low < sin_a) & (low > -sin_a) & (exact > real(LEAST_SQUARE)) else zero
 
 
 @kernel
 def cut_cones(tile: Array, light: Any, square_radius: Any, size: int) -> None:
-    """Fill row TERM of the receivers that are marked.
-
-    Parameters
-    ----------
-    tile : (>= RATIO + 1, TILE) ndarray
-        Receivers, of `whole_cones`.
-    light : tuple of 6 floats
-        Position and reversed normal.
-    square_radius : float
-        Of the sphere, m^2.
-    size : int
-        How many receivers there are.
-    """
+    """Fill row TERM (1/m^2) of the receivers that `whole_cones` marked, out of the first `size`."""
     real = tile.dtype.type
     px, py, pz, lx, ly, lz = light
     for i in range(size):
@@ -128,7 +108,7 @@ def cut_cones(tile: Array, light: Any, square_radius: Any, size: int) -> None:
 
 
 @kernel
-def _weigh(tile: Array, light: Any, square_range: Any, scale: Any, outside: bool) -> None:
+def _weight(tile: Array, light: Any, square_range: Any, scale: Any, outside: bool) -> None:
     """Multiply row TERM by what the range makes of each pair."""
     px, py, pz, lx, ly, lz = light
     for i in range(TILE):

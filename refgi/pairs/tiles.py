@@ -113,16 +113,9 @@ def _put(values: Array, places: Array, plane: Array) -> None:
 
 @kernel
 def bound_tile(tile: Array, size: int, low: Array, high: Array) -> None:
-    """Bound the positions (entries 0 to 2) and normals (3 to 5) of a tile's receivers.
+    """Fill the corners of the bounding boxes of a tile's first `size` positions (entries 0 to 2) and normals (3 to 5).
 
-    Parameters
-    ----------
-    tile : (>= 6, TILE) ndarray
-        Receivers: position and normal; TILE is a power of two.
-    size : int
-        How many of them count.
-    low, high : (6,) ndarray
-        Filled with the corners of both boxes.
+    The tile is (>= 6, TILE), TILE a power of two.
     """
     # by halves, element by element, which runs in lanes; a running minimum would not
     lanes = tile.shape[1]
@@ -141,25 +134,10 @@ def bound_tile(tile: Array, size: int, low: Array, high: Array) -> None:
 
 @kernel
 def lights_in_reach(lights: Array, first: int, last: int, low: Array, high: Array, reach: Array, chosen: Array) -> int:
-    """List the lights of a group that may reach a tile.
+    """List the lights first to last - 1 that may reach a tile, rising, in `chosen`, and return how many.
 
-    Parameters
-    ----------
-    lights : (>= 6, N) ndarray
-        Packed lights: position and reversed normal.
-    first, last : int
-        The group: lights first to last - 1.
-    low, high : (6,) ndarray
-        Boxes of the tile's positions and normals.
-    reach : (>= last - first,) ndarray of bool
-        Room to work in.
-    chosen : (>= last - first,) ndarray of int64
-        Filled with indices of lights, rising.
-
-    Returns
-    -------
-    int
-        How many were listed.
+    `lights` (>= 6, N) hold position and reversed normal, `low` and `high` (6,) are the tile's boxes of `bound_tile`,
+    `reach` (>= last - first,) bool is scratch.
     """
     _reaches(lights, first, last, low, high, reach)
     count = 0

@@ -1,4 +1,4 @@
-"""Two doors to Embree: its C functions by address, and embreex's own `run`.
+"""Two backends of Embree: its C functions called by address, and embreex's own `run`.
 
 The wheel of embreex carries Embree's shared library. Called by address, its functions cost nothing beyond the
 traversal: kernels keep one ray on the stack, no arrays are allocated, and a mesh is shared with Embree as it lies in
@@ -32,8 +32,8 @@ _OUT_OF_MEMORY = 4  # of RTCError
 _RUN_CHUNK = 1 << 18  # rays per call of `run`: its temporary arrays stay in cache
 
 
-class Door(Protocol):
-    """One way to ask Embree about batches of float32 rays."""
+class Backend(Protocol):
+    """Traces batches of float32 rays with Embree."""
 
     def closest(self, origins: Array, directions: Array, reach: Array, triangle_id: Array, distance: Array) -> None:
         """Fill triangle ids and distances of the nearest hits before `reach`."""
@@ -42,26 +42,17 @@ class Door(Protocol):
         """Fill whether anything lies before `reach`; rays of `reach` <= 0 count as blocked, untraced."""
 
 
-def open_door(vertices: Array, faces: Array) -> Door:
-    """Build Embree's tree over triangles and return the fastest door that works here.
+def open_backend(vertices: Array, faces: Array) -> Backend:
+    """Build Embree's tree over triangles and return the fastest backend that works here.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float32 ndarray
-        Vertices, world space, m.
-    faces : (m, 3) int32 ndarray
-        Vertex indices; at least one face.
-
-    Returns
-    -------
-    Door
-        By address, or by `run` where `REFGI_EMBREE=run` or the library is not found.
+    `vertices` (n, 3) float32: vertices, world space, m. `faces` (m, 3) int32: vertex indices; at least one face.
+    Result: by address, or by `run` where `REFGI_EMBREE=run` or the library is not found.
     """
     library = None if os.environ.get("REFGI_EMBREE") == "run" else _library()
-    return RunDoor(vertices, faces) if library is None else AddressDoor(library, vertices, faces)
+    return RunBackend(vertices, faces) if library is None else AddressBackend(library, vertices, faces)
 
 
-class AddressDoor:
+class AddressBackend:
     """Embree's C functions, called by address from compiled kernels.
 
     Parameters
@@ -89,7 +80,7 @@ class AddressDoor:
         occlusions(self.calls, origins, directions, reach, blocked)
 
 
-class RunDoor:
+class RunBackend:
     """embreex's `run`, which releases the GIL, on as many Python threads as Numba uses.
 
     Where memory runs out embreex traces what Embree has not built and the process may end; only calls by address are
@@ -117,7 +108,7 @@ class RunDoor:
         """Fill triangle ids and distances of the nearest hits before `reach`."""
 
         def fill(rays: slice) -> None:
-            dists = np.maximum(reach[rays], 0)  # `run` writes hit distances into what it is given
+            dists = np.maximum(reach[rays], 0)  # `run` writes hit distances into this array
             found = self._scene.run(origins[rays], directions[rays], dists=dists, query="INTERSECT", output=True)
             hit = found["primID"] != MISS
             triangle_id[rays] = np.where(hit, found["primID"], MISS)
@@ -150,7 +141,7 @@ class _Built(NamedTuple):
 
 
 def _build(library: ctypes.CDLL, vertices: Array, faces: Array, vertex_count: int, face_count: int) -> _Built:
-    """Build the tree. Embree says only when asked that a call failed; what it then left must not be traced."""
+    """Build the tree. Embree reports a failed call only through rtcGetDeviceError; what it left must not be traced."""
     device, scene, geometry = library.rtcNewDevice(None), None, None
     try:
         _check(library, device, face_count)

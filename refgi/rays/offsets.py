@@ -1,6 +1,6 @@
-"""How far ray ends stay off surfaces: the error bound of the point at hand, in single steps of float32.
+"""Ray offsets against self-intersection: the error bound of a surface point, in steps of float32.
 
-A ray that starts on a surface must not find it again. What moves the surface about in float32, with u = 2^-24: the
+A ray that starts on a surface must not hit it again. What moves the surface about in float32, with u = 2^-24: the
 rounding of the start, u |y|, and that of the triangle test, a few u times the distance from the start to the corners.
 No triangle that Embree has is longer than the larger of the scene's grain and the distance of its points from the
 coordinates' origin (`cut`), so the lift 4 u (|y|_1 + grain) covers both, whatever lies elsewhere in the scene. A
@@ -24,17 +24,8 @@ GRAIN = 8.0  # times the power of 2 above half of the triangles' largest coordin
 def grain_of(vertices: Array, faces: Array) -> float:
     """Return the size of details in a scene as its rays know it: a power of 2 that single triangles do not move.
 
-    Parameters
-    ----------
-    vertices : (n, 3) ndarray
-        Vertices, m.
-    faces : (m, 3) ndarray
-        Vertex indices.
-
-    Returns
-    -------
-    float
-        Length up to which triangles near the coordinates' origin stay whole, m.
+    `vertices` (n, 3): vertices, m. `faces` (m, 3): vertex indices. Result: length up to which triangles near the
+    coordinates' origin stay whole, m.
     """
     if not len(faces):
         return GRAIN
@@ -45,7 +36,7 @@ def grain_of(vertices: Array, faces: Array) -> float:
 
 @kernel
 def ray_offset(x: Any, y: Any, z: Any, grain: Any) -> Any:
-    """Return how far a ray must start from the surface at a point.
+    """Return the offset of a ray's start from the surface at a point, against self-intersection.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.rays.embree import MISS, Door, open_door
+from refgi.rays.embree import MISS, Backend, open_backend
 from refgi.rays.offsets import GRAIN, STEPS, grain_of
 from refgi.rays.watertight import Corners, Pieces, closest_around, corners, cut
 from refgi.scene import DirectionalLight, Geometry, Light
@@ -27,7 +27,7 @@ class Hits(NamedTuple):
 
 
 class Tracer:
-    """Answers rays against a geometry.
+    """Traces rays against a geometry.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Tracer:
         return Hits(triangle_id, exact)
 
     def occluded(self, origins: Array, directions: Array, distances: Array | float = np.inf) -> Array:
-        """Tell whether anything lies on each ray before a distance.
+        """Return whether anything lies on each ray before a distance.
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class Tracer:
 
     def segments_blocked(self, starts: Array, ends: Array, start_normals: Array | None = None,
                          end_normals: Array | None = None) -> Array:
-        """Tell whether anything lies between pairs of surface points.
+        """Return whether anything lies between pairs of surface points.
 
         Parameters
         ----------
@@ -151,7 +151,7 @@ class Tracer:
         return blocked
 
     def visible_from_light(self, position: Array, normal: Array, covered: Array, light: Light) -> Array:
-        """Tell which points of a G-buffer a light reaches.
+        """Return which points of a G-buffer a light reaches, by shadow rays.
 
         Parameters
         ----------
@@ -199,10 +199,10 @@ class Tracer:
         distance : (n,) float32 ndarray
             Filled with distances, inf for a miss.
         """
-        if self._door is None:
+        if self._backend is None:
             triangle_id[:], distance[:] = MISS, np.inf
         else:
-            self._door.closest(origins, directions, reach, triangle_id, distance)
+            self._backend.closest(origins, directions, reach, triangle_id, distance)
             if self._pieces.face is not None:
                 hit = triangle_id != MISS
                 triangle_id[hit] = self._pieces.face[triangle_id[hit]]
@@ -219,19 +219,19 @@ class Tracer:
         blocked : (n,) bool ndarray
             Filled with the answers.
         """
-        if self._door is None:
+        if self._backend is None:
             np.less_equal(reach, 0, out=blocked)
         else:
-            self._door.occluded(origins, directions, reach, blocked)
+            self._backend.occluded(origins, directions, reach, blocked)
 
     @property
-    def _door(self) -> Door | None:
+    def _backend(self) -> Backend | None:
         with self._lock:
-            return self._opened
+            return self._built_backend
 
     @cached_property
-    def _opened(self) -> Door | None:
-        return open_door(self._pieces.vertices, self._pieces.faces) if len(self._faces) else None
+    def _built_backend(self) -> Backend | None:
+        return open_backend(self._pieces.vertices, self._pieces.faces) if len(self._faces) else None
 
     @cached_property
     def _pieces(self) -> Pieces:
@@ -245,7 +245,7 @@ class Tracer:
                  missed: Array) -> list[tuple[int, int, float]]:
         """Return (ray, triangle, distance) of the misses that float64 turns into hits."""
         missed = missed[reach[missed] > 0]
-        if self._door is None or not len(missed):
+        if self._backend is None or not len(missed):
             return []
         shift = RELATIVE_SHIFT * (np.abs(origins[missed]).max(axis=1, keepdims=True) + self.grain / GRAIN)
         shifted = (origins[missed] + shift * _sideways(directions[missed])).astype(np.float32)

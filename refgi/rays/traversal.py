@@ -66,18 +66,10 @@ def closest_hits(calls: Calls, origins: Array, directions: Array, reach: Array, 
                  distance: Array) -> None:
     """Find the nearest triangle along each ray.
 
-    Parameters
-    ----------
-    calls : Calls
-        Embree's functions and scene.
-    origins, directions : (n, 3) float32 ndarray
-        Rays, world space; distances count in lengths of `directions`.
-    reach : (n,) float32 ndarray
-        How far to look; inf for no limit, rays of `reach` <= 0 miss untraced.
-    triangle_id : (n,) int32 ndarray
-        Filled with the triangle, -1 for a miss.
-    distance : (n,) float32 ndarray
-        Filled with the distance, inf for a miss.
+    `calls`: Embree's functions and scene. `origins`, `directions` (n, 3) float32: rays, world space; distances count in
+    lengths of `directions`. `reach` (n,) float32: how far to look; inf for no limit, rays of `reach` <= 0 miss
+    untraced. `triangle_id` (n,) int32: filled with the triangle, -1 for a miss. `distance` (n,) float32: filled with
+    the distance, inf for a miss.
     """
     count = len(origins)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
@@ -94,18 +86,11 @@ def closest_hits(calls: Calls, origins: Array, directions: Array, reach: Array, 
 
 @kernel(parallel=True)
 def occlusions(calls: Calls, origins: Array, directions: Array, reach: Array, blocked: Array) -> None:
-    """Tell whether any triangle lies on each ray before `reach`.
+    """Return whether any triangle lies on each ray before `reach`.
 
-    Parameters
-    ----------
-    calls : Calls
-        Embree's functions and scene.
-    origins, directions : (n, 3) float32 ndarray
-        Rays, world space; distances count in lengths of `directions`.
-    reach : (n,) float32 ndarray
-        How far to look; rays of `reach` <= 0 count as blocked and are not traced.
-    blocked : (n,) bool ndarray
-        Filled with the answers.
+    `calls`: Embree's functions and scene. `origins`, `directions` (n, 3) float32: rays, world space; distances count in
+    lengths of `directions`. `reach` (n,) float32: how far to look; rays of `reach` <= 0 count as blocked and are not
+    traced. `blocked` (n,) bool: filled with the answers.
     """
     count = len(origins)
     for chunk in prange((count + CHUNK - 1) // CHUNK):

@@ -1,12 +1,12 @@
-"""Decide in float64 the rays that slip between triangles in float32.
+"""Watertight misses: rays that pass between triangles in float32 are decided in float64.
 
 A ray aimed exactly at a vertex can pass Embree's float32 test of every triangle around it. Such a miss is found by
 asking again with the ray shifted sideways by many float32 steps: if that misses as well, the miss stands. Else the
 triangles around what the shifted ray hit are tested against the ray itself, in float64, by signed volumes of
-(direction, edge) taken in one order per edge, so that two triangles always agree on which side of their common edge a
-ray passes (Woop, Benthin & Wald 2013) and no ray passes between them.
+(direction, edge) computed in one order per edge, so that two triangles always agree on which side of their common edge
+a ray passes (Woop, Benthin & Wald 2013) and no ray passes between them.
 
-Triangles that are huge beside the rest, cut for Embree alone: float32 tests are off by a share of a triangle's size.
+Huge triangles are subdivided for Embree alone: float32 tests are off by a share of a triangle's size.
 
 A hit on a quad of 10^8 m is found to some metres, so that it may hide a floor 1 mm above it. Edges longer than the
 scene's grain and than 0.4 of their middle's distance from the coordinates' origin are halved, until none is left: then
@@ -38,17 +38,8 @@ class Corners(NamedTuple):
 def corners(vertices: Array, faces: Array) -> Corners:
     """Weld equal positions and list the triangles around each.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float32 ndarray
-        Vertices as Embree has them.
-    faces : (m, 3) int32 ndarray
-        Vertex indices.
-
-    Returns
-    -------
-    Corners
-        The tables for `closest_around`.
+    `vertices` (n, 3) float32: vertices as Embree has them. `faces` (m, 3) int32: vertex indices. Result: the tables for
+    `closest_around`.
     """
     positions, welded = np.unique(vertices + np.float32(0), axis=0, return_inverse=True)  # + 0 makes -0 equal 0
     faces = welded.reshape(-1)[faces].astype(np.int64)
@@ -61,21 +52,9 @@ def corners(vertices: Array, faces: Array) -> Corners:
 def closest_around(tables: Corners, triangle: int, origin: Array, direction: Array, reach: float) -> tuple[int, float]:
     """Find the nearest hit among the triangles that share a corner with `triangle`, in float64.
 
-    Parameters
-    ----------
-    tables : Corners
-        The mesh by corners.
-    triangle : int
-        Where to look.
-    origin, direction : (3,) float64 ndarray
-        The ray; its distance counts in lengths of `direction`.
-    reach : float
-        How far to look.
-
-    Returns
-    -------
-    tuple of int and float
-        Triangle and distance; -1 and inf for a miss. Ties go to the lowest id.
+    `tables`: the mesh by corners. `origin`, `direction` (3,) float64: the ray; its distance counts in lengths of
+    `direction`. `reach`: how far to look. Result: triangle and distance; -1 and inf for a miss. Ties go to the lowest
+    id.
     """
     nearest, hit = np.inf, -1
     for corner in range(3):
@@ -129,19 +108,8 @@ class Pieces(NamedTuple):
 def cut(vertices: Array, faces: Array, grain: float) -> Pieces:
     """Cut huge triangles into pieces that grow with their distance.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float32 ndarray
-        Vertices, m.
-    faces : (m, 3) int32 ndarray
-        Vertex indices.
-    grain : float
-        Edges up to this length stay whole, m.
-
-    Returns
-    -------
-    Pieces
-        The same arrays where nothing is cut.
+    `vertices` (n, 3) float32: vertices, m. `faces` (m, 3) int32: vertex indices. `grain`: edges up to this length stay
+    whole, m. Result: the same arrays where nothing is cut.
     """
     if not _any_longer(vertices, faces, grain):
         return Pieces(vertices, faces, None)
@@ -169,7 +137,7 @@ def cut(vertices: Array, faces: Array, grain: float) -> Pieces:
 
 
 def _any_longer(vertices: Array, faces: Array, grain: float) -> bool:
-    """Tell whether a side of any triangle's box is longer, which is asked in little memory."""
+    """Return whether a side of any triangle's box is longer, in little memory."""
     lowest, highest = vertices[faces[:, 0]], vertices[faces[:, 0]]
     for k in (1, 2):
         corner = vertices[faces[:, k]]
@@ -179,7 +147,7 @@ def _any_longer(vertices: Array, faces: Array, grain: float) -> bool:
 
 
 def _halved(faces: Array, middles: Array, of: Array) -> tuple[Array, Array]:
-    """Return the parts of triangles whose edges (from each corner to the next) have the given middles; -1: none."""
+    """Return the parts of triangles whose edges (from each corner to the next) have these midpoints; -1: none."""
     count = (middles >= 0).sum(axis=1)
     parts, owners = [], []
     # turn each so that with one middle it lies on the first edge, with two on the first two

@@ -1,9 +1,9 @@
-"""The software rasterizer (`raster`), and what it feeds (`buffers`): G-buffer, reflective shadow maps, direct light.
+"""Software rasterizer (`raster`), and the buffers it fills (`buffers`): G-buffer, reflective shadow maps, direct light.
 
 Reflective shadow maps follow Dachsbacher and Stamminger 2005 and their splatting paper of 2006 (SII), with the flux
 calibrated: exact solid angles and the spot's falloff integrated over each texel, neither of which the papers state. The
 rasterizer keeps a visibility buffer (triangle and nearness) and resolves attributes in a second pass, only those that
-are asked for.
+are used.
 """
 
 from refgi.rsm.buffers import (

@@ -1,4 +1,4 @@
-"""What is lit: scenes from files and built-in procedural ones, as one frozen model."""
+"""Scenes from files and built-in procedural ones, as one frozen model."""
 
 from refgi.scene.builtin import BuiltinScene, builtin_scenes
 from refgi.scene.load import load_scene

@@ -1,4 +1,4 @@
-"""Files on disk as bytes, and the one shape in which every mesh format hands over what it holds."""
+"""File access of the readers, and `Contents`, the common result of all mesh formats."""
 
 import difflib
 import itertools
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from refgi.errors import InputError
 from refgi.scene.model import Camera, Light, Mesh
-from refgi.scene.source import was_read
+from refgi.scene.source import record_file
 
 LONGEST_WORD, MOST_CANDIDATES = 200, 1000  # comparing words takes the square of their length, for each candidate
 
@@ -24,20 +24,8 @@ class Contents(NamedTuple):
 def read_bytes(path: Path) -> bytes:
     """Return the bytes of a regular file.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    bytes
-        Its content, not empty.
-
-    Raises
-    ------
-    InputError
-        If it is missing, a folder, not a regular file, empty or unreadable.
+    Result: its content, not empty. Raises `InputError` if it is missing, a folder, not a regular file, empty or
+    unreadable.
     """
     try:
         if path.is_dir():
@@ -53,22 +41,15 @@ def read_bytes(path: Path) -> bytes:
         raise InputError(f"{path}: cannot be read: {error}") from error
     if not content:
         raise InputError(f"{path}: the file is empty")
-    was_read(path, content)
+    record_file(path, content)
     return content
 
 
 def is_there(path: Path) -> bool:
     """Return whether a path exists.
 
-    Parameters
-    ----------
-    path : Path
-        Anything, even what no file system takes as a name.
-
-    Returns
-    -------
-    bool
-        False as well where the name is too long or holds a zero byte.
+    `path`: anything, even what no file system takes as a name. Result: false as well where the name is too long or
+    holds a zero byte.
     """
     try:
         return path.exists()
@@ -79,15 +60,7 @@ def is_there(path: Path) -> bool:
 def text_of(name: str) -> str:
     r"""Return a file's name as text that can be written anywhere.
 
-    Parameters
-    ----------
-    name : str
-        As the operating system gave it.
-
-    Returns
-    -------
-    str
-        With a question mark for each byte that is not UTF-8.
+    `name`: as the operating system gave it. Result: with a question mark for each byte that is not UTF-8.
 
     Examples
     --------
@@ -100,17 +73,8 @@ def text_of(name: str) -> str:
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return "; did you mean ...?" for the known word nearest to a mistyped one, else nothing.
 
-    Parameters
-    ----------
-    word : str
-        What was given.
-    known : iterable of str
-        What would have been right; the first `MOST_CANDIDATES` are looked at.
-
-    Returns
-    -------
-    str
-        Ready to follow an error's sentence.
+    `known`: what would have been right; the first `MOST_CANDIDATES` are looked at. Result: ready to follow an error's
+    sentence.
     """
     if len(word) > LONGEST_WORD:
         return ""

@@ -1,6 +1,6 @@
 """Lights, and the table of them that kernels read.
 
-A spot's cone as kernels read it: numbers that keep their digits however narrow or wide it is.
+`cone_row` stores a spot's cone in numbers that keep their digits however narrow or wide it is.
 """
 
 import dataclasses
@@ -19,12 +19,12 @@ from refgi.scene.values import (
     Array,
     Rgb,
     Vector,
+    as_float_tuples,
     degrees,
     is_direction,
     is_number,
     is_place,
     is_vector,
-    settle,
 )
 
 # places in a row of `cone_row`; sine and cosine of the outer half-angle come in two parts, the second the rest
@@ -76,7 +76,7 @@ class SpotLight:
         expect(0 <= self.inner_half_angle <= self.outer_half_angle, "light: inner_half_angle_deg",
                "0 to outer_half_angle_deg", degrees(self.inner_half_angle))
         _expect_power(self.intensity, "intensity_w_per_sr")
-        settle(self, "position", "direction", "intensity")
+        as_float_tuples(self, "position", "direction", "intensity")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,7 +89,7 @@ class PointLight:
     def __post_init__(self) -> None:
         expect(is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
         _expect_power(self.intensity, "intensity_w_per_sr")
-        settle(self, "position", "intensity")
+        as_float_tuples(self, "position", "intensity")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,7 +103,7 @@ class DirectionalLight:
         expect(is_direction(self.direction), "light: direction", "a finite vector, not zero, up to 1e+100 long",
                self.direction)
         _expect_power(self.irradiance, "irradiance_w_per_m2")
-        settle(self, "direction", "irradiance")
+        as_float_tuples(self, "direction", "irradiance")
 
 
 Light = SpotLight | PointLight | DirectionalLight

@@ -1,6 +1,6 @@
-"""`load_scene`: a built-in name, a scene file or a mesh file in, a `Scene` out.
+"""`load_scene`: a `Scene` from a built-in name, a scene file or a mesh file.
 
-A camera and a spot for a mesh that comes without: from above, front right, and from above, front left.
+A mesh without camera or light gets a default one: camera from above, front right; spot from above, front left.
 """
 
 import dataclasses
@@ -14,28 +14,27 @@ import numpy as np
 from refgi.errors import InputError, RefgiWarning, blame, first_faults
 from refgi.scene.builtin import SCENES, build_named
 from refgi.scene.files import did_you_mean, is_there, text_of
-from refgi.scene.health import mended_all, shining, warn_of_flat_faces, warn_of_unit
-from refgi.scene.meshfile import READERS, read_mesh_file
 from refgi.scene.model import Array, Camera, Geometry, Light, Scene, SpotLight, Vector, merge
-from refgi.scene.scenefile import read_scene_file
+from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
+from refgi.scene.scenefile import READERS, read_mesh_file, read_scene_file
 from refgi.scene.source import reading, source_of
 from refgi.stages import stage
 
-VIEW = np.array([0.55, 0.4, 1.0])  # from the middle of the mesh towards the eye
-SHINE = np.array([-0.8, 1.1, 0.7])  # ... towards the light
+VIEW_DIRECTION = np.array([0.55, 0.4, 1.0])  # from the middle of the mesh towards the eye
+LIGHT_DIRECTION = np.array([-0.8, 1.1, 0.7])  # ... towards the light
 VFOV = math.radians(35.0)
 LIGHT_DISTANCE = 4.0  # radii of the bounding sphere
 SMALLEST_RADIUS = 1e-9  # m; eye and target of a camera must differ
 FULL_IRRADIANCE = math.pi  # W/m^2 at the middle of the mesh: an albedo's radiance is then the albedo itself
 
 
-def framed(geometry: Geometry) -> Camera:
-    """Return a camera that sees the whole bounding box.
+def default_camera(geometry: Geometry) -> Camera:
+    """Return a camera with the whole bounding box in view.
 
     Parameters
     ----------
     geometry : Geometry
-        What to see, not empty.
+        Not empty.
 
     Returns
     -------
@@ -43,17 +42,17 @@ def framed(geometry: Geometry) -> Camera:
         512 x 512 pixels.
     """
     middle, radius = _sphere(geometry)
-    eye = middle + VIEW / np.linalg.norm(VIEW) * (radius / math.sin(VFOV / 2))
+    eye = middle + VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION) * (radius / math.sin(VFOV / 2))
     return Camera(_vector(eye), _vector(middle), vfov=VFOV)
 
 
-def lit(geometry: Geometry) -> SpotLight:
-    """Return a spot that lights the whole bounding box.
+def default_light(geometry: Geometry) -> SpotLight:
+    """Return a spot light whose cone holds the whole bounding box.
 
     Parameters
     ----------
     geometry : Geometry
-        What to light, not empty.
+        Not empty.
 
     Returns
     -------
@@ -62,7 +61,7 @@ def lit(geometry: Geometry) -> SpotLight:
     """
     middle, radius = _sphere(geometry)
     distance = LIGHT_DISTANCE * radius
-    position = middle + SHINE / np.linalg.norm(SHINE) * distance
+    position = middle + LIGHT_DIRECTION / np.linalg.norm(LIGHT_DIRECTION) * distance
     outer = 1.2 * math.asin(1 / LIGHT_DISTANCE)
     power = FULL_IRRADIANCE * distance**2
     return SpotLight(_vector(position), _vector(middle - position), outer / 1.2, outer, (power, power, power))
@@ -90,9 +89,9 @@ def load_scene(
         A built-in scene's name, with parameters after a colon (``"atrium:faces=1000000,seed=3"``), or the path of a
         ``.json`` scene file or a ``.glb``, ``.gltf``, ``.obj`` or ``.ply`` mesh.
     camera : Camera, optional
-        Looks instead of the scene's own camera.
+        Replaces the scene's own camera.
     lights : sequence of Light, optional
-        Shine instead of the scene's own lights.
+        Replace the scene's own lights.
 
     Returns
     -------
@@ -129,7 +128,7 @@ def _found(source: str | Path, camera: Camera | None, lights: Sequence[Light] | 
         if suffix == ".json":
             return read_scene_file(path, camera, lights)
         if suffix in READERS:
-            return _of_mesh_file(path, camera, lights)
+            return _from_mesh_file(path, camera, lights)
     if suffix or is_there(path):
         what = "a folder" if path.is_dir() else f"the suffix {suffix!r}"
         raise InputError(f"{path}: expected a scene name or a file named .json, {', '.join(READERS)}; got {what}"
@@ -142,13 +141,13 @@ def _with(scene: Scene, camera: Camera | None, lights: Sequence[Light] | None) -
     if camera is not None:
         scene = Scene(scene.name, scene.geometry, scene.materials, camera, scene.lights, scene.description,
                       scene.exposure)
-    return scene if lights is None else scene.with_lights(*shining(lights, "lights"))
+    return scene if lights is None else scene.with_lights(*lights_with_power(lights, "lights"))
 
 
-def _of_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
+def _from_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
     found = read_mesh_file(path)
     faults: list[str] = []
-    meshes, dropped = mended_all(found.meshes, lambda number: f"{path}: {found.meshes[number].name}", faults)
+    meshes, dropped = repaired_all(found.meshes, lambda number: f"{path}: {found.meshes[number].name}", faults)
     if faults:
         raise InputError(first_faults(faults))
     warn_of_flat_faces(dropped, str(path))
@@ -156,12 +155,12 @@ def _of_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] | N
     warn_of_unit(geometry, str(path))
     lacking = []
     if camera is None:
-        camera = found.cameras[0] if found.cameras else framed(geometry)
+        camera = found.cameras[0] if found.cameras else default_camera(geometry)
         lacking += [] if found.cameras else ["camera"]
     if lights is None:
-        lights = found.lights or (lit(geometry),)
+        lights = found.lights or (default_light(geometry),)
         lacking += [] if found.lights else ["light"]
     if lacking:
         text = f"{path}: the file has no {' and no '.join(lacking)}; one was placed to fit the mesh"
         warnings.warn(RefgiWarning(text), stacklevel=5)
-    return Scene(text_of(path.stem), geometry, materials, camera, shining(lights, f"{path}: lights"))
+    return Scene(text_of(path.stem), geometry, materials, camera, lights_with_power(lights, f"{path}: lights"))

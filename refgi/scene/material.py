@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.scene.values import BLACK, BRIGHTEST, Array, Rgb, is_number, is_vector, settle
+from refgi.scene.values import BLACK, BRIGHTEST, Array, Rgb, as_float_tuples, is_number, is_vector
 
 SHARPEST = 1e20  # Phong exponent; far within float32
 DENSEST = 1e3  # index of refraction
@@ -45,7 +45,7 @@ class Material:
         possible = self.is_dielectric or not reflects_too_much(self.diffuse, self.specular)
         expect(possible, f"material {self.name!r}: diffuse + specular", "at most 1 in each channel",
                [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
-        settle(self, "diffuse", "specular", "emission")
+        as_float_tuples(self, "diffuse", "specular", "emission")
 
     @property
     def is_glossy(self) -> bool:

@@ -1,9 +1,8 @@
-"""One piece of a scene on its way in, and what makes it usable: asked of one mesh, or of very many small ones at once.
+"""Meshes as read, and their validation: one at a time, or very many small ones in a batch.
 
-A file may hold a hundred thousand meshes of a few triangles each. NumPy asked about them one by one takes longer than
-everything else that is done with them, so small ones are joined into batches first.
-
-Whether a scene of so many triangles can be held at all, asked before the memory is taken.
+A file may hold a hundred thousand meshes of a few triangles each. Checking them one by one with NumPy takes longer than
+everything else that is done with them, so small ones are joined into batches first. `expect_memory` checks that a scene
+fits before memory is allocated.
 """
 
 import dataclasses
@@ -17,7 +16,7 @@ from refgi.errors import expect
 from refgi.scene.material import UNPAINTED, Material
 from refgi.scene.values import LARGEST, Array
 
-SMALL = 1 << 12  # vertices and faces of a mesh that goes into a batch; a larger one is worth a look of its own
+SMALL = 1 << 12  # vertices and faces of a mesh that goes into a batch; a larger one is checked alone
 BATCH = 1 << 18  # vertices and faces in a batch: some megabytes
 
 SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes nor overflows
@@ -85,15 +84,8 @@ class Batch(NamedTuple):
 def batches(meshes: Sequence[Mesh]) -> Iterator[Batch]:
     """Join the small meshes, some thousand at a time.
 
-    Parameters
-    ----------
-    meshes : sequence of Mesh
-        Any; those that are large, or whose arrays have no usable form, are in no batch.
-
-    Yields
-    ------
-    Batch
-        Meshes in ascending order, all of them with normals or all without.
+    `meshes`: any; those that are large, or whose arrays have no usable form, are in no batch. Result: meshes in
+    ascending order, all of them with normals or all without.
     """
     members: dict[bool, list[int]] = {False: [], True: []}
     size = {False: 0, True: 0}
@@ -113,17 +105,7 @@ def batches(meshes: Sequence[Mesh]) -> Iterator[Batch]:
 def expect_all_sound(meshes: Sequence[Mesh], name: Callable[[int], str]) -> None:
     """Raise `InputError` for the first mesh that is not sound.
 
-    Parameters
-    ----------
-    meshes : sequence of Mesh
-        Any.
-    name : callable
-        Returns what a mesh of some number is called in the error.
-
-    Raises
-    ------
-    InputError
-        As `Mesh.expect_sound`.
+    `name`: returns what a mesh of some number is called in the error. Raises `InputError`: as `Mesh.expect_sound`.
     """
     sound = np.zeros(len(meshes), np.bool_)
     for batch in batches(meshes):
@@ -135,15 +117,8 @@ def expect_all_sound(meshes: Sequence[Mesh], name: Callable[[int], str]) -> None
 def missing_normals(normals: Array) -> Array:
     """Return which normals give no direction.
 
-    Parameters
-    ----------
-    normals : (n, 3) ndarray
-        Vectors of any length.
-
-    Returns
-    -------
-    (n,) ndarray of bool
-        True where one is zero, not finite, or so short or long that its square is.
+    `normals` (n, 3): vectors of any length. Returns (n,) bool: true where one is zero, not finite, or so short or long
+    that its square is.
     """
     longest = np.abs(np.asarray(normals, np.float64)).max(axis=1, initial=0.0)
     return np.asarray(~((longest > SHORTEST) & (longest < LONGEST)))
@@ -177,37 +152,22 @@ def _rows_of_three(array: Array, kinds: str) -> bool:
     return array.ndim == 2 and array.shape[1] == 3 and array.dtype.kind in kinds
 
 
-def expect_room(vertices: int, faces: int, where: str) -> None:
+def expect_memory(vertices: int, faces: int, where: str) -> None:
     """Raise `InputError` unless indices and memory suffice for a scene's geometry.
 
-    Parameters
-    ----------
-    vertices, faces : int
-        Of the whole scene, instances counted each.
-    where : str
-        File and key, for the error's text.
-
-    Raises
-    ------
-    InputError
-        If there are more vertices than an int32 can count, or more bytes than the machine has.
+    `vertices`, `faces`: of the whole scene, instances counted each. `where`: file and key, for the error's text. Raises
+    `InputError` if there are more vertices than an int32 can count, or more bytes than the machine has.
     """
     expect(vertices <= MOST_VERTICES, where, f"at most {MOST_VERTICES} vertices in all", vertices)
     needed = vertices * BYTES_OF_VERTEX + faces * BYTES_OF_FACE
     present = physical_memory()
-    if needed > present:  # asked for every object of a file; the text is made once
+    if needed > present:  # called for every object of a file; the text is made once
         expect(False, where, f"a scene that fits in {present / 2**30:.1f} GiB of memory",
                f"{vertices} vertices and {faces} faces ({needed / 2**30:.1f} GiB)")
 
 
 def physical_memory() -> float:
-    """Return the machine's memory in bytes, infinity where the platform does not say.
-
-    Returns
-    -------
-    float
-        Bytes.
-    """
+    """Return the machine's memory in bytes, infinity where the platform does not say."""
     try:
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (AttributeError, OSError, ValueError):

@@ -1,8 +1,8 @@
-"""What is lit: a frozen description of geometry, materials, camera and lights.
+"""The scene model: frozen geometry, materials, camera and lights.
 
 World space is right-handed, y up, metres; angles are radians; colours are linear RGB. Geometry is kept flat, one list
 of triangles in world space, because every consumer (rasterizer, Embree, file writers) wants exactly that; a `Mesh` is
-one piece of it on the way in. `Scene` holds the `Geometry` object itself, so a scene with another camera or another
+one piece of it as read. `Scene` holds the `Geometry` object itself, so a scene with another camera or another
 light shares it, and whatever was computed from it stays valid.
 """
 
@@ -27,7 +27,7 @@ from refgi.scene.light import (
     light_table,
 )
 from refgi.scene.material import Material, MaterialTable, material_table
-from refgi.scene.mesh import Mesh, expect_all_sound, expect_room
+from refgi.scene.mesh import Mesh, expect_all_sound, expect_memory
 from refgi.scene.source import Source
 from refgi.scene.values import (
     BLACK,
@@ -35,12 +35,12 @@ from refgi.scene.values import (
     Array,
     Rgb,
     Vector,
+    as_float_tuples,
     degrees,
     is_count,
     is_direction,
     is_number,
     is_place,
-    settle,
 )
 
 __all__ = [
@@ -126,7 +126,7 @@ class Camera:
             expect(is_place(getattr(self, key)), f"camera: {key}", f"three finite numbers up to {LARGEST:g} m",
                    getattr(self, key))
         expect(is_direction(self.up), "camera: up", "a finite vector, not zero, up to 1e+100 long", self.up)
-        settle(self, "eye", "target", "up")
+        as_float_tuples(self, "eye", "target", "up")
         view = np.subtract(self.target, self.eye)
         expect(bool(np.linalg.norm(view) > 1e-9), "camera: target", "a point away from eye", self.target)
         cross = np.cross(view / np.linalg.norm(view), np.asarray(self.up) / np.linalg.norm(self.up))
@@ -140,7 +140,7 @@ class Camera:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Scene:
-    """One scene: what is there, what lights it, who looks."""
+    """Geometry, materials, lights and camera."""
 
     name: str
     geometry: Geometry
@@ -159,7 +159,7 @@ class Scene:
             expect(isinstance(light, Light), "lights", "spot, point or directional lights", light)
 
     def with_camera(self, **changes: Any) -> "Scene":
-        """Return the scene seen by a changed camera, sharing everything else."""
+        """Return the scene with a changed camera, sharing everything else."""
         return dataclasses.replace(self, camera=dataclasses.replace(self.camera, **changes))
 
     def with_lights(self, *lights: Light) -> "Scene":
@@ -195,7 +195,7 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
         If a mesh has a coordinate that is not finite or an index out of range, or all do not fit in memory.
     """
     expect_all_sound(meshes, lambda number: f"mesh {number} ({meshes[number].name})")
-    expect_room(sum(len(mesh.vertices) for mesh in meshes), sum(len(mesh.faces) for mesh in meshes), "meshes")
+    expect_memory(sum(len(mesh.vertices) for mesh in meshes), sum(len(mesh.faces) for mesh in meshes), "meshes")
     index_of: dict[Material, int] = {}
     index = [index_of.setdefault(mesh.material, len(index_of)) for mesh in meshes]
     smooth = smooth and any(mesh.normals is not None for mesh in meshes)

@@ -1,6 +1,4 @@
-"""Objects of a scene moved rigidly: the same triangles, some of their vertices elsewhere.
-
-Scenes far from the origin: moved near it, where float32 has steps for them.
+"""Rigid motion of objects, and translation of scenes far from the origin to where float32 resolves them.
 
 At 1e5 m two float32 numbers are 8 mm apart: positions, shadows and rays of a room there would be wrong, though the
 scene itself, in float64, knows its places to 1e-11 m. All that is computed depends on differences of places alone, so
@@ -44,12 +42,12 @@ def faces_of(scene: Scene, material: str) -> Array:
     InputError
         If there is no material of that name, or no face shows it.
     """
-    names = [given.name for given in scene.materials]
+    names = [one.name for one in scene.materials]
     if material not in names:
         raise InputError(f"material: expected one of {', '.join(names)}, got {material!r}"
                          f"{did_you_mean(material, names)}")
-    wanted = [index for index, name in enumerate(names) if name == material]
-    selected: Array = np.isin(scene.geometry.material_of_face, wanted)
+    selected_materials = [index for index, name in enumerate(names) if name == material]
+    selected: Array = np.isin(scene.geometry.material_of_face, selected_materials)
     expect(bool(selected.any()), "material", "one that a face shows", material)
     return selected
 
@@ -130,7 +128,7 @@ def rotation_about(axis: Vector, angle: float) -> Array:
     axis : tuple of 3 floats
         Direction, of any length.
     angle : float
-        Counter-clockwise for who looks against the axis, rad.
+        Counter-clockwise when viewed against the axis, rad.
 
     Returns
     -------

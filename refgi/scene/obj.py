@@ -23,20 +23,8 @@ TEXTURES = ("bump", "disp", "decal", "norm", "refl")  # and all that starts with
 def read_obj(path: Path) -> Contents:
     """Read the polygons of an OBJ file, one mesh per material in order of first use.
 
-    Parameters
-    ----------
-    path : Path
-        The file; `mtllib` files are looked for beside it.
-
-    Returns
-    -------
-    Contents
-        Meshes with vertex normals where every corner names one.
-
-    Raises
-    ------
-    InputError
-        If a line cannot be read, an index is out of range, or there are no polygons.
+    `path`: the file; `mtllib` files are looked for beside it. Result: meshes with vertex normals where every corner
+    names one. Raises `InputError` if a line cannot be read, an index is out of range, or there are no polygons.
     """
     reader = _Reader(path)
     for number, words in _lines(path):
@@ -116,25 +104,10 @@ class _Reader:
 def read_mtl(path: Path) -> dict[str, Material]:
     """Read the materials of an MTL file: Kd as albedo, Ks and Ns as Phong lobe, Ke as emission.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
+    Result: by name. A lobe that would reflect more than arrives together with Kd is left out. Raises `InputError` if
+    the file is missing or a value is out of range.
 
-    Returns
-    -------
-    dict of str to Material
-        By name. A lobe that would reflect more than arrives together with Kd is left out.
-
-    Raises
-    ------
-    InputError
-        If the file is missing or a value is out of range.
-
-    Warns
-    -----
-    RefgiWarning
-        If lobes are left out, or textures are named.
+    Warns `RefgiWarning` if lobes are left out, or textures are named.
     """
     textures: list[tuple[str, ...]] = []
     values: dict[str, dict[str, tuple[float, ...]]] = {}

@@ -1,4 +1,4 @@
-"""Camera, lights and objects on their way through one scene."""
+"""Animation of camera, lights and objects by keyframes, linear or Catmull-Rom."""
 
 import dataclasses
 import math
@@ -49,7 +49,7 @@ class Path:
     source: str = ""
 
     def place(self, frame: int, frames: int) -> str:
-        """Return where a fault of a frame lies: file, frame and time."""
+        """Return file, frame and time, for the text of an error."""
         file = f"{self.source}: " if self.source else ""
         return f"{file}frame {frame} of {frames} (at = {frame_time(frame, frames):.6g})"
 
@@ -88,14 +88,14 @@ def value_at(track: Track, time: float, curve: Curve) -> Array:
 
 
 def scenes_along(scene: Scene, path: Path, frames: int) -> Iterator[Scene]:
-    """Give the scene of every frame of a path.
+    """Yield the scene of every frame of a path.
 
     Parameters
     ----------
     scene : Scene
-        What is on its way.
+        The scene at rest.
     path : Path
-        The way.
+        Its animation.
     frames : int
         How many; the first is at time 0, the last at time 1.
 
@@ -122,14 +122,14 @@ def scenes_along(scene: Scene, path: Path, frames: int) -> Iterator[Scene]:
 
 
 def camera_and_lights(scene: Scene, path: Path, frame: int, frames: int) -> tuple[Camera, tuple[Light, ...]]:
-    """Return who looks and what shines in a frame.
+    """Return the camera and the lights of a frame.
 
     Parameters
     ----------
     scene : Scene
-        What is on its way.
+        The scene at rest.
     path : Path
-        The way.
+        Its animation.
     frame, frames : int
         Which frame of how many.
 
@@ -172,12 +172,12 @@ def frame_time(frame: int, frames: int) -> float:
     return frame / max(1, frames - 1)
 
 
-def changed(given: Any, tracks: Mapping[str, Track], time: float, curve: Curve) -> Any:
+def changed(element: Any, tracks: Mapping[str, Track], time: float, curve: Curve) -> Any:
     """Return a camera or a light with the values that it has at a time.
 
     Parameters
     ----------
-    given : Camera or Light
+    element : Camera or Light
         As the scene has it.
     tracks : mapping of str to Track
         By field.
@@ -198,7 +198,7 @@ def changed(given: Any, tracks: Mapping[str, Track], time: float, curve: Curve) 
     """
     values = {key: value_at(track, time, curve).tolist() for key, track in tracks.items()}
     changes = {key: value[0] if len(value) == 1 else tuple(value) for key, value in values.items()}
-    return dataclasses.replace(given, **changes) if changes else given
+    return dataclasses.replace(element, **changes) if changes else element
 
 
 def _placed(geometry: Geometry, path: Path, frame: int, frames: int) -> Geometry:

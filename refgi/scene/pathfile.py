@@ -132,24 +132,8 @@ class PathFile(Entry):
 def read_path(file: str | FilePath, scene: Scene) -> tuple[Path, int | None]:
     """Read what moves through a scene, and how.
 
-    Parameters
-    ----------
-    file : str or Path
-        A TOML file.
-    scene : Scene
-        Its lights and materials are what the file's can be.
-
-    Returns
-    -------
-    path : Path
-        The way of camera, lights and objects.
-    frames : int or None
-        How many frames the file asks for.
-
-    Raises
-    ------
-    InputError
-        One error with all faults of the file, one a line.
+    `scene`: its lights and materials are what the file's can be. Returns `path`: the way of camera, lights and objects.
+    `frames`: how many frames the file asks for. Raises `InputError`: one error with all faults of the file, one a line.
     """
     file = FilePath(file)
     entry = _validated(file)
@@ -195,67 +179,67 @@ def _tracks(keys: Sequence[Any], fields: Mapping[str, str], where: str, faults: 
         return {}
     tracks = {}
     for name, field in fields.items():
-        given = [(key.at, value) for key in keys if (value := getattr(key, name)) is not None]
-        if given:
-            values = np.array([value for _, value in given], np.float64).reshape(len(given), -1)
+        timed = [(key.at, value) for key in keys if (value := getattr(key, name)) is not None]
+        if timed:
+            values = np.array([value for _, value in timed], np.float64).reshape(len(timed), -1)
             in_rad = np.radians(values) if name.endswith("_deg") else values
-            tracks[field] = Track(np.array([at for at, _ in given]), in_rad)
+            tracks[field] = Track(np.array([at for at, _ in timed]), in_rad)
     return tracks
 
 
 def _unusable(
-    given: Any, keys: Sequence[Any], tracks: Mapping[str, Track], where: str, curve: Curve
+    element: Any, keys: Sequence[Any], tracks: Mapping[str, Track], where: str, curve: Curve
 ) -> Iterator[str]:
-    """Tell of the keys at whose times a camera or a light is not usable."""
+    """Yield a fault for each key at whose time a camera or a light is not usable."""
     for number, key in enumerate(keys):
         try:
-            changed(given, tracks, key.at, curve)
+            changed(element, tracks, key.at, curve)
         except InputError as error:
             yield f"{where}[{number}]: {str(error).removeprefix('camera: ').removeprefix('light: ')}"
 
 
 def _lights(entry: PathFile, scene: Scene, faults: list[str]) -> Iterator[tuple[int, dict[str, Track]]]:
-    seen = set()
-    for number, given in enumerate(entry.lights):
+    numbers = set()
+    for number, light_entry in enumerate(entry.lights):
         where = f"lights[{number}]"
-        if given.light >= len(scene.lights) or given.light in seen:
-            faults.append(f"{where}.light: expected 0 to {len(scene.lights) - 1}, each once, got {given.light}")
+        if light_entry.light >= len(scene.lights) or light_entry.light in numbers:
+            faults.append(f"{where}.light: expected 0 to {len(scene.lights) - 1}, each once, got {light_entry.light}")
             continue
-        seen.add(given.light)
-        known = LIGHTS[type(scene.lights[given.light])]
-        named = {name for key in given.keys for name in key.model_fields_set} - {"at"}
-        faults += [f"{where}.keys: {name}: light {given.light} has none, but {', '.join(known)}"
+        numbers.add(light_entry.light)
+        known = LIGHTS[type(scene.lights[light_entry.light])]
+        named = {name for key in light_entry.keys for name in key.model_fields_set} - {"at"}
+        faults += [f"{where}.keys: {name}: light {light_entry.light} has none, but {', '.join(known)}"
                    for name in sorted(named - set(known))]
-        tracks = _tracks(given.keys, known, f"{where}.keys", faults)
-        faults += _unusable(scene.lights[given.light], given.keys, tracks, f"{where}.keys", entry.curve)
-        yield given.light, tracks
+        tracks = _tracks(light_entry.keys, known, f"{where}.keys", faults)
+        faults += _unusable(scene.lights[light_entry.light], light_entry.keys, tracks, f"{where}.keys", entry.curve)
+        yield light_entry.light, tracks
 
 
 def _objects(entry: PathFile, scene: Scene, faults: list[str]) -> Iterator[Motion]:
-    for number, given in enumerate(entry.objects):
+    for number, item in enumerate(entry.objects):
         where = f"objects[{number}]"
         try:
-            faces = _faces(given, scene)
+            faces = _faces(item, scene)
         except InputError as error:
             faults.append(f"{where}.{error}")
             continue
         corners = scene.geometry.vertices[scene.geometry.faces[faces]].reshape(-1, 3)
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        tracks = _tracks(given.keys, {"turn_deg": "turn", "move": "move"}, f"{where}.keys", faults)
-        far = {f"{where}.center": given.center or (0.0, 0.0, 0.0)}
-        far |= {f"{where}.keys[{k}].move": key.move for k, key in enumerate(given.keys)}
+        tracks = _tracks(item.keys, {"turn_deg": "turn", "move": "move"}, f"{where}.keys", faults)
+        far = {f"{where}.center": item.center or (0.0, 0.0, 0.0)}
+        far |= {f"{where}.keys[{k}].move": key.move for k, key in enumerate(item.keys)}
         faults += [f"{key}: expected three lengths up to {LARGEST:g} m, got {place}" for key, place in far.items()
                    if not is_place(place)]
-        x, y, z = middle.tolist() if given.center is None else given.center
-        yield Motion(faces, given.axis, (x, y, z), tracks.get("turn"), tracks.get("move"))
+        x, y, z = middle.tolist() if item.center is None else item.center
+        yield Motion(faces, item.axis, (x, y, z), tracks.get("turn"), tracks.get("move"))
 
 
-def _faces(given: ObjectEntry, scene: Scene) -> Array:
-    if given.material is not None:
-        return faces_of(scene, given.material)
-    assert given.faces is not None  # the entry has seen to it
-    first, end = given.faces
-    expect(0 <= first < end <= scene.face_count, "faces", f"first and end within 0 to {scene.face_count}", given.faces)
+def _faces(item: ObjectEntry, scene: Scene) -> Array:
+    if item.material is not None:
+        return faces_of(scene, item.material)
+    assert item.faces is not None  # checked by ObjectEntry.sound
+    first, end = item.faces
+    expect(0 <= first < end <= scene.face_count, "faces", f"first and end within 0 to {scene.face_count}", item.faces)
     selected = np.zeros(scene.face_count, np.bool_)
     selected[first:end] = True
     return selected

@@ -32,20 +32,8 @@ class _Element(NamedTuple):
 def read_ply(path: Path) -> Contents:
     """Read the triangles (and vertex normals) of a PLY file.
 
-    Parameters
-    ----------
-    path : Path
-        The file, ASCII or binary.
-
-    Returns
-    -------
-    Contents
-        One mesh of the default material.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged, cut short or holds no triangles.
+    `path`: the file, ASCII or binary. Result: one mesh of the default material. Raises `InputError` if the file is
+    damaged, cut short or holds no triangles.
     """
     content = read_bytes(path)
     elements, encoding, start = _header(content, path)

@@ -1,10 +1,10 @@
-"""Scene files: JSON that names meshes, materials, camera and lights (docs/scenes.md has the keys)."""
+"""Scene files (JSON with meshes, materials, camera and lights; keys in docs/scenes.md), and mesh files by suffix."""
 
 import codecs
 import collections
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +12,17 @@ import numpy as np
 
 from refgi.errors import MOST_FAULTS, InputError, expect, first_faults, shortened
 from refgi.scene.files import Contents, is_there, read_bytes
-from refgi.scene.health import mended_all, shining, warn_of_flat_faces, warn_of_unit
-from refgi.scene.mesh import expect_room
-from refgi.scene.meshfile import read_mesh_file
+from refgi.scene.gltf import read_gltf
+from refgi.scene.mesh import expect_memory
 from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
-from refgi.scene.transform import placed_all
+from refgi.scene.obj import read_obj
+from refgi.scene.ply import read_ply
+from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
+from refgi.scene.transform import transformed_all
 
+READERS: dict[str, Callable[[Path], Contents]] = {
+    ".glb": read_gltf, ".gltf": read_gltf, ".obj": read_obj, ".ply": read_ply,
+}
 PLAINER = {"missing": "expected a value, nothing given", "extra_forbidden": "unknown key",
            "union_tag_invalid": "type: expected one of {expected_tags}",
            "union_tag_not_found": "expected a type"}
@@ -30,36 +35,20 @@ if TYPE_CHECKING:
 def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
     """Read a JSON scene file and the meshes it names.
 
-    Parameters
-    ----------
-    path : Path
-        The file; meshes are looked for beside it.
-    camera : Camera or None
-        Replaces the file's.
-    lights : sequence of Light or None
-        Replace the file's.
-
-    Returns
-    -------
-    Scene
-        The scene, in the order of the file's objects.
-
-    Raises
-    ------
-    InputError
-        One error with all faults of the file, else one with all faults of its meshes.
+    `path`: the file; meshes are looked for beside it. Result: the scene, in the order of the file's objects. Raises
+    `InputError`: one error with all faults of the file, else one with all faults of its meshes.
     """
     content = read_bytes(path).removeprefix(codecs.BOM_UTF8)
     entry = _validated(content, path, need_camera=camera is None, need_lights=lights is None)
-    materials = {name: given.built(name) for name, given in entry.materials.items()}
+    materials = {name: material.built(name) for name, material in entry.materials.items()}
     meshes = _meshes(entry, materials, path)
     geometry, used = merge(meshes, smooth=any(mesh.normals is not None for mesh in meshes))
     warn_of_unit(geometry, str(path))
     if camera is None and entry.camera is not None:
         camera = entry.camera.built("")
-    given = tuple(light.built("") for light in entry.lights) if lights is None else tuple(lights)
-    assert camera is not None  # _validated has seen to it
-    return Scene(entry.name, geometry, used, camera, shining(given, f"{path}: lights"), entry.description,
+    chosen = tuple(light.built("") for light in entry.lights) if lights is None else tuple(lights)
+    assert camera is not None  # by _validated
+    return Scene(entry.name, geometry, used, camera, lights_with_power(chosen, f"{path}: lights"), entry.description,
                  entry.preview_exposure)
 
 
@@ -109,10 +98,10 @@ def _fault(detail: Any, tree: Any) -> str:
     text = str(detail["msg"]).removeprefix("Value error, ").replace("Input should be", "expected")
     for prefix in ("light: ", "camera: ", "material '': ", "transform: "):
         text = text.removeprefix(prefix)
-    given, kind = detail["input"], detail["type"]
+    value, kind = detail["input"], detail["type"]
     if kind in PLAINER:
         text = PLAINER[kind].format(**detail.get("ctx", {}))
-    shown = repr(given) if kind != "value_error" and not (kind == "missing" and isinstance(given, dict)) else ""
+    shown = repr(value) if kind != "value_error" and not (kind == "missing" and isinstance(value, dict)) else ""
     got = f", got {shortened(shown, 80)}" if shown else ""
     return f"{_key(detail['loc'], tree, kind) or 'file'}: {text}{got}"
 
@@ -134,17 +123,18 @@ def _key(place: Sequence[str | int], tree: Any, kind: str) -> str:
 def _meshes(entry: "SceneFile", materials: dict[str, Material], path: Path) -> list[Mesh]:
     """Return the placed meshes of all objects, or raise one error with what is wrong with any of them."""
     faults: list[str] = []
-    dressed, owner = _dressed_meshes(entry, materials, path, faults)
+    meshes, owner = _object_meshes(entry, materials, path, faults)
 
     def name(number: int) -> str:
         return f"{path}: objects[{owner[number]}].mesh: {entry.objects[owner[number]].mesh}"
 
-    meshes, dropped = mended_all(dressed, name, faults)
+    meshes, dropped = repaired_all(meshes, name, faults)
     _raise_if_any(faults)
-    matrix_of = {k: given for k, given in enumerate(entry.objects[number].transform for number in owner) if given}
+    transforms = (entry.objects[number].transform for number in owner)
+    matrix_of = {k: matrix for k, matrix in enumerate(transforms) if matrix}
     moving = list(matrix_of)
     matrices = np.array(list(matrix_of.values()), np.float64).reshape(-1, 4, 4)
-    moved, lost = mended_all(placed_all([meshes[k] for k in moving], matrices),
+    moved, lost = repaired_all(transformed_all([meshes[k] for k in moving], matrices),
                              lambda k: f"{name(moving[k])}: after its transform", faults)
     _raise_if_any(faults)
     for k, mesh in zip(moving, moved, strict=True):
@@ -158,32 +148,32 @@ def _raise_if_any(faults: list[str]) -> None:
         raise InputError(first_faults(faults))
 
 
-def _dressed_meshes(
+def _object_meshes(
     entry: "SceneFile", materials: dict[str, Material], path: Path, faults: list[str]
 ) -> tuple[list[Mesh], list[int]]:
     """Return the meshes of all objects where their files have them, and the number of each one's object."""
     contents: dict[str, Contents | InputError] = {}
-    dressed: list[Mesh] = []
+    meshes: list[Mesh] = []
     owner: list[int] = []
     vertices = faces = 0
-    for number, given in enumerate(entry.objects):
+    for number, item in enumerate(entry.objects):
         try:
-            found = _read_once(contents, given.mesh, path.parent, suggest=len(faults) < MOST_FAULTS)
+            found = _read_once(contents, item.mesh, path.parent, suggest=len(faults) < MOST_FAULTS)
             vertices += sum(len(mesh.vertices) for mesh in found.meshes)
             faces += sum(len(mesh.faces) for mesh in found.meshes)
-            expect_room(vertices, faces, "all objects so far")
+            expect_memory(vertices, faces, "all objects so far")
         except InputError as error:
             faults.append(f"{path}: objects[{number}].mesh: {error}")
             continue
-        dressed += [_dressed(mesh, given, materials, entry.smooth_normals) for mesh in found.meshes]
+        meshes += [_with_material(mesh, item, materials, entry.smooth_normals) for mesh in found.meshes]
         owner += [number] * len(found.meshes)
-    return dressed, owner
+    return meshes, owner
 
 
 def _read_once(contents: dict[str, Contents | InputError], name: str, folder: Path, *, suggest: bool) -> Contents:
     if name not in contents:
         try:
-            # what is like a missing name takes long to find, and is not shown after so many faults
+            # suggestions for a missing name take long to find, and are not shown after so many faults
             expect(suggest or is_there(folder / name), f"{folder / name}", "a file", "none")
             contents[name] = read_mesh_file(folder / name)
         except InputError as error:
@@ -194,13 +184,27 @@ def _read_once(contents: dict[str, Contents | InputError], name: str, folder: Pa
     return found
 
 
-def _dressed(mesh: Mesh, given: "Object", materials: dict[str, Material], smooth: bool) -> Mesh:
-    """Return the mesh with the material it shows, and with normals only where the scene asks for them."""
-    if isinstance(given.material, str):
-        material = materials[given.material]
-    elif given.material is not None:
-        material = given.material.built(given.name or mesh.name)
+def _with_material(mesh: Mesh, item: "Object", materials: dict[str, Material], smooth: bool) -> Mesh:
+    """Return the mesh with its material, and with normals only where the scene enables them."""
+    if isinstance(item.material, str):
+        material = materials[item.material]
+    elif item.material is not None:
+        material = item.material.built(item.name or mesh.name)
     else:
         material = materials.get(mesh.material.name, mesh.material)
-    wanted = smooth if given.smooth_normals is None else given.smooth_normals
-    return dataclasses.replace(mesh, material=material, normals=mesh.normals if wanted else None)
+    has_normals = smooth if item.smooth_normals is None else item.smooth_normals
+    return dataclasses.replace(mesh, material=material, normals=mesh.normals if has_normals else None)
+
+
+def read_mesh_file(path: Path) -> Contents:
+    """Read a mesh file of any known format.
+
+    Result: its meshes, cameras and lights. Raises `InputError` if the suffix is unknown, the file is damaged or it
+    holds no triangle.
+    """
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError(f"{path}: expected a file named {', '.join(READERS)}, got {path.suffix!r}")
+    found = reader(path)
+    expect(bool(found.meshes), f"{path}", "at least one mesh of triangles", 0)
+    return found

@@ -1,4 +1,4 @@
-"""Where a scene came from: how it was named, and the files that were read for it."""
+"""Provenance of a scene: its name, and the files that were read for it."""
 
 import contextlib
 import hashlib
@@ -22,10 +22,7 @@ class Source(NamedTuple):
 def reading() -> Iterator[dict[Path, str]]:
     """Gather the files that are read inside the block.
 
-    Yields
-    ------
-    dict of Path to str
-        SHA-256 by path, in the order of reading; complete when the block ends.
+    Result: SHA-256 by path, in the order of reading; complete when the block ends.
     """
     files: dict[Path, str] = {}
     token = _reading.set(files)
@@ -35,16 +32,8 @@ def reading() -> Iterator[dict[Path, str]]:
         _reading.reset(token)
 
 
-def was_read(path: Path, content: bytes) -> None:
-    """Take note of a file's content where somebody asked by `reading`.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    content : bytes
-        All of it.
-    """
+def record_file(path: Path, content: bytes) -> None:
+    """Record a file's content inside a block of `reading`."""
     files = _reading.get()
     if files is not None:
         files[path] = hashlib.sha256(content).hexdigest()
@@ -53,17 +42,8 @@ def was_read(path: Path, content: bytes) -> None:
 def source_of(name: str, files: dict[Path, str]) -> Source:
     """Return the source of a scene.
 
-    Parameters
-    ----------
-    name : str
-        What `load_scene` was given.
-    files : dict of Path to str
-        What `reading` gathered.
-
-    Returns
-    -------
-    Source
-        With each file's path as seen from the first one's folder, so that it stays the same when all are moved.
+    `name`: the argument of `load_scene`. Result: with each file's path as seen from the first one's folder, so that it
+    stays the same when all are moved.
     """
     folder = next(iter(files), Path()).parent
     return Source(name, tuple((Path(os.path.relpath(path, folder)).as_posix(), digest)

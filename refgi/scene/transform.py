@@ -1,4 +1,4 @@
-"""Placing a mesh in the world by a 4x4 matrix that acts on column vectors, p' = M p."""
+"""Transform meshes to world space by a 4x4 matrix that acts on column vectors, p' = M p."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -17,22 +17,8 @@ COLLAPSED = 1e-12
 def affine(numbers: Sequence[float], where: str) -> Array:
     """Return 16 row-major numbers as an invertible affine matrix.
 
-    Parameters
-    ----------
-    numbers : sequence of float
-        Sixteen, row by row.
-    where : str
-        File and key, for the error's text.
-
-    Returns
-    -------
-    (4, 4) ndarray of float64
-        World from object.
-
-    Raises
-    ------
-    InputError
-        If a number is not finite, the last row is not 0 0 0 1, or the matrix is singular.
+    `numbers`: sixteen, row by row. `where`: file and key, for the error's text. Returns (4, 4) float64: world from
+    object. Raises `InputError` if a number is not finite, the last row is not 0 0 0 1, or the matrix is singular.
     """
     expect(len(numbers) == 16, where, "16 numbers, row by row", list(numbers))
     matrix = np.asarray(numbers, np.float64).reshape(4, 4)
@@ -43,17 +29,8 @@ def affine(numbers: Sequence[float], where: str) -> Array:
 def expect_affine(matrices: Array, where: Callable[[int], str]) -> None:
     """Raise `InputError` for the first of many matrices that is not finite, affine and invertible.
 
-    Parameters
-    ----------
-    matrices : (k, 4, 4) ndarray of float64
-        World from object.
-    where : callable
-        Returns file and key of the matrix of some number, for the error's text.
-
-    Raises
-    ------
-    InputError
-        If a number is not finite, the last row is not 0 0 0 1, or the matrix is singular.
+    `matrices` (k, 4, 4) float64: world from object. `where`: returns file and key of the matrix of some number, for the
+    error's text. Raises `InputError` if a number is not finite, the last row is not 0 0 0 1, or the matrix is singular.
     """
     finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     straight = (matrices[:, 3] == IDENTITY[3]).all(axis=1)
@@ -71,15 +48,7 @@ def expect_affine(matrices: Array, where: Callable[[int], str]) -> None:
 def invertible(matrices: Array) -> Array:
     """Return which matrices are finite and have an inverse.
 
-    Parameters
-    ----------
-    matrices : (k, 4, 4) ndarray of float64
-        Affine.
-
-    Returns
-    -------
-    (k,) ndarray of bool
-        Products of good matrices may have overflowed or vanished.
+    `matrices` (k, 4, 4) float64. Returns (k,) bool: products of good matrices may have overflowed or vanished.
     """
     finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     linear = _near_one(np.where(finite[:, None, None], matrices[:, :3, :3], 0))
@@ -92,38 +61,11 @@ def _near_one(linear: Array) -> Array:
     return np.asarray(np.ldexp(linear, -exponent[:, None, None]))
 
 
-def placed(mesh: Mesh, matrix: Array) -> Mesh:
-    """Return the mesh moved into the world; a mirroring matrix also turns the faces' winding.
+def transformed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
+    """Return each mesh in world space; a mirroring matrix also turns the winding of its faces.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        A sound mesh.
-    matrix : (4, 4) ndarray
-        World from object, affine and invertible.
-
-    Returns
-    -------
-    Mesh
-        The same object where the matrix is the identity; else normals are unit vectors, or zero where they are missing.
-    """
-    return placed_all([mesh], matrix[None])[0]
-
-
-def placed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
-    """Return each mesh moved by its own matrix, as `placed` does.
-
-    Parameters
-    ----------
-    meshes : sequence of k Mesh
-        Sound meshes.
-    matrices : (k, 4, 4) ndarray
-        World from object, affine and invertible.
-
-    Returns
-    -------
-    list of Mesh
-        The same object where a matrix is the identity.
+    `matrices` (k, 4, 4): world from object, affine and invertible. Result: the same object where a matrix is the
+    identity; else normals are unit vectors, or zero where they are missing.
     """
     linear = _near_one(matrices[:, :3, :3])
     rest = (matrices == IDENTITY).all(axis=(1, 2))
@@ -134,7 +76,7 @@ def placed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
 
 
 def _moved(mesh: Mesh, matrix: Array, inverse: Array, mirrors: bool) -> Mesh:
-    with np.errstate(over="ignore", invalid="ignore"):  # whoever reads a file looks at coordinates once they are final
+    with np.errstate(over="ignore", invalid="ignore"):  # final coordinates are checked by `repair`
         vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     normals = mesh.normals
     if normals is not None:

@@ -1,4 +1,4 @@
-"""The plain values a scene is made of: colours, vectors, arrays, and what makes one usable."""
+"""Colours, vectors and numbers of scenes, and their validation."""
 
 import math
 import numbers
@@ -18,15 +18,7 @@ LARGEST = 1e9  # m; squares and cubes of coordinates stay within float32
 def is_number(value: Any) -> bool:
     """Return whether a value is one finite number.
 
-    Parameters
-    ----------
-    value : object
-        Anything.
-
-    Returns
-    -------
-    bool
-        False for text, and for what is no number at all.
+    Result: false for text, and for what is no number at all.
     """
     try:
         return math.isfinite(value)
@@ -37,15 +29,7 @@ def is_number(value: Any) -> bool:
 def is_count(value: Any) -> bool:
     """Return whether a value is a whole number, of Python or of NumPy.
 
-    Parameters
-    ----------
-    value : object
-        Anything.
-
-    Returns
-    -------
-    bool
-        False for a float, even one without a fraction.
+    Result: false for a float, even one without a fraction.
     """
     return isinstance(value, numbers.Integral)
 
@@ -53,15 +37,7 @@ def is_count(value: Any) -> bool:
 def is_vector(value: Any) -> bool:
     """Return whether a value is three finite numbers.
 
-    Parameters
-    ----------
-    value : object
-        Anything.
-
-    Returns
-    -------
-    bool
-        False for what is no sequence of numbers at all.
+    Result: false for what is no sequence of numbers at all.
     """
     try:
         return len(value) == 3 and all(math.isfinite(c) for c in value)
@@ -69,15 +45,10 @@ def is_vector(value: Any) -> bool:
         return False
 
 
-def settle(owner: Any, *keys: str) -> None:
-    """Turn the vectors of a frozen dataclass into tuples of floats, so that it can be compared and hashed.
+def as_float_tuples(owner: Any, *keys: str) -> None:
+    """Convert the vectors of a frozen dataclass to tuples of floats, so that it can be compared and hashed.
 
-    Parameters
-    ----------
-    owner : object
-        Under construction.
-    *keys : str
-        Its fields that hold three numbers.
+    `*keys`: its fields that hold three numbers.
     """
     for key in keys:
         object.__setattr__(owner, key, tuple(float(c) for c in getattr(owner, key)))
@@ -86,15 +57,7 @@ def settle(owner: Any, *keys: str) -> None:
 def is_place(value: Any) -> bool:
     """Return whether a value is three coordinates that the arithmetic holds.
 
-    Parameters
-    ----------
-    value : object
-        Anything.
-
-    Returns
-    -------
-    bool
-        False for what is no sequence of numbers at all.
+    Result: false for what is no sequence of numbers at all.
     """
     return is_vector(value) and max(map(abs, value)) <= LARGEST
 
@@ -102,15 +65,7 @@ def is_place(value: Any) -> bool:
 def is_direction(value: Any) -> bool:
     """Return whether a value is a vector whose length neither vanishes nor overflows.
 
-    Parameters
-    ----------
-    value : object
-        Anything.
-
-    Returns
-    -------
-    bool
-        False for what is no sequence of numbers at all.
+    Result: false for what is no sequence of numbers at all.
     """
     return is_vector(value) and 1e-100 < math.hypot(*value) < 1e100  # squares neither vanish nor overflow
 
@@ -118,14 +73,6 @@ def is_direction(value: Any) -> bool:
 def degrees(angle: float) -> float:
     """Return an angle in degrees, as it was written in a file.
 
-    Parameters
-    ----------
-    angle : float
-        In rad.
-
-    Returns
-    -------
-    float
-        Rounded to 1e-9.
+    `angle`: in rad.
     """
     return round(math.degrees(angle), 9)

@@ -5,6 +5,7 @@ import math
 import numbers
 import re
 from functools import cache
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -181,6 +182,8 @@ def expected(field: Any, hint: Any) -> str:
         return none + " or ".join(map(repr, get_args(kind)))
     if kind is bool:
         return f"{none}true or false"
+    if kind in (Path, str):
+        return f"{none}a file's name"
     return f"{none}{'a whole number' if kind is int else 'a number'}{_range(field.metadata)}"
 
 

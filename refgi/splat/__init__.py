@@ -11,15 +11,15 @@ from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.splat.gather import GatherSettings, gather
 from refgi.splat.multires import MultiresSettings, multires, shared_subsplats
-from refgi.splat.sii import SiiSettings, SplatSettings, cut_irradiance, sii, splat
+from refgi.splat.sii import ReachSettings, SiiSettings, cut_irradiance, sii, splat
 
 __all__ = [
     "GatherSettings",
     "MultiresSettings",
     "PairSettings",
+    "ReachSettings",
     "Receivers",
     "SiiSettings",
-    "SplatSettings",
     "cut_irradiance",
     "gather",
     "irradiance",

@@ -1,12 +1,12 @@
-"""How much memory screen-space indirect light takes beside what every picture takes: levels, light, samples, views.
+"""Memory estimate of screen-space indirect light beside the picture's buffers: levels, sums, samples, further cameras.
 
-What the levels take in memory (Sec. 3.2: mip levels of the buffers add a third to them).
+Mip levels of the buffers add a third to them (Sec. 4).
 """
 
 import math
 
 from refgi.sssil.crown.reach import chosen_radius
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import Bitmask, HssilSettings, Rays
 
 FLOATS = 11  # a texel: position, depth, normal, radiance, area
 PIXEL_BYTES = 4  # and the pixel that it shows
@@ -25,11 +25,11 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
     Parameters
     ----------
     settings : HssilSettings
-        First level, number of levels, and how texels become one.
+        First level, number of levels, and downsampling.
     pixels : int
-        Of the picture.
+        Pixels of the picture.
     float_bytes : int
-        Of one number, 4 or 8.
+        Bytes of one number, 4 or 8.
 
     Returns
     -------
@@ -39,25 +39,26 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
     Notes
     -----
     With n levels from full resolution on it is ``(4 - 4^(1 - n)) / 3`` times the first; from half resolution on, a
-    quarter of that. The mean of radiance alone keeps how many pixels it is of.
+    quarter of that. The mean of radiance alone needs the number of its pixels as well.
 
     Examples
     --------
-    >>> level_bytes(HssilSettings(start="full", levels=1), 100, 4)
+    >>> level_bytes(HssilSettings(SamplingSettings(start="full", levels=1)), 100, 4)
     4800
     """
-    floats = FLOATS + (settings.downsample == "closest_average")
-    numbers = range(settings.first_level, settings.first_level + settings.levels)
+    sampling = settings.sampling
+    floats = FLOATS + (settings.senders.downsample == "closest_average")
+    numbers = range(sampling.first_level, sampling.first_level + sampling.levels)
     return sum(-(-pixels >> 2 * number) for number in numbers) * (floats * float_bytes + PIXEL_BYTES)
 
 
 def extra_bytes(settings: HssilSettings, size: tuple[int, int], float_bytes: int) -> int:
-    """Estimate the memory that levels, samples and further views add to a picture.
+    """Estimate the memory that levels, samples and further cameras add to a picture.
 
     Parameters
     ----------
     settings : HssilSettings
-        First level, number of levels, pattern, views.
+        First level, number of levels, pattern, cameras.
     size : tuple of 2 ints
         Width and height of the picture, pixels.
     float_bytes : int
@@ -69,26 +70,28 @@ def extra_bytes(settings: HssilSettings, size: tuple[int, int], float_bytes: int
         Bytes, rather too many than too few.
     """
     pixels = size[0] * size[1]
-    columns, rows = (-(-side >> settings.first_level) for side in size)
-    radius = chosen_radius((rows, columns), settings)
+    columns, rows = (-(-side >> settings.sampling.first_level) for side in size)
+    radius = chosen_radius((rows, columns), settings.sampling)
     padded = columns + 2 * min(math.ceil(2 * radius), columns) + PADDING
     view = level_bytes(settings, pixels, float_bytes)
     view += (PLANES * padded * (rows + 1) + LIGHT_FLOATS * columns * rows) * float_bytes
-    further = VIEW_FLOATS * pixels * float_bytes if settings.cameras or settings.views else 0
+    further = VIEW_FLOATS * pixels * float_bytes if settings.cameras.count or settings.cameras.views else 0
     samples = _sample_bytes(settings, rows, columns, radius)
-    return view + further + samples + (RAY_BYTES if settings.visibility == "rays" else 0)
+    return view + further + samples + (RAY_BYTES if isinstance(settings.visibility, Rays) else 0)
 
 
 def _sample_bytes(settings: HssilSettings, rows: int, columns: int, radius: float) -> int:
-    """Return what the list of the first level's samples takes, the longest of all levels'."""
-    if settings.pattern == "all":
+    """Return the memory of the first level's list of samples, the longest of all levels'."""
+    sampling = settings.sampling
+    if sampling.pattern == "all":
         reach = math.ceil(2 * radius)
         candidates = (2 * min(reach, rows) + 1) * (min(reach, columns) + 1)
-        rays = 2 * LISTED_RAY_BYTES * candidates if settings.visibility == "rays" else 0
+        rays = 2 * LISTED_RAY_BYTES * candidates if isinstance(settings.visibility, Rays) else 0
         return CANDIDATE_BYTES * candidates + rays
-    if settings.pattern == "pixel":
+    if sampling.pattern == "pixel":
         return 0
-    rows = 1 if settings.pattern == "fixed" else rows
-    if settings.visibility == "bitmask":  # half as many blockers as samples of the crown
-        return SLICED_BYTES * rows * (3 * settings.samples // 2 + settings.inner + 3 * settings.slice_count)
-    return OFFSET_BYTES * rows * (settings.samples + settings.inner)
+    rows = 1 if sampling.pattern == "fixed" else rows
+    if isinstance(settings.visibility, Bitmask):  # half as many occluders as samples of the crown
+        slices = settings.visibility.count(sampling.samples)
+        return SLICED_BYTES * rows * (3 * sampling.samples // 2 + sampling.inner + 3 * slices)
+    return OFFSET_BYTES * rows * (sampling.samples + sampling.inner)

@@ -1,64 +1,64 @@
-"""W: fetch for every surface point the value of the same point in another view (Sec. 3.3)."""
+"""Reprojection W: the value of each surface point in another view, with a disocclusion test (Sec. 3.3)."""
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import PERSPECTIVE, Projection
 from refgi.scene.values import Vector
+from refgi.sssil.settings import Fetch
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
-Fetch = Literal["bilinear", "nearest"]
 
 SNAP = 2.0**-8  # texels: so far off may float32 put a point that lies at a texel's centre
 
 
-class Seen(NamedTuple):
-    """A view that is asked: who looks, and the surfaces that a texel sees."""
+class SourceView(NamedTuple):
+    """A view that values are fetched from: its camera, and depths and normals of its texels."""
 
     projection: Projection  # one perspective map
-    depth: Array  # (h, w) along the view direction, m; inf where no surface is seen
+    depth: Array  # (h, w) along the view direction, m; inf where there is no surface
     normal: Array  # (3, h, w) unit vectors
     origin: Vector = (0.0, 0.0, 0.0)  # where the origin of the view's places lies, m (`Frame.origin`)
 
 
-@stage("sssil.look_up", kept=False)
-def look_up(
-    values: Array, there: Seen, position: Array, normal: Array, covered: Array, *, depth_tolerance: float,
+@stage("sssil.reproject", kept=False)
+def reproject(
+    values: Array, source: SourceView, position: Array, normal: Array, covered: Array, *, depth_tolerance: float,
     normal_cosine: float, fetch: Fetch = "bilinear", origin: Vector | None = None,
 ) -> tuple[Array, Array]:
-    """Fetch values of a view at surface points of another.
+    """Fetch values of a view at surface points of another; disoccluded points get none.
 
     Parameters
     ----------
     values : (3, h, w) ndarray
-        What each texel of the view `there` holds.
-    there : Seen
-        The view that is asked.
+        One value for each texel of `source`.
+    source : SourceView
+        The view that values are fetched from.
     position : (3, h', w') ndarray
         The points, in the view's own world space unless `origin` is given, m.
     normal : (3, h', w') ndarray
         Their unit normals.
     covered : (h', w') ndarray of bool
-        Which points there are.
+        Pixels with a surface point.
     depth_tolerance : float
-        Largest difference of a texel's depth from the point's, or from that of the point's tangent plane where the
-        texel sees it, as a share of the point's.
+        Largest difference of a texel's depth from the point's, or from that of the point's tangent plane at the texel,
+        as a share of the point's.
     normal_cosine : float
         Smallest cosine between a texel's normal and the point's.
     fetch : {"bilinear", "nearest"}
         From the four texels around the point, or from the one it falls in.
     origin : tuple of 3 floats, optional
-        Where the origin of `position` lies, m; that of `there` where absent.
+        Origin of `position`, m; that of `source` where absent.
 
     Returns
     -------
-    found : (3, h', w') ndarray
+    mean : (3, h', w') ndarray
         Mean of the texels that show the same surface, weighted bilinearly; 0 where none does.
     weight : (h', w') ndarray
         Share of the four weights that those texels have, 0 to 1.
@@ -71,40 +71,40 @@ def look_up(
     Notes
     -----
     The paper compares depths. On a plane seen at a grazing angle those of neighbouring texels differ by more than any
-    useful tolerance: there a texel passes as well whose depth is that of the plane.
+    useful tolerance: there a texel passes as well if its depth is that of the plane.
 
-    A point within 1/256 texel of a texel's centre takes that texel alone, so that a view which did not move gives its
-    values back unchanged, however often it is asked.
+    A point within 1/256 texel of a texel's centre takes that texel alone, so that a view which did not move returns its
+    values unchanged, however often it is reprojected.
     """
-    projection = there.projection
+    projection = source.projection
     expect(projection.kind == PERSPECTIVE and projection.maps == 1, "there", "one perspective map", projection.kind)
-    expect(values.shape[1:] == there.depth.shape == projection.shape, "values", f"(3, h, w) with {projection.shape}",
+    expect(values.shape[1:] == source.depth.shape == projection.shape, "values", f"(3, h, w) with {projection.shape}",
            values.shape)
     dtype = position.dtype
-    moved = np.zeros(3) if origin is None else np.subtract(there.origin, origin)
-    eye = (projection.origin[0] + moved).astype(dtype)
+    shift = np.zeros(3) if origin is None else np.subtract(source.origin, origin)
+    eye = (projection.origin[0] + shift).astype(dtype)
     size = np.array([projection.width, projection.height])
     scale = np.concatenate([size / (2 * projection.half), (size - 1) / 2]).astype(dtype)
-    found, weight = plane(position.shape, dtype), plane(covered.shape, dtype)
+    mean, weight = plane(position.shape, dtype), plane(covered.shape, dtype)
     limits = np.array([depth_tolerance, normal_cosine, SNAP], dtype)
-    _look_up(values, there.depth, there.normal, eye, projection.frame[0].astype(dtype), scale, limits,
-             fetch == "nearest", position, normal, covered, found, weight)
-    return found, weight
+    _reproject(values, source.depth, source.normal, eye, projection.frame[0].astype(dtype), scale, limits,
+             fetch == "nearest", position, normal, covered, mean, weight)
+    return mean, weight
 
 
 @kernel(parallel=True)
-def _look_up(
-    values: Array, depth: Array, normal_there: Array, eye: Array, frame: Array, scale: Array, limits: Array,
-    nearest: bool, position: Array, normal: Array, covered: Array, found: Array, weight: Array,
+def _reproject(
+    values: Array, depth: Array, source_normal: Array, eye: Array, frame: Array, scale: Array, limits: Array,
+    nearest: bool, position: Array, normal: Array, covered: Array, mean: Array, weight: Array,
 ) -> None:
     for row in prange(covered.shape[0]):
-        _place(row, eye, frame, scale, position, covered, found)
-        _fetch(row, values, depth, normal_there, frame, scale, limits, nearest, normal, found, weight)
+        _project_row(row, eye, frame, scale, position, covered, mean)
+        _fetch_row(row, values, depth, source_normal, frame, scale, limits, nearest, normal, mean, weight)
 
 
 @kernel
-def _place(
-    row: int, eye: Array, frame: Array, scale: Array, position: Array, covered: Array, place: Array
+def _project_row(
+    row: int, eye: Array, frame: Array, scale: Array, position: Array, covered: Array, projected: Array
 ) -> None:
     """Find column, row (a texel's centre at whole numbers) and depth of a row of points; depth -1 where none is."""
     real = position.dtype.type
@@ -117,17 +117,17 @@ def _place(
         dz = position[2, row, column] - eye[2]
         depth = fx * dx + fy * dy + fz * dz
         ahead = (depth > real(0)) & covered[row, column]
-        place[0, row, column] = (rx * dx + ry * dy + rz * dz) / depth + scale[2]
-        place[1, row, column] = (ux * dx + uy * dy + uz * dz) / depth + scale[3]
-        place[2, row, column] = depth if ahead else real(-1)
+        projected[0, row, column] = (rx * dx + ry * dy + rz * dz) / depth + scale[2]
+        projected[1, row, column] = (ux * dx + uy * dy + uz * dz) / depth + scale[3]
+        projected[2, row, column] = depth if ahead else real(-1)
 
 
 @kernel
-def _fetch(
-    row: int, values: Array, depth: Array, normal_there: Array, frame: Array, scale: Array, limits: Array,
-    nearest: bool, normal: Array, found: Array, weight: Array,
+def _fetch_row(
+    row: int, values: Array, depth: Array, source_normal: Array, frame: Array, scale: Array, limits: Array,
+    nearest: bool, normal: Array, mean: Array, weight: Array,
 ) -> None:
-    """Average the texels around each place of `found` that show the same surface; the mean takes its place."""
+    """Average the texels around each place of `mean` that show the same surface; the average replaces the place."""
     real = values.dtype.type
     one, half, zero = real(1), real(0.5), real(0)
     height, width = depth.shape
@@ -135,7 +135,7 @@ def _fetch(
     least_cosine, snap = limits[1], limits[2]
     view = _rays(frame, scale)
     for column in range(weight.shape[1]):
-        x, y, z = found[0, row, column], found[1, row, column], found[2, row, column]
+        x, y, z = mean[0, row, column], mean[1, row, column], mean[2, row, column]
         red, green, blue, total = zero, zero, zero, zero
         first_red, first_green, first_blue = zero, zero, zero
         if z > 0 and -half <= x <= right_end and -half <= y <= bottom_end:
@@ -150,7 +150,7 @@ def _fetch(
                     j = left + beside
                     if not (0 <= i < height and 0 <= j < width):
                         continue
-                    cosine = normal_there[0, i, j] * nx + normal_there[1, i, j] * ny + normal_there[2, i, j] * nz
+                    cosine = source_normal[0, i, j] * nx + source_normal[1, i, j] * ny + source_normal[2, i, j] * nz
                     near = abs(depth[i, j] - z) <= margin
                     if not near and cosine >= least_cosine:  # the depth of the tangent plane: z <n.r> / <n.r_tap>
                         slant = _slant(real(j), real(i), nx, ny, nz, view)
@@ -165,9 +165,9 @@ def _fetch(
                         green += share * (values[1, i, j] - first_green)
                         blue += share * (values[2, i, j] - first_blue)
         inverse = one / total if total > zero else zero
-        found[0, row, column] = first_red + red * inverse
-        found[1, row, column] = first_green + green * inverse
-        found[2, row, column] = first_blue + blue * inverse
+        mean[0, row, column] = first_red + red * inverse
+        mean[1, row, column] = first_green + green * inverse
+        mean[2, row, column] = first_blue + blue * inverse
         weight[row, column] = min(total, one)
 
 

@@ -1,115 +1,49 @@
-"""What `hssil` can be set to."""
+"""Settings of `hssil` (Soler et al. 2009) and of temporal coherence (Sec. 3.3)."""
 
 import dataclasses
 import math
-from typing import Any, ClassVar, Literal, get_args
+from collections.abc import Mapping
+from typing import ClassVar, Literal
 
 from refgi.errors import expect
 from refgi.scene.model import Camera
-from refgi.scene.values import is_count, is_number
+from refgi.settings import Settings, setting
 
 Start = Literal["full", "half", "quarter"]
 Pattern = Literal["row", "pixel", "fixed", "all"]
 Downsample = Literal["closest", "average", "closest_average"]
 FormFactor = Literal["disc", "point"]
-Upsampling = Literal["bilateral", "bilinear", "nearest"]
-Visibility = Literal["none", "bitmask", "rays"]
+Form = Literal["recursive", "printed"]
+Fetch = Literal["bilinear", "nearest"]
 
-CHOICES: dict[str, Any] = {
-    "start": Start, "pattern": Pattern, "downsample": Downsample, "form_factor": FormFactor, "upsampling": Upsampling,
-    "visibility": Visibility}
 FIRST_LEVEL = {"full": 0, "half": 1, "quarter": 2}
 LAST_SEED = 2**32 - 1
 MOST_LEVELS, MOST_SAMPLES, MOST_SLICES, MOST_CAMERAS = 16, 1 << 16, 256, 16
 LARGEST_RADIUS = 65536.0  # texels: the widest picture there may be
-# least and most of each number
-COUNTS = (("levels", 1, MOST_LEVELS), ("samples", 1, MOST_SAMPLES), ("seed", 0, LAST_SEED),
-          ("cameras", 0, MOST_CAMERAS))
-# the same of those that may be none
-COUNTS_OR_NONE = (("inner_samples", 0, MOST_SAMPLES), ("slices", 1, MOST_SLICES))
-# least and most of each number that may have a fraction, and what it is
-NUMBERS = {
-    "depth_sigma": (1e-6, 1e6, "a share of the depth"), "normal_power": (0.0, 1e4, "an exponent"),
-    "thickness": (0.0, 100.0, "a share of the scene's diagonal"), "depth_tolerance": (0.0, 1.0, "a share of the depth"),
-    "normal_cosine": (-1.0, 1.0, "a cosine")}
 
 
 @dataclasses.dataclass(frozen=True)
-class HssilSettings:
-    """What `hssil` can be set to; the defaults are the paper's, those of docs/methods/hssil where it is silent.
+class SamplingSettings(Settings):
+    """Crown sampling over mip levels (Sec. 3.2).
 
-    Sampling (Sec. 3.2): `levels` levels from `start` resolution on; at each, `samples` points of the crown from
-    `radius` to twice as many texels around a receiver (none: the smallest with which the levels cover the screen), and
-    `inner_samples` (none: a third) of the disc within, at the first level. `pattern` says who shares them: a "row" of
-    receivers, each "pixel" its own, one "fixed" mirror-symmetric set for all, or "all" texels, each once, whatever
-    `samples`. `seed` draws them.
-
-    Levels: a texel takes over the `closest` of four with its position, normal and radiance, or the `average` of all,
-    or position and normal of the closest and the average radiance (`downsample`). A sample's form factor is that of a
-    "disc" (Eq. 4) or of a "point" (Eq. 3). `only_level` (0: the first) leaves all levels but one dark.
-
-    `upsampling` from level to level is "bilateral", with weights of `depth_sigma` (share of the depth) and
-    `normal_power`, "bilinear" or "nearest". `visibility` of samples is ignored as published ("none"), found by a
-    "bitmask" of the screen in `slices` directions (none: the root of `samples`) with surfaces of `thickness` (share of
-    the scene's diagonal), or by "rays". Extra `views`, and as many `cameras` as asked for where they see most of what
-    the picture does not, light what they see as well; they are joined by the maximum where depth and normal agree
-    within `depth_tolerance` (share of the depth) and `normal_cosine`. `as_published` names forms to use as printed.
+    At each level, samples lie in the crown from `radius` to twice as many texels around a receiver; at the first level
+    also in the disc within. Patterns: a "row" of receivers shares samples, each "pixel" has its own, one "fixed"
+    mirror-symmetric set serves all, or "all" texels are samples, each once, whatever `samples`.
     """
 
-    radius: float | None = 20.0
-    levels: int = 4
-    samples: int = 64
-    inner_samples: int | None = None
-    start: Start = "half"
-    pattern: Pattern = "row"
-    seed: int = 0
-    downsample: Downsample = "closest"
-    form_factor: FormFactor = "disc"
-    only_level: int | None = None
-    upsampling: Upsampling = "bilateral"
-    depth_sigma: float = 0.02
-    normal_power: float = 8.0
-    visibility: Visibility = "none"
-    slices: int | None = None
-    thickness: float = 0.01
-    cameras: int = 0
-    views: tuple[Camera, ...] = ()
-    depth_tolerance: float = 0.02
-    normal_cosine: float = 0.95
-    as_published: frozenset[str] = frozenset()
+    PRINCIPAL = "samples"
 
-    SWITCHES: ClassVar[frozenset[str]] = frozenset({"hss_tan_f", "hss_disc_pi", "hss_level_factor"})
-
-    def __post_init__(self) -> None:
-        for key, names in CHOICES.items():
-            expect(getattr(self, key) in get_args(names), key, " or ".join(map(repr, get_args(names))),
-                   getattr(self, key))
-        for key, least, most in COUNTS:
-            count = getattr(self, key)
-            expect(is_count(count) and least <= count <= most, key, f"a whole number, {least} to {most:,}", count)
-        for key, (low, high, what) in NUMBERS.items():
-            value = getattr(self, key)
-            expect(is_number(value) and low <= value <= high, key, f"{what}, {low:g} to {high:g}", value)
-        expect(self.radius is None or (is_number(self.radius) and 1 <= self.radius <= LARGEST_RADIUS), "radius",
-               f"none or 1 to {LARGEST_RADIUS:g} texels", self.radius)
-        for key, least, most in COUNTS_OR_NONE:
-            count = getattr(self, key)
-            expect(count is None or (is_count(count) and least <= count <= most), key,
-                   f"none or a whole number, {least} to {most:,}", count)
-        expect(self.only_level is None or (is_count(self.only_level) and 0 <= self.only_level < self.levels),
-               "only_level", f"none or a level, 0 to {self.levels - 1}", self.only_level)
-        expect(self.visibility != "bitmask" or self.pattern != "all", "pattern",
-               "'row', 'pixel' or 'fixed' with the visibility 'bitmask'", self.pattern)
-        object.__setattr__(self, "views", tuple(self.views))
-        expect(all(isinstance(view, Camera) for view in self.views), "views", "cameras", self.views)
-        object.__setattr__(self, "as_published", frozenset(self.as_published))
-        expect(self.as_published <= self.SWITCHES, "as_published", f"names out of {sorted(self.SWITCHES)}",
-               sorted(self.as_published))
-
-    @property
-    def traces_rays(self) -> bool:
-        """Whether the method traces rays."""
-        return self.visibility == "rays"
+    samples: int = setting(64, "samples of the crown at each level", least=1, most=MOST_SAMPLES)
+    radius: float | None = setting(
+        20.0, "inner radius of the crowns; none: the smallest with which the levels cover the picture", least=1.0,
+        most=LARGEST_RADIUS, unit="texels")
+    levels: int = setting(4, "mip levels", least=1, most=MOST_LEVELS)
+    start: Start = setting("half", "resolution of the first level")
+    pattern: Pattern = setting("row", "receivers that share samples")
+    seed: int = setting(0, "seed of the samples' offsets", least=0, most=LAST_SEED)
+    inner_samples: int | None = setting(
+        None, "samples of the first level's inner disc; none: a third of the crown's, as dense", least=0,
+        most=MOST_SAMPLES, study=True)
 
     @property
     def first_level(self) -> int:
@@ -118,10 +52,142 @@ class HssilSettings:
 
     @property
     def inner(self) -> int:
-        """Samples of the first level's disc: as dense as the crown's unless given."""
+        """Samples of the first level's disc: as dense as the crown's by default."""
         return max(1, round(self.samples / 3)) if self.inner_samples is None else self.inner_samples
 
+
+@dataclasses.dataclass(frozen=True)
+class SenderSettings(Settings):
+    """Texels as senders: downsampling (Sec. 4) and form factor (Sec. 3.1).
+
+    A coarse texel takes position, normal and radiance of the "closest" of four, the "average" of all, or position and
+    normal of the closest and the average radiance. A sample's form factor is that of a "disc" (Eq. 4) or of a "point"
+    (Eq. 3).
+    """
+
+    PRINCIPAL = "downsample"
+
+    downsample: Downsample = setting("closest", "downsampling from level to level")
+    form_factor: FormFactor = setting("disc", "form factor of a sample: Eq. 4 (disc) or Eq. 3 (point)", study=True)
+    only_level: int | None = setting(None, "the one level that sends light, 0: the first; none: all", least=0,
+                                     most=MOST_LEVELS - 1, study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Bilateral(Settings):
+    """Joint bilateral upsampling of 3 x 3 texels (Sec. 3.2)."""
+
+    depth_sigma: float = setting(0.02, "standard deviation of depths, a share of the depth", least=1e-6, most=1e6,
+                                 study=True)
+    normal_power: float = setting(8.0, "exponent of the cosine between normals", least=0.0, most=1e4, study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Bilinear(Settings):
+    """Bilinear upsampling of 4 texels, which bleeds across edges."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Nearest(Settings):
+    """Upsampling by the nearest texel."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Bitmask(Settings):
+    """Visibility of samples by a bitmask of the depth map in slices (after Therrien et al. 2023)."""
+
+    thickness: float = setting(0.01, "thickness of surfaces, a share of the scene's diagonal", least=0.0, most=100.0)
+    slices: int | None = setting(None, "directions that are marched; none: the root of the number of samples", least=1,
+                                 most=MOST_SLICES, study=True)
+
+    def count(self, samples: int) -> int:
+        """Return the number of slices: as many as samples along each by default."""
+        return max(1, round(math.sqrt(samples))) if self.slices is None else self.slices
+
+
+@dataclasses.dataclass(frozen=True)
+class Rays(Settings):
+    """Visibility of samples by shadow rays."""
+
+
+@dataclasses.dataclass(frozen=True)
+class CameraSettings(Settings):
+    """Further cameras, joined by the maximum where depth and normal agree (Sec. 5)."""
+
+    PRINCIPAL = "count"
+
+    count: int = setting(0, "further cameras to place where they add most light", least=0, most=MOST_CAMERAS)
+    views: tuple[Camera, ...] = setting((), "further cameras of the user")
+    depth_tolerance: float = setting(0.02, "largest difference of depths, a share of the depth", least=0.0, most=1.0,
+                                     study=True)
+    normal_cosine: float = setting(0.95, "least cosine between normals", least=-1.0, most=1.0, study=True)
+
+    def check(self) -> None:
+        """Check that `views` are cameras; a list becomes a tuple."""
+        object.__setattr__(self, "views", tuple(self.views))
+        expect(all(isinstance(view, Camera) for view in self.views), "views", "cameras", self.views)
+
+
+@dataclasses.dataclass(frozen=True)
+class HssilSettings(Settings):
+    """Settings of `hssil`; the defaults are the paper's, those of docs/methods/hssil where it gives none.
+
+    Switches use a form as printed: "hss_tan_f" the tangents of Eq. 3, "hss_disc_pi" Eq. 4 without its pi,
+    "hss_level_factor" areas scaled by 4^k a second time.
+    """
+
+    sampling: SamplingSettings = setting(SamplingSettings(), "crown sampling over mip levels")
+    senders: SenderSettings = setting(SenderSettings(), "texels as senders")
+    upsampling: Bilateral | Bilinear | Nearest = setting(Bilateral(), "upsampling from level to level")
+    visibility: Bitmask | Rays | None = setting(None, "visibility of samples; none: ignored, as published")
+    cameras: CameraSettings = setting(CameraSettings(), "further cameras")
+    as_published: frozenset[str] = setting(frozenset(), "forms to use as printed", study=True)
+
+    SWITCHES: ClassVar[frozenset[str]] = frozenset({"hss_tan_f", "hss_disc_pi", "hss_level_factor"})
+
+    def check(self) -> None:
+        """Check that `only_level` exists, and that the pattern has slices where a bitmask needs them."""
+        only, levels = self.senders.only_level, self.sampling.levels
+        expect(only is None or only < levels, "senders.only_level", f"none or a level, 0 to {levels - 1}", only)
+        expect(not isinstance(self.visibility, Bitmask) or self.sampling.pattern != "all", "sampling.pattern",
+               "'row', 'pixel' or 'fixed' with the visibility 'bitmask'", self.sampling.pattern)
+
     @property
-    def slice_count(self) -> int:
-        """Directions that a bitmask is marched in: as many as samples along each unless given."""
-        return max(1, round(math.sqrt(self.samples))) if self.slices is None else self.slices
+    def traces_rays(self) -> bool:
+        """Whether the method traces rays."""
+        return isinstance(self.visibility, Rays)
+
+
+PRESETS: Mapping[str, HssilSettings] = {
+    # Fig. 6: half resolution, 4 levels, 64 samples, r = 20; Sec. 4: the closest of four texels; Eq. 4; v = 1
+    "paper": HssilSettings(SamplingSettings(samples=64, radius=20.0, levels=4, start="half"),
+                           SenderSettings(downsample="closest", form_factor="disc"), Bilateral(), None),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class TemporalSettings(Settings):
+    """Settings of temporal coherence (Sec. 3.3, which gives no numbers).
+
+    Of a pixel's light the share `weight`, a, comes from the frame before where that frame shows the same surface, by
+    depth and normal. A disoccluded pixel takes its new light alone. The "recursive" form blends with the frame before
+    as filtered, the "printed" one as computed. Where a surface moved of itself by v pixels since, a falls to
+    a exp(-v / `speed`); a moving camera alone leaves a as it is. The earlier light is fetched from the four texels
+    around a point ("bilinear") or from the "nearest".
+    """
+
+    PRINCIPAL = "weight"
+
+    weight: float = setting(0.9, "share of the frame before, a", least=0.0, most=0.9999)
+    form: Form = setting("recursive", "blend with the frame before as filtered or, as printed, as computed", study=True)
+    depth_tolerance: float = setting(0.02, "largest difference of depths, a share of the depth", least=0.0, most=1.0)
+    normal_cosine: float = setting(0.95, "least cosine between normals", least=-1.0, most=1.0)
+    speed: float = setting(16.0, "speed at which a falls to a / e", least=1e-3, most=1e6, unit="pixels a frame")
+    fetch: Fetch = setting("bilinear", "texels that earlier light is fetched from", study=True)
+
+    @property
+    def variance(self) -> float:
+        """Share of the variance of independent frames that remains where nothing moves, after many frames."""
+        if self.form == "printed":
+            return self.weight**2 + (1 - self.weight) ** 2
+        return (1 - self.weight) / (1 + self.weight)

@@ -1,8 +1,9 @@
 """Ground truth by ray tracing: one-bounce irradiance with a standard error for every pixel, and ray-traced VPLs.
 
-`truth` averages independent passes of two unbiased estimators: picks among freshly traced lit points from the light's
-side, and hemisphere sampling at the receiver, split at a bounded geometry term. `vpl` keeps the pixel lights of the
-other methods and asks a shadow ray for each, which is what their visibility approximations aim at.
+`truth` averages independent passes of two unbiased estimators: picks among freshly traced light vertices from the
+light's side, and hemisphere sampling with next-event estimation (NEE) from the receiver's, combined by multiple
+importance sampling (MIS) at a bounded geometry term. `vpl` traces a shadow ray for each of the pixel lights of the
+other methods, the limit of their visibility approximations.
 """
 
 from refgi.truth.result import TruthResult

@@ -33,7 +33,7 @@ LONGEST_CHAIN = 16
 
 
 class Film(NamedTuple):
-    """Where photons are counted."""
+    """The pixels that photons are splatted to."""
 
     scene: Scene
     shape: tuple[int, int]  # rows and columns of the picture
@@ -58,23 +58,10 @@ class Photons(NamedTuple):
 
 def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EXPONENT, *,
          longest: int | None = None) -> Film | None:
-    """Prepare the counting of photons, or return None for a scene without mirror or glass.
+    """Prepare a film for photons, or return None for a scene without mirror or glass.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    shape : tuple of 2 ints
-        Rows and columns of the picture.
-    least_exponent : float
-        Lobes from here on count as mirrors.
-    longest : int, optional
-        Surfaces that a photon meets at most, `LONGEST_CHAIN` where absent; at 2, one bounce, glass is opaque.
-
-    Returns
-    -------
-    Film or None
-        None where there is nothing to count.
+    `shape`: rows and columns of the picture. `least_exponent`: lobes from here on count as mirrors. `longest`: surfaces
+    that a photon meets at most, `LONGEST_CHAIN` where absent; at 2, one bounce, glass is opaque.
     """
     table = material_table(scene.materials)
     mirrors = surfaces(scene)
@@ -89,25 +76,9 @@ def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EX
 
 
 def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, random: np.random.Generator) -> Array:
-    """Count one pass of photons.
+    """Trace one pass of photons and splat them to pixels.
 
-    Parameters
-    ----------
-    film : Film
-        Where they are counted.
-    tracer : Tracer
-        The scene's rays.
-    lights : LightTable
-        The lights, float64.
-    photons : int
-        From each light; the largest square number up to it is sent.
-    random : numpy.random.Generator
-        Where they go.
-
-    Returns
-    -------
-    (3, h w) ndarray of float64
-        Irradiance, W/m^2.
+    `photons`: from each light; the largest square number up to it is sent. Returns (3, h w) float64: irradiance, W/m^2.
     """
     irradiance = np.zeros((3, film.solid_angle.size))
     side = math.isqrt(photons)
@@ -121,7 +92,7 @@ def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, ra
             landing = (batch.triangle_id != MISS) & (bounce > 0)
             arriving = batch.flux[landing]
             reflect(film.mirrors, film.ior, tracer.grain, words, batch)
-            _count(film, tracer, batch.landed[landing], batch.towards[landing], arriving, irradiance)
+            _splat(film, tracer, batch.landed[landing], batch.towards[landing], arriving, irradiance)
             if not (batch.reach > 0).any():
                 break
     return irradiance
@@ -145,40 +116,32 @@ def _power(lights: LightTable, k: int, directional: bool, measure: float, direct
                 flux[i, c] = power[c] * measure
 
 
-def _count(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Array, irradiance: Array) -> None:
-    """Add photons to the pixels that see where they landed, in their order."""
+def _splat(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Array, irradiance: Array) -> None:
+    """Splat photons to the pixels that see where they landed, in their order."""
     camera = film.scene.camera
     view = np.subtract(camera.eye, landed)
     row, column, _ = project(camera_projection(camera, film.shape[1], film.shape[0]), landed.T)
     cosine = (view * normals).sum(axis=1) / np.linalg.norm(view, axis=1)
-    seen = ~np.isnan(row) & (cosine > 0)
-    starts = landed[seen] + tracer.offsets(landed[seen])[:, None] * normals[seen]
+    visible = ~np.isnan(row) & (cosine > 0)
+    starts = landed[visible] + tracer.offsets(landed[visible])[:, None] * normals[visible]
     reach, blocked = np.ones(len(starts), np.float32), np.empty(len(starts), np.bool_)
     tracer.fill_occluded(starts.astype(np.float32), (camera.eye - starts).astype(np.float32), reach, blocked)
-    seen[np.flatnonzero(seen)[blocked]] = False
-    at = np.floor(row[seen]).astype(np.int64), np.floor(column[seen]).astype(np.int64)
-    density = cosine[seen] / ((view[seen] ** 2).sum(axis=1) * film.solid_angle[at])
+    visible[np.flatnonzero(visible)[blocked]] = False
+    at = np.floor(row[visible]).astype(np.int64), np.floor(column[visible]).astype(np.int64)
+    # E = dPhi <g.v> / (D^2 W)
+    density = cosine[visible] / ((view[visible] ** 2).sum(axis=1) * film.solid_angle[at])
     pixel = at[0] * film.shape[1] + at[1]
     for c in range(3):
-        irradiance[c] += np.bincount(pixel, flux[seen, c] * density, irradiance.shape[1])
+        irradiance[c] += np.bincount(pixel, flux[visible, c] * density, irradiance.shape[1])
 
 
 @kernel(parallel=True)
 def reflect(mirrors: Surfaces, ior: Array, grain: float, words: Array, photons: Photons) -> None:
-    """Note where photons landed and send on those that met a mirror-like lobe or glass.
+    """Write where photons landed, and reflect or refract those on a mirror-like lobe or glass.
 
-    Parameters
-    ----------
-    mirrors : Surfaces
-        The scene with only its mirror-like lobes.
-    ior : (k,) ndarray
-        Index of refraction by material, 0 where opaque.
-    grain : float
-        The tracer's: how far rays start above faces, m.
-    words : (n,) ndarray of uint32
-        Random numbers.
-    photons : Photons
-        Moved on; glass keeps the flux, a lobe sends on its share.
+    `mirrors`: the scene with only its mirror-like lobes. `ior` (k,): index of refraction by material, 0 where opaque.
+    `grain`: the tracer's: how far rays start above faces, m. `words` (n,) uint32: random numbers. `photons`: moved on;
+    glass keeps the flux, a lobe sends on its share.
     """
     count = len(photons.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):

@@ -2,7 +2,7 @@
 
 The file holds a first line, SHA-256 digests of the computation and of the content, and the content: number of passes
 (int64), means and sums of squares (float64), values left out (int64), little-endian. Its length follows from the
-computation, so nothing of a file that is damaged, or another's, is ever taken in.
+computation, so nothing of a file that is damaged, or another's, is ever read.
 """
 
 import contextlib

@@ -1,9 +1,10 @@
-"""Hemisphere sampling at the receiver: where cosine-distributed rays land, what the lights send back from there.
+"""Hemisphere sampling at the receiver: cosine-distributed rays, next-event estimation (NEE) where they land.
 
-A direction of density cos/pi that finds radiance L is worth pi L. A split at the bounded geometry term G leaves
-min(G, b) to the light side; here the rest, the share max(0, (G - b) / G) of each part's radiance, remains (Kollig &
-Keller 2004). Without bound the share is 1. Directions are points of a low-discrepancy set that is scrambled anew in
-every pass and shifted by a random word per pixel.
+A direction of density cos/pi that finds radiance L contributes pi L. Both estimators are combined by multiple
+importance sampling (MIS) at a bounded geometry term G: the light side has min(G, b), weight min(1, b / G); here the
+rest remains, weight max(0, (G - b) / G) of each part's radiance (Kollig & Keller 2004). Without bound the weight is 1.
+Directions are points of a low-discrepancy set that is scrambled anew in every pass and shifted by a random word per
+pixel.
 """
 
 import math
@@ -13,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS, STEPS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
-from refgi.truth.paths import CHUNK, Paths, Shadows, dot, found, row
+from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
 
 Array = npt.NDArray[Any]
@@ -28,17 +29,7 @@ Array = npt.NDArray[Any]
 def scrambled_points(count: int, seed: int) -> Array:
     """Return scrambled low-discrepancy points of the square as 32-bit words.
 
-    Parameters
-    ----------
-    count : int
-        Points.
-    seed : int
-        Which scramble.
-
-    Returns
-    -------
-    (count, 2) ndarray of uint32
-        Coordinates times 2^32.
+    Returns (count, 2) uint32: coordinates times 2^32.
     """
     points = np.empty((count, 2), np.uint32)
     for i in range(count):
@@ -51,18 +42,8 @@ def scrambled_points(count: int, seed: int) -> Array:
 def cosine_direction(u: float, v: float) -> tuple[float, float, float]:
     """Return a direction of the upper hemisphere with density cos(theta) / pi, good to 1e-8 and alike everywhere.
 
-    Parameters
-    ----------
-    u, v : float
-        Point of the unit square; u = sin^2 theta, v the share of the turn.
+    `u`, `v`: point of the unit square; u = sin^2 theta, v the share of the turn. Result: unit vector, z up.
 
-    Returns
-    -------
-    tuple of 3 floats
-        Unit vector, z up.
-
-    Notes
-    -----
     The turn is split into quarters and the series of sine and cosine up to pi/4 cut at 2e-9 (rays are float32).
     """
     quarter = math.floor(4 * v + 0.5)
@@ -77,34 +58,23 @@ def cosine_direction(u: float, v: float) -> tuple[float, float, float]:
 
 
 @kernel(parallel=True)
-def send(to: Receivers, span: tuple[int, int], points: Array, seed: int, reach: float, paths: Paths) -> None:
+def send(receivers: RayReceivers, span: tuple[int, int], points: Array, seed: int, reach: float, paths: Paths) -> None:
     """Send one ray for each point of the set from each receiver of a span.
 
-    Parameters
-    ----------
-    to : Receivers
-        Receivers.
-    span : tuple of 2 ints
-        First receiver and one past the last.
-    points : (s, 2) ndarray of uint32
-        The pass's point set.
-    seed : int
-        Random shift: a hash of it and the receiver's pixel.
-    reach : float
-        How far to look, m.
-    paths : Paths
-        Origins, directions, reach, lengths, cosines and weights are filled.
+    `span`: first receiver and one past the last. `points` (s, 2) uint32: the pass's point set. `seed`: random shift: a
+    hash of it and the receiver's pixel. `reach`: how far to look, m. `paths`: origins, directions, reach, lengths,
+    cosines and weights are filled.
     """
     count = span[1] - span[0]
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _send(to, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), points, seed, reach, paths)
+        _send(receivers, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), points, seed, reach, paths)
 
 
 @kernel
-def _send(to: Receivers, first: int, span: tuple[int, int], points: Array, seed: int, reach: float,
+def _send(receivers: RayReceivers, first: int, span: tuple[int, int], points: Array, seed: int, reach: float,
           paths: Paths) -> None:
     origins, directions, reaches, travelled, cosines, _, _, weights = paths
-    pixel, _, normals, facing, starts = to
+    pixel, _, normals, facing, starts = receivers
     ray = span[0] * len(points)
     for r in range(first + span[0], first + span[1]):
         word = hash_bits(np.uint32(pixel[r]) ^ np.uint32(seed))
@@ -129,7 +99,7 @@ def _send(to: Receivers, first: int, span: tuple[int, int], points: Array, seed:
 @kernel(parallel=True)
 def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], paths: Paths,
            shadows: Shadows) -> None:
-    """Write the shadow ray from each surface that was found to one light, and what it is worth.
+    """Next-event estimation: write the shadow ray from each hit point to one light, and its contribution.
 
     Parameters
     ----------
@@ -145,7 +115,7 @@ def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, 
     paths : Paths
         What was found.
     shadows : Shadows
-        Origins, directions, reach and worth are filled; the reach is 0 where there is nothing to gain.
+        Origins, directions, reach and contribution are filled; the reach is 0 where nothing contributes.
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
@@ -163,8 +133,8 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         if triangle == MISS:
             continue
         material = surfaces.material_of_face[triangle]
-        w, y = found(paths, ray)
-        # what ends here most often is asked first, before anything is divided or normalised
+        w, y = hit_point(paths, ray)
+        # the most frequent exits first, before anything is divided or normalised
         toward = _toward_light(lights, k, y)
         cross = face_cross(surfaces, triangle)
         side, side_out = dot(cross, toward), dot(cross, w)
@@ -172,7 +142,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
             continue
         rho, glossy = row(surfaces.diffuse, material), row(surfaces.specular, material)
         has_lobe = max(glossy[0], glossy[1], glossy[2]) > 0
-        least = 0.0  # pattern that the light side has: b r^2 / <n_x.w>, as G = pattern <n_x.w> / r^2
+        least = 0.0  # pattern that the light side covers: b r^2 / <n_x.w>, as G = pattern <n_x.w> / r^2
         if bound > 0:
             length = np.float64(paths.travelled[ray]) + paths.distance[ray]
             area = measure if directional else measure * dot(toward, toward)
@@ -188,15 +158,15 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         n = shading_normal(surfaces, triangle, y, g)
         # radiance = rho F / pi * pattern / <g.w>, F = E_perp <g.l>
         factor = dot(g, light) / (np.pi * dot(g, w))
-        # pattern times max(0, (G - b) / G)
+        # pattern times the MIS weight max(0, (G - b) / G)
         diffuse, lobe = max(0.0, dot(n, w) - least), 0.0
         if has_lobe:
             lobe = max(0.0, lobe_pattern(surfaces, material, n, light, w) - least)
         most, offset = 0.0, lift(surfaces, triangle, y, g, grain)
         for c in range(3):
-            worth = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
-            most = max(most, worth)
-            shadows.worth[ray, c] = worth
+            contribution = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
+            most = max(most, contribution)
+            shadows.contribution[ray, c] = contribution
             shadows.origin[ray, c] = y[c] + offset * g[c]
             shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
         if most > 0:

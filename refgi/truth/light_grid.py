@@ -1,11 +1,11 @@
-"""Fresh directions over a light: n x n cells of equal probability, one jittered ray in each.
+"""Stratified directions of a light: n x n cells of equal probability, one jittered ray in each.
 
 Spots and points get equal-area maps of the square to the cap or the sphere; a directional light gets a rectangle across
 the scene's bounds. Without a density each ray stands for the same solid angle or area, exactly; with one, for that over
-the density at its place. The cells are taken along a Hilbert curve: neighbours in the list are neighbours on the
-surfaces they light, which is what makes systematic picks even.
+the density at its place. The cells are ordered along a Hilbert curve: neighbours in the list are neighbours on the
+surfaces they reach, which is what makes systematic picks even.
 
-Densities over the unit square, constant in cells: uniform points are moved to where the density is high.
+Piecewise constant densities over the unit square, for importance sampling: uniform points are warped to them.
 
 q_ij is the probability of cell (i, j) of an m x m grid. The first coordinate follows the marginal sum_j q_ij, the
 second q_ij / sum_j q_ij within row i; both are linear inside a cell, so a point stands for 1 / (m^2 q_ij) of a uniform
@@ -37,17 +37,9 @@ class Density(NamedTuple):
 def density_of(contribution: Array, uniform_share: float) -> Density:
     """Make a density of contributions, mixed with a uniform one.
 
-    Parameters
-    ----------
-    contribution : (m, m) ndarray
-        What each cell is to be drawn in proportion to, >= 0; all 0 gives a uniform density.
-    uniform_share : float
-        Share of the points that are drawn uniformly, in (0, 1]: no cell gets less than that of an even share.
-
-    Returns
-    -------
-    Density
-        Its tables.
+    `contribution` (m, m): what each cell is to be drawn in proportion to, >= 0; all 0 gives a uniform density.
+    `uniform_share`: share of the points that are drawn uniformly, in (0, 1]: no cell gets less than that of an even
+    share.
     """
     expect(0 < uniform_share <= 1, "uniform_share", "a number in (0, 1]", uniform_share)
     total = contribution.sum()
@@ -59,17 +51,8 @@ def density_of(contribution: Array, uniform_share: float) -> Density:
 def warp(density: Density, points: Array) -> tuple[Array, Array]:
     """Move uniform points so that they follow a density.
 
-    Parameters
-    ----------
-    density : Density
-        The density.
-    points : (n, 2) ndarray
-        Uniform points in [0, 1).
-
-    Returns
-    -------
-    (n, 2) ndarray, (n,) ndarray
-        Points in [0, 1), and how much of the unit square each stands for relative to a uniform one.
+    `points` (n, 2): uniform points in [0, 1). Returns (n, 2), (n,): points in [0, 1), and how much of the unit square
+    each stands for relative to a uniform one.
     """
     m = len(density.cells)
     row, first = _invert(density.rows[None], np.zeros(len(points), np.int64), points[:, 0])
@@ -107,19 +90,9 @@ class LightRays(NamedTuple):
 def stratified_sets(n: int, side: int, random: np.random.Generator) -> Array:
     """Place side^2 sets of n x n points in the unit square: each set jittered, all of them together jittered finer.
 
-    Parameters
-    ----------
-    n : int
-        Cells along one side of the grid of a set.
-    side : int
-        Parts along one side of a cell: the side^2 sets share out its parts at random, one each.
-    random : numpy.random.Generator
-        Shares out the parts and places the points in them.
-
-    Returns
-    -------
-    (side^2, n * n, 2) ndarray
-        Each set along a Hilbert curve over the grid. Every point is uniform in its cell.
+    `n`: cells along one side of the grid of a set. `side`: parts along one side of a cell: the side^2 sets share out
+    its parts at random, one each. `random`: shares out the parts and places the points in them. Returns (side^2, n * n,
+    2): each set along a Hilbert curve over the grid. Every point is uniform in its cell.
     """
     count = side * side
     part = random.permuted(np.broadcast_to(np.arange(count), (n * n, count)), axis=1).T
@@ -130,15 +103,7 @@ def stratified_sets(n: int, side: int, random: np.random.Generator) -> Array:
 def cell_centres(n: int) -> Array:
     """Return the centres of n x n cells of the unit square, along a Hilbert curve.
 
-    Parameters
-    ----------
-    n : int
-        Cells along one side.
-
-    Returns
-    -------
-    (n * n, 2) ndarray
-        Points.
+    `n`: cells along one side. Returns (n * n, 2): points.
     """
     return np.asarray((_cells(n) + 0.5) / n)
 
@@ -146,19 +111,8 @@ def cell_centres(n: int) -> Array:
 def light_rays(light: Light, geometry: Geometry, jitter: Array) -> LightRays:
     """Send one ray through each cell of a light's grid.
 
-    Parameters
-    ----------
-    light : Light
-        The light.
-    geometry : Geometry
-        What it shines on; only its bounds matter, and only to a directional light.
-    jitter : (n * n, 2) ndarray
-        Place of each ray in its cell, in [0, 1).
-
-    Returns
-    -------
-    LightRays
-        Along a Hilbert curve over the grid.
+    `geometry`: what it shines on; only its bounds matter, and only to a directional light. `jitter` (n * n, 2): place
+    of each ray in its cell, in [0, 1). Result: along a Hilbert curve over the grid.
     """
     n = math.isqrt(len(jitter))
     return rays_through(light, geometry, (_cells(n) + jitter) / n, n * n)
@@ -168,23 +122,9 @@ def rays_through(light: Light, geometry: Geometry, square: Array, cells: int,
                  density: Density | None = None) -> LightRays:
     """Send rays through points of the unit square that stands for a light's directions.
 
-    Parameters
-    ----------
-    light : Light
-        The light.
-    geometry : Geometry
-        What it shines on; only its bounds matter, and only to a directional light.
-    square : (s, 2) ndarray
-        Points of the unit square, uniform.
-    cells : int
-        How many rays share the light's whole measure.
-    density : Density, optional
-        Where rays go more often than elsewhere; evenly where absent.
-
-    Returns
-    -------
-    LightRays
-        In the order of the points.
+    `geometry`: what it shines on; only its bounds matter, and only to a directional light. `square` (s, 2): points of
+    the unit square, uniform. `cells`: how many rays share the light's whole measure. `density`: where rays go more
+    often than elsewhere; evenly where absent. Result: in the order of the points.
     """
     square, weight = (square, np.ones(len(square))) if density is None else warp(density, square)
     if isinstance(light, DirectionalLight):
@@ -202,19 +142,8 @@ def rays_through(light: Light, geometry: Geometry, square: Array, cells: int,
 def footprint(light: Light, geometry: Geometry, n: int) -> tuple[float, float]:
     """Return the measure of one ray and its largest footprint in the scene.
 
-    Parameters
-    ----------
-    light : Light
-        The light.
-    geometry : Geometry
-        What it shines on.
-    n : int
-        Cells along one side of the grid.
-
-    Returns
-    -------
-    tuple of 2 floats
-        Solid angle (sr) or area (m^2) of a ray, and the largest measure x distance^2 (m^2).
+    `geometry`: what it shines on. `n`: cells along one side of the grid. Result: solid angle (sr) or area (m^2) of a
+    ray, and the largest measure x distance^2 (m^2).
     """
     measure = rays_through(light, geometry, np.full((1, 2), 0.5), n * n).measure
     if isinstance(light, DirectionalLight):

@@ -1,11 +1,11 @@
-"""The light side: each receiver picks lit points in proportion to what they would give it unshadowed.
+"""The light side: each receiver importance-samples light vertices by their unshadowed contribution.
 
-The picture's pixels take turns with several sets of lit points, so that what one set misses does not show in all of
-them; receivers of one set make up tiles. For receiver x and sender i the unshadowed term is
-p_i min(q_i <n_x.w> / r^2, b_i), with the sender's pattern q. A receiver sums the terms in blocks of 32 and parts of 8,
-places its picks evenly over the total with one random shift (systematic sampling), finds the point that each falls on,
-and sends it a shadow ray. A pick stands for total / picks, so what remains random is visibility and colour. Sums and
-comparisons run in float32, everywhere in one order.
+The picture's pixels alternate between several sets of light vertices, so that what one set misses does not show in all
+of them; receivers of one set make up tiles. For receiver x and sender i the unshadowed term is p_i min(q_i <n_x.w> /
+r^2, b_i), with the sender's pattern q. A receiver sums the terms in blocks of 32 and parts of 8, places its picks
+evenly over the total with one random shift (systematic sampling), finds the point that each falls on, and traces a
+shadow ray to it (next-event estimation to a light vertex). A pick stands for total / picks, so what remains random is
+visibility and colour. Sums and comparisons run in float32, everywhere in one order.
 """
 
 from itertools import pairwise
@@ -16,10 +16,10 @@ import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import far_offset, ray_offset
 from refgi.sampling import hash_bits
-from refgi.truth.lit_points import BLOCK, LitPoints
+from refgi.truth.light_vertices import BLOCK, LightVertices
 
 Array = npt.NDArray[Any]
 
@@ -31,26 +31,29 @@ BELOW_1 = np.float32(1 - 2.0**-24)
 
 
 @kernel
-def _diffuse(dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any, mx: Any, my: Any, mz: Any, bound: Any) -> Any:
+def _bounded_geometry(
+    dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any, mx: Any, my: Any, mz: Any, bound: Any
+) -> Any:
     """Return min(G, b) for d = y - x, receiver normal n and sender normal m; free of branches."""
     zero = np.float32(0)
     r2 = dx * dx + dy * dy + dz * dz
     inverse = np.float32(1) / (r2 if r2 > TINY else TINY)
     cos_x = nx * dx + ny * dy + nz * dz
     cos_y = -(mx * dx + my * dy + mz * dz)
+    # G = <n_x.w> <n_y.-w> / r^2, the geometry term of SII Eq. (2)
     geometry = ((cos_x if cos_x > zero else zero) * inverse) * ((cos_y if cos_y > zero else zero) * inverse)
-    return geometry if geometry < bound else bound
+    return geometry if geometry < bound else bound  # MIS: the light side's weight is min(1, b / G)
 
 
 @kernel
-def _lobe(points: LitPoints, j: int) -> Any:
-    """Return what `_shape` needs of sender j: axis, normal, pattern on the axis."""
+def _lobe(points: LightVertices, j: int) -> Any:
+    """Return what `_lobe_geometry` needs of sender j: axis, normal, pattern on the axis."""
     return (points.axis[0, j], points.axis[1, j], points.axis[2, j], points.normal[0, j], points.normal[1, j],
             points.normal[2, j], points.peak[j])
 
 
 @kernel
-def _shape(lobe: Any, dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any) -> Any:
+def _lobe_geometry(lobe: Any, dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any) -> Any:
     """Return -h = <a.w> - 1 and f, of which G = f 2^(P log2(1 - h)) for a lobe around a; free of branches.
 
     h = |a - w|^2 / 2, w the direction from the sender: near the axis of a sharp lobe h keeps its digits.
@@ -70,7 +73,7 @@ def _shape(lobe: Any, dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any) -> A
 
 
 @kernel
-def _sum_diffuse(points: LitPoints, tile: Array, first: int, count: int, parts: Array) -> None:
+def _sum_diffuse(points: LightVertices, tile: Array, first: int, count: int, parts: Array) -> None:
     """Fill the sums of the terms of each part of diffuse senders at each receiver of a tile, two senders at a time."""
     for p in range(count):
         for j in range(first + p * PART, first + p * PART + PART, 2):
@@ -81,13 +84,13 @@ def _sum_diffuse(points: LitPoints, tile: Array, first: int, count: int, parts: 
             lx, ly, lz = points.axis[0, j + 1], points.axis[1, j + 1], points.axis[2, j + 1]
             for i in range(TILE):
                 x, y, z, nx, ny, nz = tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i], tile[5, i]
-                one = power * _diffuse(px - x, py - y, pz - z, nx, ny, nz, kx, ky, kz, bound)
-                two = power_q * _diffuse(qx - x, qy - y, qz - z, nx, ny, nz, lx, ly, lz, bound_q)
+                one = power * _bounded_geometry(px - x, py - y, pz - z, nx, ny, nz, kx, ky, kz, bound)
+                two = power_q * _bounded_geometry(qx - x, qy - y, qz - z, nx, ny, nz, lx, ly, lz, bound_q)
                 parts[p, i] = (parts[p, i] + one) + two
 
 
 @kernel
-def _sum_lobes(points: LitPoints, tile: Array, first: int, done: int, parts: Array) -> None:
+def _sum_lobes(points: LightVertices, tile: Array, first: int, done: int, parts: Array) -> None:
     """Fill the sums of the terms of each part of lobes at each receiver of a tile: one loop a function, for SIMD."""
     power_of, factor = np.empty(TILE, np.float32), np.empty(TILE, np.float32)
     for p in range(done, parts.shape[0]):
@@ -96,7 +99,7 @@ def _sum_lobes(points: LitPoints, tile: Array, first: int, done: int, parts: Arr
             power, exponent, bound, lobe = points.power[j], points.exponent[j], points.bound[j], _lobe(points, j)
             for i in range(TILE):
                 x, y, z, nx, ny, nz = tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i], tile[5, i]
-                power_of[i], factor[i] = _shape(lobe, px - x, py - y, pz - z, nx, ny, nz)
+                power_of[i], factor[i] = _lobe_geometry(lobe, px - x, py - y, pz - z, nx, ny, nz)
             for i in range(TILE):
                 power_of[i] = log2p1(power_of[i])
             for i in range(TILE):
@@ -107,38 +110,38 @@ def _sum_lobes(points: LitPoints, tile: Array, first: int, done: int, parts: Arr
 
 
 @kernel
-def _diffuse_term(points: LitPoints, j: int, tile: Array, i: int) -> Any:
+def _diffuse_term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
     """Return the term of one diffuse sender at one receiver, bit for bit that which was summed."""
     dx, dy = points.position[0, j] - tile[0, i], points.position[1, j] - tile[1, i]
     dz = points.position[2, j] - tile[2, i]
-    return points.power[j] * _diffuse(dx, dy, dz, tile[3, i], tile[4, i], tile[5, i], points.axis[0, j],
+    return points.power[j] * _bounded_geometry(dx, dy, dz, tile[3, i], tile[4, i], tile[5, i], points.axis[0, j],
                                       points.axis[1, j], points.axis[2, j], points.bound[j])
 
 
 @kernel
-def _lobe_term(points: LitPoints, j: int, tile: Array, i: int) -> Any:
+def _lobe_term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
     """Return the term of one lobe at one receiver, bit for bit that which was summed."""
     dx, dy = points.position[0, j] - tile[0, i], points.position[1, j] - tile[1, i]
     dz = points.position[2, j] - tile[2, i]
-    power_of, factor = _shape(_lobe(points, j), dx, dy, dz, tile[3, i], tile[4, i], tile[5, i])
+    power_of, factor = _lobe_geometry(_lobe(points, j), dx, dy, dz, tile[3, i], tile[4, i], tile[5, i])
     geometry = factor * exp2(points.exponent[j] * log2p1(power_of))
     return points.power[j] * (geometry if geometry < points.bound[j] else points.bound[j])
 
 
 @kernel
-def _aim(points: LitPoints, j: int, to: Receivers, r: int, grain: Any, origins: Array, directions: Array,
+def _aim(points: LightVertices, j: int, receivers: RayReceivers, r: int, grain: Any, origins: Array, directions: Array,
          ray: int) -> Any:
     """Write the shadow segment to a picked point and return its reach: 1, or 0 where a face is seen from behind."""
     real = np.float32
     from_x, from_y = real(0), real(0)
     x, y, z = points.position[0, j], points.position[1, j], points.position[2, j]
     offset = ray_offset(x, y, z, grain)
-    offset += far_offset(x - to.position[0, r], y - to.position[1, r], z - to.position[2, r])
+    offset += far_offset(x - receivers.position[0, r], y - receivers.position[1, r], z - receivers.position[2, r])
     for c in range(3):
-        origins[ray, c] = to.origin[c, r]
-        directions[ray, c] = points.position[c, j] + offset * points.facing[c, j] - to.origin[c, r]
-        toward = points.position[c, j] - to.position[c, r]
-        from_x += to.facing[c, r] * toward
+        origins[ray, c] = receivers.origin[c, r]
+        directions[ray, c] = points.position[c, j] + offset * points.facing[c, j] - receivers.origin[c, r]
+        toward = points.position[c, j] - receivers.position[c, r]
+        from_x += receivers.facing[c, r] * toward
         from_y -= points.facing[c, j] * toward
     return real(1) if from_x > real(0) and from_y > real(0) else real(0)
 
@@ -146,17 +149,9 @@ def _aim(points: LitPoints, j: int, to: Receivers, r: int, grain: Any, origins: 
 def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
     """Sort a span of receivers by their set and cut them into tiles.
 
-    Parameters
-    ----------
-    set_of : (r,) int ndarray
-        Which set of lit points each receiver picks from.
-    first, last : int
-        First receiver of the span and one past the last.
-
-    Returns
-    -------
-    (last - first,) ndarray, (t, 3) ndarray, both int64
-        Receivers; and for each tile where it begins and ends among them, and its set.
+    `set_of` (r,) int: which set of light vertices each receiver picks from. `first`, `last`: first receiver of the span
+    and one past the last. Returns (last - first,), (t, 3), both int64: receivers; and for each tile where it begins and
+    ends among them, and its set.
     """
     order = np.argsort(set_of[first:last], kind="stable")
     sets = set_of[first:last][order]
@@ -166,26 +161,15 @@ def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
 
 
 @kernel(parallel=True)
-def pick(points: LitPoints, starts: Array, to: Receivers, tiles: tuple[Array, Array], how: tuple[int, int, int, Any],
-         rays: tuple[Array, Array, Array, Array, Array]) -> None:
-    """Let each receiver of some tiles pick lit points, and write the shadow rays and what they are worth.
+def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: tuple[Array, Array],
+         sampling: tuple[int, int, int, Any], rays: tuple[Array, Array, Array, Array, Array]) -> None:
+    """Pick light vertices for each receiver of some tiles; write shadow rays and their contributions.
 
-    Parameters
-    ----------
-    points : LitPoints
-        Senders, in sets.
-    starts : (sets, 3) int64 ndarray
-        First block of each set, its first of lobes and one past its last.
-    to : Receivers
-        Receivers.
-    tiles : tuple of 2 arrays
-        Receivers sorted by set, and the table of tiles.
-    how : tuple of 3 ints and a float32
-        First receiver of the span; picks of each; seed of the random shift, a hash of it and the receiver's pixel; the
-        tracer's grain: segments end above the sender's face by `ray_offset` and `far_offset`, m.
-    rays : tuple of 5 arrays
-        Filled: origins, directions (n, 3), reach (n,), worth (n, 3) W/m^2, float32, and the point picked (n,) int32;
-        n = picks x receivers. The reach is 0 where there is nothing to gain.
+    `starts` (sets, 3) int64: first block of each set, its first of lobes and one past its last. `tiles`: receivers
+    sorted by set, and the table of tiles. `sampling`: first receiver of the span; picks of each; seed of the random
+    shift, a hash of it and the receiver's pixel; the tracer's grain: segments end above the sender's face by
+    `ray_offset` and `far_offset`, m. `rays`: filled: origins, directions (n, 3), reach (n,), contribution (n, 3) W/m^2,
+    float32, and the point picked (n,) int32; n = picks x receivers. The reach is 0 where there is nothing to gain.
     """
     members, table = tiles
     for number in prange(len(table)):
@@ -195,8 +179,8 @@ def pick(points: LitPoints, starts: Array, to: Receivers, tiles: tuple[Array, Ar
         tile = np.zeros((6, TILE), np.float32)
         for c in range(3):
             for i in range(count):
-                tile[c, i] = to.position[c, members[low + i]]
-                tile[3 + c, i] = to.normal[c, members[low + i]]
+                tile[c, i] = receivers.position[c, members[low + i]]
+                tile[3 + c, i] = receivers.normal[c, members[low + i]]
         first, first_lobe, size = starts[chosen, 0], starts[chosen, 1], starts[chosen, 2] - starts[chosen, 0]
         start = (first * BLOCK, first_lobe * BLOCK)
         parts = np.zeros((size * PARTS, TILE), np.float32)
@@ -207,15 +191,16 @@ def pick(points: LitPoints, starts: Array, to: Receivers, tiles: tuple[Array, Ar
         for p in range(parts.shape[0]):
             for i in range(TILE):
                 blocks[p // PARTS, i] += parts[p, i]
-        _pick_all(points, to, members[low:high], tile, how, (start, blocks, parts), rays)
+        _pick_all(points, receivers, members[low:high], tile, sampling, (start, blocks, parts), rays)
 
 
 @kernel
-def _pick_all(points: LitPoints, to: Receivers, members: Array, tile: Array, how: tuple[int, int, int, Any],
-              sums: tuple[tuple[int, int], Array, Array], rays: tuple[Array, Array, Array, Array, Array]) -> None:
+def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, tile: Array,
+              sampling: tuple[int, int, int, Any], sums: tuple[tuple[int, int], Array, Array],
+              rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
-    origins, directions, reach, worth, picked = rays
-    first, picks, seed, grain = how
+    origins, directions, reach, contribution, picked = rays
+    first, picks, seed, grain = sampling
     (first_point, first_lobe), blocks, parts = sums
     real = np.float32
     for i in range(len(members)):
@@ -224,7 +209,7 @@ def _pick_all(points: LitPoints, to: Receivers, members: Array, tile: Array, how
             total += blocks[b, i]
         for s in range(picks):
             reach[(r - first) * picks + s] = real(0)
-        shift = real(hash_bits(np.uint32(to.pixel[r]) ^ np.uint32(seed)) >> np.uint32(8)) * real(2.0**-24)
+        shift = real(hash_bits(np.uint32(receivers.pixel[r]) ^ np.uint32(seed)) >> np.uint32(8)) * real(2.0**-24)
         share = total / real(picks)
         b, before = 0, real(0)  # block, and the sum of those before it
         for s in range(picks if total > real(0) else 0):
@@ -252,7 +237,7 @@ def _pick_all(points: LitPoints, to: Receivers, members: Array, tile: Array, how
                     j += 1
                     term = _lobe_term(points, j, tile, i)
             if term > real(0):
-                reach[ray] = _aim(points, j, to, r, grain, origins, directions, ray)
+                reach[ray] = _aim(points, j, receivers, r, grain, origins, directions, ray)
                 picked[ray] = j
                 for c in range(3):
-                    worth[ray, c] = share * points.colour[c, j]
+                    contribution[ray, c] = share * points.colour[c, j]

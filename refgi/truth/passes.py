@@ -1,6 +1,6 @@
 """One pass of the ground truth: an independent, unbiased estimate of every receiver's one-bounce irradiance.
 
-Where a path goes after it found a surface: through it, where nothing blocks, or on by the surface's reflection.
+At a surface a path passes through (without visibility), or scatters by the surface's reflection.
 """
 
 from typing import Any
@@ -10,17 +10,17 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.lobes import inverse_fraction, lobe_direction
-from refgi.pairs.shadow_rays import Receivers
+from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
+from refgi.truth.camera_visibility import aim_paths
 from refgi.truth.caustics import photon_pass
 from refgi.truth.hemisphere import cosine_direction, gather, scrambled_points, send
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side
-from refgi.truth.paths import Paths, dot, found, row
-from refgi.truth.seen import aim_paths
+from refgi.truth.paths import Paths, dot, hit_point, row
 from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
-from refgi.truth.task import Task, settle, shadow_batch, spans
+from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
 
 Array = npt.NDArray[Any]
 # A lobe may point below an interpolated horizon: K is 1/2 no more, but <r.w>^P / K stays below 18 for K >= 1e-12.
@@ -31,14 +31,8 @@ BELOW_HORIZON = 9.0
 def pass_through(surfaces: Surfaces, grain: float, paths: Paths) -> None:
     """Move each ray to the far side of what it found, with the same direction.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    grain : float
-        The tracer's: how far rays start above faces, m.
-    paths : Paths
-        Origins, reach and lengths are moved on; rays that found nothing end.
+    `grain`: the tracer's: how far rays start above faces, m. `paths`: origins, reach and lengths are moved on; rays
+    that found nothing end.
     """
     for ray in prange(len(paths.reach)):
         _pass_through(surfaces, grain, paths, ray)
@@ -49,7 +43,7 @@ def _pass_through(surfaces: Surfaces, grain: float, paths: Paths, ray: int) -> N
     if paths.triangle_id[ray] == MISS:
         paths.reach[ray] = 0
         return
-    w, y = found(paths, ray)
+    w, y = hit_point(paths, ray)
     g = face_normal(surfaces, paths.triangle_id[ray], w[0], w[1], w[2])  # on the side the ray leaves to
     offset = lift(surfaces, paths.triangle_id[ray], y, g, grain)
     for c in range(3):
@@ -59,36 +53,21 @@ def _pass_through(surfaces: Surfaces, grain: float, paths: Paths, ray: int) -> N
 
 
 @kernel(parallel=True)
-def scatter(surfaces: Surfaces, grain: float, seed: int, to: Receivers, first: int, per_receiver: int,
+def scatter(surfaces: Surfaces, grain: float, seed: int, receivers: RayReceivers, first: int, per_receiver: int,
             paths: Paths) -> None:
-    """Send each path on from the surface it found, by that surface's reflection.
+    """Send each path on from the surface it hit, by that surface's BRDF.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    grain : float
-        The tracer's: how far rays start above faces, m.
-    seed : int
-        Random numbers: a hash of it, the receiver's pixel and the path's number there.
-    to : Receivers
-        Receivers.
-    first : int
-        Receiver of the first path.
-    per_receiver : int
-        Paths of each receiver.
-    paths : Paths
-        Origins, directions, reach and weights are renewed; paths that found nothing or a black surface end.
+    `grain`: the tracer's: how far rays start above faces, m. `seed`: random numbers: a hash of it, the receiver's pixel
+    and the path's number there. `first`: receiver of the first path. `per_receiver`: paths of each receiver. `paths`:
+    origins, directions, reach and weights are renewed; paths that found nothing or a black surface end.
 
-    Notes
-    -----
     One of the two parts is chosen by its largest reflectance, with probability p. With v the way back, the diffuse
     part sends on a cosine-distributed direction around the face normal g with weight rho <n.v> / (<g.v> p), the lobe a
     direction around the mirror direction of v with density (P + 1) / (2 pi) cos^P and weight rho <g.w> / (K <g.v> p),
     K for light that comes from w.
     """
     for ray in prange(len(paths.reach)):
-        pixel = to.pixel[first + ray // per_receiver]
+        pixel = receivers.pixel[first + ray // per_receiver]
         word = hash_bits(hash_bits(np.uint32(pixel) ^ np.uint32(seed)) + np.uint32(ray % per_receiver))
         _scatter(surfaces, grain, word, paths, ray)
 
@@ -106,7 +85,7 @@ def _scatter(surfaces: Surfaces, grain: float, word: Any, paths: Paths, ray: int
         return
     u, v = _uniform(word ^ np.uint32(0x68E31DA4)), _uniform(word ^ np.uint32(0xB5297A4D))
     chance = most / (most + most_glossy)
-    back, y = found(paths, ray)
+    back, y = hit_point(paths, ray)
     g = face_normal(surfaces, triangle, -back[0], -back[1], -back[2])
     n = shading_normal(surfaces, triangle, y, g)
     cos_g, cos_n = dot(g, back), dot(n, back)
@@ -140,21 +119,12 @@ def _uniform(word: Any) -> Any:
 def one_pass(task: Task, number: int) -> Array:
     """Estimate every receiver's irradiance once.
 
-    Parameters
-    ----------
-    task : Task
-        What to compute.
-    number : int
-        Which pass: its random numbers depend on this and the settings' seed alone.
-
-    Returns
-    -------
-    (3, r) ndarray of float64
-        Irradiance, W/m^2.
+    `number`: which pass: its random numbers depend on this and the settings' seed alone. Returns (3, r) float64:
+    irradiance, W/m^2.
     """
-    sums = np.zeros((3, len(task.to.pixel)))
+    sums = np.zeros((3, len(task.receivers.pixel)))
     words = np.random.SeedSequence([task.settings.seed, number]).generate_state(4 + task.settings.bounces)
-    if len(task.to.pixel):
+    if len(task.receivers.pixel):
         if task.settings.picks_per_pass:
             add_light_side(task, words[:3], sums)
         if task.settings.directions_per_pass:
@@ -162,35 +132,35 @@ def one_pass(task: Task, number: int) -> Array:
         if task.caustics is not None:
             random = np.random.default_rng([*words[:2], 1])
             photons = photon_pass(task.caustics, task.tracer, task.lights, task.settings.photons, random)
-            sums += photons[:, task.to.pixel]
+            sums += photons[:, task.receivers.pixel]
     return sums
 
 
 def _hemisphere(task: Task, words: Array, sums: Array) -> None:
-    """Add what cosine-distributed directions find, beyond the bound where the light side has the rest."""
+    """Add the hemisphere estimator, by its MIS weight where the light side has the rest."""
     count = task.settings.directions_per_pass
     points, reach = scrambled_points(count, int(words[3])), _reach(task)
     for first, last in spans(task, count):
         paths = _paths((last - first) * count)
-        send(task.to, (first, last), points, int(words[3]), reach, paths)
+        send(task.receivers, (first, last), points, int(words[3]), reach, paths)
         for bounce in range(task.settings.bounces):
             if bounce:
-                scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.to, first, count, paths)
+                scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
             _follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums)
 
 
 def _follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums: Array) -> None:
-    """Trace paths to the next surface and add its light; to every surface along them where nothing blocks."""
+    """Trace paths to the next surface, next-event estimation there; to every surface along them without visibility."""
     while True:
         task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
-        unseen = _unseen(task, paths)
+        hidden = _hidden_from_camera(task, paths)
         for k, light in enumerate(task.scene.lights):
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = shadow_batch(len(paths.reach))
             gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), paths, shadows)
-            if unseen is not None:
-                shadows.reach[unseen] = 0
-            settle(task, shadows, first, count, sums, True)
+            if hidden is not None:
+                shadows.reach[hidden] = 0
+            add_unblocked(task, shadows, first, count, sums, True)
         if task.settings.visibility:
             return
         pass_through(task.surfaces, task.tracer.grain, paths)
@@ -198,8 +168,8 @@ def _follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums
             return
 
 
-def _unseen(task: Task, paths: Paths) -> Array | None:
-    """Return which paths end where the camera does not see; None where that does not matter."""
+def _hidden_from_camera(task: Task, paths: Paths) -> Array | None:
+    """Return which paths end at points that the camera does not see; None where that does not matter."""
     if task.view is None:
         return None
     rays = shadow_batch(len(paths.reach))
@@ -209,7 +179,7 @@ def _unseen(task: Task, paths: Paths) -> Array | None:
 
 
 def _reach(task: Task) -> float:
-    """Return how far a receiver must look: beyond, the geometry term stays below the bound."""
+    """Return the length of hemisphere rays: beyond, the geometry term stays below the bound."""
     bound, surfaces = task.settings.shared_bound, task.surfaces
     if bound == 0 or task.settings.bounces > 1:
         return np.inf

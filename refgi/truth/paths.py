@@ -1,7 +1,7 @@
 """Paths and shadow rays of a batch, as arrays, and the small vector algebra of their kernels.
 
-Parallel loops over paths only call a kernel for each chunk: Numba drops, without a word, what a parallel loop itself
-writes into arrays that it reached through a NamedTuple's attribute. Inside, scalars are taken one by one: a row taken
+Parallel loops over paths only call a kernel for each chunk: Numba silently drops what a parallel loop itself
+writes into arrays that it reached through a NamedTuple's attribute. Inside, scalars are loaded one by one: a row loaded
 as a view counts references, and over that count threads wait for each other.
 """
 
@@ -31,29 +31,18 @@ class Paths(NamedTuple):
 
 
 class Shadows(NamedTuple):
-    """Shadow rays of a batch, and what each is worth if it is free."""
+    """Shadow rays of a batch, and the contribution of each if it is unblocked."""
 
     origin: Array  # (n, 3) float32
     direction: Array  # (n, 3) float32
     reach: Array  # (n,) float32
     blocked: Array  # (n,) bool
-    worth: Array  # (n, 3) float32, W/m^2
+    contribution: Array  # (n, 3) float32, W/m^2
 
 
 @kernel
 def dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
-    """Return the dot product of two vectors.
-
-    Parameters
-    ----------
-    a, b : tuple of 3 floats
-        The vectors.
-
-    Returns
-    -------
-    float
-        Their dot product.
-    """
+    """Return the dot product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -61,36 +50,16 @@ def dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
 def row(rows: Array, i: int) -> tuple[float, float, float]:
     """Return a row of three as float64 scalars.
 
-    Parameters
-    ----------
-    rows : (n, 3) ndarray
-        Vectors or colours.
-    i : int
-        Which.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Its values.
+    `rows` (n, 3): vectors or colours.
     """
     return np.float64(rows[i, 0]), np.float64(rows[i, 1]), np.float64(rows[i, 2])
 
 
 @kernel
-def found(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+def hit_point(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Return the direction back along a ray and the point it found.
 
-    Parameters
-    ----------
-    paths : Paths
-        The batch.
-    ray : int
-        Which, of those that found something.
-
-    Returns
-    -------
-    tuple of 2 tuples of 3 floats
-        Unit vector, and point (m).
+    `ray`: which, of those that found something. Result: unit vector, and point (m).
     """
     t = np.float64(paths.distance[ray])
     dx, dy, dz = row(paths.direction, ray)

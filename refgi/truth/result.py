@@ -1,11 +1,11 @@
-"""TruthResult: irradiance by path tracing, and how sure it is at every scale.
+"""TruthResult: irradiance by path tracing, with standard errors of pixels, blocks and picture.
 
 Means over passes: running mean and sum of squared deviations, in float64 (Welford's update).
 
 Passes are independent, so the spread of their values gives the variance of the mean, whatever correlation there is
-between the samples inside a pass or between pixels. Pixels share lit points, so the errors of means over several pixels
-do not follow from theirs: means over blocks of 8 x 8 pixels and over the picture are followed as values of their own.
-A value that is not a finite number is left out of all of them and counted.
+between the samples inside a pass or between pixels. Pixels share light vertices, so the errors of means over several
+pixels do not follow from theirs: means over blocks of 8 x 8 pixels and over the picture are followed as values of their
+own. A value that is not a finite number is left out of all of them and counted.
 """
 
 from typing import Any, NamedTuple
@@ -21,7 +21,7 @@ BLOCK_SIDE = 8  # pixels
 
 
 class Moments(NamedTuple):
-    """What all passes so far add up to; updated in place."""
+    """Running moments of all passes so far; updated in place."""
 
     passes: Array  # () int64
     mean: Array  # (3, n) float64
@@ -52,7 +52,7 @@ def no_passes(values: int) -> Moments:
 
 
 def add_pass(moments: Moments, values: Array) -> None:
-    """Take one pass into the moments.
+    """Add one pass to the moments (Welford).
 
     Parameters
     ----------
@@ -105,9 +105,9 @@ def with_means(values: Array, block: Array, blocks: int) -> Array:
         receivers, NaN where none is finite.
     """
     finite = np.isfinite(values).all(axis=0)
-    block, kept = np.append(block, np.full(len(block), blocks)), np.tile(values, 2)  # the picture is one block more
-    counts = [np.bincount(block[some], minlength=blocks + 1) for some in (np.tile(finite, 2), slice(None))]
-    sums = np.stack([np.bincount(block, channel, blocks + 1) for channel in np.where(np.tile(finite, 2), kept, 0)])
+    block, doubled = np.append(block, np.full(len(block), blocks)), np.tile(values, 2)  # the picture is one block more
+    counts = [np.bincount(block[chosen], minlength=blocks + 1) for chosen in (np.tile(finite, 2), slice(None))]
+    sums = np.stack([np.bincount(block, channel, blocks + 1) for channel in np.where(np.tile(finite, 2), doubled, 0)])
     means = sums / np.maximum(counts[0], 1)
     means[:, (counts[0] == 0) & (counts[1] > 0)] = np.nan
     return np.concatenate([values, means], axis=1)
@@ -118,13 +118,13 @@ def _add(mean: Array, squares: Array, values: Array, finite: Array, count: Array
     for i in prange(values.shape[1]):
         if finite[i]:
             for c in range(3):
-                delta = values[c, i] - mean[c, i]
+                delta = values[c, i] - mean[c, i]  # Welford's update
                 mean[c, i] += delta / count[i]
                 squares[c, i] += delta * (values[c, i] - mean[c, i])
 
 
 class TruthResult(NamedTuple):
-    """Irradiance by path tracing, and how sure it is.
+    """Irradiance by path tracing, and its standard error.
 
     Variances are estimated from the spread of the passes, with `degrees_of_freedom` = passes - 1: from two passes they
     say little more than the order of magnitude. `confidence_factor` turns standard errors into intervals that know it.
@@ -132,7 +132,7 @@ class TruthResult(NamedTuple):
 
     mean: Array  # (3, h, w) float64, W/m^2
     variance_of_mean: Array  # (3, h, w) float64, (W/m^2)^2
-    samples: Array  # (h, w) int64 samples a pixel; 0 where nothing is seen
+    samples: Array  # (h, w) int64 samples a pixel; 0 without surface
     picture_mean: Array  # (3,) float64: mean over all pixels that see a surface
     picture_variance: Array  # (3,) float64: variance of that mean, with the correlation between pixels
     passes: int
@@ -185,7 +185,7 @@ class TruthResult(NamedTuple):
 
     @property
     def error_statement(self) -> str:
-        """What is known of the error, in a sentence."""
+        """The confidence intervals, in a sentence."""
         factor = self.confidence_factor()
         parts = ((self.pixel_error, "a pixel"), (self.block_error, f"a block of {BLOCK_SIDE}x{BLOCK_SIDE} pixels"),
                  (self.picture_error, "the picture's mean"))
@@ -209,7 +209,7 @@ class TruthResult(NamedTuple):
 
 def result_of(moments: Moments, pixel: Array, shape: tuple[int, ...], blocks: tuple[Array, tuple[int, int]],
               per_pass: int) -> TruthResult:
-    """Lay out moments as pictures.
+    """Return moments as pictures.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def result_of(moments: Moments, pixel: Array, shape: tuple[int, ...], blocks: tu
     Returns
     -------
     TruthResult
-        Zero where nothing is seen.
+        Zero without surface.
     """
     (block, grid), r = blocks, len(pixel)
     mean, variance = np.zeros((3, *shape)), np.zeros((3, *shape))

@@ -1,4 +1,4 @@
-"""TruthSettings: what the ground truth is asked for."""
+"""TruthSettings: how the ground truth is estimated, and when it stops."""
 
 import dataclasses
 import math
@@ -6,77 +6,64 @@ from pathlib import Path
 from typing import Literal
 
 from refgi.errors import expect
+from refgi.settings import Settings, setting
 
 Estimator = Literal["combined", "hemisphere", "light"]
-Emitters = Literal["all", "seen"]
+Emitters = Literal["all", "visible"]
 
 # By trial the least error in equal time on the Cornell box, at 0.5 s as at 5 s; half or twice of each differs little.
 PICKS, DIRECTIONS, DIRECTIONS_ALONE, BOUND = 16, 8, 16, 0.1
 
 
 @dataclasses.dataclass(frozen=True)
-class TruthSettings:
-    """How the ground truth is computed and when it stops: at the first of `samples`, `seconds`, `target_error`.
+class TruthSettings(Settings):
+    """How the ground truth is computed; it stops at the first of `samples`, `seconds`, `target_error`.
 
-    - `estimator`: "combined" (split at a bounded geometry term), "hemisphere" or "light" alone.
-    - `samples` per pixel (picks of lit points plus hemisphere directions; at least two passes are made), `seconds`
-      (checked after each pass), `target_error` (root mean square standard error of the picture over its mean).
+    - `target_error` is the root mean square standard error of the picture over its mean; `seconds` is checked after
+      each pass.
     - `visibility=False`: nothing blocks between emitter and receiver; the emitter's direct light stays shadowed.
-    - `emitters="seen"`: only what the camera sees lights anything (inside its picture, facing it, nothing between), as
-      for a method that knows the picture alone. `visibility` remains a choice of its own.
-    - `bounces` before the receiver, diffuse or glossy, 1 or more.
-    - `caustics`: add light through mirror-like lobes and glass, by `photons` from each light in a pass; those lobes are
-      then left out of the estimators.
-    - `seed`: which random numbers.
-    - `interleave`^2 sets of lit points a pass: pixel (x, y) picks from set (x mod `interleave`, y mod `interleave`).
-    - `uniform_share` of each light's rays go out evenly, the rest where a pilot found that they light the picture.
-    - `light_grid` directions along one side of each light's grid, `picks` of lit points and `directions` over the
-      hemisphere (8, or 16 for "hemisphere") of each receiver in a pass; `bound` is the largest geometry term left to
-      the light side, in units of 1 / footprint of a light direction.
-    - `checkpoint`: file that holds all passes so far; an existing one of the same computation is continued.
-    - `batch` rays are traced at a time, which changes memory and never a bit of the result.
+    - `emitters="visible"`: only surfaces that the camera sees emit (inside its picture, facing it, nothing between), as
+      for a screen-space method. `visibility` remains a choice of its own.
+    - `caustics`: photons also carry light through mirror-like lobes and glass; those lobes are then left out of the
+      estimators. Without, photons follow the sharpest lobes alone, on their first bounce.
+    - `estimator`: "combined" is multiple importance sampling (MIS) of both at a bounded geometry term.
+    - `interleave`^2 sets of light vertices a pass: pixel (x, y) picks from set (x mod n, y mod n), n = `interleave`.
+    - `uniform_share` of each light's rays are uniform, the rest follow the density of a pilot pass.
     """
 
-    estimator: Estimator = "combined"
-    samples: int = 192
-    seconds: float | None = None
-    target_error: float | None = None
-    visibility: bool = True
-    emitters: Emitters = "all"
-    bounces: int = 1
-    caustics: bool = False
-    photons: int = 1 << 18
-    seed: int = 0
-    light_grid: int = 32
-    interleave: int = 4
-    uniform_share: float = 0.5
-    picks: int = PICKS
-    directions: int | None = None
-    bound: float = BOUND
-    checkpoint: Path | str | None = None
-    batch: int = 1 << 18
+    samples: int = setting(192, "samples a pixel: picks of light vertices and directions; two passes at least", least=1,
+                           most=2**31)
+    seconds: float | None = setting(None, "time to stop after", above=0.0, unit="s")
+    target_error: float | None = setting(None, "relative standard error to stop at", above=0.0)
+    bounces: int = setting(1, "bounces before the receiver, diffuse or glossy", least=1, most=64)
+    visibility: bool = setting(True, "surfaces block light between emitter and receiver")
+    emitters: Emitters = setting("all", "which surfaces emit: all, or those visible to the camera")
+    caustics: bool = setting(False, "photons carry light through mirror-like lobes and glass")
+    seed: int = setting(0, "which random numbers", least=0, most=2**32 - 1)
+    estimator: Estimator = setting("combined", "both estimators combined by MIS, or one alone", study=True)
+    photons: int = setting(1 << 18, "photons of each light in a pass", least=1, most=2**28, study=True)
+    light_grid: int = setting(32, "directions along one side of each light's grid", least=1, most=1024, study=True)
+    interleave: int = setting(4, "pixels along one side of the pattern of sets of light vertices", least=1, most=64,
+                              study=True)
+    uniform_share: float = setting(0.5, "share of each light's rays that are uniform", above=0.0, most=1.0, study=True)
+    picks: int = setting(PICKS, "light vertices that each receiver picks in a pass", least=1, most=1024, study=True)
+    directions: int | None = setting(None, "hemisphere directions of each receiver in a pass; none: 8, or 16 alone",
+                                     least=1, most=65536, study=True)
+    bound: float = setting(BOUND, "largest geometry term left to the light side, in 1 / footprint of a direction",
+                           above=0.0, study=True)
+    checkpoint: Path | str | None = setting(None, "file of all passes so far, continued where it exists", study=True)
+    batch: int = setting(1 << 18, "rays traced at a time: memory, never a bit of the result", least=1, most=2**30,
+                         study=True)
 
-    def __post_init__(self) -> None:
-        expect(self.estimator in ("combined", "hemisphere", "light"), "estimator",
-               "'combined', 'hemisphere' or 'light'", self.estimator)
-        expect(self.emitters in ("all", "seen"), "emitters", "'all' or 'seen'", self.emitters)
-        for key, low, high in (("samples", 1, 2**31), ("bounces", 1, 64), ("seed", 0, 2**32 - 1),
-                               ("light_grid", 1, 1024), ("interleave", 1, 64), ("picks", 1, 1024),
-                               ("photons", 1, 2**28), ("batch", 1, 2**30)):
-            value = getattr(self, key)
-            expect(isinstance(value, int) and low <= value <= high, key, f"an integer, {low} to {high}", value)
-        expect(self.directions is None or 1 <= self.directions <= 65536, "directions", "1 to 65536",
-               self.directions)
-        for key in ("seconds", "target_error"):
-            value = getattr(self, key)
-            expect(value is None or (math.isfinite(value) and value > 0), key, "a finite number > 0", value)
-        expect(0 < self.uniform_share <= 1, "uniform_share", "a number in (0, 1]", self.uniform_share)
-        expect(math.isfinite(self.bound) and self.bound > 0, "bound", "a finite number > 0", self.bound)
+    def check(self) -> None:
+        """Check the settings that depend on each other."""
         expect(self.bounces == 1 or self.estimator != "light", "bounces",
                "1 for the light estimator, which knows no further bounce", self.bounces)
         expect(self.bounces == 1 or self.visibility, "visibility", "True for more than one bounce", self.visibility)
         expect(self.emitters == "all" or (self.bounces == 1 and not self.caustics), "emitters",
                "'all' for caustics or more than one bounce", self.emitters)
+        expect(self.checkpoint is None or isinstance(self.checkpoint, Path | str), "checkpoint", "a file's name",
+               self.checkpoint)
 
     @property
     def traces_rays(self) -> bool:
@@ -85,7 +72,7 @@ class TruthSettings:
 
     @property
     def picks_per_pass(self) -> int:
-        """Lit points that each receiver picks in a pass."""
+        """Light vertices that each receiver picks in a pass."""
         return 0 if self.estimator == "hemisphere" else self.picks
 
     @property

@@ -1,13 +1,13 @@
-"""What rays find: the tables kernels read, and the light that a directly lit point sends on.
+"""Triangles and materials for kernels, and the radiance that a directly lit point reflects.
 
-Symbols: y a lit point, n its shading normal and g its face normal, both on the lit side, l the direction to the
-light, F = I(l) cos(g, l) / d^2 the incident flux per area, w a direction away from y.
+Symbols: y a lit point, n its shading normal and g its face normal, both on the side of the light, l the direction to
+the light, F = I(l) cos(g, l) / d^2 the incident flux per area, w a direction away from y.
 
 - Diffuse: intensity per area rho_d F / pi <n.w>, so that a whole texel sends Phi / pi <n.w>, the RSM's convention.
 - Lobe: rho_s F (P + 1) / (2 pi K) <r.w>^P [n.w > 0], r the mirror direction about n, K the part above the surface.
 
 Both are written rho F / pi * pattern(w), where pattern is <n.w>, or (P + 1) / (2 K) <r.w>^P. Light leaves only on the
-lit side of the face: g.w > 0.
+side of the light: g.w > 0.
 """
 
 import math
@@ -40,17 +40,7 @@ class Surfaces(NamedTuple):
 def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
     """Lay out a scene's triangles and materials for kernels.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    mirror_exponent : float
-        Lobes of at least this exponent are left out.
-
-    Returns
-    -------
-    Surfaces
-        Dielectrics have no reflectance in it.
+    `mirror_exponent`: lobes of at least this exponent are left out. Result: dielectrics have no reflectance in it.
     """
     geometry, table = scene.geometry, material_table(scene.materials)
     table.diffuse[table.ior > 0] = 0
@@ -65,35 +55,14 @@ def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
 def lights_of(scene: Scene) -> LightTable:
     """Return a scene's lights for kernels in float64.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-
-    Returns
-    -------
-    LightTable
-        One row a light.
+    Result: one row a light.
     """
     return light_table(scene.lights)
 
 
 @kernel
 def face_cross(surfaces: Surfaces, triangle: int) -> tuple[float, float, float]:
-    """Return the cross product of two edges of a triangle: along its normal, twice its area long.
-
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    triangle : int
-        Which one.
-
-    Returns
-    -------
-    tuple of 3 floats
-        The vector, m^2.
-    """
+    """Return the cross product of two edges of a triangle: along its normal, twice its area long."""
     v = surfaces.vertices
     i, j, k = surfaces.faces[triangle, 0], surfaces.faces[triangle, 1], surfaces.faces[triangle, 2]
     ax, ay, az = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
@@ -105,19 +74,7 @@ def face_cross(surfaces: Surfaces, triangle: int) -> tuple[float, float, float]:
 def face_normal(surfaces: Surfaces, triangle: int, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
     """Return a triangle's unit normal on the side against a direction.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    triangle : int
-        Which one.
-    dx, dy, dz : float
-        Direction in which the surface is seen or lit.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Unit vector g with g.d <= 0.
+    `dx`, `dy`, `dz`: direction of a ray or of light towards the surface. Result: unit vector g with g.d <= 0.
     """
     nx, ny, nz = face_cross(surfaces, triangle)
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
@@ -130,21 +87,7 @@ def shading_normal(surfaces: Surfaces, triangle: int, y: tuple[float, float, flo
                    g: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return the interpolated unit normal at a point, on the side of the face normal g; g itself on flat faces.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    triangle : int
-        Which one the point lies on.
-    y : tuple of 3 floats
-        The point, m.
-    g : tuple of 3 floats
-        Unit face normal.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Unit vector n with n.g >= 0.
+    `triangle`: which one the point lies on. `y`: the point, m. Result: unit vector n with n.g >= 0.
     """
     if len(surfaces.normals) == 0:
         return g
@@ -172,21 +115,7 @@ def height_above(surfaces: Surfaces, triangle: int, y: tuple[float, float, float
                  g: tuple[float, float, float]) -> Any:
     """Return how far the rounding of a ray's distance moved a found point off its face.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    triangle : int
-        Which triangle was found.
-    y : tuple of 3 floats
-        Where, m.
-    g : tuple of 3 floats
-        Unit face normal.
-
-    Returns
-    -------
-    float
-        Length along g, m.
+    `triangle`: which triangle was found. `y`: where, m. Result: length along g, m.
     """
     v, i = surfaces.vertices, surfaces.faces[triangle, 0]
     return (y[0] - v[i, 0]) * g[0] + (y[1] - v[i, 1]) * g[1] + (y[2] - v[i, 2]) * g[2]
@@ -197,23 +126,8 @@ def lift(surfaces: Surfaces, triangle: int, y: tuple[float, float, float], g: tu
          grain: float) -> Any:
     """Return how far along the face normal from a found point a ray must start.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    triangle : int
-        Which triangle was found.
-    y : tuple of 3 floats
-        Where, as the ray's rounded distance has it, m.
-    g : tuple of 3 floats
-        Unit face normal on the side to start on.
-    grain : float
-        The tracer's, m.
-
-    Returns
-    -------
-    float
-        Length, m: the offset from the face.
+    `triangle`: which triangle was found. `y`: where, as the ray's rounded distance has it, m. `g`: unit face normal on
+    the side to start on. `grain`: the tracer's, m. Result: length, m: the offset from the face.
     """
     return ray_offset(y[0], y[1], y[2], grain) - height_above(surfaces, triangle, y, g)
 
@@ -223,19 +137,8 @@ def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float
                  w: tuple[float, float, float]) -> Any:
     """Return (P + 1) / (2 K) <r.w>^P [n.w > 0], the lobe's emission relative to diffuse rho F / pi.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    material : int
-        Which material.
-    n, light, w : tuple of 3 floats
-        Shading normal, towards the light, away from the point; unit vectors, but for w, whose length may be rounded.
-
-    Returns
-    -------
-    float
-        The pattern; its integral over directions above the surface is pi.
+    `n`, `light`, `w`: shading normal, towards the light, away from the point; unit vectors, but for w, whose length may
+    be rounded. Result: the pattern; its integral over directions above the surface is pi.
     """
     exponent = surfaces.exponent[material]
     cos_in = n[0] * light[0] + n[1] * light[1] + n[2] * light[2]
@@ -244,6 +147,7 @@ def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float
         return 0.0
     twice = 2 * cos_in  # r = 2 (n.l) n - l
     gap = lobe_gap(twice * n[0] - light[0], twice * n[1] - light[1], twice * n[2] - light[2], w[0], w[1], w[2])
+    # SII Eq. (3), normalised by K, over the diffuse 1 / pi
     return np.pi * lobe_norm(cos_in, exponent) * lobe_power(gap, exponent) if gap < 1 else 0.0
 
 
@@ -251,17 +155,7 @@ def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float
 def around(axis: tuple[float, float, float], x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return a local direction (z along the axis) in world space.
 
-    Parameters
-    ----------
-    axis : tuple of 3 floats
-        Unit vector.
-    x, y, z : float
-        Local direction.
-
-    Returns
-    -------
-    tuple of 3 floats
-        World direction of the same length.
+    Result: world direction of the same length.
     """
     tx, ty, tz, bx, by, bz = orthonormal_basis(axis[0], axis[1], axis[2])
     return (tx * x + bx * y + axis[0] * z, ty * x + by * y + axis[1] * z, tz * x + bz * y + axis[2] * z)

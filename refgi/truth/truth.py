@@ -1,4 +1,4 @@
-"""The ground truth: one-bounce irradiance at the G-buffer's points, with its standard error."""
+"""The ground truth: path-traced one-bounce irradiance at the G-buffer's points, with its standard error."""
 
 import dataclasses
 import hashlib
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-WHEN_IT_STOPS = {"samples", "seconds", "target_error", "checkpoint", "batch"}  # settings that change no pass
+STOPPING = {"samples", "seconds", "target_error", "checkpoint", "batch"}  # settings that change no pass
 
 def truth(frame: "Frame", settings: TruthSettings | None = None) -> Array:
     """Compute the one-bounce irradiance by path tracing.
@@ -40,7 +40,7 @@ def truth(frame: "Frame", settings: TruthSettings | None = None) -> Array:
     Parameters
     ----------
     frame : Frame
-        What is seen and lit.
+        The view of the scene.
     settings : TruthSettings, optional
         How; the defaults where absent.
 
@@ -58,7 +58,7 @@ def trace_truth(frame: "Frame", settings: TruthSettings | None = None) -> TruthR
     Parameters
     ----------
     frame : Frame
-        What is seen and lit.
+        The view of the scene.
     settings : TruthSettings, optional
         How; the defaults where absent.
 
@@ -113,19 +113,19 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
         _warm_up(scene, tracer, buffer, settings)
     started = time.perf_counter()
     task = task_of(scene, tracer, *buffer, settings)
-    block, grid = blocks_of(task.to.pixel, triangle_id.shape)
+    block, grid = blocks_of(task.receivers.pixel, triangle_id.shape)
     values = len(block) + grid[0] * grid[1] + 1
     file = Checkpoint(Path(settings.checkpoint), _fingerprint(task, triangle_id.shape), values) \
         if settings.checkpoint else None
     moments = file.moments if file else no_passes(values)
-    while not _enough(moments, len(block), settings, time.perf_counter() - started):
+    while not _is_done(moments, len(block), settings, time.perf_counter() - started):
         add_pass(moments, with_means(one_pass(task, int(moments.passes)), block, grid[0] * grid[1]))
         if file:
             file.save_when_due()
         report_progress(min(1.0, int(moments.passes) / settings.passes))
     if file:
         file.save()
-    result = result_of(moments, task.to.pixel, triangle_id.shape, (block, grid),
+    result = result_of(moments, task.receivers.pixel, triangle_id.shape, (block, grid),
                        settings.picks_per_pass + settings.directions_per_pass)
     if result.lost:
         warnings.warn(RefgiWarning(f"scene {scene.name!r}: {result.lost} of {int(moments.passes) * len(block)} values "
@@ -134,7 +134,7 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
 
 
 def _photons(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> tuple[Film | None, float]:
-    """Return where photons are counted, and the exponent from which on lobes are left to them; warn where none can be.
+    """Return the film of photons, and the exponent from which on lobes are left to them; warn where none can be.
 
     Photons follow lobes without `visibility` or for what the camera sees as little as beyond the first bounce.
     """
@@ -154,7 +154,7 @@ def _photons(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> t
 
 
 def _warm_up(scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array], settings: TruthSettings) -> None:
-    """Run a pass of one pixel that nobody waits for: kernels are compiled or loaded before the clock starts."""
+    """Run a pass of one pixel, so that kernels are compiled or loaded before the clock starts."""
     settings = dataclasses.replace(settings, photons=1)
     covered = np.flatnonzero(buffer[2].reshape(-1) >= 0)[:1]
     position, normal = (field.reshape(3, 1, -1)[..., covered] for field in buffer[:2])
@@ -165,7 +165,7 @@ def _warm_up(scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array], sett
 
 def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
             settings: TruthSettings) -> Task:
-    """Prepare what every pass works on.
+    """Prepare the inputs of every pass.
 
     Parameters
     ----------
@@ -185,16 +185,16 @@ def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_
     Task
         With the densities that the pilot found.
     """
-    to = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
-    set_of = sets_of(to.pixel, triangle_id.shape[1], settings.interleave)
+    points = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
+    set_of = sets_of(points.pixel, triangle_id.shape[1], settings.interleave)
     caustics, left_to_photons = _photons(scene, triangle_id.shape, settings)
-    found = surfaces(scene, left_to_photons)
-    view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "seen" else None
-    task = Task(scene, settings, tracer, found, lights_of(scene), to, set_of, caustics, view)
+    reflecting = surfaces(scene, left_to_photons)
+    view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "visible" else None
+    task = Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, caustics, view)
     return task._replace(densities=pilot(task))
 
 
-def _enough(moments: Moments, receivers: int, settings: TruthSettings, seconds: float) -> bool:
+def _is_done(moments: Moments, receivers: int, settings: TruthSettings, seconds: float) -> bool:
     passes = int(moments.passes)
     if passes < 2:
         return False
@@ -209,11 +209,11 @@ def _enough(moments: Moments, receivers: int, settings: TruthSettings, seconds: 
 def _fingerprint(task: Task, shape: tuple[int, ...]) -> bytes:
     """Return a digest of everything the passes depend on; not of when they stop."""
     chosen = {field.name: getattr(task.settings, field.name) for field in dataclasses.fields(task.settings)
-              if field.name not in WHEN_IT_STOPS}
+              if field.name not in STOPPING}
     digest = hashlib.sha256(repr((sys.modules["refgi"].__version__, shape, chosen)).encode())
-    seen_by = () if task.view is None else (task.view.origin, task.view.frame, task.view.half)
+    view_arrays = () if task.view is None else (task.view.origin, task.view.frame, task.view.half)
     film = () if task.caustics is None else (task.caustics.solid_angle, *task.caustics.mirrors, task.caustics.ior)
-    for array in (*task.surfaces, *task.lights, *task.to, *seen_by, *film):
+    for array in (*task.surfaces, *task.lights, *task.receivers, *view_arrays, *film):
         digest.update(repr((array.shape, array.dtype.str)).encode() + np.ascontiguousarray(array).data)
     return digest.digest()
 

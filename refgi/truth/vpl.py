@@ -1,6 +1,6 @@
-"""Pixel lights with ray-traced visibility: what every method of pixel lights converges to.
+"""Pixel lights (VPLs) with ray-traced visibility, the limit of every method of pixel lights.
 
-E(x) = sum_i Phi_i / pi <n_i.w> <n_x.-w> / r^2 V(x, x_i), and the same with a lobe (papers' Eq. 2 and 3, calibrated).
+E(x) = sum_i Phi_i / pi <n_i.w> <n_x.-w> / r^2 V(x, x_i), and the same with a lobe (SII Eq. 2 and 3, calibrated).
 """
 
 import dataclasses
@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from refgi.errors import expect
 from refgi.method import Method
+from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, receivers, shadowed_sum
+from refgi.settings import Settings, setting
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -23,27 +24,25 @@ Pattern = Literal["grid", "halton", "all", "random"]
 
 
 @dataclasses.dataclass(frozen=True)
-class VplSettings:
-    """Which pixel lights `vpl` uses, as for `sii`, and whether they are shadowed.
+class VplLights(Settings):
+    """Which texels of shadow maps are pixel lights."""
 
-    `lights` a shadow map are taken from a `pattern` ("all": every texel, `lights` is not used) with `seed`;
-    `filtered` averages the flux over each light's cell. `visibility=False` leaves out the rays. `batch` pairs are
-    held at a time, which changes no bit of the result.
-    """
+    PRINCIPAL = "count"
 
-    lights: int = 768
-    pattern: Pattern = "halton"
-    seed: int = 0
-    filtered: bool = False
-    visibility: bool = True
-    batch: int = BATCH
+    count: int = setting(768, "pixel lights of a map", least=1, most=MOST_LIGHTS)
+    pattern: Pattern = setting("halton", "where they lie in a map; all: every texel, whatever the count")
+    filtered: bool = setting(False, "flux is averaged over each light's cell (SII Sec. 4)")
+    seed: int = setting(0, "which random numbers", least=0, most=LAST_SEED)
 
-    def __post_init__(self) -> None:
-        expect(1 <= self.lights <= MOST_LIGHTS, "lights", f"1 to {MOST_LIGHTS:,} pixel lights", self.lights)
-        expect(self.pattern in ("grid", "halton", "all", "random"), "pattern",
-               "'grid', 'halton', 'all' or 'random'", self.pattern)
-        expect(self.seed >= 0, "seed", "a whole number >= 0", self.seed)
-        expect(1 <= self.batch <= 2**30, "batch", f"1 to {2**30:,} pairs", self.batch)
+
+@dataclasses.dataclass(frozen=True)
+class VplSettings(Settings):
+    """Which pixel lights `vpl` uses, and whether they are shadowed."""
+
+    lights: VplLights = setting(VplLights(), "pixel lights")
+    visibility: bool = setting(True, "a shadow ray for each pair of light and receiver")
+    batch: int = setting(BATCH, "pairs held at a time: memory, never a bit of the result", least=1, most=2**30,
+                         study=True)
 
     @property
     def traces_rays(self) -> bool:
@@ -52,12 +51,12 @@ class VplSettings:
 
 
 def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
-    """Light every pixel by pixel lights with a shadow ray each.
+    """Sum pixel lights at every pixel, with a shadow ray for each pair.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The view of the scene.
     settings : VplSettings, optional
         Which lights; the defaults where absent.
 
@@ -69,13 +68,16 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     from refgi.lights import choose_pixel_lights
 
     settings = settings or VplSettings()
-    lights = choose_pixel_lights(frame.rsms, count=None if settings.pattern == "all" else settings.lights,
-                                 pattern=settings.pattern, seed=settings.seed, filtered=settings.filtered)
+    chosen = settings.lights
+    lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
+                                 pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
     buffer = frame.gbuffer
-    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
+    points = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id,
+                       frame.tracer.grain)
     irradiance = np.zeros((3, frame.height, frame.width), frame.dtype)
-    irradiance.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, lights, visibility=settings.visibility,
-                                                           batch=settings.batch)
+    # SII Eq. (2), (3) with visibility V(x, x_i)
+    irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(frame.tracer, points, lights,
+                                                              visibility=settings.visibility, batch=settings.batch)
     return irradiance
 
 

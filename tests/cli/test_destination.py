@@ -73,14 +73,6 @@ def test_a_refused_scene_leaves_no_folder(verb):
     assert not Path("new").exists()
 
 
-def test_bench_spares_other_programs_files_too():
-    Path("out").mkdir()
-    Path("out", "table1_other.png").write_text("precious")
-    arguments = ["--paper", "sii", "--only", "table1", "--quick", "--out", "out"]
-    assert refused(run("bench", *arguments), "table1_other.png", "--force")
-    assert refused(run("bench", *arguments[:-1], "a/b"), "--parents")
-
-
 def test_one_file_by_its_name():
     Path("mine.exr").write_text("precious")
     assert refused(run("render", "cornell_box", "--out", "mine.exr"), "mine.exr", "--force")

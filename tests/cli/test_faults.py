@@ -63,7 +63,6 @@ def fault(result):
     (["sequence", "cornell_box", "none.toml", "--out", "a"], "none.toml", None),
     (["compare", "cornell_box", "--methods", "sii,nothing"], None, None),
     (["compare", "cornell_box", "--set", "lights=3"], None, "--set"),
-    (["bench", "--out", "a"], None, "--paper"),
     (["explain", "cornell_box", "--method", "nothing"], None, None),
 ], ids=str)
 def test_every_error_is_one_object_on_stdout(arguments, file, key):

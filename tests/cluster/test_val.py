@@ -47,7 +47,7 @@ def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
     """Oracle: `sii` without a cut, at equal lights."""
     at = frame(dtype=dtype)
     plain = val(at, of(ValSettings, visibility="none", **SMALL))
-    full = sii(at, of(SiiSettings, lights=64, i_low=0))
+    full = sii(at, of(SiiSettings, lights=64))
     off = np.abs(plain - full).max() / full.max()
     assert off <= SUM[dtype]
     evidence(f"{np.dtype(dtype).name}: against sii {off:.1e} of the brightest pixel")

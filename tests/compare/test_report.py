@@ -11,7 +11,7 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from refgi.compare.plot import Point, time_against_error
+from refgi.compare.plot import Axes, Curve, Point, curves_plot, time_against_error
 from refgi.compare.report import PAGE, ledger_cells, number, page, write_report
 from refgi.errors import RefgiWarning
 from refgi.image import is_from_refgi, tone_map
@@ -190,3 +190,12 @@ def test_the_plot_is_the_same_each_time_and_leaves_out_what_has_no_place():
 @pytest.mark.parametrize("points", [[], [Point("sii", 0.2, 1e-2, True)]])
 def test_a_plot_of_few_points_is_drawn(points):
     assert "</svg>" in time_against_error(points, 0.0)
+
+
+def test_curves_leave_out_what_cannot_be_drawn():
+    points = Curve("a", (1, 2, 4), (1.0, float("nan"), 3.0)), Curve("b", (0, 2, 4), (1.0, 0.0, 3.0), dashed=True)
+    svg = curves_plot(points, Axes("lights", "error", log_x=True, log_y=True))
+    assert svg == curves_plot(points, Axes("lights", "error", log_x=True, log_y=True))
+    assert 'aria-label="error over lights"' in svg
+    assert "nan" not in svg
+    assert "#0102" not in svg

@@ -24,7 +24,7 @@ def lights_of(scene, **settings):
 @pytest.mark.feature("SII-17")
 def test_first_bounce_has_the_mean_of_the_map(evidence):
     frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=512)
-    clamp = {"clamp": "distance", "clamp_value": 0.05, "i_low": 0}
+    clamp = {"clamp": "distance", "clamp_value": 0.05}
     reference = sii(frame, of(SiiSettings, pattern="all", **clamp)).astype(float).mean(axis=(1, 2))
     walks = (of(SiiSettings, source="walk", lights=1000, seed=s, **clamp) for s in range(1, 31))
     runs = np.array([sii(frame, walk).mean(axis=(1, 2), dtype=float) for walk in walks])
@@ -71,7 +71,7 @@ def test_irradiance_of_all_bounces_in_a_sphere(evidence):
     rho, bounces = 0.5, 6
     scene = load_scene(f"integrating_sphere:faces=20000,albedo={rho}")
     frame = Frame(scene, width=16, height=16)
-    got = sii(frame, of(SiiSettings, source="walk", lights=3000, bounces=bounces, i_low=0))
+    got = sii(frame, of(SiiSettings, source="walk", lights=3000, bounces=bounces))
     light = scene.lights[0]
     half = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
     emitted = light.intensity[0] * 2 * math.pi * ((1 - half[0]) + 0.5 * (half[0] - half[1]))

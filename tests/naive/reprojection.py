@@ -25,7 +25,7 @@ def same_surface(depth, ray, z, d, normal, tolerance):
     return slant < 0 and abs(depth - float(normal @ d) / slant) <= tolerance * z
 
 
-def look_up(values, depth, normal_there, point, normal, view, depth_tolerance, normal_cosine):
+def reproject(values, depth, normal_there, point, normal, view, depth_tolerance, normal_cosine):
     """Mean value and weight of the four texels around a point that show its surface."""
     height, width = depth.shape
     seen = place(point, *view, height, width)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.lights import PixelLights
-from refgi.pairs.shadow_rays import Receivers, shadowed_sum
+from refgi.pairs.shadow_rays import RayReceivers, shadowed_sum
 from refgi.rays import Tracer
 from refgi.scene import Geometry
 from tests.test_lobes import literal_power
@@ -23,7 +23,7 @@ def lobe(axis, exponent):
 
 def receiver(position, normal):
     at, up = (np.reshape(v, (3, 1)).astype(np.float32) for v in (position, normal))
-    return Receivers(np.array([0]), at, up, up, at)
+    return RayReceivers(np.array([0]), at, up, up, at)
 
 
 @pytest.mark.parametrize("exponent", [0.0, 3.0, 1e3, 1e6, 1e12])

@@ -86,10 +86,10 @@ def test_each_method_tells_of_its_clamp():
 
 
 @pytest.mark.parametrize("cut", [
-    {"i_low": 0.05, "reference_length": 0.2}, {"irradiance_low": 0.2}, {"i_low": 0.2}, {"i_low": 0.3, "bound": "quad"},
-    {"i_low": 0.2, "half_resolution": True},
-    {"i_low": 0.05, "reference_length": 0.1, "as_published": {"per_light_ilow"}},
-    {"irradiance_low": 0.5, "bound": "mesh", "mesh_faces": 8, "inflate": False}])
+    {"cut_share": 0.05, "reference_length": 0.2}, {"cut_irradiance": 0.2}, {"cut_share": 0.2},
+    {"cut_share": 0.3, "bound": "quad"}, {"cut_share": 0.2, "half_resolution": True},
+    {"cut_share": 0.05, "reference_length": 0.1, "as_published": {"per_light_ilow"}},
+    {"cut_irradiance": 0.5, "bound": "mesh", "bound_faces": 8, "bound_inflate": False}])
 def test_what_the_threshold_takes_is_told(cut):
     at, settings = frame("cornell_box"), of(SiiSettings, lights=LIGHTS, **cut)
     light, said = told(sii, at, settings)
@@ -97,12 +97,12 @@ def test_what_the_threshold_takes_is_told(cut):
     assert share > 2 + NEAR
     assert len(said) == 1
     assert said[0][0] == pytest.approx(share, abs=NEAR)
-    assert said[0][1].startswith(f"sii: irradiance_low {cut['irradiance_low']:g} W/m^2 takes" if "irradiance_low" in cut
-                                 else f"sii: i_low {cut['i_low']:g} with reference_length")
+    absolute = f"sii: reach.cut.irradiance {cut['cut_irradiance']:g} W/m^2 takes" if "cut_irradiance" in cut else ""
+    assert said[0][1].startswith(absolute or f"sii: reach.cut.share {cut['cut_share']:g} with reference_length")
 
 
 def test_clamp_and_threshold_are_told_apart():
-    at, settings = frame("cornell_box"), of(SiiSettings, clamp="distance", clamp_value=0.2, irradiance_low=0.1)
+    at, settings = frame("cornell_box"), of(SiiSettings, clamp="distance", clamp_value=0.2, cut_irradiance=0.1)
     light, said = told(sii, at, settings)
     clamped = full(at, settings)
     shares = 100 * (1 - clamped / full(at, settings, PairSettings())), 100 * (1 - light.sum(dtype=float) / clamped)
@@ -111,8 +111,8 @@ def test_clamp_and_threshold_are_told_apart():
 
 @pytest.mark.parametrize("settings", [
     of(SiiSettings, lights=LIGHTS), of(SiiSettings, lights=LIGHTS, clamp="distance", clamp_value=1e-4),
-    of(SiiSettings, lights=LIGHTS, irradiance_low=1e-6), of(SiiSettings, irradiance_low=0.5, stochastic_range=True),
-    of(SiiSettings, lights=LIGHTS, stochastic_range=True, bound="quad")])
+    of(SiiSettings, lights=LIGHTS, cut_irradiance=1e-6), of(SiiSettings, cut_irradiance=0.5, stochastic=True),
+    of(SiiSettings, lights=LIGHTS, stochastic=True, bound="quad")])
 def test_settings_that_take_little_or_nothing_in_the_mean_are_passed_over(settings):
     _, said = told(sii, frame("cornell_box"), settings)
     assert said == []
@@ -130,7 +130,7 @@ def test_a_black_or_empty_picture_has_nothing_to_lose():
     away = BOX.with_camera(eye=(0.0, 50.0, 0.0), target=(0.0, 60.0, 0.1))
     for scene in (dark, away):
         at = Frame(scene, width=16, height=16, rsm_resolution=16)
-        for method, settings in ((sii, of(SiiSettings, i_low=0.05, clamp="disc")), (multires, MultiresSettings()),
+        for method, settings in ((sii, of(SiiSettings, cut_share=0.05, clamp="disc")), (multires, MultiresSettings()),
                                  (gather, GatherSettings())):
             light, said = told(method, at, settings)
             assert np.isfinite(light).all()
@@ -172,7 +172,7 @@ def test_what_lies_outside_the_discs_of_gathering_is_told(radius):
     """Oracle: under a point light every pixel has a place on the map."""
     scene = BOX.with_lights(PointLight((0.3, 0.3, 0.2), (1.0, 1.0, 1.0)))
     at = Frame(scene, width=24, height=24, rsm_resolution=24)
-    _, said = told(gather, at, GatherSettings(radius=radius))
+    _, said = told(gather, at, of(GatherSettings, radius=radius))
     assert said[0][0] == pytest.approx(outside_share(at, radius), abs=NEAR)
     assert said[0][1].startswith(f"gather: radius {radius:g} of a map's width takes")
 
@@ -180,7 +180,7 @@ def test_what_lies_outside_the_discs_of_gathering_is_told(radius):
 def test_a_disc_over_the_whole_map_loses_nothing():
     at = frame("cornell_box")
     assert disc_loss(receivers(at), at.rsms, math.sqrt(2)) == 0
-    assert told(gather, at, GatherSettings(radius=1.5, samples=16))[1] == []
+    assert told(gather, at, of(GatherSettings, radius=1.5, samples=16))[1] == []
     assert 0 < disc_loss(receivers(at), at.rsms, 1.0) < disc_loss(receivers(at), at.rsms, 0.5)
 
 

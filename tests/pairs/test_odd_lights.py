@@ -10,13 +10,13 @@ from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import PairSettings
 from refgi.settings import of
 from refgi.splat.sii.reach.threshold import all_peaks, light_range, low_irradiance
-from refgi.splat.sii.settings import SplatSettings
+from refgi.splat.sii.settings import SiiSettings
 
 UP = np.array([[0.0], [1.0], [0.0]], np.float32)
 NORMS = ("none", "full_lobe", "clamped")
 SETTINGS = ({}, {"clamp": "disc"}, {"clamp": "sphere", "clamp_value": 1e18}, {"clamp": "distance", "clamp_value": 1e18},
-            {"widening": 1e9}, {"i_low": 0.0}, {"i_low": 1e9, "reference_length": 1e-9}, {"irradiance_low": 1e300},
-            {"as_published": {"per_light_ilow"}}, {"as_published": {"per_light_ilow"}, "i_low": 0.0})
+            {"widening": 1e9}, {"cut_share": 1e9, "reference_length": 1e-9}, {"cut_irradiance": 1e300},
+            {"as_published": {"per_light_ilow"}, "reference_length": 1e-9})
 
 
 def odd_lights(flux: float, exponent: float, axis: tuple[float, float, float]) -> PixelLights:
@@ -35,7 +35,7 @@ def test_all_that_is_packed_is_finite(flux, exponent, axis, real):
     lights = odd_lights(flux, exponent, axis)
     for norm in NORMS:
         for options in SETTINGS:
-            settings = of(SplatSettings, lobe_norm=norm, **options)
+            settings = of(SiiSettings, lobe_norm=norm, **options)
             for footprint in (0.0, 3e38):
                 packed = pack(lights, settings.pairs, np.full(3, footprint), real)
                 assert np.isfinite(packed.diffuse).all()
@@ -44,7 +44,7 @@ def test_all_that_is_packed_is_finite(flux, exponent, axis, real):
                 low = low_irradiance(lights, settings)
                 assert math.isfinite(low)
                 for peak in all_peaks(packed):
-                    assert np.isfinite(light_range(peak, low, settings, 0, real).square).all()
+                    assert np.isfinite(light_range(peak, low, settings.reach, 0, real).square).all()
 
 
 def test_peaks_within_the_dtype_are_as_the_equation_says():
@@ -55,8 +55,8 @@ def test_peaks_within_the_dtype_are_as_the_equation_says():
     assert beyond.lobes.lights[10:13].max() == np.float32(np.finfo(np.float32).max / HEADROOM)
 
 
-def test_without_a_share_nothing_is_cut_for_any_light():
-    settings = of(SplatSettings, as_published={"per_light_ilow"}, i_low=0.0)
-    reach = light_range(np.array([1.0, 0.0, 1e-30]), 0.0, settings, 0, np.float32)
+def test_a_tiny_share_cuts_nothing_for_any_light():
+    settings = of(SiiSettings, as_published={"per_light_ilow"}, cut_share=1e-300, reference_length=1.0)
+    reach = light_range(np.array([1.0, 0.0, 1e-30]), 0.0, settings.reach, 0, np.float32)
     farthest = math.sqrt(np.finfo(np.float32).max)
     assert reach.square.tolist() == [np.float32(farthest), 0.0, np.float32(farthest)]

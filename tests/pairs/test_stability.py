@@ -13,8 +13,8 @@ from refgi import Frame, load_scene
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight
 from refgi.settings import of, replaced
-from refgi.splat import PairSettings, SplatSettings, irradiance
-from refgi.splat.sii.splat import splat
+from refgi.splat import PairSettings, SiiSettings, irradiance
+from refgi.splat.sii.sii import splat
 from tests.pairs import sets
 
 U = 2.0**-24  # unit of rounding of float32
@@ -133,7 +133,7 @@ def test_sums_lose_no_more_than_their_groups(evidence):
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
-@pytest.mark.parametrize("how", [PairSettings(), of(PairSettings, widening=0.3), of(SplatSettings, i_low=0.05)])
+@pytest.mark.parametrize("how", [PairSettings(), of(PairSettings, widening=0.3), of(SiiSettings, cut_share=0.05)])
 @pytest.mark.feature("SII-07")
 def test_no_place_no_exponent_and_no_size_leaves_the_numbers(how, real, evidence):
     """Lights on receivers, 1e-6 m off them, and at grazing angles both ways, in scenes of 1e-6, 1 and 1e6 m."""
@@ -147,7 +147,7 @@ def test_no_place_no_exponent_and_no_size_leaves_the_numbers(how, real, evidence
                 lights = sets.glossy(places + off, -normal, axis, 0, real=real)
                 lights = lights._replace(flux=np.ones((3, count), real),
                                          lobe_exponent=np.resize(EXPONENTS, count).astype(real))
-                got = (splat if isinstance(how, SplatSettings) else irradiance)(here, lights, how)
+                got = (splat if isinstance(how, SiiSettings) else irradiance)(here, lights, how)
                 assert np.isfinite(got).all()
                 assert (got >= 0).all()
     evidence(f"{np.dtype(real).name}, {how}: 60 sets of 120 x 120 pairs finite")
@@ -161,21 +161,21 @@ def lit_room():
                                       lobe_exponent=(10 ** rng.uniform(-1, 6, 260)).astype(np.float32))
 
 
-@pytest.mark.parametrize("how", [PairSettings(), of(PairSettings, widening=0.5), SplatSettings(),
-                                 of(SplatSettings, i_low=0.05, reference_length=1.0),
-                                 of(SplatSettings, i_low=0.05, reference_length=1.0, stochastic_range=True)])
+@pytest.mark.parametrize("how", [PairSettings(), of(PairSettings, widening=0.5), SiiSettings(),
+                                 of(SiiSettings, cut_share=0.05, reference_length=1.0),
+                                 of(SiiSettings, cut_share=0.05, reference_length=1.0, stochastic=True)])
 @pytest.mark.parametrize("factor", [2.0, 4.0, 0.5, 1024.0])
 @pytest.mark.feature("REF-05")
 def test_powers_of_two_scale_to_the_bit(how, factor, evidence):
     receivers, lights = lit_room()
-    add = splat if isinstance(how, SplatSettings) else irradiance
+    add = splat if isinstance(how, SiiSettings) else irradiance
     once = add(receivers, lights, how)
     more = lights._replace(flux=lights.flux * np.float32(factor), lobe_flux=lights.lobe_flux * np.float32(factor))
     np.testing.assert_array_equal(add(receivers, more, how), once * np.float32(factor))
-    widening = (how.pairs if isinstance(how, SplatSettings) else how).lobe.widening
+    widening = (how.pairs if isinstance(how, SiiSettings) else how).lobe.widening
     there = {"widening": widening * factor}
-    if isinstance(how, SplatSettings) and how.cuts:
-        there["reference_length"] = how.reference_length * factor
+    if isinstance(how, SiiSettings) and how.reach.cut:
+        there["reference_length"] = how.reach.cut.reference_length * factor
     longer = add(receivers._replace(position=receivers.position * np.float32(factor)),
                  lights._replace(position=lights.position * np.float32(factor)), replaced(how, there))
     np.testing.assert_array_equal(longer, once / np.float32(factor**2))

@@ -70,7 +70,7 @@ def small(scene, shadows="map"):
 def hssil_by_rays(frame):
     from refgi.sssil import HssilSettings, hssil
 
-    return hssil(frame, HssilSettings(visibility="rays"))
+    return hssil(frame, of(HssilSettings, visibility="rays"))
 
 
 def multires_by_rays(frame):
@@ -93,12 +93,12 @@ def shares_of_rays(frame):
 
 
 def cameras_sight(frame):
-    from refgi.sssil.camera_transport import free
+    from refgi.sssil.camera_transport import unoccluded
 
     position, normal = (part[:, frame.gbuffer.covered].T.astype(float)
                         for part in (frame.gbuffer.position, frame.gbuffer.normal))
     lifted = position + frame.tracer.offsets(position)[:, None] * normal
-    return free(frame.tracer, lifted, np.roll(lifted, 7, axis=0)).astype(float)
+    return unoccluded(frame.tracer, lifted, np.roll(lifted, 7, axis=0)).astype(float)
 
 
 def walked_lights(frame):
@@ -111,10 +111,10 @@ def walked_lights(frame):
 
 USERS = {
     "truth": lambda frame: trace_truth(frame, TruthSettings(samples=48)).mean,
-    "two bounces": lambda frame: trace_truth(frame, TruthSettings("hemisphere", samples=32, bounces=2)).mean,
-    "seen": lambda frame: trace_truth(frame, TruthSettings(samples=48, emitters="seen")).mean,
+    "two bounces": lambda frame: trace_truth(frame, TruthSettings(estimator="hemisphere", samples=32, bounces=2)).mean,
+    "seen": lambda frame: trace_truth(frame, TruthSettings(samples=48, emitters="visible")).mean,
     "caustics": lambda frame: trace_truth(frame, TruthSettings(samples=48, caustics=True, photons=1 << 12)).mean,
-    "vpl": lambda frame: vpl(frame, VplSettings(lights=64)),
+    "vpl": lambda frame: vpl(frame, of(VplSettings, lights=64)),
     "hssil": hssil_by_rays,
     "multires": multires_by_rays,
     "reference modes of val": shares_of_rays,
@@ -270,10 +270,11 @@ def test_a_wall_lights_a_plane_far_away(away):
     camera = Camera((0.0, 3.0, away), (0.0, 0.0, away + 3.0), (0, 1, 0), 0.5, 16, 16)
     frame = small(dataclasses.replace(scene([*wall, ground], lamp), camera=camera))
     assert (frame.gbuffer.triangle_id >= 8).all()
-    free, open_ = (vpl(frame, VplSettings(lights=64, visibility=v)) for v in (True, False))
+    free, open_ = (vpl(frame, of(VplSettings, lights=64, visibility=v)) for v in (True, False))
     assert open_.mean() > 0
     assert (free == open_).all()
-    free, open_ = (trace_truth(frame, TruthSettings("light", samples=32, visibility=v)).mean for v in (True, False))
+    free, open_ = (trace_truth(frame, TruthSettings(estimator="light", samples=32, visibility=v)).mean
+                   for v in (True, False))
     assert (free == open_).all()
 
 
@@ -301,10 +302,11 @@ def test_nothing_blocks_in_a_convex_room(size, shift):
     lamp = SpotLight(place((0.4, 1.7, 0.5)), (-0.6, -0.8, -0.5), 0.4, 1.2, (3.0, 2.0, 1.0))
     camera = Camera(place((0.0, 1.2, 0.95)), place((0.1, 0.7, 0.0)), (0, 1, 0), 1.6, 24, 24)
     frame = small(dataclasses.replace(scene(walls, lamp), camera=camera))
-    free, open_ = (vpl(frame, VplSettings(lights=128, visibility=v)) for v in (True, False))
+    free, open_ = (vpl(frame, of(VplSettings, lights=128, visibility=v)) for v in (True, False))
     assert open_.mean() > 0
     assert (free == open_).all()
-    free, open_ = (trace_truth(frame, TruthSettings("light", samples=32, visibility=v)).mean for v in (True, False))
+    free, open_ = (trace_truth(frame, TruthSettings(estimator="light", samples=32, visibility=v)).mean
+                   for v in (True, False))
     assert (free == open_).all()
 
 

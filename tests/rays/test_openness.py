@@ -1,4 +1,4 @@
-"""Openness: closed forms on a plane, near walls and inside a sphere; seeds, subsets, doors, progress."""
+"""Openness: closed forms on a plane, near walls and inside a sphere; seeds, subsets, backends, progress."""
 
 import sys
 
@@ -121,7 +121,7 @@ def test_a_map_and_a_list_give_the_same_and_uncovered_points_are_open():
 
 
 @pytest.mark.feature("REF-19")
-def test_threads_spans_and_doors_do_not_change_it(monkeypatch, evidence):
+def test_threads_spans_and_backends_do_not_change_it(monkeypatch, evidence):
     at, up = floor_points(np.random.default_rng(4).random(700))
     shape = geometry(FLOOR, WALL)
     expected = openness(Tracer(shape), at, up, radius=1.0, seed=1)
@@ -132,7 +132,7 @@ def test_threads_spans_and_doors_do_not_change_it(monkeypatch, evidence):
     monkeypatch.setenv("REFGI_EMBREE", "run")
     np.testing.assert_array_equal(openness(Tracer(shape), at, up, radius=1.0, seed=1), expected)
     assert (openness(Tracer(shape), at, up, radius=1.0, seed=2) != expected).any()
-    evidence("openness: equal bits for 1 and 2 threads, spans of 15 and 8192 points, both doors to Embree")
+    evidence("openness: equal bits for 1 and 2 threads, spans of 15 and 8192 points, both Embree backends")
 
 
 def test_it_reports_progress(monkeypatch):

@@ -35,12 +35,12 @@ def unit_vectors(count, seed):
 
 
 @pytest.fixture(params=["address", "run"])
-def door(request, monkeypatch):
+def backend(request, monkeypatch):
     monkeypatch.setenv("REFGI_EMBREE", request.param)
     return request.param
 
 
-@pytest.mark.usefixtures("door")
+@pytest.mark.usefixtures("backend")
 def test_hits_equal_the_naive_twin():
     random = np.random.default_rng(3)
     soup = geometry(random.normal(size=(60, 3)), np.arange(60).reshape(20, 3))
@@ -55,7 +55,7 @@ def test_hits_equal_the_naive_twin():
     assert (hits.triangle_id != MISS).any()
 
 
-def test_both_doors_give_the_same_bits(monkeypatch, evidence):
+def test_both_backends_give_the_same_bits(monkeypatch, evidence):
     answers = {}
     mesh, origins = icosphere(4), unit_vectors(20_000, 5) * 0.9
     directions, reach = unit_vectors(20_000, 6), np.linspace(0, 2, 20_000)
@@ -68,7 +68,7 @@ def test_both_doors_give_the_same_bits(monkeypatch, evidence):
     evidence("address and run: 20,000 closest hits and occlusions equal to the bit")
 
 
-@pytest.mark.usefixtures("door")
+@pytest.mark.usefixtures("backend")
 @pytest.mark.parametrize("centre", [(0.0, 0.0, 0.0), (7.3, -2.1, 4.4)])
 def test_rays_at_vertices_and_edges_of_closed_meshes_never_slip_through(centre, evidence):
     mesh = icosphere(5, centre)
@@ -163,7 +163,7 @@ def test_unusable_vertices_are_refused():
         Tracer(geometry([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]]))
 
 
-@pytest.mark.usefixtures("door")
+@pytest.mark.usefixtures("backend")
 def test_inputs_are_copied_and_left_alone():
     mesh = box()
     tracer = Tracer(mesh)
@@ -176,12 +176,12 @@ def test_inputs_are_copied_and_left_alone():
     assert all(np.array_equal(a, b) for a, b in zip(before, (origins, directions, reach), strict=True))
 
 
-@pytest.mark.usefixtures("door")
+@pytest.mark.usefixtures("backend")
 def test_first_use_by_many_threads_at_once():
     tracer = Tracer(icosphere(4))
     origins, directions = np.zeros((1000, 3)), unit_vectors(1000, 11)
     with ThreadPoolExecutor(4) as pool:  # each asks in its own thread; the tree is built once
-        futures = [pool.submit(lambda: tracer._door) for _ in range(4)]
+        futures = [pool.submit(lambda: tracer._backend) for _ in range(4)]
         assert len({id(future.result()) for future in futures}) == 1
     distance = tracer.closest(origins, directions).distance
     assert np.abs(distance - 1).max() < 0.01  # the sphere's chords

@@ -60,7 +60,7 @@ def test_ten_million_faces_of_the_atrium() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_face_is_flat_and_every_index_is_used(name: str) -> None:
-    from refgi.scene.health import zero_area
+    from refgi.scene.repair import zero_area
 
     geometry = load_scene(name).geometry
     assert not zero_area(geometry.vertices, geometry.faces).any()

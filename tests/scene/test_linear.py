@@ -14,9 +14,9 @@ import pytest
 
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import Material, Mesh, load_scene
-from refgi.scene.health import mended, mended_all
 from refgi.scene.model import merge
-from refgi.scene.transform import placed, placed_all
+from refgi.scene.repair import repaired, repaired_all
+from refgi.scene.transform import transformed_all
 from tests.scene.samples import SCENE, glb_bytes, gltf_tree, ply_bytes
 
 FEW, MANY = 700, 2800
@@ -168,8 +168,8 @@ def same(first: Mesh, second: Mesh) -> bool:
 def test_meshes_mended_together_are_those_mended_alone() -> None:
     meshes = shapes(np.random.default_rng(3))
     faults: list[str] = []
-    together, dropped = mended_all(meshes, lambda number: f"{number}", faults)
-    alone = [mended(mesh, "") for mesh in meshes]
+    together, dropped = repaired_all(meshes, lambda number: f"{number}", faults)
+    alone = [repaired(mesh, "") for mesh in meshes]
     assert not faults
     assert dropped == sum(count for _, count in alone) > 0
     assert all(same(one, other) for one, (other, _) in zip(together, alone, strict=True))
@@ -192,9 +192,9 @@ def test_what_is_wrong_with_one_of_many_meshes_is_told_as_if_alone(spoil: str) -
         faces = faces[:, :2]
     meshes[7] = Mesh(vertices, faces, meshes[7].normals)
     with pytest.raises(InputError) as alone:
-        mended(meshes[7], "number 7")
+        repaired(meshes[7], "number 7")
     faults: list[str] = []
-    mended_all(meshes, lambda number: f"number {number}", faults)
+    repaired_all(meshes, lambda number: f"number {number}", faults)
     assert faults == [str(alone.value)]
     if spoil != "flat":
         with pytest.raises(InputError, match=r"mesh 7 \(mesh\): "):
@@ -203,14 +203,14 @@ def test_what_is_wrong_with_one_of_many_meshes_is_told_as_if_alone(spoil: str) -
 
 def test_meshes_placed_together_are_those_placed_alone() -> None:
     random = np.random.default_rng(5)
-    meshes = [mended(mesh, "")[0] for mesh in shapes(random)]
+    meshes = [repaired(mesh, "")[0] for mesh in shapes(random)]
     matrices = np.tile(np.eye(4), (len(meshes), 1, 1))
     matrices[1:, :3] = random.normal(size=(len(meshes) - 1, 3, 4))
-    together = placed_all(meshes, matrices)
+    together = transformed_all(meshes, matrices)
     assert together[0] is meshes[0]
     mirrored = 0
     for mesh, matrix, found in zip(meshes[1:], matrices[1:], together[1:], strict=True):
-        assert same(found, placed(mesh, matrix))
+        assert same(found, transformed_all([mesh], matrix[None])[0])
         for row, vertex in enumerate(mesh.vertices.astype(np.float64)):
             assert found.vertices[row] == pytest.approx(matrix[:3, :3] @ vertex + matrix[:3, 3], rel=1e-12, abs=1e-12)
         mirror = np.linalg.det(matrix[:3, :3]) < 0

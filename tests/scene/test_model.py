@@ -23,9 +23,9 @@ from refgi.scene import (
     material_table,
     merge,
 )
-from refgi.scene.health import mended, shining, zero_area
-from refgi.scene.load import framed, lit
-from refgi.scene.transform import affine, placed
+from refgi.scene.load import default_camera, default_light
+from refgi.scene.repair import lights_with_power, repaired, zero_area
+from refgi.scene.transform import affine, transformed_all
 
 VERTICES = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 FACES = np.array([[0, 1, 2]])
@@ -121,7 +121,7 @@ def test_vectors_given_as_arrays_compare_and_hash_like_tuples() -> None:
 def test_a_mesh_of_any_size_is_framed_and_lit(size: float) -> None:
     geometry, _ = merge([Mesh(VERTICES * size, FACES)])
     middle = np.mean(geometry.bounds, axis=0)
-    for place in (framed(geometry).eye, lit(geometry).position):
+    for place in (default_camera(geometry).eye, default_light(geometry).position):
         assert 1 < np.linalg.norm(middle - place) / geometry.diagonal < 5
 
 
@@ -143,9 +143,9 @@ def test_tables() -> None:
 def test_lights_without_power() -> None:
     dark, bright = PointLight((0, 0, 0), (0, 0, 0)), DirectionalLight((0, 1, 0), (0, 0, 1))
     with pytest.warns(RefgiWarning, match="2 lights of zero power"):
-        assert shining([dark, bright, dark], "lights") == (bright,)
+        assert lights_with_power([dark, bright, dark], "lights") == (bright,)
     with pytest.raises(InputError, match="got 'none'"):
-        shining([], "lights")
+        lights_with_power([], "lights")
 
 
 @settings(deadline=None)
@@ -158,7 +158,7 @@ def test_placing_moves_points_normals_and_orientation_alike(numbers: list[float]
         return
     if np.linalg.cond(matrix[:3, :3]) > 1e4:
         return
-    moved = placed(Mesh(VERTICES, FACES, np.array([[0.0, 0, 1]] * 3)), matrix)
+    moved, = transformed_all([Mesh(VERTICES, FACES, np.array([[0.0, 0, 1]] * 3))], matrix[None])
     assert np.allclose(sorted(map(tuple, moved.vertices)), sorted(tuple(matrix[:3, :3] @ v + matrix[:3, 3])
                                                                   for v in VERTICES), atol=1e-9)
     a, b, c = moved.vertices[moved.faces[0]]
@@ -186,6 +186,6 @@ def test_a_thin_face_is_kept_at_any_scale(scale: float, slim: float) -> None:
 
 def test_missing_normals_are_filled_in() -> None:
     normals = np.array([[0.0, 0, 2], [0, 0, 0], [math.nan, 0, 0]])
-    mesh, dropped = mended(Mesh(VERTICES, FACES, normals), "mesh")
+    mesh, dropped = repaired(Mesh(VERTICES, FACES, normals), "mesh")
     assert dropped == 0
     assert np.asarray(mesh.normals).tolist() == [[0, 0, 1]] * 3

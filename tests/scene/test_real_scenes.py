@@ -10,7 +10,7 @@ import pytest
 
 from refgi.errors import RefgiWarning
 from refgi.scene import Scene, load_scene
-from refgi.scene.meshfile import read_mesh_file
+from refgi.scene.scenefile import read_mesh_file
 
 # Name, faces, materials used. Faces of zero area count in the table and are skipped with a warning.
 SCENES = [("cornell_box", 30, 3), ("cornell_horse", 16990, 4), ("dragon_bunny", 405458, 6), ("buddha", 100008, 5),

@@ -12,7 +12,7 @@ from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.scene import load_scene
 from refgi.settings import of
-from refgi.splat.sii.ledger_sides import pixel_areas
+from refgi.splat.sii.ledger_terms import pixel_areas
 from refgi.truth import TruthSettings, trace_truth
 
 PUBLISHED = Warp("B", 3)  # SII Table 1: 4096 lights, 3 levels, method B

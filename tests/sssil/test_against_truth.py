@@ -8,9 +8,10 @@ from scipy.integrate import dblquad
 
 from refgi.frame import Frame
 from refgi.scene import PointLight, load_scene
+from refgi.settings import of
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.hssil import hssil
-from refgi.sssil.level import Level
+from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.truth import accumulate
@@ -18,14 +19,14 @@ from tests.form_factors import polygon_form_factor
 from tests.truth.scenes import corner_room
 
 SIGMAS = 5.0  # Student's t of 8 passes
-FEW_PASSES = {"emitters": "seen", "picks": 64, "directions": 32, "light_grid": 64, "samples": 8 * 96}
+FEW_PASSES = {"emitters": "visible", "picks": 64, "directions": 32, "light_grid": 64, "samples": 8 * 96}
 LAMP = PointLight((0.2, 1.1, 0.3), (0.6, 0.5, 0.4))
 VIEW = {"eye": (1.7, 1.4, 1.5), "target": (-0.4, 0.35, -0.5), "vfov": math.radians(60)}
 
 
 def everything(**others):
     """Return settings with which every pixel lights every pixel."""
-    return HssilSettings(radius=None, levels=1, start="full", pattern="all", **others)
+    return of(HssilSettings, radius=None, levels=1, start="full", pattern="all", **others)
 
 
 def room(size, blocker):
@@ -134,8 +135,8 @@ def test_a_disc_has_no_spikes(evidence):
     covered = frame.gbuffer.covered
     for form in ("point", "disc"):
         settings = {"radius": 20.0, "levels": 1, "start": "full", "form_factor": form}
-        whole = hssil(frame, HssilSettings(**settings, pattern="all"))[1, covered].mean()
-        runs = np.stack([hssil(frame, HssilSettings(**settings, pattern="pixel", seed=seed))[1, covered]
+        whole = hssil(frame, of(HssilSettings, **settings, pattern="all"))[1, covered].mean()
+        runs = np.stack([hssil(frame, of(HssilSettings, **settings, pattern="pixel", seed=seed))[1, covered]
                          for seed in range(4)])
         variance[form] = float(runs.var(axis=0, ddof=1).mean() / whole**2)
         spike[form], mean[form] = float(runs.max() / whole), float(runs.mean() / whole - 1)
@@ -167,7 +168,7 @@ def test_the_line_of_figure_5(evidence):
         return float(np.sqrt(np.mean((line - truth)[:, asked] ** 2)) / truth[:, asked].mean())
 
     def found(**settings):
-        return off(hssil(frame, HssilSettings(start="full", **settings))[:, row])
+        return off(hssil(frame, of(HssilSettings, start="full", **settings))[:, row])
 
     disc, point = (found(radius=FIGURE_5 / 18, form_factor=form) for form in ("disc", "point"))
     many, average = (found(radius=None, samples=512, downsample=mode) for mode in ("closest", "average"))

@@ -7,6 +7,7 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.scene import PointLight, SpotLight
+from refgi.settings import of
 from refgi.sssil.crown.pattern import offsets_at, row_offsets
 from refgi.sssil.hssil import hssil
 from refgi.sssil.settings import HssilSettings
@@ -33,43 +34,47 @@ def twin(frame, settings):
     view = buffer.projection
     texels = naive.first_texels(depth, normal, albedo * frame.direct / math.pi, view.frame[0], view.half,
                                 "hss_tan_f" in printed)
-    return naive.hssil(texels, first=settings.first_level, count=settings.levels, offsets=samples(settings),
-                       mode=settings.downsample, form=settings.form_factor, kind=settings.upsampling,
-                       sigma=settings.depth_sigma, power=settings.normal_power, only=settings.only_level,
+    sampling, senders, upsampling = settings.sampling, settings.senders, settings.upsampling
+    weights = {} if upsampling.name() != "bilateral" else {
+        "sigma": upsampling.depth_sigma, "power": upsampling.normal_power}
+    return naive.hssil(texels, first=sampling.first_level, count=sampling.levels, offsets=samples(settings),
+                       mode=senders.downsample, form=senders.form_factor, kind=upsampling.name(),
+                       only=senders.only_level, **weights,
                        disc_pi="hss_disc_pi" in printed, level_factor="hss_level_factor" in printed)
 
 
 def samples(settings):
     """Return the function that lists (ox, oy, w) for a receiver of a level."""
     def listed(index, level, row, column):
-        if settings.pattern == "all":
-            return naive.everything(settings.radius, index, (13, 17))
-        inner = settings.inner if index == 0 else 0
-        if settings.pattern == "fixed":
-            offsets, weight = row_offsets(settings, index, level, 1)
+        if settings.sampling.pattern == "all":
+            return naive.everything(settings.sampling.radius, index, (13, 17))
+        inner = settings.sampling.inner if index == 0 else 0
+        if settings.sampling.pattern == "fixed":
+            offsets, weight = row_offsets(settings.sampling, index, level, 1)
             return [(ox, oy, w) for (ox, oy), w in zip(offsets[0].tolist(), weight.tolist(), strict=True)]
-        return naive.weighted(offsets_at(settings, index, level, row, column).tolist(), inner, settings.radius)
+        offsets = offsets_at(settings.sampling, index, level, row, column).tolist()
+        return naive.weighted(offsets, inner, settings.sampling.radius)
     return listed
 
 
 SETTINGS = {
-    "every pixel": HssilSettings(pattern="all", start="full", levels=1, radius=11.0),
-    "every texel of four levels": HssilSettings(pattern="all", start="full", levels=4, radius=2.0),
-    "from half resolution": HssilSettings(pattern="all", levels=3, radius=2.0),
-    "from quarter resolution": HssilSettings(pattern="all", start="quarter", levels=2, radius=2.0),
-    "a row's samples": HssilSettings(levels=3, radius=2.0, samples=9),
-    "a pixel's samples": HssilSettings(pattern="pixel", start="full", levels=3, radius=3.0, samples=8, seed=4),
-    "fixed samples": HssilSettings(pattern="fixed", levels=3, radius=2.0, samples=11, inner_samples=5),
-    "no inner samples": HssilSettings(pattern="pixel", levels=3, radius=2.0, samples=8, inner_samples=0),
-    "averages": HssilSettings(levels=3, radius=2.0, pattern="all", start="full", downsample="average"),
-    "closest places, average light": HssilSettings(levels=3, radius=2.0, downsample="closest_average"),
-    "points": HssilSettings(levels=3, radius=2.0, form_factor="point"),
-    "bilinear": HssilSettings(levels=3, radius=2.0, upsampling="bilinear"),
-    "nearest": HssilSettings(levels=3, radius=2.0, upsampling="nearest"),
-    "wide weights": HssilSettings(levels=3, radius=2.0, depth_sigma=0.3, normal_power=1.5),
-    "the second level alone": HssilSettings(levels=3, radius=2.0, only_level=1),
-    "as printed": HssilSettings(levels=3, radius=2.0, as_published=HssilSettings.SWITCHES),
-    "tan f alone": HssilSettings(levels=3, radius=2.0, as_published={"hss_tan_f"}),
+    "every pixel": of(HssilSettings, pattern="all", start="full", levels=1, radius=11.0),
+    "every texel of four levels": of(HssilSettings, pattern="all", start="full", levels=4, radius=2.0),
+    "from half resolution": of(HssilSettings, pattern="all", levels=3, radius=2.0),
+    "from quarter resolution": of(HssilSettings, pattern="all", start="quarter", levels=2, radius=2.0),
+    "a row's samples": of(HssilSettings, levels=3, radius=2.0, samples=9),
+    "a pixel's samples": of(HssilSettings, pattern="pixel", start="full", levels=3, radius=3.0, samples=8, seed=4),
+    "fixed samples": of(HssilSettings, pattern="fixed", levels=3, radius=2.0, samples=11, inner_samples=5),
+    "no inner samples": of(HssilSettings, pattern="pixel", levels=3, radius=2.0, samples=8, inner_samples=0),
+    "averages": of(HssilSettings, levels=3, radius=2.0, pattern="all", start="full", downsample="average"),
+    "closest places, average light": of(HssilSettings, levels=3, radius=2.0, downsample="closest_average"),
+    "points": of(HssilSettings, levels=3, radius=2.0, form_factor="point"),
+    "bilinear": of(HssilSettings, levels=3, radius=2.0, upsampling="bilinear"),
+    "nearest": of(HssilSettings, levels=3, radius=2.0, upsampling="nearest"),
+    "wide weights": of(HssilSettings, levels=3, radius=2.0, depth_sigma=0.3, normal_power=1.5),
+    "the second level alone": of(HssilSettings, levels=3, radius=2.0, only_level=1),
+    "as printed": of(HssilSettings, levels=3, radius=2.0, as_published=HssilSettings.SWITCHES),
+    "tan f alone": of(HssilSettings, levels=3, radius=2.0, as_published={"hss_tan_f"}),
 }
 
 

@@ -11,6 +11,7 @@ from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.scene.builtin.surfaces import rectangle, sphere
 from refgi.scene.model import Camera, DirectionalLight, Material, PointLight, Scene, merge
+from refgi.settings import of
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 
@@ -28,7 +29,7 @@ def ball(width=33, height=27, scene=None, **options):
 
 def light_of(frame, **settings):
     """Return the light, and expect what holds of any picture."""
-    light = hssil(frame, HssilSettings(**QUICK | settings))
+    light = hssil(frame, of(HssilSettings, **QUICK | settings))
     assert light.shape == (3, frame.height, frame.width)
     assert light.dtype == frame.dtype
     assert np.isfinite(light).all()
@@ -39,9 +40,10 @@ def light_of(frame, **settings):
 
 def most(frame, settings):
     """Return the bound of Eq. 4: each sample sends at most pi L, whatever the distance."""
-    settings = HssilSettings(**QUICK | settings)
+    settings = of(HssilSettings, **QUICK | settings)
     radiance = (frame.gbuffer.albedo * frame.direct).max() / math.pi
-    return math.pi * radiance * (settings.samples * settings.levels + settings.inner) * (1 + 1e-5)
+    sampling = settings.sampling
+    return math.pi * radiance * (sampling.samples * sampling.levels + sampling.inner) * (1 + 1e-5)
 
 
 @pytest.fixture(scope="module")

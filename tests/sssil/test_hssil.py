@@ -9,11 +9,12 @@ from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
+from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 from refgi.stages import observe
 
-SMALL = HssilSettings(radius=None, levels=3, samples=24)
+SMALL = of(HssilSettings, radius=None, levels=3, samples=24)
 SUM = {np.float32: 2e-6, np.float64: 1e-14}  # another order of summation, relative to the brightest pixel
 
 
@@ -27,7 +28,7 @@ def ball():
 
 
 def changed(**changes):
-    return dataclasses.replace(SMALL, **changes)
+    return replaced(SMALL, changes)
 
 
 def test_it_is_in_the_table_of_methods(ball):
@@ -75,9 +76,9 @@ def test_printed_forms_differ_by_the_factor_of_the_table(switch, vfov, factor, e
 def test_the_printed_level_factor_is_that_of_each_level(evidence):
     at = frame(dtype=np.float64)
     found = []
-    for level in range(SMALL.levels):
+    for level in range(SMALL.sampling.levels):
         alone = changed(only_level=level)
-        printed = hssil(at, dataclasses.replace(alone, as_published={"hss_level_factor"}))
+        printed = hssil(at, replaced(alone, {"as_published": {"hss_level_factor"}}))
         found.append(printed.sum() / hssil(at, alone).sum())
     np.testing.assert_allclose(found, [1, 4, 16], rtol=1e-12)
     evidence(f"hss_level_factor: {', '.join(f'{factor:.4f}' for factor in found)}")
@@ -89,10 +90,10 @@ def test_levels_shown_one_by_one_add_up_to_the_picture(dtype, evidence):
     """Upsampling is linear in light: its weights come from depth and normals alone."""
     at = frame(dtype=dtype)
     whole = hssil(at, SMALL)
-    parts = sum(hssil(at, changed(only_level=level)).astype(np.float64) for level in range(SMALL.levels))
+    parts = sum(hssil(at, changed(only_level=level)).astype(np.float64) for level in range(SMALL.sampling.levels))
     off = np.abs(parts - whole).max() / whole.max()
     assert off <= SUM[dtype]
-    evidence(f"{np.dtype(dtype).name}: sum of {SMALL.levels} levels against all at once {off:.1e}")
+    evidence(f"{np.dtype(dtype).name}: sum of {SMALL.sampling.levels} levels against all at once {off:.1e}")
 
 
 @pytest.mark.feature("HSS-07")
@@ -106,7 +107,7 @@ def test_settings_that_do_not_cover_the_screen_say_so(ball, evidence):
 
 def test_more_levels_than_the_picture_has_are_left_out(ball):
     with observe() as log:
-        many = hssil(ball, HssilSettings(radius=30.0, levels=16, samples=8))
+        many = hssil(ball, of(HssilSettings, radius=30.0, levels=16, samples=8))
     assert len([run for run in log.runs if run.name == "sssil.gather"]) < 16
     assert log.status("sssil.level") == ["skipped"]
     assert np.isfinite(many).all()
@@ -169,6 +170,6 @@ def test_rows_of_thin_pictures_are_counted():
 
 def test_all_texels_of_a_huge_radius_are_those_of_the_picture():
     small = frame(width=12, height=9)
-    near, far = (HssilSettings(pattern="all", start="full", levels=1, radius=radius) for radius in (10.0, 65536.0))
+    near, far = (of(HssilSettings, pattern="all", start="full", levels=1, radius=radius) for radius in (10.0, 65536.0))
     np.testing.assert_array_equal(hssil(small, far), hssil(small, near))
     assert find_method("hssil").extra_bytes(far, (12, 9), 4) < 1 << 20

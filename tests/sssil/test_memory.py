@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from refgi.settings import of
 from refgi.sssil.memory import level_bytes
 from refgi.sssil.settings import HssilSettings
 from tests.sssil.pyramid.pictures import camera, made, random_picture
@@ -15,7 +16,7 @@ def test_mip_levels_add_a_third(evidence):
     """What arrays hold is what is foretold; all levels of a picture of 2^7 x 2^7 take 4/3 of the first."""
     picture, view, figures = random_picture(128, 128), camera(128, 128), []
     for start, first in (("full", 0), ("half", 1), ("quarter", 2)):
-        settings = HssilSettings(start=start, levels=5)
+        settings = of(HssilSettings, start=start, levels=5)
         held = sum(plane.nbytes for level in made(picture, view, first, 5, dtype=np.float32) for plane in level[1:])
         assert held == level_bytes(settings, 128 * 128, 4)
         ratio = held / (BUFFER_BYTES * 128 * 128)
@@ -26,6 +27,7 @@ def test_mip_levels_add_a_third(evidence):
 
 def test_doubles_and_means_of_radiance_take_more():
     pixels = 1280 * 720
-    assert level_bytes(HssilSettings(start="full", levels=1), pixels, 8) == pixels * 92
-    assert level_bytes(HssilSettings(start="full", levels=1, downsample="closest_average"), pixels, 4) == pixels * 52
-    assert level_bytes(HssilSettings(start="half", levels=1), 1, 4) == 48
+    assert level_bytes(of(HssilSettings, start="full", levels=1), pixels, 8) == pixels * 92
+    mean = of(HssilSettings, start="full", levels=1, downsample="closest_average")
+    assert level_bytes(mean, pixels, 4) == pixels * 52
+    assert level_bytes(of(HssilSettings, start="half", levels=1), 1, 4) == 48

@@ -10,7 +10,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.rsm.raster.projection import camera_projection, cube_projection
 from refgi.scene import Camera, load_scene
-from refgi.sssil.reprojection import Seen, look_up
+from refgi.sssil.reprojection import SourceView, reproject
 from tests.naive import reprojection as naive
 
 TESTS = {"depth_tolerance": 0.02, "normal_cosine": 0.95}
@@ -18,14 +18,14 @@ TESTS = {"depth_tolerance": 0.02, "normal_cosine": 0.95}
 TWIN_32, TWIN_64 = 2e-3, 1e-9
 
 
-def seen_by(frame):
+def source_of(frame):
     depth, normal = frame.gbuffer.resolve("depth", "normal")
-    return Seen(frame.gbuffer.projection, depth, normal, frame.origin)
+    return SourceView(frame.gbuffer.projection, depth, normal, frame.origin)
 
 
-def asked(values, there, frame, **changed):
+def reprojected(values, there, frame, **changed):
     buffer = frame.gbuffer
-    return look_up(values, there, buffer.position, buffer.normal, buffer.covered, origin=frame.origin,
+    return reproject(values, there, buffer.position, buffer.normal, buffer.covered, origin=frame.origin,
                    **{**TESTS, **changed})
 
 
@@ -40,7 +40,7 @@ def wall(height=6, width=8, distance=2.0, dtype=np.float64, shift=(0.0, 0.0)):
     rows, columns = np.mgrid[0:height, 0:width]
     position = np.stack([x + (columns + 0.5 - width / 2) * 0.1, y - (rows + 0.5 - height / 2) * 0.1,
                          np.full((height, width), -distance)]).astype(dtype)
-    return Seen(view, np.full((height, width), distance, dtype), normal), position
+    return SourceView(view, np.full((height, width), distance, dtype), normal), position
 
 
 def ramp(height=6, width=8, dtype=np.float64):
@@ -60,13 +60,13 @@ def views():
 def test_equals_the_naive_twin(views, single):
     there, here = views[0 if single else 1]
     values = np.random.default_rng(3).random((3, 30, 40)).astype(here.dtype)
-    seen, buffer = seen_by(there), here.gbuffer
-    found, weight = asked(values, seen, here)
+    seen, buffer = source_of(there), here.gbuffer
+    found, weight = reprojected(values, seen, here)
     frame = seen.projection.frame[0]
     view = (seen.projection.origin[0], *frame, math.tan(there.scene.camera.vfov / 2))
     worst, differing = 0.0, 0
     for i, j in np.argwhere(buffer.covered):
-        mean, share = naive.look_up(values, seen.depth, seen.normal, buffer.position[:, i, j], buffer.normal[:, i, j],
+        mean, share = naive.reproject(values, seen.depth, seen.normal, buffer.position[:, i, j], buffer.normal[:, i, j],
                                     view, TESTS["depth_tolerance"], TESTS["normal_cosine"])
         if abs(share - weight[i, j]) > TWIN_32:
             differing += 1  # a test that rounding decides
@@ -81,7 +81,7 @@ def test_equals_the_naive_twin(views, single):
 def test_a_view_that_did_not_move_gives_its_values_back_to_the_bit(views, single):
     frame = views[0 if single else 1][0]
     values = np.random.default_rng(4).random((3, 30, 40)).astype(frame.dtype)
-    found, weight = asked(values, seen_by(frame), frame)
+    found, weight = reprojected(values, source_of(frame), frame)
     covered = frame.gbuffer.covered
     assert np.array_equal(found, values * covered)
     assert np.array_equal(weight, covered.astype(frame.dtype))
@@ -90,11 +90,12 @@ def test_a_view_that_did_not_move_gives_its_values_back_to_the_bit(views, single
 @pytest.mark.feature("HSS-13")
 def test_a_shift_by_whole_and_half_pixels(evidence):
     there, _ = wall()
-    whole = look_up(ramp(), there, wall(shift=(2, 1))[1], there.normal, np.ones((6, 8), np.bool_), **TESTS)
+    whole = reproject(ramp(), there, wall(shift=(2, 1))[1], there.normal, np.ones((6, 8), np.bool_), **TESTS)
     assert np.allclose(whole[0][:, :5, :6], ramp()[:, 1:, 2:], atol=1e-12)
     assert not whole[1][5].any()  # a row below the picture that was asked
     assert not whole[1][:, 6:].any()
-    found, weight = look_up(ramp(), there, wall(shift=(0.5, 0.25))[1], there.normal, np.ones((6, 8), np.bool_), **TESTS)
+    found, weight = reproject(ramp(), there, wall(shift=(0.5, 0.25))[1], there.normal, np.ones((6, 8), np.bool_),
+                              **TESTS)
     inner = np.s_[:5, :7]
     error = max(np.abs(found[0] - ramp()[0] - 0.5)[inner].max(), np.abs(found[1] - ramp()[1] - 0.25)[inner].max())
     assert error < 1e-12
@@ -105,7 +106,7 @@ def test_a_shift_by_whole_and_half_pixels(evidence):
 
 def test_nearest_takes_the_texel_the_point_falls_in():
     there, _ = wall()
-    found, weight = look_up(ramp(), there, wall(shift=(0.4, 0.6))[1], there.normal, np.ones((6, 8), np.bool_),
+    found, weight = reproject(ramp(), there, wall(shift=(0.4, 0.6))[1], there.normal, np.ones((6, 8), np.bool_),
                             fetch="nearest", **TESTS)
     assert np.array_equal(found[0][:5], ramp()[0][:5])
     assert np.array_equal(found[1][:5], ramp()[1][:5] + 1)
@@ -118,7 +119,7 @@ def test_nearest_takes_the_texel_the_point_falls_in():
 def test_another_depth_is_another_surface(depth, passes):
     there, position = wall()
     there = there._replace(depth=np.full_like(there.depth, depth))
-    found, weight = look_up(ramp(), there, position, there.normal, np.ones((6, 8), np.bool_), **TESTS)
+    found, weight = reproject(ramp(), there, position, there.normal, np.ones((6, 8), np.bool_), **TESTS)
     assert (weight == passes).all()
     assert np.array_equal(found, ramp() * passes)
 
@@ -128,7 +129,7 @@ def test_another_normal_is_another_surface(degrees, passes):  # arccos 0.95 is 1
     there, position = wall()
     turned = np.zeros_like(there.normal)
     turned[0], turned[2] = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
-    weight = look_up(ramp(), there, position, turned, np.ones((6, 8), np.bool_), **TESTS)[1]
+    weight = reproject(ramp(), there, position, turned, np.ones((6, 8), np.bool_), **TESTS)[1]
     assert (weight == passes).all()
 
 
@@ -139,10 +140,12 @@ def test_points_behind_beside_and_nowhere_find_nothing():
     behind = -position
     lost = np.full_like(position, np.nan)
     for points in (far, behind, lost):
-        found, weight = look_up(ramp(dtype=np.float32), there, points, there.normal, np.ones((6, 8), np.bool_), **TESTS)
+        found, weight = reproject(ramp(dtype=np.float32), there, points, there.normal, np.ones((6, 8), np.bool_),
+                                  **TESTS)
         assert not weight.any()
         assert not found.any()
-    found, weight = look_up(ramp(dtype=np.float32), there, position, there.normal, np.zeros((6, 8), np.bool_), **TESTS)
+    found, weight = reproject(ramp(dtype=np.float32), there, position, there.normal, np.zeros((6, 8), np.bool_),
+                              **TESTS)
     assert not weight.any()
     assert not found.any()
 
@@ -150,7 +153,7 @@ def test_points_behind_beside_and_nowhere_find_nothing():
 def test_equal_values_stay_as_they_are(views):
     there, here = views[0]
     values = np.full((3, 30, 40), 0.1, np.float32)
-    found, weight = asked(values, seen_by(there), here)
+    found, weight = reprojected(values, source_of(there), here)
     assert (found[:, weight > 0] == np.float32(0.1)).all()
     assert (weight <= 1).all()
 
@@ -158,10 +161,11 @@ def test_equal_values_stay_as_they_are(views):
 def test_the_origins_of_two_views_may_differ(views):
     there, here = views[1]
     values = np.random.default_rng(5).random((3, 30, 40))
-    seen, buffer = seen_by(there), here.gbuffer
-    plain = asked(values, seen, here)[0]
-    moved = look_up(values, seen._replace(origin=(8.0, 0.0, -4.0)), buffer.position - np.reshape([-8, 0, 4], (3, 1, 1)),
-                    buffer.normal, buffer.covered, origin=(0.0, 0.0, 0.0), **TESTS)[0]
+    seen, buffer = source_of(there), here.gbuffer
+    plain = reprojected(values, seen, here)[0]
+    moved = reproject(values, seen._replace(origin=(8.0, 0.0, -4.0)),
+                      buffer.position - np.reshape([-8, 0, 4], (3, 1, 1)), buffer.normal, buffer.covered,
+                      origin=(0.0, 0.0, 0.0), **TESTS)[0]
     assert np.allclose(plain, moved, atol=1e-9)
 
 
@@ -171,14 +175,14 @@ def test_the_same_bits_on_any_number_of_threads(views):
     results = []
     for count in (1, 2):
         with threads(count):
-            results.append(asked(values, seen_by(there), here))
+            results.append(reprojected(values, source_of(there), here))
     for one, two in zip(*results, strict=True):
         assert np.array_equal(one, two)
 
 
 def test_one_pixel():
     there, position = wall(1, 1)
-    found, weight = look_up(ramp(1, 1), there, position, there.normal, np.ones((1, 1), np.bool_), **TESTS)
+    found, weight = reproject(ramp(1, 1), there, position, there.normal, np.ones((1, 1), np.bool_), **TESTS)
     assert found[:, 0, 0].tolist() == [0, 0, 10]
     assert weight[0, 0] == 1
 
@@ -187,7 +191,7 @@ def test_what_is_refused():
     there, position = wall()
     covered = np.ones((6, 8), np.bool_)
     with pytest.raises(InputError, match="values"):
-        look_up(ramp(5), there, position, there.normal, covered, **TESTS)
+        reproject(ramp(5), there, position, there.normal, covered, **TESTS)
     with pytest.raises(InputError, match="one perspective map"):
-        look_up(ramp(), there._replace(projection=cube_projection((0, 0, 0), 4)), position, there.normal, covered,
+        reproject(ramp(), there._replace(projection=cube_projection((0, 0, 0), 4)), position, there.normal, covered,
                 **TESTS)

@@ -1,10 +1,12 @@
-"""What `hssil` can be set to: each wrong value is refused by name."""
+"""Settings of `hssil`: each wrong value is refused by name, and the tree of keys."""
 
 import pytest
 
 from refgi.errors import InputError
 from refgi.scene import load_scene
+from refgi.settings import leaves, of
 from refgi.sssil import HssilSettings
+from refgi.sssil.settings import PRESETS, Bilateral, Bitmask, Rays, TemporalSettings
 
 NAN = float("nan")
 
@@ -19,23 +21,50 @@ NAN = float("nan")
 ])
 def test_a_wrong_value_is_refused_by_name(key, value):
     with pytest.raises(InputError, match=key):
-        HssilSettings(**{key: value})
+        of(HssilSettings, **{key: value})
+
+
+@pytest.mark.parametrize("values", [
+    {"upsampling": "bilinear", "depth_sigma": 0.1}, {"visibility": "rays", "thickness": 0.1},
+    {"visibility": "rays", "slices": 4}, {"visibility": "bitmask", "pattern": "all"},
+])
+def test_combinations_that_mean_nothing_are_refused(values):
+    with pytest.raises(InputError):
+        of(HssilSettings, **values)
+
+
+def test_choices_hold_their_own_settings():
+    settings = of(HssilSettings, visibility="bitmask", thickness=0.1, depth_sigma=0.3)
+    assert settings.visibility == Bitmask(thickness=0.1)
+    assert settings.upsampling == Bilateral(depth_sigma=0.3)
+    assert of(HssilSettings, visibility="rays") == HssilSettings(visibility=Rays())
+
+
+@pytest.mark.parametrize("kind", [HssilSettings, TemporalSettings])
+def test_a_page_shows_few_keys_and_says_what_each_is(kind):
+    shown = [leaf for leaf in leaves(kind) if not leaf.is_for_study]
+    assert len(shown) <= 12
+    assert all(leaf.about for leaf in leaves(kind))
+
+
+def test_the_papers_values_are_the_defaults():
+    assert PRESETS["paper"] == HssilSettings()
 
 
 def test_settings_compare_by_value_and_serve_as_keys():
     camera = load_scene("cornell_box").camera
-    one, other = (HssilSettings(views=[camera], as_published=["hss_tan_f"]) for _ in range(2))
+    one, other = (of(HssilSettings, views=[camera], as_published=["hss_tan_f"]) for _ in range(2))
     assert one == other
     assert hash(one) == hash(other)
 
 
 @pytest.mark.parametrize(("start", "first"), [("full", 0), ("half", 1), ("quarter", 2)])
 def test_the_start_is_a_level(start, first):
-    assert HssilSettings(start=start).first_level == first
+    assert of(HssilSettings, start=start).sampling.first_level == first
 
 
 @pytest.mark.parametrize(("samples", "inner"), [(64, 21), (256, 85), (1, 1), (3, 1)])
 def test_the_first_disc_is_as_dense_as_its_crown(samples, inner):
     """A disc of radius r has a third of the area of the crown from r to 2 r."""
-    assert HssilSettings(samples=samples).inner == inner
-    assert HssilSettings(samples=samples, inner_samples=7).inner == 7
+    assert of(HssilSettings, samples=samples).sampling.inner == inner
+    assert of(HssilSettings, samples=samples, inner_samples=7).sampling.inner == 7

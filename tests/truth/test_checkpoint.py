@@ -88,7 +88,8 @@ def test_what_is_read_is_what_was_saved(tmp_path):
 
 @pytest.mark.parametrize("change", [{"seed": 3}, {"interleave": 2}, {"uniform_share": 1.0}, {"light_grid": 16},
                                     {"visibility": False}, {"picks": 8}, {"directions": 4}, {"bound": 0.2},
-                                    {"estimator": "light"}, {"emitters": "seen"}, {"bounces": 2}, {"caustics": True}])
+                                    {"estimator": "light"}, {"emitters": "visible"}, {"bounces": 2},
+                                    {"caustics": True}])
 def test_a_checkpoint_of_something_else_is_refused(frame, tmp_path, change):
     settings = TruthSettings(samples=48, checkpoint=tmp_path / "c")
     trace_truth(frame, settings)

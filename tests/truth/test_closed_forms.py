@@ -29,8 +29,8 @@ def deviation(result, expected):
 def test_spot_over_a_plane(estimator, evidence):
     c, h, rho, intensity = math.radians(40), 0.7, 0.6, np.array([1.0, 2.0, 0.5])
     expected = 0.4 * rho * intensity / h**2 * (1 - math.cos(c) ** 5)
-    settings = TruthSettings(estimator, samples=40 * (64 if estimator != "light" else 16), light_grid=64, picks=16,
-                             directions=48 if estimator != "light" else None)
+    settings = TruthSettings(estimator=estimator, samples=40 * (64 if estimator != "light" else 16), light_grid=64,
+                             picks=16, directions=48 if estimator != "light" else None)
     result = at(scene([floor()], spot_down(h, c)), [(0, h, 0)], [(0, -1, 0)], settings, repeat=256)
     error, beyond = deviation(result, expected)
     assert beyond < BIAS
@@ -53,7 +53,8 @@ def test_lit_rectangle_gives_its_form_factor(estimator, evidence):
     for point, normal, triangle in (((0.5, 0.8, -0.7), (0, -1, 0), 0), ((-0.3, 0.4, -0.5), (1, 0, 0), 2),
                                     ((0.2, 0.05, 0.1), (0, 0, -1), 4)):
         expected = 0.6 * irradiance * polygon_form_factor(point, normal, corners)
-        result = at(lit, [point], [normal], TruthSettings(estimator, samples=1200), triangle=triangle, repeat=64)
+        settings = TruthSettings(estimator=estimator, samples=1200)
+        result = at(lit, [point], [normal], settings, triangle=triangle, repeat=64)
         error, beyond = deviation(result, expected)
         assert beyond < BIAS
         worst = max(worst, error)
@@ -87,7 +88,7 @@ FACES, POLYHEDRON = 200_000, 1.2e-4
 def test_integrating_sphere(estimator, evidence):
     light = PointLight((0.3, -0.2, 0.4), (0.8, 1.6, 0.4))
     expected = 0.5 * 4 * math.pi * np.array(light.intensity) / (4 * math.pi)
-    settings = TruthSettings(estimator, samples=1600, light_grid=64)
+    settings = TruthSettings(estimator=estimator, samples=1600, light_grid=64)
     result = in_sphere(sphere(FACES, light=light), settings)
     error, beyond = deviation(result, expected)
     spread = (result.mean / expected[:, None, None]).std()
@@ -122,7 +123,8 @@ def agree(room, evidence, label, kinds=("combined", "hemisphere"), **settings):
     points, normals, triangles = receivers_in_corner()
     tracer, results = Tracer(room.geometry), []
     for kind in kinds:
-        options = TruthSettings(kind, samples=128 * 24, directions=256 if kind == "hemisphere" else 8, **settings)
+        options = TruthSettings(estimator=kind, samples=128 * 24, directions=256 if kind == "hemisphere" else 8,
+                                **settings)
         repeated = [np.repeat(a.T.reshape(3, -1, 1), 32, axis=2) for a in (points, normals)]
         results.append(pixel_means(room, tracer, *repeated, np.repeat(triangles.reshape(-1, 1), 32, axis=1), options))
     (a, va), (b, vb) = results
@@ -174,8 +176,8 @@ def test_a_lamp_in_the_plane_of_the_ceiling(estimator):
     c, h, rho, intensity = math.radians(40), 0.7, 0.6, np.array([1.0, 2.0, 0.5])
     expected = 0.4 * rho * intensity / h**2 * (1 - math.cos(c) ** 5)
     ceiling = rectangle((-0.5, h, -0.5), (1, 0, 0), (0, 0, 1))
-    settings = TruthSettings(estimator, samples=40 * (64 if estimator != "light" else 16), light_grid=64, picks=16,
-                             directions=48 if estimator != "light" else None)
+    settings = TruthSettings(estimator=estimator, samples=40 * (64 if estimator != "light" else 16), light_grid=64,
+                             picks=16, directions=48 if estimator != "light" else None)
     result = at(scene([floor(), ceiling], spot_down(h, c)), [(0, h, 0)], [(0, -1, 0)], settings, triangle=2, repeat=256)
     _, beyond = deviation(result, expected)
     assert beyond < BIAS

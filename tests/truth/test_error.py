@@ -50,7 +50,7 @@ SCATTER = {"combined": (0.06, 0.03, 0.008), "hemisphere": (0.06, 0.04, 0.03), "l
 
 @pytest.mark.parametrize("estimator", ["combined", "hemisphere", "light"])
 def test_pixels_lie_within_their_standard_error(frame, long_run, estimator, evidence):
-    settings = TruthSettings(estimator, directions=8 if estimator != "light" else None)
+    settings = TruthSettings(estimator=estimator, directions=8 if estimator != "light" else None)
     shares, pictures = [], []
     for seed in (5, 6, 7):
         result = trace_truth(frame, dataclasses.replace(settings, seed=seed, samples=30 * per_pass(settings)))
@@ -182,7 +182,7 @@ def test_same_bits_for_threads_and_batches(frame, evidence):
 
 
 @pytest.mark.feature("REF-19")
-def test_both_doors_give_the_same_picture(frame, monkeypatch, evidence):
+def test_both_backends_give_the_same_picture(frame, monkeypatch, evidence):
     settings = TruthSettings(samples=48)
     monkeypatch.setenv("REFGI_EMBREE", "run")
     by_run = trace_truth(Frame(frame.scene, width=SIZE, height=SIZE), settings)
@@ -195,7 +195,7 @@ def test_both_doors_give_the_same_picture(frame, monkeypatch, evidence):
 def test_twice_the_light_is_twice_the_picture(frame, estimator, evidence):
     light = frame.scene.lights[0]
     brighter = dataclasses.replace(light, intensity=tuple(2 * c for c in light.intensity))
-    settings = TruthSettings(estimator, samples=48)
+    settings = TruthSettings(estimator=estimator, samples=48)
     double = trace_truth(Frame(frame.scene.with_lights(brighter), width=SIZE, height=SIZE), settings)
     assert np.array_equal(double.mean, 2 * trace_truth(frame, settings).mean)
     evidence(f"{estimator}: equal to the bit")
@@ -237,6 +237,6 @@ def test_unusable_settings_are_refused(key, value):
 
 def test_settings_that_do_not_go_together():
     with pytest.raises(InputError, match="bounces"):
-        TruthSettings("light", bounces=2)
+        TruthSettings(estimator="light", bounces=2)
     with pytest.raises(InputError, match="visibility"):
         TruthSettings(bounces=2, visibility=False)

@@ -15,7 +15,7 @@ from refgi.scene import SpotLight
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.caustics import SHARP_LOBE
 from refgi.truth.light_grid import light_rays
-from refgi.truth.lit_points import join, trace_lit_points
+from refgi.truth.light_vertices import join, trace_light_vertices
 from refgi.truth.result import add_pass, no_passes, with_means
 from refgi.truth.surfaces import lights_of, lobe_pattern, surfaces
 from tests.naive.truth import mirror_mean
@@ -92,7 +92,8 @@ def test_below_the_shading_horizon_a_lobe_sends_nothing():
     for w in ((0.6, 0.0, 0.8), (-math.sqrt(0.75), 0.0, 1e-9), (1.0, 0.0, 0.0)):
         assert lobe_pattern(tables, 0, n, light, w) == 0
     rays = light_rays(scene.lights[0], scene.geometry, np.full((64 * 64, 2), 0.5))
-    points = join([trace_lit_points(Tracer(scene.geometry), tables, lights_of(scene), 0, rays, 0.1)], 1, 64 * 64).points
+    found = trace_light_vertices(Tracer(scene.geometry), tables, lights_of(scene), 0, rays, 0.1)
+    points = join([found], 1, 64 * 64).points
     assert np.isfinite(points.peak).all()
     below = (points.peak == 0) & (points.power > 0)
     assert below.any()  # the scene holds such points
@@ -130,7 +131,7 @@ def test_values_that_are_no_numbers_are_counted_and_left_out():
 
 def test_a_picture_tells_how_many_values_it_lost(monkeypatch):
     def one_pass(task, number):
-        values = np.full((3, len(task.to.pixel)), 2.0)
+        values = np.full((3, len(task.receivers.pixel)), 2.0)
         values[0, :5] = np.nan if number == 0 else 2.0
         return values
 
@@ -146,7 +147,7 @@ def test_a_picture_tells_how_many_values_it_lost(monkeypatch):
 
 def test_sharp_lobes_that_photons_cannot_serve_are_announced():
     frame = Frame(glossy("cornell_box", 1e6), width=6, height=6)
-    for settings in (TruthSettings(samples=24, visibility=False), TruthSettings(samples=24, emitters="seen")):
+    for settings in (TruthSettings(samples=24, visibility=False), TruthSettings(samples=24, emitters="visible")):
         with pytest.warns(RefgiWarning, match=r"sharp \(exponent 1000 or more\) and sampled by chance"):
             trace_truth(frame, settings)
     with pytest.warns(RefgiWarning, match="left out beyond the first bounce"):

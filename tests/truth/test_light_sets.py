@@ -1,4 +1,4 @@
-"""Sets of lit points, densities from the pilot and lobes in blocks of their own: same expectation, same bits."""
+"""Sets of light vertices, densities from the pilot and lobes in blocks of their own: same expectation, same bits."""
 
 import dataclasses
 
@@ -13,7 +13,7 @@ from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.light_grid import cell_centres, density_of, light_rays, rays_through, stratified_sets, warp
 from refgi.truth.light_pass import fresh_points
 from refgi.truth.light_side import TILE, tiles
-from refgi.truth.lit_points import BLOCK
+from refgi.truth.light_vertices import BLOCK
 from refgi.truth.task import sets_of
 from refgi.truth.truth import accumulate, task_of
 from tests.truth.scenes import CAMERA, corner_room, receivers_in_corner, rectangle, scene
@@ -139,7 +139,7 @@ def test_sets_and_densities_change_no_expectation(lights, evidence):
     place, up = (np.repeat(a.T.reshape(3, -1, 1), 8, axis=2) for a in (points, normals))
     ids = np.repeat(triangles.reshape(-1, 1), 8, axis=1).astype(np.int32)
     results = [accumulate(room, Tracer(room.geometry), place, up, ids,
-                          TruthSettings("light", samples=16 * 100, light_grid=16, seed=k, **variant))
+                          TruthSettings(estimator="light", samples=16 * 100, light_grid=16, seed=k, **variant))
                for k, variant in enumerate(VARIANTS)]
     worst = 0.0
     for other in results[1:]:
@@ -203,7 +203,7 @@ def test_same_bits_for_threads_and_batches_with_many_sets(frame):
 
 
 def test_a_scene_without_lobes_has_no_blocks_of_them(frame):
-    task = frame_task(frame, TruthSettings("light"))
+    task = frame_task(frame, TruthSettings(estimator="light"))
     points, starts = fresh_points(task, np.random.default_rng(0))
     assert np.array_equal(starts[:, 1], starts[:, 2])
     assert not points.lobe.any()

@@ -33,7 +33,7 @@ def test_all_texels_converge_to_the_truth(name, evidence):
     noise = math.sqrt(np.mean(reference.variance_of_mean)) / reference.picture_mean.mean()
     errors = []
     for resolution in RESOLUTIONS:
-        picture = vpl(Frame(found, width=32, height=32, rsm_resolution=resolution), VplSettings(pattern="all"))
+        picture = vpl(Frame(found, width=32, height=32, rsm_resolution=resolution), of(VplSettings, pattern="all"))
         errors.append(relative_error(picture, reference.mean, seen))
     slope = -np.polyfit(np.log(RESOLUTIONS), np.log(errors), 1)[0]
     mean = picture[:, seen].mean() / reference.mean[:, seen].mean()
@@ -50,8 +50,8 @@ def test_the_full_sum_without_visibility_is_that_of_sii_and_of_the_truth(evidenc
     from refgi.splat.sii.sii import sii
 
     frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=128)
-    ours = vpl(frame, VplSettings(pattern="all", visibility=False))
-    theirs = sii(frame, of(SiiSettings, pattern="all", i_low=0))
+    ours = vpl(frame, of(VplSettings, pattern="all", visibility=False))
+    theirs = sii(frame, of(SiiSettings, pattern="all"))
     reference = trace_truth(frame, TruthSettings(samples=24 * 80, visibility=False))
     sums = np.abs(ours - theirs).max() / ours.max()
     mean = ours[:, frame.gbuffer.covered].mean() / reference.mean[:, frame.gbuffer.covered].mean()
@@ -65,10 +65,10 @@ def test_the_full_sum_without_visibility_is_that_of_sii_and_of_the_truth(evidenc
 
 def test_shadows_only_take_light_away_and_batches_change_nothing():
     frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=64)
-    shadowed, free = vpl(frame, VplSettings(lights=200)), vpl(frame, VplSettings(lights=200, visibility=False))
+    shadowed, free = vpl(frame, of(VplSettings, lights=200)), vpl(frame, of(VplSettings, lights=200, visibility=False))
     assert (shadowed <= free).all()
     assert 0.5 < shadowed.mean() / free.mean() < 0.95
-    assert np.array_equal(shadowed, vpl(frame, VplSettings(lights=200, batch=3000)))
+    assert np.array_equal(shadowed, vpl(frame, of(VplSettings, lights=200, batch=3000)))
     assert (shadowed[:, ~frame.gbuffer.covered] == 0).all()
 
 
@@ -77,11 +77,11 @@ def test_light_is_additive():
     found = load_scene("cornell_box")
     single = Frame(found, width=24, height=24, rsm_resolution=32)
     double = Frame(found.with_lights(*found.lights, *found.lights), width=24, height=24, rsm_resolution=32)
-    settings = VplSettings(pattern="all")
+    settings = of(VplSettings, pattern="all")
     assert vpl(double, settings) == pytest.approx(2 * vpl(single, settings), rel=1e-6)
 
 
 @pytest.mark.parametrize(("key", "value"), [("lights", 0), ("pattern", "spiral"), ("seed", -1), ("batch", 0)])
 def test_unusable_settings_are_refused(key, value):
     with pytest.raises(InputError, match=key):
-        VplSettings(**{key: value})
+        of(VplSettings, **{key: value})

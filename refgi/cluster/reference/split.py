@@ -130,7 +130,7 @@ def split_error(
     for name, changes in STEPS.items():
         pictures[name] = lit(frame, lights, areas, maps, dataclasses.replace(base, **changes), 1)
     interleaved, seen = lit(frame, lights, areas, maps, base, block), surface(frame)
-    pictures["interleaved"] = blur(interleaved, seen, block, base, frame.seen_extent.diagonal)
+    pictures["interleaved"] = blur(interleaved, seen, block, base, frame.visible_extent.diagonal)
     covered = np.asarray(seen.covered, np.bool_)
     return ErrorSplit(steps_between(pictures, covered), pictures, covered)
 

@@ -1,6 +1,6 @@
-"""What the rasterizer feeds: G-buffer, reflective shadow maps, direct light, and the radiance that a camera receives.
+"""G-buffer, reflective shadow maps, direct light, and the radiance that a camera receives.
 
-`gbuffer` resolves the attributes of what each texel sees (`runs`, `attributes`), only those that are asked for;
+`gbuffer` resolves the attributes of each texel's triangle (`runs`, `attributes`), only those that are used;
 `reflective` adds the flux that reaches each texel from a light (`light_projection`, `solid_angle`).
 """
 

@@ -1,4 +1,4 @@
-"""The second pass: attributes of what each texel sees, from the triangle's plane and the texel's ray in float64.
+"""Attribute resolve, the second pass of rasterization: position, normal and albedo of each texel, in float64.
 
 Every texel of every projection has a ray: an origin o and a direction d, where d reaches depth 1 (planar maps) or has
 unit length (paraboloid). With v_i relative to o and N = (v1 - v0) x (v2 - v0) the hit is o + t d,
@@ -18,13 +18,13 @@ from refgi.rsm.buffers.runs import (
     Rows,
     Runs,
     Surface,
+    allocate_runs,
     cross,
     describe_runs,
     find_runs,
     image_ray,
-    room_for_runs,
     row_view,
-    take_runs,
+    runs_at,
     towards,
 )
 from refgi.rsm.raster.projection import Projection
@@ -34,7 +34,7 @@ Array = npt.NDArray[Any]
 STRIP = 8  # rows resolved at once: their runs stay in cache
 
 
-class Wanted(NamedTuple):
+class ChannelMask(NamedTuple):
     """Which channels a pass fills; the others' planes are empty."""
 
     depth: bool
@@ -51,39 +51,28 @@ class Planes(NamedTuple):
     depth: Array  # (H, W) m: axial in perspective and orthographic maps, else distance
     distance: Array  # (H, W) m: from the centre of projection; orthographic: the depth
     position: Array  # (3, H, W) m, world space
-    normal: Array  # (3, H, W) unit vector on the side that is seen
+    normal: Array  # (3, H, W) unit vector on the visible side
     albedo: Array  # (3, H, W) diffuse reflectance
     material_id: Array  # (H, W) int32
 
 
 @kernel(parallel=True)
 def resolve(
-    surface: Surface, projection: Projection, triangle_id: Array, wanted: Wanted, planes: Planes, workers: int
+    surface: Surface, projection: Projection, triangle_id: Array, channels: ChannelMask, planes: Planes, workers: int
 ) -> None:
-    """Fill the wanted planes.
+    """Fill the planes of the chosen channels.
 
-    Parameters
-    ----------
-    surface : Surface
-        The triangles.
-    projection : Projection
-        The maps that `triangle_id` was drawn on.
-    triangle_id : (H, W) ndarray
-        Triangle at each texel, -1 for none.
-    wanted : Wanted
-        Which planes to fill.
-    planes : Planes
-        The result.
-    workers : int
-        Threads; strips of rows are dealt to them in turn.
+    `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
+    `channels`: which planes to fill. `workers`: threads; strips of rows are assigned to them round-robin.
     """
     for worker in prange(workers):
-        _resolve_rows(surface, projection, triangle_id, wanted, planes, worker, workers)
+        _resolve_rows(surface, projection, triangle_id, channels, planes, worker, workers)
 
 
 @kernel
 def _resolve_rows(
-    surface: Surface, projection: Projection, triangle_id: Array, wanted: Wanted, planes: Planes, first: int, step: int
+    surface: Surface, projection: Projection, triangle_id: Array, channels: ChannelMask, planes: Planes, first: int,
+    step: int,
 ) -> None:
     """Fill every `step`-th strip of rows from strip `first` on.
 
@@ -91,53 +80,42 @@ def _resolve_rows(
     branches, in SIMD lanes. Strips, because each call with arrays costs atomic reference counts, which threads share.
     """
     height, width = triangle_id.shape
-    runs = room_for_runs(STRIP, width)
+    runs = allocate_runs(STRIP, width)
     for top in range(first * STRIP, height, step * STRIP):
         rows = (top, min(top + STRIP, height))
-        _fill(surface, projection, find_runs(triangle_id, rows, runs), runs, rows, wanted, planes)
+        _fill_rows(surface, projection, find_runs(triangle_id, rows, runs), runs, rows, channels, planes)
 
 
 @kernel
 def resolve_at(
-    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, wanted: Wanted, planes: Planes
+    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, channels: ChannelMask, planes: Planes
 ) -> None:
-    """Fill the wanted planes at some texels, with the bits that `resolve` gives there.
+    """Fill the planes of the chosen channels at some texels, with the bits that `resolve` gives there.
 
-    Parameters
-    ----------
-    surface : Surface
-        The triangles.
-    projection : Projection
-        The maps that `triangle_id` was drawn on.
-    triangle_id : (H, W) ndarray
-        Triangle at each texel, -1 for none.
-    texel : (n,) ndarray
-        Texels of the flattened maps.
-    wanted : Wanted
-        Which planes to fill.
-    planes : Planes
-        The result, n rows of one texel.
+    `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
+    `texel` (n,): texels of the flattened maps. `channels`: which planes to fill. `planes`: the result, n rows of one
+    texel.
     """
-    runs = room_for_runs(len(texel), 1)
-    _fill(surface, projection, take_runs(triangle_id, texel, runs), runs, (0, len(texel)), wanted, planes)
+    runs = allocate_runs(len(texel), 1)
+    _fill_rows(surface, projection, runs_at(triangle_id, texel, runs), runs, (0, len(texel)), channels, planes)
 
 
 @kernel
-def _fill(
-    surface: Surface, projection: Projection, count: int, runs: Runs, rows: Rows, wanted: Wanted, planes: Planes
+def _fill_rows(
+    surface: Surface, projection: Projection, count: int, runs: Runs, rows: Rows, channels: ChannelMask, planes: Planes
 ) -> None:
     """Fill some rows of the planes; `count` is one past the last run."""
     describe_runs(surface, projection, count, runs)
-    if wanted.depth or wanted.distance or wanted.position:
-        _meet(projection, rows, runs, wanted, planes)
-    _spread(rows, runs, wanted, planes)
-    if len(surface.normals) > 0 and wanted.normal:
+    if channels.depth or channels.distance or channels.position:
+        _intersect(projection, rows, runs, channels, planes)
+    _write_constant(rows, runs, channels, planes)
+    if len(surface.normals) > 0 and channels.normal:
         _interpolate(surface, projection, rows, runs, planes.normal)
 
 
 @kernel
-def _meet(projection: Projection, rows: Rows, runs: Runs, wanted: Wanted, planes: Planes) -> None:
-    """Write t, the length of t d and the point o + t d of each texel: inf, inf and 0 where nothing is seen."""
+def _intersect(projection: Projection, rows: Rows, runs: Runs, channels: ChannelMask, planes: Planes) -> None:
+    """Write t, the length of t d and the point o + t d of each texel: inf, inf and 0 without surface."""
     across, half, kind = 2.0 / projection.width, projection.half[0], projection.kind
     slot, fixed, width = runs.slot, runs.fixed, runs.slot.shape[1]
     line, hit = np.empty((6, width)), np.empty((4, width))
@@ -154,52 +132,52 @@ def _meet(projection: Projection, rows: Rows, runs: Runs, wanted: Wanted, planes
             gx, gy, gz = line[3, x], line[4, x], line[5, x]
             facing = dx * gx + dy * gy + dz * gz
             t = ((line[0, x] - ox) * gx + (line[1, x] - oy) * gy + (line[2, x] - oz) * gz) / facing
-            seen = slot[y, x] > 0
-            hit[0, x] = t if seen else np.inf
-            hit[1, x] = ox + t * dx if seen else 0.0
-            hit[2, x] = oy + t * dy if seen else 0.0
-            hit[3, x] = oz + t * dz if seen else 0.0
-        if wanted.distance:
+            covered = slot[y, x] > 0
+            hit[0, x] = t if covered else np.inf
+            hit[1, x] = ox + t * dx if covered else 0.0
+            hit[2, x] = oy + t * dy if covered else 0.0
+            hit[3, x] = oz + t * dz if covered else 0.0
+        if channels.distance:
             for x in range(width):
                 _, _, _, dx, dy, dz = image_ray(kind, view, ((x + middle) * across - 1.0) * half, v)
                 planes.distance[row, x] = hit[0, x] * math.sqrt(dx * dx + dy * dy + dz * dz)
-        _round(hit, row, wanted, planes)
+        _store_hits(hit, row, channels, planes)
 
 
 @kernel
-def _round(hit: Array, row: int, wanted: Wanted, planes: Planes) -> None:
+def _store_hits(hit: Array, row: int, channels: ChannelMask, planes: Planes) -> None:
     """Round depths and points of a row to the buffer's type."""
-    if wanted.depth:
+    if channels.depth:
         for x in range(hit.shape[1]):
             planes.depth[row, x] = hit[0, x]
-    if wanted.position:
+    if channels.position:
         for axis in range(3):
             for x in range(hit.shape[1]):
                 planes.position[axis, row, x] = hit[1 + axis, x]
 
 
 @kernel
-def _spread(rows: Rows, runs: Runs, wanted: Wanted, planes: Planes) -> None:
+def _write_constant(rows: Rows, runs: Runs, channels: ChannelMask, planes: Planes) -> None:
     """Write along each run what is the same all along it."""
     slot, fixed, corner = runs.slot, runs.fixed, runs.corner
     normal, albedo = planes.normal, planes.albedo
     for row in range(rows[0], rows[1]):
         y = row - rows[0]
-        if wanted.normal:
+        if channels.normal:
             for x in range(slot.shape[1]):
                 run = np.uint64(slot[y, x])
                 normal[0, row, x], normal[1, row, x], normal[2, row, x] = fixed[run, 6], fixed[run, 7], fixed[run, 8]
-        if wanted.albedo:
+        if channels.albedo:
             for x in range(slot.shape[1]):
                 run = np.uint64(slot[y, x])
                 albedo[0, row, x], albedo[1, row, x], albedo[2, row, x] = fixed[run, 9], fixed[run, 10], fixed[run, 11]
-        if wanted.material_id:
+        if channels.material_id:
             for x in range(slot.shape[1]):
                 planes.material_id[row, x] = corner[np.uint64(slot[y, x]), 3]
 
 
 @kernel
-def _weight(ray: Any, ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
+def _barycentric(ray: Any, ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
     """Return d . (a x b), relative to the ray's origin: a barycentric coordinate up to the common factor d . N."""
     ox, oy, oz, dx, dy, dz = ray
     cx, cy, cz = cross(ax - ox, ay - oy, az - oz, bx - ox, by - oy, bz - oz)
@@ -227,8 +205,8 @@ def _interpolate(surface: Surface, projection: Projection, rows: Rows, runs: Run
             ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
             jx, jy, jz = vertices[j, 0], vertices[j, 1], vertices[j, 2]
             kx, ky, kz = vertices[k, 0], vertices[k, 1], vertices[k, 2]
-            a = _weight(ray, jx, jy, jz, kx, ky, kz) / facing
-            b = _weight(ray, kx, ky, kz, ix, iy, iz) / facing
+            a = _barycentric(ray, jx, jy, jz, kx, ky, kz) / facing
+            b = _barycentric(ray, kx, ky, kz, ix, iy, iz) / facing
             c = 1.0 - a - b
             sx = a * shading[i, 0] + b * shading[j, 0] + c * shading[k, 0]
             sy = a * shading[i, 1] + b * shading[j, 1] + c * shading[k, 1]

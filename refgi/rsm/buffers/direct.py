@@ -1,4 +1,7 @@
-"""Direct light: irradiance of one light at the receivers, and its shadows from the map's depth."""
+"""Direct light of one light source: irradiance at the receivers, and shadow-map visibility.
+
+The shadow test compares with the receiver's own plane (a receiver-plane depth bias) in place of a constant bias.
+"""
 
 import math
 from typing import Any, NamedTuple
@@ -12,28 +15,28 @@ from refgi.jit import kernel, prange
 from refgi.radiometry import FOR_FLOAT32, SPOT, falloff_in_float64, incident_light
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.reflective import Rsm
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection, image_point, texel_coordinates
 from refgi.scene.model import Light, LightTable, light_table
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
-MARGIN = 0.1  # texels, also per unit of slope: how far above a receiver's plane its own surface may be stored
-STEEPEST = 10.0  # largest slope, depth per sideways distance, that the margin follows
+PLANE_BIAS = 0.1  # texels, also per unit of slope: how far above a receiver's plane its own surface may be stored
+LARGEST_SLOPE = 10.0  # largest slope, depth per sideways distance, that the bias follows
 NO_SHADOW = np.zeros((0, 0), np.bool_)
 
 
-class Stored(NamedTuple):
-    """What a light's map tells about its nearest surface."""
+class ShadowMap(NamedTuple):
+    """Depth and position of the nearest surface at each texel of a light's map."""
 
     depth: Array  # (T,) m
     position: Array  # (3, T) m
     bias: float  # m; negative: compare with the receiver's plane
 
 
-class Receivers(NamedTuple):
-    """Surface points that may be lit."""
+class SurfacePoints(NamedTuple):
+    """Receivers: surface points and their normals."""
 
     position: Array  # (3, h, w) m
     normal: Array  # (3, h, w) unit vectors
@@ -44,7 +47,7 @@ class Receivers(NamedTuple):
 def shadow_map_visibility(
     position: Array, normal: Array, covered: Array, rsm: Rsm, bias: float | None = None
 ) -> Array:
-    """Tell which receivers a light reaches, by the depth in its map.
+    """Return which receivers a light reaches: the shadow-map test, one look-up at the nearest texel.
 
     Parameters
     ----------
@@ -55,13 +58,13 @@ def shadow_map_visibility(
     rsm : Rsm
         The light's map.
     bias : float, optional
-        A receiver counts as lit up to this far behind the stored depth, m: the published test. By default it is in
+        A receiver is visible up to this far behind the stored depth, m: the published test. By default it is in
         shadow where the stored point lies above the receiver's own plane by more than a fraction of a texel.
 
     Returns
     -------
     (h, w) ndarray of bool
-        True where lit; false outside the map, which encloses all that the light reaches.
+        True where the light arrives; false outside the map, which encloses all that the light reaches.
 
     Raises
     ------
@@ -70,77 +73,81 @@ def shadow_map_visibility(
 
     Notes
     -----
-    One look-up, of the nearest texel: shadow edges are as coarse as the map. What blocks the light lies between it and
-    the receiver, hence above the receiver's plane; a neighbouring point of the same surface does not, at any slope.
+    Shadow edges are as coarse as the map, without percentage-closer filtering (PCF). What blocks the light lies between
+    it and the receiver, hence above the receiver's plane; a neighbouring point of the same surface does not, at any
+    slope.
     """
     expect(bias is None or (math.isfinite(bias) and bias >= 0), "bias", "a finite number >= 0, m", bias)
     visible = plane(covered.shape, np.bool_)
-    depth, stored_position = rsm.resolve("depth", "position")
-    stored = Stored(depth.reshape(-1), stored_position.reshape(3, -1), -1.0 if bias is None else bias)
-    _look_up(rsm.projection, Receivers(position, normal, covered), stored, numba.get_num_threads(), visible)
+    depth, map_position = rsm.resolve("depth", "position")
+    shadow_map = ShadowMap(depth.reshape(-1), map_position.reshape(3, -1), -1.0 if bias is None else bias)
+    receivers = SurfacePoints(position, normal, covered)
+    _shadow_lookup(rsm.projection, receivers, shadow_map, numba.get_num_threads(), visible)
     return visible
 
 
 @kernel(parallel=True)
-def _look_up(maps: Projection, receivers: Receivers, stored: Stored, workers: int, visible: Array) -> None:
+def _shadow_lookup(
+    maps: Projection, receivers: SurfacePoints, shadow_map: ShadowMap, workers: int, visible: Array
+) -> None:
     for worker in prange(workers):
-        _look_up_rows(maps, receivers, stored, worker, workers, visible)
+        _shadow_lookup_rows(maps, receivers, shadow_map, worker, workers, visible)
 
 
 @kernel
-def _look_up_rows(
-    maps: Projection, receivers: Receivers, stored: Stored, first: int, step: int, visible: Array
+def _shadow_lookup_rows(
+    maps: Projection, receivers: SurfacePoints, shadow_map: ShadowMap, first: int, step: int, visible: Array
 ) -> None:
     """Look up every `step`-th row; what needs no branch is done for a whole row first, in SIMD lanes."""
     position, normal, covered = receivers.position, receivers.normal, receivers.covered
     width = visible.shape[1]
-    place, far, above = np.empty(width, np.int32), np.empty(width), np.empty(width)
-    fixed, relative = _largest_margin(maps)
+    nearest_texel, receiver_depth, above_plane = np.empty(width, np.int32), np.empty(width), np.empty(width)
+    constant, relative = _largest_plane_bias(maps)
     for row in range(first, len(visible), step):
-        _project_row(maps, position, row, place, far)
+        _project_row(maps, position, row, nearest_texel, receiver_depth)
         for x in range(width):
-            texel = max(place[x], 0)
+            texel = max(nearest_texel[x], 0)
             # in the receivers' type, as the sum's parts are
-            along = normal[0, row, x] * (stored.position[0, texel] - position[0, row, x])
-            down = normal[1, row, x] * (stored.position[1, texel] - position[1, row, x])
-            ahead = normal[2, row, x] * (stored.position[2, texel] - position[2, row, x])
-            above[x] = 0.0 + along + np.float64(down) + np.float64(ahead)
+            along = normal[0, row, x] * (shadow_map.position[0, texel] - position[0, row, x])
+            down = normal[1, row, x] * (shadow_map.position[1, texel] - position[1, row, x])
+            ahead = normal[2, row, x] * (shadow_map.position[2, texel] - position[2, row, x])
+            above_plane[x] = 0.0 + along + np.float64(down) + np.float64(ahead)
         for x in range(width):
-            if not covered[row, x] or place[x] < 0:
+            if not covered[row, x] or nearest_texel[x] < 0:
                 visible[row, x] = False
-            elif stored.bias >= 0.0:
-                visible[row, x] = far[x] <= stored.depth[place[x]] + stored.bias
-            elif far[x] <= stored.depth[place[x]] or above[x] <= 1e-6 * far[x]:
+            elif shadow_map.bias >= 0.0:
+                visible[row, x] = receiver_depth[x] <= shadow_map.depth[nearest_texel[x]] + shadow_map.bias
+            elif receiver_depth[x] <= shadow_map.depth[nearest_texel[x]] or above_plane[x] <= 1e-6 * receiver_depth[x]:
                 visible[row, x] = True
-            elif above[x] > fixed + relative * far[x]:  # most of what is in shadow: the margin is dear
+            elif above_plane[x] > constant + relative * receiver_depth[x]:  # most shadowed points: saves `_plane_bias`
                 visible[row, x] = False
             else:
                 point = position[0, row, x], position[1, row, x], position[2, row, x]
                 facing = normal[0, row, x], normal[1, row, x], normal[2, row, x]
-                margin = _margin(maps, place[x] // (maps.height * maps.width), point, facing)
-                visible[row, x] = above[x] <= margin + 1e-6 * far[x]
+                plane_bias = _plane_bias(maps, nearest_texel[x] // (maps.height * maps.width), point, facing)
+                visible[row, x] = above_plane[x] <= plane_bias + 1e-6 * receiver_depth[x]
 
 
 @kernel
-def _project_row(maps: Projection, position: Array, row: int, place: Array, far: Array) -> None:
+def _project_row(maps: Projection, position: Array, row: int, nearest_texel: Array, receiver_depth: Array) -> None:
     """Write the texel of the first map that sees each point, as `texel_of` does, or -1, and the point's depth."""
     half, rows = maps.half, len(maps.origin) * maps.height
-    place[:] = -1
+    nearest_texel[:] = -1
     for m in range(len(maps.origin)):
-        for x in range(len(place)):
+        for x in range(len(nearest_texel)):
             u, v, depth = image_point(maps, m, position[0, row, x], position[1, row, x], position[2, row, x])
-            seen = (place[x] < 0) & (abs(u) <= half[0]) & (abs(v) <= half[1])
-            column, line = texel_coordinates(maps, m, u if seen else 0.0, v if seen else 0.0)
+            inside = (nearest_texel[x] < 0) & (abs(u) <= half[0]) & (abs(v) <= half[1])
+            column, line = texel_coordinates(maps, m, u if inside else 0.0, v if inside else 0.0)
             texel = min(int(line), rows - 1) * maps.width + min(int(column), maps.width - 1)
-            place[x] = texel if seen else place[x]
-            far[x] = depth if seen else far[x]
+            nearest_texel[x] = texel if inside else nearest_texel[x]
+            receiver_depth[x] = depth if inside else receiver_depth[x]
 
 
 @kernel
-def _largest_margin(maps: Projection) -> tuple[float, float]:
-    """Return (a, b): the margin and what rounding adds are less than a + b depth, whatever the receiver's slope."""
+def _largest_plane_bias(maps: Projection) -> tuple[float, float]:
+    """Return (a, b): the plane bias and what rounding adds are less than a + b depth, whatever the receiver's slope."""
     width = 2.0 * max(maps.half[0] / maps.width, maps.half[1] / maps.height)
-    most = (1.0 + 1e-3) * MARGIN * (1.0 + STEEPEST) * width
+    most = (1.0 + 1e-3) * PLANE_BIAS * (1.0 + LARGEST_SLOPE) * width
     if maps.kind == ORTHOGRAPHIC:
         return most, 2e-6
     if maps.kind == PARABOLOID:
@@ -149,8 +156,8 @@ def _largest_margin(maps: Projection) -> tuple[float, float]:
 
 
 @kernel
-def _margin(maps: Projection, m: int, point: Any, facing: Any) -> Any:
-    """Return the margin over a receiver's plane, m: a fraction of a texel that grows with the slope."""
+def _plane_bias(maps: Projection, m: int, point: Any, facing: Any) -> Any:
+    """Return the bias over a receiver's plane, m: a fraction of a texel that grows with the slope."""
     frame, origin = maps.frame, maps.origin
     dx, dy, dz = frame[m, 2, 0], frame[m, 2, 1], frame[m, 2, 2]
     width = 2.0 * max(maps.half[0] / maps.width, maps.half[1] / maps.height)
@@ -161,7 +168,7 @@ def _margin(maps: Projection, m: int, point: Any, facing: Any) -> Any:
         width *= 2.0 * distance if maps.kind == PARABOLOID else distance
     cosine = abs(dx * facing[0] + dy * facing[1] + dz * facing[2])
     slope = math.sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-6)
-    return MARGIN * width * (1.0 + min(slope, STEEPEST))
+    return PLANE_BIAS * width * (1.0 + min(slope, LARGEST_SLOPE))
 
 
 @stage("rsm.direct_irradiance")
@@ -200,15 +207,15 @@ def _irradiance(
 ) -> None:
     for row in prange(covered.shape[0]):
         if lights.kind[0] == SPOT:
-            _spot_row(lights, Receivers(position, normal, covered), visible, row, out)
+            _spot_row(lights, SurfacePoints(position, normal, covered), visible, row, out)
         else:
             for column in range(covered.shape[1]):
-                _irradiance_at(lights, Receivers(position, normal, covered), visible, row, column, out)
+                _irradiance_at(lights, SurfacePoints(position, normal, covered), visible, row, column, out)
 
 
 @kernel
 def _irradiance_at(
-    lights: LightTable, receivers: Receivers, visible: Array, row: int, column: int, out: Array
+    lights: LightTable, receivers: SurfacePoints, visible: Array, row: int, column: int, out: Array
 ) -> None:
     position, normal, covered = receivers
     out[0, row, column], out[1, row, column], out[2, row, column] = 0.0, 0.0, 0.0
@@ -217,12 +224,13 @@ def _irradiance_at(
         wx, wy, wz, _, er, eg, eb = incident_light(lights, 0, x, y, z)
         cosine = wx * normal[0, row, column] + wy * normal[1, row, column] + wz * normal[2, row, column]
         cosine = max(cosine, 0.0)
+        # E = I(w) cos / d^2
         out[0, row, column], out[1, row, column], out[2, row, column] = er * cosine, eg * cosine, eb * cosine
 
 
 @kernel
-def _spot_row(lights: LightTable, receivers: Receivers, visible: Array, row: int, out: Array) -> None:
-    """Light a row in SIMD lanes; the few receivers at the edge of the cone, which float64 leaves in doubt, anew."""
+def _spot_row(lights: LightTable, receivers: SurfacePoints, visible: Array, row: int, out: Array) -> None:
+    """Fill a row of a spot's irradiance in SIMD lanes; doubtful receivers at the edge of its cone are recomputed."""
     position, normal, covered = receivers
     width, plain = covered.shape[1], FOR_FLOAT32 if out.itemsize == 4 else np.inf
     px, py, pz = lights.position[0, 0], lights.position[0, 1], lights.position[0, 2]
@@ -234,10 +242,11 @@ def _spot_row(lights: LightTable, receivers: Receivers, visible: Array, row: int
         square = dx * dx + dy * dy + dz * dz
         cosine = -(dx * normal[0, row, x] + dy * normal[1, row, x] + dz * normal[2, row, x])
         share, certain = falloff_in_float64((dx, dy, dz), axis, cone, plain)
-        lit = (visible.size == 0 or visible[row, x]) & covered[row, x] & (cosine > 0.0) & (square > 0.0)
-        factor = share * cosine / (square * math.sqrt(square)) if lit else 0.0
+        illuminated = (visible.size == 0 or visible[row, x]) & covered[row, x] & (cosine > 0.0) & (square > 0.0)
+        # E = I(w) cos / d^2, with a cosine times d
+        factor = share * cosine / (square * math.sqrt(square)) if illuminated else 0.0
         out[0, row, x], out[1, row, x], out[2, row, x] = red * factor, green * factor, blue * factor
-        doubtful[x] = lit & (not certain)
+        doubtful[x] = illuminated & (not certain)
     for x in range(width):
         if doubtful[x]:
             _irradiance_at(lights, receivers, visible, row, x, out)

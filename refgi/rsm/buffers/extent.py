@@ -1,8 +1,7 @@
-"""The scene's extent: the box of what takes part, which settings that are shares of the scene's size refer to.
+"""Extent of a scene: the bounding box of what is visible or illuminated, to which relative settings refer.
 
-What nobody sees and no light reaches has no part in a picture, so its size must have none either. Surfaces take part
-where the camera sees them and where light falls on them that they reflect. Of a light's map a grid of texels is asked,
-so that no other texel's place need be known.
+Surfaces that are neither visible to the camera nor reflect light have no effect on a picture, so their size must have
+none either. Of a light's map a grid of texels is sampled, so that no other texel's position need be computed.
 """
 
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
-ASKED = 96  # texels along a side of a light's map: the box is then short of 1 % of what the map shows at either end
+SAMPLES = 96  # texels along a side of a light's map: the box is then short of 1 % of what the map shows at either end
 
 
 class Extent(NamedTuple):
@@ -48,9 +47,9 @@ class Extent(NamedTuple):
         return self if self.diagonal > 0 else Extent(*geometry.bounds)
 
 
-@stage("frame.seen_extent")
-def seen_extent(buffer: GBuffer) -> Extent:
-    """Return the box of what a camera sees.
+@stage("frame.visible_extent")
+def visible_extent(buffer: GBuffer) -> Extent:
+    """Return the bounding box of the visible surfaces.
 
     Parameters
     ----------
@@ -68,9 +67,9 @@ def seen_extent(buffer: GBuffer) -> Extent:
     return Extent(rows[:3].min(axis=1), rows[3:].max(axis=1))
 
 
-@stage("frame.lit_extent")
-def lit_extent(rsms: Sequence[Rsm]) -> Extent:
-    """Return the box of what lights reach and is not black, at a grid of each map's texels.
+@stage("frame.illuminated_extent")
+def illuminated_extent(rsms: Sequence[Rsm]) -> Extent:
+    """Return the bounding box of surfaces that reflect direct light, from a grid of each map's texels.
 
     Parameters
     ----------
@@ -80,42 +79,35 @@ def lit_extent(rsms: Sequence[Rsm]) -> Extent:
     Returns
     -------
     Extent
-        Empty where nothing is lit.
+        Empty where nothing reflects light.
     """
-    places = np.concatenate([np.zeros((3, 0)), *(_lit_places(rsm) for rsm in rsms)], axis=1, dtype=np.float64)
-    return Extent(places.min(axis=1, initial=np.inf), places.max(axis=1, initial=-np.inf))
+    parts = (_reflecting_positions(rsm) for rsm in rsms)
+    positions = np.concatenate([np.zeros((3, 0)), *parts], axis=1, dtype=np.float64)
+    return Extent(positions.min(axis=1, initial=np.inf), positions.max(axis=1, initial=-np.inf))
 
 
 def joined(one: Extent, other: Extent) -> Extent:
     """Return the box around two.
 
-    Parameters
-    ----------
-    one, other : Extent
-        Boxes.
-
-    Returns
-    -------
-    Extent
-        The smallest that holds both.
+    Result: the smallest that holds both.
     """
     return Extent(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
 
 
-def _lit_places(rsm: Rsm) -> Array:
-    """Return positions of lit texels among a grid, (3, n)."""
+def _reflecting_positions(rsm: Rsm) -> Array:
+    """Return positions of a grid of texels, (3, n): those that reflect light."""
     height, width = rsm.covered.shape
     maps = max(1, height // width)
     rows, columns = ((np.arange(min(size, count)) + 0.5) * size / min(size, count)
-                     for size, count in ((height, maps * ASKED), (width, ASKED)))
+                     for size, count in ((height, maps * SAMPLES), (width, SAMPLES)))
     texel = (rows.astype(np.int64)[:, None] * width + columns.astype(np.int64)).ravel()
     texel = texel[rsm.covered.reshape(-1)[texel]]
     position, flux = rsm.at(texel, "position", "flux")
-    lit = flux.any(axis=0)
+    reflects = flux.any(axis=0)
     lobes = rsm.lobe_flux
     if lobes is not None:
-        lit |= lobes.reshape(3, -1)[:, texel].any(axis=0)
-    return np.asarray(position[:, lit])
+        reflects |= lobes.reshape(3, -1)[:, texel].any(axis=0)
+    return np.asarray(position[:, reflects])
 
 
 @kernel

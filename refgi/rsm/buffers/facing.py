@@ -1,4 +1,4 @@
-"""Normals of the triangles themselves, where the shading normal may be another: what lies before a surface's plane."""
+"""Geometric (face) normals of the G-buffer's triangles, where shading normals are interpolated."""
 
 import math
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
@@ -34,12 +34,12 @@ def facing_normals(geometry: Geometry, triangle_id: Array, normal: Array) -> Arr
     if geometry.vertex_normals is None:
         return normal
     facing = plane(normal.shape, normal.dtype)
-    _fill(geometry.vertices, geometry.faces, triangle_id, normal, facing)
+    _fill_facing(geometry.vertices, geometry.faces, triangle_id, normal, facing)
     return facing
 
 
 @kernel(parallel=True)
-def _fill(vertices: Array, faces: Array, triangle_id: Array, normal: Array, facing: Array) -> None:
+def _fill_facing(vertices: Array, faces: Array, triangle_id: Array, normal: Array, facing: Array) -> None:
     for row in prange(triangle_id.shape[0]):
         last, nx, ny, nz = -1, 0.0, 0.0, 0.0
         for column in range(triangle_id.shape[1]):

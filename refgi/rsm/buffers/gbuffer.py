@@ -1,4 +1,4 @@
-"""The G-buffer: what a camera or a light sees through every texel, each channel resolved when first asked for."""
+"""The G-buffer of a camera or a light: depth, position, normal, albedo, ids; each channel resolved on first use."""
 
 from typing import Any
 
@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.rsm.buffers.attributes import Planes, Wanted, resolve, resolve_at
+from refgi.rsm.buffers.attributes import ChannelMask, Planes, resolve, resolve_at
 from refgi.rsm.buffers.runs import Surface
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
 from refgi.scene.model import Camera, Geometry, MaterialTable
@@ -30,7 +30,7 @@ class GBuffer:
     materials : MaterialTable
         Their materials.
     projection : Projection
-        Who looks.
+        The view.
     visibility : Visibility
         Which triangle each texel sees.
     dtype : dtype
@@ -68,12 +68,12 @@ class GBuffer:
 
     @property
     def triangle_id(self) -> Array:
-        """Triangle that is seen, (h, w) int32, -1 for none."""
+        """Visible triangle, (h, w) int32, -1 for none."""
         return self.visibility.triangle_id
 
     @property
     def covered(self) -> Array:
-        """Whether any surface is seen, (h, w) bool."""
+        """Whether a surface is visible, (h, w) bool."""
         if "covered" not in self._channels:
             covered = plane(self.visibility.triangle_id.shape, np.bool_)
             self._channels["covered"] = np.greater_equal(self.visibility.triangle_id, 0, out=covered)
@@ -96,7 +96,7 @@ class GBuffer:
 
     @property
     def normal(self) -> Array:
-        """Unit normal on the side that is seen, (3, h, w): interpolated where the geometry has vertex normals."""
+        """Unit normal on the visible side, (3, h, w): interpolated where the geometry has vertex normals."""
         return self.resolve("normal")[0]
 
     @property
@@ -106,7 +106,7 @@ class GBuffer:
 
     @property
     def material_id(self) -> Array:
-        """Material that is seen, (h, w) int32, -1 for none."""
+        """Visible material, (h, w) int32, -1 for none."""
         return self.resolve("material_id")[0]
 
     def resolve(self, *names: str) -> tuple[Array, ...]:
@@ -128,8 +128,9 @@ class GBuffer:
             If a name is not a channel.
         """
         for name in names:
-            expect(name in (*Wanted._fields, "triangle_id", "covered"), "channel", "a channel of the G-buffer", name)
-        missing = [name for name in Wanted._fields if name in names and name not in self._channels]
+            known = name in (*ChannelMask._fields, "triangle_id", "covered")
+            expect(known, "channel", "a channel of the G-buffer", name)
+        missing = [name for name in ChannelMask._fields if name in names and name not in self._channels]
         if missing:
             self._channels.update(_resolve(self._geometry, self._materials, self.projection,
                                            self.visibility.triangle_id, self.dtype, tuple(missing)))  # fmt: skip
@@ -152,18 +153,18 @@ class GBuffer:
         """
         if MANY * len(texel) > self.visibility.triangle_id.size:
             self.resolve(*names)
-        missing = tuple(name for name in Wanted._fields if name in names and name not in self._channels)
-        there = {}
+        missing = tuple(name for name in ChannelMask._fields if name in names and name not in self._channels)
+        computed = {}
         if missing:
             planes = _planes(missing, (len(texel), 1), self.dtype)
             surface = _surface(self._geometry, self._materials, self.dtype)
-            wanted = Wanted(*(name in missing for name in Wanted._fields))
-            resolve_at(surface, self.projection, self.visibility.triangle_id, texel, wanted, planes)
-            there = {name: getattr(planes, name)[..., 0] for name in missing}
-        return tuple(there[n] if n in there else taken(self.resolve(n)[0], texel) for n in names)
+            channels = ChannelMask(*(name in missing for name in ChannelMask._fields))
+            resolve_at(surface, self.projection, self.visibility.triangle_id, texel, channels, planes)
+            computed = {name: getattr(planes, name)[..., 0] for name in missing}
+        return tuple(computed[n] if n in computed else values_at(self.resolve(n)[0], texel) for n in names)
 
 
-def taken(channel: Array, texel: Array) -> Array:
+def values_at(channel: Array, texel: Array) -> Array:
     """Return a channel's values at some texels.
 
     Parameters
@@ -190,7 +191,7 @@ def gbuffer(
     height: int | None = None,
     dtype: npt.DTypeLike = np.float32,
 ) -> GBuffer:
-    """Look at triangles through a camera.
+    """Rasterize triangles for a camera.
 
     Parameters
     ----------
@@ -199,7 +200,7 @@ def gbuffer(
     materials : MaterialTable
         Their materials.
     camera : Camera
-        Who looks.
+        The view.
     width, height : int, optional
         Size in pixels; the camera's own where absent.
     dtype : dtype
@@ -231,15 +232,15 @@ def _resolve(
 ) -> dict[str, Array]:
     """Return the named channels, computed in one pass."""
     planes = _planes(names, triangle_id.shape, dtype)
-    wanted = Wanted(*(name in names for name in Wanted._fields))
-    resolve(_surface(geometry, materials, dtype), projection, triangle_id, wanted, planes, numba.get_num_threads())
+    channels = ChannelMask(*(name in names for name in ChannelMask._fields))
+    resolve(_surface(geometry, materials, dtype), projection, triangle_id, channels, planes, numba.get_num_threads())
     return {name: getattr(planes, name) for name in names}
 
 
 def _planes(names: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype[Any]) -> Planes:
-    """Return room for the named channels."""
+    """Allocate the planes of the named channels."""
     planes = {}
-    for name in Wanted._fields:
+    for name in ChannelMask._fields:
         size = shape if name in names else (0, 0)
         planes[name] = plane((3, *size) if name in ("position", "normal", "albedo") else size,
                              np.int32 if name == "material_id" else dtype)  # fmt: skip

@@ -1,4 +1,4 @@
-"""Light that leaves what a camera sees towards the camera: emission + albedo/pi irradiance."""
+"""Radiance that leaves towards the camera, the picture: L = L_e + albedo/pi E."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.gbuffer import GBuffer
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.scene.model import MaterialTable
 
 Array = npt.NDArray[Any]
@@ -15,17 +15,17 @@ Array = npt.NDArray[Any]
 NONE = np.zeros((0, 0), np.int32)
 
 
-def leaving_radiance(irradiance: Array, more: Array | None, buffer: GBuffer, materials: MaterialTable) -> Array:
+def leaving_radiance(irradiance: Array, extra: Array | None, buffer: GBuffer, materials: MaterialTable) -> Array:
     """Return what the camera receives: L = L_e + albedo/pi (E + more).
 
     Parameters
     ----------
     irradiance : (3, h, w) ndarray
-        What arrives, W/m^2.
-    more : (3, h, w) ndarray, optional
-        What arrives besides, W/m^2.
+        Irradiance E, W/m^2.
+    extra : (3, h, w) ndarray, optional
+        More irradiance, W/m^2.
     buffer : GBuffer
-        What the camera sees.
+        The camera's.
     materials : MaterialTable
         Their emission.
 
@@ -34,24 +34,25 @@ def leaving_radiance(irradiance: Array, more: Array | None, buffer: GBuffer, mat
     (3, h, w) ndarray
         Radiance, W/m^2/sr, linear RGB.
     """
-    radiance = plane(irradiance.shape, irradiance.dtype if more is None else np.result_type(irradiance, more))
+    radiance = plane(irradiance.shape, irradiance.dtype if extra is None else np.result_type(irradiance, extra))
     emits = bool(materials.emission.any())
     material_id = buffer.material_id if emits else NONE
-    _leave(irradiance, irradiance if more is None else more, more is not None, buffer.albedo, radiance)
+    _reflect(irradiance, irradiance if extra is None else extra, extra is not None, buffer.albedo, radiance)
     if emits:
         _emit(materials.emission, material_id, radiance)
     return radiance
 
 
 @kernel(parallel=True)
-def _leave(irradiance: Array, more: Array, both: bool, albedo: Array, radiance: Array) -> None:
+def _reflect(irradiance: Array, extra: Array, both: bool, albedo: Array, radiance: Array) -> None:
     pi = irradiance.dtype.type(np.pi)
     for row in prange(radiance.shape[1]):
         for channel in range(3):
             for x in range(radiance.shape[2]):
                 arriving = irradiance[channel, row, x]
                 if both:
-                    arriving = arriving + more[channel, row, x]
+                    arriving = arriving + extra[channel, row, x]
+                # L = albedo/pi E, the BRDF of a diffuse surface
                 radiance[channel, row, x] = arriving * albedo[channel, row, x] / pi
 
 

@@ -1,6 +1,7 @@
-"""The maps that enclose what a light shines on.
+"""Shadow-map projections of a light, and the flux that arrives through each texel.
 
-What arrives from a light through each texel of its maps, whatever is met there.
+A spot gets one perspective or paraboloid map, a point light a cube or two paraboloid maps, a directional light an
+orthographic map.
 """
 
 import math
@@ -31,26 +32,8 @@ Array = npt.NDArray[Any]
 def light_projection(light: Light, geometry: Geometry, resolution: int, shape: MapShape = "auto") -> Projection:
     """Return the maps that enclose what a light shines on.
 
-    Parameters
-    ----------
-    light : Light
-        Whose view.
-    geometry : Geometry
-        What a directional light must enclose.
-    resolution : int
-        Texels along a side of one map.
-    shape : str
-        As in `reflective_shadow_map`.
-
-    Returns
-    -------
-    Projection
-        The maps.
-
-    Raises
-    ------
-    InputError
-        If the resolution or shape does not suit the light.
+    `geometry`: what a directional light must enclose. `resolution`: texels along a side of one map. Raises `InputError`
+    if the resolution or shape does not suit the light.
     """
     expect(isinstance(resolution, int | np.integer) and 1 <= resolution <= 16384, "resolution",
            "1 to 16384 texels", resolution)  # fmt: skip
@@ -92,7 +75,7 @@ def _described(light: Light) -> str:
 def texel_shares(
     light: Light, maps: Projection, solid_angle: Array | None = None, texel: Array | None = None
 ) -> Array:
-    """Return how much of a light each texel of its maps takes in.
+    """Return the integral of a light's falloff over each texel of its maps.
 
     Parameters
     ----------

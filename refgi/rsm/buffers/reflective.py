@@ -1,4 +1,4 @@
-"""The reflective shadow map: the scene from a light, with the flux that each texel's surface reflects.
+"""Reflective shadow maps (RSM): G-buffer of a light, with the flux that each texel's surface reflects.
 
 Phi_t = albedo * (integral of I over the texel's directions), W, without cosine or distance (docs/radiometry); a
 directional light gives albedo * E_perp * A_perp. Glass reflects nothing here. The Phong lobe of a material leaves in
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.rsm.buffers.gbuffer import GBuffer, taken
+from refgi.rsm.buffers.gbuffer import GBuffer, values_at
 from refgi.rsm.buffers.light_projection import MapShape, incident_flux, light_projection
 from refgi.rsm.buffers.runs import texel_ray
 from refgi.rsm.buffers.solid_angle import texel_solid_angles
@@ -27,52 +27,52 @@ __all__ = ["Rsm", "reflective_shadow_map"]
 
 Array = npt.NDArray[Any]
 
-SEEN = ("depth", "position", "normal")  # channels of the light's view
+VIEW_CHANNELS = ("depth", "position", "normal")  # channels of the light's view
 LOBE = ("lobe_flux", "lobe_axis", "lobe_exponent")
 
 
 class Rsm:
-    """What one light sees and reflects, on H x W texels (stacked maps); a channel is computed when first asked for.
+    """The reflective shadow map of one light, H x W texels (stacked maps); a channel is computed on first use.
 
     Parameters
     ----------
     light : Light
-        Whose view.
+        The light source.
     view : GBuffer
-        What it sees.
+        Its G-buffer.
     materials : MaterialTable
-        What that is made of.
-    given : mapping of str to ndarray or None, optional
-        Channels that are known to be others than those of the view.
+        The scene's materials.
+    overrides : mapping of str to ndarray or None, optional
+        Channels that replace those of the view.
     """
 
     def __init__(
-        self, light: Light, view: GBuffer, materials: MaterialTable, given: Mapping[str, Array | None] | None = None
+        self, light: Light, view: GBuffer, materials: MaterialTable, overrides: Mapping[str, Array | None] | None = None
     ) -> None:
         self.light = light
         self.projection = view.projection
         self._view = view
         self._materials = materials
-        self._given = dict(given or {})
+        self._known = dict(overrides or {})
         self._glossy = bool((materials.specular.any(axis=1) & (materials.ior == 0)).any())
 
     def _replace(self, **channels: Array | None) -> "Rsm":
         """Return the map with other channels."""
-        return Rsm(self.light, self._view, self._materials, {**self._given, **channels})
+        return Rsm(self.light, self._view, self._materials, {**self._known, **channels})
 
     @property
     def triangle_id(self) -> Array:
-        """Triangle that is seen, (H, W) int32, -1 for none."""
+        """Visible triangle, (H, W) int32, -1 for none."""
         return self._view.triangle_id
 
     @property
     def covered(self) -> Array:
-        """Whether any surface is seen, (H, W) bool."""
+        """Whether a surface is visible, (H, W) bool."""
         return self._view.covered
 
     @property
     def depth(self) -> Array:
-        """Axial depth, or distance on a paraboloid map, (H, W), m; inf where nothing is seen."""
+        """Axial depth, or distance on a paraboloid map, (H, W), m; inf without surface."""
         return self.resolve("depth")[0]
 
     @property
@@ -82,7 +82,7 @@ class Rsm:
 
     @property
     def normal(self) -> Array:
-        """Unit normal on the lit side, (3, H, W)."""
+        """Unit normal on the side of the light, (3, H, W)."""
         return self.resolve("normal")[0]
 
     @property
@@ -123,7 +123,7 @@ class Rsm:
         tuple of ndarray
             The channels, in the order asked for.
         """
-        self._view.resolve(*(name for name in names if name in SEEN and name not in self._given))
+        self._view.resolve(*(name for name in names if name in VIEW_CHANNELS and name not in self._known))
         return tuple(self._whole(name) for name in names)
 
     def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
@@ -141,13 +141,15 @@ class Rsm:
         tuple of (n,) or (3, n) ndarray
             The channels, in the order asked for, with the bits that they have on the whole map.
         """
-        parts = {name: taken(self._whole(name), texel) for name in names if name in self._given}
+        parts = {name: values_at(self._whole(name), texel) for name in names if name in self._known}
         absent = [name for name in names if name not in parts]
-        wanted = dict.fromkeys([*(n for n in absent if n in SEEN), *(self._reflecting if "flux" in absent else ())])
-        seen = dict(zip(wanted, self._view.at(texel, *wanted), strict=True))
+        reflecting = self._reflecting if "flux" in absent else ()
+        needed = dict.fromkeys([*(n for n in absent if n in VIEW_CHANNELS), *reflecting])
+        surface = dict(zip(needed, self._view.at(texel, *needed), strict=True))
         if "flux" in absent:
-            seen["flux"] = self._flux(incident_flux(self.light, self.projection, None, self._view.dtype, texel), seen)
-        parts.update(seen)
+            incident = incident_flux(self.light, self.projection, None, self._view.dtype, texel)
+            surface["flux"] = self._flux(incident, surface)
+        parts.update(surface)
         return tuple(parts[name] for name in names)
 
     @property
@@ -155,37 +157,37 @@ class Rsm:
         """Channels of the view that the flux depends on."""
         return ("albedo", "material_id") if self._glossy or self._materials.ior.any() else ("albedo",)
 
-    def _flux(self, incident: Array, seen: Mapping[str, Array]) -> Array:
+    def _flux(self, incident: Array, surface: Mapping[str, Array]) -> Array:
         """Return what the diffuse part reflects of the incident flux, in its place."""
-        if "material_id" in seen:
-            incident *= (self._materials.ior == 0)[seen["material_id"]]
-        incident *= seen["albedo"]
+        if "material_id" in surface:
+            incident *= (self._materials.ior == 0)[surface["material_id"]]
+        incident *= surface["albedo"]  # Phi_t = albedo I(w) solid_angle_t (SII Sec. 3.1, calibrated)
         return incident
 
     def _whole(self, name: str) -> Array:
-        if name in SEEN and name not in self._given:
+        if name in VIEW_CHANNELS and name not in self._known:
             return self._view.resolve(name)[0]
-        if name not in self._given:
+        if name not in self._known:
             if name == "solid_angle":
-                self._given[name] = texel_solid_angles(self.projection).astype(self._view.dtype)
+                self._known[name] = texel_solid_angles(self.projection).astype(self._view.dtype)
             else:
                 incident = incident_flux(self.light, self.projection, None, self._view.dtype)
-                seen = zip(self._reflecting, self._view.resolve(*self._reflecting), strict=True)
-                self._given[name] = self._flux(incident, dict(seen))
-        channel = self._given[name]
+                surface = zip(self._reflecting, self._view.resolve(*self._reflecting), strict=True)
+                self._known[name] = self._flux(incident, dict(surface))
+        channel = self._known[name]
         assert channel is not None
         return channel
 
     def _lobe(self, name: str) -> Array | None:
-        if name not in self._given and not self._glossy:
+        if name not in self._known and not self._glossy:
             return None
-        if name not in self._given:
+        if name not in self._known:
             normal, material = self._view.resolve("normal", "material_id")
             incident = incident_flux(self.light, self.projection, None, self._view.dtype)
             incident *= (self._materials.ior == 0)[material]
             lobe = _lobe(self._materials, self.projection, material, normal, incident * self.covered)
-            self._given = {**dict(zip(LOBE, lobe, strict=True)), **self._given}
-        return self._given[name]
+            self._known = {**dict(zip(LOBE, lobe, strict=True)), **self._known}
+        return self._known[name]
 
     @property
     def texels(self) -> int:
@@ -217,7 +219,7 @@ def reflective_shadow_map(
     dtype: npt.DTypeLike = np.float32,
     projection: MapShape = "auto",
 ) -> Rsm:
-    """Look at the scene from a light and find what each texel reflects.
+    """Rasterize the scene from a light; channels of flux are computed on first use.
 
     Parameters
     ----------
@@ -226,7 +228,7 @@ def reflective_shadow_map(
     materials : MaterialTable
         Their materials.
     light : Light
-        Whose view.
+        The light source.
     resolution : int
         Texels along a side of one map.
     dtype : dtype
@@ -275,6 +277,7 @@ def _mirror(maps: Projection, normal: Array, has_lobe: Array, axis: Array) -> No
             if has_lobe[row, column]:
                 _, _, _, dx, dy, dz = texel_ray(maps, row, column)
                 nx, ny, nz = normal[0, row, column], normal[1, row, column], normal[2, row, column]
+                # r = d - 2 (n . d) n
                 twice = 2.0 * (dx * nx + dy * ny + dz * nz)
                 rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
                 scale = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)

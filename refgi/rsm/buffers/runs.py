@@ -1,7 +1,4 @@
-"""Runs: stretches of texels of a row that see the same triangle, which is looked up once for all of them.
-
-The ray of each texel: where it starts and where it goes.
-"""
+"""Rays of texels, and runs: stretches of a row's texels with the same triangle, whose data is loaded once a run."""
 
 import math
 from typing import Any, NamedTuple
@@ -22,17 +19,8 @@ ALBEDO = 9  # first of its columns in `Runs.fixed`
 def texel_ray(projection: Projection, row: int, column: int) -> tuple[float, float, float, float, float, float]:
     """Return the ray through a texel centre of the stacked maps.
 
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
-    row, column : int
-        Texel of the stacked maps.
-
-    Returns
-    -------
-    tuple of 6 floats
-        Origin (m) and direction in world space; the direction's length is one unit of depth.
+    `row`, `column`: texel of the stacked maps. Result: origin (m) and direction in world space; the direction's length
+    is one unit of depth.
     """
     view, v = row_view(projection, row)
     u = ((column + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0]
@@ -43,17 +31,8 @@ def texel_ray(projection: Projection, row: int, column: int) -> tuple[float, flo
 def row_view(projection: Projection, row: int) -> Any:
     """Return what the rays of a row have in common.
 
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
-    row : int
-        Row of the stacked maps.
-
-    Returns
-    -------
-    tuple of (tuple of 12 floats, float)
-        Origin, right, down and forward of the row's map; the row's coordinate on the image plane.
+    `row`: row of the stacked maps. Result: origin, right, down and forward of the row's map; the row's coordinate on
+    the image plane.
     """
     m = row // projection.height
     v = ((row - m * projection.height + 0.5) * (2.0 / projection.height) - 1.0) * projection.half[1]
@@ -66,19 +45,7 @@ def row_view(projection: Projection, row: int) -> Any:
 def image_ray(kind: int, view: Any, u: float, v: float) -> tuple[float, float, float, float, float, float]:
     """Return origin and direction at a point of the image plane.
 
-    Parameters
-    ----------
-    kind : int
-        Kind of the projection.
-    view : tuple of 12 floats
-        As `row_view` gives it.
-    u, v : float
-        Coordinates on the image plane.
-
-    Returns
-    -------
-    tuple of 6 floats
-        As of `texel_ray`.
+    `kind`: kind of the projection. `view`: as `row_view` gives it. `u`, `v`: coordinates on the image plane.
     """
     ox, oy, oz, rx, ry, rz, qx, qy, qz, fx, fy, fz = view
     if kind == ORTHOGRAPHIC:
@@ -102,47 +69,25 @@ class Surface(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """Stretches of texels that see one triangle, in some rows of texels; run 0 is all that sees nothing."""
+    """Stretches of texels with one triangle, in some rows of texels; run 0 is all texels without surface."""
 
     row: Array  # (rows,) int32: row on the maps
     column: Array  # (rows,) int32: column of the first texel
     slot: Array  # (rows, texels) uint32: run of each texel
     start: Array  # (n, 3) int32: triangle, row and first column of each run on the maps
-    fixed: Array  # (n, 12) float64: corner v_0, N, normal on the side that is seen, albedo
+    fixed: Array  # (n, 12) float64: corner v_0, N, normal on the visible side, albedo
     corner: Array  # (n, 4) int32: vertices, material
 
 
 @kernel
 def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
-    """Return a x b.
-
-    Parameters
-    ----------
-    ax, ay, az, bx, by, bz : float
-        The vectors.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Their vector product.
-    """
+    """Return a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @kernel
 def towards(nx: float, ny: float, nz: float, tx: float, ty: float, tz: float) -> tuple[float, float, float]:
-    """Return the unit vector along n on the side of t; along t where n has no length.
-
-    Parameters
-    ----------
-    nx, ny, nz, tx, ty, tz : float
-        The vectors.
-
-    Returns
-    -------
-    tuple of 3 floats
-        A unit vector.
-    """
+    """Return the unit vector along n on the side of t; along t where n has no length."""
     square = nx * nx + ny * ny + nz * nz
     if not square > 0.0:
         nx, ny, nz = tx, ty, tz
@@ -152,18 +97,10 @@ def towards(nx: float, ny: float, nz: float, tx: float, ty: float, tz: float) ->
 
 
 @kernel
-def room_for_runs(rows: int, texels: int) -> Any:
-    """Return room for the runs of some rows.
+def allocate_runs(rows: int, texels: int) -> Any:
+    """Allocate the runs of some rows.
 
-    Parameters
-    ----------
-    rows, texels : int
-        Rows, and texels of each.
-
-    Returns
-    -------
-    Runs
-        Run 0 is that of texels that see nothing.
+    `rows`, `texels`: rows, and texels of each. Result: run 0 is that of texels that see nothing.
     """
     most = rows * texels + 1
     return Runs(np.empty(rows, np.int32), np.empty(rows, np.int32), np.empty((rows, texels), np.uint32),
@@ -174,19 +111,8 @@ def room_for_runs(rows: int, texels: int) -> Any:
 def find_runs(triangle_id: Array, rows: Rows, runs: Runs) -> int:
     """Find the runs of whole rows.
 
-    Parameters
-    ----------
-    triangle_id : (H, W) ndarray
-        Triangle at each texel, -1 for none.
-    rows : tuple of 2 int
-        First row and one past the last.
-    runs : Runs
-        Receives where they lie.
-
-    Returns
-    -------
-    int
-        How many there are, run 0 included.
+    `triangle_id` (H, W): triangle at each texel, -1 for none. `rows`: first row and one past the last. `runs`: receives
+    where they lie. Result: how many there are, run 0 included.
     """
     slot, start, count = runs.slot, runs.start, 1
     for row in range(rows[0], rows[1]):
@@ -205,22 +131,11 @@ def find_runs(triangle_id: Array, rows: Rows, runs: Runs) -> int:
 
 
 @kernel
-def take_runs(triangle_id: Array, texel: Array, runs: Runs) -> int:
+def runs_at(triangle_id: Array, texel: Array, runs: Runs) -> int:
     """Find the runs that some texels belong to, one for each.
 
-    Parameters
-    ----------
-    triangle_id : (H, W) ndarray
-        Triangle at each texel, -1 for none.
-    texel : (n,) ndarray
-        Texels of the flattened maps.
-    runs : Runs
-        Receives where they lie, for n rows of one texel.
-
-    Returns
-    -------
-    int
-        How many there are, run 0 included.
+    `triangle_id` (H, W): triangle at each texel, -1 for none. `texel` (n,): texels of the flattened maps. `runs`:
+    receives where they lie, for n rows of one texel. Result: how many there are, run 0 included.
     """
     slot, start, count, width = runs.slot, runs.start, 1, triangle_id.shape[1]
     for y in range(len(texel)):
@@ -240,16 +155,7 @@ def take_runs(triangle_id: Array, texel: Array, runs: Runs) -> int:
 def describe_runs(surface: Surface, projection: Projection, count: int, runs: Runs) -> None:
     """Write what is the same all along each run but run 0.
 
-    Parameters
-    ----------
-    surface : Surface
-        The triangles.
-    projection : Projection
-        The maps.
-    count : int
-        One past the last run.
-    runs : Runs
-        `start` is read, `fixed` and `corner` are written.
+    `count`: one past the last run. `runs`: `start` is read, `fixed` and `corner` are written.
     """
     vertices, faces, diffuse, start, fixed = surface.vertices, surface.faces, surface.diffuse, runs.start, runs.fixed
     corner = runs.corner

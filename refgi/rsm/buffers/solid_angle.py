@@ -51,18 +51,8 @@ class Circles(NamedTuple):
 def texel_solid_angles(projection: Projection) -> Array:
     """Return the solid angle of every texel.
 
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
+    Returns (H, W): sr, float64; of an orthographic map the area perpendicular to the light, m^2.
 
-    Returns
-    -------
-    (H, W) ndarray
-        Sr, float64; of an orthographic map the area perpendicular to the light, m^2.
-
-    Notes
-    -----
     A hemisphere's paraboloid map is cut at the unit disc and sums to 2 pi exactly: the part of a rim texel whose
     centre lies outside, which sees nothing, counts with its inner neighbour.
     """
@@ -76,18 +66,9 @@ def texel_solid_angles(projection: Projection) -> Array:
 def spot_power(projection: Projection, inner: float, outer: float) -> Array:
     """Return the integral of a spot's falloff over every texel of one map that looks along the spot's axis.
 
-    Parameters
-    ----------
-    projection : Projection
-        A perspective or paraboloid map.
-    inner, outer : float
-        The spot's half-angles, rad.
-
-    Returns
-    -------
-    (H, W) ndarray
-        Sr, float64: the texel's power is this times the on-axis intensity. Sums to
-        2 pi (1 - (cos inner + cos outer)/2) when the map encloses the cone.
+    `projection`: a perspective or paraboloid map. `inner`, `outer`: the spot's half-angles, rad. Returns (H, W): sr,
+    float64: the texel's power is this times the on-axis intensity. Sums to 2 pi (1 - (cos inner + cos outer)/2) when
+    the map encloses the cone.
     """
     return _stacked(projection, _texel_integrals(_intrinsics(projection), _circles(projection.kind, inner, outer)))
 
@@ -95,19 +76,8 @@ def spot_power(projection: Projection, inner: float, outer: float) -> Array:
 def spot_power_at(projection: Projection, inner: float, outer: float, texel: Array) -> Array:
     """Return what `spot_power` gives at some texels.
 
-    Parameters
-    ----------
-    projection : Projection
-        A perspective or paraboloid map.
-    inner, outer : float
-        The spot's half-angles, rad.
-    texel : (n,) ndarray of int
-        Texels of the flattened map.
-
-    Returns
-    -------
-    (n,) ndarray
-        Sr, float64.
+    `projection`: a perspective or paraboloid map. `inner`, `outer`: the spot's half-angles, rad. `texel` (n,) int:
+    texels of the flattened map. Returns (n,): sr, float64.
     """
     if projection.kind == PARABOLOID:  # whose rim texels hold what their neighbours give them
         return spot_power(projection, inner, outer).reshape(-1)[texel]
@@ -137,7 +107,7 @@ def _texel_integrals(projection: Projection, spot: Circles) -> Array:
     quadrant = np.zeros(((height + 1) // 2, (width + 1) // 2))
     _fill_quadrant(projection, spot, quadrant)
     if projection.kind == PARABOLOID:
-        _give_rim_inwards(projection, quadrant)
+        _move_rim_inwards(projection, quadrant)
     # row 0 of the quadrant touches the axis; the middle row of an odd height is half a row on either side
     across = np.concatenate([quadrant[:, ::-1], quadrant[:, width % 2 :]], axis=1)
     whole = np.concatenate([across[::-1], across[height % 2 :]], axis=0)
@@ -276,7 +246,7 @@ def _falloff_strip(kind: int, x: float, y0: float, y1: float, spot: Circles) -> 
 
 
 @kernel
-def _give_rim_inwards(projection: Projection, quadrant: Array) -> None:
+def _move_rim_inwards(projection: Projection, quadrant: Array) -> None:
     """Move what texels with a centre beyond the hemisphere hold to the neighbour nearer to the axis."""
     step = 2.0 * projection.half[0] / projection.width
     shift = 0.5 - 0.5 * (projection.width % 2)
@@ -299,19 +269,8 @@ def _beyond(i: int, j: int, shift: float, step: float) -> bool:
 def sampled_spot_share(projection: Projection, axis: Array, inner: float, outer: float) -> Array:
     """Return the mean falloff of a spot over each texel of maps that do not look along its axis.
 
-    Parameters
-    ----------
-    projection : Projection
-        Perspective maps, such as the faces of a cube.
-    axis : (3,) ndarray
-        Unit vector along the spot.
-    inner, outer : float
-        The spot's half-angles, rad.
-
-    Returns
-    -------
-    (H, W) ndarray
-        0 to 1, float64, from 4 x 4 samples a texel.
+    `projection`: perspective maps, such as the faces of a cube. `axis` (3,): unit vector along the spot. `inner`,
+    `outer`: the spot's half-angles, rad. Returns (H, W): 0 to 1, float64, from 4 x 4 samples a texel.
     """
     share = np.empty(projection.shape)
     _sample_spot(projection, np.asarray(axis, np.float64), cone_row(inner, outer), share)

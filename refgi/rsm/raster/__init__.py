@@ -1,6 +1,6 @@
-"""The software rasterizer: which triangle each texel of a map sees, and how near.
+"""Software rasterizer: the nearest triangle at every texel of a map.
 
-`projection` says how maps see the world; `batch` draws triangles on perspective and orthographic maps, `paraboloid` on
+`projection` has the kinds of maps; `batch` draws triangles on perspective and orthographic maps, `paraboloid` on
 paraboloid ones, `visibility_buffer` on either kind, several maps at once. `depth_maps` keeps distances alone.
 """
 

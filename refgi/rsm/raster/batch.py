@@ -1,4 +1,4 @@
-"""Triangles drawn in batches on a perspective or orthographic map: which texels each owns, and how near it is there.
+"""Batched triangle rasterization on perspective and orthographic maps, by edge functions with the top-left rule.
 
 With vertices v_i = (column w, row w, w) and the texel centre (x, y, 1):
 
@@ -44,17 +44,8 @@ def edge(
 ) -> tuple[float, float, float, float]:
     """Return the edge function v_j x v_k and the value from which on a texel centre is inside.
 
-    Parameters
-    ----------
-    xj, yj, wj, xk, yk, wk : float
-        Column, row and w of the edge's two vertices.
-    sign : float
-        Sign of the triangle's determinant, 1 or -1.
-
-    Returns
-    -------
-    tuple of 4 floats
-        a, b, c of a x + b y + c, and the threshold.
+    `xj`, `yj`, `wj`, `xk`, `yk`, `wk`: column, row and w of the edge's two vertices. `sign`: sign of the triangle's
+    determinant, 1 or -1. Result: a, b, c of a x + b y + c, and the threshold.
     """
     xj, yj, xk, yk = xj * wj, yj * wj, xk * wk, yk * wk
     a = (yj * wk - yk * wj) * sign
@@ -68,21 +59,10 @@ def edge(
 def draw(corners: Array, faces: Array, part: Part, nearness: Array, ids: Array) -> None:
     """Write nearness and id of triangles where each is the nearest so far; ties stay with the earlier one.
 
-    Parameters
-    ----------
-    corners : (n, 4) ndarray
-        Projected vertices.
-    faces : (m, 3) ndarray
-        Vertices of each triangle.
-    part : Part
-        Which triangles, in which order, and where.
-    nearness : (h, max(w, LANES)) ndarray
-        Nearest so far, float32; 0 where nothing is.
-    ids : (h, max(w, LANES)) ndarray
-        Triangle id, int32.
+    `corners` (n, 4): projected vertices. `faces` (m, 3): vertices of each triangle. `part`: which triangles, in which
+    order, and where. `nearness` (h, max(w, LANES)): nearest so far, float32; 0 where nothing is. `ids` (h, max(w,
+    LANES)): triangle id, int32.
 
-    Notes
-    -----
     The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
     """
     width, members, boxes = nearness.shape[1], part.members, part.boxes

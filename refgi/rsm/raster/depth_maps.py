@@ -1,4 +1,4 @@
-"""Distances to the nearest surface on hemispheres around many points, one paraboloid map each."""
+"""Paraboloid depth maps: distance to the nearest surface over the hemisphere of each of many points."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.paraboloid import BLOCK, Ignored, draw_distances
 from refgi.rsm.raster.projection import Projection, paraboloid_projection
 from refgi.rsm.raster.triangle import Chunks, chunks
@@ -37,7 +37,7 @@ def paraboloid_depth_maps(
     Returns
     -------
     (k, n, n) ndarray
-        Distance, m; inf where nothing is seen and outside the disc. Map m's frame is
+        Distance, m; inf without surface and outside the disc. Map m's frame is
         ``refgi.rsm.raster.projection.paraboloid_projection(centers, axes, size).frame[m]``.
 
     Raises
@@ -51,12 +51,12 @@ def paraboloid_depth_maps(
     expect(len(centers) == len(axes), "axes", f"{len(centers)} as many as centres", len(axes))
     expect(bool(np.isfinite(centers).all()), "centers", "finite coordinates", centers)
     expect(bool(np.isfinite(axes).all() and axes.any(axis=1).all()), "axes", "finite vectors, not zero", axes)
-    laid = chunks(geometry.vertices, geometry.faces)
-    return distance_maps(paraboloid_projection(centers, axes, size), laid, dtype)[0]
+    triangles = chunks(geometry.vertices, geometry.faces)
+    return distance_maps(paraboloid_projection(centers, axes, size), triangles, dtype)[0]
 
 
 def distance_maps(
-    projection: Projection, laid: Chunks, dtype: npt.DTypeLike, ignored: Ignored | None = None
+    projection: Projection, triangles: Chunks, dtype: npt.DTypeLike, ignored: Ignored | None = None
 ) -> tuple[Array, Array, Array]:
     """Measure the distance to the nearest of some triangles on paraboloid maps.
 
@@ -64,7 +64,7 @@ def distance_maps(
     ----------
     projection : Projection
         k paraboloid maps of n x n texels.
-    laid : Chunks
+    triangles : Chunks
         The triangles.
     dtype : dtype
         Float32 or float64.
@@ -74,7 +74,7 @@ def distance_maps(
     Returns
     -------
     distance : (k, n, n) ndarray
-        Distance, m; inf where nothing is seen and outside the disc.
+        Distance, m; inf without surface and outside the disc.
     nearest : (k,) ndarray
         Float64: smallest distance on each map, m; inf where nothing is.
     left_out : (k,) ndarray
@@ -82,5 +82,5 @@ def distance_maps(
     """
     n, none = projection.width, np.zeros(projection.maps)
     distance = plane((projection.maps * n, max(n, BLOCK)), dtype)
-    found = draw_distances(projection, laid, ignored or Ignored(none, none), numba.get_num_threads(), distance)
+    found = draw_distances(projection, triangles, ignored or Ignored(none, none), numba.get_num_threads(), distance)
     return np.ascontiguousarray(distance[:, :n]).reshape(-1, n, n), *found

@@ -1,4 +1,4 @@
-"""Paraboloid maps, exact: a texel is inside a triangle when its direction lies within the triangle's three planes.
+"""Exact rasterization of paraboloid maps: a texel is covered when its direction lies within the triangle's planes.
 
 Straight edges are arcs on a paraboloid map, so the test is made in direction space. With vertices v_i in the map's
 frame, n_i = v_j x v_k, and the texel's direction d = (2s, 2t, 1 - s^2 - t^2) of length 1 + s^2 + t^2:
@@ -20,6 +20,7 @@ from refgi.jit import kernel, prange
 from refgi.rsm.raster.paraboloid_batch import (
     ACROSS,
     BEHIND,
+    BETWEEN_TEXELS,
     BOX,
     LIMIT,
     NEAR,
@@ -27,11 +28,10 @@ from refgi.rsm.raster.paraboloid_batch import (
     ROWS,
     SQUARE,
     STATE,
-    UNSEEN,
     bound_across,
     is_behind,
     orient,
-    place,
+    transform_chunk,
 )
 from refgi.rsm.raster.projection import Projection
 from refgi.rsm.raster.triangle import CHUNK, SPAN_CUT, Chunks, chunks
@@ -42,7 +42,7 @@ BLOCK = 16  # texels tested at once; a map has at least as many columns in memor
 
 
 class Ignored(NamedTuple):
-    """What each map does not see of the geometry near its centre."""
+    """Which geometry near its centre each map ignores."""
 
     planes: Array  # (k,) float64, m: triangles whose plane passes nearer than this
     ball: Array  # (k,) float64, m: surfaces nearer than this, as if cut away
@@ -62,19 +62,20 @@ def draw_paraboloids(
     faces : (m, 3) ndarray
         Vertices of each triangle.
     workers : int
-        Threads; maps are dealt to them in turn.
+        Threads; maps are assigned to them round-robin.
     nearness : (H, max(W, BLOCK)) ndarray
         Float32, receives 1/tau; 0 where nothing is.
     ids : (H, max(W, BLOCK)) ndarray
         Int32, receives the triangle's id.
     """
-    laid, none = chunks(vertices, faces), np.zeros(projection.maps)
-    room = np.zeros((workers, 1, nearness.shape[1]), np.int32)
-    _draw_maps(projection, laid, Ignored(none, none), nearness, ids, room, np.zeros(projection.maps, np.int64), none)
+    triangles, none = chunks(vertices, faces), np.zeros(projection.maps)
+    scratch = np.zeros((workers, 1, nearness.shape[1]), np.int32)
+    left_out = np.zeros(projection.maps, np.int64)
+    _draw_maps(projection, triangles, Ignored(none, none), nearness, ids, scratch, left_out, none)
 
 
 def draw_distances(
-    projection: Projection, laid: Chunks, ignored: Ignored, workers: int, distance: Array
+    projection: Projection, triangles: Chunks, ignored: Ignored, workers: int, distance: Array
 ) -> tuple[Array, Array]:
     """Draw triangles on every paraboloid map and turn nearness into distance.
 
@@ -82,12 +83,12 @@ def draw_distances(
     ----------
     projection : Projection
         The maps.
-    laid : Chunks
+    triangles : Chunks
         The triangles.
     ignored : Ignored
         What lies too near the centres to count.
     workers : int
-        Threads; maps are dealt to them in turn.
+        Threads; maps are assigned to them round-robin.
     distance : (H, max(W, BLOCK)) ndarray
         Float32 or float64, of any content; receives the distance, m, inf where nothing is and outside the disc.
 
@@ -99,30 +100,30 @@ def draw_distances(
         Int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in its ball.
     """
     left_out, nearest = np.zeros(projection.maps, np.int64), np.full(projection.maps, np.inf)
-    room = np.zeros((workers, projection.height, distance.shape[1]), np.int32)
-    _draw_maps(projection, laid, ignored, distance, room[0, :0], room, left_out, nearest)
+    scratch = np.zeros((workers, projection.height, distance.shape[1]), np.int32)
+    _draw_maps(projection, triangles, ignored, distance, scratch[0, :0], scratch, left_out, nearest)
     return nearest, left_out
 
 
 @kernel(parallel=True)
 def _draw_maps(
-    projection: Projection, laid: Chunks, ignored: Ignored, nearness: Array, ids: Array, room: Array, left_out: Array,
-    nearest: Array,
+    projection: Projection, triangles: Chunks, ignored: Ignored, nearness: Array, ids: Array, scratch: Array,
+    left_out: Array, nearest: Array,
 ) -> None:
-    workers, height, wanted = len(room), projection.height, len(ids) > 0
-    corners, box = laid.corners, laid.box
+    workers, height, with_ids = len(scratch), projection.height, len(ids) > 0
+    corners, box = triangles.corners, triangles.box
     for worker in prange(workers):
         setup = np.zeros(ROWS * CHUNK)
         for m in range(worker, len(projection.origin), workers):
             first, last = m * height, (m + 1) * height
-            own, seen = nearness[first:last], ids[first:last] if wanted else room[worker]
-            own[:] = 0
+            map_nearness, map_ids = nearness[first:last], ids[first:last] if with_ids else scratch[worker]
+            map_nearness[:] = 0
             limits = 1.0 / (ignored.planes[m] * ignored.planes[m]), ignored.ball[m]
-            left_out[m] = _draw(projection, m, corners, box, limits, setup, own, seen)
-            if wanted:
-                _clear_outside_disc(projection, own, seen)
+            left_out[m] = _draw(projection, m, corners, box, limits, setup, map_nearness, map_ids)
+            if with_ids:
+                _clear_outside_disc(projection, map_nearness, map_ids)
             else:
-                nearest[m] = _to_distance(projection, own)
+                nearest[m] = _to_distance(projection, map_nearness)
 
 
 @kernel
@@ -148,7 +149,7 @@ def _to_distance(projection: Projection, nearness: Array) -> float:
         for column in range(n):
             s = (column + 0.5) * step - half
             square = s * s + t * t
-            # nothing seen: nearness 0, distance inf
+            # no surface: nearness 0, distance inf
             distance = (1.0 + square) / nearness[row, column]
             nearness[row, column] = real(distance if square <= 1.0 else np.inf)
             least = min(least, nearness[row, column])
@@ -172,7 +173,7 @@ def _draw(
     for chunk in range(len(box)):
         if is_behind(box, chunk, view):
             continue
-        place(corners, chunk, view, half, n, ball, setup)
+        transform_chunk(corners, chunk, view, half, n, ball, setup)
         orient(setup)
         for b in range(CHUNK):
             state = setup[STATE + b]
@@ -181,7 +182,7 @@ def _draw(
             if state == NEAR or setup[SQUARE + b] > steepest:  # its plane lies 1/sqrt of this from the centre
                 left_out += 1
                 continue
-            if state == UNSEEN or (state == ACROSS and not bound_across(setup, b, half, n)):
+            if state == BETWEEN_TEXELS or (state == ACROSS and not bound_across(setup, b, half, n)):
                 continue
             face, limit = chunk * CHUNK + b, real(setup[LIMIT + b])
             x0, y0, z0, t0 = setup[b], setup[CHUNK + b], setup[2 * CHUNK + b], setup[3 * CHUNK + b]

@@ -1,6 +1,6 @@
-"""A chunk of triangles made ready for one paraboloid map, in SIMD lanes: boxes, planes through the centre, nearness.
+"""Triangle set-up for paraboloid maps, a chunk at a time in SIMD lanes: boxes, planes through the centre, nearness.
 
-Where a triangle may be on a paraboloid map: the box of its corners, made wider for edges that are arcs.
+The box of a triangle's corners is widened, because straight edges are arcs on a paraboloid map.
 """
 
 import math
@@ -26,25 +26,15 @@ BOX = 18 * CHUNK  # first and last column, first and last row
 CORNERS = 22 * CHUNK  # x, y, z of the corners in the map's frame
 ROWS = 31
 # behind the plane z = 0; ahead of it; across it; ahead of it but between texels; within the ball that is cut away
-BEHIND, AHEAD, ACROSS, UNSEEN, NEAR = 0.0, 1.0, 2.0, 3.0, 4.0
+BEHIND, AHEAD, ACROSS, BETWEEN_TEXELS, NEAR = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @kernel
 def bulge(square: float) -> Any:
     """Return how far an edge may leave its chord of squared length L^2: 1 - sqrt(1 - L^2/4).
 
-    Parameters
-    ----------
-    square : float
-        L^2.
+    Result: in the units of the unit disc, a little too much.
 
-    Returns
-    -------
-    float
-        In the units of the unit disc, a little too much.
-
-    Notes
-    -----
     Each edge is an arc of at most half a circle, of radius R >= 1: R - sqrt(R^2 - L^2/4) is largest for R = 1.
     """
     if square < 0.04:
@@ -56,15 +46,8 @@ def bulge(square: float) -> Any:
 def box_across(x: Any, y: Any, z: Any) -> tuple[float, float, float, float]:
     """Return the range of s and of t that the part ahead of z = 0 may cover of a triangle that crosses it.
 
-    Parameters
-    ----------
-    x, y, z : tuple of 4 floats
-        Corners in the map's frame, the first again at the end.
-
-    Returns
-    -------
-    tuple of 4 floats
-        Least and greatest s, least and greatest t.
+    `x`, `y`, `z`: corners in the map's frame, the first again at the end. Result: least and greatest s, least and
+    greatest t.
     """
     s_low, s_high, t_low, t_high, longest = np.inf, -np.inf, np.inf, -np.inf, 0.0
     s_first, t_first, s_last, t_last = np.nan, np.nan, np.nan, np.nan
@@ -97,21 +80,10 @@ def box_across(x: Any, y: Any, z: Any) -> tuple[float, float, float, float]:
 
 @kernel
 def is_behind(box: Array, chunk: int, view: Any) -> bool:
-    """Tell whether a whole chunk lies behind a map's plane z = 0.
+    """Return whether a whole chunk lies behind a map's plane z = 0.
 
-    Parameters
-    ----------
-    box : (c, 6) ndarray
-        Box of each chunk, m.
-    chunk : int
-        Which chunk.
-    view : tuple of 12 floats
-        Centre of the map, then its frame, row by row.
-
-    Returns
-    -------
-    bool
-        True where no corner's z can be 0 or more: z is summed as that of corners is, and rounding is monotone.
+    `box` (c, 6): box of each chunk, m. `view`: centre of the map, then its frame, row by row. Result: true where no
+    corner's z can be 0 or more: z is summed as that of corners is, and rounding is monotone.
     """
     ox, oy, oz, _, _, _, _, _, _, fx, fy, fz = view
     px = (box[chunk, 3] if fx > 0.0 else box[chunk, 0]) - ox
@@ -137,25 +109,12 @@ def _longest(x: float, y: float, z: float) -> Any:
 
 
 @kernel
-def place(corners: Array, chunk: int, view: Any, half: float, size: int, ball: float, setup: Array) -> None:
+def transform_chunk(corners: Array, chunk: int, view: Any, half: float, size: int, ball: float, setup: Array) -> None:
     """Write where every triangle of a chunk lies on a map.
 
-    Parameters
-    ----------
-    corners : (c, 9, CHUNK) ndarray
-        Corners of the triangles of each chunk, world space, m.
-    chunk : int
-        Which chunk.
-    view : tuple of 12 floats
-        Centre of the map, then its frame, row by row.
-    half : float
-        Half extent of the map.
-    size : int
-        Texels along a side.
-    ball : float
-        Triangles all nearer than this to the centre are `NEAR`, m.
-    setup : (ROWS * CHUNK,) ndarray
-        Receives corners, state and box of each.
+    `corners` (c, 9, CHUNK): corners of the triangles of each chunk, world space, m. `view`: centre of the map, then its
+    frame, row by row. `half`: half extent of the map. `size`: texels along a side. `ball`: triangles all nearer than
+    this to the centre are `NEAR`, m. `setup` (ROWS * CHUNK,): receives corners, state and box of each.
     """
     ox, oy, oz, rx, ry, rz, dx, dy, dz, fx, fy, fz = view
     texels, within = 0.5 * size / half, ball * ball
@@ -185,8 +144,8 @@ def place(corners: Array, chunk: int, view: Any, half: float, size: int, ball: f
         first_row = np.ceil(max((t_low - spare) * texels + low_offset, 0.0))
         last_row = np.floor(min((t_high + spare) * texels + high_offset, last))
         nearest, farthest = min(zi, min(zj, zk)), max(zi, max(zj, zk))
-        seen = (first_column <= last_column) & (first_row <= last_row)
-        state = ACROSS if nearest < 0.0 else (AHEAD if seen else UNSEEN)
+        has_texels = (first_column <= last_column) & (first_row <= last_row)
+        state = ACROSS if nearest < 0.0 else (AHEAD if has_texels else BETWEEN_TEXELS)
         state = NEAR if max(qi, max(qj, qk)) < within else state
         setup[STATE + b] = BEHIND if farthest < 0.0 else state
         at = BOX + b
@@ -198,10 +157,7 @@ def place(corners: Array, chunk: int, view: Any, half: float, size: int, ball: f
 def orient(setup: Array) -> None:
     """Write the planes through the centre and the edges of every triangle of a chunk, and its own plane.
 
-    Parameters
-    ----------
-    setup : (ROWS * CHUNK,) ndarray
-        Corners are read, the rest is written.
+    `setup` (ROWS * CHUNK,): corners are read, the rest is written.
     """
     for b in range(CHUNK):
         at = CORNERS + b
@@ -232,21 +188,8 @@ def orient(setup: Array) -> None:
 def bound_across(setup: Array, b: int, half: float, size: int) -> bool:
     """Bound a triangle that crosses the plane z = 0.
 
-    Parameters
-    ----------
-    setup : (ROWS * CHUNK,) ndarray
-        Set-up of the chunk; receives the box.
-    b : int
-        Which triangle.
-    half : float
-        Half extent of the map.
-    size : int
-        Texels along a side.
-
-    Returns
-    -------
-    bool
-        Whether it may cover a texel.
+    `setup` (ROWS * CHUNK,): set-up of the chunk; receives the box. `half`: half extent of the map. `size`: texels along
+    a side. Result: whether it may cover a texel.
     """
     at, texels = CORNERS + b, 0.5 * size / half
     xi, yi, zi = setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK]

@@ -1,4 +1,4 @@
-"""How maps see the world: perspective, orthographic and paraboloid projections, one or several maps at once.
+"""Perspective, orthographic and paraboloid projections of one or several maps at once.
 
 A `Projection` holds k maps of equal size, stacked along rows: one for a camera, six for a cube, two for a dual
 paraboloid, any number for a batch. Each map has an origin and a right-handed frame (right, down, forward). Texel
@@ -56,7 +56,7 @@ def camera_projection(camera: Camera, width: int | None = None, height: int | No
     Parameters
     ----------
     camera : Camera
-        Who looks.
+        The camera.
     width, height : int, optional
         Size in pixels; the camera's own where absent.
 
@@ -74,83 +74,42 @@ def camera_projection(camera: Camera, width: int | None = None, height: int | No
     height = camera.height if height is None else height
     _expect_size(height, width)
     half_v = math.tan(camera.vfov / 2)
-    frame = look_frame(np.subtract(camera.target, camera.eye), camera.up)
+    frame = view_frame(np.subtract(camera.target, camera.eye), camera.up)
     return _maps(PERSPECTIVE, height, width, [camera.eye], [frame], (half_v * width / height, half_v))
 
 
 def spot_projection(light: SpotLight, n: int) -> Projection:
     """Return the square perspective map whose inscribed circle is the spot's outer cone.
 
-    Parameters
-    ----------
-    light : SpotLight
-        Whose view.
-    n : int
-        Texels along a side.
-
-    Returns
-    -------
-    Projection
-        One perspective map.
+    `n`: texels along a side.
     """
     half = math.tan(light.outer_half_angle)
-    return _maps(PERSPECTIVE, n, n, [light.position], [look_frame(light.direction)], (half, half))
+    return _maps(PERSPECTIVE, n, n, [light.position], [view_frame(light.direction)], (half, half))
 
 
 def cube_projection(position: npt.ArrayLike, n: int) -> Projection:
     """Return the six faces of a cube around a point: +x, -x, +y, -y, +z, -z, 90 degrees each.
 
-    Parameters
-    ----------
-    position : (3,) array_like
-        Centre, m.
-    n : int
-        Texels along a side of a face.
-
-    Returns
-    -------
-    Projection
-        Six perspective maps.
+    `position` (3,) array_like: centre, m. `n`: texels along a side of a face.
     """
-    frames = [look_frame(forward, up) for forward, up in zip(CUBE_FORWARD, CUBE_UP, strict=True)]
+    frames = [view_frame(forward, up) for forward, up in zip(CUBE_FORWARD, CUBE_UP, strict=True)]
     return _maps(PERSPECTIVE, n, n, [position] * 6, frames, (1.0, 1.0))
 
 
 def paraboloid_projection(centers: npt.ArrayLike, axes: npt.ArrayLike, n: int, half: float = 1.0) -> Projection:
     """Return one paraboloid map per pair of centre and axis.
 
-    Parameters
-    ----------
-    centers, axes : (k, 3) array_like
-        Where each map looks from (m) and to (any length).
-    n : int
-        Texels along a side.
-    half : float
-        Radius of the map's inscribed circle on the image plane, tan(angle/2); 1 is the hemisphere.
-
-    Returns
-    -------
-    Projection
-        k paraboloid maps.
+    `centers`, `axes` (k, 3) array_like: where each map looks from (m) and to (any length). `n`: texels along a side.
+    `half`: radius of the map's inscribed circle on the image plane, tan(angle/2); 1 is the hemisphere.
     """
     axes = np.reshape(np.asarray(axes, np.float64), (-1, 3))
-    return _maps(PARABOLOID, n, n, centers, [look_frame(axis) for axis in axes], (half, half))
+    return _maps(PARABOLOID, n, n, centers, [view_frame(axis) for axis in axes], (half, half))
 
 
 def dual_paraboloid_projection(position: npt.ArrayLike, n: int) -> Projection:
     """Return two paraboloid maps, towards +z and -z, that see all directions.
 
-    Parameters
-    ----------
-    position : (3,) array_like
-        Centre, m.
-    n : int
-        Texels along a side of a map.
-
-    Returns
-    -------
-    Projection
-        Two paraboloid maps.
+    `position` (3,) array_like: centre, m. `n`: texels along a side of a map.
     """
     return paraboloid_projection(np.stack([position, position]), [(0, 0, 1), (0, 0, -1)], n)
 
@@ -158,21 +117,10 @@ def dual_paraboloid_projection(position: npt.ArrayLike, n: int) -> Projection:
 def directional_projection(light: DirectionalLight, bounds: tuple[Array, Array], n: int) -> Projection:
     """Return the orthographic map along a directional light that encloses a box.
 
-    Parameters
-    ----------
-    light : DirectionalLight
-        Whose view.
-    bounds : pair of (3,) ndarray
-        Corners of the box, m.
-    n : int
-        Texels along a side; they need not be square.
-
-    Returns
-    -------
-    Projection
-        One orthographic map; depth 0 lies just before the box.
+    `bounds`: corners of the box, m. `n`: texels along a side; they need not be square. Result: one orthographic map;
+    depth 0 lies just before the box.
     """
-    frame = look_frame(light.direction)
+    frame = view_frame(light.direction)
     corners = np.array(np.meshgrid(*np.stack(bounds, axis=1))).reshape(3, -1).T
     inside = corners @ frame.T
     low, high = inside.min(axis=0), inside.max(axis=0)
@@ -183,20 +131,11 @@ def directional_projection(light: DirectionalLight, bounds: tuple[Array, Array],
     return _maps(ORTHOGRAPHIC, n, n, [origin], [frame], half, reach)
 
 
-def look_frame(forward: npt.ArrayLike, up: npt.ArrayLike | None = None) -> Array:
+def view_frame(forward: npt.ArrayLike, up: npt.ArrayLike | None = None) -> Array:
     """Return the frame (right, down, forward) of a view.
 
-    Parameters
-    ----------
-    forward : (3,) array_like
-        View direction, any length.
-    up : (3,) array_like, optional
-        What appears upwards; +y where absent, or -z when the view is along y.
-
-    Returns
-    -------
-    (3, 3) ndarray
-        Unit vectors as rows, right-handed.
+    `forward` (3,) array_like: view direction, any length. `up` (3,) array_like, optional: what appears upwards; +y
+    where absent, or -z when the view is along y. Returns (3, 3): unit vectors as rows, right-handed.
     """
     ahead = _unit(forward)
     if up is None:
@@ -239,17 +178,8 @@ def _project_all(projection: Projection, position: Array, out: Array) -> None:
 def texel_of(projection: Projection, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return row, column and depth of a world point on the first map that sees it, or nan thrice.
 
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
-    x, y, z : float
-        The point, world space, m.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Continuous row and column in the stacked maps, and depth as in `project`.
+    `x`, `y`, `z`: the point, world space, m. Result: continuous row and column in the stacked maps, and depth as in
+    `project`.
     """
     for m in range(projection.origin.shape[0]):
         u, v, depth = image_point(projection, m, x, y, z)
@@ -263,19 +193,8 @@ def texel_of(projection: Projection, x: float, y: float, z: float) -> tuple[floa
 def image_point(projection: Projection, m: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return where map `m` sees a world point on its image plane, nan where it looks away, and its depth.
 
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
-    m : int
-        Which map.
-    x, y, z : float
-        The point, world space, m.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Horizontal and vertical coordinate, perhaps beyond the map, and depth as in `project`.
+    `x`, `y`, `z`: the point, world space, m. Result: horizontal and vertical coordinate, perhaps beyond the map, and
+    depth as in `project`.
     """
     a, b, depth = view_coordinates(projection, m, x, y, z)
     if projection.kind == ORTHOGRAPHIC:
@@ -291,19 +210,7 @@ def image_point(projection: Projection, m: int, x: float, y: float, z: float) ->
 def texel_coordinates(projection: Projection, m: int, u: float, v: float) -> tuple[float, float]:
     """Return continuous column and row, in the stacked maps, of a point of the image plane of map `m`.
 
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
-    m : int
-        Which map.
-    u, v : float
-        Horizontal and vertical coordinate.
-
-    Returns
-    -------
-    tuple of 2 floats
-        Column and row.
+    `u`, `v`: horizontal and vertical coordinate.
     """
     column = (u / projection.half[0] + 1.0) * 0.5 * projection.width
     row = (v / projection.half[1] + 1.0) * 0.5 * projection.height
@@ -314,19 +221,7 @@ def texel_coordinates(projection: Projection, m: int, u: float, v: float) -> tup
 def view_coordinates(projection: Projection, m: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return a world point in the frame of map `m`: along right, down and forward, m.
 
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
-    m : int
-        Which map.
-    x, y, z : float
-        The point, world space, m.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Coordinates along right, down, forward.
+    `x`, `y`, `z`: the point, world space, m. Result: coordinates along right, down, forward.
     """
     frame, origin = projection.frame, projection.origin
     px, py, pz = x - origin[m, 0], y - origin[m, 1], z - origin[m, 2]
@@ -358,5 +253,5 @@ def _expect_size(height: int, width: int) -> None:
 
 
 def _unit(vector: npt.ArrayLike) -> Array:
-    given = np.asarray(vector, np.float64)
-    return given / np.linalg.norm(given)
+    values = np.asarray(vector, np.float64)
+    return values / np.linalg.norm(values)

@@ -1,10 +1,10 @@
-"""Where a triangle may be on a perspective or orthographic map: its vertices there, and the texels it may cover.
+"""Triangle bounds on perspective and orthographic maps: projected vertices, and the texels a triangle may cover.
 
 A vertex is kept as (column, row, w, n): its continuous texel coordinates, w (axial depth; 1 when orthographic) and n
 (1; the nearness 1 - depth/reach when orthographic). Nothing is clipped: of a triangle that crosses the plane of the
 eye, the box is that of its forward part.
 
-Triangles in chunks of consecutive ones, their corners laid out for SIMD lanes, each chunk with its box.
+`chunks` groups consecutive triangles, corners in the order of SIMD lanes, each chunk with its bounding box.
 """
 
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
 
 Array = npt.NDArray[Any]
@@ -32,24 +32,12 @@ CHUNK = 64  # triangles
 def project_vertices(
     projection: Projection, m: int, vertices: Array, first: int, last: int, corners: Array, cells: Array
 ) -> None:
-    """Fill rows of `corners` and `cells` with vertices as seen on map `m`.
+    """Fill rows of `corners` and `cells` with vertices as projected on map `m`.
 
-    Parameters
-    ----------
-    projection : Projection
-        Perspective or orthographic maps.
-    m : int
-        Which map.
-    vertices : (n, 3) ndarray
-        World space, m.
-    first, last : int
-        First vertex and one past the last.
-    corners : (n, 4) ndarray
-        Column, row, w, n.
-    cells : (n, 4) ndarray of int
-        First column and row whose centre is not left of or above the vertex, and the negatives of the last ones whose
-        centre is not right of or below it, a little widened: the least of each bounds a triangle. `BEHIND` first where
-        the vertex is not in front of the eye.
+    `projection`: perspective or orthographic maps. `vertices` (n, 3): world space, m. `first`, `last`: first vertex and
+    one past the last. `corners` (n, 4): column, row, w, n. `cells` (n, 4) int: first column and row whose centre is not
+    left of or above the vertex, and the negatives of the last ones whose centre is not right of or below it, a little
+    widened: the least of each bounds a triangle. `BEHIND` first where the vertex is not in front of the eye.
     """
     width, height = projection.width, projection.height
     for i in range(first, last):
@@ -74,23 +62,11 @@ def bound_triangles(
 ) -> None:
     """Write the texels whose centres triangles may cover.
 
-    Parameters
-    ----------
-    corners : (n, 4) ndarray
-        Projected vertices.
-    cells : (n, 4) ndarray of int
-        The texels that each lies between.
-    faces : (m, 3) ndarray
-        Vertices of each triangle.
-    first, last : int
-        First triangle and one past the last.
-    size : tuple of 2 int
-        Columns and rows of the map.
-    boxes : (last - first, 4) ndarray
-        First and last column, first and last row; first > last where a triangle covers nothing.
+    `corners` (n, 4): projected vertices. `cells` (n, 4) int: the texels that each lies between. `faces` (m, 3):
+    vertices of each triangle. `first`, `last`: first triangle and one past the last. `size`: columns and rows of the
+    map. `boxes` (last - first, 4): first and last column, first and last row; first > last where a triangle covers
+    nothing.
 
-    Notes
-    -----
     The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
     """
     for block in range(first, last, BLOCK):
@@ -128,17 +104,8 @@ def _bound_crossing(corners: Array, faces: Array, first: int, last: int, size: t
 def centres_between(low: float, high: float, size: int) -> tuple[int, int]:
     """Return the first and last texel whose centre lies in an interval, or a little outside it.
 
-    Parameters
-    ----------
-    low, high : float
-        The interval, continuous texel coordinates.
-    size : int
-        Texels in all.
-
-    Returns
-    -------
-    tuple of 2 int
-        Within 0 to `size` - 1; first > last where there is none.
+    `low`, `high`: the interval, continuous texel coordinates. Result: within 0 to `size` - 1; first > last where there
+    is none.
     """
     first = np.ceil(min(max(low, 0.0), size + 1.0) - (0.5 + BOX_PAD))
     last = np.floor(min(max(high, -1.0), float(size)) + (BOX_PAD - 0.5))
@@ -173,28 +140,19 @@ class Chunks(NamedTuple):
 
 
 def chunks(vertices: Array, faces: Array) -> Chunks:
-    """Lay out triangles in chunks.
+    """Group triangles in chunks.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float64 ndarray
-        World space, m.
-    faces : (m, 3) ndarray
-        Vertices of each triangle.
-
-    Returns
-    -------
-    Chunks
-        A copy of their corners.
+    `vertices` (n, 3) float64: world space, m. `faces` (m, 3): vertices of each triangle. Result: a copy of their
+    corners.
     """
     number = (len(faces) + CHUNK - 1) // CHUNK
-    laid = Chunks(plane((number, 9, CHUNK), np.float64), np.empty((number, 6)))
-    _lay_out(vertices, faces, laid.corners, laid.box)
-    return laid
+    filled = Chunks(plane((number, 9, CHUNK), np.float64), np.empty((number, 6)))
+    _fill_chunks(vertices, faces, filled.corners, filled.box)
+    return filled
 
 
 @kernel(parallel=True)
-def _lay_out(vertices: Array, faces: Array, corners: Array, box: Array) -> None:
+def _fill_chunks(vertices: Array, faces: Array, corners: Array, box: Array) -> None:
     for chunk in prange(len(box)):
         first = np.int64(chunk) * CHUNK
         for axis in range(3):

@@ -1,4 +1,4 @@
-"""The visibility buffer: which triangle each texel sees, and how near.
+"""The visibility buffer: nearest triangle and its inverse depth at every texel.
 
 Work is split by rows. One map is cut into bands; each band keeps the list of triangles that reach it, in mesh order,
 and draws them alone, so that the result does not depend on the height of a band or the number of threads. Several
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.batch import Part, draw
 from refgi.rsm.raster.paraboloid import draw_paraboloids
 from refgi.rsm.raster.projection import PARABOLOID, Projection
@@ -27,7 +27,7 @@ CHUNKS = 32  # pieces of the list of triangles that are counted and listed on th
 
 
 class Visibility(NamedTuple):
-    """What is seen through each texel of the stacked maps."""
+    """Nearest triangle at each texel of the stacked maps."""
 
     triangle_id: Array  # (H, W) int32, -1: nothing
     inverse_depth: Array  # (H, W) float32: 1/depth, 1/m; orthographic 1 - depth/reach; 0: nothing
@@ -43,7 +43,7 @@ class Bands(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Room for each worker that draws whole maps."""
+    """Scratch arrays of each worker that draws whole maps."""
 
     corners: Array  # (workers, n, 4) float64
     cells: Array  # (workers, n, 4) int32
@@ -77,25 +77,25 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     vertices, faces = geometry.vertices, geometry.faces
     height, width = projection.shape
     columns = max(width, LANES)
-    seen = Visibility(plane((height, columns), np.int32), plane((height, columns), np.float32))
-    _clear(seen.triangle_id, seen.inverse_depth)
+    visibility = Visibility(plane((height, columns), np.int32), plane((height, columns), np.float32))
+    _clear(visibility.triangle_id, visibility.inverse_depth)
     workers = numba.get_num_threads()
     if projection.kind == PARABOLOID:
-        draw_paraboloids(projection, vertices, faces, workers, seen.inverse_depth, seen.triangle_id)
+        draw_paraboloids(projection, vertices, faces, workers, visibility.inverse_depth, visibility.triangle_id)
     elif projection.maps > 1:
-        _draw_maps(projection, vertices, faces, scratch(workers, len(vertices)), seen)
+        _draw_maps(projection, vertices, faces, scratch(workers, len(vertices)), visibility)
     else:
         corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
         _project(projection, vertices, corners, cells)
         rows = band_rows or min(max(projection.height // 32, 4), 32)
-        _draw_bands(corners, faces, bands(corners, cells, faces, width, height, rows), workers, seen)
+        _draw_bands(corners, faces, bands(corners, cells, faces, width, height, rows), workers, visibility)
     if width < LANES:
-        seen = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in seen))
-    return seen
+        visibility = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in visibility))
+    return visibility
 
 
 def scratch(workers: int, vertices: int) -> Scratch:
-    """Allocate room for workers that draw whole maps.
+    """Allocate scratch arrays for workers that draw whole maps.
 
     Parameters
     ----------
@@ -194,18 +194,18 @@ def _list(boxes: Array, band_of: Array, cursors: Array, members: Array) -> None:
 
 
 @kernel(parallel=True)
-def _draw_bands(corners: Array, faces: Array, lists: Bands, workers: int, seen: Visibility) -> None:
+def _draw_bands(corners: Array, faces: Array, lists: Bands, workers: int, visibility: Visibility) -> None:
     for worker in prange(workers):
         for band in range(worker, len(lists.starts) - 1, workers):  # interleaved: neighbours cost alike
             top = band * lists.rows
             part = Part(
                 lists.members, lists.starts[band], lists.starts[band + 1], lists.boxes, 0, top, top + lists.rows - 1
             )
-            draw(corners, faces, part, seen.inverse_depth, seen.triangle_id)
+            draw(corners, faces, part, visibility.inverse_depth, visibility.triangle_id)
 
 
 @kernel(parallel=True)
-def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: Scratch, seen: Visibility) -> None:
+def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: Scratch, visibility: Visibility) -> None:
     workers, height = len(scratch.corners), projection.height
     for worker in prange(workers):
         corners, cells = scratch.corners[worker], scratch.cells[worker]
@@ -220,4 +220,4 @@ def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: S
                     members[count] = face
                     count += boxes[face - base, 0] <= boxes[face - base, 1]
                 part = Part(members, 0, count, boxes, base, 0, height - 1)
-                draw(corners, faces, part, seen.inverse_depth[rows], seen.triangle_id[rows])
+                draw(corners, faces, part, visibility.inverse_depth[rows], visibility.triangle_id[rows])

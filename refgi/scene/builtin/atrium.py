@@ -64,17 +64,8 @@ POOL = np.array([(1.1, 0.4, 0, 0), (0.01, 0.4, 0, 0)])
 def atrium(faces: int = 250_000, seed: int = 1) -> Scene:
     """Build the courtyard.
 
-    Parameters
-    ----------
-    faces : int
-        Triangles, 10 thousand to 20 million.
-    seed : int
-        Which curtains are drawn, and the colours of the cloth.
-
-    Returns
-    -------
-    Scene
-        Within 5 % of that many faces, 14 materials.
+    `faces`: triangles, 10 thousand to 20 million. `seed`: which curtains are drawn, and the colours of the cloth.
+    Result: within 5 % of that many faces, 14 materials.
     """
     expect(FEWEST_FACES <= faces <= MOST_FACES, "faces", f"{FEWEST_FACES} to {MOST_FACES}", faces)
     expect(0 <= seed < 2**32, "seed", "0 to 2^32 - 1", seed)

@@ -52,17 +52,8 @@ class Part:
 def turned(profile: Array, rows: int, columns: int) -> Array:
     """Return a body turned around y: profile rows are radius, height, squareness and depth of flutes.
 
-    Parameters
-    ----------
-    profile : (n, 4) ndarray
-        Radius and height, m; 0 for a circle to 1 for a square of that half width; flute depth as share of the radius.
-    rows, columns : int
-        Cells.
-
-    Returns
-    -------
-    (rows + 1, columns, 3) ndarray
-        Closed around, normals outward.
+    `profile` (n, 4): radius and height, m; 0 for a circle to 1 for a square of that half width; flute depth as share of
+    the radius. Returns (rows + 1, columns, 3): closed around, normals outward.
     """
     radius, height, square, flute = resampled(profile, rows + 1).T[:, :, None]
     turn = 2 * np.pi * (np.arange(columns) + 0.5) / columns
@@ -75,17 +66,8 @@ def turned(profile: Array, rows: int, columns: int) -> Array:
 def resampled(profile: Array, count: int) -> Array:
     """Return `count` points along a polyline: its own corners first, the rest spread over the segments by length.
 
-    Parameters
-    ----------
-    profile : (n, d) ndarray
-        Corners; the first two values are a position.
-    count : int
-        Wanted points.
-
-    Returns
-    -------
-    (count, d) ndarray
-        All corners among them where count >= n, else a polyline of fewer, evenly picked corners.
+    `profile` (n, d): corners; the first two values are a position. Returns (count, d): all corners among them where
+    count >= n, else a polyline of fewer, evenly picked corners.
     """
     corners = len(profile)
     if count <= corners:
@@ -101,19 +83,9 @@ def resampled(profile: Array, count: int) -> Array:
 def swept(profile: Array, half_length: float, half_width: float, rows: int, columns: int) -> Array:
     """Return a profile swept around the courtyard, mitred at its corners: courses, rails, floors, walls.
 
-    Parameters
-    ----------
-    profile : (n, 2) ndarray
-        Distance from the column line towards the courtyard, and height, m.
-    half_length, half_width : float
-        Of the column line, m.
-    rows, columns : int
-        Cells; the columns are spread over the four sides so that every corner is met.
-
-    Returns
-    -------
-    (rows + 1, columns, 3) ndarray
-        Closed around.
+    `profile` (n, 2): distance from the column line towards the courtyard, and height, m. `half_length`, `half_width`:
+    of the column line, m. `rows`, `columns`: cells; the columns are spread over the four sides so that every corner is
+    met. Returns (rows + 1, columns, 3): closed around.
     """
     line = resampled(profile, rows + 1)
     short = max(1, round(columns / 2 * half_width / (half_length + half_width)))
@@ -129,16 +101,6 @@ def swept(profile: Array, half_length: float, half_width: float, rows: int, colu
 def with_arguments(shape: Callable[..., Array], *arguments: float | Array) -> Callable[[int, int], Array]:
     """Return a shape with its leading arguments given.
 
-    Parameters
-    ----------
-    shape : callable
-        A function of this module.
-    *arguments : float or ndarray
-        All but rows and columns.
-
-    Returns
-    -------
-    callable
-        Of (rows, columns).
+    `shape`: a function of this module. `*arguments`: all but rows and columns.
     """
     return partial(shape, *arguments)

@@ -16,17 +16,8 @@ WALL_THICKNESS = 0.5  # m
 def arch_front(springing: float, top: float, rows: int, columns: int) -> Array:
     """Return the courtyard side of one bay's wall over its arch, from the arch up to `top`.
 
-    Parameters
-    ----------
-    springing, top : float
-        Heights where the arch begins and the wall ends, m.
-    rows, columns : int
-        Cells.
-
-    Returns
-    -------
-    (rows + 1, columns + 1, 3) ndarray
-        In the plane z = half the wall's thickness.
+    `springing`, `top`: heights where the arch begins and the wall ends, m. Returns (rows + 1, columns + 1, 3): in the
+    plane z = half the wall's thickness.
     """
     lower = arch_line(springing, columns)
     up = np.linspace(0.0, 1.0, rows + 1)[:, None]
@@ -38,17 +29,8 @@ def arch_front(springing: float, top: float, rows: int, columns: int) -> Array:
 def arch_back(springing: float, top: float, rows: int, columns: int) -> Array:
     """Return the gallery side of one bay's wall, with its normal away from the courtyard.
 
-    Parameters
-    ----------
-    springing, top : float
-        Heights where the arch begins and the wall ends, m.
-    rows, columns : int
-        Cells.
-
-    Returns
-    -------
-    (rows + 1, columns + 1, 3) ndarray
-        In the plane z = minus half the wall's thickness.
+    `springing`, `top`: heights where the arch begins and the wall ends, m. Returns (rows + 1, columns + 1, 3): in the
+    plane z = minus half the wall's thickness.
     """
     return arch_front(springing, top, rows, columns)[::-1] * (1.0, 1.0, -1.0)
 
@@ -56,17 +38,8 @@ def arch_back(springing: float, top: float, rows: int, columns: int) -> Array:
 def arch_under(springing: float, rows: int, columns: int) -> Array:
     """Return the underside of one bay's arch.
 
-    Parameters
-    ----------
-    springing : float
-        Height where the arch begins, m.
-    rows, columns : int
-        Cells across the wall's thickness and along the arch.
-
-    Returns
-    -------
-    (rows + 1, columns + 1, 3) ndarray
-        Normals down and inward.
+    `springing`: height where the arch begins, m. `rows`, `columns`: cells across the wall's thickness and along the
+    arch. Returns (rows + 1, columns + 1, 3): normals down and inward.
     """
     lower = arch_line(springing, columns)
     depth = np.linspace(-0.5, 0.5, rows + 1)[:, None] * WALL_THICKNESS
@@ -78,17 +51,8 @@ def arch_under(springing: float, rows: int, columns: int) -> Array:
 def archivolt(springing: float, rows: int, columns: int) -> Array:
     """Return the moulding around an arch, a half-round band on the courtyard side.
 
-    Parameters
-    ----------
-    springing : float
-        Height where the arch begins, m.
-    rows, columns : int
-        Cells across and along.
-
-    Returns
-    -------
-    (rows + 1, columns + 1, 3) ndarray
-        Standing 9 cm proud of the wall.
+    `springing`: height where the arch begins, m. `rows`, `columns`: cells across and along. Returns (rows + 1, columns
+    + 1, 3): standing 9 cm proud of the wall.
     """
     around = np.pi * np.linspace(0.0, 1.0, rows + 1)[:, None]
     along = np.pi * np.linspace(0.0, 1.0, columns + 1)
@@ -101,17 +65,7 @@ def archivolt(springing: float, rows: int, columns: int) -> Array:
 def arch_line(springing: float, columns: int) -> Array:
     """Return the lower edge of one bay's wall: from a column's middle over the arch to the next column's.
 
-    Parameters
-    ----------
-    springing : float
-        Height where the arch begins, m.
-    columns : int
-        Cells, at least 3.
-
-    Returns
-    -------
-    (columns + 1, 2) ndarray
-        x and y, m.
+    `springing`: height where the arch begins, m. `columns`: cells, at least 3. Returns (columns + 1, 2): x and y, m.
     """
     turn = np.pi * np.linspace(0.0, 1.0, columns - 1)
     x = np.concatenate([[-BAY / 2], -ARCH_RADIUS * np.cos(turn), [BAY / 2]])
@@ -122,21 +76,8 @@ def arch_line(springing: float, columns: int) -> Array:
 def curtain(folds: int, gathered: float, phase: float, rows: int, columns: int) -> Array:
     """Return a curtain in one bay, hanging in folds from a rod, drawn together at hip height.
 
-    Parameters
-    ----------
-    folds : int
-        Number of folds.
-    gathered : float
-        0 hangs straight, 1 is drawn wholly to its left side at hip height.
-    phase : float
-        Where the folds begin, rad.
-    rows, columns : int
-        Cells.
-
-    Returns
-    -------
-    (rows + 1, columns + 1, 3) ndarray
-        2.5 m wide at the rod, 3 m high.
+    `gathered`: 0 hangs straight, 1 is drawn wholly to its left side at hip height. `phase`: where the folds begin, rad.
+    Returns (rows + 1, columns + 1, 3): 2.5 m wide at the rod, 3 m high.
     """
     down = np.linspace(0.0, 1.0, rows + 1)[:, None]
     across = np.linspace(0.0, 1.0, columns + 1)[None, :]
@@ -151,17 +92,8 @@ def curtain(folds: int, gathered: float, phase: float, rows: int, columns: int) 
 def swag(sag: float, rows: int, columns: int) -> Array:
     """Return a cloth hung between two columns of the upper storey, sagging in the middle.
 
-    Parameters
-    ----------
-    sag : float
-        How far the lower edge hangs below the upper one, m.
-    rows, columns : int
-        Cells.
-
-    Returns
-    -------
-    (rows + 1, columns + 1, 3) ndarray
-        Upper corners at y = 0, 2.5 m apart.
+    `sag`: how far the lower edge hangs below the upper one, m. Returns (rows + 1, columns + 1, 3): upper corners at y =
+    0, 2.5 m apart.
     """
     down = np.linspace(0.0, 1.0, rows + 1)[:, None]
     across = np.linspace(-1.0, 1.0, columns + 1)[None, :]
@@ -175,17 +107,8 @@ def swag(sag: float, rows: int, columns: int) -> Array:
 def shrub(radius: float, rows: int, columns: int) -> Array:
     """Return a clipped round shrub, a sphere with bumps.
 
-    Parameters
-    ----------
-    radius : float
-        Its mean radius, m.
-    rows, columns : int
-        Cells.
-
-    Returns
-    -------
-    (rows + 1, columns, 3) ndarray
-        Around the origin, closed around; the poles are a hand's breadth wide.
+    `radius`: its mean radius, m. Returns (rows + 1, columns, 3): around the origin, closed around; the poles are a
+    hand's breadth wide.
     """
     polar = np.linspace(0.06, np.pi - 0.06, rows + 1)[:, None]
     turn = 2 * np.pi * np.arange(columns)[None, :] / columns
@@ -198,17 +121,7 @@ def shrub(radius: float, rows: int, columns: int) -> Array:
 def tile(size: float, rows: int, columns: int) -> Array:
     """Return one floor tile: flat, its edges worn down into the joint.
 
-    Parameters
-    ----------
-    size : float
-        Length of its sides, m.
-    rows, columns : int
-        Cells.
-
-    Returns
-    -------
-    (rows + 1, columns + 1, 3) ndarray
-        Normals up; corners 15 mm below the middle.
+    `size`: length of its sides, m. Returns (rows + 1, columns + 1, 3): normals up; corners 15 mm below the middle.
     """
     u = np.linspace(-1.0, 1.0, rows + 1)[:, None]
     v = np.linspace(-1.0, 1.0, columns + 1)[None, :]

@@ -15,22 +15,9 @@ GAP = 2e-5
 def integrating_sphere(faces: int = 20_000, albedo: float = 0.5, radius: float = 1.0) -> Scene:
     """Build the inside of a diffuse sphere with a spot and the camera in it.
 
-    Parameters
-    ----------
-    faces : int
-        Triangles, 8 to 50 million.
-    albedo : float
-        Albedo of the wall, 0 to 1.
-    radius : float
-        Radius of the sphere, m.
+    `faces`: triangles, 8 to 50 million. `albedo`: albedo of the wall, 0 to 1. `radius`: radius of the sphere, m.
+    Result: about that many faces; vertices lie on the sphere and vertex normals are exact.
 
-    Returns
-    -------
-    Scene
-        About that many faces; vertices lie on the sphere and vertex normals are exact.
-
-    Notes
-    -----
     The kernel cos cos / r^2 equals 1 / (4 R^2) between any two points of a sphere, so that one bounce gives the same
     irradiance albedo Phi0 / (4 pi R^2) everywhere, Phi0 being the flux of the light (docs/radiometry).
     """
@@ -49,23 +36,10 @@ def integrating_sphere(faces: int = 20_000, albedo: float = 0.5, radius: float =
 def wedge(angle_deg: float = 90.0, albedo: float = 0.5, length: float = 4.0) -> Scene:
     """Build two plates that meet in an edge; parallel light falls on one and grazes the other.
 
-    Parameters
-    ----------
-    angle_deg : float
-        Angle between the plates, 5 to 175 degrees.
-    albedo : float
-        Albedo of both, 0 to 1.
-    length : float
-        Length of the edge, 0.01 to 10 thousand m.
+    `angle_deg`: angle between the plates, 5 to 175 degrees. `albedo`: albedo of both, 0 to 1. `length`: length of the
+    edge, 0.01 to 10 thousand m. Result: 4 faces, 2 materials. The receiver lies in y = 0 from the edge x = 0 to x = 1,
+    the sender leans over it; both are 1 m wide and centred on z = 0.
 
-    Returns
-    -------
-    Scene
-        4 faces, 2 materials. The receiver lies in y = 0 from the edge x = 0 to x = 1, the sender leans over it; both
-        are 1 m wide and centred on z = 0.
-
-    Notes
-    -----
     The light travels along -x with E_perp = 1 W/m^2: the sender has E = sin(angle) throughout, the receiver none. For
     an endless wedge the receiver at distance s from the edge gets albedo sin(angle) (1 + (cos(angle) - s) / d) / 2
     with d^2 = 1 + s^2 - 2 s cos(angle). At z = 0 the missing ends take up to 9 % of that from a length of 4 m, and
@@ -94,22 +68,10 @@ def wedge(angle_deg: float = 90.0, albedo: float = 0.5, length: float = 4.0) -> 
 def parallel_plates(height: float = 1.0, half_angle_deg: float = 40.0, albedo: float = 0.5) -> Scene:
     """Build a floor lit by a spot straight from above, and a small plate over it that only the floor lights.
 
-    Parameters
-    ----------
-    height : float
-        Height of light and receiver over the floor, m.
-    half_angle_deg : float
-        Half-angle of the spot, which has the same intensity in all of its cone; 1 to 75 degrees.
-    albedo : float
-        Albedo of both plates, 0 to 1.
+    `height`: height of light and receiver over the floor, m. `half_angle_deg`: half-angle of the spot, which has the
+    same intensity in all of its cone; 1 to 75 degrees. `albedo`: albedo of both plates, 0 to 1. Result: 4 faces, 2
+    materials. The receiver is 0.6 h wide; the camera sees its lower side and the floor.
 
-    Returns
-    -------
-    Scene
-        4 faces, 2 materials. The receiver is 0.6 h wide; the camera sees its lower side and the floor.
-
-    Notes
-    -----
     At the middle of the receiver E = 2/5 albedo I / h^2 (1 - cos^5 c) for half-angle c and intensity I = 1 W/sr. The
     light hangs 2e-5 h below the receiver so that the receiver cannot block it.
     """

@@ -45,10 +45,7 @@ LIGHT = SpotLight((0.278, 0.5475, 0.2), (0.216263, -0.970525, 0.106359), math.ra
 def cornell_box() -> Scene:
     """Build the box with its two blocks.
 
-    Returns
-    -------
-    Scene
-        30 faces, 3 materials.
+    Result: 30 faces, 3 materials.
     """
     blocks = [_quads(SHORT_BLOCK, WHITE, "short_block"), _quads(TALL_BLOCK, WHITE, "tall_block")]
     geometry, materials = merge([*shell(), *blocks])
@@ -59,15 +56,8 @@ def cornell_box() -> Scene:
 def cornell_sphere(faces: int = 16_990) -> Scene:
     """Build the box with one large sphere instead of the blocks.
 
-    Parameters
-    ----------
-    faces : int
-        Triangles in all, 18 to 50 million.
-
-    Returns
-    -------
-    Scene
-        About that many faces, 4 materials, exact normals on the sphere.
+    `faces`: triangles in all, 18 to 50 million. Result: about that many faces, 4 materials, exact normals on the
+    sphere.
     """
     expect(18 <= faces <= 50_000_000, "faces", "18 to 50000000", faces)
     ball = sphere((0.29, 0.1505, 0.3), 0.15, faces - 10, Material("sphere", (0.62, 0.6, 0.55)), "sphere")
@@ -81,10 +71,7 @@ def cornell_sphere(faces: int = 16_990) -> Scene:
 def shell() -> list[Mesh]:
     """Return the five walls of the box.
 
-    Returns
-    -------
-    list of Mesh
-        Ten faces in all, open towards -z.
+    Result: ten faces in all, open towards -z.
     """
     return [_quads(FLOOR, WHITE, "floor"), _quads(CEILING, WHITE, "ceiling"), _quads(BACK_WALL, WHITE, "back_wall"),
             _quads(RIGHT_WALL, GREEN, "right_wall"), _quads(LEFT_WALL, RED, "left_wall")]

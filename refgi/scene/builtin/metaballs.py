@@ -32,17 +32,8 @@ class Balls(NamedTuple):
 def metaballs(t: float = 0.0, resolution: int = 24) -> Scene:
     """Build the blob at a time, hovering over the stage.
 
-    Parameters
-    ----------
-    t : float
-        Time; the motion repeats after 1.
-    resolution : int
-        Cells along each side of the grid, 4 to 400.
-
-    Returns
-    -------
-    Scene
-        5 materials; pieces and faces change with `t`, faces grow with the square of `resolution`.
+    `t`: time; the motion repeats after 1. `resolution`: cells along each side of the grid, 4 to 400. Result: 5
+    materials; pieces and faces change with `t`, faces grow with the square of `resolution`.
     """
     expect(4 <= resolution <= 400, "resolution", "4 to 400", resolution)
     expect(math.isfinite(t), "t", "a finite number", t)
@@ -57,15 +48,7 @@ def metaballs(t: float = 0.0, resolution: int = 24) -> Scene:
 def balls_at(t: float) -> Balls:
     """Return six balls on their closed paths.
 
-    Parameters
-    ----------
-    t : float
-        Time; the motion repeats after 1.
-
-    Returns
-    -------
-    Balls
-        Around `MIDDLE`, well inside the grid.
+    `t`: time; the motion repeats after 1. Result: around `MIDDLE`, well inside the grid.
     """
     number = np.arange(6)
     turn = 2 * np.pi * (np.array([1, -1, 2, -1, 1, -2]) * t + number / 6.0)
@@ -77,17 +60,7 @@ def balls_at(t: float) -> Balls:
 def field(balls: Balls, points: Array) -> Array:
     """Return f at points (..., 3).
 
-    Parameters
-    ----------
-    balls : Balls
-        What makes the field.
-    points : (..., 3) ndarray
-        Positions, m.
-
-    Returns
-    -------
-    (...) ndarray of float64
-        Positive inside.
+    `balls`: what makes the field. `points` (..., 3): positions, m. Returns (...) float64: positive inside.
     """
     total = np.full(points.shape[:-1], -1.0)
     for center, radius in zip(*balls, strict=True):
@@ -98,17 +71,7 @@ def field(balls: Balls, points: Array) -> Array:
 def gradient(balls: Balls, points: Array) -> Array:
     """Return grad f at points.
 
-    Parameters
-    ----------
-    balls : Balls
-        What makes the field.
-    points : (n, 3) ndarray
-        Positions, m.
-
-    Returns
-    -------
-    (n, 3) ndarray of float64
-        In 1/m; points inward.
+    `balls`: what makes the field. `points` (n, 3): positions, m. Returns (n, 3) float64: in 1/m; points inward.
     """
     total = np.zeros_like(points)
     for center, radius in zip(*balls, strict=True):
@@ -121,17 +84,7 @@ def gradient(balls: Balls, points: Array) -> Array:
 def blob(balls: Balls, resolution: int) -> Mesh:
     """Return the surface f = 0 inside the grid.
 
-    Parameters
-    ----------
-    balls : Balls
-        What makes the field.
-    resolution : int
-        Cells along each side of the grid.
-
-    Returns
-    -------
-    Mesh
-        Watertight, normals outward.
+    `balls`: what makes the field. `resolution`: cells along each side of the grid.
     """
     side = np.linspace(-HALF_SIZE, HALF_SIZE, resolution + 1)
     grid = MIDDLE + np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1)

@@ -7,8 +7,8 @@ import numpy as np
 
 from refgi.errors import expect
 from refgi.scene.builtin.surfaces import lathe, rectangle, ring_surface, sphere
-from refgi.scene.health import mean_face_normals
 from refgi.scene.model import Array, Camera, Material, Mesh, Scene, SpotLight, merge
+from refgi.scene.repair import mean_face_normals
 
 MOST_FACES = 50_000_000
 FLOOR = Material("stage_floor", (0.75, 0.73, 0.7))
@@ -30,10 +30,7 @@ VASE = np.array([(0.0, 0.0), (0.055, 0.0), (0.058, 0.012), (0.045, 0.022), (0.07
 def walls() -> list[Mesh]:
     """Return the stage's floor and walls.
 
-    Returns
-    -------
-    list of Mesh
-        Eight faces, 1.2 x 0.7 x 1.0 m, open in front and above; normals point inside.
+    Result: eight faces, 1.2 x 0.7 x 1.0 m, open in front and above; normals point inside.
     """
     return [rectangle((-0.6, 0.0, 0.6), (1.2, 0.0, 0.0), (0.0, 0.0, -1.0), FLOOR, "floor"),
             rectangle((-0.6, 0.0, -0.4), (1.2, 0.0, 0.0), (0.0, 0.7, 0.0), BACK, "back"),
@@ -44,15 +41,8 @@ def walls() -> list[Mesh]:
 def stage(faces: int = 6_328) -> Scene:
     """Build the stage with a slightly glossy vase.
 
-    Parameters
-    ----------
-    faces : int
-        Triangles in all, 100 to 50 million.
-
-    Returns
-    -------
-    Scene
-        About that many faces, 5 materials, one of them with a Phong lobe.
+    `faces`: triangles in all, 100 to 50 million. Result: about that many faces, 5 materials, one of them with a Phong
+    lobe.
     """
     expect(100 <= faces <= MOST_FACES, "faces", f"100 to {MOST_FACES}", faces)
     camera = Camera((0.1, 0.42, 1.15), (0.0, 0.13, 0.0), vfov=math.radians(30), width=640, height=480)
@@ -65,15 +55,7 @@ def stage(faces: int = 6_328) -> Scene:
 def vase(faces: int) -> Mesh:
     """Return a thin-walled vase standing on y = 0.
 
-    Parameters
-    ----------
-    faces : int
-        Wanted triangles.
-
-    Returns
-    -------
-    Mesh
-        Watertight, with smooth outward normals.
+    Result: watertight, with smooth outward normals.
     """
     rows = max(8, round(math.sqrt(faces / 2)))
     columns = max(3, round(faces / (2 * (rows - 1))))
@@ -84,15 +66,7 @@ def vase(faces: int) -> Mesh:
 def glass_ball(faces: int = 20_488) -> Scene:
     """Build a clear glass ball over the stage's floor, with its caustic in its shadow.
 
-    Parameters
-    ----------
-    faces : int
-        Triangles in all, 100 to 50 million.
-
-    Returns
-    -------
-    Scene
-        About that many faces, 5 materials, one of them a dielectric.
+    `faces`: triangles in all, 100 to 50 million. Result: about that many faces, 5 materials, one of them a dielectric.
     """
     expect(100 <= faces <= MOST_FACES, "faces", f"100 to {MOST_FACES}", faces)
     camera = Camera((0.05, 0.36, 1.15), (0.0, 0.12, 0.0), vfov=math.radians(30), width=640, height=480)
@@ -106,15 +80,7 @@ def glass_ball(faces: int = 20_488) -> Scene:
 def ring(faces: int = 20_482) -> Scene:
     """Build a polished metal ring on a wooden plate, with a caustic inside the ring.
 
-    Parameters
-    ----------
-    faces : int
-        Triangles in all, 100 to 50 million.
-
-    Returns
-    -------
-    Scene
-        About that many faces, 2 materials, one of them a near mirror.
+    `faces`: triangles in all, 100 to 50 million. Result: about that many faces, 2 materials, one of them a near mirror.
     """
     expect(100 <= faces <= MOST_FACES, "faces", f"100 to {MOST_FACES}", faces)
     columns = max(4, round(math.sqrt(faces / 5)))

@@ -15,17 +15,8 @@ from refgi.scene.model import Array, Material, Mesh
 def grid_faces(rows: int, columns: int, *, closed: bool = False) -> Array:
     """Return the triangles of a grid of vertices numbered row by row.
 
-    Parameters
-    ----------
-    rows, columns : int
-        Numbers of points.
-    closed : bool
-        Join the last column to the first.
-
-    Returns
-    -------
-    (m, 3) ndarray of int32
-        2 (rows - 1) (columns - 1) triangles, or 2 (rows - 1) columns where closed.
+    `closed`: join the last column to the first. Returns (m, 3) int32: 2 (rows - 1) (columns - 1) triangles, or 2 (rows
+    - 1) columns where closed.
     """
     row = np.arange(rows - 1, dtype=np.int32)[:, None] * np.int32(columns)
     column = np.arange(columns if closed else columns - 1, dtype=np.int32)
@@ -37,21 +28,7 @@ def grid_faces(rows: int, columns: int, *, closed: bool = False) -> Array:
 def patch(points: Array, material: Material, name: str, *, closed: bool = False) -> Mesh:
     """Return the mesh of a grid of points.
 
-    Parameters
-    ----------
-    points : (rows, columns, 3) ndarray
-        Positions, m.
-    material : Material
-        Its material.
-    name : str
-        Its name.
-    closed : bool
-        Join the last column to the first.
-
-    Returns
-    -------
-    Mesh
-        Without vertex normals.
+    `points` (rows, columns, 3): positions, m. `closed`: join the last column to the first.
     """
     rows, columns = points.shape[:2]
     return Mesh(points.reshape(-1, 3), grid_faces(rows, columns, closed=closed), material=material, name=name)
@@ -60,23 +37,8 @@ def patch(points: Array, material: Material, name: str, *, closed: bool = False)
 def sphere(center: tuple[float, float, float], radius: float, faces: int, material: Material, name: str) -> Mesh:
     """Return a closed sphere of about `faces` triangles with exact outward normals.
 
-    Parameters
-    ----------
-    center : tuple of float
-        Its centre, m.
-    radius : float
-        Its radius, m.
-    faces : int
-        Wanted triangles, at least 8; a multiple of twice the number of meridians is made.
-    material : Material
-        Its material.
-    name : str
-        Its name.
-
-    Returns
-    -------
-    Mesh
-        Vertices on the sphere; watertight.
+    `center`: its centre, m. `radius`: its radius, m. `faces`: wanted triangles, at least 8; a multiple of twice the
+    number of meridians is made. Result: vertices on the sphere; watertight.
     """
     bands = max(2, round(math.sqrt(faces) / 2))
     meridians = max(3, round(faces / (2 * (bands - 1))))
@@ -97,23 +59,9 @@ def sphere(center: tuple[float, float, float], radius: float, faces: int, materi
 def lathe(profile: Array, columns: int, material: Material, name: str, *, ribs: Array | float = 0.0) -> Mesh:
     """Return the surface that a profile sweeps around the y axis.
 
-    Parameters
-    ----------
-    profile : (rows, 2) ndarray
-        Radius and height, m, from bottom to top on the outside.
-    columns : int
-        Points around.
-    material : Material
-        Its material.
-    name : str
-        Its name.
-    ribs : (rows, columns) ndarray or float
-        Share by which each point's radius is changed.
-
-    Returns
-    -------
-    Mesh
-        Normals outward; closed around; an end of the profile that lies on the axis is one vertex, another is open.
+    `profile` (rows, 2): radius and height, m, from bottom to top on the outside. `ribs` (rows, columns) or float: share
+    by which each point's radius is changed. Result: normals outward; closed around; an end of the profile that lies on
+    the axis is one vertex, another is open.
     """
     turn = 2 * np.pi * np.arange(columns) / columns
     radius = profile[:, :1] * (1.0 + np.broadcast_to(ribs, (len(profile), columns)))
@@ -127,23 +75,9 @@ def ring_surface(major: float, section: tuple[float, float], rows: int, columns:
                  name: str) -> Mesh:
     """Return a torus of elliptic section that stands on y = 0, with exact outward normals.
 
-    Parameters
-    ----------
-    major : float
-        Radius of the circle that the section's centre follows, m.
-    section : tuple of float
-        Half axes of the ellipse, radial and vertical, m.
-    rows, columns : int
-        Points along the circle and around the section.
-    material : Material
-        Its material.
-    name : str
-        Its name.
-
-    Returns
-    -------
-    Mesh
-        2 rows columns triangles; watertight.
+    `major`: radius of the circle that the section's centre follows, m. `section`: half axes of the ellipse, radial and
+    vertical, m. `rows`, `columns`: points along the circle and around the section. Result: 2 rows columns triangles;
+    watertight.
     """
     along = 2 * np.pi * np.arange(rows)[:, None] / rows
     around = 2 * np.pi * np.arange(columns) / columns
@@ -163,23 +97,8 @@ def rectangle(corner: tuple[float, float, float], first: tuple[float, float, flo
               cells: tuple[int, int] = (1, 1)) -> Mesh:
     """Return a parallelogram with normal along `first` x `second`.
 
-    Parameters
-    ----------
-    corner : tuple of float
-        One corner, m.
-    first, second : tuple of float
-        The sides that leave it, m.
-    material : Material
-        Its material.
-    name : str
-        Its name.
-    cells : tuple of int
-        Cells along each side.
-
-    Returns
-    -------
-    Mesh
-        Two triangles a cell.
+    `corner`: one corner, m. `first`, `second`: the sides that leave it, m. `cells`: cells along each side. Result: two
+    triangles a cell.
     """
     u = np.linspace(0.0, 1.0, cells[0] + 1)[:, None, None]
     v = np.linspace(0.0, 1.0, cells[1] + 1)[None, :, None]

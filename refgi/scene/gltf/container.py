@@ -31,7 +31,7 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 class Document:
     """The JSON of one glTF file with checked look-ups, and its buffers.
 
-    Look-ups are asked for by the hundred thousand: the text of an error is made where there is one.
+    There are hundreds of thousands of look-ups: the text of an error is made only where there is one.
 
     Parameters
     ----------
@@ -181,26 +181,9 @@ def _are_finite(values: Sequence[Any]) -> bool:
 def accessor(document: Document, index: Any, kind: str, referrer: str) -> Array:
     """Return the elements of an accessor.
 
-    Parameters
-    ----------
-    document : Document
-        The file.
-    index : int
-        Which accessor; checked.
-    kind : str
-        ``"SCALAR"``, ``"VEC3"`` ...: what the referrer needs.
-    referrer : str
-        The key that names the accessor.
-
-    Returns
-    -------
-    (count,) or (count, width) ndarray
-        In the file's component type, or float64 where the accessor is normalised.
-
-    Raises
-    ------
-    InputError
-        If a key is missing or any byte lies outside its buffer.
+    `kind`: ``"SCALAR"``, ``"VEC3"`` ...: what the referrer needs. `referrer`: the key that names the accessor. Returns
+    (count,) or (count, width): in the file's component type, or float64 where the accessor is normalised. Raises
+    `InputError` if a key is missing or any byte lies outside its buffer.
     """
     entry = document.item("accessors", index, referrer)
     where = f"accessors[{index}]"

@@ -37,20 +37,7 @@ class Nodes(NamedTuple):
 def scene_nodes(document: Document) -> Nodes:
     """Walk the default scene of a document.
 
-    Parameters
-    ----------
-    document : Document
-        The file.
-
-    Returns
-    -------
-    Nodes
-        Every node once.
-
-    Raises
-    ------
-    InputError
-        If a reference leads nowhere or to a node with another parent, or a matrix is not usable.
+    Raises `InputError` if a reference leads nowhere or to a node with another parent, or a matrix is not usable.
     """
     numbers, parent = _order(document)
     nodes = document.items("nodes")
@@ -136,26 +123,8 @@ def _rotation(quaternion: tuple[float, ...], where: str) -> tuple[Vector, Vector
 def node_light(document: Document, node: dict[str, Any], matrix: Array, where: str) -> Light | None:
     """Return the light a node carries, in world space.
 
-    Parameters
-    ----------
-    document : Document
-        The file.
-    node : dict
-        The node's JSON.
-    matrix : (4, 4) ndarray
-        World from node.
-    where : str
-        The node's place in the JSON.
-
-    Returns
-    -------
-    Light or None
-        None where the node has none.
-
-    Raises
-    ------
-    InputError
-        If the light's keys do not make a light.
+    `matrix` (4, 4): world from node. `where`: the node's place in the JSON. Result: none where the node has none.
+    Raises `InputError` if the light's keys do not make a light.
     """
     reference = document.member(document.member(node, "extensions", where), EXTENSION, where)
     if "light" not in reference:
@@ -197,26 +166,8 @@ def _not_over_flat(angle: float) -> float:
 def node_camera(document: Document, node: dict[str, Any], matrix: Array, where: str) -> Camera | None:
     """Return the perspective camera a node carries, in world space.
 
-    Parameters
-    ----------
-    document : Document
-        The file.
-    node : dict
-        The node's JSON.
-    matrix : (4, 4) ndarray
-        World from node.
-    where : str
-        The node's place in the JSON.
-
-    Returns
-    -------
-    Camera or None
-        None where the node has none, or an orthographic one.
-
-    Raises
-    ------
-    InputError
-        If the camera's keys do not make a camera.
+    `matrix` (4, 4): world from node. `where`: the node's place in the JSON. Result: none where the node has none, or an
+    orthographic one. Raises `InputError` if the camera's keys do not make a camera.
     """
     if "camera" not in node:
         return None

@@ -10,9 +10,9 @@ from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.files import Contents
 from refgi.scene.gltf.container import Document, accessor
 from refgi.scene.gltf.nodes import node_camera, node_light, scene_nodes
-from refgi.scene.mesh import expect_room
+from refgi.scene.mesh import expect_memory
 from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
-from refgi.scene.transform import placed_all
+from refgi.scene.transform import transformed_all
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
@@ -64,7 +64,7 @@ class _Reader:
             self._view_and_light(node, nodes.world[k], where)
         for what, count in self.passed_over.items():
             warnings.warn(RefgiWarning(f"{self.path}: {count} {what} passed over"), stacklevel=4)
-        meshes = placed_all(shapes, nodes.world[placed_by]) if shapes else []
+        meshes = transformed_all(shapes, nodes.world[placed_by]) if shapes else []
         return Contents(tuple(meshes), tuple(self.cameras), tuple(self.lights))
 
     def _shapes_of(self, node: dict[str, Any], where: str) -> list[Mesh]:
@@ -74,7 +74,7 @@ class _Reader:
         found = self._mesh(node["mesh"], f"{where}.mesh")
         self.vertices += sum(len(mesh.vertices) for mesh in found)
         self.faces += sum(len(mesh.faces) for mesh in found)
-        expect_room(self.vertices, self.faces, f"{self.path}: {where}.mesh")
+        expect_memory(self.vertices, self.faces, f"{self.path}: {where}.mesh")
         return found
 
     def _view_and_light(self, node: dict[str, Any], matrix: Array, where: str) -> None:

@@ -3,9 +3,7 @@
 The pattern is polar with radius r_max xi_1, so its density falls as 1 / r and each sample weighs xi_1
 (Dachsbacher and Stamminger 2005). Symbols as in `pair_sum`.
 
-Where in the reflective shadow map a pixel's disc of texels lies.
-
-How much light lies outside the discs of texels that pixels gather from, told from some pixels and texels.
+`centers` places the disc; `disc_loss` estimates, from sampled pixels and texels, the share of light outside all discs.
 """
 
 import math
@@ -65,7 +63,7 @@ def disc_pattern(samples: int, seed: int, weight_squared: bool = False) -> Array
     """
     shift = draws(seed, GATHERING, 2).tolist() if seed else None
     xi, turn = halton(samples, shift=shift, start=1).T
-    # density 1 / (2 pi xi): the weight is 2 pi xi; with xi^2 the mean weight is kept, 2 pi * 3/2 xi^2
+    # density 1 / (2 pi xi): the weight is 2 pi xi; with xi^2 the mean weight stays the same, 2 pi * 3/2 xi^2
     weight = 2 * math.pi * (1.5 * xi * xi if weight_squared else xi)
     return np.stack([xi * np.cos(2 * math.pi * turn), xi * np.sin(2 * math.pi * turn), weight], axis=1)
 
@@ -74,22 +72,11 @@ def disc_pattern(samples: int, seed: int, weight_squared: bool = False) -> Array
 def gather_discs(
     position: Array, normal: Array, center: Array, source: GatherMap, pattern: Array, scale: Any, irradiance: Array
 ) -> None:
-    """Add E = scale * sum over the pattern of weight Phi g for every receiver.
+    """Add E = scale * sum over the pattern of weight Phi g for every receiver, W/m^2.
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers, world space; m and unit vectors.
-    center : (2, n) ndarray of float64
-        Their row and column in the map, continuous.
-    source : GatherMap
-        The map.
-    pattern : (S, 3) ndarray
-        Rows down and columns right of the centre, and weight (dtype of the receivers).
-    scale : float
-        1 / (pi S) times the texels in a disc of unit weight.
-    irradiance : (3, n) ndarray
-        Added to, W/m^2. Texels outside the map count 0.
+    `position` and `normal` (3, n) are the receivers, `center` (2, n) float64 their continuous row and column in the
+    map; `pattern` (S, 3) holds rows down, columns right and weight; `scale` is 1 / (pi S) times the texels in a disc of
+    unit weight. Texels outside the map count 0.
     """
     real = position.dtype.type
     height, width = source.flux.shape[1:]
@@ -105,6 +92,7 @@ def gather_discs(
                 fr, fg, fb = source.flux[0, t, u], source.flux[1, t, u], source.flux[2, t, u]
                 if fr > 0 or fg > 0 or fb > 0:
                     p, n = source.position, source.normal
+                    # SII Eq. (2)
                     g = geometry_term(p[0, t, u] - x, p[1, t, u] - y, p[2, t, u] - z,
                                       -n[0, t, u], -n[1, t, u], -n[2, t, u], nx, ny, nz)
                     g *= real(pattern[s, 2])

@@ -1,4 +1,4 @@
-"""Screen-space interpolation of indirect light from a coarse grid of pixels (RSM 2005, used in SII Fig. 12)."""
+"""Screen-space interpolation of indirect light from a coarse grid of pixels (RSM 2005, in SII Fig. 12)."""
 
 from typing import Any, NamedTuple
 
@@ -11,11 +11,11 @@ from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
-NEEDED = 3  # of the four coarse neighbours that must agree with a pixel
+LEAST_SIMILAR = 3  # of the four coarse neighbours that must be similar to a pixel
 
 
-class Agreement(NamedTuple):
-    """When a coarse pixel may stand for another."""
+class SimilarityLimits(NamedTuple):
+    """How far a coarse pixel's surface may differ from a pixel's."""
 
     least_cosine: float  # between their normals
     reach: float  # distance between their surfaces, m
@@ -48,45 +48,45 @@ def coarse_pixels(height: int, width: int, grid: int) -> tuple[Array, Array]:
 
 @stage("gather.interpolate")
 def interpolate(
-    receivers: Receivers, known: Array, coarse: tuple[Array, Array], agreement: Agreement
+    receivers: Receivers, coarse_light: Array, coarse: tuple[Array, Array], limits: SimilarityLimits
 ) -> tuple[Array, Array]:
-    """Interpolate light between coarse pixels where their surfaces agree.
+    """Interpolate light between coarse pixels where their surfaces are similar.
 
     Parameters
     ----------
     receivers : Receivers
         All pixels.
-    known : (3, h, w) ndarray
-        Irradiance, right at the coarse pixels.
+    coarse_light : (3, h, w) ndarray
+        Irradiance, W/m^2, valid at the coarse pixels.
     coarse : tuple of two 1-D ndarrays
         Rows and columns of the coarse pixels.
-    agreement : Agreement
-        When a coarse pixel may stand for another.
+    limits : SimilarityLimits
+        How far their surfaces may differ.
 
     Returns
     -------
     irradiance : (3, h, w) ndarray
         Interpolated irradiance, W/m^2; 0 where it could not be.
-    done : (h, w) ndarray of bool
-        Where it could be: three of four neighbours agree, or the pixel is a coarse one itself.
+    interpolated : (h, w) ndarray of bool
+        Where it could be: three of four neighbours are similar, or the pixel is a coarse one itself.
 
     Notes
     -----
-    Weights are bilinear and made to sum to 1 over the neighbours that agree.
+    Weights are bilinear and made to sum to 1 over the similar neighbours.
     """
     covered = np.asarray(receivers.covered)
-    result = np.zeros_like(known)
-    done = np.zeros_like(covered)
-    lines = (*_between(coarse[0], covered.shape[0]), *_between(coarse[1], covered.shape[1]))
-    _interpolate(receivers.position, receivers.normal, known, covered, lines, agreement, (result, done))
+    result = np.zeros_like(coarse_light)
+    interpolated = np.zeros_like(covered)
+    lines = (*_neighbours(coarse[0], covered.shape[0]), *_neighbours(coarse[1], covered.shape[1]))
+    _interpolate(receivers.position, receivers.normal, coarse_light, covered, lines, limits, (result, interpolated))
     at_coarse = np.ix_(*coarse)
-    done[at_coarse] = covered[at_coarse]
+    interpolated[at_coarse] = covered[at_coarse]
     channels = np.ix_(np.arange(3), *coarse)
-    result[channels] = known[channels]
-    return result, done
+    result[channels] = coarse_light[channels]
+    return result, interpolated
 
 
-def _between(coarse: Array, size: int) -> tuple[Array, Array, Array]:
+def _neighbours(coarse: Array, size: int) -> tuple[Array, Array, Array]:
     """Return for each pixel of an axis the coarse pixels around it and the weight of the second, 0 to 1."""
     pixel = np.arange(size)
     first = np.clip(np.searchsorted(coarse, pixel, side="right") - 1, 0, max(0, len(coarse) - 2))
@@ -96,33 +96,33 @@ def _between(coarse: Array, size: int) -> tuple[Array, Array, Array]:
 
 @kernel(parallel=True)
 def _interpolate(
-    position: Array, normal: Array, known: Array, covered: Array, lines: Any, agreement: Agreement, out: Any
+    position: Array, normal: Array, coarse_light: Array, covered: Array, lines: Any, limits: SimilarityLimits, out: Any
 ) -> None:
     top, bottom, down, left, right, across = lines
-    result, done = out
+    result, interpolated = out
     real = position.dtype.type
     for i in prange(covered.shape[0]):
         for j in range(covered.shape[1]):
             if not covered[i, j]:
                 continue
-            total, agreeing = 0.0, 0
+            total, similar = 0.0, 0
             for corner in range(4):
                 r, c = bottom[i] if corner & 2 else top[i], right[j] if corner & 1 else left[j]
-                if covered[r, c] and _agree(position, normal, i, j, r, c, agreement):
+                if covered[r, c] and _similar(position, normal, i, j, r, c, limits):
                     weight = (down[i] if corner & 2 else 1.0 - down[i]) * (across[j] if corner & 1 else 1.0 - across[j])
-                    agreeing += 1
+                    similar += 1
                     total += weight
                     for channel in range(3):
-                        result[channel, i, j] += real(weight) * known[channel, r, c]
-            done[i, j] = total > 0.0 and agreeing >= NEEDED
+                        result[channel, i, j] += real(weight) * coarse_light[channel, r, c]
+            interpolated[i, j] = total > 0.0 and similar >= LEAST_SIMILAR
             for channel in range(3):
-                result[channel, i, j] = result[channel, i, j] / real(total) if done[i, j] else real(0.0)
+                result[channel, i, j] = result[channel, i, j] / real(total) if interpolated[i, j] else real(0.0)
 
 
 @kernel
-def _agree(position: Array, normal: Array, i: int, j: int, r: int, c: int, agreement: Agreement) -> Any:
+def _similar(position: Array, normal: Array, i: int, j: int, r: int, c: int, limits: SimilarityLimits) -> Any:
     cosine, square = 0.0, 0.0
     for axis in range(3):
         cosine += normal[axis, i, j] * normal[axis, r, c]
         square += (position[axis, i, j] - position[axis, r, c]) ** 2
-    return cosine >= agreement.least_cosine and square <= agreement.reach * agreement.reach
+    return cosine >= limits.least_cosine and square <= limits.reach * limits.reach

@@ -9,13 +9,31 @@ the pixels.
 
 from refgi.method import Method
 from refgi.splat.sii.ledger import energy_ledger
-from refgi.splat.sii.settings import SiiSettings, SplatSettings
-from refgi.splat.sii.sii import sii
-from refgi.splat.sii.splat import cut_irradiance, splat
+from refgi.splat.sii.settings import (
+    PRESETS,
+    AbsoluteCut,
+    EllipsoidBound,
+    FullBound,
+    MeshBound,
+    QuadBound,
+    ReachSettings,
+    RelativeCut,
+    SiiSettings,
+    TangentBound,
+)
+from refgi.splat.sii.sii import cut_irradiance, sii, splat
 
 __all__ = [
+    "PRESETS",
+    "AbsoluteCut",
+    "EllipsoidBound",
+    "FullBound",
+    "MeshBound",
+    "QuadBound",
+    "ReachSettings",
+    "RelativeCut",
     "SiiSettings",
-    "SplatSettings",
+    "TangentBound",
     "cut_irradiance",
     "sii",
     "splat",
@@ -23,4 +41,4 @@ __all__ = [
 
 METHOD = Method(
     "sii", "Splatting Indirect Illumination (2006): pixel lights shine where they are significant", sii, SiiSettings,
-    visibility=False, ledger=energy_ledger)
+    visibility=False, ledger=energy_ledger, presets=PRESETS)

@@ -1,6 +1,6 @@
-r"""Where the power of the lights goes under `sii`: an account in watts whose lines sum to what was emitted (REF-04).
+r"""Energy ledger of `sii`: an account in watts whose lines sum to what the lights emit (REF-04).
 
-Light, exact (`light_side`):
+Light, exact (`light_terms`):
 
     emitted = missed + absorbed + glass + reflected + refracted
 
@@ -16,7 +16,7 @@ with `sii_no_pi` pi Phi_i, with `lobe_norm` "full_lobe" K Phi_i and (1 - K) Phi_
     sum of Phi_i = sent + into its own surface + printed
 
 What meets the visible surface, as a sum over pixels: irradiance times A, the area that the pixel sees. With no limit on
-range and no clamp that is `full`, and `full` with all receivers turned round is what meets their other side, because
+range and no clamp that is `full`, and `full` with all receivers turned round is what meets their other terms, because
 there is no visibility. What is left of `sent` meets no visible pixel:
 
     sent = full + (behind - into its own surface) + off_screen
@@ -43,7 +43,7 @@ from refgi.lights.selection import choose_lights, light_maps
 from refgi.lights.settings import MapLights, PathLights
 from refgi.radiometry import lobe_fraction
 from refgi.settings import replaced
-from refgi.splat.sii.ledger_sides import LightSide, light_side, screen_side
+from refgi.splat.sii.ledger_terms import LightTerms, light_terms, screen_terms
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -58,9 +58,9 @@ MEANING = {
     "emitted": "by all lights", "missed": "met no surface", "absorbed": "by the first surface",
     "glass": "met glass that did not hand it on", "reflected": "handed on by the first surface",
     "refracted": "handed on by glass", "sampling": "lost by drawing pixel lights",
-    "bounced": "sent again by later bounces", "scaled": "taken by openness", "lights": "flux of the pixel lights",
+    "bounced": "sent again by later bounces", "scaled": "removed by openness", "lights": "flux of the pixel lights",
     "printed": "left out by norms as printed", "arrived": "on visible surfaces", "interpolated": "lost between pixels",
-    "cut": "out of range", "clamped": "taken from near pairs", "behind": "behind a light's or a visible surface",
+    "cut": "out of range", "clamped": "removed by the clamp", "behind": "behind a light's or a visible surface",
     "off_screen": "met no visible surface, less what met several",
 }
 SUBTOTALS = ("reflected", "refracted", "lights")
@@ -119,9 +119,9 @@ def energy_ledger(frame: "Frame", settings: "SiiSettings") -> Ledger:
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The scene and its buffers.
     settings : SiiSettings
-        As given to `sii`.
+        Those of `sii`.
 
     Returns
     -------
@@ -133,25 +133,25 @@ def energy_ledger(frame: "Frame", settings: "SiiSettings") -> Ledger:
     Takes three to six times as long as the picture. Lines after `sampling` are as good as the sum over pixels is as an
     integral over the visible surface.
     """
-    side = _light_side(frame, settings)
+    terms = _light_terms(frame, settings)
     first, drawn, lights = _pixel_lights(frame, settings)
     flux = _flux(lights)
     sent, inwards, printed = _sent(lights, settings)
-    screen = screen_side(frame, lights, settings)
+    screen = screen_terms(frame, lights, settings)
     return Ledger(
-        *side[:4], reflected=side.reflected, refracted=side.refracted,
-        sampling=side.reflected + side.refracted - first, bounced=first - drawn, scaled=drawn - flux, lights=flux,
+        *terms[:4], reflected=terms.reflected, refracted=terms.refracted,
+        sampling=terms.reflected + terms.refracted - first, bounced=first - drawn, scaled=drawn - flux, lights=flux,
         printed=printed + screen.printed, arrived=screen.arrived, interpolated=screen.interpolated, cut=screen.cut,
         clamped=screen.clamped, behind=inwards + screen.behind, off_screen=sent - screen.full - screen.behind,
     )
 
 
-def _light_side(frame: "Frame", settings: "SiiSettings") -> LightSide:
+def _light_terms(frame: "Frame", settings: "SiiSettings") -> LightTerms:
     """Return the account of all lights together."""
     source = settings.lights.source
     maps = light_maps(frame, source) if isinstance(source, MapLights) else frame.rsms
-    sides = [light_side(rsm, frame.scene.geometry, frame.materials) for rsm in maps]
-    return LightSide(*(sum(line, np.zeros(3)) for line in zip(*sides, strict=True)))
+    terms = [light_terms(rsm, frame.scene.geometry, frame.materials) for rsm in maps]
+    return LightTerms(*(sum(line, np.zeros(3)) for line in zip(*terms, strict=True)))
 
 
 def _pixel_lights(frame: "Frame", settings: "SiiSettings") -> "tuple[Array, Array, PixelLights]":
@@ -191,6 +191,6 @@ def _lobe_shares(lights: "PixelLights", settings: "SiiSettings") -> tuple[Array,
         return np.ones(count), np.ones(count)  # what lies below the surface is never sent
     cosine = np.asarray((lights.normal * lights.lobe_axis).sum(axis=0), np.float64)
     exponent = np.asarray(lights.lobe_exponent, np.float64)
-    kept = np.array([lobe_fraction(c, p) for c, p in zip(cosine, exponent, strict=True)])
+    above = np.array([lobe_fraction(c, p) for c, p in zip(cosine, exponent, strict=True)])
     whole = np.ones(count) if settings.pairs.lobe.norm == "full_lobe" else 2.0 * math.pi / (exponent + 1.0)
-    return whole, kept * whole
+    return whole, above * whole

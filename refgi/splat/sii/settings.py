@@ -1,66 +1,127 @@
-"""What `sii` can be set to: which pixel lights, and how far each reaches."""
+"""Settings of `sii`: pixel lights, the pair term, and how far each light reaches (SII Sec. 3.4 and appendix).
+
+A pair of light and receiver counts where B = I_0 cos^n / r^2 is at least I_low, one irradiance for all lights.
+"""
 
 import dataclasses
 from typing import ClassVar, Literal
 
 from refgi.errors import expect
-from refgi.lights.settings import LightSettings, expect_footprints
+from refgi.lights.settings import LightSettings, MapLights, expect_footprints
 from refgi.pairs.settings import LAST_SEED, PairSettings
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 
-Bound = Literal["full", "quad", "ellipsoid", "tangent", "mesh"]
-
 
 @dataclasses.dataclass(frozen=True)
-class SplatSettings(Settings):
-    """How far a pixel light reaches (SII Sec. 3.4 and appendix), besides how it lights a receiver.
+class RelativeCut(Settings):
+    """I_low is a share of the largest peak intensity I_0 over the square of a reference length (the paper's: 0.05)."""
 
-    A pair counts where B = I_0 cos^n / r^2 is at least I_low, one irradiance for all lights: `i_low` (0: no cut; the
-    paper's is 0.05) of the largest peak intensity I_0 over the square of `reference_length` (m; none: under which 0.05
-    leave as large a share of the pairs as in the paper, see `with_reference_length`), or `irradiance_low` (W/m^2) where
-    that is given. `bound` says which geometry finds the pixels that come into question; it changes no
-    bit of the picture but for a "mesh" of `mesh_faces` faces that is not made to enclose its ellipsoid (`inflate`).
-    `stochastic_range` cuts at a random share of I_low instead, drawn by `seed`, and weighs what is left: no bias.
-    """
-
+    NAME = "relative"
     SWITCHES: ClassVar[frozenset[str]] = frozenset({"per_light_ilow"})
 
-    pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
-    i_low: float = setting(0.0, "share of the brightest light's intensity", least=0.0, most=LARGEST)
-    reference_length: float | None = setting(None, "length of the share", least=1 / LARGEST, most=LARGEST, unit="m")
-    irradiance_low: float | None = setting(None, "irradiance under which pairs are cut", least=0.0, unit="W/m^2")
-    bound: Bound = setting("tangent", "geometry that finds the pixels of a light")
-    mesh_faces: Literal[8, 20, 80, 320, 1280] = setting(80, "faces of a mesh")
-    inflate: bool = setting(True, "meshes enclose their ellipsoid")
-    stochastic_range: bool = setting(False, "cut at a random share of I_low")
-    seed: int = setting(0, "of the random shares", least=0, most=LAST_SEED)
+    share: float = setting(0.05, "share of the largest peak intensity", above=0.0, most=LARGEST)
+    reference_length: float | None = setting(
+        None, "length of the share; none: under which 0.05 leaves the paper's share of the pairs", least=1 / LARGEST,
+        most=LARGEST, unit="m")
     as_published: frozenset[str] = setting(frozenset(), "forms of the cut to use as printed", study=True)
-
-    @property
-    def cuts(self) -> bool:
-        """Whether any pair may be left out."""
-        return self.i_low > 0 if self.irradiance_low is None else self.irradiance_low > 0
 
 
 @dataclasses.dataclass(frozen=True)
-class SiiSettings(SplatSettings):
-    """What `sii` can be set to; the defaults are the paper's (768 lights, no importance) but for its cut.
+class AbsoluteCut(Settings):
+    """I_low is given in W/m^2."""
 
-    Nothing is cut: the sum of all lights takes at most 1.7 times as long as the paper's cut of 5 % (`i_low=0.05`, Fig.
-    12), which takes up to a third of the light.
+    NAME = "absolute"
+
+    irradiance: float | None = setting(None, "irradiance under which pairs are cut; must be given", above=0.0,
+                                       unit="W/m^2")
+
+
+@dataclasses.dataclass(frozen=True)
+class FullBound(Settings):
+    """Every pixel is tested."""
+
+    NAME = "full"
+
+
+@dataclasses.dataclass(frozen=True)
+class QuadBound(Settings):
+    """The screen rectangle of the sphere of radius R_0 (SII Sec. 3.2)."""
+
+    NAME = "quad"
+
+
+@dataclasses.dataclass(frozen=True)
+class EllipsoidBound(Settings):
+    """The ellipsoid of the appendix (SII Eq. 8)."""
+
+    NAME = "ellipsoid"
+
+
+@dataclasses.dataclass(frozen=True)
+class TangentBound(Settings):
+    """The ellipsoid through the light that touches its region: the least waste."""
+
+    NAME = "tangent"
+
+
+@dataclasses.dataclass(frozen=True)
+class MeshBound(Settings):
+    """The ellipsoid of the appendix as a mesh of triangles, drawn by the rasterizer (SII Sec. 4)."""
+
+    NAME = "mesh"
+
+    faces: Literal[8, 20, 80, 320, 1280] = setting(80, "triangles of the mesh", study=True)
+    inflate: bool = setting(True, "the mesh encloses its ellipsoid; else pixels at its rim are lost", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class ReachSettings(Settings):
+    """How far a pixel light reaches (SII Sec. 3.4 and appendix)."""
+
+    cut: RelativeCut | AbsoluteCut | None = setting(None, "threshold under which pairs are left out")
+    bound: TangentBound | EllipsoidBound | QuadBound | MeshBound | FullBound = setting(
+        TangentBound(), "geometry that finds candidate pixels; changes no bit of the picture", study=True)
+    stochastic: bool = setting(False, "cut at a random share of I_low and weight what is left: no bias", study=True)
+    seed: int = setting(0, "of the random shares", least=0, most=LAST_SEED, study=True)
+
+    def check(self) -> None:
+        """Check that an absolute cut has its threshold."""
+        if isinstance(self.cut, AbsoluteCut):
+            expect(self.cut.irradiance is not None, "cut.irradiance", "a number > 0 for the cut 'absolute', W/m^2",
+                   None)
+
+    @property
+    def on_screen(self) -> bool:
+        """Whether the bound is one on the screen, not in space."""
+        return isinstance(self.bound, QuadBound | MeshBound)
+
+
+@dataclasses.dataclass(frozen=True)
+class SiiSettings(Settings):
+    """Settings of `sii`; by default nothing is cut, and every light reaches every pixel.
+
+    The sum of all lights takes at most 1.7 times as long as the paper's cut of 5 % (Fig. 12), which removes up to a
+    third of the light.
     """
 
     lights: LightSettings = setting(LightSettings(), "pixel lights")
-    half_resolution: bool = setting(False, "every second pixel is lit, the others are interpolated (Table 3)")
+    pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
+    reach: ReachSettings = setting(ReachSettings(), "how far a light reaches")
+    half_resolution: bool = setting(False, "evaluate one pixel of 2 x 2 and upsample by a joint bilateral filter")
 
     def check(self) -> None:
         """Check what fields ask of each other."""
         expect_footprints(self.lights, self.pairs)
-        expect(not self.half_resolution or self.bound not in ("quad", "mesh"), "bound",
-               "one in space, not on the screen, at half resolution", self.bound)
+        expect(not (self.half_resolution and self.reach.on_screen), "reach.bound",
+               "one in space, not on the screen, at half resolution", self.reach.bound.name())
 
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
         return self.lights.traces_rays
+
+
+# 768 lights by a filtered look-up of the flux (Sec. 4), a cut of 5 % (Fig. 12), the ellipsoids of the appendix
+PRESETS = {"paper": SiiSettings(lights=LightSettings(source=MapLights(filtered=True)),
+                                reach=ReachSettings(cut=RelativeCut(), bound=EllipsoidBound()))}

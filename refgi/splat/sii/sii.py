@@ -1,20 +1,35 @@
-"""Splatting Indirect Illumination (Dachsbacher and Stamminger 2006): the method."""
+"""Splatting Indirect Illumination (Dachsbacher and Stamminger 2006): the method and its sum.
+
+`sii` chooses pixel lights and adds each one's irradiance to the pixels where it is significant (Eq. 2, Sec. 3). The
+paper draws a bound of each light and lights the pixels it covers. Here the bound lists lights for tiles of pixels, and
+the pairs of light and pixel with B < I_low are left out one by one, so that the picture is that of the threshold alone,
+the same to the bit for every bound. `cut_irradiance` sums what the cut removes.
+
+Symbols: B = I(w) / r^2 (W/m^2), the irradiance a light causes at most, I_low the threshold (W/m^2).
+"""
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import numpy.typing as npt
 
 from refgi.lights.selection import choose_lights, footprints
-from refgi.pairs.irradiance import Receivers
+from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
+from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.loss import warn_of_clamp
+from refgi.pairs.ranged_sum import sum_pairs_in_range, sum_weighted_pairs
+from refgi.pairs.sphere_sum import sum_spheres
 from refgi.splat.sii.half_resolution import half_resolution
+from refgi.splat.sii.reach.lists import LightLists
 from refgi.splat.sii.reach.reference_length import with_reference_length
 from refgi.splat.sii.reach.threshold import warn_of_cut
 from refgi.splat.sii.settings import SiiSettings
-from refgi.splat.sii.splat import splat
+from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
+    from refgi.lights import PixelLights
+    from refgi.rsm import Projection
 
 Array = npt.NDArray[Any]
 
@@ -25,7 +40,7 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The scene and its buffers.
     settings : SiiSettings
         Which lights, how each lights a receiver and how far it reaches.
 
@@ -38,12 +53,106 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     footprint = footprints(frame, settings.lights, settings.pairs)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading
 
-    reach = with_reference_length(receivers, lights, settings)
+    resolved = with_reference_length(receivers, lights, settings)
 
-    def lit(some: Receivers) -> Array:
-        return splat(some, lights, reach, footprint, frame.gbuffer.projection)  # Eq. (2), Sec. 3.4
+    def evaluate(points: Receivers) -> Array:
+        return splat(points, lights, resolved, footprint, frame.gbuffer.projection)  # Eq. (2), Sec. 3.4
 
-    light = half_resolution(receivers, lit) if settings.half_resolution else lit(receivers)
+    light = half_resolution(receivers, evaluate) if settings.half_resolution else evaluate(receivers)
     warn_of_clamp(receivers, lights, settings.pairs, footprint, "sii")
-    warn_of_cut(light, receivers, lights, reach, footprint)
+    warn_of_cut(light, receivers, lights, resolved, footprint)
     return light
+
+
+def splat(
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None,
+    projection: "Projection | None" = None,
+) -> Array:
+    """Sum the irradiance of every pixel light at the receivers where it may be significant (SII Eq. 2, Sec. 3.4).
+
+    Parameters
+    ----------
+    receivers : Receivers
+        Points to light; their dtype is that of the result.
+    lights : PixelLights
+        Lights to sum.
+    settings : SiiSettings
+        The parts `reach` and `pairs`.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+    projection : Projection, optional
+        The camera's map; needed by the bounds "quad" and "mesh" alone.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2, linear RGB, as that of `irradiance`, of the pairs with B >= I_low. Without a threshold it
+        is that of `irradiance` to the bit.
+
+    Raises
+    ------
+    InputError
+        As `irradiance`; or if the bound lacks its map.
+    """
+    if settings.reach.cut is None:
+        skip("splat.bins", "no cut: every light reaches every pixel")
+        return irradiance(receivers, lights, settings.pairs, footprint)
+    return _splat(receivers, lights, settings, footprint, projection)
+
+
+@stage("splat.irradiance")
+def _splat(
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
+    projection: "Projection | None",
+) -> Array:
+    return _sum_in_range(receivers, lights, settings, footprint, projection, outside=False)
+
+
+@stage("splat.cut")
+def cut_irradiance(
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None
+) -> Array:
+    """Sum the irradiance of the pairs that `splat` leaves out.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        Points to light.
+    lights : PixelLights
+        Lights.
+    settings : SiiSettings
+        As for `splat`; the bound does not matter.
+    footprint : (N,) ndarray, optional
+        As for `splat`.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2, linear RGB: with that of `splat` it makes the full sum, but for rounding. With a random
+        range it is the full sum less the weighted one, and may be below 0.
+    """
+    if settings.reach.cut is None:
+        return np.zeros_like(np.asarray(receivers.position))
+    return _sum_in_range(receivers, lights, settings, footprint, None, outside=True)
+
+
+def _sum_in_range(
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
+    projection: "Projection | None", *, outside: bool,
+) -> Array:
+    packed = checked(receivers, lights, settings.pairs, footprint)
+    settings = with_reference_length(receivers, lights, settings)
+    lists = LightLists(packed, settings, outside, receivers.covered.shape[1], projection)
+    weighted = outside or settings.reach.stochastic
+
+    def add(here: Array, facing: Array, places: Array, sums: Array) -> None:
+        if lists.diffuse is not None and packed.spheres is not None:
+            sum_spheres(here, facing, packed.diffuse, packed.spheres, lists.diffuse, sums)
+        elif lists.diffuse is not None:
+            run = sum_weighted_pairs if weighted else sum_pairs_in_range
+            listed = lists.of_diffuse(here, facing, places)
+            run(here, facing, packed.diffuse, packed.clamp, lists.diffuse, listed, sums)
+        if packed.lobes is not None:
+            add_lobes(here, facing, *packed.lobes, lists.lobes, lists.of_lobes(here, facing, places), sums)
+
+    return over_receivers(receivers, packed, add)

@@ -1,1 +1,1 @@
-"""Samples of a crown around every texel, and what they send (Sec. 3.2, indirect lighting shader)."""
+"""Crown sampling around every texel of a level (Sec. 3.2, indirect lighting shader)."""

@@ -1,10 +1,10 @@
-"""Two samples added to a tile of receivers: the innermost loop (Sec. 3.1, Eq. 3 and 4).
+"""Form factor of a receiver and a sample (Sec. 3.1, Eq. 3 and 4), and the innermost loop over samples.
 
-Receivers of a row are the SIMD lanes. Their tile is one array in which all distances are known to the compiler, so
-that few checks for overlap are left to every call.
+The receivers of a row are the SIMD lanes. A tile of receivers is one array with strides known to the compiler, so that
+few overlap checks remain in each call.
 
-Symbols: d vector from receiver to sample, m = -n_j ds_j / pi of the sample, c = max(0, n . d), s = max(0, m . d),
-g = c s / (r^4 + s r) for Eq. 4, c s / r^4 for Eq. 3: with |d| = r, what radiance is multiplied by, without pi.
+Symbols: d vector from receiver to sample; m = -n_j ds_j / pi of the sample; c = max(0, n . d) = r cos(theta);
+s = max(0, m . d) = r R^2, with the radius R of the disc that has the sample's projected area; |d| = r.
 """
 
 import math
@@ -25,38 +25,35 @@ X, Y, Z, NX, NY, NZ, R, G, B = (np.uint64(k * WIDE) for k in range(9))
 
 
 @kernel
+def form_factor(c: Any, s: Any, square: Any, disc: bool) -> Any:
+    """Return c s / (r^4 + s r) (Eq. 4, `disc`) or c s / r^4 (Eq. 3): cos(theta) R^2 / (r^2 + R^2), without pi.
+
+    `square` is r^2. 0 where c or s is 0, and where receiver and sample coincide.
+    """
+    least = type(c)(LEAST)
+    # Eq. (3): cos(theta) cos(theta') ds / r^2
+    below = square * square
+    if disc:
+        # Eq. (4): cos(theta) R^2 / (r^2 + R^2)
+        below = below + s * math.sqrt(square)
+    return c * s / (below if below > least else least)
+
+
+@kernel
 def term(px: Any, py: Any, pz: Any, nx: Any, ny: Any, nz: Any, qx: Any, qy: Any, qz: Any, mx: Any, my: Any, mz: Any,
          weight: Any, disc: bool) -> Any:
-    """Return g of one receiver and one sample.
+    """Return the form factor of one receiver and one sample that stands for `weight` texels.
 
-    Parameters
-    ----------
-    px, py, pz, nx, ny, nz : float
-        Position and normal of the receiver.
-    qx, qy, qz, mx, my, mz : float
-        Position of the sample, and its reversed normal times area / pi of its texel.
-    weight : float
-        Texels that the sample stands for.
-    disc : bool
-        Eq. 4 instead of Eq. 3.
-
-    Returns
-    -------
-    float
-        g; 0 where either faces away and where both are at the same place.
+    p, n: position and normal of the receiver; q, m: position of the sample, and its reversed normal times area / pi.
     """
-    real = type(px)
-    zero, least = real(0.0), real(LEAST)
+    zero = type(px)(0.0)
     dx, dy, dz = qx - px, qy - py, qz - pz
     square = dx * dx + dy * dy + dz * dz
     c = nx * dx + ny * dy + nz * dz
     s = mx * dx + my * dy + mz * dz
     c = c if c > zero else zero
     s = (s if s > zero else zero) * weight
-    below = square * square
-    if disc:
-        below = below + s * math.sqrt(square)
-    return c * s / (below if below > least else least)
+    return form_factor(c, s, square, disc)
 
 
 @kernel
@@ -64,30 +61,10 @@ def add_two(
     tile: Array, low: int, lanes: int, packed: Array, step: int, first: int, first_weight: Any, second: int,
     second_weight: Any, disc: bool,
 ) -> None:
-    """Add what two samples send to each receiver of a tile; the two are added to each other first.
+    """Add the light of two samples to each receiver of a tile; the two contributions are added to each other first.
 
-    Parameters
-    ----------
-    tile : (ROWS * WIDE,) ndarray
-        Receivers and their sums.
-    low : int
-        The first receiver that is lit.
-    lanes : int
-        How many of them are, from there on.
-    packed : (n,) ndarray
-        Texels, plane by plane; those of neighbouring receivers' samples are neighbours.
-    step : int
-        Elements from plane to plane.
-    first : int
-        Where the first sample of the first receiver is in the first plane.
-    first_weight : float
-        Texels that it stands for.
-    second : int
-        Likewise the second.
-    second_weight : float
-        Texels that it stands for.
-    disc : bool
-        Eq. 4 instead of Eq. 3.
+    `tile` (ROWS * WIDE,) holds receivers and their sums, of which `lanes` from `low` on receive. `packed` holds texels,
+    plane by plane, `step` elements apart; `first` and `second` are the places of the first receiver's samples in it.
     """
     tile = tile[low:]
     # unsigned: no checks for places counted from the end
@@ -102,6 +79,7 @@ def add_two(
                  packed[a5 + i], first_weight, disc)
         h = term(px, py, pz, nx, ny, nz, packed[b + i], packed[b1 + i], packed[b2 + i], packed[b3 + i], packed[b4 + i],
                  packed[b5 + i], second_weight, disc)
+        # Eq. (1)
         tile[R + i] = tile[R + i] + (g * packed[a6 + i] + h * packed[b6 + i])
         tile[G + i] = tile[G + i] + (g * packed[a7 + i] + h * packed[b7 + i])
         tile[B + i] = tile[B + i] + (g * packed[a8 + i] + h * packed[b8 + i])
@@ -109,15 +87,7 @@ def add_two(
 
 @kernel
 def close_group(tile: Array, lanes: int) -> None:
-    """Add the sum of a group of samples to the sum of all, so that a sum of many rounds like one of few.
-
-    Parameters
-    ----------
-    tile : (ROWS * WIDE,) ndarray
-        Receivers and their sums.
-    lanes : int
-        How many of them are in use.
-    """
+    """Add the sums of a group of samples to the totals of a tile: many samples round like few."""
     zero = tile.dtype.type(0.0)
     for c in range(6, 9):
         here, there = np.uint64(c * WIDE), np.uint64((c + 3) * WIDE)

@@ -1,10 +1,10 @@
-"""A level's texels as the sum over samples reads them: lines of lanes with darkness around.
+"""Packing of a level's texels as senders, for the sum over samples.
 
-The columns of a level are dealt out to phases, column x to phase x modulo P, and those of one phase lie next to each
-other: receivers that share samples are the SIMD lanes, and what they read is contiguous. Around the columns, and in
-one row below the last, there is nothing: samples off the picture need no test.
+The columns of a level are split into phases, column x into phase x modulo P, and those of one phase are adjacent:
+receivers that share samples are the SIMD lanes, and what they read is contiguous. Padding of zero radiance surrounds
+the columns, and one row of it follows the last, so that samples outside the picture need no test.
 
-Lengths are scaled by a power of two, so that fourth powers of distances stay far from the ends of float32.
+Lengths are scaled by a power of two, so that fourth powers of distances stay within float32.
 """
 
 import math
@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
-from refgi.sssil.level import Level
+from refgi.rsm.pool import plane
+from refgi.sssil.pyramid.view import Level
 
 Array = npt.NDArray[Any]
 
@@ -24,11 +24,11 @@ PLANES = 9  # position, m = -normal area / pi, radiance
 
 
 class Emitters(NamedTuple):
-    """Texels of a level, ready to be summed over."""
+    """Texels of a level, packed for sums over samples."""
 
     packed: Array  # (PLANES (h + 1) phases line,) by row, plane, phase and lane; the last row is dark
-    lit_from: Array  # (h + 1, phases, line / BLOCK + 1) int32: lane of the first lit block from this one on
-    lit_to: Array  # likewise: lane behind the last lit block before this one
+    emit_from: Array  # (h + 1, phases, line / BLOCK + 1) int32: lane of the first emitting block from this one on
+    emit_to: Array  # likewise: lane behind the last emitting block before this one
     phases: int  # P
     line: int  # lanes of a phase, with those around
     pad: int  # lanes before the first column
@@ -36,19 +36,19 @@ class Emitters(NamedTuple):
     scale: float  # power of two that lengths were multiplied by
 
 
-def pack(level: Level, phases: int, farthest: int, most: int) -> Emitters:
-    """Lay out the texels of a level for sums over samples.
+def pack(level: Level, phases: int, farthest: int, most_lanes: int) -> Emitters:
+    """Pack the texels of a level for sums over samples.
 
     Parameters
     ----------
     level : Level
         The texels.
     phases : int
-        P, 1 or 2, among which columns are dealt out.
+        P, 1 or 2, into which columns are split.
     farthest : int
-        Columns that a sample may lie away; farther ones reach none.
-    most : int
-        Lanes that may be summed at once, a multiple of BLOCK.
+        Largest distance of a sample, columns.
+    most_lanes : int
+        Most lanes that may be summed at once, a multiple of BLOCK.
 
     Returns
     -------
@@ -57,21 +57,21 @@ def pack(level: Level, phases: int, farthest: int, most: int) -> Emitters:
     """
     rows, columns = level.shape
     lanes = -(-columns // phases)
-    strips = -(-lanes // most)
+    strips = -(-lanes // most_lanes)
     strip = -(-lanes // (strips * BLOCK)) * BLOCK
     pad = -(-(min(farthest, columns) // phases + 1) // BLOCK) * BLOCK
     line = 2 * pad + strips * strip
     packed = plane((PLANES * (rows + 1) * phases * line,), level.position.dtype)
-    lit_from, lit_to = np.empty((2, rows + 1, phases, line // BLOCK + 1), np.int32)
+    emit_from, emit_to = np.empty((2, rows + 1, phases, line // BLOCK + 1), np.int32)
     scale = length_scale(level.depth)
     real = level.position.dtype.type
     _pack(level.position, level.normal, level.radiance, level.area, phases, line, pad, real(scale),
-          real(scale * scale / math.pi), packed, lit_from, lit_to)
-    return Emitters(packed, lit_from, lit_to, phases, line, pad, strip, scale)
+          real(scale * scale / math.pi), packed, emit_from, emit_to)
+    return Emitters(packed, emit_from, emit_to, phases, line, pad, strip, scale)
 
 
 def length_scale(depth: Array) -> float:
-    """Return the power of two that brings the middle of the depths' range to about 1.
+    """Return the power of two that scales the geometric middle of the depths' range to about 1.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def length_scale(depth: Array) -> float:
     Returns
     -------
     float
-        What lengths are multiplied by; 1 where no surface is seen.
+        Scale of lengths; 1 where no surface is visible.
     """
     some = depth[(depth > 0) & (depth < np.inf)]
     if not some.size:
@@ -92,17 +92,17 @@ def length_scale(depth: Array) -> float:
 @kernel(parallel=True)
 def _pack(
     position: Array, normal: Array, radiance: Array, area: Array, phases: int, line: int, pad: int, scale: Any,
-    share: Any, packed: Array, lit_from: Array, lit_to: Array,
+    share: Any, packed: Array, emit_from: Array, emit_to: Array,
 ) -> None:
     for row in prange(area.shape[0] + 1):
-        _pack_row(position, normal, radiance, area, np.int64(row), phases, line, pad, scale, share, packed, lit_from,
-                  lit_to)
+        _pack_row(position, normal, radiance, area, np.int64(row), phases, line, pad, scale, share, packed, emit_from,
+                  emit_to)
 
 
 @kernel
 def _pack_row(
     position: Array, normal: Array, radiance: Array, area: Array, row: Any, phases: int, line: int, pad: int,
-    scale: Any, share: Any, packed: Array, lit_from: Array, lit_to: Array,
+    scale: Any, share: Any, packed: Array, emit_from: Array, emit_to: Array,
 ) -> None:
     start, step = row * PLANES * phases * line, phases * line
     for phase in range(phases):
@@ -112,14 +112,14 @@ def _pack_row(
             _pack_line(position, normal, radiance, area, row, phase, phases, start + phase * line + pad, step, scale,
                        share, packed)
         for k in range(PLANES):
-            here = start + (k * phases + phase) * line
-            _darken(packed, here, here + pad)
-            _darken(packed, here + pad + lanes, here + line)
-        _find_lit(packed, start + phase * line, step, row, phase, lit_from, lit_to)
+            line_start = start + (k * phases + phase) * line
+            _clear_lanes(packed, line_start, line_start + pad)
+            _clear_lanes(packed, line_start + pad + lanes, line_start + line)
+        _find_emitting(packed, start + phase * line, step, row, phase, emit_from, emit_to)
 
 
 @kernel
-def _darken(packed: Array, first: Any, last: Any) -> None:
+def _clear_lanes(packed: Array, first: Any, last: Any) -> None:
     zero = packed.dtype.type(0.0)
     for i in range(np.uint64(first), np.uint64(last)):
         packed[i] = zero
@@ -152,24 +152,26 @@ def _pack_line(
 
 
 @kernel
-def _find_lit(packed: Array, first: Any, step: int, row: Any, phase: int, lit_from: Array, lit_to: Array) -> None:
+def _find_emitting(
+    packed: Array, first: Any, step: int, row: Any, phase: int, emit_from: Array, emit_to: Array
+) -> None:
     """Find the blocks of a line that hold any radiance: the next from each on, and the last before it."""
-    blocks = lit_to.shape[2] - 1
-    lit_to[row, phase, 0], lit_from[row, phase, blocks] = 0, blocks * BLOCK
+    blocks = emit_to.shape[2] - 1
+    emit_to[row, phase, 0], emit_from[row, phase, blocks] = 0, blocks * BLOCK
     for block in range(blocks):
-        lit = _any_light(packed, first + 6 * step + block * BLOCK, step)
-        lit_to[row, phase, block + 1] = (block + 1) * BLOCK if lit else lit_to[row, phase, block]
+        emits = _emits(packed, first + 6 * step + block * BLOCK, step)
+        emit_to[row, phase, block + 1] = (block + 1) * BLOCK if emits else emit_to[row, phase, block]
     for block in range(blocks - 1, -1, -1):
-        lit = lit_to[row, phase, block + 1] == (block + 1) * BLOCK
-        lit_from[row, phase, block] = block * BLOCK if lit else lit_from[row, phase, block + 1]
+        emits = emit_to[row, phase, block + 1] == (block + 1) * BLOCK
+        emit_from[row, phase, block] = block * BLOCK if emits else emit_from[row, phase, block + 1]
 
 
 @kernel
-def _any_light(packed: Array, first: Any, step: int) -> bool:
+def _emits(packed: Array, first: Any, step: int) -> bool:
     zero = packed.dtype.type(0.0)
     for c in range(3):
-        here = np.uint64(first + c * step)
+        line_start = np.uint64(first + c * step)
         for i in range(np.uint64(BLOCK)):
-            if packed[here + i] > zero:
+            if packed[line_start + i] > zero:
                 return True
     return False

@@ -1,8 +1,8 @@
-"""What the samples of a crown send to every texel of a level (Sec. 3.2, indirect lighting shader).
+"""Sum over the samples around every texel of a level (Sec. 3.1, Eq. 1; Sec. 3.2, indirect lighting shader).
 
-Threads take strips of a level, so narrow that what their samples read stays in the cache of a core. Where receivers
-share samples, `add_two` reads them as they lie; where each has its own, they are copied into a line first. Receivers
-whose samples are dark are passed over at either end of a strip, which changes no bit of a sum.
+Threads take strips of a level so narrow that what their samples read stays in the cache of a core. Where receivers
+share samples, `add_two` reads them in place; where each has its own, they are first copied into a line. Receivers at
+either end of a strip whose samples have no radiance are skipped, which changes no bit of a sum.
 """
 
 import math
@@ -12,21 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.sssil.crown.add import ROWS, WIDE, add_two, close_group
 from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, pack
-from refgi.sssil.crown.pattern import (
-    level_key,
-    pixel_key,
-    row_key,
-    sample_points,
-    sample_weight,
-    shared_offsets,
-    shift_of,
-    shifted,
-)
+from refgi.sssil.crown.pattern import shared_offsets
+from refgi.sssil.crown.points import level_key, pixel_key, row_key, sample_points, sample_weight, shift_of, shifted
 from refgi.sssil.crown.reach import chosen_radius
-from refgi.sssil.level import Level
+from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import stage
 
@@ -38,7 +30,7 @@ GROUP = 256  # samples that are summed before they are added to the total
 
 @stage("sssil.gather")
 def gather(level: Level, index: int, settings: HssilSettings) -> Array:
-    """Sum what the samples around each texel of a level send to it.
+    """Sum the light of the samples around each texel of a level (Eq. 1).
 
     Parameters
     ----------
@@ -47,7 +39,7 @@ def gather(level: Level, index: int, settings: HssilSettings) -> Array:
     index : int
         0 for the first level, whose inner disc is sampled as well.
     settings : HssilSettings
-        How many samples, which pattern and which form factor.
+        Sampling and form factor.
 
     Returns
     -------
@@ -55,20 +47,21 @@ def gather(level: Level, index: int, settings: HssilSettings) -> Array:
         Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi and visibility.
     """
     rows, columns = level.shape
-    radius = chosen_radius((rows << index, columns << index), settings)
+    sampling = settings.sampling
+    radius = chosen_radius((rows << index, columns << index), sampling)
     real = level.position.dtype.type
-    disc, factor = settings.form_factor == "disc", real(math.pi * level_factor(index, settings))
+    disc, factor = settings.senders.form_factor == "disc", real(math.pi * level_factor(index, settings))
     farthest, result = math.ceil(2 * radius), plane(level.radiance.shape, level.radiance.dtype)
-    if settings.pattern == "pixel":
-        inner = settings.inner if index == 0 else 0
-        points, weight = sample_points(inner, settings.samples), sample_weight(radius, inner, settings.samples)
-        key = level_key(settings.seed, level.number)
+    if sampling.pattern == "pixel":
+        inner = sampling.inner if index == 0 else 0
+        points, weight = sample_points(inner, sampling.samples), sample_weight(radius, inner, sampling.samples)
+        key = level_key(sampling.seed, level.number)
         emitters = pack(level, 1, farthest, WIDE)
-        _gather_own(emitters, level.normal, points, inner, radius, key, weight.astype(real), disc, factor, result)
+        _gather_per_pixel(emitters, level.normal, points, inner, radius, key, weight.astype(real), disc, factor, result)
         return result
-    offsets, weight = _reaching(*shared_offsets(settings, index, level.number, rows, radius, columns), rows, columns)
+    offsets, weight = _reaching(*shared_offsets(sampling, index, level.number, rows, radius, columns), rows, columns)
     emitters = pack(level, offsets.shape[1], farthest, WIDE)
-    paired = settings.pattern != "row"
+    paired = sampling.pattern != "row"
     _gather_shared(emitters, level.normal, offsets, weight.astype(real), paired, disc, factor, result)
     return result
 
@@ -77,27 +70,27 @@ def _reaching(offsets: Array, weight: Array, rows: int, columns: int) -> tuple[A
     """Return the samples without those that reach no texel from anywhere, where all receivers share one set."""
     if offsets.shape[:2] != (1, 1):
         return offsets, weight
-    near = (np.abs(offsets[0, 0]) < (columns, rows)).all(axis=1)
-    return offsets[:, :, near], weight[near]
+    within = (np.abs(offsets[0, 0]) < (columns, rows)).all(axis=1)
+    return offsets[:, :, within], weight[within]
 
 
 def level_factor(index: int, settings: HssilSettings) -> float:
-    """Return what the sum of a level is multiplied by.
+    """Return the factor of a level's sum: 1 but for forms used as printed.
 
     Parameters
     ----------
     index : int
-        How many levels finer ones there are.
+        Position of the level, 0 for the first.
     settings : HssilSettings
-        Say whether forms are used as printed.
+        `as_published` and the form factor.
 
     Returns
     -------
     float
-        1 unless Eq. 4 lacks its pi or areas are scaled by the level's 4^k a second time.
+        1 / pi where Eq. 4 lacks its pi, times 4^k where areas are scaled by the level's 4^k a second time.
     """
     factor = 1.0
-    if "hss_disc_pi" in settings.as_published and settings.form_factor == "disc":
+    if "hss_disc_pi" in settings.as_published and settings.senders.form_factor == "disc":
         factor /= math.pi
     if "hss_level_factor" in settings.as_published:
         factor *= 4.0**index
@@ -110,7 +103,7 @@ def _gather_shared(
     result: Array,
 ) -> None:
     rows = normal.shape[1]
-    packed, lit_from, lit_to = emitters.packed, emitters.lit_from, emitters.lit_to
+    packed, emit_from, emit_to = emitters.packed, emitters.emit_from, emitters.emit_to
     phases, strip, line, pad = emitters.phases, emitters.strip, emitters.line, emitters.pad
     strips, bands = (line - 2 * pad) // strip, (rows + BAND - 1) // BAND
     for task in prange(strips * bands):
@@ -122,8 +115,8 @@ def _gather_shared(
             for phase in range(phases):
                 first = row * PLANES * phases * line + phase * line + pad + left
                 _load(tile, strip, packed, phases * line, first, normal, row, phase + phases * left, phases)
-                count = _list_lit(offsets[shared, phase], weight, paired, lit_from, lit_to, row, phase, pad + left,
-                                  strip, line, starts, weights)
+                count = _list_emitting(offsets[shared, phase], weight, paired, emit_from, emit_to, row, phase,
+                                       pad + left, strip, line, starts, weights)
                 for j in range(0, count, 2):
                     low = min(starts[1, j], starts[1, j + 1]) // BLOCK * BLOCK
                     lanes = (max(starts[2, j], starts[2, j + 1]) - low + BLOCK - 1) // BLOCK * BLOCK
@@ -159,35 +152,35 @@ def _load(
 
 
 @kernel
-def _list_lit(
-    offsets: Array, weight: Array, paired: bool, lit_from: Array, lit_to: Array, row: int, phase: int, first: int,
+def _list_emitting(
+    offsets: Array, weight: Array, paired: bool, emit_from: Array, emit_to: Array, row: int, phase: int, first: int,
     lanes: int, line: int, starts: Array, weights: Array,
 ) -> int:
-    """List where samples of a strip start that are not dark, and for which of its lanes they are not.
+    """List the places of a strip's samples that emit, and the lanes for which they do.
 
-    In twos where samples are paired; a dark one stands in for a missing partner.
+    In pairs where samples are paired; one without radiance stands in for a missing partner.
     """
-    rows, phases = lit_to.shape[0] - 1, lit_to.shape[1]
-    dark = rows * PLANES * phases * line
+    rows, phases = emit_to.shape[0] - 1, emit_to.shape[1]
+    black = rows * PLANES * phases * line
     start, low, high = starts[0], starts[1], starts[2]
-    count, kept = 0, 0
+    count, emitting_in_pair = 0, 0
     for j in range(weight.size):
         a, column = row + np.int64(offsets[j, 1]), phase + np.int64(offsets[j, 0])
         of, lane = column & (phases - 1), first + (column >> (phases - 1))  # phases are 1 or 2
-        start[count], low[count], high[count], weights[count] = dark, lanes, 0, weight[j]
+        start[count], low[count], high[count], weights[count] = black, lanes, 0, weight[j]
         inside = 0 <= a < rows and lane >= 0 and lane + lanes <= line
         if inside and not (offsets[j, 0] == 0 and offsets[j, 1] == 0):
             start[count] = (a * PLANES * phases + of) * line + lane
             block, last = np.uint64(lane) // np.uint64(BLOCK), np.uint64(lane + lanes - 1) // np.uint64(BLOCK)
-            low[count] = max(0, lit_from[a, of, block] - lane)
-            high[count] = min(lanes, lit_to[a, of, last + np.uint64(1)] - lane)
-        found = low[count] < high[count]
-        count += 1 if found or paired else 0
-        kept += 1 if found else 0
-        if paired and j % 2 == 1 and kept == 0:
+            low[count] = max(0, emit_from[a, of, block] - lane)
+            high[count] = min(lanes, emit_to[a, of, last + np.uint64(1)] - lane)
+        emits = low[count] < high[count]
+        count += 1 if emits or paired else 0
+        emitting_in_pair += 1 if emits else 0
+        if paired and j % 2 == 1 and emitting_in_pair == 0:
             count -= 2
-        kept = kept if j % 2 == 0 else 0
-    start[count], low[count], high[count], weights[count] = dark, lanes, 0, weight.dtype.type(0.0)
+        emitting_in_pair = emitting_in_pair if j % 2 == 0 else 0
+    start[count], low[count], high[count], weights[count] = black, lanes, 0, weight.dtype.type(0.0)
     return count
 
 
@@ -202,7 +195,7 @@ def _store(tile: Array, lanes: int, factor: Any, row: int, column: int, phases: 
 
 
 @kernel(parallel=True)
-def _gather_own(
+def _gather_per_pixel(
     emitters: Emitters, normal: Array, points: Array, inner: int, radius: float, key: Any, weight: Array, disc: bool,
     factor: Any, result: Array,
 ) -> None:
@@ -236,9 +229,9 @@ def _expand(
     shifts: Array, lanes: int, lines: Array, to: int,
 ) -> None:
     """Copy the texels of one sample of each receiver of a strip into a line."""
-    near = 0.0 if j < inner else 1.0
+    within = 0.0 if j < inner else 1.0
     for i in range(np.uint64(lanes)):
-        ox, oy = shifted(points, j, near, radius, shifts[0, i], shifts[1, i], shifts[2, i])
+        ox, oy = shifted(points, j, within, radius, shifts[0, i], shifts[1, i], shifts[2, i])
         lane = first % line + np.int64(i) + ox
         inside = 0 <= row + oy < rows and 0 <= lane < line and not (ox == 0 and oy == 0)
         texel = np.uint64((row + oy) * PLANES * line + lane if inside else rows * PLANES * line)

@@ -1,4 +1,4 @@
-"""Points of a crown: one low-discrepancy set for all receivers, and how each shifts it by a hash of its own.
+"""Low-discrepancy points of a crown (Sec. 3.2), shifted for each receiver by a hash (Cranley and Patterson 1976).
 
 A point (u, v) of the unit square lies r sqrt(1 + 3 u) from the receiver in the crown, r sqrt(u) in the disc within, at
 the angle 2 pi v: equal areas get equally many points. It stands for the texel it falls into.
@@ -21,12 +21,12 @@ TO_UNIT = 2.0**-32
 
 
 def sample_points(inner: int, crown: int) -> Array:
-    """Return the points of the unit square that all patterns shift: those of the inner disc, then the crown's.
+    """Return the points of the unit square that all patterns shift: those of the inner disc, then those of the crown.
 
     Parameters
     ----------
     inner, crown : int
-        How many.
+        Numbers of points in the disc and in the crown.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def sample_weight(radius: float, inner: int, crown: int) -> Array:
     radius : float
         Inner radius of the crown, texels.
     inner, crown : int
-        How many samples the disc and the crown have.
+        Numbers of samples in the disc and the crown.
 
     Returns
     -------
@@ -59,74 +59,27 @@ def sample_weight(radius: float, inner: int, crown: int) -> Array:
 
 @kernel
 def level_key(seed: Any, number: Any) -> Any:
-    """Return what draws the samples of one level.
-
-    Parameters
-    ----------
-    seed, number : int
-        Of the settings, and of the level.
-
-    Returns
-    -------
-    uint32
-        A hash of both.
-    """
+    """Return the hash of seed and level number, uint32."""
     return hash_bits(np.uint32(seed) ^ hash_bits(np.uint32(number) + np.uint32(0x9E3779B9)))
 
 
 @kernel
 def row_key(key: Any, row: Any) -> Any:
-    """Return what draws the samples of one row.
-
-    Parameters
-    ----------
-    key : uint32
-        Of the level.
-    row : int
-        Row of the receivers.
-
-    Returns
-    -------
-    uint32
-        A hash of both.
-    """
+    """Return the hash of a level's key and a row, uint32."""
     return hash_bits(key ^ hash_bits(np.uint32(row) + np.uint32(0x85EBCA6B)))
 
 
 @kernel
 def pixel_key(key: Any, column: Any) -> Any:
-    """Return what draws the samples of one receiver.
-
-    Parameters
-    ----------
-    key : uint32
-        Of the row.
-    column : int
-        Column of the receiver.
-
-    Returns
-    -------
-    uint32
-        A hash of both.
-    """
+    """Return the hash of a row's key and a column, uint32."""
     return hash_bits(key ^ hash_bits(np.uint32(column) + np.uint32(0xC2B2AE35)))
 
 
 @kernel
 def shift_of(key: Any, block: Any) -> Any:
-    """Return how the common points are shifted (Cranley and Patterson 1976).
+    """Return the shift of the common points by a key: an addend of u modulo 1, and cosine and sine of a turn.
 
-    Parameters
-    ----------
-    key : uint32
-        Draws the shift.
-    block : int
-        Points of the sequence to go ahead.
-
-    Returns
-    -------
-    u, cosine, sine : float64
-        What is added to u, modulo 1, and the turn that is added to the angle.
+    `block` points of the sequence are skipped.
     """
     u = (hash_bits(key) * TO_UNIT + block * FIRST_STEP) % 1.0
     v = (hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT + block * SECOND_STEP) % 1.0
@@ -135,25 +88,9 @@ def shift_of(key: Any, block: Any) -> Any:
 
 @kernel
 def shifted(points: Array, j: Any, near: float, radius: float, u: float, cosine: float, sine: float) -> Any:
-    """Return where a shifted point lies.
+    """Return the offset (ox, oy) of shifted point j, texels from the receiver.
 
-    Parameters
-    ----------
-    points : (n, 3) ndarray of float64
-        Of `sample_points`.
-    j : int
-        Which of them.
-    near : float
-        0 for a point of the disc, 1 for one of the crown.
-    radius : float
-        Inner radius of the crown, texels.
-    u, cosine, sine : float
-        Of `shift_of`.
-
-    Returns
-    -------
-    ox, oy : int64
-        Texels from the receiver.
+    `points` are of `sample_points`; `near` is 0 in the disc and 1 in the crown; `u, cosine, sine` of `shift_of`.
     """
     share = points[j, 0] + u
     share = share - 1.0 if share >= 1.0 else share
@@ -165,25 +102,6 @@ def shifted(points: Array, j: Any, near: float, radius: float, u: float, cosine:
 
 @kernel
 def pixel_offset(points: Array, inner: int, radius: float, key: Any, j: int) -> Any:
-    """Return one sample of a receiver with samples of its own.
-
-    Parameters
-    ----------
-    points : (n, 3) ndarray of float64
-        Of `sample_points`.
-    inner : int
-        How many of them lie in the inner disc.
-    radius : float
-        Inner radius of the crown, texels.
-    key : uint32
-        Draws the shift.
-    j : int
-        Which sample.
-
-    Returns
-    -------
-    ox, oy : int64
-        Texels from the receiver.
-    """
+    """Return the offset (ox, oy) of sample j of a receiver with its own samples; the first `inner` lie in the disc."""
     u, cosine, sine = shift_of(key, 0)
     return shifted(points, j, 0.0 if j < inner else 1.0, radius, u, cosine, sine)

@@ -1,9 +1,7 @@
-"""How far the crowns of all levels reach together, and the smallest radius with which they cover the picture.
+"""Reach of the crowns of all levels together, and the smallest radius with which they cover the picture (Sec. 3.2).
 
 The crown of level k ends at 2 r texels of that level: r 2^K texels of the first of K levels. A receiver in a corner
-needs the diagonal of the picture.
-
-How often each offset from a receiver is sampled: once, by the crowns of all levels together (Sec. 3.2, Fig. 2).
+needs the diagonal of the picture. Together the crowns sample each offset from a receiver once (Fig. 2).
 """
 
 import math
@@ -14,30 +12,31 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
-from refgi.sssil.crown.pattern import offsets_at, row_offsets, sample_weight
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.crown.pattern import offsets_at, row_offsets
+from refgi.sssil.crown.points import sample_weight
+from refgi.sssil.settings import SamplingSettings
 
 Array = npt.NDArray[Any]
 
 RECEIVERS = 256  # rows of receivers, or receivers, whose samples are counted
 
 
-def chosen_radius(shape: tuple[int, int], settings: HssilSettings) -> float:
+def chosen_radius(shape: tuple[int, int], sampling: SamplingSettings) -> float:
     """Return the inner radius of the crowns: that of the settings, else the smallest that covers the picture.
 
     Parameters
     ----------
     shape : tuple of int
         Rows and columns of the first level.
-    settings : HssilSettings
-        May name a radius.
+    sampling : SamplingSettings
+        Radius and number of levels.
 
     Returns
     -------
     float
         Texels, 1 or more.
     """
-    return covering_radius(shape, settings.levels) if settings.radius is None else float(settings.radius)
+    return covering_radius(shape, sampling.levels) if sampling.radius is None else float(sampling.radius)
 
 
 def covering_radius(shape: tuple[int, int], levels: int) -> float:
@@ -63,13 +62,13 @@ def covering_radius(shape: tuple[int, int], levels: int) -> float:
     return max(1.0, math.hypot(*shape) / float(1 << levels))
 
 
-def reach(settings: HssilSettings, radius: float) -> float:
-    """Return how far the last crown ends from a receiver: r 2^K.
+def reach(sampling: SamplingSettings, radius: float) -> float:
+    """Return the outer radius of the last crown: r 2^K.
 
     Parameters
     ----------
-    settings : HssilSettings
-        Says how many levels there are.
+    sampling : SamplingSettings
+        Number of levels K.
     radius : float
         r, texels.
 
@@ -78,38 +77,38 @@ def reach(settings: HssilSettings, radius: float) -> float:
     float
         Texels of the first level.
     """
-    return radius * float(1 << settings.levels)
+    return radius * float(1 << sampling.levels)
 
 
-def expect_reach(shape: tuple[int, int], settings: HssilSettings) -> None:
+def warn_short_reach(shape: tuple[int, int], sampling: SamplingSettings) -> None:
     """Warn when light from one corner of the picture does not reach the other.
 
     Parameters
     ----------
     shape : tuple of int
         Rows and columns of the first level.
-    settings : HssilSettings
-        Say how far it reaches.
+    sampling : SamplingSettings
+        Radius and number of levels.
 
     Warns
     -----
     RefgiWarning
-        With the reach, the diagonal, and the radius that would do.
+        With the reach, the diagonal, and the radius that covers it.
     """
     diagonal = math.hypot(*shape)
-    far = reach(settings, chosen_radius(shape, settings))
+    far = reach(sampling, chosen_radius(shape, sampling))
     if far < diagonal:
         warnings.warn(RefgiWarning(
             f"radius: samples reach {far:g} of the first level's diagonal of {diagonal:.0f} texels; "
-            f"{math.ceil(covering_radius(shape, settings.levels))} texels cover it, as does none"), stacklevel=2)
+            f"{math.ceil(covering_radius(shape, sampling.levels))} texels cover it, as does none"), stacklevel=2)
 
 
-def coverage(settings: HssilSettings, shape: tuple[int, int], receivers: int = RECEIVERS) -> Array:
+def coverage(sampling: SamplingSettings, shape: tuple[int, int], receivers: int = RECEIVERS) -> Array:
     """Count how many texels' worth of samples fall on each texel around a receiver, over all levels.
 
     Parameters
     ----------
-    settings : HssilSettings
+    sampling : SamplingSettings
         Pattern, radius and levels.
     shape : tuple of int
         Rows and columns of the first level.
@@ -126,45 +125,45 @@ def coverage(settings: HssilSettings, shape: tuple[int, int], receivers: int = R
     -----
     A receiver is equally likely to lie anywhere in its texel of level k, so that a crown's rims are blurred by 2^k.
     """
-    radius = chosen_radius(shape, settings)
+    radius = chosen_radius(shape, sampling)
     rows, columns = (np.arange(1 - size, size) for size in shape)
     total = np.zeros((len(rows), len(columns)))
-    for index in range(settings.levels):
-        weight = texel_weights(settings, index, settings.first_level + index, receivers, radius)
+    for index in range(sampling.levels):
+        weight = texel_weights(sampling, index, sampling.first_level + index, receivers, radius)
         across = _spread(weight.T, columns, index).T
         total += _spread(across, rows, index)
     return total
 
 
 def texel_weights(
-    settings: HssilSettings, index: int, number: int, receivers: int = RECEIVERS, radius: float | None = None
+    sampling: SamplingSettings, index: int, number: int, receivers: int = RECEIVERS, radius: float | None = None
 ) -> Array:
     """Count how many texels' worth of samples fall on each texel of one level around a receiver.
 
     Parameters
     ----------
-    settings : HssilSettings
+    sampling : SamplingSettings
         Pattern and radius.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     number : int
-        Which level of the pyramid.
+        Number of the level in the pyramid.
     receivers : int
         How many rows of receivers are averaged, or receivers with samples of their own.
     radius : float, optional
-        Inner radius of the crown, texels; that of the settings unless given.
+        Inner radius of the crown, texels; that of the settings by default.
 
     Returns
     -------
     (2 n + 1, 2 n + 1) ndarray of float64
         Mean weight of offset (row - n, column - n), texels of the level; samples on the receiver itself count.
     """
-    if settings.pattern == "pixel":
-        offsets = np.stack([offsets_at(settings, index, number, 0, column, radius) for column in range(receivers)])
-        known = radius if radius is not None else chosen_radius((1, 1), settings)
-        weight = sample_weight(known, settings.inner if index == 0 else 0, settings.samples)
+    if sampling.pattern == "pixel":
+        offsets = np.stack([offsets_at(sampling, index, number, 0, column, radius) for column in range(receivers)])
+        known = radius if radius is not None else chosen_radius((1, 1), sampling)
+        weight = sample_weight(known, sampling.inner if index == 0 else 0, sampling.samples)
     else:
-        offsets, weight = row_offsets(settings, index, number, receivers, radius)
+        offsets, weight = row_offsets(sampling, index, number, receivers, radius)
     reach = int(np.abs(offsets).max(initial=0))
     counted = np.zeros((2 * reach + 1, 2 * reach + 1))
     np.add.at(counted, (offsets[..., 1] + reach, offsets[..., 0] + reach), weight / len(offsets))

@@ -1,1 +1,1 @@
-"""What a camera sees, at falling resolutions (Sec. 4, hierarchical maps)."""
+"""Mip levels of what a camera sees (Sec. 4, hierarchical maps)."""

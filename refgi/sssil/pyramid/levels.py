@@ -1,4 +1,4 @@
-"""The pyramids of what a camera sees: position, normal, direct light and sample area (Sec. 4)."""
+"""Pyramid of what a camera sees: position, normal, direct radiance and sample area (Sec. 4, hierarchical maps)."""
 
 import itertools
 import math
@@ -8,14 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection
-from refgi.sssil.level import Level, Picture
-from refgi.sssil.pyramid.closest import BEYOND
+from refgi.sssil.pyramid.closest import NO_PIXEL
 from refgi.sssil.pyramid.fill import fill_coarser_level, fill_first_level
 from refgi.sssil.pyramid.mean import average_pixels, average_texels
-from refgi.sssil.pyramid.view import View, view_of
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.pyramid.view import Level, Picture, View, view_of
+from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
@@ -25,38 +24,39 @@ Array = npt.NDArray[Any]
 
 
 def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
-    """Return what a camera sees at the resolutions that light is gathered at.
+    """Return what a camera sees at the resolutions at which light is gathered.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        Scene, camera and lights.
     settings : HssilSettings
-        First level, number of levels and how texels become one.
+        First level, number of levels and downsampling.
 
     Returns
     -------
     list of Level
-        Finest first; fewer than asked for where the samples of the last ones would all lie off the picture.
+        Finest first; fewer than asked for where the samples of the last ones would all lie outside the picture.
     """
     buffer = frame.gbuffer
     # positions, which direct light needs, come from the same pass
     depth, normal, albedo, _ = buffer.resolve("depth", "normal", "albedo", "position")
-    count = useful_levels((frame.height, frame.width), settings)
-    if count < settings.levels:
-        skip("sssil.level", f"no texel of level {settings.first_level + count} has another in its crown")
-    return list(levels(depth, normal, albedo, frame.direct, buffer.projection, settings.first_level, count,
-                       settings.downsample, settings.as_published & {"hss_tan_f"}))
+    sampling = settings.sampling
+    count = useful_levels((frame.height, frame.width), sampling)
+    if count < sampling.levels:
+        skip("sssil.level", f"no texel of level {sampling.first_level + count} has another in its crown")
+    return list(levels(depth, normal, albedo, frame.direct, buffer.projection, sampling.first_level, count,
+                       settings.senders.downsample, settings.as_published & {"hss_tan_f"}))
 
 
-def useful_levels(shape: tuple[int, int], settings: HssilSettings) -> int:
+def useful_levels(shape: tuple[int, int], sampling: SamplingSettings) -> int:
     """Return how many levels have texels that lie within each other's crown.
 
     Parameters
     ----------
     shape : tuple of 2 ints
         Height and width of the picture.
-    settings : HssilSettings
+    sampling : SamplingSettings
         Radius, first level and number of levels.
 
     Returns
@@ -64,13 +64,13 @@ def useful_levels(shape: tuple[int, int], settings: HssilSettings) -> int:
     int
         At least 1: the first level has a disc.
     """
-    if settings.radius is None:  # chosen so that all reach
-        return settings.levels
-    for index in range(1, settings.levels):
-        height, width = level_shape(shape, settings.first_level + index)
-        if settings.radius >= math.hypot(height, width):
+    if sampling.radius is None:  # chosen so that all reach
+        return sampling.levels
+    for index in range(1, sampling.levels):
+        height, width = level_shape(shape, sampling.first_level + index)
+        if sampling.radius >= math.hypot(height, width):
             return index
-    return settings.levels
+    return sampling.levels
 
 
 def level_shape(shape: tuple[int, int], number: int) -> tuple[int, int]:
@@ -101,9 +101,9 @@ def levels(
     Parameters
     ----------
     depth : (H, W) ndarray
-        Along the view direction, m; inf where no surface is seen.
+        Along the view direction, m; inf where there is no surface.
     normal : (3, H, W) ndarray
-        Unit vectors on the side that is seen, world space.
+        Unit vectors on the visible side, world space.
     albedo : (3, H, W) ndarray
         Diffuse reflectance.
     direct : (3, H, W) ndarray
@@ -135,31 +135,31 @@ def levels(
     keeps the light; its positions may lie between two surfaces.
     """
     shape = (projection.height, projection.width)
-    for name, given in (("normal", normal), ("albedo", albedo), ("direct", direct)):
-        expect(given.shape == (3, *shape), name, f"shape {(3, *shape)}", given.shape)
     expect(depth.shape == shape, "depth", f"shape {shape}", depth.shape)
-    expect(depth.size < BEYOND, "picture", f"fewer than {BEYOND:,} pixels", f"{depth.size:,}")
-    picture = Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(given, depth.dtype)
-                                                     for given in (normal, albedo, direct)))
+    for name, array in (("normal", normal), ("albedo", albedo), ("direct", direct)):
+        expect(array.shape == (3, *shape), name, f"shape {(3, *shape)}", array.shape)
+    expect(depth.size < NO_PIXEL, "picture", f"fewer than {NO_PIXEL:,} pixels", f"{depth.size:,}")
+    picture = Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(array, depth.dtype)
+                                                     for array in (normal, albedo, direct)))
     view = view_of(projection, as_published)
-    made = [_room(number, shape, depth.dtype) for number in range(first, first + count)]
-    fill_first_level(picture, view, made[0])
-    for fine, coarse in itertools.pairwise(made):
+    levels_made = [_empty_level(number, shape, depth.dtype) for number in range(first, first + count)]
+    fill_first_level(picture, view, levels_made[0])
+    for fine, coarse in itertools.pairwise(levels_made):
         fill_coarser_level(fine, *shape, coarse)
     if downsample != "closest":
-        _average(picture, view, downsample == "average", made)
-    return tuple(made)
+        _average(picture, view, downsample == "average", levels_made)
+    return tuple(levels_made)
 
 
-def _average(picture: Picture, view: View, by_surface: bool, made: list[Level]) -> None:
+def _average(picture: Picture, view: View, by_surface: bool, levels_made: list[Level]) -> None:
     """Put means into levels that hold the closest pixels."""
-    weights = [level.area if by_surface else plane(level.shape, level.area.dtype) for level in made]
-    average_pixels(picture, view, by_surface, made[0], weights[0])
-    for finer, coarser in itertools.pairwise(range(len(made))):
-        average_texels(made[finer], weights[finer], by_surface, made[coarser], weights[coarser])
+    weights = [level.area if by_surface else plane(level.shape, level.area.dtype) for level in levels_made]
+    average_pixels(picture, view, by_surface, levels_made[0], weights[0])
+    for finer, coarser in itertools.pairwise(range(len(levels_made))):
+        average_texels(levels_made[finer], weights[finer], by_surface, levels_made[coarser], weights[coarser])
 
 
-def _room(number: int, shape: tuple[int, int], dtype: npt.DTypeLike) -> Level:
+def _empty_level(number: int, shape: tuple[int, int], dtype: npt.DTypeLike) -> Level:
     h, w = level_shape(shape, number)
     three = (3, h, w)
     return Level(number, plane(three, dtype), plane((h, w), dtype), plane(three, dtype), plane(three, dtype),

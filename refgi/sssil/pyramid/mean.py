@@ -1,8 +1,8 @@
-"""Texels that hold means of what they cover, where the closest pixel alone would stand for all.
+"""Averaged texels, where otherwise the closest pixel alone stands for all that a texel covers.
 
-"average": position, normal, depth and radiance are means weighted by surface, the surface is the sum; so the flux that
-texels send, the sum of radiance times area, is that of the pixels. "closest_average": radiance alone is a mean, over
-the pixels that see a surface.
+"average": position, normal, depth and radiance are means weighted by surface area, the area is the sum; so the flux
+that texels send, the sum of radiance times area, is that of the pixels. "closest_average": radiance alone is a mean,
+over the pixels with a surface.
 
 A row of weighted values is one line for each quantity; neighbours are added pairwise, so that a mirrored picture has
 mirrored sums.
@@ -15,32 +15,21 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.sssil.level import Level, Picture
-from refgi.sssil.pyramid.view import View, centre, pixel_surface
+from refgi.sssil.pyramid.view import Level, Picture, View, centre, pixel_surface
 
 Array = npt.NDArray[Any]
 
 # lines: weight; weight times radiance, depth, position, normal
 RADIANCE, DEPTH, POSITION, NORMAL, LINES = 1, 4, 5, 8, 11
-TASKS = 16  # blocks of rows that are dealt to threads, whatever their number
+TASKS = 16  # blocks of rows that threads take, whatever their number
 
 
 @kernel(parallel=True)
 def average_pixels(picture: Picture, view: View, by_surface: bool, level: Level, weight: Array) -> None:
     """Put means of pixels into the first level, which holds the closest ones.
 
-    Parameters
-    ----------
-    picture : Picture
-        What is seen.
-    view : View
-        Its rays.
-    by_surface : bool
-        Whether surface weighs and all is a mean; else pixels count equally and radiance alone is one.
-    level : Level
-        The first level.
-    weight : (h, w) ndarray
-        Becomes the sum of weights, m^2 or pixels.
+    `by_surface`: area weighs and every quantity is a mean; else pixels count equally and radiance alone is one.
+    `weight` (h, w) is filled with the sum of weights, m^2 or pixels.
     """
     rows = level.area.shape[0]
     for task in prange(TASKS):
@@ -49,21 +38,7 @@ def average_pixels(picture: Picture, view: View, by_surface: bool, level: Level,
 
 @kernel(parallel=True)
 def average_texels(fine: Level, fine_weight: Array, by_surface: bool, level: Level, weight: Array) -> None:
-    """Put means of a level into the next coarser one, which holds the closest texels.
-
-    Parameters
-    ----------
-    fine : Level
-        The level to start from.
-    fine_weight : (h, w) ndarray
-        Its weights.
-    by_surface : bool
-        Whether all is a mean, or radiance alone.
-    level : Level
-        The coarser level.
-    weight : (ceil(h / 2), ceil(w / 2)) ndarray
-        Becomes its weights.
-    """
+    """Put means of a finer level into the next coarser one, which holds the closest texels; weights likewise."""
     rows = level.area.shape[0]
     for task in prange(TASKS):
         _average_texels(fine, fine_weight, by_surface, level, weight, task * rows // TASKS,
@@ -107,13 +82,13 @@ def _weigh_pixels(picture: Picture, view: View, row: int, by_surface: bool, line
     real = lines.dtype.type
     y = centre(row, view.height)
     for c in range(view.width):
-        seen = depth[row, c] < np.inf
-        z, x = (depth[row, c] if seen else real(0.0)), centre(c, view.width)
+        covered = depth[row, c] < np.inf
+        z, x = (depth[row, c] if covered else real(0.0)), centre(c, view.width)
         rx, ry, rz = (ahead[0] + y * down[0] + x * across[0], ahead[1] + y * down[1] + x * across[1],
                       ahead[2] + y * down[2] + x * across[2])
         facing = -(normal[0, row, c] * rx + normal[1, row, c] * ry + normal[2, row, c] * rz)
         surface = real(pixel_surface(np.float64(depth[row, c]), facing, view.pixel_area))
-        weight = surface if by_surface else (real(1.0) if seen else real(0.0))
+        weight = surface if by_surface else (real(1.0) if covered else real(0.0))
         lines[0, c] = weight
         for k in range(3):
             lines[RADIANCE + k, c] = weight * (albedo[k, row, c] * direct[k, row, c] / real(math.pi))
@@ -166,7 +141,7 @@ def _store(sums: Array, i: int, by_surface: bool, level: Level, weight: Array) -
     one, zero = weight.dtype.type(1.0), weight.dtype.type(0.0)
     for j in range(sums.shape[1]):
         weight[i, j] = sums[0, j]
-        if sums[0, j] > zero:  # else what the closest shows stays
+        if sums[0, j] > zero:  # else the closest pixel's values stay
             share = one / sums[0, j]
             for k in range(3):
                 level.radiance[k, i, j] = sums[RADIANCE + k, j] * share

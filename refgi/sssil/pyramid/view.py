@@ -1,10 +1,11 @@
-"""Rays through the centres of pixels, as the levels' kernels follow them.
-
-Sample area: how much surface a pixel shows (Sec. 3.1, Eq. 2).
+"""Mip levels as arrays, the view rays of pixels, and sample area (Soler et al. 2009, Sec. 3.1, Eq. 2; Sec. 4).
 
 ``ds = z^2 4 tan(f_h / 2) tan(f_v / 2) dP / (W H) cos(alpha) / cos(beta)`` with z the depth, alpha the angle of the
 pixel's ray with the view direction and beta that with the surface's normal. For the ray d of length 1 along the view
 direction cos(alpha) is ``1 / |d|`` and cos(beta) is ``-n.d / |d|``: their ratio is 1 / -n.d, without a root.
+
+The paper calls beta the angle at the "receiving" surface; it is that at the sample's own. At silhouettes cos(beta)
+goes to 0 and the area has no bound: a ratio below a millionth, which is rounding, counts as a millionth.
 """
 
 import math
@@ -14,14 +15,44 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.jit import kernel
 from refgi.rsm.raster.projection import Projection
 
 Array = npt.NDArray[Any]
 
 ROUNDING = 1e-12  # of a tangent: 90 degrees in radians are not quite 90 degrees
 GRAZING = 1e-6  # least ratio of the cosines: below, it is rounding of a float32 normal
+
+
+class Level(NamedTuple):
+    """One mip level of what a camera sees, 1 / 2^number of full resolution; without a surface all is 0, `pixel` -1.
+
+    Positions are relative to the eye, along the axes of the world: a sum over pairs knows differences and scalar
+    products alone, so the view is not rotated. At level k texel (row, column) covers the pixels from 2^k row and
+    2^k column on, as many of its 2^k x 2^k as the picture has.
+    """
+
+    number: int  # k: 0 is full resolution
+    position: Array  # (3, h, w) from the eye, m
+    depth: Array  # (h, w) along the view direction, m; inf where there is no surface
+    normal: Array  # (3, h, w) unit vectors, on the visible side
+    radiance: Array  # (3, h, w) diffusely reflected direct light, W/m^2/sr
+    area: Array  # (h, w) surface that the texel stands for, m^2
+    pixel: Array  # (h, w) int32 pixel of full resolution whose position and normal these are, row * width + column
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.area.shape[0], self.area.shape[1]
+
+
+class Picture(NamedTuple):
+    """G-buffer and direct light at full resolution, all of one dtype."""
+
+    depth: Array  # (H, W) along the view direction, m; inf where there is no surface
+    normal: Array  # (3, H, W) unit vectors on the visible side
+    albedo: Array  # (3, H, W) diffuse reflectance
+    direct: Array  # (3, H, W) direct irradiance, W/m^2
 
 
 class View(NamedTuple):
@@ -40,7 +71,7 @@ class View(NamedTuple):
 
 
 def view_of(projection: Projection, as_published: frozenset[str] = frozenset()) -> View:
-    """Return the rays of a camera.
+    """Return the view rays of a camera.
 
     Parameters
     ----------
@@ -52,7 +83,7 @@ def view_of(projection: Projection, as_published: frozenset[str] = frozenset()) 
     Returns
     -------
     View
-        What kernels need to know of it.
+        Its rays and the area of a pixel.
 
     Raises
     ------
@@ -80,99 +111,17 @@ def view_of(projection: Projection, as_published: frozenset[str] = frozenset()) 
 
 @kernel
 def centre(index: int, count: int) -> float:
-    """Return where the centre of a pixel lies between the picture's edges, -1 to 1.
-
-    Parameters
-    ----------
-    index : int
-        Column or row.
-    count : int
-        How many there are.
-
-    Returns
-    -------
-    float
-        Exactly the negative of the mirrored pixel's.
-    """
+    """Return a pixel's centre between the picture's edges, -1 to 1; the mirrored pixel has exactly its negative."""
     return float((2 * index + 1 - count) / count)
-
-
-def sample_area(
-    depth: Array, normal: Array, projection: Projection, as_published: frozenset[str] = frozenset()
-) -> Array:
-    """Return the surface that each pixel shows, ``ds`` of Eq. 2 with ``dP = 1``.
-
-    Parameters
-    ----------
-    depth : (h, w) ndarray
-        Along the view direction, m; inf where no surface is seen.
-    normal : (3, h, w) ndarray
-        Unit vectors, world space.
-    projection : Projection
-        The camera's map.
-    as_published : frozenset of str
-        "hss_tan_f": the tangents of Eq. 3 as printed.
-
-    Returns
-    -------
-    (h, w) ndarray
-        m^2, in the dtype of `depth`. 0 where no surface is seen or the normal does not face the eye.
-
-    Raises
-    ------
-    InputError
-        If shapes do not fit, or "hss_tan_f" meets a field of view of 90 degrees or more.
-
-    Notes
-    -----
-    The paper lets beta be the angle at the "receiving" surface; it is that of the sample's own. At silhouettes
-    cos(beta) goes to 0 and the area has no bound: a ratio under a millionth, which is rounding, counts as a millionth.
-    """
-    shape = (projection.height, projection.width)
-    expect(depth.shape == shape, "depth", f"shape {shape}", depth.shape)
-    expect(normal.shape == (3, *shape), "normal", f"shape {(3, *shape)}", normal.shape)
-    area = plane(shape, depth.dtype)
-    _fill(np.ascontiguousarray(depth), np.ascontiguousarray(normal, depth.dtype), view_of(projection, as_published),
-          area)
-    return area
 
 
 @kernel
 def pixel_surface(depth: float, facing: float, pixel_area: float) -> float:
-    """Return ``ds`` of Eq. 2 for one pixel.
+    """Return the surface area that one pixel shows, ds of Eq. 2 with dP = 1, m^2; 0 without a surface or facing away.
 
-    Parameters
-    ----------
-    depth : float
-        Along the view direction, m; inf where no surface is seen.
-    facing : float
-        ``cos(beta) / cos(alpha)``: -n.d for the ray d of length 1 along the view direction.
-    pixel_area : float
-        Of the pixel at depth 1.
-
-    Returns
-    -------
-    float
-        m^2; 0 where no surface is seen or it does not face the eye.
+    `facing` is cos(beta) / cos(alpha) = -n.d for the ray d of length 1 along the view direction.
     """
-    seen = (depth < np.inf) & (facing > 0.0)
-    z = depth if seen else 0.0
-    return float(z * z * pixel_area / max(facing, GRAZING))  # Eq. 2
-
-
-@kernel(parallel=True)
-def _fill(depth: Array, normal: Array, view: View, area: Array) -> None:
-    for row in prange(depth.shape[0]):
-        _fill_row(depth, normal, view, row, area)
-
-
-@kernel
-def _fill_row(depth: Array, normal: Array, view: View, row: int, area: Array) -> None:
-    y = centre(row, view.height)
-    dx, dy, dz = (view.ahead[0] + y * view.down[0], view.ahead[1] + y * view.down[1], view.ahead[2] + y * view.down[2])
-    ax, ay, az = view.across[0], view.across[1], view.across[2]
-    for c in range(view.width):
-        x = centre(c, view.width)
-        facing = -(normal[0, row, c] * (dx + x * ax) + normal[1, row, c] * (dy + x * ay)
-                   + normal[2, row, c] * (dz + x * az))
-        area[row, c] = pixel_surface(float(depth[row, c]), facing, view.pixel_area)
+    covered = (depth < np.inf) & (facing > 0.0)
+    z = depth if covered else 0.0
+    # Eq. (2)
+    return float(z * z * pixel_area / max(facing, GRAZING))

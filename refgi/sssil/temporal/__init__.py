@@ -1,11 +1,11 @@
-"""Indirect light kept from frame to frame: most of a sequence's noise goes, at the price of light that lags behind.
+"""Temporal coherence: indirect light blended over frames, which removes most of the noise and adds lag (Sec. 3.3).
 
-Each pixel's surface point is found in the frame before, where that surface was then (`motion`), and the light it had
-there is blended with the new (`filter`). `Sequence` renders scenes one after the other and keeps of each what the next
-needs; `refgi.scene.path` moves camera, lights and objects through one scene.
+Each pixel's surface point is reprojected into the frame before, where that surface was then (`motion`), and the light
+it had there is blended with the new (`filter`). `Sequence` renders scenes one after the other and stores the `History`
+of the last; `refgi.scene.path` moves camera, lights and objects through one scene.
 """
 
-from refgi.sssil.temporal.filter import TemporalSettings
-from refgi.sssil.temporal.sequence import Sequence, Step
+from refgi.sssil.settings import TemporalSettings
+from refgi.sssil.temporal.sequence import Sequence, SequenceFrame
 
-__all__ = ["Sequence", "Step", "TemporalSettings"]
+__all__ = ["Sequence", "SequenceFrame", "TemporalSettings"]

@@ -1,11 +1,11 @@
-"""The temporal filter: F_i = a W(F_{i-1}) + (1 - a) I_i (Sec. 3.3).
+"""Temporal filter F_i = a W(F_{i-1}) + (1 - a) I_i (Sec. 3.3).
 
-What the temporal filter can be set to.
+Symbols: I_i light of frame i as computed, F_i as filtered, W reprojection, a share of the frame before.
 """
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,64 +14,22 @@ from refgi.elementary import exp2
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.scene.model import Geometry
-from refgi.scene.values import is_number
-from refgi.sssil.reprojection import Fetch, Seen, look_up
-from refgi.sssil.temporal.motion import points_before
+from refgi.sssil.reprojection import SourceView, reproject
+from refgi.sssil.settings import TemporalSettings
+from refgi.sssil.temporal.motion import previous_points
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
-Form = Literal["recursive", "printed"]
-
-CHOICES = {"form": Form, "fetch": Fetch}
-# least and most of each number, and what it is
-NUMBERS = {
-    "weight": (0.0, 0.9999, "a share"), "depth_tolerance": (0.0, 1.0, "a share of the depth"),
-    "normal_cosine": (-1.0, 1.0, "a cosine"), "speed": (1e-3, 1e6, "pixels a frame")}
 Array = npt.NDArray[Any]
 
 
-@dataclasses.dataclass(frozen=True)
-class TemporalSettings:
-    """How much of the light of earlier frames stays (Sec. 3.3, which gives no numbers).
-
-    Of a pixel's light the share `weight`, a, comes from the frame before where that frame shows the same surface: a
-    depth within `depth_tolerance` (share of the depth) and a normal within `normal_cosine`. A pixel that it does not
-    show takes its new light alone. `form` "recursive" blends with the frame before as filtered, "printed" as computed.
-    Where a surface moved of itself by v pixels since, a falls to a exp(-v / `speed`); a moving camera alone leaves a as
-    it is. `fetch` takes the earlier light from the four texels around a point ("bilinear") or from the one it is in
-    ("nearest").
-    """
-
-    weight: float = 0.9
-    form: Form = "recursive"
-    depth_tolerance: float = 0.02
-    normal_cosine: float = 0.95
-    speed: float = 16.0
-    fetch: Fetch = "bilinear"
-
-    def __post_init__(self) -> None:
-        for key, names in CHOICES.items():
-            expect(getattr(self, key) in get_args(names), key, " or ".join(map(repr, get_args(names))),
-                   getattr(self, key))
-        for key, (low, high, what) in NUMBERS.items():
-            value = getattr(self, key)
-            expect(is_number(value) and low <= value <= high, key, f"{what}, {low:g} to {high:g}", value)
-
-    @property
-    def variance(self) -> float:
-        """Share of the variance of independent frames that stays where nothing moves, after many frames."""
-        if self.form == "printed":
-            return self.weight**2 + (1 - self.weight) ** 2
-        return (1 - self.weight) / (1 + self.weight)
-
-
 class History(NamedTuple):
-    """What a frame leaves to the next."""
+    """State that a frame leaves to the next."""
 
     irradiance: Array  # (3, h, w) F, or I for the printed form, W/m^2
-    seen: Seen  # what its camera saw
+    view: SourceView  # its camera, depths and normals
     geometry: Geometry  # the scene's triangles, where the scene has them
 
 
@@ -82,17 +40,17 @@ class Filtered(NamedTuple):
     reused: float  # share of the pixels with a surface that the frame before shows as well
 
 
-def remember(frame: "Frame", geometry: Geometry, irradiance: Array) -> History:
-    """Return what the next frame needs of this one.
+def history_of(frame: "Frame", geometry: Geometry, irradiance: Array) -> History:
+    """Return the state that the next frame needs of this one.
 
     Parameters
     ----------
     frame : Frame
         The frame.
     geometry : Geometry
-        Its scene's triangles as the scene was given: the very object of the next scene if nothing moves.
+        Its scene's triangles as the scene holds them: the very object of the next scene if nothing moves.
     irradiance : (3, h, w) ndarray
-        Its light as the form of the filter wants it, W/m^2.
+        Light for the next frame, F or I by the form of the filter, W/m^2.
 
     Returns
     -------
@@ -101,7 +59,7 @@ def remember(frame: "Frame", geometry: Geometry, irradiance: Array) -> History:
     """
     buffer = frame.gbuffer
     depth, normal = buffer.resolve("depth", "normal")
-    return History(irradiance, Seen(buffer.projection, depth, normal, frame.origin), geometry)
+    return History(irradiance, SourceView(buffer.projection, depth, normal, frame.origin), geometry)
 
 
 @stage("sssil.temporal", kept=False)
@@ -117,16 +75,16 @@ def temporal_filter(
     frame : Frame
         The frame.
     geometry : Geometry
-        Its scene's triangles as the scene was given.
+        Its scene's triangles as the scene holds them.
     history : History
-        What the frame before left.
+        State of the frame before.
     settings : TemporalSettings
-        How much of it stays, and where.
+        Share of the frame before, and the disocclusion test.
 
     Returns
     -------
     Filtered
-        F_i and how much of the picture was found again.
+        F_i and the share of pixels that are not disoccluded.
 
     Raises
     ------
@@ -136,8 +94,9 @@ def temporal_filter(
     Notes
     -----
     The paper prints W(I_{i-1}), which averages two frames; what it says of a, "the larger, the farther in time", needs
-    W(F_{i-1}). A pixel whose point fails the tests has a = 0. The light of what moves is as old as that of what rests:
-    an object that leaves its place takes the light of its old place along, which is why its a falls with its speed.
+    W(F_{i-1}). A disoccluded pixel, whose point fails the tests, has a = 0. The light of a moving surface is as old as
+    that of a resting one: an object that leaves its place takes the light of its old place along, which is why its a
+    falls with its speed.
     """
     buffer = frame.gbuffer
     position, normal = buffer.resolve("position", "normal")
@@ -146,14 +105,16 @@ def temporal_filter(
         skip("sssil.motion", "the same geometry")
     else:
         expect_same_triangles(geometry, history.geometry)
-        position, normal, speed = points_before(buffer, frame.scene.geometry, _at(history.geometry, frame.origin))
-    found, weight = look_up(history.irradiance, history.seen, position, normal, buffer.covered, origin=frame.origin,
-                            depth_tolerance=settings.depth_tolerance, normal_cosine=settings.normal_cosine,
-                            fetch=settings.fetch)
+        before = _relative_to(history.geometry, frame.origin)
+        position, normal, speed = previous_points(buffer, frame.scene.geometry, before)
+    reprojected, weight = reproject(history.irradiance, history.view, position, normal, buffer.covered,
+                                    origin=frame.origin, depth_tolerance=settings.depth_tolerance,
+                                    normal_cosine=settings.normal_cosine, fetch=settings.fetch)
     real = irradiance.dtype.type
     reused = np.empty(len(weight), np.int64)  # pixels of each row
-    _blend(irradiance, speed, real(settings.weight), real(-math.log2(math.e) / settings.speed), weight, found, reused)
-    return Filtered(found, int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))))
+    falloff = real(-math.log2(math.e) / settings.speed)
+    _blend(irradiance, speed, real(settings.weight), falloff, weight, reprojected, reused)
+    return Filtered(reprojected, int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))))
 
 
 def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
@@ -162,7 +123,7 @@ def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
     Parameters
     ----------
     geometry, before : Geometry
-        Today's and the one of the frame before.
+        Those of this frame and of the frame before.
     """
     expect(geometry.vertices.shape == before.vertices.shape, "scenes", f"the {len(before.vertices):,} vertices of the "
            "frame before in each", f"{len(geometry.vertices):,}")
@@ -172,7 +133,7 @@ def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
            "vertex normals in all or in none", "some with and some without")
 
 
-def _at(geometry: Geometry, origin: tuple[float, float, float]) -> Geometry:
+def _relative_to(geometry: Geometry, origin: tuple[float, float, float]) -> Geometry:
     """Return the geometry relative to a frame's origin."""
     if not any(origin):
         return geometry
@@ -198,4 +159,5 @@ def _blend(
         for channel in range(3):
             for column in range(weight.shape[1]):
                 new = irradiance[channel, row, column]
+                # Eq. of Sec. 3.3: F_i = a W(F_{i-1}) + (1 - a) I_i
                 blended[channel, row, column] = new + weight[row, column] * (blended[channel, row, column] - new)

@@ -1,6 +1,5 @@
-"""Frames of a sequence, each lit with the help of the one before."""
+"""Sequence of frames with temporal coherence (Sec. 3.3), each blended with the one before."""
 
-import dataclasses
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
@@ -9,16 +8,17 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.frame import Frame
 from refgi.scene.model import Scene
-from refgi.sssil.settings import LAST_SEED, HssilSettings
-from refgi.sssil.temporal.filter import History, TemporalSettings, remember, temporal_filter
+from refgi.settings import flat, replaced
+from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
+from refgi.sssil.temporal.filter import History, history_of, temporal_filter
 
 Array = npt.NDArray[Any]
-Light = Callable[[Frame, Any], Array]
+Method = Callable[[Frame, Any], Array]
 
-USUAL = TemporalSettings()
+DEFAULT = TemporalSettings()
 
 
-class Step(NamedTuple):
+class SequenceFrame(NamedTuple):
     """One frame of a sequence."""
 
     frame: Frame
@@ -46,17 +46,17 @@ class Sequence:
     Raises
     ------
     InputError
-        While iterating, if what should be a scene is none, or has other triangles than the one before.
+        While iterating, if a scene is not a `Scene`, or has other triangles than the one before.
 
     Notes
     -----
-    Of earlier frames only the last one's `History` is kept. Under one `stages.Memory` frames share what is the same
-    object in both: the G-buffer while camera and geometry rest, an RSM while its light does.
+    Of earlier frames only the last one's `History` stays in memory. Under one `stages.Memory` frames share what is the
+    same object in both: the G-buffer while camera and geometry rest, an RSM while its light does.
     """
 
     def __init__(
-        self, scenes: Iterable[Scene], settings: Any = None, temporal: TemporalSettings | None = USUAL, *,
-        method: Light | None = None, **frame_options: Any,
+        self, scenes: Iterable[Scene], settings: Any = None, temporal: TemporalSettings | None = DEFAULT, *,
+        method: Method | None = None, **frame_options: Any,
     ) -> None:
         expect(temporal is None or isinstance(temporal, TemporalSettings), "temporal", "TemporalSettings or None",
                temporal)
@@ -66,10 +66,10 @@ class Sequence:
         self.method = method or _hssil()
         self.frame_options = frame_options
 
-    def __iter__(self) -> Iterator[Step]:
+    def __iter__(self) -> Iterator[SequenceFrame]:
         return self.over(self.scenes)
 
-    def over(self, scenes: Iterable[Scene], first: int = 0, history: History | None = None) -> Iterator[Step]:
+    def over(self, scenes: Iterable[Scene], first: int = 0, history: History | None = None) -> Iterator[SequenceFrame]:
         """Render scenes that follow on others.
 
         Parameters
@@ -92,19 +92,19 @@ class Sequence:
             yield step
             del step  # whoever took it may let go of it before the next is made
 
-    def _step(self, scene: Scene, number: int, history: History | None) -> tuple[Step, History | None]:
+    def _step(self, scene: Scene, number: int, history: History | None) -> tuple[SequenceFrame, History | None]:
         frame = Frame(scene, **self.frame_options)
-        new = self.method(frame, seeded(self.settings, number))
+        irradiance = self.method(frame, seeded(self.settings, number))
         if self.temporal is None:
-            return Step(frame, new, frame.radiance(new), 0.0), None
-        light, reused = new, 0.0
+            return SequenceFrame(frame, irradiance, frame.radiance(irradiance), 0.0), None
+        filtered, reused = irradiance, 0.0
         if history is not None:
-            light, reused = temporal_filter(new, frame, scene.geometry, history, self.temporal)
-        left = remember(frame, scene.geometry, new if self.temporal.form == "printed" else light)
-        return Step(frame, light, frame.radiance(light), reused), left
+            filtered, reused = temporal_filter(irradiance, frame, scene.geometry, history, self.temporal)
+        left = history_of(frame, scene.geometry, irradiance if self.temporal.form == "printed" else filtered)
+        return SequenceFrame(frame, filtered, frame.radiance(filtered), reused), left
 
 
-def _hssil() -> Light:
+def _hssil() -> Method:
     from refgi.sssil.hssil import hssil
 
     return hssil
@@ -115,16 +115,17 @@ def seeded(settings: Any, number: int) -> Any:
 
     Parameters
     ----------
-    settings : dataclass
+    settings : Settings
         A method's settings.
     number : int
         Which frame: 0 leaves them as they are.
 
     Returns
     -------
-    dataclass
+    Settings
         The same object where the method draws no random numbers.
     """
-    if number == 0 or "seed" not in {field.name for field in dataclasses.fields(settings)}:
+    seeds = {key: seed for key, seed in flat(settings).items() if key.rpartition(".")[2] == "seed"}
+    if number == 0 or not seeds:
         return settings
-    return dataclasses.replace(settings, seed=(settings.seed + number) % (LAST_SEED + 1))
+    return replaced(settings, {key: (seed + number) % (LAST_SEED + 1) for key, seed in seeds.items()})

@@ -1,1 +1,1 @@
-"""From one level to the next finer one (Sec. 3.2, continuous combination)."""
+"""Upsampling of irradiance from level to level (Sec. 3.2): joint bilateral, bilinear, nearest."""

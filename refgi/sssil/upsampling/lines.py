@@ -1,8 +1,8 @@
-"""Rows of texels around a block of pixels, each value written once for every pixel of a row that the texel has.
+"""Rows of texels around a block of pixels, each value repeated for every pixel of a row that the texel covers.
 
-All that a row of pixels reads lies in line then, whatever a pixel's place in its texel: what is left and right of its
-texel is as many places away as a texel has pixels. Depth is kept as its inverse, the nearness: it is linear in the
-picture along every plane, and 0 at infinity.
+Whatever a pixel's place in its texel, its texel's neighbours are as many places away as a texel has pixels, so that a
+row of pixels reads contiguous values. Depth is stored as its inverse, the nearness: it is linear in the picture along
+every plane, and 0 at infinity.
 """
 
 from typing import Any
@@ -23,37 +23,17 @@ NOWHERE = 1e18  # 1/m; nearness of a texel that sees no surface: no pixel has th
 
 @kernel
 def load_texels(
-    light: Array, depth: Array, normal: Array, row: int, left: int, wide: int, factor: int, room: Array, texels: Array
+    light: Array, depth: Array, normal: Array, row: int, left: int, wide: int, factor: int, scratch: Array,
+    texels: Array,
 ) -> None:
-    """Write a row of texels around a block of pixels.
+    """Write a row of texels around a block of pixels into `texels` (LINES,).
 
-    Parameters
-    ----------
-    light : (3, hc, wc) ndarray
-        Irradiance, W/m^2.
-    depth : (hc, wc) ndarray
-        Depth, m; inf where no surface is seen.
-    normal : (3, hc, wc) ndarray
-        Unit normals.
-    row : int
-        Row of texels; outside the picture there are no surfaces.
-    left : int
-        First pixel of the block, which is the first of a texel.
-    wide : int
-        Pixels of the block, whole texels; some may lie beyond the picture.
-    factor : int
-        Pixels along a texel's side.
-    room : (2, SPAN) ndarray
-        Overwritten.
-    texels : (LINES,) ndarray
-        Filled.
-
-    Notes
-    -----
-    Beyond the picture light and normals are those of its edge.
+    `light` (3, hc, wc), W/m^2; `depth` (hc, wc), m, inf for no surface; `normal` (3, hc, wc). Beyond the picture there
+    are no surfaces, light and normals are those of its edge. The block begins at pixel `left`, the first of a texel,
+    and has `wide` pixels, whole texels of `factor`. `scratch` is (2, SPAN).
     """
-    nowhere = room.dtype.type(NOWHERE)
-    texel = room[0]
+    nowhere = scratch.dtype.type(NOWHERE)
+    texel = scratch[0]
     low, high, end = _inside(left, wide, factor, depth.shape[1])
     for c in range(3):
         _copy(light[c], row, left // factor - 1, low, high, end, texel)
@@ -72,29 +52,14 @@ def load_texels(
 
 
 @kernel
-def load_bounds(light: Array, row: int, left: int, wide: int, factor: int, room: Array, bounds: Array) -> None:
-    """Write the least and the most light of the three by three texels around each one of a row.
+def load_bounds(light: Array, row: int, left: int, wide: int, factor: int, scratch: Array, bounds: Array) -> None:
+    """Write the minimum and the maximum light of the 3 x 3 texels around each one of a row into `bounds` (BOUNDS,).
 
-    Parameters
-    ----------
-    light : (3, hc, wc) ndarray
-        Irradiance, W/m^2.
-    row : int
-        Row of texels, in the picture.
-    left : int
-        First pixel of the block.
-    wide : int
-        Pixels of the block.
-    factor : int
-        Pixels along a texel's side.
-    room : (2, SPAN) ndarray
-        Overwritten.
-    bounds : (BOUNDS,) ndarray
-        Filled; as other lines, they begin a texel left of the block.
+    Arguments as those of `load_texels`; lines begin a texel left of the block.
     """
     low, high, end = _inside(left, wide, factor, light.shape[2])
     above, below, shift = max(row - 1, 0), min(row + 1, light.shape[1] - 1), np.uint64(left // factor - 1)
-    least, most = room[0], room[1]
+    least, most = scratch[0], scratch[1]
     one, two = np.uint64(1), np.uint64(2)
     for c in range(3):
         for i in range(np.uint64(low), np.uint64(high)):

@@ -1,8 +1,8 @@
-"""Rows of pixels that light is carried over to: normals, and where planes through them run.
+"""Rows of pixels that irradiance is upsampled to: normals, and the planes through them.
 
-On a plane the nearness 1/z is linear in the picture, so differences between neighbouring pixels say what it is at the
+On a plane the nearness 1/z is linear in the picture, so differences between neighbouring pixels give its value at the
 texels around, without rays or normals: of the two differences along each axis the smaller one counts, and none where
-they disagree in sign, which keeps clear of silhouettes.
+they disagree in sign, which avoids silhouettes.
 
 Symbols: g_x, g_y slope of the nearness (1/m a texel).
 """
@@ -23,24 +23,9 @@ ACROSS, DOWN, HERE = 5 * SPAN, 6 * SPAN, 7 * SPAN
 
 @kernel
 def load_nearness(depth: Array, row: int, left: int, wide: int, line: Array) -> None:
-    """Write 1/z of a row of pixels and of one more at either end.
+    """Write 1/z of a row of pixels, and of one more at either end, into `line` (SPAN,); 0 for no surface.
 
-    Parameters
-    ----------
-    depth : (h, w) ndarray
-        Depth, m; inf where no surface is seen.
-    row : int
-        Row of pixels; -1 or h continues the picture.
-    left : int
-        First pixel of the block.
-    wide : int
-        Pixels of the block.
-    line : (SPAN,) ndarray
-        Filled from place 0, which is pixel left - 1, on; 0 where no surface is seen.
-
-    Notes
-    -----
-    One pixel beyond the picture's edge, the slope is that at the edge.
+    Place 0 is pixel `left` - 1. One pixel beyond the picture's edge (row -1 or h), the slope is that at the edge.
     """
     zero, one = line.dtype.type(0.0), line.dtype.type(1.0)
     height, width = depth.shape
@@ -69,59 +54,40 @@ def load_nearness(depth: Array, row: int, left: int, wide: int, line: Array) -> 
 def _beyond(depth: Any, inner: Any) -> Any:
     """Return the nearness as far on the other side of a pixel as another is on this; 0 if not known."""
     zero, one, two = type(depth)(0.0), type(depth)(1.0), type(depth)(2.0)
-    here, there = one / depth, one / inner
-    value = two * here - there
-    return value if (here > zero) & (there > zero) & (value > zero) else zero
+    pixels, there = one / depth, one / inner
+    value = two * pixels - there
+    return value if (pixels > zero) & (there > zero) & (value > zero) else zero
 
 
 @kernel
 def load_receivers(
-    normal: Array, row: int, left: int, wide: int, factor: int, sharpness: Any, lean: Any, above: Array,
-    nearness: Array, below: Array, tents: Array, here: Array,
+    normal: Array, row: int, left: int, wide: int, factor: int, sharpness: Any, corner: Any, above: Array,
+    nearness: Array, below: Array, tents: Array, pixels: Array,
 ) -> None:
-    """Write normals of a row of pixels, and nearness as their planes have it at the places of texels.
+    """Write normals of a row of pixels, and the nearness of their planes at texels, into `pixels` (HERE,).
 
-    Parameters
-    ----------
-    normal : (3, h, w) ndarray
-        Unit normals.
-    row : int
-        Row of pixels, in the picture.
-    left : int
-        First pixel of the block.
-    wide : int
-        Pixels of the block.
-    factor : int
-        F, pixels along a texel's side.
-    sharpness : float
-        1 / (4 sqrt(2) sigma), sigma the standard deviation of depths as a share of the depth.
-    lean : float
-        How far the point that a texel stands for is from its middle, to the nearer side along either axis; texels.
-    above, nearness, below : (SPAN,) ndarray
-        Of `load_nearness`, of this row and those beside it.
-    tents : (TENTS,) ndarray
-        Of `write_tents`.
-    here : (HERE,) ndarray
-        Filled: normal; sharpness z, 0 where no surface is seen; nearness at the own texel's point; its change from
-        texel to texel.
+    `sharpness` = 1 / (4 sqrt(2) sigma), sigma the standard deviation of depths as a share of the depth; `corner`:
+    offset of the point that a texel stands for from its centre, toward the nearer side along either axis, texels;
+    `above`, `nearness`, `below`: of `load_nearness`; `tents`: of `write_tents`. Filled: normal; sharpness z, 0 for no
+    surface; nearness at the own texel's point; its change from texel to texel.
     """
-    real = here.dtype.type
+    real = pixels.dtype.type
     zero, side = real(0.0), real(factor)
     offset_y = tents[row % factor]
     size = np.uint64(min(wide, normal.shape[2] - left))
     for c in range(3):
         line = np.uint64(NORMAL + c * SPAN)
         for i in range(size):
-            here[line + i] = normal[c, row, np.uint64(left) + i]
+            pixels[line + i] = normal[c, row, np.uint64(left) + i]
     for i in range(np.uint64(wide)):
         value = nearness[i + np.uint64(1)]
         gx = side * _slope(nearness[i], value, nearness[i + np.uint64(2)])
         gy = side * _slope(above[i + np.uint64(1)], value, below[i + np.uint64(1)])
-        here[np.uint64(ACROSS) + i] = gx
-        here[np.uint64(DOWN) + i] = gy
-        here[np.uint64(SCALE) + i] = sharpness / value if value > zero else zero
-        # what a texel stands for is at its corner that is nearest, not in its middle
-        here[np.uint64(PLANE) + i] = (value - (tents[i] * gx - lean * abs(gx))) - (offset_y * gy - lean * abs(gy))
+        pixels[np.uint64(ACROSS) + i] = gx
+        pixels[np.uint64(DOWN) + i] = gy
+        pixels[np.uint64(SCALE) + i] = sharpness / value if value > zero else zero
+        # the point that a texel stands for is at its nearest corner, not in its centre
+        pixels[np.uint64(PLANE) + i] = (value - (tents[i] * gx - corner * abs(gx))) - (offset_y * gy - corner * abs(gy))
 
 
 @kernel

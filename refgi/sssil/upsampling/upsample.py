@@ -1,23 +1,21 @@
-"""Irradiance of a level brought to the next finer one, or to the picture, and added to what is known there.
+"""Upsampling of a level's irradiance to the next finer level, or to the picture, plus that level's own irradiance.
 
-Upsampling that knows of no surfaces: bilinear, which bleeds across edges, and nearest.
+Bilinear and nearest upsampling ignore surfaces: bilinear light bleeds across edges.
 """
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
+from refgi.sssil.settings import Bilateral, HssilSettings, Nearest
 from refgi.sssil.upsampling.bilateral import fill_bilateral
 from refgi.sssil.upsampling.lines import PAD
 from refgi.stages import stage
-
-if TYPE_CHECKING:
-    from refgi.sssil.settings import HssilSettings
 
 Array = npt.NDArray[Any]
 QUICK_POWER = 8.0  # of the cosine between normals: three multiplications
@@ -25,29 +23,13 @@ QUICK_POWER = 8.0  # of the cosine between normals: three multiplications
 
 @kernel(parallel=True)
 def fill_plain(
-    light: Array, below_depth: Array, depth: Array, factor: int, nearest: bool, added: Array, adds: bool,
+    light: Array, coarse_depth: Array, depth: Array, factor: int, nearest: bool, added: Array, adds: bool,
     result: Array,
 ) -> None:
-    """Carry irradiance of texels over to pixels, whatever they see.
+    """Upsample irradiance of texels to pixels by the bilinear mean of four texels, or by the `nearest` one.
 
-    Parameters
-    ----------
-    light : (3, hc, wc) ndarray
-        Irradiance of texels, W/m^2.
-    below_depth : (hc, wc) ndarray
-        Depth of texels, m; those at infinity have no weight.
-    depth : (h, w) ndarray
-        Depth of pixels, m; those at infinity receive nothing.
-    factor : int
-        Pixels along a texel's side.
-    nearest : bool
-        Take a pixel's own texel instead of the bilinear mean of four.
-    added : (3, h, w) ndarray
-        Irradiance that is added where a surface is seen, W/m^2.
-    adds : bool
-        Whether it is.
-    result : (3, h, w) ndarray
-        Filled.
+    Texels without a surface (`coarse_depth` = inf) have no weight, pixels without one receive nothing. `added` (3, h,
+    w) is added if `adds`; `result` (3, h, w) is filled, W/m^2.
     """
     width = depth.shape[1]
     real = depth.dtype.type
@@ -55,25 +37,25 @@ def fill_plain(
     for row in prange(depth.shape[0]):
         y = np.int64(row)
         for x in range(width):
-            seen = depth[y, x] < infinite
-            weights = _weights(below_depth, y, x, factor, nearest)
+            covered = depth[y, x] < infinite
+            weights = _weights(coarse_depth, y, x, factor, nearest)
             for c in range(3):
-                value = _mean(light, c, y, x, factor, weights) if seen else zero
+                value = _mean(light, c, y, x, factor, weights) if covered else zero
                 if adds:
-                    value = value + (added[c, y, x] if seen else zero)
+                    value = value + (added[c, y, x] if covered else zero)
                 result[c, y, x] = value
 
 
 @kernel
-def _weights(below_depth: Array, y: Any, x: int, factor: int, nearest: bool) -> Any:
+def _weights(coarse_depth: Array, y: Any, x: int, factor: int, nearest: bool) -> Any:
     """Return the weights of own texel, row's neighbour, column's neighbour and both's; their sum is 1 or 0."""
-    real = below_depth.dtype.type
+    real = coarse_depth.dtype.type
     one = real(1.0)
     tx, ty = (real(0.0), real(0.0)) if nearest else (_distance(x, factor, real), _distance(y, factor, real))
     i, j, ni, nj = x // factor, y // factor, x // factor + _side(x, factor), y // factor + _side(y, factor)
-    own = _seen(below_depth, j, i) * ((one - tx) * (one - ty))
-    row, column = _seen(below_depth, j, ni) * (tx * (one - ty)), _seen(below_depth, nj, i) * ((one - tx) * ty)
-    both = _seen(below_depth, nj, ni) * (tx * ty)
+    own = _coverage(coarse_depth, j, i) * ((one - tx) * (one - ty))
+    row, column = _coverage(coarse_depth, j, ni) * (tx * (one - ty)), _coverage(coarse_depth, nj, i) * ((one - tx) * ty)
+    both = _coverage(coarse_depth, nj, ni) * (tx * ty)
     total = (own + row) + (column + both)
     total = total if total > real(0.0) else one
     return own / total, row / total, column / total, both / total
@@ -94,7 +76,7 @@ def _mean(light: Array, c: int, y: Any, x: int, factor: int, weights: Any) -> An
 
 @kernel
 def _distance(place: int, factor: int, real: Any) -> Any:
-    """Return how far a pixel's centre is from that of its texel, texels."""
+    """Return the distance of a pixel's centre from that of its texel, texels."""
     return real(abs(2 * (place % factor) + 1 - factor)) / real(2 * factor)
 
 
@@ -104,43 +86,43 @@ def _side(place: int, factor: int) -> int:
 
 
 @kernel
-def _seen(depth: Array, row: int, column: int) -> Any:
+def _coverage(depth: Array, row: int, column: int) -> Any:
     real = depth.dtype.type
     inside = (row >= 0) & (row < depth.shape[0]) & (column >= 0) & (column < depth.shape[1])
     return real(1.0) if inside and depth[row, column] < real(np.inf) else real(0.0)
 
 
 class Guide(NamedTuple):
-    """What the texels of a level, or the pixels of the picture, see: it says which of them belong together."""
+    """Depths and normals that guide joint bilateral upsampling, of a level's texels or the picture's pixels."""
 
-    depth: Array  # (h, w) m along the view direction; inf where no surface is seen
+    depth: Array  # (h, w) m along the view direction; inf where there is no surface
     normal: Array  # (3, h, w) unit vectors
 
 
 @stage("sssil.upsample", kept=False)
 def upsample(
-    coarse: Array, below: Guide, here: Guide, settings: "HssilSettings", added: Array | None = None
+    coarse: Array, coarse_guide: Guide, guide: Guide, settings: HssilSettings, added: Array | None = None
 ) -> Array:
-    """Carry irradiance over to a finer level and add what that level has of its own.
+    """Upsample irradiance to a finer level and add that level's own (joint bilateral upsampling, Sec. 3.2).
 
     Parameters
     ----------
     coarse : (3, hc, wc) ndarray
         Irradiance of the coarser level's texels, W/m^2; its dtype is that of the result.
-    below : Guide
-        What those texels see.
-    here : Guide
-        What the finer level's texels, or the pixels, see: (h, w) of them, hc = ceil(h / F) and wc = ceil(w / F) for F
+    coarse_guide : Guide
+        Depths and normals of those texels.
+    guide : Guide
+        Those of the finer level's texels, or of the pixels: (h, w) of them, hc = ceil(h / F) and wc = ceil(w / F) for F
         one of 2, 4, .. 32.
     settings : HssilSettings
-        `upsampling`, `depth_sigma`, `normal_power`; `downsample` says where in a texel its depth was found.
+        Filter and its parameters; the downsampling, on which the place of a texel's depth depends.
     added : (3, h, w) ndarray, optional
         Irradiance to add, W/m^2.
 
     Returns
     -------
     (3, h, w) ndarray
-        Irradiance, W/m^2; 0 where no surface is seen.
+        Irradiance, W/m^2; 0 where there is no surface.
 
     Raises
     ------
@@ -157,25 +139,27 @@ def upsample(
     texel is of the receiver's surface. Where no texel has any weight, the nearest in depth is taken.
     """
     dtype = coarse.dtype
-    values, depth, normal, below_depth, below_normal = (
-        np.ascontiguousarray(array, dtype) for array in (coarse, *here, *below))
-    more = None if added is None else np.ascontiguousarray(added, dtype)
-    factor = _factor(depth.shape, below_depth.shape)
-    expect(values.shape == (3, *below_depth.shape), "coarse", f"shape {(3, *below_depth.shape)}", values.shape)
-    for name, array, shape in (("below.normal", below_normal, values.shape), ("here.normal", normal, (3, *depth.shape)),
-                               ("added", more, (3, *depth.shape))):
+    values, depth, normal, coarse_depth, coarse_normal = (
+        np.ascontiguousarray(array, dtype) for array in (coarse, *guide, *coarse_guide))
+    addend = None if added is None else np.ascontiguousarray(added, dtype)
+    factor = _factor(depth.shape, coarse_depth.shape)
+    expect(values.shape == (3, *coarse_depth.shape), "coarse", f"shape {(3, *coarse_depth.shape)}", values.shape)
+    for name, array, shape in (("coarse_guide.normal", coarse_normal, values.shape),
+                               ("guide.normal", normal, (3, *depth.shape)),
+                               ("added", addend, (3, *depth.shape))):
         expect(array is None or array.shape == shape, name, f"shape {shape}", array is not None and array.shape)
     result = plane((3, *depth.shape), dtype)
-    adds, more = (False, result) if more is None else (True, more)
-    if settings.upsampling != "bilateral":
-        fill_plain(values, below_depth, depth, factor, settings.upsampling == "nearest", more, adds, result)
+    adds, addend = (False, result) if addend is None else (True, addend)
+    weights = settings.upsampling
+    if not isinstance(weights, Bilateral):
+        fill_plain(values, coarse_depth, depth, factor, isinstance(weights, Nearest), addend, adds, result)
         return result
     real = dtype.type
-    sharpness = real(1.0 / (4.0 * math.sqrt(2.0) * settings.depth_sigma))
+    sharpness = real(1.0 / (4.0 * math.sqrt(2.0) * weights.depth_sigma))
     # the closest of F x F pixels of a slope is at a corner of the texel
-    lean = real(0.0 if settings.downsample == "average" else (factor - 1) / (2 * factor))
-    power = None if settings.normal_power == QUICK_POWER else real(settings.normal_power)
-    fill_bilateral(values, below_depth, below_normal, depth, normal, factor, sharpness, lean, power, more, adds,
+    corner = real(0.0 if settings.senders.downsample == "average" else (factor - 1) / (2 * factor))
+    power = None if weights.normal_power == QUICK_POWER else real(weights.normal_power)
+    fill_bilateral(values, coarse_depth, coarse_normal, depth, normal, factor, sharpness, corner, power, addend, adds,
                    result)
     return result
 

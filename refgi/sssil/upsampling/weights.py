@@ -1,17 +1,15 @@
-"""Weighted sums over three by three texels for a row of pixels; the pixels are the SIMD lanes.
+"""Joint bilateral weights and weighted means of 3 x 3 texels for a row of pixels; the pixels are the SIMD lanes.
 
 A texel weighs tent * exp(-u) * max(0, <n . n'>)^p for a pixel, u = delta^2 / (2 sigma^2), delta = z (1/z' - d) with d
-the nearness that the plane through the pixel has at the texel's place. The exponential is taken as (1 - u / 16)^16, 0
+the nearness of the plane through the pixel at the texel's place. The exponential is taken as (1 - u / 16)^16, 0
 from u = 16 (5.7 sigma) on, so that with p = 8 the product is the eighth power of cosine * (1 - u / 16)^2.
 
 Left and right texels are added to each other first: pictures that mirror each other get sums that do, to the bit.
 
-Spatial weights of three texels in a row.
-
-The tent about a place t texels (up to 1/2) from the middle one has a half width of (4 + |t|) / 3; brought to a sum of 1
-its weights are (1 - 2 |t|) / 6, (2 - |t|) / 3 and (1 + 4 |t|) / 6 for the far, the own and the near texel. Of all tents
-it is the one that leaves linear functions linear, as the bilinear weights of two texels do, which it goes over to at
-|t| = 1/2 and which stand in beyond.
+Tent: about a place t texels (up to 1/2) from the middle one its half width is (4 + |t|) / 3; brought to a sum of 1 its
+weights are (1 - 2 |t|) / 6, (2 - |t|) / 3 and (1 + 4 |t|) / 6 for the far, the own and the near texel. Of all tents
+it is the one that leaves linear functions linear, as the bilinear weights of two texels do, which it equals at
+|t| = 1/2 and which replace it beyond.
 """
 
 from typing import Any
@@ -33,22 +31,10 @@ SIXTH, THIRD = 1 / 6, 1 / 3
 
 
 @kernel
-def alike(cosine: Any, off: Any, power: Any) -> Any:
-    """Return how much two points are of the same surface.
+def bilateral_weight(cosine: Any, off: Any, power: Any) -> Any:
+    """Return the range weight max(0, cosine)^p (1 - off^2)^16 of a texel, 0 to 1.
 
-    Parameters
-    ----------
-    cosine : float
-        Between their normals.
-    off : float
-        delta / (4 sqrt(2) sigma), whose square is u / 16.
-    power : float or None
-        p; None stands for 8.
-
-    Returns
-    -------
-    float
-        0 to 1.
+    `cosine` between the normals; `off` = delta / (4 sqrt(2) sigma), whose square is u / 16; `power` p, None for 8.
     """
     zero, one = type(off)(0.0), type(off)(1.0)
     q = one - off * off
@@ -66,50 +52,34 @@ def alike(cosine: Any, off: Any, power: Any) -> Any:
 
 @kernel
 def average(
-    above: Array, middle: Array, below: Array, here: Array, bounds: Array, tents: Array, place: int, wide: int,
+    above: Array, middle: Array, below: Array, pixels: Array, bounds: Array, tents: Array, place: int, wide: int,
     factor: int, power: Any, means: Array,
 ) -> None:
-    """Average the light of three by three texels for each pixel of a row.
+    """Average the light of 3 x 3 texels for each of `wide` pixels of a row.
 
-    Parameters
-    ----------
-    above, middle, below : (lines.LINES,) ndarray
-        Rows of texels; the middle one has the pixels.
-    here : (HERE,) ndarray
-        The pixels.
-    bounds : (lines.BOUNDS,) ndarray
-        Between which means lie.
-    tents : (TENTS,) ndarray
-        Of `write_tents`.
-    place : int
-        Of the row in its texels, 0 to factor - 1.
-    wide : int
-        Pixels of the block.
-    factor : int
-        Pixels along a texel's side.
-    power : float or None
-        Of `alike`.
-    means : (MEANS,) ndarray
-        Filled: light, three lines, and the sum of the weights, 0 where that is too small.
+    `above`, `middle`, `below` (lines.LINES,): rows of texels, the middle one with the pixels. `pixels` (HERE,),
+    `bounds` (lines.BOUNDS,) of the means, `tents` (TENTS,) of `write_tents`, `place` of the row in its texels. `means`
+    (MEANS,) is filled with three lines of light and the sum of the weights, 0 where that is too small.
 
-    Notes
-    -----
-    Bounds cut off roundings: equal light stays equal to the bit. Dividing keeps light of 1 so beside any other surface.
+    Bounds cut off rounding: equal light stays equal to the bit. Dividing keeps light of 1 exact beside any other
+    surface.
     """
     real = means.dtype.type
     zero, one, least, side = real(0.0), real(1.0), real(LEAST), np.uint64(factor)
     u_rising, u_level, u_falling = _tents(tents, BEFORE, np.uint64(place))
     d_rising, d_level, d_falling = _tents(tents, AFTER, np.uint64(place))
     for i in range(np.uint64(wide)):
-        across, plane = here[np.uint64(receivers.ACROSS) + i], here[np.uint64(receivers.PLANE) + i]
-        down = here[np.uint64(receivers.DOWN) + i]
+        across, plane = pixels[np.uint64(receivers.ACROSS) + i], pixels[np.uint64(receivers.PLANE) + i]
+        down = pixels[np.uint64(receivers.DOWN) + i]
         b_rising, b_level, b_falling = _tents(tents, BEFORE, i)
         a_rising, a_level, a_falling = _tents(tents, AFTER, i)
-        before, after = _by_sign(across, b_rising, b_level, b_falling), _by_sign(across, a_rising, a_level, a_falling)
-        upper, lower = _by_sign(down, u_rising, u_level, u_falling), _by_sign(down, d_rising, d_level, d_falling)
-        u0, u1, u2 = _alike_in(above, here, i, side, plane - down, across, power)
-        m0, m1, m2 = _alike_in(middle, here, i, side, plane, across, power)
-        d0, d1, d2 = _alike_in(below, here, i, side, plane + down, across, power)
+        before = _by_slope_sign(across, b_rising, b_level, b_falling)
+        after = _by_slope_sign(across, a_rising, a_level, a_falling)
+        upper = _by_slope_sign(down, u_rising, u_level, u_falling)
+        lower = _by_slope_sign(down, d_rising, d_level, d_falling)
+        u0, u1, u2 = _row_weights(above, pixels, i, side, plane - down, across, power)
+        m0, m1, m2 = _row_weights(middle, pixels, i, side, plane, across, power)
+        d0, d1, d2 = _row_weights(below, pixels, i, side, plane + down, across, power)
         u0, u1, u2 = u0 * (upper * before), u1 * upper, u2 * (upper * after)
         m0, m2 = m0 * before, m2 * after
         d0, d1, d2 = d0 * (lower * before), d1 * lower, d2 * (lower * after)
@@ -138,7 +108,7 @@ def _tents(tents: Array, line: int, i: Any) -> Any:
 
 
 @kernel
-def _by_sign(value: Any, positive: Any, none: Any, negative: Any) -> Any:
+def _by_slope_sign(value: Any, positive: Any, none: Any, negative: Any) -> Any:
     zero = type(value)(0.0)
     # as a sum: a choice of three would be gathered
     chosen = (positive if value > zero else zero) + (negative if value < zero else zero)
@@ -146,18 +116,20 @@ def _by_sign(value: Any, positive: Any, none: Any, negative: Any) -> Any:
 
 
 @kernel
-def _alike_in(texels: Array, here: Array, i: Any, side: Any, plane: Any, across: Any, power: Any) -> Any:
-    """Return how much left, own and right texel of a row are of the pixel's surface."""
-    return (_alike_at(texels, i, here, i, plane - across, power), _alike_at(texels, side + i, here, i, plane, power),
-            _alike_at(texels, side + side + i, here, i, plane + across, power))
+def _row_weights(texels: Array, pixels: Array, i: Any, side: Any, plane: Any, across: Any, power: Any) -> Any:
+    """Return the range weights of left, own and right texel of a row."""
+    return (_texel_weight(texels, i, pixels, i, plane - across, power),
+            _texel_weight(texels, side + i, pixels, i, plane, power),
+            _texel_weight(texels, side + side + i, pixels, i, plane + across, power))
 
 
 @kernel
-def _alike_at(texels: Array, at: Any, here: Array, i: Any, plane: Any, power: Any) -> Any:
+def _texel_weight(texels: Array, at: Any, pixels: Array, i: Any, plane: Any, power: Any) -> Any:
     n, m, span = np.uint64(receivers.NORMAL) + i, np.uint64(lines.NORMAL) + at, np.uint64(SPAN)
-    cosine = here[n] * texels[m] + here[n + span] * texels[m + span] + here[n + span + span] * texels[m + span + span]
-    off = (texels[np.uint64(lines.NEARNESS) + at] - plane) * here[np.uint64(receivers.SCALE) + i]
-    return alike(cosine, off, power)
+    cosine = (pixels[n] * texels[m] + pixels[n + span] * texels[m + span]
+              + pixels[n + span + span] * texels[m + span + span])
+    off = (texels[np.uint64(lines.NEARNESS) + at] - plane) * pixels[np.uint64(receivers.SCALE) + i]
+    return bilateral_weight(cosine, off, power)
 
 
 @kernel
@@ -175,18 +147,10 @@ def _bounded(value: Any, bounds: Array, channel: int, i: Any) -> Any:
 
 
 @kernel
-def tent_at(t: Any) -> Any:
-    """Return the weights of three texels in a row.
+def _tent_at(t: Any) -> Any:
+    """Return the weights of the texel before, the own and the one after; their sum is 1.
 
-    Parameters
-    ----------
-    t : float
-        Where the receiver lies from the point that the middle texel stands for, texels, -1 to 1.
-
-    Returns
-    -------
-    before, own, after : float
-        Weights; their sum is 1.
+    `t`: place of the receiver from the point that the middle texel stands for, texels, -1 to 1.
     """
     real = type(t)
     zero, one, two, four = real(0.0), real(1.0), real(2.0), real(4.0)
@@ -199,45 +163,23 @@ def tent_at(t: Any) -> Any:
 
 
 @kernel
-def write_tents(factor: int, lean: Any, tents: Array) -> None:
-    """Write where the centres of a row's pixels lie from those of their texels, and what the texels beside weigh.
+def write_tents(factor: int, corner: Any, tents: Array) -> None:
+    """Write the offsets of a row's pixels from the centres of their texels, and the weights of the texels beside.
 
-    Parameters
-    ----------
-    factor : int
-        Pixels along a texel's side.
-    lean : float
-        How far the point that a texel stands for is from its middle, texels.
-    tents : (TENTS,) ndarray
-        Filled: offsets, texels, -1/2 to 1/2; weights of the texel before and of the one after as shares of the
-        own texel's, three lines each: for points after the middle by `lean`, in it, and before it by `lean`.
+    `tents` (TENTS,) is filled: offsets, texels, -1/2 to 1/2; weights of the texel before and of the one after as shares
+    of the own texel's, three lines each, for points `corner` texels after the centre, in it, and before it.
     """
     for i in range(WIDE):
-        t = offset(i % factor, factor, tents)
+        t = _offset(i % factor, factor, tents)
         tents[i] = t
         for lie in range(3):
-            before, own, after = tent_at(t + tents.dtype.type(lie - 1) * lean)
+            before, own, after = _tent_at(t + tents.dtype.type(lie - 1) * corner)
             tents[BEFORE + lie * SPAN + i] = before / own
             tents[AFTER + lie * SPAN + i] = after / own
 
 
 @kernel
-def offset(place: int, factor: int, like: Array) -> Any:
-    """Return where a pixel's centre lies from that of its texel.
-
-    Parameters
-    ----------
-    place : int
-        Of the pixel in its texel, 0 to factor - 1.
-    factor : int
-        Pixels along a texel's side.
-    like : ndarray
-        Of the type of the result.
-
-    Returns
-    -------
-    float
-        Texels, -1/2 to 1/2.
-    """
+def _offset(place: int, factor: int, like: Array) -> Any:
+    """Return the offset of a pixel's centre from that of its texel, texels, -1/2 to 1/2; in the dtype of `like`."""
     real = like.dtype.type
     return real(2 * place + 1 - factor) / real(2 * factor)

@@ -1,1 +1,1 @@
-"""What the paper leaves out: whether anything stands between a receiver and a sample, by rays or by the depth map."""
+"""Visibility of samples, which the paper ignores: by rays or by a bitmask of the depth map."""

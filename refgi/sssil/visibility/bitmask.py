@@ -1,15 +1,15 @@
-"""Visibility of samples by what the depth map holds before them: a bitmask of angles (after Therrien et al. 2023).
+"""Visibility of samples by a bitmask of angles on the depth map (after Therrien et al. 2023).
 
-From a receiver the picture is marched in slices, nearest samples first. The surface at a sample is taken to reach from
-its point away from the eye by a thickness. Both ends lie in the plane of the eye, the receiver and the sample. How high
-they stand there above the receiver's own plane counts in 32 sectors, from its horizon on the sample's side over its
-normal to the other horizon; the surface blocks the sectors whose middle it covers. Sectors are steps of ::
+From a receiver the picture is marched in slices, nearest samples first. The surface at a sample is taken to extend
+from its point away from the eye by a thickness. Both ends lie in the plane of the eye, the receiver and the sample.
+Their elevation there above the receiver's own plane counts in 32 sectors, from its horizon on the sample's side over
+its normal to the other horizon; the surface occludes the sectors whose middle it covers. Sectors are steps of ::
 
     q(a, b) = a / (a + |b|), 2 - that where b < 0, 0 where a < 0
 
 for a direction with a along the normal and b along the horizon: they have 0.64 to 1.27 of equal angles, and need no
-arctangent. A sample is seen as far as the two sectors whose middles are next to it are free, interpolated; and wholly
-where it stands as high as all before it, which keeps receding surfaces from blocking themselves.
+arctangent. The visibility of a sample is that of the two sectors whose middles are next to it, interpolated; and 1
+where it is as high as all before it, which keeps receding surfaces from occluding themselves.
 
 Symbols: d vector from receiver to sample (m), c = max(0, n . d), s = max(0, -m . d) with m = n_j ds_j / pi, t
 thickness (m), l distance of the receiver from the eye (m).
@@ -23,19 +23,19 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
+from refgi.sssil.crown.add import LEAST, form_factor
 from refgi.sssil.crown.emitters import length_scale
 from refgi.sssil.crown.gather import level_factor
-from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
+from refgi.sssil.crown.points import level_key, pixel_key, row_key
 from refgi.sssil.crown.reach import chosen_radius
-from refgi.sssil.level import Level
-from refgi.sssil.settings import HssilSettings
-from refgi.sssil.visibility.slices import Steps, fill_slices, slice_offsets, steps_of
+from refgi.sssil.pyramid.view import Level
+from refgi.sssil.settings import Bitmask, HssilSettings
+from refgi.sssil.visibility.slices import SliceCounts, fill_slices, slice_counts, slice_offsets
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
 SECTORS = 32
-LEAST = 1e-37  # stands in for a divisor of 0 under a numerator of 0
 # planes of a packed level; 1 / l, l, and the cosine of the direction to the eye against the normal
 X, N, L, AREA, INVERSE, LENGTH, FACING, PLANES = 0, 3, 6, 9, 10, 11, 12, 13
 PART, TOTAL, HIGHEST, SCRATCH = 0, 6, 9, 10  # lines of scratch: two slices' sums, all sums, largest q so far
@@ -43,7 +43,7 @@ PART, TOTAL, HIGHEST, SCRATCH = 0, 6, 9, 10  # lines of scratch: two slices' sum
 
 @stage("sssil.bitmask")
 def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: float) -> Array:
-    """Sum what the samples around each texel of a level send to it past what the picture shows between.
+    """Sum the light of the samples around each texel of a level, times their visibility by a bitmask of the depth map.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: 
     index : int
         0 for the first level, whose inner disc is sampled as well.
     settings : HssilSettings
-        How many samples in how many slices, which pattern and form factor, and how thick surfaces are.
+        Sampling, form factor, number of slices and thickness.
     diagonal : float
-        Of the scene, m.
+        Diagonal of the scene, m.
 
     Returns
     -------
@@ -64,24 +64,26 @@ def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: 
     Raises
     ------
     InputError
-        If the pattern has no slices.
+        If `visibility` is no bitmask.
     """
-    expect(settings.pattern != "all", "pattern", "row, pixel or fixed with visibility by a bitmask", settings.pattern)
+    sampling, bitmask = settings.sampling, settings.visibility
+    expect(isinstance(bitmask, Bitmask), "visibility", "bitmask", bitmask)
+    assert isinstance(bitmask, Bitmask)
     rows, columns = level.shape
-    steps = steps_of(settings, index, chosen_radius((rows << index, columns << index), settings))
+    steps = slice_counts(sampling, bitmask, index, chosen_radius((rows << index, columns << index), sampling))
     real = level.position.dtype.type
     scale = length_scale(level.depth)
     packed = np.empty((rows, PLANES, columns), level.position.dtype)
     _pack(level.position, level.normal, level.radiance, level.area, real(scale), packed)
-    thickness, bulge = real(settings.thickness * diagonal * scale), real(settings.form_factor == "disc")
+    thickness, disc = real(bitmask.thickness * diagonal * scale), settings.senders.form_factor == "disc"
     factor = real(level_factor(index, settings))
     result = np.empty_like(level.radiance)
-    if settings.pattern == "pixel":
-        key = level_key(settings.seed, level.number)
-        _march_pixels(packed, steps, key, thickness, bulge, factor, result)
+    if sampling.pattern == "pixel":
+        key = level_key(sampling.seed, level.number)
+        _march_pixels(packed, steps, key, thickness, disc, factor, result)
     else:
-        offsets, weight = slice_offsets(settings, steps, level.number, rows)
-        _march_rows(packed, offsets, weight.astype(real), thickness, bulge, factor, result)
+        offsets, weight = slice_offsets(sampling, steps, level.number, rows)
+        _march_rows(packed, offsets, weight.astype(real), thickness, disc, factor, result)
     return result
 
 
@@ -106,25 +108,25 @@ def _pack(position: Array, normal: Array, radiance: Array, area: Array, scale: A
 
 
 @kernel(parallel=True)
-def _march_rows(packed: Array, offsets: Array, weight: Array, thickness: Any, bulge: Any, factor: Any,
+def _march_rows(packed: Array, offsets: Array, weight: Array, thickness: Any, disc: bool, factor: Any,
                 result: Array) -> None:
     for prow in prange(packed.shape[0]):
         row = np.int64(prow)
         lines, mask = np.zeros((SCRATCH, packed.shape[2]), packed.dtype), np.zeros(packed.shape[2], np.uint32)
         shared = min(row, offsets.shape[0] - 1)
         for k in range(offsets.shape[1]):
-            _march_row(packed, row, offsets[shared, k], weight[shared, k], thickness, bulge, lines, mask, k % 2)
+            _march_row(packed, row, offsets[shared, k], weight[shared, k], thickness, disc, lines, mask, k % 2)
             if k % 2 == 1 or k + 1 == offsets.shape[1]:
                 _join(lines)
         _store(packed, row, lines, factor, result)
 
 
 @kernel
-def _march_row(packed: Array, row: Any, offsets: Array, weight: Array, thickness: Any, bulge: Any, lines: Array,
+def _march_row(packed: Array, row: Any, offsets: Array, weight: Array, thickness: Any, disc: bool, lines: Array,
                mask: Array, half: int) -> None:
     """March one slice for a row of receivers, which are the SIMD lanes."""
     rows, columns = packed.shape[0], packed.shape[2]
-    here, part = packed[row], np.uint64(PART + 3 * half)
+    receiver, part = packed[row], np.uint64(PART + 3 * half)
     mask[:] = np.uint32(0)
     lines[HIGHEST, :] = packed.dtype.type(0.0)
     for j in range(offsets.shape[0]):
@@ -132,82 +134,81 @@ def _march_row(packed: Array, row: Any, offsets: Array, weight: Array, thickness
         size = columns - abs(ox)
         if row + oy < 0 or row + oy >= rows or size <= 0 or (ox == 0 and oy == 0):
             continue
-        there, first, second = packed[row + oy], np.uint64((abs(ox) - ox) // 2), np.uint64((abs(ox) + ox) // 2)
+        sender, first, second = packed[row + oy], np.uint64((abs(ox) - ox) // 2), np.uint64((abs(ox) + ox) // 2)
         if weight[j] > 0.0:
-            _light(here, first, there, second, np.uint64(size), weight[j], bulge, thickness, lines, mask, part)
+            _add_sample(receiver, first, sender, second, np.uint64(size), weight[j], disc, thickness, lines, mask, part)
         else:
-            _block(here, first, there, second, np.uint64(size), thickness, lines, mask)
+            _add_occluder(receiver, first, sender, second, np.uint64(size), thickness, lines, mask)
 
 
 @kernel
-def _light(here: Array, first: Any, there: Array, second: Any, size: Any, weight: Any, bulge: Any,
+def _add_sample(receiver: Array, first: Any, sender: Array, second: Any, size: Any, weight: Any, disc: bool,
            thickness: Any, lines: Array, mask: Array, part: Any) -> None:
-    """Add what one sample sends to each receiver of a row, and let it block."""
+    """Add the light of one sample to each receiver of a row, and its occlusion to the masks."""
     for i in range(size):
         p, q = first + i, second + i
-        dx, dy, dz, c = _pair(here, p, there, q)
+        dx, dy, dz, c = _direction(receiver, p, sender, q)
         square = dx * dx + dy * dy + dz * dz
-        front, back = _heights(here, p, there, q, dx, dy, dz, c, thickness)
-        seen = _seen(front, lines[HIGHEST, p], mask[p])
-        g = seen * _transfer(there, q, dx, dy, dz, c, square, weight, bulge)
-        lines[part, p] = lines[part, p] + g * there[L, q]
-        lines[part + np.uint64(1), p] = lines[part + np.uint64(1), p] + g * there[L + 1, q]
-        lines[part + np.uint64(2), p] = lines[part + np.uint64(2), p] + g * there[L + 2, q]
+        front, back = _heights(receiver, p, sender, q, dx, dy, dz, c, thickness)
+        visibility = _visibility(front, lines[HIGHEST, p], mask[p])
+        g = visibility * _transfer(sender, q, dx, dy, dz, c, square, weight, disc)
+        lines[part, p] = lines[part, p] + g * sender[L, q]
+        lines[part + np.uint64(1), p] = lines[part + np.uint64(1), p] + g * sender[L + 1, q]
+        lines[part + np.uint64(2), p] = lines[part + np.uint64(2), p] + g * sender[L + 2, q]
         lines[HIGHEST, p] = front if front > lines[HIGHEST, p] else lines[HIGHEST, p]
-        mask[p] = mask[p] | _covered(back, front)
+        mask[p] = mask[p] | _sector_mask(back, front)
 
 
 @kernel
-def _block(here: Array, first: Any, there: Array, second: Any, size: Any, thickness: Any, lines: Array,
+def _add_occluder(receiver: Array, first: Any, sender: Array, second: Any, size: Any, thickness: Any, lines: Array,
            mask: Array) -> None:
-    """Let one sample block the light of those after it, for each receiver of a row."""
+    """Add the occlusion of one sample to the masks of a row of receivers."""
     for i in range(size):
         p, q = first + i, second + i
-        dx, dy, dz, c = _pair(here, p, there, q)
-        front, back = _heights(here, p, there, q, dx, dy, dz, c, thickness)
+        dx, dy, dz, c = _direction(receiver, p, sender, q)
+        front, back = _heights(receiver, p, sender, q, dx, dy, dz, c, thickness)
         lines[HIGHEST, p] = front if front > lines[HIGHEST, p] else lines[HIGHEST, p]
-        mask[p] = mask[p] | _covered(back, front)
+        mask[p] = mask[p] | _sector_mask(back, front)
 
 
 @kernel
-def _pair(here: Array, p: Any, there: Array, q: Any) -> Any:
+def _direction(receiver: Array, p: Any, sender: Array, q: Any) -> Any:
     """Return d and n . d of a receiver and a sample."""
-    dx = there[X, q] - here[X, p]
-    dy = there[X + 1, q] - here[X + 1, p]
-    dz = there[X + 2, q] - here[X + 2, p]
-    return dx, dy, dz, here[N, p] * dx + here[N + 1, p] * dy + here[N + 2, p] * dz
+    dx = sender[X, q] - receiver[X, p]
+    dy = sender[X + 1, q] - receiver[X + 1, p]
+    dz = sender[X + 2, q] - receiver[X + 2, p]
+    return dx, dy, dz, receiver[N, p] * dx + receiver[N + 1, p] * dy + receiver[N + 2, p] * dz
 
 
 @kernel
-def _transfer(there: Array, q: Any, dx: Any, dy: Any, dz: Any, c: Any, square: Any, weight: Any,
-              bulge: Any) -> Any:
-    """Return pi c s / (r^4 + s r) (Eq. 4, with its pi) or, without bulge, pi c s / r^4 (Eq. 3)."""
+def _transfer(sender: Array, q: Any, dx: Any, dy: Any, dz: Any, c: Any, square: Any, weight: Any,
+              disc: bool) -> Any:
+    """Return pi times the form factor of Eq. 4, or without `disc` of Eq. 3."""
     real = type(dx)
-    zero, least = real(0.0), real(LEAST)
-    s = -(there[N, q] * dx + there[N + 1, q] * dy + there[N + 2, q] * dz)
-    s = (s if s > zero else zero) * (there[AREA, q] * weight)
-    below = square * square + bulge * s * math.sqrt(square)
-    return real(math.pi) * (c if c > zero else zero) * s / (below if below > least else least)
+    zero = real(0.0)
+    s = -(sender[N, q] * dx + sender[N + 1, q] * dy + sender[N + 2, q] * dz)
+    s = (s if s > zero else zero) * (sender[AREA, q] * weight)
+    return form_factor(real(math.pi) * (c if c > zero else zero), s, square, disc)
 
 
 @kernel
-def _heights(here: Array, p: Any, there: Array, q: Any, dx: Any, dy: Any, dz: Any, c: Any,
+def _heights(receiver: Array, p: Any, sender: Array, q: Any, dx: Any, dy: Any, dz: Any, c: Any,
              thickness: Any) -> Any:
     """Return q of a sample's front and back, 0 to 2; both 0 where there is no surface."""
     zero = type(dx)(0.0)
-    toward = here[X, p] * dx + here[X + 1, p] * dy + here[X + 2, p] * dz
-    x = -toward * here[INVERSE, p]  # along the receiver's direction to the eye
+    toward = receiver[X, p] * dx + receiver[X + 1, p] * dy + receiver[X + 2, p] * dz
+    x = -toward * receiver[INVERSE, p]  # along the receiver's direction to the eye
     # |p x d| and not the root of d^2 - x^2, of which nothing is left where one of both is near the eye
-    ax = here[X + 1, p] * dz - here[X + 2, p] * dy
-    ay = here[X + 2, p] * dx - here[X, p] * dz
-    az = here[X, p] * dy - here[X + 1, p] * dx
-    y = math.sqrt(ax * ax + ay * ay + az * az) * here[INVERSE, p]
+    ax = receiver[X + 1, p] * dz - receiver[X + 2, p] * dy
+    ay = receiver[X + 2, p] * dx - receiver[X, p] * dz
+    az = receiver[X, p] * dy - receiver[X + 1, p] * dx
+    y = math.sqrt(ax * ax + ay * ay + az * az) * receiver[INVERSE, p]
     # the back lies on the sample's ray from the eye: further by a share of all that grows along it
-    share, length, facing = thickness * there[INVERSE, q], here[LENGTH, p], here[FACING, p]
+    share, length, facing = thickness * sender[INVERSE, q], receiver[LENGTH, p], receiver[FACING, p]
     front = _height(x, y, c, facing)
     back = _height(x + share * (x - length), y + share * y, c + share * (c - facing * length), facing)
-    seen = there[INVERSE, q] > zero
-    return front if seen else zero, back if seen else zero
+    visibility = sender[INVERSE, q] > zero
+    return front if visibility else zero, back if visibility else zero
 
 
 @kernel
@@ -224,8 +225,8 @@ def _height(x: Any, y: Any, c: Any, facing: Any) -> Any:
 
 
 @kernel
-def _seen(height: Any, highest: Any, mask: Any) -> Any:
-    """Return how much of a sample is seen, 0 to 1."""
+def _visibility(height: Any, highest: Any, mask: Any) -> Any:
+    """Return the visibility of a sample, 0 to 1."""
     real, last = type(height), np.int32(SECTORS - 1)
     one = real(1.0)
     place = height * real(SECTORS // 2) + real(0.5)
@@ -238,15 +239,15 @@ def _seen(height: Any, highest: Any, mask: Any) -> Any:
 
 
 @kernel
-def _covered(back: Any, front: Any) -> Any:
+def _sector_mask(back: Any, front: Any) -> Any:
     """Return the sectors whose middles lie between the heights of back and front."""
     real = type(front)
     half, sectors = real(0.5), real(SECTORS // 2)
-    return np.uint32(_below(np.int32(front * sectors + half)) & ~_below(np.int32(back * sectors + half)))
+    return np.uint32(_bits_below(np.int32(front * sectors + half)) & ~_bits_below(np.int32(back * sectors + half)))
 
 
 @kernel
-def _below(sector: Any) -> Any:
+def _bits_below(sector: Any) -> Any:
     """Return the bits of all sectors before one, 0 to 32 or more."""
     last = min(sector, np.int32(SECTORS))
     half = np.uint32(last >> 1) & np.uint32(31)  # no shift reaches 32 bits, which processors disagree about
@@ -272,27 +273,27 @@ def _store(packed: Array, row: Any, lines: Array, factor: Any, result: Array) ->
 
 
 @kernel(parallel=True)
-def _march_pixels(packed: Array, steps: Steps, key: Any, thickness: Any, bulge: Any, factor: Any,
+def _march_pixels(packed: Array, steps: SliceCounts, key: Any, thickness: Any, disc: bool, factor: Any,
                   result: Array) -> None:
     for prow in prange(packed.shape[0]):
         row = np.int64(prow)
-        count = steps.disc + steps.crown + steps.blockers
+        count = steps.disc + steps.crown + steps.occluders
         offsets, length = np.empty((steps.slices, count, 2), np.int32), np.empty(count)
         weight = np.empty((steps.slices, count))
         lines, mask = np.zeros((SCRATCH, packed.shape[2]), packed.dtype), np.zeros(packed.shape[2], np.uint32)
         for column in range(packed.shape[2]):
             fill_slices(steps, pixel_key(row_key(key, row), column), False, length, offsets, weight)
             for k in range(steps.slices):
-                _march_pixel(packed, row, column, offsets[k], weight[k], thickness, bulge, lines, mask)
+                _march_pixel(packed, row, column, offsets[k], weight[k], thickness, disc, lines, mask)
         _join(lines)
         _store(packed, row, lines, factor, result)
 
 
 @kernel
-def _march_pixel(packed: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any, bulge: Any,
+def _march_pixel(packed: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any, disc: bool,
                  lines: Array, mask: Array) -> None:
     rows, columns = packed.shape[0], packed.shape[2]
-    here, part, one, p = packed[row], np.uint64(PART), np.uint64(1), np.uint64(column)
+    receiver, part, one, p = packed[row], np.uint64(PART), np.uint64(1), np.uint64(column)
     mask[p], lines[HIGHEST, p] = np.uint32(0), packed.dtype.type(0.0)
     for j in range(offsets.shape[0]):
         a, b = row + np.int64(offsets[j, 1]), column + np.int64(offsets[j, 0])
@@ -300,6 +301,6 @@ def _march_pixel(packed: Array, row: Any, column: Any, offsets: Array, weight: A
             continue
         if weight[j] > 0.0:
             stands_for = packed.dtype.type(weight[j])
-            _light(here, p, packed[a], np.uint64(b), one, stands_for, bulge, thickness, lines, mask, part)
+            _add_sample(receiver, p, packed[a], np.uint64(b), one, stands_for, disc, thickness, lines, mask, part)
         else:
-            _block(here, p, packed[a], np.uint64(b), one, thickness, lines, mask)
+            _add_occluder(receiver, p, packed[a], np.uint64(b), one, thickness, lines, mask)

@@ -1,7 +1,7 @@
-"""Where the samples of a visibility bitmask lie: in slices, directions of the picture that are marched from a receiver.
+"""Offsets of the samples of a visibility bitmask, in slices: directions of the picture marched from a receiver.
 
-A slice holds the samples of its share of crown and disc, and blockers: samples of weight 0 that only block. Offsets are
-whole texels (ox, oy) as in `crown.pattern`, nearest first.
+A slice holds the samples of its share of crown and disc, and occluders: samples of weight 0 that only occlude. Offsets
+are whole texels (ox, oy) as in `crown.pattern`, nearest first.
 """
 
 import math
@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sampling import hash_bits
-from refgi.sssil.crown.pattern import level_key, row_key
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.crown.points import level_key, row_key
+from refgi.sssil.settings import Bitmask, SamplingSettings
 
 Array = npt.NDArray[Any]
 
@@ -21,28 +21,30 @@ GOLDEN = 0.6180339887498949  # turns the samples of one slice against those of t
 TO_UNIT = 2.0**-32
 
 
-class Steps(NamedTuple):
-    """How densely slices are sampled."""
+class SliceCounts(NamedTuple):
+    """Numbers of samples of a slice."""
 
     slices: int
     disc: int  # samples of each slice in the inner disc
     crown: int  # and in the crown
-    blockers: int  # and in the inner disc to block alone
+    occluders: int  # and in the inner disc to block alone
     radius: float  # of the crown, texels
 
     @property
     def per_slice(self) -> int:
         """Samples of a slice."""
-        return self.disc + self.crown + self.blockers
+        return self.disc + self.crown + self.occluders
 
 
-def steps_of(settings: HssilSettings, index: int, radius: float) -> Steps:
+def slice_counts(sampling: SamplingSettings, bitmask: Bitmask, index: int, radius: float) -> SliceCounts:
     """Return how densely the slices of a level are sampled.
 
     Parameters
     ----------
-    settings : HssilSettings
-        Samples of crown and disc, shared out to slices; at least one a slice.
+    sampling : SamplingSettings
+        Samples of crown and disc, distributed over slices; at least one a slice.
+    bitmask : Bitmask
+        Number of slices.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     radius : float
@@ -50,28 +52,28 @@ def steps_of(settings: HssilSettings, index: int, radius: float) -> Steps:
 
     Returns
     -------
-    Steps
-        With half as many blockers as the crown has samples.
+    SliceCounts
+        With half as many occluders as the crown has samples.
     """
-    slices = settings.slice_count
-    crown = max(1, round(settings.samples / slices))
-    disc = max(1, round(settings.inner / slices)) if index == 0 and settings.inner else 0
-    return Steps(slices, disc, crown, (crown + 1) // 2, radius)
+    slices = bitmask.count(sampling.samples)
+    crown = max(1, round(sampling.samples / slices))
+    disc = max(1, round(sampling.inner / slices)) if index == 0 and sampling.inner else 0
+    return SliceCounts(slices, disc, crown, (crown + 1) // 2, radius)
 
 
-def slice_offsets(settings: HssilSettings, steps: Steps, number: int, rows: int) -> tuple[Array, Array]:
+def slice_offsets(sampling: SamplingSettings, steps: SliceCounts, number: int, rows: int) -> tuple[Array, Array]:
     """Return the samples that a row of receivers shares, slice by slice.
 
     Parameters
     ----------
-    settings : HssilSettings
+    sampling : SamplingSettings
         Pattern ("row" or "fixed") and seed.
     steps : Steps
         Of `steps_of`.
     number : int
-        Which level of the pyramid.
+        Number of the level in the pyramid.
     rows : int
-        How many rows there are.
+        Rows of the level.
 
     Returns
     -------
@@ -81,15 +83,15 @@ def slice_offsets(settings: HssilSettings, steps: Steps, number: int, rows: int)
     weight : (rows, slices, n) ndarray of float64
         Texels of the level that each sample stands for; 0 for a blocker.
     """
-    fixed = settings.pattern == "fixed"
+    fixed = sampling.pattern == "fixed"
     shape = (1 if fixed else rows, steps.slices, steps.per_slice)
     offsets, weight = np.empty((*shape, 2), np.int32), np.empty(shape)
-    _fill_rows(steps, level_key(settings.seed, number), fixed, offsets, weight)
+    _fill_rows(steps, level_key(sampling.seed, number), fixed, offsets, weight)
     return offsets, weight
 
 
 @kernel(parallel=True)
-def _fill_rows(steps: Steps, key: Any, fixed: bool, offsets: Array, weight: Array) -> None:
+def _fill_rows(steps: SliceCounts, key: Any, fixed: bool, offsets: Array, weight: Array) -> None:
     for row in prange(offsets.shape[0]):
         here = key if fixed else row_key(key, np.int64(row))
         length = np.empty(offsets.shape[2])
@@ -97,23 +99,11 @@ def _fill_rows(steps: Steps, key: Any, fixed: bool, offsets: Array, weight: Arra
 
 
 @kernel
-def fill_slices(steps: Steps, key: Any, mirrored: bool, length: Array, offsets: Array, weight: Array) -> None:
-    """Write the samples around one receiver.
+def fill_slices(steps: SliceCounts, key: Any, mirrored: bool, length: Array, offsets: Array, weight: Array) -> None:
+    """Write the samples around one receiver: `offsets` (slices, n, 2) and `weight` (slices, n).
 
-    Parameters
-    ----------
-    steps : Steps
-        How densely.
-    key : uint32
-        Draws the turn of the slices and the shift of samples along them.
-    mirrored : bool
-        Whether slices come in pairs of mirror images.
-    length : (n,) ndarray of float64
-        Scratch.
-    offsets : (slices, n, 2) ndarray of int32
-        Filled.
-    weight : (slices, n) ndarray of float64
-        Filled.
+    `key` draws the turn of the slices and the shift of samples along them; `mirrored`: slices come in pairs of mirror
+    images; `length` (n,) is scratch.
     """
     turn, shift = hash_bits(key) * TO_UNIT, hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT
     pairs = steps.slices // 2
@@ -132,12 +122,12 @@ def fill_slices(steps: Steps, key: Any, mirrored: bool, length: Array, offsets: 
 
 
 @kernel
-def _fill_lengths(steps: Steps, shift: float, length: Array, weight: Array) -> None:
-    """Write how far the samples of a slice lie from the receiver, rising, and what each stands for."""
+def _fill_lengths(steps: SliceCounts, shift: float, length: Array, weight: Array) -> None:
+    """Write the distances of a slice's samples from the receiver, rising, and the number of texels each stands for."""
     share = math.pi * steps.radius**2 / steps.slices
     filled = 0
-    for j in range(steps.blockers):
-        filled = _insert(steps.radius * (j + shift) / steps.blockers, 0.0, filled, length, weight)
+    for j in range(steps.occluders):
+        filled = _insert(steps.radius * (j + shift) / steps.occluders, 0.0, filled, length, weight)
     for j in range(steps.disc):
         u = (j + shift) / steps.disc
         filled = _insert(steps.radius * math.sqrt(u), share / steps.disc, filled, length, weight)

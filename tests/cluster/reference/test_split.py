@@ -34,7 +34,7 @@ def test_the_picture_of_exact_shadows_is_that_of_vpl(evidence):
     frame = Frame(load_scene("cornell_box"), width=20, height=20, rsm_resolution=64)
     settings = of(ValSettings, lights=100)
     exact = exact_shadows(frame, choose_lights(frame, settings), settings)
-    reference = vpl(frame, VplSettings(lights=100))
+    reference = vpl(frame, of(VplSettings, lights=100))
     off = np.abs(exact - reference).max() / reference.max()
     evidence(f"100 area lights of one light each, V by rays: {off:.1e} of the maximum off the method vpl")
     assert off < ROUNDING

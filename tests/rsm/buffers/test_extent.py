@@ -9,7 +9,8 @@ from refgi import Frame, load_scene, rays
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, Geometry, SpotLight
 from refgi.scene.model import Camera, Scene
-from refgi.settings import of
+from refgi.settings import flat, of, replaced
+from refgi.settings.keys import find_key
 from refgi.splat.sii.settings import SiiSettings
 from refgi.stages import observe
 
@@ -65,9 +66,13 @@ def made_of(scene, **changes):
     return dataclasses.replace(scene, materials=tuple(dataclasses.replace(m, **changes) for m in scene.materials))
 
 
+def settings_of(method, changes):
+    return of(find_method(method).settings, **changes)
+
+
 @pytest.mark.parametrize(("method", "changes"), CASES, ids=lambda value: str(value))
 def test_a_plane_that_nobody_sees_changes_no_pixel(method, changes, evidence):
-    settings = of(find_method(method).settings, **changes)
+    settings = settings_of(method, changes)
     plain, off = render(room(), method, settings, **SIZE).irradiance.astype(float), {}
     for half in HALVES:
         with_plane = render(room(half), method, settings, **SIZE).irradiance
@@ -83,8 +88,8 @@ def test_the_plane_is_not_what_the_settings_refer_to():
     for method, changes, key in (("val", {**VAL, "interleaving": 4, "blur_extent": 0.05}, "blur_extent"),
                                  ("hssil", {"visibility": "bitmask"}, "thickness"),
                                  ("gather", {"samples": 64, "grid": 6, "reach": 0.1}, "reach")):
-        settings = of(find_method(method).settings, **changes)
-        smaller = dataclasses.replace(settings, **{key: getattr(settings, key) / 10})
+        settings = settings_of(method, changes)
+        smaller = replaced(settings, {key: flat(settings)[find_key(settings, key).key] / 10})
         one, other = (render(room(), method, s, **SIZE).irradiance for s in (settings, smaller))
         assert np.abs(one - other).max() > 1e3 * CHANGE * one.mean()
 
@@ -94,7 +99,8 @@ def test_extents_are_the_boxes_of_what_is_seen_and_lit(half):
     frame = Frame(room(half), **SIZE)
     seen = frame.gbuffer.position[:, frame.gbuffer.covered].astype(float)
     lit = frame.rsms[0].position[:, frame.rsms[0].flux.any(axis=0)].astype(float)
-    for extent, places in ((frame.seen_extent, seen), (frame.lit_extent, lit), (frame.extent, np.hstack([seen, lit]))):
+    for extent, places in ((frame.visible_extent, seen), (frame.illuminated_extent, lit),
+                           (frame.extent, np.hstack([seen, lit]))):
         np.testing.assert_array_equal(extent.low, places.min(axis=1))
         np.testing.assert_array_equal(extent.high, places.max(axis=1))
         assert extent.diagonal == pytest.approx(np.linalg.norm(np.ptp(places, axis=1)), rel=ROUNDING)
@@ -104,7 +110,7 @@ def test_extents_are_the_boxes_of_what_is_seen_and_lit(half):
 
 def test_a_grid_of_texels_finds_the_box_of_a_fine_map(evidence):
     """What 96 texels a side miss of a map of 512: one in five at either end."""
-    coarse, fine = (Frame(room(), **{**SIZE, "rsm_resolution": n}).lit_extent for n in (96, 512))
+    coarse, fine = (Frame(room(), **{**SIZE, "rsm_resolution": n}).illuminated_extent for n in (96, 512))
     off = max(np.abs(coarse.low - fine.low).max(), np.abs(coarse.high - fine.high).max()) / fine.diagonal
     assert off < 0.01
     evidence(f"extent of the light by 96 of 512 texels a side: off by {off:.4f} of the diagonal")
@@ -112,20 +118,20 @@ def test_a_grid_of_texels_finds_the_box_of_a_fine_map(evidence):
 
 def test_a_lobe_alone_is_lit_as_well():
     scene = room()
-    shining = Frame(made_of(scene, diffuse=(0.0,) * 3, specular=(0.5,) * 3, exponent=20.0), **SIZE).lit_extent
-    np.testing.assert_array_equal(shining, Frame(scene, **SIZE).lit_extent)
+    shining = Frame(made_of(scene, diffuse=(0.0,) * 3, specular=(0.5,) * 3, exponent=20.0), **SIZE).illuminated_extent
+    np.testing.assert_array_equal(shining, Frame(scene, **SIZE).illuminated_extent)
 
 
 def test_without_light_or_view_the_extent_is_that_of_all_triangles():
     scene = room()
     black = made_of(scene, diffuse=(0.0,) * 3)
     away = scene.with_camera(eye=(0.0, 5.0, 0.0), target=(0.0, 9.0, 1.0))
-    for extent in (Frame(black, **SIZE).lit_extent, Frame(away, **SIZE).seen_extent):
+    for extent in (Frame(black, **SIZE).illuminated_extent, Frame(away, **SIZE).visible_extent):
         np.testing.assert_array_equal(extent, scene.geometry.bounds)
 
 
-@pytest.mark.parametrize(("which", "not_run"), [("seen_extent", "rsm.reflective_shadow_map"),
-                                                ("lit_extent", "rsm.gbuffer")])
+@pytest.mark.parametrize(("which", "not_run"), [("visible_extent", "rsm.reflective_shadow_map"),
+                                                ("illuminated_extent", "rsm.gbuffer")])
 def test_an_extent_asks_for_no_buffer_that_it_does_not_need(which, not_run):
     with observe() as log:
         getattr(Frame(room(), **SIZE), which)
@@ -138,7 +144,7 @@ def test_screen_space_visibility_needs_no_rsm():
     method = find_method("hssil")
     run, kind = method.function, method.settings
     with observe() as log:
-        run(frame, kind(visibility="bitmask"))
+        run(frame, of(kind, visibility="bitmask"))
     assert "rsm.reflective_shadow_map" not in {run.name for run in log.runs}
 
 
@@ -151,10 +157,10 @@ def test_rays_of_openness_are_a_tenth_of_what_lights_reach(monkeypatch):
 
     monkeypatch.setattr(rays, "openness", noted)
     render(scene, "sii", of(SiiSettings, lights=16, openness_flux="scale"), **SIZE)
-    assert asked == [pytest.approx(Frame(scene, **SIZE).lit_extent.diagonal / 10)]
+    assert asked == [pytest.approx(Frame(scene, **SIZE).illuminated_extent.diagonal / 10)]
 
 
 def test_directional_light_reaches_the_plane():
     """A plane below a room is not hidden from a light from below: it takes part."""
     scene = room(1e3).with_lights(DirectionalLight((0.0, 1.0, 0.1), (1.0, 1.0, 1.0)))
-    assert Frame(scene, **SIZE).lit_extent.diagonal > 1e3
+    assert Frame(scene, **SIZE).illuminated_extent.diagonal > 1e3

@@ -8,12 +8,12 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.rsm import gbuffer
-from refgi.rsm.buffers.attributes import Wanted
+from refgi.rsm.buffers.attributes import ChannelMask
 from refgi.scene import Camera, Material, material_table
 from tests.naive import raster as naive
 from tests.rsm.shapes import geometry, soup, sphere
 
-CHANNELS = (*Wanted._fields, "triangle_id", "covered")
+CHANNELS = (*ChannelMask._fields, "triangle_id", "covered")
 MATERIALS = (Material(diffuse=(0.1, 0.2, 0.3)), Material(diffuse=(0.4, 0.5, 0.6)), Material(diffuse=(0.7, 0.8, 0.9)))
 CAMERA = Camera((0.4, 0.3, 2.5), (0.1, 0, 0), vfov=math.radians(55), width=44, height=36)
 FLOAT64 = 1e-12  # two ways to the same point in float64; cancellation at grazing angles costs some digits

@@ -12,6 +12,7 @@ from refgi.methods import find_method, render
 from refgi.rsm.buffers.light_projection import incident_flux, light_projection
 from refgi.scene import SpotLight, load_scene
 from refgi.scene.gltf import read_gltf
+from refgi.settings import of
 from tests.scene.samples import SCENE, glb_bytes, gltf_tree, write_scene
 
 RIGHT = math.pi / 2
@@ -50,7 +51,7 @@ def test_a_perspective_map_of_a_half_space_is_refused_with_the_maps_that_suit(ro
 @pytest.mark.parametrize("method", ["sii", "val", "vpl", "hssil", "truth"])
 def test_ninety_degrees_light_as_the_angles_just_below(room, method):
     settings_class = find_method(method).settings
-    settings = settings_class(lights=256) if method in ("sii", "val", "vpl") else settings_class()
+    settings = of(settings_class, lights=256) if method in ("sii", "val", "vpl") else settings_class()
     below, wide = (render(room.with_lights(dataclasses.replace(room.lights[0], inner_half_angle=0.5,
                                                                outer_half_angle=angle)), method, settings)
                    for angle in (ALMOST, RIGHT))

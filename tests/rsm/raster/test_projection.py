@@ -11,10 +11,10 @@ from refgi.rsm.raster.projection import (
     cube_projection,
     directional_projection,
     dual_paraboloid_projection,
-    look_frame,
     paraboloid_projection,
     project,
     spot_projection,
+    view_frame,
 )
 from refgi.scene import Camera, DirectionalLight, SpotLight
 
@@ -82,7 +82,7 @@ def test_pictures_are_the_right_way_round():
 def test_frames_are_right_handed():
     rng = np.random.default_rng(1)
     for forward in [*rng.normal(size=(20, 3)), (0, 1, 0), (0, -1, 0), (0, 0, 1)]:
-        frame = look_frame(forward)
+        frame = view_frame(forward)
         np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15 * 8)
         assert np.linalg.det(frame) > 0
         np.testing.assert_allclose(frame[2], forward / np.linalg.norm(forward))

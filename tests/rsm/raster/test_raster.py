@@ -15,8 +15,8 @@ from refgi.rsm.raster.projection import (
     cube_projection,
     directional_projection,
     dual_paraboloid_projection,
-    look_frame,
     paraboloid_projection,
+    view_frame,
 )
 from refgi.rsm.raster.visibility_buffer import rasterize
 from refgi.scene import Camera, DirectionalLight
@@ -93,7 +93,7 @@ def test_a_sheet_covers_each_texel_exactly_once(kind):
         flat = sheet(5, rng, 0.4)
         turn = rotation(rng)
         shape = geometry(40 * flat.vertices @ turn.T + turn[:, 2], flat.faces)
-        above, along = -turn[None, :, 2], look_frame(turn[:, 2])[None]
+        above, along = -turn[None, :, 2], view_frame(turn[:, 2])[None]
         projection = {
             "perspective": camera_projection(Camera((0, 0, 0), tuple(turn[:, 2]), tuple(turn[:, 1]), 1.5, 37, 29)),
             "orthographic": Projection(ORTHOGRAPHIC, 31, 33, above, along, np.array([20.0, 25.0]), 10.0),
@@ -107,7 +107,7 @@ def test_a_sheet_covers_each_texel_exactly_once(kind):
 
 
 def test_shared_edges_and_vertices_on_texel_centres_belong_to_one_triangle():
-    projection = Projection(ORTHOGRAPHIC, 16, 16, np.array([[0.0, 0, 4]]), look_frame((0, 0, -1), (0, 1, 0))[None],
+    projection = Projection(ORTHOGRAPHIC, 16, 16, np.array([[0.0, 0, 4]]), view_frame((0, 0, -1), (0, 1, 0))[None],
                             np.array([1.0, 1.0]), 8.0)  # fmt: skip
     for n in (4, 8, 16, 32):
         flat = sheet(n)
@@ -128,7 +128,7 @@ def test_planes_through_texel_centres_of_a_paraboloid_belong_to_one_triangle():
 
 
 def test_a_lone_quad_owns_its_top_and_left_border():
-    projection = Projection(ORTHOGRAPHIC, 8, 8, np.array([[0.0, 0, 4]]), look_frame((0, 0, -1), (0, 1, 0))[None],
+    projection = Projection(ORTHOGRAPHIC, 8, 8, np.array([[0.0, 0, 4]]), view_frame((0, 0, -1), (0, 1, 0))[None],
                             np.array([4.0, 4.0]), 8.0)  # fmt: skip
     quad = geometry([[-1.5, 1.5, 0], [0.5, 1.5, 0], [0.5, -0.5, 0], [-1.5, -0.5, 0]], [[0, 1, 2], [0, 2, 3]])
     seen = rasterize(quad, projection).triangle_id >= 0

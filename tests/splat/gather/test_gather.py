@@ -13,7 +13,7 @@ from refgi.settings import of
 from refgi.splat import GatherSettings, Receivers, SiiSettings, gather, sii
 from refgi.splat.gather.gather import gather_counted, gather_irradiance
 from refgi.splat.gather.gather_sum import disc_pattern
-from refgi.splat.gather.interpolation import Agreement, coarse_pixels, interpolate
+from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, interpolate
 from tests.naive import eq2
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -28,7 +28,7 @@ def box():
 
 @pytest.fixture(scope="module")
 def full_sum(box):
-    return sii(box, of(SiiSettings, pattern="all", i_low=0))
+    return sii(box, of(SiiSettings, pattern="all"))
 
 
 def relative(image, reference):
@@ -58,7 +58,7 @@ def test_pattern_lies_in_the_disc(seed):
 @pytest.mark.parametrize("offset", [0.0, 0.03])
 def test_sum_is_that_of_the_twin(offset):
     frame = Frame(load_scene("cornell_box"), width=12, height=12, dtype=np.float64, rsm_resolution=32)
-    got = gather(frame, GatherSettings(samples=60, radius=0.4, grid=0, offset=offset))
+    got = gather(frame, of(GatherSettings, samples=60, radius=0.4, interpolation="none", offset=offset))
     (rsm,) = frame.rsms
     row, column, _ = rsm.project(frame.gbuffer.position)
     seen = np.argwhere(frame.gbuffer.covered & np.isfinite(row))
@@ -71,7 +71,7 @@ def test_sum_is_that_of_the_twin(offset):
 
 @pytest.mark.feature("SII-25")
 def test_converges_to_the_full_sum(box, full_sum, evidence):
-    errors = [relative(gather(box, GatherSettings(samples=s, radius=WHOLE_MAP, grid=0)), full_sum)
+    errors = [relative(gather(box, of(GatherSettings, samples=s, radius=WHOLE_MAP, interpolation="none")), full_sum)
               for s in (156, 1020, 10_000, 100_000)]
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 5e-3
@@ -86,19 +86,20 @@ def test_paper_presets_of_samples_and_radius(box, full_sum, evidence):
     """A small disc misses the light of the rest of the map; the preset's samples lower the noise, not that loss."""
     found = []
     for samples in (156, 308, 1020):
-        got = gather(box, GatherSettings(samples=samples))
+        got = gather(box, of(GatherSettings, samples=samples))
         assert got.mean() < full_sum.mean()
         found.append(f"S = {samples}: {got.mean() / full_sum.mean():.3f}")
-    wide = [gather(box, GatherSettings(samples=5000, radius=r, grid=0)).mean() for r in (0.1, 0.3, 0.6, WHOLE_MAP)]
+    wide = [gather(box, of(GatherSettings, samples=5000, radius=r, interpolation="none")).mean()
+            for r in (0.1, 0.3, 0.6, WHOLE_MAP)]
     assert wide == sorted(wide)
     evidence("share of the full sum at r_max = 0.3: " + ", ".join(found))
 
 
 @pytest.mark.feature("SII-25")
 def test_published_weight_loses_light(box, full_sum, evidence):
-    how = {"samples": 20_000, "radius": WHOLE_MAP, "grid": 0}
-    plain = gather(box, GatherSettings(**how))
-    squared = gather(box, GatherSettings(**how, as_published=frozenset({"rsm_weight_squared"})))
+    how = {"samples": 20_000, "radius": WHOLE_MAP, "interpolation": "none"}
+    plain = gather(box, of(GatherSettings, **how))
+    squared = gather(box, of(GatherSettings, **how, as_published=frozenset({"rsm_weight_squared"})))
     assert relative(plain, full_sum) < 0.02
     assert relative(squared, full_sum) > 0.1
     evidence(f"rsm_weight_squared: {squared.mean() / full_sum.mean():.3f} of the full sum, mean |error| "
@@ -109,9 +110,9 @@ def test_published_weight_loses_light(box, full_sum, evidence):
                                    DirectionalLight((0.3, -1.0, 0.4), (1.0, 1.0, 1.0))])
 def test_other_lights_converge_too(box, light):
     frame = Frame(box.scene.with_lights(light), width=16, height=16, rsm_resolution=32)
-    full = sii(frame, of(SiiSettings, pattern="all", i_low=0))
-    got = gather(frame, GatherSettings(samples=200_000, radius=10.0 if isinstance(light, PointLight) else WHOLE_MAP,
-                                       grid=0))
+    full = sii(frame, of(SiiSettings, pattern="all"))
+    got = gather(frame, of(GatherSettings, samples=200_000, radius=10.0 if isinstance(light, PointLight) else WHOLE_MAP,
+                                  interpolation="none"))
     assert full.mean() > 0
     assert relative(got, full) < 0.05
 
@@ -119,12 +120,12 @@ def test_other_lights_converge_too(box, light):
 @pytest.mark.feature("SII-25")
 def test_interpolation_saves_work_and_costs_little(evidence):
     frame = Frame(load_scene("cornell_box"), width=256, height=256, rsm_resolution=64)
-    exact = gather(frame, GatherSettings(grid=0))
-    result = gather_counted(frame, GatherSettings(grid=64))
+    exact = gather(frame, of(GatherSettings, interpolation="none"))
+    result = gather_counted(frame, of(GatherSettings, grid=64))
     assert result.covered == np.count_nonzero(frame.gbuffer.covered)
     assert result.evaluated < 0.4 * result.covered
     assert relative(result.irradiance, exact) < 0.06
-    all_of_them = gather_counted(frame, GatherSettings(grid=64, reach=0.0))
+    all_of_them = gather_counted(frame, of(GatherSettings, grid=64, reach=0.0))
     np.testing.assert_array_equal(all_of_them.irradiance, exact)
     assert all_of_them.evaluated == result.covered
     evidence(f"64^2 of 256^2: {result.evaluated} of {result.covered} pixels run the sum, mean |difference| "
@@ -144,7 +145,7 @@ def test_interpolation_is_bilinear_on_a_plane():
     floor = plane(20, 30)
     light = np.stack([1 + floor.position[0], 2 + floor.position[1], floor.position[0] * 0 + 5])
     coarse = coarse_pixels(20, 30, 5)
-    got, done = interpolate(floor, light, coarse, Agreement(0.9, 100.0))
+    got, done = interpolate(floor, light, coarse, SimilarityLimits(0.9, 100.0))
     assert done.all()
     inside = np.s_[:, coarse[0][0] : coarse[0][-1] + 1, coarse[1][0] : coarse[1][-1] + 1]
     np.testing.assert_allclose(got[inside], light[inside], rtol=1e-12)
@@ -154,7 +155,7 @@ def test_interpolation_keeps_to_one_side_of_a_step():
     floor = plane(16, 16)
     floor.position[2, :, 8:] = 50  # a cliff
     light = np.where(floor.position > 1e9, 0, np.where(np.arange(16) < 8, 1.0, 9.0))
-    got, done = interpolate(floor, light, coarse_pixels(16, 16, 4), Agreement(0.9, 20.0))
+    got, done = interpolate(floor, light, coarse_pixels(16, 16, 4), SimilarityLimits(0.9, 20.0))
     np.testing.assert_allclose(got[:, done], light[:, done])
     assert 0.4 < done.mean() < 1
 
@@ -163,22 +164,22 @@ def test_interpolation_keeps_to_one_side_of_a_step():
 def test_interpolation_at_any_size(size):
     floor = plane(*size)
     light = np.ones((3, *size))
-    got, done = interpolate(floor, light, coarse_pixels(*size, 4), Agreement(0.9, 1e9))
+    got, done = interpolate(floor, light, coarse_pixels(*size, 4), SimilarityLimits(0.9, 1e9))
     np.testing.assert_allclose(got[:, done], 1)
     assert done.any()
 
 
 @pytest.mark.feature("REF-19")
 def test_same_bits_for_any_threads_and_neighbours(box, evidence):
-    how = GatherSettings(samples=100, grid=16)
+    how = of(GatherSettings, samples=100, grid=16)
     whole = gather(box, how)
     with threads(1):
         np.testing.assert_array_equal(gather(box, how), whole)
     buffer = box.gbuffer
     some = buffer.covered & (np.random.default_rng(1).random(buffer.covered.shape) < 0.3)
     receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
-    np.testing.assert_array_equal(gather_irradiance(receivers._replace(covered=some), box.rsms, how),
-                                  gather_irradiance(receivers, box.rsms, how) * some)
+    np.testing.assert_array_equal(gather_irradiance(receivers._replace(covered=some), box.rsms, how.disc),
+                                  gather_irradiance(receivers, box.rsms, how.disc) * some)
     evidence("equal bits for 1 and 2 threads, and for 30 % of the pixels alone")
 
 
@@ -186,4 +187,4 @@ def test_settings_are_checked():
     for change in ({"samples": 0}, {"radius": 0.0}, {"seed": -1}, {"grid": -1}, {"least_cosine": 2.0}, {"reach": -1.0},
                    {"offset": math.inf}, {"offset": 1e300}, {"radius": 1e300}, {"as_published": {"xi"}}):
         with pytest.raises(InputError, match=next(iter(change))):
-            GatherSettings(**change)
+            of(GatherSettings, **change)

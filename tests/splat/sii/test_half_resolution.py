@@ -150,14 +150,14 @@ def test_error_and_cost_on_scenes(evidence):
     found = []
     for name in ("cornell_box", "stage", "atrium:faces=20000"):
         frame = Frame(load_scene(name), width=192, height=160, rsm_resolution=96)
-        settings = of(SiiSettings, i_low=0.0, lights=96, clamp="disc")
-        lights, area = choose_lights(frame, settings), footprints(frame, settings)
+        settings = of(SiiSettings, lights=96, clamp="disc")
+        lights, area = choose_lights(frame, settings.lights), footprints(frame, settings.lights, settings.pairs)
         receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
         counted = []
 
         def evaluate(some, lights=lights, settings=settings, area=area, counted=counted):
             counted.append(np.count_nonzero(some.covered))
-            return irradiance(some, lights, settings, area)
+            return irradiance(some, lights, settings.pairs, area)
 
         full = evaluate(receivers)
         errors = []

@@ -10,10 +10,10 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.rsm.raster.projection import CUBE_FORWARD, CUBE_UP
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
 from refgi.splat.sii.ledger import energy_ledger
-from refgi.splat.sii.ledger_sides import pixel_areas
+from refgi.splat.sii.ledger_terms import pixel_areas
 from refgi.stages import observe
 from tests.form_factors import polygon_form_factor
 from tests.naive import ledger as naive
@@ -26,24 +26,24 @@ FACETS = 4e-4  # of the lights' flux: 20,000 facets have 3.6e-4 less area than t
 RIM = 2e-4  # of a plate some 150 pixels wide: those on its rim count wholly or not
 GRAZING = 3e-3  # of what slanting lobes send: part of it runs along the light's own facet, 1.8e-3 of 80,000 facets
 TWIN = 1e-12  # of emitted: float64 sums in another order
-UNCUT = of(SiiSettings, i_low=0.0, lights=64)
+UNCUT = of(SiiSettings, lights=64)
 
 CASES = [
     ("cornell_box", {}),
-    ("cornell_box", {"irradiance_low": 0.3, "stochastic_range": True}),
-    ("cornell_box", {"irradiance_low": 0.05, "bound": "mesh", "mesh_faces": 8, "inflate": False}),
-    ("cornell_box", {"clamp": "disc", "i_low": 0.5}),
-    ("cornell_box", {"clamp": "sphere", "i_low": 0.0}),
+    ("cornell_box", {"cut_irradiance": 0.3, "stochastic": True}),
+    ("cornell_box", {"cut_irradiance": 0.05, "bound": "mesh", "bound_faces": 8, "bound_inflate": False}),
+    ("cornell_box", {"clamp": "disc", "cut_share": 0.5}),
+    ("cornell_box", {"clamp": "sphere"}),
     ("cornell_box", {"clamp": "geometry", "clamp_value": 30.0, "offset": 0.01}),
     ("cornell_box", {"clamp": "distance", "clamp_value": 0.05, "half_resolution": True}),
     ("cornell_box", {"source": "walk", "bounces": 3}),
     ("cornell_box", {"warp": "A", "importance": "openness", "openness_flux": "scale"}),
     ("cornell_box", {"warp": "B", "openness_flux": "roulette"}),
     ("cornell_box", {"as_published": {"sii_no_pi", "sii_no_tn", "per_light_ilow"}}),
-    ("ring", {"lobe_norm": "full_lobe", "i_low": 0.5}),
+    ("ring", {"lobe_norm": "full_lobe", "cut_share": 0.5}),
     ("ring", {"lobe_norm": "none", "widening": 0.5, "as_published": {"sii_widening"}, "clamp": "distance",
               "clamp_value": 0.05}),
-    ("ring", {"stochastic_range": True, "i_low": 0.5, "clamp": "disc"}),
+    ("ring", {"stochastic": True, "cut_share": 0.5, "clamp": "disc"}),
     ("glass_ball", {"refraction": "back_face"}),
     ("glass_ball", {"refraction": "none", "pattern": "grid", "lights": 64, "filtered": True}),
 ]
@@ -76,13 +76,13 @@ def test_what_a_setting_does_is_on_its_line(frames):
     signed = ("sampling", "bounced", "scaled", "printed", "interpolated", "cut", "clamped")
 
     def lines(name, **settings):
-        ledger = energy_ledger(frames(name), of(SiiSettings, **{"lights": 200, "i_low": 0.0} | settings))
+        ledger = energy_ledger(frames(name), of(SiiSettings, **{"lights": 200} | settings))
         return {line: float(getattr(ledger, line)[1] / ledger.emitted[1]) for line in signed if line != "sampling"}
 
     still = dict.fromkeys(signed[1:], 0.0)
     assert lines("cornell_box") == still
     for line, sign, settings in (
-        ("cut", 1, {"irradiance_low": 0.1}), ("clamped", 1, {"clamp": "distance", "clamp_value": 0.1}),
+        ("cut", 1, {"cut_irradiance": 0.1}), ("clamped", 1, {"clamp": "distance", "clamp_value": 0.1}),
         ("scaled", 1, {"openness_flux": "scale"}), ("bounced", -1, {"source": "walk", "bounces": 2}),
         ("printed", -1, {"as_published": {"sii_no_pi"}}),
     ):
@@ -106,7 +106,7 @@ def pixels_of(frame):
 def test_each_line_is_that_of_the_twin(name, threshold, evidence):
     """Oracle: kept, cut, clamped and behind from loops over pixels and lights, and together the full sum."""
     frame = Frame(load_scene(name), width=11, height=8, rsm_resolution=64, dtype=np.float64)
-    settings = of(SiiSettings, lights=24, irradiance_low=threshold, clamp="distance", clamp_value=0.05)
+    settings = of(SiiSettings, lights=24, cut_irradiance=threshold, clamp="distance", clamp_value=0.05)
     ledger = energy_ledger(frame, settings)
     expected = naive.screen(list(pixels_of(frame)), choose_lights(frame, settings), threshold, 0.05)
     error = {line: float(np.abs(getattr(ledger, line) - value).max() / ledger.emitted.max())
@@ -149,10 +149,10 @@ def test_lobes_below_the_horizon_are_behind(evidence):
                                  materials=(Material("gloss", (0.1,) * 3, (0.5,) * 3, 3.0),))
     found, stray = [], None
     for norm in ("clamped", "full_lobe", "none"):
-        settings = dataclasses.replace(UNCUT, lobe_norm=norm)
+        settings = replaced(UNCUT, {"lobe_norm": norm})
         frames = list(around(glossy, (0.1, -0.1, 0.2), 64, rsm_resolution=64))
         views = [energy_ledger(frame, settings) for frame in frames]
-        lights = choose_lights(frames[0], settings)
+        lights = choose_lights(frames[0], settings.lights)
         tilt = np.arccos(np.clip((lights.normal * lights.lobe_axis).sum(axis=0), -1, 1).astype(float))
         above = np.array([lobe_fraction(t, 3.0) for t in tilt])
         whole = 2 * math.pi / 4 if norm == "none" else 1.0
@@ -188,7 +188,7 @@ def test_flux_that_meets_a_plate_has_its_form_factor(below, evidence):
     """Analytic: a light under a plate sends it Phi F; seen from above the plate is met from behind."""
     scene, plate = plates(below)
     frame = Frame(scene, width=256, height=256, rsm_resolution=64)
-    ledger, lights = energy_ledger(frame, UNCUT), choose_lights(frame, UNCUT)
+    ledger, lights = energy_ledger(frame, UNCUT), choose_lights(frame, UNCUT.lights)
     factors = np.array([polygon_form_factor(p, n, plate) for p, n in zip(lights.position.T, lights.normal.T,
                                                                         strict=True)])
     met, missed = lights.flux @ factors, lights.flux @ (1 - factors)
@@ -205,13 +205,13 @@ def test_cut_follows_the_law_of_the_range(evidence):
     """Analytic (E-SII-15): of one light facing a plate at distance D a share (D / R0)^(4/3) is out of range."""
     scene, plate = plates(below=True)
     frame = Frame(scene, width=256, height=256, rsm_resolution=64)
-    one = dataclasses.replace(UNCUT, lights=1, pattern="grid")
-    light = choose_lights(frame, one)
+    one = replaced(UNCUT, {"lights": 1, "pattern": "grid"})
+    light = choose_lights(frame, one.lights)
     factor = polygon_form_factor(light.position[:, 0], light.normal[:, 0], plate)
     found = []
     for reach in (1.05, 1.1):  # R0 in plate distances: the lit disc lies inside the plate
         threshold = float(light.flux[0, 0]) / math.pi / reach**2
-        ledger = energy_ledger(frame, dataclasses.replace(one, irradiance_low=threshold))
+        ledger = energy_ledger(frame, replaced(one, {"cut_irradiance": threshold}))
         kept = 1 - reach ** (-4 / 3)
         cut = ledger.cut[0] / ledger.lights[0]
         assert cut == pytest.approx(factor - kept, abs=RIM)
@@ -223,11 +223,11 @@ def test_cut_follows_the_law_of_the_range(evidence):
 @pytest.mark.feature("REF-04")
 def test_the_random_range_cuts_nothing_in_the_mean(frames, evidence):
     """Statistical: the signed cut over 64 seeds is 0 within four of its standard errors, the plain cut is not."""
-    settings = of(SiiSettings, lights=64, irradiance_low=0.05)
+    settings = of(SiiSettings, lights=64, cut_irradiance=0.05)
     plain = energy_ledger(frames("cornell_box"), settings)
     lights = []
     for seed in range(64):
-        some = dataclasses.replace(settings, stochastic_range=True, seed=seed, pattern="grid")
+        some = replaced(settings, {"stochastic": True, "seed": seed, "pattern": "grid"})
         lights.append(energy_ledger(frames("cornell_box"), some).cut[1])
     mean, error = np.mean(lights), np.std(lights) / 8
     assert abs(mean) < 4 * error
@@ -295,5 +295,5 @@ def test_a_dark_scene_and_a_view_of_nothing_balance():
 def test_who_does_not_ask_does_not_pay(frames):
     frame = frames("cornell_box")
     with observe() as log:
-        sii(frame, of(SiiSettings, lights=32, irradiance_low=0.1))
+        sii(frame, of(SiiSettings, lights=32, cut_irradiance=0.1))
     assert not {"splat.ledger", "splat.cut"} & {run.name for run in log.runs}

@@ -1,6 +1,5 @@
 """The cut sum: literal twin, same bits for every bound, what it loses, its random range, its counts."""
 
-import dataclasses
 import math
 
 import numba
@@ -13,18 +12,18 @@ from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
 from refgi.pairs.ranged_sum import LANES, range_factor
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import PairSettings, Receivers, irradiance
 from refgi.splat.sii.reach.bounds import light_solids
 from refgi.splat.sii.reach.fragments import fragments, gather_bits
 from refgi.splat.sii.reach.screen_bounds import covered_pixels, screen_quads
 from refgi.splat.sii.reach.threshold import low_irradiance
-from refgi.splat.sii.settings import SplatSettings
-from refgi.splat.sii.splat import cut_irradiance, splat
+from refgi.splat.sii.settings import SiiSettings
+from refgi.splat.sii.sii import cut_irradiance, splat
 from tests.naive import bounds as naive
 from tests.pairs import sets
 
-CUT = of(SplatSettings, irradiance_low=0.05)
+CUT = of(SiiSettings, cut_irradiance=0.05)
 BOUNDS = ("full", "quad", "ellipsoid", "tangent", "mesh")
 ROUNDING = {np.float32: 3e-6, np.float64: 1e-14}  # as of the full sum
 TOGETHER = 1e-6  # kept and cut are rounded by themselves, in float32, before they are added
@@ -52,7 +51,7 @@ def test_sum_is_that_of_the_twin(real, evidence):
     receivers, lights = sets.room(rng, 60, real)
     args = (row(part) for part in receivers[:2])
     twin = sets.lights(*(part.astype(np.float64) for part in lights[:3]))
-    inside, outside, overdraw = naive.irradiance(*args, twin, CUT.irradiance_low)
+    inside, outside, overdraw = naive.irradiance(*args, twin, CUT.reach.cut.irradiance)
     for got, expected in ((splat(receivers, lights, CUT), inside), (cut_irradiance(receivers, lights, CUT), outside)):
         assert not row(got)[expected == 0].any()
         assert np.abs(row(got) - expected).max() < 100 * ROUNDING[real] * (inside + outside).mean()
@@ -67,9 +66,9 @@ def test_sum_is_that_of_the_twin(real, evidence):
 def test_kept_and_cut_make_the_full_sum(corner, clamp):
     receivers, lights, _ = corner
     footprint = np.full(lights.flux.shape[1], 1e-3)
-    how = of(SplatSettings, i_low=0.05, reference_length=0.1, **clamp)
+    how = of(SiiSettings, cut_share=0.05, reference_length=0.1, **clamp)
     full = irradiance(receivers, lights, of(PairSettings, **clamp), footprint)
-    for settings in (how, dataclasses.replace(how, stochastic_range=True, seed=5)):
+    for settings in (how, replaced(how, {"stochastic": True, "seed": 5})):
         kept = splat(receivers, lights, settings, footprint)
         cut = cut_irradiance(receivers, lights, settings, footprint)
         scale = np.abs(kept).max() + np.abs(cut).max() + full.max()
@@ -83,11 +82,11 @@ def test_without_a_threshold_nothing_changes(corner, real):
     receivers, lights, _ = corner
     receivers = Receivers(receivers.position.astype(real), receivers.normal.astype(real), receivers.covered)
     full = irradiance(receivers, lights, PairSettings())
-    for how in ({"i_low": 0.0}, {"irradiance_low": 0.0}, {"irradiance_low": 1e-20}, {"irradiance_low": 1e-300}):
-        np.testing.assert_array_equal(splat(receivers, lights, of(SplatSettings, **how)), full)
-    assert not cut_irradiance(receivers, lights, of(SplatSettings, i_low=0.0)).any()
-    assert not cut_irradiance(receivers, lights, of(SplatSettings, irradiance_low=1e-20)).any()
-    assert not splat(receivers, lights, of(SplatSettings, irradiance_low=1e20)).any()
+    for how in ({}, {"cut_irradiance": 1e-20}, {"cut_irradiance": 1e-300}):
+        np.testing.assert_array_equal(splat(receivers, lights, of(SiiSettings, **how)), full)
+    assert not cut_irradiance(receivers, lights, SiiSettings()).any()
+    assert not cut_irradiance(receivers, lights, of(SiiSettings, cut_irradiance=1e-20)).any()
+    assert not splat(receivers, lights, of(SiiSettings, cut_irradiance=1e20)).any()
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
@@ -96,20 +95,20 @@ def test_without_a_threshold_nothing_changes(corner, real):
 def test_every_bound_gives_the_same_picture(corner, real, glossy, evidence):
     receivers, lights, view = corner
     receivers = Receivers(receivers.position.astype(real), receivers.normal.astype(real), receivers.covered)
-    five_percent = of(SplatSettings, i_low=0.05, reference_length=0.15)
-    cases = [of(SplatSettings, irradiance_low=low_irradiance(lights, five_percent))]
+    five_percent = of(SiiSettings, cut_share=0.05, reference_length=0.15)
+    cases = [of(SiiSettings, cut_irradiance=low_irradiance(lights, five_percent))]
     if glossy:
         rng = np.random.default_rng(2)
         axis = sets.unit(lights.normal + 0.5 * sets.random_directions(rng, lights.flux.shape[1]))
         lights = lights._replace(lobe_flux=lights.flux[::-1], lobe_axis=axis,
                                  lobe_exponent=np.geomspace(0.5, 300, axis.shape[1]))
         if real == np.float32:
-            cases += [dataclasses.replace(cases[0], widening=0.2),
-                      dataclasses.replace(cases[0], widening=5.0, as_published={"sii_widening"})]
+            cases += [replaced(cases[0], {"widening": 0.2}),
+                      replaced(cases[0], {"widening": 5.0, "as_published": {"sii_widening"}})]
     for how in cases:
         pictures, counts = {}, {}
         for bound in BOUNDS if how is cases[0] else BOUNDS[:-1]:
-            settings = dataclasses.replace(how, bound=bound)
+            settings = replaced(how, {"bound": bound})
             pictures[bound] = splat(receivers, lights, settings, None, view)
             np.testing.assert_array_equal(pictures[bound], pictures["full"])
             if bound != "mesh":
@@ -117,7 +116,7 @@ def test_every_bound_gives_the_same_picture(corner, real, glossy, evidence):
                 np.testing.assert_array_equal(counts[bound].overdraw, counts["full"].overdraw)
         order = [count.evaluated for count in counts.values()]
         assert how.widening > 0 or order[0] > order[1] > order[2] > order[3]
-        assert not np.array_equal(pictures["full"], irradiance(receivers, lights, how))
+        assert not np.array_equal(pictures["full"], irradiance(receivers, lights, how.pairs))
         figures = ", ".join(f"{bound} {counts[bound].evaluated / counts['full'].total:.2f}" for bound in counts)
         evidence(f"{np.dtype(real).name}{', lobes' * glossy}: equal bits; pairs evaluated a fragment: {figures}")
 
@@ -126,7 +125,7 @@ def test_every_bound_gives_the_same_picture(corner, real, glossy, evidence):
 def test_fewer_pixels_are_drawn_by_tighter_bounds(corner, evidence):
     """Fragments that hardware would shade: the whole screen, quads, meshes of the ellipsoids, and those needed."""
     receivers, lights, view = corner
-    settings = of(SplatSettings, i_low=0.05, reference_length=0.1)
+    settings = of(SiiSettings, cut_share=0.05, reference_length=0.1)
     square = lights.flux.max(axis=0) / math.pi / low_irradiance(lights, settings)
     top, bottom, left, right = screen_quads(view, lights.position, np.sqrt(square))
     row, column = np.mgrid[: view.height, : view.width][..., None] + 0.5
@@ -143,18 +142,18 @@ def test_fewer_pixels_are_drawn_by_tighter_bounds(corner, evidence):
 
 def test_meshes_that_are_not_inflated_lose_pixels(corner):
     receivers, lights, view = corner
-    how = of(SplatSettings, i_low=0.05, reference_length=0.02, bound="mesh", mesh_faces=8, inflate=False)
+    how = of(SiiSettings, cut_share=0.05, reference_length=0.02, bound="mesh", bound_faces=8, bound_inflate=False)
     kept = splat(receivers, lights, how, None, view)
-    whole = splat(receivers, lights, dataclasses.replace(how, inflate=True), None, view)
+    whole = splat(receivers, lights, replaced(how, {"bound_inflate": True}), None, view)
     assert (kept <= whole).all()
     assert (kept < whole).any()
 
 
-@pytest.mark.parametrize("how", [{}, {"stochastic_range": True}])
+@pytest.mark.parametrize("how", [{}, {"stochastic": True}])
 def test_bits_do_not_depend_on_threads_or_neighbours(how):
     rng = np.random.default_rng(4)
     receivers, lights = sets.room(rng, 1111, np.float32)
-    settings = of(SplatSettings, irradiance_low=0.3, **how)
+    settings = of(SiiSettings, cut_irradiance=0.3, **how)
     with threads(1):
         whole = splat(receivers, lights, settings)
     with threads(min(2, numba.config.NUMBA_NUM_THREADS)):
@@ -181,10 +180,10 @@ def test_range_scales_with_the_scene(length):
 
 def test_threshold_is_one_irradiance_for_all_lights():
     light = sets.lights(np.zeros((3, 3)), np.array([[0.0] * 3, [0] * 3, [1] * 3]), [[1.0, 2, 3], [9, 1, 0], [0, 0, 5]])
-    settings = of(SplatSettings, i_low=0.1, reference_length=2.0)
+    settings = of(SiiSettings, cut_share=0.1, reference_length=2.0)
     assert low_irradiance(light, settings) == pytest.approx(0.1 * 9 / math.pi / 4)
-    assert low_irradiance(light, dataclasses.replace(settings, irradiance_low=7.0)) == 7
-    no_pi = dataclasses.replace(settings, as_published={"sii_no_pi"})
+    assert low_irradiance(light, replaced(settings, {"cut": "absolute", "cut_irradiance": 7.0})) == 7
+    no_pi = replaced(settings, {"as_published": {"sii_no_pi"}})
     assert low_irradiance(light, no_pi) == pytest.approx(0.1 * 9 / 4)
     lobe = sets.glossy(np.zeros((3, 1)), np.array([[0.0], [0], [1]]), np.array([[0.0], [0], [1]]), 10.0, 2.0)
     assert low_irradiance(lobe, settings) == pytest.approx(0.1 * 2 * 11 / (2 * math.pi) / 4)  # K = 1 upright
@@ -192,12 +191,12 @@ def test_threshold_is_one_irradiance_for_all_lights():
     assert low_irradiance(none, settings) == 0
 
 
-@pytest.mark.parametrize("how", [{"irradiance_low": 1e-320}, {"i_low": 1e-320, "reference_length": 1e9},
-                                 {"i_low": 1e-320, "reference_length": 1.0, "as_published": {"per_light_ilow"}}])
+@pytest.mark.parametrize("how", [{"cut_irradiance": 1e-320}, {"cut_share": 1e-320, "reference_length": 1e9},
+                                 {"cut_share": 1e-320, "reference_length": 1.0, "as_published": {"per_light_ilow"}}])
 def test_thresholds_near_0_cut_nothing(how):
     receivers, lights = sets.room(np.random.default_rng(31), 50)
-    settings = of(SplatSettings, **how)
-    np.testing.assert_array_equal(splat(receivers, lights, settings), irradiance(receivers, lights, settings))
+    settings = of(SiiSettings, **how)
+    np.testing.assert_array_equal(splat(receivers, lights, settings), irradiance(receivers, lights, settings.pairs))
     assert not cut_irradiance(receivers, lights, settings).any()
 
 
@@ -207,7 +206,7 @@ def test_range_of_a_light_is_that_of_its_flux():
     receivers = sets.receivers(np.stack([0 * z, 0 * z, z]), np.stack([0 * z, 0 * z, -1 + 0 * z]))
     two = sets.lights(np.zeros((3, 2)), np.array([[0.0, 0], [0, 0], [1, 1]]), [[1.0, 0.25], [0, 0], [0, 0]])
     for published, expected in ((set(), (4, 2)), ({"per_light_ilow"}, (4, 4))):
-        settings = of(SplatSettings, i_low=1 / 16, reference_length=1.0, as_published=published)
+        settings = of(SiiSettings, cut_share=1 / 16, reference_length=1.0, as_published=published)
         overdraw = fragments(receivers, two, settings).overdraw[0]
         reach = [z[overdraw >= least].max() for least in (1, 2)]
         np.testing.assert_allclose(reach, expected, atol=2e-3)
@@ -233,9 +232,9 @@ def test_loss_follows_the_closed_form(evidence):
         for i, x in enumerate((0.01, 0.05, 0.07, 0.10)):
             for distance in (1.0, 0.5):
                 receivers, area = plane(distance)
-                settings = of(SplatSettings, i_low=x, reference_length=1.0)
-                full = (row(irradiance(receivers, light, settings))[0] * area).sum()
-                lost = (row(cut_irradiance(receivers, light, settings))[0] * area).sum() / full
+                settings = of(SiiSettings, cut_share=x, reference_length=1.0)
+                full = (row(irradiance(receivers, light, settings.pairs))[0] * area).sum()
+                lost = (row(cut_irradiance(receivers, light, settings.pairs))[0] * area).sum() / full
                 expected = (distance * math.sqrt(x)) ** (2 * (exponent + 1) / (exponent + 2))
                 assert lost == pytest.approx(expected, abs=EDGE * (exponent + 1))
                 if i == 1:
@@ -255,12 +254,12 @@ def test_fragments_grow_as_one_over_the_threshold_until_the_screen_is_full(corne
     receivers = sets.receivers(np.stack([x, 0 * x + 1e-3, z]), np.stack([0 * x, 0 * x - 1, 0 * x]))
     light = sets.lights(np.zeros((3, 1)), np.array([[0.0], [0], [1]]), 1.0)
     lows = np.array([8.0, 4, 2, 1])
-    cuts = [of(SplatSettings, i_low=low, reference_length=1.0) for low in lows]
+    cuts = [of(SiiSettings, cut_share=low, reference_length=1.0) for low in lows]
     counts = np.array([fragments(receivers, light, cut).total for cut in cuts])
     np.testing.assert_allclose(counts * lows / (counts * lows)[-1], 1, rtol=0.02)
     room, lights, _ = corner
     shares = (0.1, 0.07, 0.05, 0.01, 1e-3, 1e-5, 1e-6)
-    means = [fragments(room, lights, of(SplatSettings, i_low=x, reference_length=0.1)).overdraw[room.covered].mean()
+    means = [fragments(room, lights, of(SiiSettings, cut_share=x, reference_length=0.1)).overdraw[room.covered].mean()
              for x in shares]
     assert (np.diff(means) > 0).all()
     assert means[-1] < lights.flux.shape[1]  # what lies behind a light never counts
@@ -277,7 +276,7 @@ def test_fragments_grow_as_one_over_the_threshold_until_the_screen_is_full(corne
 @pytest.mark.feature("SII-23", "SII-24")
 def test_counts_and_traffic(corner, evidence):
     receivers, lights, view = corner
-    counted = fragments(receivers, lights, of(SplatSettings, i_low=0.05, reference_length=0.1), None, view)
+    counted = fragments(receivers, lights, of(SiiSettings, cut_share=0.05, reference_length=0.1), None, view)
     assert counted.overdraw.sum() == counted.of_light.sum() == counted.total
     assert not counted.overdraw[~receivers.covered].any()
     assert counted.bits == 72 * counted.total
@@ -286,7 +285,7 @@ def test_counts_and_traffic(corner, evidence):
     assert pixels * 125 * 72 == 2_359_296_000
     assert gather_bits(pixels, 308) == pixels * 308 * 112
     assert round(pixels * 125 / 768, -2) == 42_700  # the caption of Fig. 8 cuts it to 42,600
-    off = fragments(receivers, lights, of(SplatSettings, i_low=0))
+    off = fragments(receivers, lights, of(SiiSettings))
     assert off.total == off.evaluated == np.count_nonzero(receivers.covered) * lights.flux.shape[1]
     evidence(f"map sums to {counted.total} fragments = sum over lights; {counted.bits} bits at 72 each; evaluated "
              f"{counted.evaluated / counted.total:.2f} a fragment; Fig. 8: 281 MB a frame, 308 samples: 1078 MiB")
@@ -299,7 +298,7 @@ def test_lobes_are_counted_as_the_twin_counts_them(widening, evidence):
     receivers, lights = sets.room(rng, 60)
     exponent, low = 6.0, 0.05
     lights = sets.glossy(lights.position, lights.normal, sets.random_directions(rng, 60), exponent)
-    how = of(SplatSettings, irradiance_low=low, lobe_norm="full_lobe", widening=widening)
+    how = of(SiiSettings, cut_irradiance=low, lobe_norm="full_lobe", widening=widening)
     expected = np.zeros(60, int)
     for i, k in np.ndindex(60, 60):
         x, p = row(receivers.position)[:, i], lights.position[:, k]
@@ -320,7 +319,7 @@ def test_tiles_keep_to_the_fragments(data_dir, scene, length, evidence):
     frame = Frame(load_scene(data_dir / f"{scene}.json"), width=512, height=512)
     lights = choose_pixel_lights(frame.rsms, count=768, pattern="halton")
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
-    counted = fragments(receivers, lights, of(SplatSettings, i_low=0.05, reference_length=length))
+    counted = fragments(receivers, lights, of(SiiSettings, cut_share=0.05, reference_length=length))
     mean = counted.overdraw[receivers.covered].mean()
     assert 100 < mean < 200
     assert counted.evaluated < FRAGMENTS * counted.total
@@ -334,8 +333,8 @@ def test_stochastic_range_has_the_mean_of_the_full_sum(glossy, evidence):
     receivers, lights = sets.room(rng, 48)
     if glossy:
         lights = sets.glossy(lights.position, lights.normal, lights.normal, 5.0)
-    settings = of(SplatSettings, irradiance_low=0.3, stochastic_range=True)
-    mean = np.mean([row(splat(receivers, lights, dataclasses.replace(settings, seed=seed)))[0] for seed in range(400)],
+    settings = of(SiiSettings, cut_irradiance=0.3, stochastic=True)
+    mean = np.mean([row(splat(receivers, lights, replaced(settings, {"seed": seed})))[0] for seed in range(400)],
                    axis=0)
     # a pair with B < I_low is kept with the chance p = B / I_low, times 1 / p: its variance is E^2 (1 / p - 1)
     full, variance = np.zeros(48), np.zeros(48)
@@ -349,7 +348,7 @@ def test_stochastic_range_has_the_mean_of_the_full_sum(glossy, evidence):
         chance = np.minimum(1, peak * cosine ** (5 if glossy else 1) / r**2 / 0.3)
         full, variance = full + term, variance + term**2 * (1 / chance - 1)
     z = (mean - full)[variance > 0] / np.sqrt(variance[variance > 0] / 400)
-    plain = row(splat(receivers, lights, dataclasses.replace(settings, stochastic_range=False)))[0]
+    plain = row(splat(receivers, lights, replaced(settings, {"stochastic": False})))[0]
     assert np.abs(z).max() < CHANCE
     bias = 1 - plain.sum() / full.sum()
     assert bias > 0.1
@@ -371,15 +370,15 @@ def test_factor_of_a_pair():
 @pytest.mark.parametrize("bound", ["quad", "mesh"])
 def test_bounds_on_the_screen_need_its_map(corner, bound):
     receivers, lights, _ = corner
-    with pytest.raises(InputError, match=f"projection: expected the receivers' map for the bound '{bound}'"):
-        splat(receivers, lights, of(SplatSettings, i_low=0.05, bound=bound))
+    with pytest.raises(InputError, match=f"projection: expected the camera's map for the bound '{bound}'"):
+        splat(receivers, lights, of(SiiSettings, cut_share=0.05, bound=bound))
 
 
 def test_nothing_to_light_or_to_light_with():
     receivers, lights = sets.room(np.random.default_rng(8), 5)
     none = sets.PixelLights(*(part[:, :0] for part in lights[:3]), None, None, None, 0)
     dark = receivers._replace(covered=np.zeros((1, 5), bool))
-    for how in (CUT, SplatSettings(), of(SplatSettings, i_low=0.05, stochastic_range=True)):
+    for how in (CUT, SiiSettings(), of(SiiSettings, cut_share=0.05, stochastic=True)):
         assert not splat(receivers, none, how).any()
         assert not splat(dark, lights, how).any()
         assert fragments(receivers, none, how).total == 0

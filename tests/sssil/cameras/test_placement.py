@@ -12,8 +12,16 @@ from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import BLACK, Camera, Material, Scene, SpotLight, merge
-from refgi.sssil.camera_transport import Points, Views, free, lit_points, seen_points, sight, transport
-from refgi.sssil.cameras import placed_cameras
+from refgi.sssil.camera_transport import (
+    Points,
+    Views,
+    equal_flux_points,
+    sampling_quality,
+    transport,
+    unoccluded,
+    visible_points,
+)
+from refgi.sssil.cameras import place_cameras
 from refgi.stages import observe
 from tests.sssil.cameras.hidden_side import BACK, HALF_ANGLE, LIGHT, hidden_side
 
@@ -28,7 +36,7 @@ def small(scene, **options):
 def test_the_camera_placed_first_faces_the_side_that_the_picture_misses(evidence):
     """Analytic: the lit disc's middle lies inside its picture, and so does some of the wall."""
     frame = small(hidden_side())
-    (camera,) = placed_cameras(frame, 1)
+    (camera,) = place_cameras(frame, 1)
     view = camera_projection(camera)
     seen = np.array([(0.0, 0.5, BACK), (0.0, 1.2, -2.0)]) - camera.eye
     right, down, depth = view.frame[0] @ seen.T
@@ -45,20 +53,20 @@ def test_the_camera_placed_first_faces_the_side_that_the_picture_misses(evidence
 def test_eyes_are_in_free_space(name):
     """Property: each sees a place that the picture shows as well, from the side that the picture shows."""
     frame = small(load_scene(name))
-    points = seen_points(frame)
+    points = visible_points(frame)
     offset = frame.tracer.offsets(points.position)[:, None]
-    cameras = placed_cameras(frame, 4)
+    cameras = place_cameras(frame, 4)
     assert len(cameras) > 1
     for camera in cameras:
         facing = ((camera.eye - points.position) * points.normal).sum(axis=1) > 0
         lifted = (points.position + offset * points.normal)[facing]
-        assert free(frame.tracer, np.broadcast_to(camera.eye, lifted.shape), lifted).any()
+        assert unoccluded(frame.tracer, np.broadcast_to(camera.eye, lifted.shape), lifted).any()
 
 
 def test_no_eye_lies_inside_a_solid():
     """Property: rays from within a closed box would meet its faces from behind."""
     frame = small(hidden_side())
-    for camera in placed_cameras(frame, 16):
+    for camera in place_cameras(frame, 16):
         x, y, z = camera.eye
         assert not (abs(x) <= 0.5 and 0 <= y <= 1 and abs(z) <= 0.4)
         assert y > 0
@@ -66,7 +74,7 @@ def test_no_eye_lies_inside_a_solid():
 
 def test_each_camera_adds_to_those_before_it_and_the_first_are_the_same():
     frame = small(load_scene("cornell_box"))
-    one, three = placed_cameras(frame, 1), placed_cameras(frame, 3)
+    one, three = place_cameras(frame, 1), place_cameras(frame, 3)
     assert three[:1] == one
     assert len(set(three)) == 3
 
@@ -75,7 +83,7 @@ def test_cameras_are_the_same_for_any_number_of_threads():
     chosen = []
     for count in (1, 2):
         with threads(count):
-            chosen.append(placed_cameras(small(load_scene("cornell_box")), 3))
+            chosen.append(place_cameras(small(load_scene("cornell_box")), 3))
     assert chosen[0] == chosen[1]
 
 
@@ -96,26 +104,26 @@ def nothing_missed():
 ], ids=["nothing is lit twice", "background", "light into nowhere", "black light", "all seen"])
 def test_where_nothing_is_to_be_gained_there_are_no_cameras(scene):
     with observe() as log:
-        assert placed_cameras(small(scene, width=200, height=150), 3) == ()
+        assert place_cameras(small(scene, width=200, height=150), 3) == ()
     assert any(run.status == "skipped" and "shows what lights it" in run.reason for run in log.runs)
 
 
 def test_a_view_straight_down_has_an_upward_direction():
     scene = hidden_side().with_camera(eye=(0, 5, -0.3), target=(0, 0, -0.3), up=(0, 0, -1))
-    for camera in placed_cameras(small(scene), 4):
+    for camera in place_cameras(small(scene), 4):
         assert math.isfinite(sum(camera.up))
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 50), (50, 1)])
 def test_pictures_of_any_shape(size):
-    for camera in placed_cameras(small(hidden_side(), width=size[0], height=size[1]), 2):
+    for camera in place_cameras(small(hidden_side(), width=size[0], height=size[1]), 2):
         assert (camera.width, camera.height) == size
         assert 0 < camera.vfov < math.pi / 2
 
 
 def test_lit_points_share_the_flux_that_the_side_reflects():
     """Analytic: a cone's flux times the albedo's sum, around the cone's middle, on the disc it lights."""
-    points, flux = lit_points(small(hidden_side()))
+    points, flux = equal_flux_points(small(hidden_side()))
     cone = 2 * math.pi * (1 - math.cos(HALF_ANGLE)) * 3.0
     assert flux * len(points.position) == pytest.approx(cone * 1.1, rel=1e-4)
     np.testing.assert_allclose(points.position[:, 2], BACK, atol=1e-6)
@@ -145,8 +153,8 @@ def test_sight_falls_with_distance_and_towards_grazing_views():
     toward, slanted = (0.0, 0.0, -1.0), (0.0, 0.8, -0.6)
     points = Points(np.array([(0, 0, 2), (0, 0, 2), (0, 0, -2), (0, 2.1, 2), (3.9, 0, 2), (5, 0, 2), (0, 0, 2)], float),
                     np.array([toward, slanted, toward, toward, toward, toward, (0, 0, 1)], float))
-    np.testing.assert_allclose(sight(tracer, view, points, 0.4)[0],
+    np.testing.assert_allclose(sampling_quality(tracer, view, points, 0.4)[0],
                                [1 / (1 + 0.25), 1 / (1 + (0.2 / 0.24) ** 2), 0, 0,
                                 1 / (1 + (0.2 / 0.4 * math.hypot(3.9, 2) / 2) ** 2), 0, 0], rtol=1e-12)
     points = Points(np.array([(3.3, 0, 2.0)]), np.array([toward]))  # behind the plate
-    assert sight(tracer, view, points, 0.4)[0, 0] == 0
+    assert sampling_quality(tracer, view, points, 0.4)[0, 0] == 0

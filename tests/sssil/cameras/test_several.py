@@ -9,8 +9,9 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.scene.model import Camera
-from refgi.sssil import HssilSettings
-from refgi.sssil.cameras import placed_cameras, seen_by, several_cameras
+from refgi.settings import of
+from refgi.sssil import CameraSettings, HssilSettings
+from refgi.sssil.cameras import frame_through, join_cameras, place_cameras
 from refgi.sssil.hssil import hssil
 from refgi.stages import observe
 from tests.sssil.cameras.hidden_side import SIDE_VIEW, from_the_lit_side, hidden_side
@@ -43,8 +44,8 @@ def on_the_wall(frame):
 @pytest.mark.feature("HSS-15")
 def test_light_of_a_side_that_the_camera_does_not_see_comes_back(basket, exact, evidence):
     """Analytic (Fig. 9): one camera finds none at all, a view from the side what quadrature gives."""
-    assert not hssil(basket, HssilSettings(**BRUTE)).any()
-    found = hssil(basket, HssilSettings(views=(SIDE_VIEW,), **BRUTE))
+    assert not hssil(basket, of(HssilSettings, **BRUTE)).any()
+    found = hssil(basket, of(HssilSettings, views=(SIDE_VIEW,), **BRUTE))
     wall = on_the_wall(basket)
     assert (found[0, wall] > 0).mean() > 0.7
     near = wall & (found[0] > 0) & (basket.gbuffer.position[0] > 0)  # where the view from the side is not a grazing one
@@ -62,7 +63,7 @@ def test_placed_cameras_bring_it_back_by_themselves(basket, exact, evidence):
     frames = [Frame(basket.scene, shadows="exact"), basket]
     shares = []
     for cameras, frame in zip((1, 2), frames, strict=True):
-        found = hssil(frame, HssilSettings(cameras=cameras, **BRUTE))
+        found = hssil(frame, of(HssilSettings, cameras=cameras, **BRUTE))
         shares.append(found.sum() / exact.sum())
         assert (found - exact)[:, on_the_wall(frame)].max() < PIXELS * exact.max()
     assert shares[0] > 0.4
@@ -74,8 +75,8 @@ def test_placed_cameras_bring_it_back_by_themselves(basket, exact, evidence):
 def test_it_is_never_darker_than_one_camera(evidence):
     """Property: to the bit, in every pixel and channel, for a noisy pattern as well."""
     frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
-    one = hssil(frame, HssilSettings(**QUICK))
-    more = hssil(frame, HssilSettings(cameras=2, **QUICK))
+    one = hssil(frame, of(HssilSettings, **QUICK))
+    more = hssil(frame, of(HssilSettings, cameras=2, **QUICK))
     assert (more >= one).all()
     assert more.sum() > 1.01 * one.sum()
     evidence(f"Cornell box: nowhere darker to the bit, {more.sum() / one.sum():.3f} times the light by two more")
@@ -89,8 +90,8 @@ def test_it_is_never_above_what_all_surfaces_send(evidence):
     light, inner, outer = scene.lights[0], math.cos(math.radians(20)), math.cos(math.radians(32))
     flux = light.intensity[0] * 2 * math.pi * (1 - inner + (inner - outer) / 2)  # the falloff's mean is 1/2
     whole = 0.5 * flux / (4 * math.pi)  # albedo Phi / (4 pi R^2)
-    one, more = (hssil(frame, HssilSettings(cameras=cameras, **BRUTE)).mean() / whole for cameras in (0, 2))
-    highest = hssil(frame, HssilSettings(cameras=2, **BRUTE)).max() / whole
+    one, more = (hssil(frame, of(HssilSettings, cameras=cameras, **BRUTE)).mean() / whole for cameras in (0, 2))
+    highest = hssil(frame, of(HssilSettings, cameras=2, **BRUTE)).max() / whole
     assert one < 0.2
     assert more > 0.9
     assert highest < 1 + FACETS
@@ -100,16 +101,16 @@ def test_it_is_never_above_what_all_surfaces_send(evidence):
 def test_the_camera_itself_as_a_further_view_changes_nothing():
     """Property: each point is found where it is, to the bit."""
     frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
-    np.testing.assert_array_equal(hssil(frame, HssilSettings(views=(frame.scene.camera,), **QUICK)),
-                                  hssil(frame, HssilSettings(**QUICK)))
+    np.testing.assert_array_equal(hssil(frame, of(HssilSettings, views=(frame.scene.camera,), **QUICK)),
+                                  hssil(frame, of(HssilSettings, **QUICK)))
 
 
 def test_the_largest_counts_not_the_last():
     """Property: views in any order, and a view twice, give the same."""
     frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
-    views = placed_cameras(frame, 2)
+    views = place_cameras(frame, 2)
     assert len(views) == 2
-    first, second, twice = (hssil(frame, HssilSettings(views=given, **QUICK))
+    first, second, twice = (hssil(frame, of(HssilSettings, views=given, **QUICK))
                             for given in (views, views[::-1], (*views, views[0])))
     np.testing.assert_array_equal(first, second)
     np.testing.assert_array_equal(first, twice)
@@ -121,17 +122,17 @@ def test_views_of_a_scene_far_from_the_origin_are_moved_with_it(basket):
     frame = Frame(hidden_side(shift=far), shadows="exact")
     assert any(frame.origin)
     view = Camera(tuple(far + SIDE_VIEW.eye), tuple(far + SIDE_VIEW.target), vfov=SIDE_VIEW.vfov)
-    near = hssil(basket, HssilSettings(views=(SIDE_VIEW,), **BRUTE))
-    np.testing.assert_array_equal(hssil(frame, HssilSettings(views=(view,), **BRUTE)), near)
+    near = hssil(basket, of(HssilSettings, views=(SIDE_VIEW,), **BRUTE))
+    np.testing.assert_array_equal(hssil(frame, of(HssilSettings, views=(view,), **BRUTE)), near)
 
 
 def test_maps_and_rays_are_shared_and_the_picture_is_as_large():
     frame = Frame(load_scene("cornell_box"), width=21, height=13, rsm_resolution=64)
     with observe() as log:
-        hssil(frame, HssilSettings(views=(Camera((0.2, 0.2, -0.5), (0.3, 0.2, 0.5), width=99),), **QUICK))
+        hssil(frame, of(HssilSettings, views=(Camera((0.2, 0.2, -0.5), (0.3, 0.2, 0.5), width=99),), **QUICK))
     assert log.status("rsm.reflective_shadow_map") == ["ran"]
     assert log.status("rsm.gbuffer") == ["ran", "ran"]
-    other = seen_by(frame, frame.scene.camera)
+    other = frame_through(frame, frame.scene.camera)
     assert other.rsms is frame.rsms
     assert (other.width, other.height, other.rsm_resolution) == (21, 13, 64)
 
@@ -139,7 +140,7 @@ def test_maps_and_rays_are_shared_and_the_picture_is_as_large():
 def test_the_light_given_is_left_as_it_was():
     frame = Frame(load_scene("cornell_box"), width=9, height=7, rsm_resolution=64)
     light = np.zeros((3, 7, 9), np.float32)
-    joined = several_cameras(frame, light, HssilSettings(views=(frame.scene.camera,)), lambda *_: light + 1)
+    joined = join_cameras(frame, light, CameraSettings(views=(frame.scene.camera,)), lambda _: light + 1)
     assert not light.any()
     assert (joined == frame.gbuffer.covered).all()
 
@@ -149,5 +150,5 @@ def test_bits_do_not_depend_on_the_number_of_threads():
     for count in (1, 2):
         with threads(count):
             frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
-            pictures.append(hssil(frame, HssilSettings(cameras=1, **QUICK)))
+            pictures.append(hssil(frame, of(HssilSettings, cameras=1, **QUICK)))
     np.testing.assert_array_equal(*pictures)

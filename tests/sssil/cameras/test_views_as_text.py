@@ -4,17 +4,17 @@ import math
 
 import pytest
 
-from refgi.cli.settings import read_settings
 from refgi.errors import InputError
 from refgi.scene.model import Camera
+from refgi.settings import from_text
 from refgi.sssil import HssilSettings
 
 
 def test_text_becomes_cameras_with_angles_in_degrees():
     text = 'views=[{"eye": [0, 1, 2], "target": [0, 0, 0], "vfov_deg": 60}, {"eye": [0, 1, 3], "target": [0, 0, 0]}]'
-    assert read_settings(HssilSettings, [text]).views == (
+    assert from_text(HssilSettings(), [text]).cameras.views == (
         Camera((0, 1, 2), (0, 0, 0), vfov=math.radians(60)), Camera((0, 1, 3), (0, 0, 0)))
-    assert read_settings(HssilSettings, ["views=[]"]).views == ()
+    assert from_text(HssilSettings(), ["views=[]"]).cameras.views == ()
 
 
 @pytest.mark.parametrize(("entry", "reason"), [
@@ -26,4 +26,4 @@ def test_text_becomes_cameras_with_angles_in_degrees():
 ])
 def test_what_is_wrong_with_a_camera_is_named(entry, reason):
     with pytest.raises(InputError, match=reason):
-        read_settings(HssilSettings, [f"views=[{entry}]"])
+        from_text(HssilSettings(), [f"views=[{entry}]"])

@@ -1,6 +1,5 @@
 """Sums over samples: against loops written from the paper, and what they must keep whatever the numbers."""
 
-import dataclasses
 import math
 
 import numba
@@ -8,13 +7,15 @@ import numpy as np
 import pytest
 
 from refgi.jit import threads
+from refgi.settings import of, replaced
 from refgi.sssil.crown.gather import gather
-from refgi.sssil.crown.pattern import offsets_at, row_offsets, sample_weight
-from refgi.sssil.level import Level
+from refgi.sssil.crown.pattern import offsets_at, row_offsets
+from refgi.sssil.crown.points import sample_weight
+from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from tests.naive import crown as naive
 
-SETTINGS = HssilSettings(radius=3.3, samples=9, levels=2)
+SETTINGS = of(HssilSettings, radius=3.3, samples=9, levels=2)
 # of the largest value: terms of a sum of up to 200, each with a dozen roundings
 ROUNDING = {np.float64: 4e-15, np.float32: 2e-6}
 
@@ -31,9 +32,10 @@ def random_level(shape, dtype=np.float64, seed=0, background=0.2, number=1):
 
 
 def weights(settings, index):
-    if settings.pattern == "pixel":
-        return sample_weight(settings.radius, settings.inner if index == 0 else 0, settings.samples)
-    return row_offsets(settings, index, 1, 1)[1]
+    if settings.sampling.pattern == "pixel":
+        sampling = settings.sampling
+        return sample_weight(sampling.radius, sampling.inner if index == 0 else 0, sampling.samples)
+    return row_offsets(settings.sampling, index, 1, 1)[1]
 
 
 @pytest.mark.parametrize("form", ["disc", "point"])
@@ -42,9 +44,9 @@ def test_equals_the_sum_written_as_loops(pattern, form):
     """Oracle: every pattern and form, float64, first level and a later one, odd sizes."""
     for shape, index in (((7, 11), 0), ((9, 6), 1)):
         level = random_level(shape, seed=index)
-        settings = dataclasses.replace(SETTINGS, pattern=pattern, form_factor=form)
+        settings = replaced(SETTINGS, {"pattern": pattern, "form_factor": form})
         expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
-                                  lambda row, column, s=settings, i=index: offsets_at(s, i, 1, row, column),
+                                  lambda row, column, s=settings, i=index: offsets_at(s.sampling, i, 1, row, column),
                                   weights(settings, index), form)
         assert expected.max() > 0
         np.testing.assert_allclose(gather(level, index, settings), expected, rtol=0,
@@ -55,9 +57,10 @@ def test_single_precision_rounds_and_no_more():
     """Oracle: float32 against the loops on the same numbers; several strips of lanes, some of them dark."""
     level = random_level((5, 700), np.float32)
     level.radiance[:, :, 100:500] = 0
-    settings = dataclasses.replace(SETTINGS, samples=4)
+    settings = replaced(SETTINGS, {"samples": 4})
     expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
-                              lambda row, column: offsets_at(settings, 0, 1, row, column), weights(settings, 0), "disc")
+                              lambda row, column: offsets_at(settings.sampling, 0, 1, row, column),
+                              weights(settings, 0), "disc")
     found = gather(level, 0, settings)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING[np.float32] * expected.max())
@@ -66,7 +69,7 @@ def test_single_precision_rounds_and_no_more():
 @pytest.mark.parametrize("pattern", ["row", "pixel"])
 def test_same_bits_for_any_number_of_threads(pattern):
     """Property: one thread and all of them."""
-    level, settings = random_level((70, 33), np.float32), dataclasses.replace(SETTINGS, pattern=pattern)
+    level, settings = random_level((70, 33), np.float32), replaced(SETTINGS, {"pattern": pattern})
     found = gather(level, 0, settings)
     with threads(1):
         np.testing.assert_array_equal(gather(level, 0, settings), found)
@@ -84,7 +87,7 @@ def test_a_mirrored_level_receives_mirrored_light(pattern, evidence):
                                      for name in ("depth", "radiance", "area", "pixel")},
                                   position=np.ascontiguousarray(level.position[..., ::-1] * sign),
                                   normal=np.ascontiguousarray(level.normal[..., ::-1] * sign))
-        settings = dataclasses.replace(SETTINGS, pattern=pattern, samples=16)
+        settings = replaced(SETTINGS, {"pattern": pattern, "samples": 16})
         there = gather(mirrored, 0, settings)
         np.testing.assert_array_equal(there[..., ::-1], gather(level, 0, settings))
     evidence(f"pattern {pattern}: mirrored level, mirrored irradiance to the bit, float32 and float64")
@@ -120,7 +123,7 @@ def test_hard_numbers_stay_finite_and_bounded(form):
         level.position[:, 3:5, 4:9] = level.position[:, :1, :1]
         level.depth[level.area > 0] = np.abs(level.position).max(axis=0)[level.area > 0] + 1e-3
         level.area[...] *= (10.0 ** rng.uniform(-9, 12, level.shape)).astype(dtype)
-        found = gather(level, 0, dataclasses.replace(SETTINGS, form_factor=form))
+        found = gather(level, 0, replaced(SETTINGS, {"form_factor": form}))
         assert np.isfinite(found).all()
         assert (found >= 0).all()
         if form == "disc":  # each sample fills at most the hemisphere
@@ -132,7 +135,7 @@ def test_one_texel_and_none_seen_receive_nothing():
     for shape, background in (((1, 1), 0.0), ((1, 1), 1.0), ((6, 5), 1.0)):
         assert not gather(random_level(shape, background=background), 0, SETTINGS).any()
     for shape in ((1, 9), (9, 1)):
-        found = gather(random_level(shape, background=0.0), 0, dataclasses.replace(SETTINGS, pattern="all"))
+        found = gather(random_level(shape, background=0.0), 0, replaced(SETTINGS, {"pattern": "all"}))
         assert found.any()
         assert np.isfinite(found).all()
 
@@ -142,7 +145,7 @@ def test_printed_forms_differ_by_their_factor():
     level = random_level((6, 8))
 
     def light(index, *names, form="disc"):
-        settings = dataclasses.replace(SETTINGS, as_published=frozenset(names), form_factor=form)
+        settings = replaced(SETTINGS, {"as_published": frozenset(names), "form_factor": form})
         return gather(level, index, settings)
 
     np.testing.assert_allclose(light(1, "hss_disc_pi"), light(1) / math.pi, rtol=1e-14)
@@ -168,7 +171,7 @@ def groove(number, size):
 def test_mean_light_does_not_depend_on_the_split_into_levels(evidence):
     """Analytic: one level of radius 16, two of 8 and three of 4 reach as far; the printed 2^2k counts areas twice."""
     def mean(levels, *printed):
-        settings = HssilSettings(radius=16.0 / 2 ** (levels - 1), levels=levels, pattern="all",
+        settings = of(HssilSettings, radius=16.0 / 2 ** (levels - 1), levels=levels, pattern="all",
                                  as_published=frozenset(printed))
         return sum(gather(groove(k, 64), k, settings).mean() for k in range(levels))
 
@@ -186,11 +189,11 @@ def test_error_falls_with_samples_and_the_mean_stays(pattern, evidence):
     """Statistical: Eq. 3 on a bounded scene, 12 seeds: no bias, and the error falls at least as N^-1/2."""
     level, count = groove(0, 32), 12
     level.position[2, :, 16:] += 0.5  # the halves are apart: no pair is near
-    settings = HssilSettings(radius=6.0, levels=1, pattern=pattern, form_factor="point")
-    exact = _of_shares(level, settings.radius)
+    settings = of(HssilSettings, radius=6.0, levels=1, pattern=pattern, form_factor="point")
+    exact = _of_shares(level, settings.sampling.radius)
     error = []
     for samples in (16, 64, 256):
-        found = np.array([gather(level, 1, dataclasses.replace(settings, samples=samples, seed=seed))[0]
+        found = np.array([gather(level, 1, replaced(settings, {"samples": samples, "seed": seed}))[0]
                           for seed in range(count)])
         means = found.mean(axis=(1, 2))
         assert abs(means.mean() - exact.mean()) < 4.0 * means.std(ddof=1) / math.sqrt(count) + 1e-3 * exact.mean()
@@ -231,7 +234,7 @@ def test_the_first_level_has_most_of_the_samples(evidence):
     fifth = crowns[4] / sum(crowns[:4])
     assert fifth < 0.01
     settings = HssilSettings()
-    disc = settings.inner * sizes[0]
+    disc = settings.sampling.inner * sizes[0]
     whole = (crowns[0] + disc) / (sum(crowns[:4]) + disc)
-    evidence(f"first of 4 levels: {share:.1%} of the crowns' samples, {whole:.1%} with its disc of {settings.inner}; "
-             f"a fifth adds {fifth:.2%}")
+    evidence(f"first of 4 levels: {share:.1%} of the crowns' samples, {whole:.1%} with its disc of "
+             f"{settings.sampling.inner}; a fifth adds {fifth:.2%}")

@@ -1,18 +1,18 @@
 """Where samples lie: the share that each texel gets, mirror images, and who shares them."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 
 from refgi.errors import InputError
+from refgi.settings import of, replaced
 from refgi.sssil.crown.pattern import offsets_at, row_offsets
 from refgi.sssil.crown.reach import coverage, texel_weights
 from refgi.sssil.settings import HssilSettings
 from tests.naive import crown as naive
 
-SETTINGS = HssilSettings(radius=4.0, samples=12, inner_samples=5, levels=3)
+SETTINGS = of(HssilSettings, radius=4.0, samples=12, inner_samples=5, levels=3)
 ROWS = 6000
 DEVIATIONS = 4.5  # of the mean weight of one texel out of 270: 1 in 500 sets of independent ones would pass it
 
@@ -21,10 +21,10 @@ DEVIATIONS = 4.5  # of the mean weight of one texel out of 270: 1 in 500 sets of
 @pytest.mark.parametrize("index", [0, 1])
 def test_texels_get_their_share_of_the_crown(index, evidence):
     """Statistical: the mean weight of a texel is the share of it that lies in the crown, in the first level's disc."""
-    found = texel_weights(SETTINGS, index, 1 + index, ROWS)
+    found = texel_weights(SETTINGS.sampling, index, 1 + index, ROWS)
     reach = found.shape[0] // 2
-    low = 0.0 if index == 0 else SETTINGS.radius
-    share = np.array([[naive.share_inside(ox, oy, low, 2 * SETTINGS.radius) for ox in range(-reach, reach + 1)]
+    low = 0.0 if index == 0 else SETTINGS.sampling.radius
+    share = np.array([[naive.share_inside(ox, oy, low, 2 * SETTINGS.sampling.radius) for ox in range(-reach, reach + 1)]
                       for oy in range(-reach, reach + 1)])
     most = 3 * math.pi * 16 / 12
     error = np.abs(found - share) / np.sqrt(most * np.maximum(share, 1e-9) / ROWS + 1e-5)
@@ -38,8 +38,8 @@ def test_texels_get_their_share_of_the_crown(index, evidence):
 @pytest.mark.feature("HSS-05")
 def test_every_offset_is_covered_once(evidence):
     """Property: the crowns of all levels together cover each offset within reach once, and none beyond."""
-    settings = HssilSettings(radius=8.0, levels=3, pattern="all")
-    weight = coverage(settings, (80, 80))
+    settings = of(HssilSettings, radius=8.0, levels=3, pattern="all")
+    weight = coverage(settings.sampling, (80, 80))
     oy, ox = np.mgrid[-79:80, -79:80]
     length = np.hypot(ox, oy)
     # offsets of coarse texels are known to half of one: rings blur by 2^k texels where they meet
@@ -56,7 +56,7 @@ def test_every_offset_is_covered_once(evidence):
 
 def test_all_has_each_texel_of_the_crown_once():
     """Analytic: by brute force over a square."""
-    offsets, weight = row_offsets(dataclasses.replace(SETTINGS, pattern="all"), 1, 1, 3)
+    offsets, weight = row_offsets(replaced(SETTINGS, {"pattern": "all"}).sampling, 1, 1, 3)
     expected = {(x, y) for x in range(-9, 10) for y in range(-9, 10) if 16 <= x * x + y * y < 64}
     assert offsets.shape[0] == 1
     assert len(offsets[0]) == len(expected)
@@ -67,7 +67,7 @@ def test_all_has_each_texel_of_the_crown_once():
 @pytest.mark.parametrize(("pattern", "samples"), [("fixed", 12), ("fixed", 7), ("all", 12)])
 def test_symmetric_patterns_are_pairs_of_mirror_images(pattern, samples):
     """Property: partners follow each other; those on the middle line come last."""
-    offsets, weight = row_offsets(dataclasses.replace(SETTINGS, pattern=pattern, samples=samples), 0, 1, 3)
+    offsets, weight = row_offsets(replaced(SETTINGS, {"pattern": pattern, "samples": samples}).sampling, 0, 1, 3)
     even = len(weight) // 2 * 2
     first, second = offsets[0, :even:2], offsets[0, 1:even:2]
     mirrored = (first * (-1, 1) == second).all(axis=1)
@@ -81,8 +81,8 @@ def test_symmetric_patterns_are_pairs_of_mirror_images(pattern, samples):
 @pytest.mark.parametrize("pattern", ["row", "pixel", "fixed"])
 def test_samples_lie_in_disc_and_crown(pattern):
     """Property: as far from the receiver as their texel may be from their point."""
-    settings = dataclasses.replace(SETTINGS, pattern=pattern)
-    length = np.hypot(*offsets_at(settings, 0, 1, 5, 6).T)
+    settings = replaced(SETTINGS, {"pattern": pattern})
+    length = np.hypot(*offsets_at(settings.sampling, 0, 1, 5, 6).T)
     assert (length[:5] <= 4.0 + math.sqrt(0.5)).all() or pattern == "fixed"
     assert (length <= 8.0 + math.sqrt(0.5)).all()
     assert len(length) == 17
@@ -90,19 +90,19 @@ def test_samples_lie_in_disc_and_crown(pattern):
 
 def test_receivers_of_a_row_share_samples_with_every_second():
     """Property: by row and phase, and by seed and level."""
-    offsets, _ = row_offsets(SETTINGS, 0, 1, 8)
-    odd, _ = row_offsets(SETTINGS, 0, 1, 8, phase=1)
-    np.testing.assert_array_equal(offsets[3], offsets_at(SETTINGS, 0, 1, 3, 10))
-    np.testing.assert_array_equal(odd[3], offsets_at(SETTINGS, 0, 1, 3, 11))
+    offsets, _ = row_offsets(SETTINGS.sampling, 0, 1, 8)
+    odd, _ = row_offsets(SETTINGS.sampling, 0, 1, 8, phase=1)
+    np.testing.assert_array_equal(offsets[3], offsets_at(SETTINGS.sampling, 0, 1, 3, 10))
+    np.testing.assert_array_equal(odd[3], offsets_at(SETTINGS.sampling, 0, 1, 3, 11))
     assert (offsets[3] != odd[3]).any()
     assert (offsets[3] != offsets[4]).any()
-    assert (offsets != row_offsets(dataclasses.replace(SETTINGS, seed=1), 0, 1, 8)[0]).any()
-    assert (offsets != row_offsets(SETTINGS, 0, 2, 8)[0]).any()
+    assert (offsets != row_offsets(replaced(SETTINGS, {"seed": 1}).sampling, 0, 1, 8)[0]).any()
+    assert (offsets != row_offsets(SETTINGS.sampling, 0, 2, 8)[0]).any()
 
 
 def test_what_cannot_be_is_refused():
     """No shared samples where each pixel has its own; no samples without a radius."""
     with pytest.raises(InputError, match="pattern"):
-        row_offsets(dataclasses.replace(SETTINGS, pattern="pixel"), 0, 1, 8)
+        row_offsets(replaced(SETTINGS, {"pattern": "pixel"}).sampling, 0, 1, 8)
     with pytest.raises(InputError, match="radius"):
-        row_offsets(dataclasses.replace(SETTINGS, radius=None), 0, 1, 8)
+        row_offsets(replaced(SETTINGS, {"radius": None}).sampling, 0, 1, 8)

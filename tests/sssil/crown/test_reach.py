@@ -6,7 +6,8 @@ import warnings
 import pytest
 
 from refgi.errors import RefgiWarning
-from refgi.sssil.crown.reach import chosen_radius, covering_radius, expect_reach, reach
+from refgi.settings import of
+from refgi.sssil.crown.reach import chosen_radius, covering_radius, reach, warn_short_reach
 from refgi.sssil.settings import HssilSettings
 
 # first level, levels, radius -> reach and diagonal, texels: Fig. 6 at 1280 x 720 and Fig. 5 at 720 x 720
@@ -18,21 +19,21 @@ PAPER = [((180, 320), 4, 20.0, 320, 367), ((360, 640), 4, 20.0, 320, 734), ((360
 @pytest.mark.parametrize(("shape", "levels", "radius", "far", "diagonal"), PAPER)
 def test_the_papers_settings_do_not_cover_the_screen(shape, levels, radius, far, diagonal, evidence):
     """Analytic: r 2^K against the diagonal; the warning names both and the radius that would do."""
-    settings = HssilSettings(radius=radius, levels=levels)
-    assert reach(settings, chosen_radius(shape, settings)) == far
+    settings = of(HssilSettings, radius=radius, levels=levels)
+    assert reach(settings.sampling, chosen_radius(shape, settings.sampling)) == far
     assert int(math.hypot(*shape)) == diagonal
     with pytest.warns(RefgiWarning, match=rf"{far}.*{diagonal}.*{math.ceil(diagonal / 2**levels)} texels"):
-        expect_reach(shape, settings)
+        warn_short_reach(shape, settings.sampling)
     evidence(f"{shape[1]} x {shape[0]}, r = {radius:g}, K = {levels}: reaches {far} of {diagonal} texels")
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 7), (90, 160), (361, 641)])
 def test_the_chosen_radius_covers_the_screen(shape):
     """Property: without a radius nothing is warned of, and one texel less would not do."""
-    settings = HssilSettings(radius=None, levels=3)
-    radius = chosen_radius(shape, settings)
-    assert reach(settings, radius) >= math.hypot(*shape) * (1 - 1e-12)
+    settings = of(HssilSettings, radius=None, levels=3)
+    radius = chosen_radius(shape, settings.sampling)
+    assert reach(settings.sampling, radius) >= math.hypot(*shape) * (1 - 1e-12)
     assert radius == max(1.0, math.hypot(*shape) / 8) == covering_radius(shape, 3)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        expect_reach(shape, settings)
+        warn_short_reach(shape, settings.sampling)

@@ -10,6 +10,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.sssil.pyramid.levels import pyramid, useful_levels
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import Memory, observe
@@ -81,7 +82,7 @@ def test_float32_is_float64_to_its_rounding(mode):
 def test_level_0_is_the_buffers_and_the_light_that_leaves_them(dtype, evidence):
     """Radiance is that of the composed picture without emission; positions are the G-buffer's, from the eye."""
     frame = Frame(load_scene("cornell_box"), width=75, height=53, dtype=dtype)
-    level = pyramid(frame, HssilSettings(start="full", levels=1))[0]
+    level = pyramid(frame, of(HssilSettings, start="full", levels=1))[0]
     buffer = frame.gbuffer
     dark = frame.materials.emission[buffer.material_id].max(axis=-1) == 0
     covered = buffer.covered & dark
@@ -162,18 +163,18 @@ def test_levels_whose_crowns_miss_the_picture_are_left_out():
     """A crown from 20 texels on needs a level of more than 20 texels from corner to corner."""
     frame = Frame(load_scene("cornell_box"), width=64, height=64)
     with observe() as log:
-        numbers = [level.number for level in pyramid(frame, HssilSettings(radius=20, levels=4))]
+        numbers = [level.number for level in pyramid(frame, of(HssilSettings, radius=20, levels=4))]
     assert numbers == [1, 2]  # 32 x 32 and 16 x 16: 22.6; 8 x 8: 11.3
     assert log.status("sssil.level") == ["skipped"]
-    assert useful_levels((64, 64), HssilSettings(radius=None, levels=9)) == 9
-    assert useful_levels((1, 1), HssilSettings(radius=1, levels=9)) == 9
-    assert useful_levels((1, 1), HssilSettings(radius=2, levels=9)) == 1
+    assert useful_levels((64, 64), of(HssilSettings, radius=None, levels=9).sampling) == 9
+    assert useful_levels((1, 1), of(HssilSettings, radius=1, levels=9).sampling) == 9
+    assert useful_levels((1, 1), of(HssilSettings, radius=2, levels=9).sampling) == 1
 
 
 def test_levels_are_kept_while_only_samples_change():
     frame, memory = Frame(load_scene("cornell_box"), width=16, height=16), Memory()
     found = []
-    for settings in (HssilSettings(), HssilSettings(samples=7, seed=3), HssilSettings(downsample="average")):
+    for settings in (HssilSettings(), of(HssilSettings, samples=7, seed=3), of(HssilSettings, downsample="average")):
         with observe(memory=memory) as log:
             pyramid(frame, settings)
         found += log.status("sssil.pyramid")

@@ -10,12 +10,19 @@ from refgi.frame import Frame
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Camera, Material, PointLight, Scene, merge
 from refgi.scene.builtin.surfaces import rectangle
-from refgi.sssil.pyramid.view import GRAZING, sample_area
+from refgi.sssil.pyramid.levels import levels
+from refgi.sssil.pyramid.view import GRAZING
 from tests.sssil.pyramid.pictures import FLOAT64, camera, random_picture
 
 SUM_720P = 1e-3  # 0.1 % is asked at 720 lines; pixels on the outline count whole or not at all
 # one pixel's area by its centre's ray: the midpoint rule, off by about the square of its angle, 3 mrad
 MIDPOINT = 1e-5
+
+
+def sample_area(depth, normal, projection, as_published=frozenset()):
+    """The area of each texel of level 0, a pixel each."""
+    nothing = np.zeros((3, *depth.shape), depth.dtype)
+    return levels(depth, normal, nothing, nothing, projection, 0, 1, as_published=as_published)[0].area
 
 
 def rays(view):

@@ -12,8 +12,8 @@ from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.scene.motion import faces_of, moved, rotation_about
 from refgi.sssil.temporal import Sequence, TemporalSettings
-from refgi.sssil.temporal.filter import remember, temporal_filter
-from refgi.sssil.temporal.motion import points_before
+from refgi.sssil.temporal.filter import history_of, temporal_filter
+from refgi.sssil.temporal.motion import previous_points
 from tests.naive.reprojection import recursion
 
 SIZE = {"width": 40, "height": 30}
@@ -61,7 +61,7 @@ def at_rest(frame, lights, settings):
         if history is not None:
             light, reused = temporal_filter(new, frame, frame.scene.geometry, history, settings)
             assert reused == 1
-        history = remember(frame, frame.scene.geometry, new if settings.form == "printed" else light)
+        history = history_of(frame, frame.scene.geometry, new if settings.form == "printed" else light)
         results.append(light[:, frame.gbuffer.covered])
     return results
 
@@ -138,7 +138,7 @@ def test_rigid_motion_is_undone(name, side, evidence):
     figures = {}
     for dtype, bound in ((np.float32, PLACE_OFF), (np.float64, 1e-15)):
         buffer = Frame(after, dtype=dtype).gbuffer
-        back = points_before(buffer, after.geometry, before.geometry)
+        back = previous_points(buffer, after.geometry, before.geometry)
         covered = buffer.covered
         place = buffer.position[:, covered].T.astype(np.float64)
         expected = (place - center - (0.03, -0.02, 0.05)) @ rotation + center
@@ -169,7 +169,7 @@ def test_light_stays_on_a_turning_object(evidence):
         lights = [painted(frame, i) for i, frame in enumerate(frames)]
         now = frames[1]
         geometry = scenes[1].geometry if own else scenes[0].geometry
-        history = remember(frames[0], geometry if not own else scenes[0].geometry, lights[0])
+        history = history_of(frames[0], geometry if not own else scenes[0].geometry, lights[0])
         zero = np.zeros_like(lights[1])
         result = temporal_filter(zero, now, geometry, history, TemporalSettings(weight=0.5, speed=1e6)).irradiance
         on = (now.gbuffer.triangle_id >= 0) & sphere[now.gbuffer.triangle_id] & (result[0] > 0)
@@ -185,7 +185,7 @@ def test_a_bent_mesh_is_followed_by_its_vertices(room):
     vertices = np.array(room.geometry.vertices)
     bent = dataclasses.replace(room.geometry, vertices=vertices + 0.02 * np.sin(9 * vertices[:, [1, 2, 0]]))
     now = Frame(dataclasses.replace(room, geometry=bent), dtype=np.float64)
-    back = points_before(now.gbuffer, bent, room.geometry)
+    back = previous_points(now.gbuffer, bent, room.geometry)
     for i, j in np.argwhere(now.gbuffer.covered)[::37]:
         face = room.geometry.faces[now.gbuffer.triangle_id[i, j]]
         corners, old = bent.vertices[face], vertices[face]
@@ -200,7 +200,7 @@ def test_what_rests_keeps_its_bits(room):
     selected = faces_of(room, "red")
     after = turned(room, 0.1, selected)
     buffer = Frame(after).gbuffer
-    back = points_before(buffer, after.geometry, room.geometry)
+    back = previous_points(buffer, after.geometry, room.geometry)
     resting = buffer.covered & ~selected[buffer.triangle_id]
     assert resting.any()
     assert (~resting & buffer.covered).any()
@@ -220,9 +220,9 @@ def test_the_weight_falls_with_the_speed(room, evidence):
     covered = frame.gbuffer.covered
     seen, earlier = (place[:2] / np.where(covered, place[2], 1) for place in (seen, earlier))
     expected = 15 / math.tan(room.camera.vfov / 2) * np.hypot(*(seen - earlier))
-    back = points_before(frame.gbuffer, after.geometry, room.geometry)
+    back = previous_points(frame.gbuffer, after.geometry, room.geometry)
     assert np.allclose(back.speed[covered], expected[covered], rtol=1e-9)
-    history = remember(before, room.geometry, np.zeros((3, 30, 40)))
+    history = history_of(before, room.geometry, np.zeros((3, 30, 40)))
     result = temporal_filter(np.ones((3, 30, 40)), frame, after.geometry, history,
                              TemporalSettings(weight=0.8, speed=0.4))
     found = covered & (result.irradiance[0] < 1)
@@ -238,17 +238,17 @@ def test_the_weight_falls_with_the_speed(room, evidence):
 def test_a_camera_that_moves_leaves_the_weight(room):
     x, y, z = room.camera.eye
     frame = Frame(room.with_camera(eye=(x + 0.1, y, z)), dtype=np.float64)
-    history = remember(Frame(room, dtype=np.float64), room.geometry, np.zeros((3, 30, 40)))
+    history = history_of(Frame(room, dtype=np.float64), room.geometry, np.zeros((3, 30, 40)))
     result = temporal_filter(np.ones((3, 30, 40)), frame, room.geometry, history, TemporalSettings(weight=0.8))
     assert set(np.round(np.unique(result.irradiance[:, frame.gbuffer.covered]), 12)) == {0.2, 1.0}
 
 
 def test_a_point_that_was_behind_the_camera_is_new(room):
     after = turned(room, 0, move=(0.0, 0.0, 3.0))
-    back = points_before(Frame(after).gbuffer, after.geometry, turned(room, 0, move=(0, 0, -3.0)).geometry)
+    back = previous_points(Frame(after).gbuffer, after.geometry, turned(room, 0, move=(0, 0, -3.0)).geometry)
     assert np.isinf(back.speed[Frame(after).gbuffer.covered]).all()
     frame = Frame(after)
-    history = remember(Frame(room), turned(room, 0, move=(0, 0, -3.0)).geometry, np.zeros((3, 30, 40), np.float32))
+    history = history_of(Frame(room), turned(room, 0, move=(0, 0, -3.0)).geometry, np.zeros((3, 30, 40), np.float32))
     result = temporal_filter(np.ones((3, 30, 40), np.float32), frame, after.geometry, history, TemporalSettings())
     assert (result.irradiance[:, frame.gbuffer.covered] == 1).all()
 

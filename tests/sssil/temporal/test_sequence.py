@@ -10,6 +10,7 @@ import pytest
 from refgi import stages
 from refgi.errors import InputError
 from refgi.scene import load_scene
+from refgi.settings import of, replaced
 from refgi.sssil.settings import LAST_SEED, HssilSettings
 from refgi.sssil.temporal import Sequence, TemporalSettings
 
@@ -23,17 +24,17 @@ def room():
 
 def white(frame, settings):
     """Noise of the settings' seed."""
-    return np.random.default_rng(settings.seed).random((3, frame.height, frame.width), dtype=np.float32)
+    return np.random.default_rng(settings.sampling.seed).random((3, frame.height, frame.width), dtype=np.float32)
 
 
 def test_the_seed_advances(room):
     seeds = []
 
     def light(frame, settings):
-        seeds.append(settings.seed)
+        seeds.append(settings.sampling.seed)
         return white(frame, settings)
 
-    list(Sequence([room] * 3, HssilSettings(seed=LAST_SEED - 1), method=light, **QUICK))
+    list(Sequence([room] * 3, of(HssilSettings, seed=LAST_SEED - 1), method=light, **QUICK))
     assert seeds == [LAST_SEED - 1, LAST_SEED, 0]
 
 
@@ -66,7 +67,7 @@ def test_only_what_the_next_frame_needs_is_kept(room, evidence):
     assert not any(ref() is not None for ref in (*frames, *lights))
     sequence = Sequence([], method=white, **QUICK)
     _, history = sequence._step(room, 0, None)
-    kept = history.irradiance.nbytes + history.seen.depth.nbytes + history.seen.normal.nbytes
+    kept = history.irradiance.nbytes + history.view.depth.nbytes + history.view.normal.nbytes
     pixels = 24 * 20
     assert kept == 7 * 4 * pixels
     assert history.geometry is room.geometry
@@ -74,16 +75,16 @@ def test_only_what_the_next_frame_needs_is_kept(room, evidence):
 
 
 def test_without_a_filter_each_frame_is_by_itself(room):
-    settings = HssilSettings(seed=5)
+    settings = of(HssilSettings, seed=5)
     for number, step in enumerate(Sequence([room] * 3, settings, None, method=white, **QUICK)):
-        assert np.array_equal(step.irradiance, white(step.frame, dataclasses.replace(settings, seed=5 + number)))
+        assert np.array_equal(step.irradiance, white(step.frame, replaced(settings, {"seed": 5 + number})))
         assert step.reused == 0
 
 
 def test_the_printed_form_averages_two_frames(room):
-    settings = HssilSettings(seed=3)
+    settings = of(HssilSettings, seed=3)
     steps = list(Sequence([room] * 3, settings, TemporalSettings(weight=0.75, form="printed"), method=white, **QUICK))
-    one, two = (white(steps[2].frame, HssilSettings(seed=seed)) for seed in (4, 5))
+    one, two = (white(steps[2].frame, of(HssilSettings, seed=seed)) for seed in (4, 5))
     covered = steps[2].frame.gbuffer.covered
     assert np.allclose(steps[2].irradiance[:, covered], (0.75 * one + 0.25 * two)[:, covered], atol=1e-6)
 
@@ -117,7 +118,7 @@ def test_what_is_refused(room):
 def test_hssil_grows_calm(evidence):
     """The noise of few samples, from frame to frame, before the filter and after it."""
     scene = load_scene("cornell_box").with_camera(width=48, height=40)
-    settings = HssilSettings(samples=8, radius=None, levels=2, start="full")
+    settings = of(HssilSettings, samples=8, radius=None, levels=2, start="full")
     changes = {}
     for temporal in (None, TemporalSettings(weight=0.7)):
         steps = list(Sequence([scene] * 12, settings, temporal, rsm_resolution=64))

@@ -5,6 +5,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
+from refgi.settings import of
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.upsampling.upsample import Guide, upsample
 from tests.naive import upsampling as naive
@@ -72,13 +73,14 @@ CASES = {
 @pytest.mark.feature("HSS-11")
 def test_equals_its_twin(case, evidence):
     shape, factor, changes, dtype = CASES[case]
-    settings = HssilSettings(**changes)
+    settings = of(HssilSettings, **changes)
     below, here = guides(*rubble(shape, 1), factor, dtype)
     rng = np.random.default_rng(2)
     light, added = (rng.random((3, *size)).astype(dtype) for size in (below.depth.shape, shape))
     got = upsample(light, below, here, settings, added)
-    twin = naive.bilateral(light, *map(np.float64, below), *map(np.float64, here), factor, settings.depth_sigma,
-                           settings.normal_power, settings.downsample != "average")
+    twin = naive.bilateral(light, *map(np.float64, below), *map(np.float64, here), factor,
+                           settings.upsampling.depth_sigma, settings.upsampling.normal_power,
+                           settings.senders.downsample != "average")
     twin += added * np.isfinite(here.depth)
     error = float(np.max(np.abs(got - twin)))
     assert got.dtype == dtype
@@ -90,7 +92,7 @@ def test_equals_its_twin(case, evidence):
 def test_plain_modes(mode):
     below, here = guides(*rubble((13, 18), 3), 4)
     light = np.random.default_rng(4).random((3, *below.depth.shape))
-    got = upsample(light, below, here, HssilSettings(upsampling=mode))
+    got = upsample(light, below, here, of(HssilSettings, upsampling=mode))
     seen = np.isfinite(here.depth)
     own = light.repeat(4, 1).repeat(4, 2)[:, :13, :18] * seen
     np.testing.assert_allclose(got, naive.bilinear(light, below.depth, here.depth, 4) if mode == "bilinear" else own,
@@ -103,7 +105,8 @@ def test_constants_stay(evidence):
     below, here = guides(depth, normal, 2, np.float32)
     light = np.full((3, *below.depth.shape), 0.3, np.float32)
     for mode in ("bilateral", "bilinear", "nearest"):
-        off = upsample(light, below, here, HssilSettings(upsampling=mode))[:, np.isfinite(depth)] / np.float32(0.3) - 1
+        got = upsample(light, below, here, of(HssilSettings, upsampling=mode))
+        off = got[:, np.isfinite(depth)] / np.float32(0.3) - 1
         assert np.max(np.abs(off)) <= ROUNDING
     below, here = guides(*slanted((40, 70)), 2, np.float32)
     light = np.full((3, *below.depth.shape), 0.3, np.float32)
@@ -123,7 +126,7 @@ def test_linear_light_stays_linear_on_a_slanted_plane(factor, downsample, eviden
     if downsample == "average":  # of the texel's middle, as is its nearness
         light = ramp.reshape(32 // factor, factor, -1, factor).mean((1, 3))
         below = Guide(1 / (1 / depth).reshape(32 // factor, factor, -1, factor).mean((1, 3)), below.normal)
-    got = upsample(np.stack([light] * 3), below, here, HssilSettings(downsample=downsample))
+    got = upsample(np.stack([light] * 3), below, here, of(HssilSettings, downsample=downsample))
     inner = (slice(None), slice(factor, -factor), slice(factor, -factor))
     error = float(np.max(np.abs(got - ramp)[inner]) / ramp.max())
     steps = np.abs(np.diff(below.depth, axis=0)) / below.depth[1:]
@@ -150,7 +153,7 @@ def test_no_bleeding_across_a_step(gap, turned, evidence):
     light = np.where((below.depth == 2.0) & (below.normal[2] == 1), 1.0, 0.0) * np.ones((3, 1, 1))
     right = np.zeros_like(depth)
     right[:, :17] = 1
-    bled = [float(np.max(np.abs(upsample(light, below, here, HssilSettings(upsampling=mode)) - right)))
+    bled = [float(np.max(np.abs(upsample(light, below, here, of(HssilSettings, upsampling=mode)) - right)))
             for mode in ("bilateral", "bilinear")]
     assert bled[0] == 0
     assert bled[1] > 0.2  # a pixel beside the edge takes a quarter from beyond
@@ -169,7 +172,7 @@ def test_adding_first_equals_upsampling_apart(evidence):
     light = [rng.random((3, *level.depth.shape)) * np.isfinite(level.depth) for level in guide]
     worst = 0.0
     for mode in ("bilateral", "bilinear", "nearest"):
-        settings = HssilSettings(upsampling=mode)
+        settings = of(HssilSettings, upsampling=mode)
 
         def up(values, number, added=None, settings=settings):
             return upsample(values, guide[number], guide[number - 1], settings, added)
@@ -195,7 +198,7 @@ def test_mirrored_pictures_come_out_mirrored_to_the_bit(mode, evidence):
     below, here = guides(depth, normal, 2, np.float32)
     light, added = (np.random.default_rng(3).random((3, *g.depth.shape)).astype(np.float32) for g in (below, here))
     flipped = [Guide(*(np.ascontiguousarray(array[..., ::-1]) for array in guide)) for guide in (below, here)]
-    settings = HssilSettings(upsampling=mode)
+    settings = of(HssilSettings, upsampling=mode)
     straight = upsample(light, below, here, settings, added)
     mirrored = upsample(light[..., ::-1], *flipped, settings, added[..., ::-1])
     assert np.array_equal(mirrored[..., ::-1], straight)
@@ -220,7 +223,7 @@ def test_background_receives_nothing_and_gives_nothing():
     light = np.where(np.isfinite(below.depth), np.float32(1), np.float32(1e30)) * np.ones((3, 1, 1), np.float32)
     added = np.where(np.isfinite(depth), np.float32(1), np.float32(np.nan)) * np.ones((3, 1, 1), np.float32)
     for mode in ("bilateral", "bilinear", "nearest"):
-        got = upsample(light, below, here, HssilSettings(upsampling=mode), added)
+        got = upsample(light, below, here, of(HssilSettings, upsampling=mode), added)
         np.testing.assert_allclose(got, 2.0 * np.isfinite(depth) * np.ones((3, 1, 1)), rtol=ROUNDING)
     nothing = Guide(np.full_like(here.depth, np.inf), np.zeros_like(here.normal))
     empty = Guide(np.full_like(below.depth, np.inf), np.zeros_like(below.normal))
@@ -236,7 +239,7 @@ def test_any_depth_is_finite_and_within_bounds(scale, sigma):
     depth[3, 4], depth[8, 9] = 1e-6, 1e6  # next to others: far beyond any slope
     below, here = guides(depth * scale, normal, 2, np.float32)
     light = np.random.default_rng(5).random((3, *below.depth.shape)).astype(np.float32) + np.float32(0.5)
-    got = upsample(light, below, here, HssilSettings(depth_sigma=sigma))[:, np.isfinite(depth)]
+    got = upsample(light, below, here, of(HssilSettings, depth_sigma=sigma))[:, np.isfinite(depth)]
     assert np.all(np.isfinite(got))
     assert got.min() >= 0.5 * (1 - ROUNDING)
     assert got.max() <= 1.5 * (1 + ROUNDING)

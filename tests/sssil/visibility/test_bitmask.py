@@ -1,20 +1,20 @@
 """Samples past the bitmask, against a twin of vectors and sets, convex rooms, and what must hold for any picture."""
 
-import dataclasses
 
 import numpy as np
 import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
-from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
-from refgi.sssil.level import Level
+from refgi.settings import of, replaced
+from refgi.sssil.crown.points import level_key, pixel_key, row_key
+from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.slices import fill_slices, slice_offsets, steps_of
+from refgi.sssil.visibility.slices import fill_slices, slice_counts, slice_offsets
 from tests.naive import bitmask as naive
 
-SETTINGS = HssilSettings(radius=4, levels=1, samples=24, slices=5, start="full", thickness=0.1)
+SETTINGS = of(HssilSettings, radius=4, levels=1, samples=24, slices=5, start="full", thickness=0.1)
 DIAGONAL = 2.0  # m; with the thickness above, surfaces of 0.2 m
 ROUNDING = 1e-12  # float64 sums of some 100 terms of like sign
 SINGLE = 3e-5  # float32: some 100 roundings of 6e-8, and cosines of small angles
@@ -56,29 +56,29 @@ def shaken(level):
     return level._replace(position=level.position + np.random.default_rng(6).normal(0, 1e-3, level.position.shape))
 
 
-def twin(level, settings, offsets_of, thickness=DIAGONAL * SETTINGS.thickness):
+def twin(level, settings, offsets_of, thickness=DIAGONAL * SETTINGS.visibility.thickness):
     def around(row, column):
         offsets, weight = offsets_of(row, column)
         return [[(*map(int, o), w) for o, w in zip(*both, strict=True)] for both in zip(offsets, weight, strict=True)]
 
     if thickness is None:
         flat = lambda row, column: [sample for samples in around(row, column) for sample in samples]  # noqa: E731
-        return naive.light(level._asdict(), flat, settings.form_factor)
-    return naive.masked_light(level._asdict(), around, thickness, settings.form_factor)
+        return naive.light(level._asdict(), flat, settings.senders.form_factor)
+    return naive.masked_light(level._asdict(), around, thickness, settings.senders.form_factor)
 
 
 def shared(level, index, settings):
-    steps = steps_of(settings, index, settings.radius)
-    offsets, weight = slice_offsets(settings, steps, level.number, level.shape[0])
+    steps = slice_counts(settings.sampling, settings.visibility, index, settings.sampling.radius)
+    offsets, weight = slice_offsets(settings.sampling, steps, level.number, level.shape[0])
     return lambda row, _: (offsets[min(row, len(offsets) - 1)], weight[min(row, len(offsets) - 1)])
 
 
 def own(level, index, settings):
-    steps = steps_of(settings, index, settings.radius)
+    steps = slice_counts(settings.sampling, settings.visibility, index, settings.sampling.radius)
     offsets, weight = np.empty((steps.slices, steps.per_slice, 2), np.int32), np.empty((steps.slices, steps.per_slice))
 
     def of(row, column):
-        key = pixel_key(row_key(level_key(settings.seed, level.number), row), column)
+        key = pixel_key(row_key(level_key(settings.sampling.seed, level.number), row), column)
         fill_slices(steps, key, False, np.empty(steps.per_slice), offsets, weight)
         return offsets, weight
 
@@ -91,7 +91,7 @@ CASES = [("row", "disc", 0), ("fixed", "point", 1), ("pixel", "disc", 1)]
 
 @pytest.mark.parametrize(("pattern", "form", "index"), CASES)
 def test_twin(pattern, form, index):
-    settings = dataclasses.replace(SETTINGS, pattern=pattern, form_factor=form)
+    settings = replaced(SETTINGS, {"pattern": pattern, "form_factor": form})
     level = without(shaken(seen(plate=PLATE)), np.arange(140).reshape(10, 14) % 17 == 3)
     expected = twin(level, settings, (own if pattern == "pixel" else shared)(level, index, settings))
     got = bitmask_gather(level, index, settings, DIAGONAL)
@@ -110,7 +110,7 @@ def test_float32_is_float64_rounded_but_for_ties():
 @pytest.mark.feature("HSS-17")
 @pytest.mark.parametrize("pattern", ["row", "fixed"])
 def test_surfaces_of_no_thickness_block_nothing(pattern, evidence):
-    settings = dataclasses.replace(SETTINGS, pattern=pattern, thickness=0.0)
+    settings = replaced(SETTINGS, {"pattern": pattern, "thickness": 0.0})
     level = seen(plate=PLATE)
     expected = twin(level, settings, shared(level, 0, settings), None)
     got = bitmask_gather(level, 0, settings, DIAGONAL)
@@ -122,9 +122,9 @@ def test_surfaces_of_no_thickness_block_nothing(pattern, evidence):
 @pytest.mark.feature("HSS-17")
 def test_nothing_blocks_in_a_convex_room(evidence):
     """Along a slice of a convex room each surface stands higher than those before it."""
-    settings = dataclasses.replace(SETTINGS, slices=4, radius=8)
+    settings = replaced(SETTINGS, {"slices": 4, "radius": 8})
     level = seen(24, 32)
-    free, masked = (bitmask_gather(level, 0, dataclasses.replace(settings, thickness=t, pattern="fixed"), DIAGONAL)
+    free, masked = (bitmask_gather(level, 0, replaced(settings, {"thickness": t, "pattern": "fixed"}), DIAGONAL)
                     for t in (0.0, 0.1))
     lost = 1 - masked.sum() / free.sum()
     evidence(f"convex room: {lost:.2%} of the light lost to blocking")
@@ -147,8 +147,8 @@ def test_a_post_hides_the_lamp_behind_it(thickness, lamp_height, share):
     level = seen(1, 3)._replace(position=np.array(points).T[:, None], radiance=np.zeros((3, 1, 3)))
     level.normal[:, 0] = np.array([[0, -1, 0], [-1, 0, 0], [-1, 0, 0]]).T
     level.radiance[:, 0, 2] = 1.0
-    settings = dataclasses.replace(SETTINGS, slices=2, radius=1, samples=16, pattern="fixed")
-    free, got = (bitmask_gather(level, 0, dataclasses.replace(settings, thickness=t), 1.0)[0, 0, 0]
+    settings = replaced(SETTINGS, {"slices": 2, "radius": 1, "samples": 16, "pattern": "fixed"})
+    free, got = (bitmask_gather(level, 0, replaced(settings, {"thickness": t}), 1.0)[0, 0, 0]
                  for t in (0.0, thickness))
     assert free > 0
     assert got == share * free
@@ -158,9 +158,9 @@ def test_a_post_hides_the_lamp_behind_it(thickness, lamp_height, share):
 def test_never_above_the_unoccluded_sum(evidence):
     level = seen(30, 40, PLATE)
     shares = []
-    free = bitmask_gather(level, 0, dataclasses.replace(SETTINGS, thickness=0.0), DIAGONAL)
+    free = bitmask_gather(level, 0, replaced(SETTINGS, {"thickness": 0.0}), DIAGONAL)
     for thickness in (0.02, 0.1, 1.0):
-        masked = bitmask_gather(level, 0, dataclasses.replace(SETTINGS, thickness=thickness), DIAGONAL)
+        masked = bitmask_gather(level, 0, replaced(SETTINGS, {"thickness": thickness}), DIAGONAL)
         assert (masked >= 0).all()
         assert (masked <= free * (1 + ROUNDING)).all()
         shares.append(masked.sum() / free.sum())
@@ -172,7 +172,7 @@ def test_mirror_images_to_the_bit():
     level = seen(12, 15, ((-0.5, -0.2, 2.0), (0.5, 0.9, 2.2)), np.float32)
     level = level._replace(radiance=level.radiance + level.radiance[:, :, ::-1])
     for slices in (4, 5):
-        settings = dataclasses.replace(SETTINGS, pattern="fixed", slices=slices)
+        settings = replaced(SETTINGS, {"pattern": "fixed", "slices": slices})
         got = bitmask_gather(level, 0, settings, DIAGONAL)
         np.testing.assert_array_equal(got, got[:, :, ::-1])
 
@@ -180,7 +180,7 @@ def test_mirror_images_to_the_bit():
 @pytest.mark.parametrize("pattern", ["row", "pixel"])
 def test_same_bits_for_any_number_of_threads(pattern):
     level = seen(9, 21, PLATE, np.float32)
-    settings = dataclasses.replace(SETTINGS, pattern=pattern)
+    settings = replaced(SETTINGS, {"pattern": pattern})
     results = []
     for count in (1, 2):
         with threads(count):
@@ -193,7 +193,7 @@ def test_small_pictures_and_background(shape):
     level = seen(*shape, dtype=np.float32)
     for one in (level, without(level, np.ones(shape, bool))):
         for pattern in ("row", "pixel"):
-            got = bitmask_gather(one, 0, dataclasses.replace(SETTINGS, pattern=pattern), DIAGONAL)
+            got = bitmask_gather(one, 0, replaced(SETTINGS, {"pattern": pattern}), DIAGONAL)
             assert got.shape == (3, *shape)
             assert np.isfinite(got).all()
     assert not got.any()
@@ -233,4 +233,9 @@ def test_surfaces_in_the_same_place_give_nothing():
 
 def test_all_texels_have_no_slices():
     with pytest.raises(InputError, match="pattern"):
-        bitmask_gather(seen(), 0, dataclasses.replace(SETTINGS, pattern="all"), DIAGONAL)
+        replaced(SETTINGS, {"pattern": "all"})
+
+
+def test_a_bitmask_needs_its_settings():
+    with pytest.raises(InputError, match="visibility: expected bitmask"):
+        bitmask_gather(seen(), 0, replaced(SETTINGS, {"visibility": "rays"}), DIAGONAL)

@@ -8,16 +8,18 @@ import pytest
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, merge
-from refgi.sssil.crown.pattern import offsets_at, sample_weight
+from refgi.settings import of, replaced
+from refgi.sssil.crown.pattern import offsets_at
+from refgi.sssil.crown.points import sample_weight
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.rays import add_free, ray_gather
+from refgi.sssil.visibility.rays import add_unoccluded, ray_gather
 from tests.naive import bitmask as naive
 
 WHITE = Material("white", (0.6, 0.6, 0.6))
 ROUNDING = 1e-12  # float64 sums of some 20 terms of like sign
-SETTINGS = HssilSettings(radius=4, levels=1, samples=12, start="full")
+SETTINGS = of(HssilSettings, radius=4, levels=1, samples=12, start="full")
 MARGIN = 1e-4  # share of a segment where triangles do not count: its ends lie on some
 
 
@@ -43,14 +45,15 @@ def frame():
 
 
 def around(level, index, settings):
-    weight = sample_weight(settings.radius, settings.inner if index == 0 else 0, settings.samples)
+    sampling = settings.sampling
+    weight = sample_weight(sampling.radius, sampling.inner if index == 0 else 0, sampling.samples)
     return lambda row, column: [(int(ox), int(oy), w) for (ox, oy), w in zip(
-        offsets_at(settings, index, level.number, row, column), weight, strict=True)]
+        offsets_at(settings.sampling, index, level.number, row, column), weight, strict=True)]
 
 
 def twin(level, settings, frame=None):
     if frame is None:
-        return naive.light(level._asdict(), around(level, 0, settings), settings.form_factor)
+        return naive.light(level._asdict(), around(level, 0, settings), settings.senders.form_factor)
     geometry, eye = frame.scene.geometry, np.asarray(frame.scene.camera.eye)
     corners = geometry.vertices[geometry.faces]
 
@@ -58,13 +61,13 @@ def twin(level, settings, frame=None):
         ends = (level.position[:, *texel] + eye for texel in (receiver, sender))
         return float(not naive.blocked_by_triangles(corners, *ends, MARGIN))
 
-    return naive.light(level._asdict(), around(level, 0, settings), settings.form_factor, see)
+    return naive.light(level._asdict(), around(level, 0, settings), settings.senders.form_factor, see)
 
 
 @pytest.mark.feature("REF-02")
 @pytest.mark.parametrize(("pattern", "form"), [("row", "disc"), ("pixel", "point")])
 def test_twin(frame, pattern, form, evidence):
-    settings = dataclasses.replace(SETTINGS, pattern=pattern, form_factor=form)
+    settings = replaced(SETTINGS, {"pattern": pattern, "form_factor": form})
     (level,) = pyramid(frame, settings)
     expected, free = twin(level, settings, frame), twin(level, settings)
     got = ray_gather(level, 0, settings, frame)
@@ -101,8 +104,8 @@ def test_mirror_images_are_added_to_each_other_first():
     blocked = rng.random(40) < 0.3
     exchanged = np.arange(40).reshape(-1, 2)[:, ::-1].ravel()
     sums = np.zeros((2, 3, 1))
-    add_free(radiance, 0, 1, 40, blocked, worth, sender, sums[0])
-    add_free(radiance, 0, 1, 40, blocked[exchanged], worth[exchanged], sender[exchanged], sums[1])
+    add_unoccluded(radiance, 0, 1, 40, blocked, worth, sender, sums[0])
+    add_unoccluded(radiance, 0, 1, 40, blocked[exchanged], worth[exchanged], sender[exchanged], sums[1])
     np.testing.assert_array_equal(sums[0], sums[1])
     np.testing.assert_allclose(sums[0, :, 0], radiance[:, sender] @ (worth * ~blocked), rtol=1e-14)
 
@@ -121,13 +124,13 @@ def test_background_receives_nothing():
 @pytest.mark.feature("HSS-17")
 def test_over_brightness_and_what_the_bitmask_leaves_of_it(evidence):
     """Samples of slices without visibility and with the bitmask, against rays to every texel."""
-    settings = HssilSettings(radius=6, levels=1, samples=64, start="full", pattern="all")
+    settings = of(HssilSettings, radius=6, levels=1, samples=64, start="full", pattern="all")
     frame = Frame(scene(blocker=True), width=48, height=36, rsm_resolution=128)
     (level,) = pyramid(frame, settings)
     true = ray_gather(level, 0, settings, frame)
-    dense = dataclasses.replace(settings, pattern="row", slices=16, samples=512, thickness=0.01)
-    free, masked = (bitmask_gather(level, 0, dataclasses.replace(dense, thickness=t), frame.scene.geometry.diagonal)
-                    for t in (0.0, dense.thickness))
+    dense = replaced(settings, {"pattern": "row", "slices": 16, "samples": 512, "thickness": 0.01})
+    free, masked = (bitmask_gather(level, 0, replaced(dense, {"thickness": t}), frame.scene.geometry.diagonal)
+                    for t in (0.0, dense.visibility.thickness))
     over, left = (light.sum() / true.sum() - 1 for light in (free, masked))
     error, rest = (np.abs(light - true).mean() / true.mean() for light in (free, masked))
     evidence(f"below a shelf: V = 1 is {over:.1%} too bright, {left:.1%} with the bitmask; mean error of a texel "

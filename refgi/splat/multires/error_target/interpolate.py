@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange, threads
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.splat.multires.refinement.grid import level_shape, representative
 from refgi.stages import stage
 

@@ -17,7 +17,7 @@ from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.packing import Packed
 from refgi.pairs.pair_sum import NX, SUM, Clamp, X, clamped_term, geometry_term
 from refgi.pairs.tiles import block_by_block, put, taken
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.splat.multires.refinement.grid import level_shape
 from refgi.stages import stage
 

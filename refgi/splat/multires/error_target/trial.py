@@ -16,7 +16,7 @@ from refgi.jit import kernel, prange, threads
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.packing import Packed
 from refgi.pairs.tiles import put, taken
-from refgi.rsm.memory import plane
+from refgi.rsm.pool import plane
 from refgi.splat.multires.error_target.descent import fill_coarsest, fill_level, fill_picture, residuals
 from refgi.splat.multires.error_target.interpolate import SurfaceLevel, blend_weights
 from refgi.splat.multires.error_target.near import NearLight

@@ -1,8 +1,8 @@
-"""Which lights may count for which tile of receivers (SII Sec. 3.4 on tiles instead of fragments).
+"""Light lists for tiles of receivers: which lights may count where (SII Sec. 3.4, on tiles instead of fragments).
 
 A tile of 8 x 8 pixels is bounded by boxes around its positions and normals. A light is left out where the whole tile
 lies behind its surface, it behind the surfaces of all receivers, its solid misses the box, or the largest B that the
-box admits is below I_low. Tiles of 16 x 16 are asked first, their parts only about lights that may reach the whole.
+box admits is below I_low. Tiles of 16 x 16 are tested first, their parts only against lights that may reach the whole.
 All is done from differences of positions, with a margin for rounding: lists may be longer than need be, never shorter.
 
 Symbols: d vector from the solid's centre to the box's, q the half sides of the box; with the solid scaled to the unit
@@ -112,10 +112,10 @@ def _list(position: Array, normal: Array, solids: Array, balls: bool, listed: Ar
         passed = np.empty(solids.shape[1], np.bool_)
         _reach(solids, solids.shape[1], low[parts], high[parts], balls, passed)
         near, chosen = np.empty_like(solids), np.empty(solids.shape[1], np.uint32)
-        found = _gather(solids, passed, near, chosen)
+        found = _compact(solids, passed, near, chosen)
         for part in range(here):
             _reach(near, found, low[part], high[part], balls, passed)
-            _mark(listed[block * parts + part], chosen, passed, found)
+            _scatter(listed[block * parts + part], chosen, passed, found)
 
 
 @kernel
@@ -152,8 +152,8 @@ def _extremes(values: Array, row: int, first: int, last: int) -> Any:
 
 
 @kernel
-def _gather(solids: Array, passed: Array, near: Array, chosen: Array) -> int:
-    """Copy the solids that passed to the front."""
+def _compact(solids: Array, passed: Array, near: Array, chosen: Array) -> int:
+    """Copy the solids that passed to the front and return how many there are."""
     count = 0
     for k in range(len(passed)):
         chosen[count] = k
@@ -165,14 +165,14 @@ def _gather(solids: Array, passed: Array, near: Array, chosen: Array) -> int:
 
 
 @kernel
-def _mark(listed: Array, chosen: Array, passed: Array, count: int) -> None:
+def _scatter(listed: Array, chosen: Array, passed: Array, count: int) -> None:
     for i in range(count):
         listed[chosen[i]] = passed[i]
 
 
 @kernel
 def _reach(solids: Array, count: int, low: Array, high: Array, balls: bool, passed: Array) -> None:
-    """Tell of the first `count` lights whether they may count inside a box."""
+    """Fill `passed` for the first `count` lights: whether each may count inside a box."""
     real = solids.dtype.type
     zero, half, one = real(0.0), real(0.5), real(1.0)
     slack = real(ROUNDING) * real(np.finfo(solids.dtype).eps)

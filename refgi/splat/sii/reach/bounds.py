@@ -1,4 +1,4 @@
-"""Where a pixel light is significant, and ellipsoids around it (SII appendix, with Eq. 8 corrected).
+"""Ellipsoids that bound where a pixel light is significant (SII appendix, Eq. 7 and 8 with the exponent restored).
 
 A light of exponent n (1: diffuse) sends B = I_0 cos^n(alpha) / r^2, so B >= I_low inside r^2 = R_0^2 cos^n(alpha),
 R_0^2 = I_0 / I_low. All lengths here are shares of R_0. x runs along the light's axis (normal or lobe axis), rho across
@@ -58,7 +58,9 @@ def appendix_ellipsoid(exponent: npt.ArrayLike) -> Ellipsoid:
     """
     n = np.asarray(exponent, np.float64)
     share = n / (n + 2)
-    center = share ** ((n + 2) / 4)  # Eq. (8)
+    # Eq. (8)
+    center = share ** ((n + 2) / 4)
+    # Eq. (7) at the centre
     height = share ** (n / 4) * np.sqrt(2 / (n + 2))
     return Ellipsoid(center, np.maximum(center, 1 - center), height)
 
@@ -117,7 +119,7 @@ def half_ball_radius(square_range: Array, widening: float, literal: bool = False
 
 
 def light_solids(
-    position: Array, axis: Array, exponent: Array, square: Array, kind: str, widening: float = 0.0,
+    position: Array, axis: Array, exponent: Array, square: Array, tangent: bool, widening: float = 0.0,
     literal: bool = False,
 ) -> Solids:
     """Return the bounds of some lights.
@@ -130,8 +132,8 @@ def light_solids(
         n: 1 for diffuse lights.
     square : (N,) ndarray
         R_0^2 = I_0 / I_low, m^2.
-    kind : str
-        "tangent", or the ellipsoid of the appendix.
+    tangent : bool
+        Use tangent ellipsoids; else those of the appendix.
     widening : float
         The distance within which exponents fall, m; 0: nowhere.
     literal : bool
@@ -142,7 +144,7 @@ def light_solids(
     Solids
         In float64.
     """
-    ellipsoid = (tangent_ellipsoid if kind == "tangent" else appendix_ellipsoid)(exponent)
+    ellipsoid = (tangent_ellipsoid if tangent else appendix_ellipsoid)(exponent)
     square = np.asarray(square, np.float64)
     ball = half_ball_radius(square, widening, literal) if widening > 0 else None
     return Solids(np.asarray(position, np.float64), np.asarray(axis, np.float64), square, ellipsoid, ball)

@@ -1,4 +1,4 @@
-"""What a splatted picture costs: how many lights count at each pixel, and the traffic that makes (SII Fig. 8, Sec. 6).
+"""Cost of a splatted picture: overdraw, fragments and memory traffic (SII Fig. 8, Sec. 6).
 
 A fragment is a pair of light and pixel with B >= I_low; the parts of a light, diffuse and glossy, count by themselves.
 On graphics hardware each fragment reads 72 bits of receiver (48 position, 24 normal), each sample of a gather 112 bits
@@ -16,9 +16,9 @@ from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES, reached
-from refgi.splat.sii.reach.lists import Lists
+from refgi.splat.sii.reach.lists import LightLists
 from refgi.splat.sii.reach.reference_length import lobe_strength, with_reference_length
-from refgi.splat.sii.settings import SplatSettings
+from refgi.splat.sii.settings import SiiSettings
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
@@ -35,7 +35,7 @@ class Fragments(NamedTuple):
 
     overdraw: Array  # (h, w) int32: lights that count at a pixel
     of_light: Array  # (N,) int64: pixels at which a light counts
-    evaluated: int  # pairs that the kernels look at
+    evaluated: int  # pairs that the kernels evaluate
 
     @property
     def total(self) -> int:
@@ -70,19 +70,19 @@ def gather_bits(pixels: int, samples: int) -> int:
 
 
 def fragments(
-    receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None = None,
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None,
     projection: "Projection | None" = None,
 ) -> Fragments:
-    """Count the pairs of light and pixel that `splat` keeps, and those it looks at.
+    """Count the pairs of light and pixel that `splat` keeps, and those it evaluates.
 
     Parameters
     ----------
     receivers : Receivers
-        Points that are lit.
+        Points to light.
     lights : PixelLights
         Lights.
-    settings : SplatSettings
-        Threshold and bound.
+    settings : SiiSettings
+        The parts `reach` and `pairs`.
     footprint : (N,) ndarray, optional
         As for `splat`.
     projection : Projection, optional
@@ -92,17 +92,17 @@ def fragments(
     -------
     Fragments
         Overdraw and fragments depend on the threshold alone, pairs evaluated on the bound as well. Lobes are counted
-        in float64: at the edge of their range a pair may be told apart from the sum's.
+        in float64: at the edge of their range a pair may count here and not in the sum, or the reverse.
     """
     packed = checked(receivers, lights, settings.pairs, footprint)
     overdraw, of_light, evaluated = np.zeros(receivers.covered.shape, np.int32), np.zeros(len(packed.shines), int), 0
-    if not settings.cuts:
+    if settings.reach.cut is None:
         count = int(packed.shines.sum()) + int(packed.glossy.sum())
         overdraw[receivers.covered] = count
         pixels = int(np.count_nonzero(receivers.covered))
         return Fragments(overdraw, pixels * (packed.shines.astype(int) + packed.glossy), pixels * count)
     settings = with_reference_length(receivers, lights, settings)
-    lists = Lists(packed, settings, False, receivers.covered.shape[1], projection)
+    lists = LightLists(packed, settings, False, receivers.covered.shape[1], projection)
 
     def add(here: Array, facing: Array, places: Array, _: Array) -> None:
         nonlocal evaluated

@@ -1,4 +1,4 @@
-"""How far the lights of one picture reach, and which tiles their bounds list them for."""
+"""Ranges of the lights of one picture, and light lists of its tiles by the chosen bound (SII Sec. 3.2, 3.4)."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from refgi.splat.sii.reach.bins import list_lights, of_whole_tiles, pack_solids
 from refgi.splat.sii.reach.bounds import Solids, light_solids
 from refgi.splat.sii.reach.screen_bounds import covered_pixels, screen_quads, tiles_of_pixels, tiles_of_quads
 from refgi.splat.sii.reach.threshold import DIFFUSE, GLOSSY, all_peaks, light_range, threshold
-from refgi.splat.sii.settings import SplatSettings
+from refgi.splat.sii.settings import FullBound, MeshBound, QuadBound, SiiSettings, TangentBound
 
 if TYPE_CHECKING:
     from refgi.rsm import Projection
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 
-class Lists:
+class LightLists:
     """The range of all lights of a picture, and lists of lights for any of its receivers.
 
     Parameters
     ----------
     packed : Packed
         The lights.
-    settings : SplatSettings
-        Threshold and bound.
+    settings : SiiSettings
+        The parts `reach` and `pairs`.
     outside : bool
         Sum what the cut loses; every light is then listed everywhere.
     width : int
         Of the picture, in pixels.
     projection : Projection or None
-        The map its pixels are seen on.
+        The camera's map.
 
     Attributes
     ----------
@@ -46,17 +46,20 @@ class Lists:
     """
 
     def __init__(
-        self, packed: Packed, settings: SplatSettings, outside: bool, width: int, projection: "Projection | None"
+        self, packed: Packed, settings: SiiSettings, outside: bool, width: int, projection: "Projection | None"
     ) -> None:
-        self._bound = "full" if outside else settings.bound
-        if self._bound in ("quad", "mesh"):
-            expect(projection is not None, "projection", f"the receivers' map for the bound {self._bound!r}", None)
+        self._bound = FullBound() if outside else settings.reach.bound
+        self._on_screen = isinstance(self._bound, QuadBound | MeshBound)
+        if self._on_screen:
+            expect(projection is not None, "projection", f"the camera's map for the bound {self._bound.name()!r}", None)
+        self._tangent = isinstance(self._bound, TangentBound)
         self._packed, self._settings, self._width, self._projection = packed, settings, width, projection
         diffuse, glossy = all_peaks(packed)
-        self.low = threshold(np.concatenate([diffuse, glossy]), settings)
+        self.low = threshold(np.concatenate([diffuse, glossy]), settings.reach)
         dtype = packed.diffuse.dtype
-        self.diffuse = light_range(diffuse, self.low, settings, DIFFUSE, dtype, outside) if len(diffuse) > 1 else None
-        self.lobes = light_range(glossy, self.low, settings, GLOSSY, dtype, outside) if len(glossy) else None
+        reach, low = settings.reach, self.low
+        self.diffuse = light_range(diffuse, low, reach, DIFFUSE, dtype, outside) if len(diffuse) > 1 else None
+        self.lobes = light_range(glossy, low, reach, GLOSSY, dtype, outside) if len(glossy) else None
 
     def of_diffuse(self, position: Array, normal: Array, places: Array) -> Array:
         """Return which diffuse lights may count for which tile of LANES receivers, (ceil(n / LANES), M) bool."""
@@ -72,33 +75,32 @@ class Lists:
         """Return the bounds of the diffuse lights, without the black one."""
         assert self.diffuse is not None
         lights, square = self._packed.diffuse[:, :-1], _square(self.diffuse)[:-1]
-        return light_solids(lights[:3], -lights[3:6], np.ones(len(square)), square, self._settings.bound)
+        return light_solids(lights[:3], -lights[3:6], np.ones(len(square)), square, self._tangent)
 
     def lobe_solids(self) -> Solids:
         """Return the bounds of the lobes."""
         assert self.lobes is not None
         assert self._packed.lobes is not None
         lights = self._packed.lobes.lights
-        return light_solids(lights[:3], -lights[6:9], lights[9], _square(self.lobes), self._settings.bound,
+        return light_solids(lights[:3], -lights[6:9], lights[9], _square(self.lobes), self._tangent,
                             self._settings.pairs.lobe.widening,
                             "sii_widening" in self._settings.pairs.as_published)
 
     def _list(
         self, position: Array, normal: Array, places: Array, lights: Array, solids: Solids, nearest: bool
     ) -> Array:
-        if self._bound == "full":
+        if isinstance(self._bound, FullBound):
             return np.ones((-(-len(places) // LANES), lights.shape[1]), np.bool_)
-        on_screen = self._bound in ("quad", "mesh")
-        packed = pack_solids(solids, lights[3:6], hollow=on_screen, nearest=nearest and self._bound == "tangent")
+        packed = pack_solids(solids, lights[3:6], hollow=self._on_screen, nearest=nearest and self._tangent)
         listed = list_lights(position, normal, packed)
-        return listed & self._on_screen(places, solids) if on_screen else listed
+        return listed & self._tiles_on_screen(places, solids) if self._on_screen else listed
 
-    def _on_screen(self, places: Array, solids: Solids) -> Array:
+    def _tiles_on_screen(self, places: Array, solids: Solids) -> Array:
         assert self._projection is not None
-        if self._bound == "quad":
+        if not isinstance(self._bound, MeshBound):
             return tiles_of_quads(screen_quads(self._projection, solids.position, np.sqrt(solids.square)), places,
                                   self._width)
-        faces, inflate = self._settings.mesh_faces, self._settings.inflate
+        faces, inflate = self._bound.faces, self._bound.inflate
         return np.stack([tiles_of_pixels(covered_pixels(self._projection, solids, k, faces, inflate), places)
                          for k in range(solids.position.shape[1])], axis=1)
 

@@ -1,15 +1,15 @@
-"""The reference length of a picture whose settings give none: the length under which the paper's cut is the paper's.
+"""Reference length of a picture whose settings give none: under it the paper's cut keeps the paper's share of pairs.
 
 I_low is "x % of I_0", an irradiance of an intensity: the paper's unit of length is missing, and with it how far splats
-reach. Figure 8 tells how far they do: of 768 lights cut at 5 % a mean of 125 counts at a pixel. Here B of pairs of
+reach. Figure 8 shows how far they do: of 768 lights cut at 5 % a mean of 125 counts at a pixel. Here B of pairs of
 lights and sampled pixels is sorted: the length is the one under which 5 % leave that share of them, in any unit.
 
-B = I(w) / r^2 of a pair of light and receiver: what the threshold is held against, in float64.
+B = I(w) / r^2 of a pair of light and receiver is what the threshold compares, in float64.
 """
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,82 +19,48 @@ from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lobe_shape import CORRECTED, Widening, lobe_norm_factor
 from refgi.pairs.loss import PAIRS, sample_for
 from refgi.pairs.packing import Packed, pack
+from refgi.pairs.pair_sum import pair_cosines
+from refgi.pairs.settings import PairSettings
 from refgi.scene.values import LARGEST
 from refgi.splat.sii.reach.threshold import all_peaks
-from refgi.splat.sii.settings import SplatSettings
+from refgi.splat.sii.settings import RelativeCut, SiiSettings
 from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
-S = TypeVar("S", bound=SplatSettings)
 
 PAPER_OVERDRAW, PAPER_LIGHTS, PAPER_CUT = 125.0, 768, 0.05  # Figure 8
-LEAST_SAMPLED = 64  # pixels, enough to count pairs by; of more lights than go with them every so many-th is looked at
+LEAST_SAMPLED = 64  # pixels, enough to count pairs by; of more lights than go with them every n-th is tested
 LONGEST = 10.0  # diagonals of the sample: where not even that leaves as many pairs, next to nothing is cut
 
 
 @kernel
-def diffuse_strength(position: Array, i: int, lights: Array, k: int) -> float:
-    """Return B / I_0 = cos / r^2 of a packed diffuse light at a receiver.
-
-    Parameters
-    ----------
-    position : (3, n) ndarray
-        Receivers, m.
-    i : int
-        Which receiver.
-    lights : (9, N) ndarray
-        Packed lights: position, reversed normal, flux / pi.
-    k : int
-        Which light.
-
-    Returns
-    -------
-    float
-        1/m^2; 0 behind the light.
-    """
-    above, r2 = 0.0, 0.0
-    for axis in range(3):
-        d = float(lights[axis, k]) - float(position[axis, i])
-        above += d * lights[3 + axis, k]
-        r2 += d * d
-    return above / (r2 * math.sqrt(r2)) if above > 0.0 else 0.0
+def _diffuse_strength(position: Array, i: int, lights: Array, k: int) -> Any:
+    """Return B / I_0 = cos / r^2 of packed diffuse light k at receiver i, 1/m^2; 0 behind the light."""
+    dx, dy, dz = _difference(position, i, lights, k)
+    square, cl, _ = pair_cosines(dx, dy, dz, lights[3, k], lights[4, k], lights[5, k], 0.0, 0.0, 0.0)
+    return cl / (square * math.sqrt(square)) if cl > 0.0 else 0.0
 
 
 @kernel
-def lobe_strength(position: Array, i: int, lights: Array, widening: Widening | None, k: int) -> float:
-    """Return B / I_0 = cos^P / r^2 of a packed lobe at a receiver.
-
-    Parameters
-    ----------
-    position : (3, n) ndarray
-        Receivers, m.
-    i : int
-        Which receiver.
-    lights : (13, N) ndarray
-        Packed lobes: position, reversed normal and axis, exponent, flux times norm.
-    widening : Widening or None
-        How exponents fall near the light.
-    k : int
-        Which lobe.
-
-    Returns
-    -------
-    float
-        1/m^2; 0 behind the light's surface and behind the lobe.
-    """
-    above, along, r2 = 0.0, 0.0, 0.0
-    for axis in range(3):
-        d = float(lights[axis, k]) - float(position[axis, i])
-        above += d * lights[3 + axis, k]
-        along += d * lights[6 + axis, k]
-        r2 += d * d
+def lobe_strength(position: Array, i: int, lights: Array, widening: Widening | None, k: int) -> Any:
+    """Return B / I_0 = cos^P / r^2 of packed lobe k at receiver i, 1/m^2; 0 behind light or lobe."""
+    dx, dy, dz = _difference(position, i, lights, k)
+    square, above, along = pair_cosines(dx, dy, dz, lights[3, k], lights[4, k], lights[5, k], lights[6, k],
+                                        lights[7, k], lights[8, k])
     if above <= 0.0 or along <= 0.0:
         return 0.0
-    r = math.sqrt(r2)
-    return _shape(along / r, r, float(lights[9, k]), widening, k) / r2
+    r = math.sqrt(square)
+    return _shape(along / r, r, float(lights[9, k]), widening, k) / square
+
+
+@kernel
+def _difference(position: Array, i: int, lights: Array, k: int) -> Any:
+    """Return the vector from receiver i to packed light k in float64, m."""
+    return (float(lights[0, k]) - float(position[0, i]), float(lights[1, k]) - float(position[1, i]),
+            float(lights[2, k]) - float(position[2, i]))
 
 
 @kernel
@@ -111,7 +77,7 @@ def _shape(cosine: float, r: float, exponent: float, widening: Widening | None, 
     return float(cosine**here * norm)
 
 
-def with_reference_length(receivers: Receivers, lights: "PixelLights", settings: S) -> S:
+def with_reference_length(receivers: Receivers, lights: "PixelLights", settings: SiiSettings) -> SiiSettings:
     """Return settings whose cut is in full: with the reference length of a picture where they need one and give none.
 
     Parameters
@@ -120,21 +86,24 @@ def with_reference_length(receivers: Receivers, lights: "PixelLights", settings:
         The picture's points.
     lights : PixelLights
         Its lights.
-    settings : SplatSettings
+    settings : SiiSettings
         Any.
 
     Returns
     -------
-    SplatSettings
+    SiiSettings
         The same, or with a `reference_length`.
     """
-    if settings.reference_length is not None or settings.irradiance_low is not None or not settings.cuts:
+    cut = settings.reach.cut
+    if not isinstance(cut, RelativeCut) or cut.reference_length is not None:
         return settings
-    return dataclasses.replace(settings, reference_length=reference_length(receivers, lights, settings))
+    length = reference_length(receivers, lights, settings.pairs)
+    return dataclasses.replace(settings, reach=dataclasses.replace(settings.reach, cut=dataclasses.replace(
+        cut, reference_length=length)))
 
 
 @stage("splat.reference_length")
-def reference_length(receivers: Receivers, lights: "PixelLights", settings: SplatSettings) -> float:
+def reference_length(receivers: Receivers, lights: "PixelLights", pairs: PairSettings) -> float:
     """Return the length under which lights cut at 5 % count at 125 / 768 of the pixels on average.
 
     Parameters
@@ -143,7 +112,7 @@ def reference_length(receivers: Receivers, lights: "PixelLights", settings: Spla
         The picture's points.
     lights : PixelLights
         Lights; those drawn without flux count as lights that reach nothing, as they do in the paper.
-    settings : SplatSettings
+    pairs : PairSettings
         Offset, norms and widening.
 
     Returns
@@ -151,7 +120,7 @@ def reference_length(receivers: Receivers, lights: "PixelLights", settings: Spla
     float
         Length, m; 1 where there is nothing to cut.
     """
-    packed = pack(lights, settings.pairs, np.zeros(lights.flux.shape[1]), np.float64)
+    packed = pack(lights, pairs, np.zeros(lights.flux.shape[1]), np.float64)
     position = sample_for(receivers, lights, least=LEAST_SAMPLED).position.astype(np.float64)
     step = 1 + lights.flux.shape[1] * LEAST_SAMPLED // PAIRS
     strength = _strengths(packed, position, step)
@@ -186,7 +155,7 @@ def _strengths(packed: Packed, position: Array, step: int) -> Array:
 def _diffuse_strengths(position: Array, lights: Array, strength: Array) -> None:
     for k in prange(strength.shape[0]):
         for i in range(strength.shape[1]):
-            strength[k, i] = diffuse_strength(position, i, lights, k)
+            strength[k, i] = _diffuse_strength(position, i, lights, k)
 
 
 @kernel(parallel=True)

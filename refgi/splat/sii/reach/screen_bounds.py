@@ -67,7 +67,7 @@ def screen_quads(projection: "Projection", position: Array, radius: Array) -> Ar
 
 
 def _tangents(across: Array, ahead: Array, radius: Array) -> tuple[Array, Array]:
-    """Return the slopes between which a circle is seen; low > high when it lies behind the eye."""
+    """Return the slopes of the two tangents to a circle; low > high when it lies behind the eye."""
     distance = np.hypot(across, ahead)
     outside = distance > radius
     angle = np.arctan2(across, ahead)
@@ -82,7 +82,7 @@ def _tangents(across: Array, ahead: Array, radius: Array) -> tuple[Array, Array]
 
 
 def tiles_of_quads(quads: Array, places: Array, width: int) -> Array:
-    """Tell which tiles of receivers have pixels in which rectangles.
+    """Return which tiles of receivers have pixels in which rectangles.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def tiles_of_quads(quads: Array, places: Array, width: int) -> Array:
 
 
 def tiles_of_pixels(mask: Array, places: Array) -> Array:
-    """Tell which tiles of receivers have pixels in a mask.
+    """Return which tiles of receivers have pixels in a mask.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ The paper sets I_low to "x % of I_0", an irradiance to an intensity. Here it is 
 I_low = x max I_0 / L_ref^2: dim lights reach less far, as Sec. 3.6 says they do. The intensity of an RGB light is its
 largest channel.
 
-How much light the threshold takes from a picture: what the picture holds at some pixels, and what it would uncut.
+`cut_loss` is the share of light that the threshold removes: the picture's sum at sampled pixels against the full one.
 """
 
 import math
@@ -19,7 +19,7 @@ from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import light_at, lost_share, sample_for, warn_of_loss
 from refgi.pairs.packing import Packed, pack
 from refgi.pairs.pixel_lights import Range
-from refgi.splat.sii.settings import SplatSettings
+from refgi.splat.sii.settings import AbsoluteCut, ReachSettings, RelativeCut, SiiSettings
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -31,20 +31,20 @@ LEAST_THRESHOLD = 1e-200  # W/m^2: any light over it is a number
 DIFFUSE, GLOSSY = 0, 1  # parts of a light, which have each their own xi
 
 
-def low_irradiance(lights: "PixelLights", settings: SplatSettings) -> float:
-    """Return I_low = x max I_0 / L_ref^2, or what `irradiance_low` says.
+def low_irradiance(lights: "PixelLights", settings: SiiSettings) -> float:
+    """Return I_low = x max I_0 / L_ref^2, or the absolute one.
 
     Parameters
     ----------
     lights : PixelLights
         Lights; the peak of a lobe is its flux times its norm.
-    settings : SplatSettings
-        Share, reference length and norms.
+    settings : SiiSettings
+        The parts `reach` and `pairs`.
 
     Returns
     -------
     float
-        Irradiance, W/m^2; 0 without lights.
+        Irradiance, W/m^2; 0 without lights or without a cut.
 
     Notes
     -----
@@ -52,7 +52,7 @@ def low_irradiance(lights: "PixelLights", settings: SplatSettings) -> float:
     With `per_light_ilow` this is the I_low of the brightest light.
     """
     packed = pack(lights, settings.pairs, np.zeros(lights.flux.shape[1]), np.float64)
-    return threshold(np.concatenate(all_peaks(packed)), settings)
+    return threshold(np.concatenate(all_peaks(packed)), settings.reach)
 
 
 def all_peaks(packed: Packed) -> tuple[Array, Array]:
@@ -74,35 +74,35 @@ def all_peaks(packed: Packed) -> tuple[Array, Array]:
     return packed.diffuse[6:9].max(axis=0).astype(np.float64), lobes.max(axis=0).astype(np.float64)
 
 
-def threshold(peak: Array, settings: SplatSettings) -> float:
+def threshold(peak: Array, reach: ReachSettings) -> float:
     """Return I_low for lights of these peak intensities.
 
     Parameters
     ----------
     peak : (N,) ndarray
         I_0 of all lights, W/sr.
-    settings : SplatSettings
-        Share and reference length, or the irradiance itself.
+    reach : ReachSettings
+        The cut: share and reference length, or the irradiance itself.
 
     Returns
     -------
     float
         Irradiance, W/m^2.
     """
-    if settings.irradiance_low is not None:
-        return settings.irradiance_low
-    return settings.i_low * float(peak.max(initial=0.0)) / _length(settings) ** 2
+    if isinstance(reach.cut, AbsoluteCut):
+        return reach.cut.irradiance or 0.0
+    return 0.0 if reach.cut is None else reach.cut.share * float(peak.max(initial=0.0)) / _length(reach.cut) ** 2
 
 
-def _length(settings: SplatSettings) -> float:
-    length = settings.reference_length if settings.i_low > 0 else 1.0
+def _length(cut: RelativeCut) -> float:
+    length = cut.reference_length
     expect(length is not None, "reference_length", "a length for lights without receivers, m", length)
     assert length is not None
     return length
 
 
 def light_range(
-    peak: Array, low: float, settings: SplatSettings, part: int, dtype: npt.DTypeLike, outside: bool = False
+    peak: Array, low: float, reach: ReachSettings, part: int, dtype: npt.DTypeLike, outside: bool = False
 ) -> Range:
     """Return how far lights reach.
 
@@ -112,8 +112,8 @@ def light_range(
         I_0 of each light, W/sr.
     low : float
         I_low, W/m^2; counts as at least `LEAST_THRESHOLD`.
-    settings : SplatSettings
-        Whether the range is random, and the seed.
+    reach : ReachSettings
+        Whether the range is random, the seed, and the cut's printed form.
     part : int
         DIFFUSE or GLOSSY.
     dtype : dtype
@@ -127,21 +127,20 @@ def light_range(
         R_0^2 and xi of each light.
     """
     square = peak / max(low, LEAST_THRESHOLD)
-    if "per_light_ilow" in settings.as_published and settings.irradiance_low is None:
+    if isinstance(reach.cut, RelativeCut) and "per_light_ilow" in reach.cut.as_published:
         # I_low = x I_0 of the light itself
-        own = _length(settings) ** 2 / settings.i_low if settings.i_low > 0 else math.inf  # 0: nothing is cut
-        square = np.where(peak > 0, own, 0.0)
+        square = np.where(peak > 0, _length(reach.cut) ** 2 / reach.cut.share, 0.0)
     scale = np.ones(len(peak))
-    if settings.stochastic_range:
-        scale = 1.0 - draws(settings.seed, RANGE, len(peak), part)  # (0, 1]
-    # far from the largest numbers, whose squares are taken, and from 0, which xi must not round to
+    if reach.stochastic:
+        scale = 1.0 - draws(reach.seed, RANGE, len(peak), part)  # (0, 1]
+    # far from the largest numbers, which are squared, and from 0, which xi must not round to
     square = np.minimum(square, math.sqrt(float(np.finfo(dtype).max)))
     return Range(square.astype(dtype), np.maximum(scale, 1e-30).astype(dtype), outside)
 
 
 @stage("splat.cut_loss")
 def cut_loss(
-    light: Array, receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None = None
+    light: Array, receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None
 ) -> float:
     """Return the share of the light that the threshold leaves out of a picture.
 
@@ -153,7 +152,7 @@ def cut_loss(
         Its points.
     lights : PixelLights
         Its lights.
-    settings : SplatSettings
+    settings : SiiSettings
         How one light lights one receiver.
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
@@ -164,13 +163,13 @@ def cut_loss(
         Of the light without visibility, at sampled pixels.
     """
     sample = sample_for(receivers, lights)
-    kept = light.reshape(3, -1)[:, sample.place]
+    cut = light.reshape(3, -1)[:, sample.place]
     whole = light_at(sample, lights, settings.pairs, footprint)
-    return lost_share(whole, float(kept.mean(dtype=np.float64))) if kept.size else 0.0
+    return lost_share(whole, float(cut.mean(dtype=np.float64))) if cut.size else 0.0
 
 
 def warn_of_cut(
-    light: Array, receivers: Receivers, lights: "PixelLights", settings: SplatSettings, footprint: Array | None
+    light: Array, receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None
 ) -> None:
     """Warn where the threshold of `sii` leaves out more than `LEAST_LOSS` of the light.
 
@@ -182,8 +181,8 @@ def warn_of_cut(
         Its points.
     lights : PixelLights
         Its lights.
-    settings : SplatSettings
-        The threshold. A random range takes no light in the mean and is passed over.
+    settings : SiiSettings
+        The cut. A stochastic one removes no light in the mean and gives no warning.
     footprint : (N,) ndarray or None
         Surface area each light stands for, m^2.
 
@@ -192,8 +191,9 @@ def warn_of_cut(
     RefgiWarning
         With setting and share.
     """
-    if not settings.cuts or settings.stochastic_range:
+    cut = settings.reach.cut
+    if cut is None or settings.reach.stochastic:
         return
-    said = (f"i_low {settings.i_low:g} with reference_length {settings.reference_length:.3g} m"
-            if settings.irradiance_low is None else f"irradiance_low {settings.irradiance_low:g} W/m^2")
-    warn_of_loss(cut_loss(light, receivers, lights, settings, footprint), f"sii: {said}")
+    said = (f"irradiance {cut.irradiance:g} W/m^2" if isinstance(cut, AbsoluteCut) else
+            f"share {cut.share:g} with reference_length {cut.reference_length:.3g} m")
+    warn_of_loss(cut_loss(light, receivers, lights, settings, footprint), f"sii: reach.cut.{said}")

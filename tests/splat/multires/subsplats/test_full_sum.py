@@ -8,6 +8,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
+from refgi.settings import of
 from refgi.splat import Receivers, irradiance
 from refgi.splat.gather.gather import GatherSettings, gather
 from refgi.splat.multires.multires import multires
@@ -64,7 +65,7 @@ def test_all_finest_subsplats_are_the_full_sum(box, evidence):
 def test_all_finest_subsplats_with_rays_are_vpl(box):
     """Oracle: `vpl` with the same lights, to the bit."""
     ours = multires(box, unclamped(lights=64, visibility="rays", **ALL_FINEST))
-    np.testing.assert_array_equal(ours, vpl(box, VplSettings(lights=64, pattern="grid")))
+    np.testing.assert_array_equal(ours, vpl(box, of(VplSettings, lights=64, pattern="grid")))
 
 
 @pytest.mark.feature("AMS-17")
@@ -104,9 +105,9 @@ def test_against_gathering_shadowed_lights_and_truth(box, evidence):
         "multires": {False: multires(box, light),
                      True: multires(box, unclamped(lights=1024, visibility="rays"))},
         "full sum": {False: every_pixel(box, light)},
-        "vpl": {True: vpl(box, VplSettings(lights=1024, pattern="grid"))},
-        "gather": {False: gather(box, GatherSettings(samples=4096, radius=WHOLE_MAP, grid=0))},
-        "gather within 0.3 maps": {False: gather(box, GatherSettings(grid=0))}}
+        "vpl": {True: vpl(box, of(VplSettings, lights=1024, pattern="grid"))},
+        "gather": {False: gather(box, of(GatherSettings, samples=4096, radius=WHOLE_MAP, interpolation="none"))},
+        "gather within 0.3 maps": {False: gather(box, of(GatherSettings, interpolation="none"))}}
     table = {}
     for name, kinds in pictures.items():
         for rays, picture in kinds.items():

@@ -33,10 +33,10 @@ def test_subsplats_get_the_bits_of_vpl(box, level):
     lights = choose_lights(box, of(MultiresSettings, lights=64).lights)
     some = cells(box.gbuffer.covered, level)
     ours = evaluate_visible(box.tracer, box.scene.geometry, box.gbuffer, some, lights)
-    full = vpl(box, VplSettings(lights=64, pattern="grid"))
+    full = vpl(box, of(VplSettings, lights=64, pattern="grid"))
     assert ours.dtype == box.dtype
     np.testing.assert_array_equal(ours, full.reshape(3, -1)[:, some.pixel])
-    free = vpl(box, VplSettings(lights=64, pattern="grid", visibility=False)).reshape(3, -1)[:, some.pixel]
+    free = vpl(box, of(VplSettings, lights=64, pattern="grid", visibility=False)).reshape(3, -1)[:, some.pixel]
     assert (ours <= free).all()
     assert 0.5 < ours.mean() / free.mean() < 0.95
 

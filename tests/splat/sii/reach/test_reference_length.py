@@ -14,15 +14,15 @@ from refgi.lights.selection import choose_lights
 from refgi.pairs.settings import PairSettings
 from refgi.radiometry import lobe_fraction
 from refgi.scene import load_scene
-from refgi.settings import of
-from refgi.splat import Receivers, SiiSettings, SplatSettings, cut_irradiance, irradiance, sii, splat
+from refgi.settings import of, replaced
+from refgi.splat import Receivers, SiiSettings, cut_irradiance, irradiance, sii, splat
 from refgi.splat.sii.ledger import energy_ledger
 from refgi.splat.sii.reach.fragments import fragments
 from refgi.splat.sii.reach.reference_length import reference_length, with_reference_length
 from refgi.splat.sii.reach.threshold import low_irradiance
 from refgi.stages import observe
 
-PAPER = of(SiiSettings, i_low=0.05)  # 768 lights
+PAPER = of(SiiSettings, cut_share=0.05)  # 768 lights
 SHARE = 125 / 768
 SAMPLING = 0.05  # of the share: about 1400 of 4096 pixels, whose overdraw spreads by as much as its mean
 SAME = 2e-4  # relative, of float32 pictures in other units: pairs at the edge of the cut fall on either side
@@ -46,9 +46,9 @@ def quietly(run, *args):
 @pytest.mark.feature("SII-21")
 def test_nothing_is_cut_by_default(evidence):
     at = frame()
-    full = irradiance(receivers(at), choose_lights(at, SiiSettings()), PairSettings())
+    full = irradiance(receivers(at), choose_lights(at, SiiSettings().lights), PairSettings())
     np.testing.assert_array_equal(sii(at, SiiSettings()), full)
-    assert not SiiSettings().cuts
+    assert SiiSettings().reach.cut is None
     evidence("defaults: the bits of the full sum")
 
 
@@ -73,33 +73,33 @@ def counted(at, lights, low):
 def test_the_papers_cut_leaves_the_papers_share_of_pairs(name):
     """Oracle: a count over all pixels, pair by pair, at the length found from some."""
     at = frame(name)
-    lights = choose_lights(at, PAPER)
-    length = reference_length(receivers(at), lights, PAPER)
-    low = low_irradiance(lights, dataclasses.replace(PAPER, reference_length=length))
+    lights = choose_lights(at, PAPER.lights)
+    length = reference_length(receivers(at), lights, PAPER.pairs)
+    low = low_irradiance(lights, replaced(PAPER, {"reference_length": length}))
     share = counted(at, lights, low) / lights.drawn / at.gbuffer.covered.sum()
     assert share == pytest.approx(SHARE, rel=SAMPLING)
 
 
 @pytest.mark.parametrize("change", [
-    {}, {"i_low": 0.02}, {"stochastic_range": True}, {"bound": "quad"}, {"bound": "mesh", "mesh_faces": 20},
+    {}, {"cut_share": 0.02}, {"stochastic": True}, {"bound": "quad"}, {"bound": "mesh", "bound_faces": 20},
     {"as_published": {"per_light_ilow"}}, {"half_resolution": True}])
 def test_a_picture_is_that_of_its_length_given_by_hand(change):
-    at, settings = frame(), of(SiiSettings, **{"i_low": 0.05, "lights": 96} | change)
-    lights = choose_lights(at, settings)
-    by_hand = dataclasses.replace(settings, reference_length=reference_length(receivers(at), lights, settings))
+    at, settings = frame(), of(SiiSettings, **{"cut_share": 0.05, "lights": 96} | change)
+    lights = choose_lights(at, settings.lights)
+    by_hand = replaced(settings, {"reference_length": reference_length(receivers(at), lights, settings.pairs)})
     with observe() as log:
         light = quietly(sii, at, settings)
     np.testing.assert_array_equal(light, quietly(sii, at, by_hand))
     assert log.status("splat.reference_length") == ["ran"]
-    longer = dataclasses.replace(by_hand, reference_length=1.02 * by_hand.reference_length)
+    longer = replaced(by_hand, {"reference_length": 1.02 * by_hand.reach.cut.reference_length})
     assert (light != quietly(sii, at, longer)).any()
 
 
 def test_stages_without_a_length_choose_the_methods():
-    at, lights = frame(), choose_lights(frame(), PAPER)
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
     to, view = receivers(at), at.gbuffer.projection
     by_hand = with_reference_length(to, lights, PAPER)
-    assert by_hand.reference_length == reference_length(to, lights, PAPER)
+    assert by_hand.reach.cut.reference_length == reference_length(to, lights, PAPER.pairs)
     for stage in (splat, cut_irradiance):
         np.testing.assert_array_equal(stage(to, lights, PAPER), stage(to, lights, by_hand))
     counts = [fragments(to, lights, settings, None, view) for settings in (PAPER, by_hand)]
@@ -109,9 +109,9 @@ def test_stages_without_a_length_choose_the_methods():
 
 
 def test_a_length_is_chosen_only_where_it_counts():
-    at, lights = frame(), choose_lights(frame(), PAPER)
-    for settings in (SiiSettings(), of(SiiSettings, i_low=0.05, irradiance_low=0.1), of(SiiSettings, i_low=0.0),
-                     of(SiiSettings, i_low=0.05, reference_length=0.3)):
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
+    for settings in (SiiSettings(), of(SiiSettings, cut_irradiance=0.1),
+                     of(SiiSettings, cut_share=0.05, reference_length=0.3)):
         assert with_reference_length(receivers(at), lights, settings) is settings
     assert low_irradiance(lights, SiiSettings()) == 0
 
@@ -128,7 +128,7 @@ def scaled(scene, unit):
 
 
 @pytest.mark.parametrize("unit", [1e3, 1e-3, 4.0 / 0.55 * 1e3])
-@pytest.mark.parametrize("settings", [of(SiiSettings, lights=96), of(SiiSettings, lights=96, i_low=0.05)])
+@pytest.mark.parametrize("settings", [of(SiiSettings, lights=96), of(SiiSettings, lights=96, cut_share=0.05)])
 def test_a_scene_in_mm_m_or_km_gives_the_same_picture(settings, unit):
     """Property: E goes as the inverse square of lengths, and the last unit makes the box 4 m wide and read in mm."""
     scene, size = load_scene("cornell_box"), {"width": 40, "height": 40, "rsm_resolution": 64}
@@ -140,45 +140,46 @@ def test_a_scene_in_mm_m_or_km_gives_the_same_picture(settings, unit):
 
 @pytest.mark.parametrize("factor", [2.0, 0.25, 1024.0])
 def test_lengths_scale_with_powers_of_two_to_the_bit(factor):
-    at, lights = frame(), choose_lights(frame(), PAPER)
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
     to = receivers(at)
     longer = lights._replace(position=lights.position * np.float32(factor), flux=lights.flux * np.float32(4))
     far = to._replace(position=to.position * np.float32(factor))
-    assert reference_length(far, longer, PAPER) == factor * reference_length(to, lights, PAPER)
+    assert reference_length(far, longer, PAPER.pairs) == factor * reference_length(to, lights, PAPER.pairs)
 
 
 def test_many_lights_have_the_length_of_few():
     """Property: of 25,600 lights every second is looked at, and the length is a scene's, not a number of lights'."""
     at = Frame(load_scene("cornell_box"), width=64, height=64, rsm_resolution=160)
-    every, few = of(SiiSettings, pattern="all", i_low=0.05), of(SiiSettings, i_low=0.05)
-    lengths = [reference_length(receivers(at), choose_lights(at, settings), settings) for settings in (every, few)]
+    every, few = of(SiiSettings, pattern="all", cut_share=0.05), of(SiiSettings, cut_share=0.05)
+    lengths = [reference_length(receivers(at), choose_lights(at, settings.lights), settings.pairs)
+               for settings in (every, few)]
     assert lengths[0] == pytest.approx(lengths[1], rel=SAMPLING)
 
 
 def test_nothing_to_cut_has_some_length():
-    at, lights = frame(), choose_lights(frame(), PAPER)
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
     arrays = {key: part[..., :0] for key, part in lights._asdict().items() if isinstance(part, np.ndarray)}
     none = lights._replace(**arrays)
     to = receivers(at)
-    assert reference_length(to, none, PAPER) == 1
-    assert reference_length(to._replace(covered=np.zeros_like(to.covered)), lights, PAPER) == 1
+    assert reference_length(to, none, PAPER.pairs) == 1
+    assert reference_length(to._replace(covered=np.zeros_like(to.covered)), lights, PAPER.pairs) == 1
 
 
 def test_lights_that_reach_too_little_are_hardly_cut():
     """Limit: where all lights together reach fewer pairs than the paper's, the length is ten diagonals."""
-    at, lights = frame(), choose_lights(frame(), PAPER)
+    at, lights = frame(), choose_lights(frame(), PAPER.lights)
     few = lights._replace(drawn=100 * lights.drawn)
-    length = reference_length(receivers(at), few, PAPER)
+    length = reference_length(receivers(at), few, PAPER.pairs)
     assert length > 5 * at.scene.geometry.diagonal
-    settings = dataclasses.replace(PAPER, reference_length=length)
+    settings = replaced(PAPER, {"reference_length": length})
     cut, full = splat(receivers(at), lights, settings), irradiance(receivers(at), lights, PairSettings())
     assert cut.sum() > 0.999 * full.sum()
 
 
 def test_the_ledger_uses_the_same_length():
     at = frame()
-    settings = of(SiiSettings, lights=96, i_low=0.05)
-    by_hand = with_reference_length(receivers(at), choose_lights(at, settings), settings)
+    settings = of(SiiSettings, lights=96, cut_share=0.05)
+    by_hand = with_reference_length(receivers(at), choose_lights(at, settings.lights), settings)
     ledgers = [quietly(energy_ledger, at, one) for one in (settings, by_hand)]
     for row, other in zip(*(ledger.rows for ledger in ledgers), strict=True):
         np.testing.assert_array_equal(row.watts, other.watts)
@@ -188,4 +189,4 @@ def test_the_ledger_uses_the_same_length():
 def test_settings_are_checked():
     for change in ({"reference_length": 0}, {"reference_length": -1.0}, {"reference_length": math.inf}):
         with pytest.raises(InputError, match="reference_length"):
-            of(SplatSettings, **change)
+            of(SiiSettings, **change)

@@ -1,0 +1,68 @@
+"""Buffer pool for frame-sized arrays: memory is reused once no array refers to it.
+
+The operating system clears new pages, one thread at a time, at about 0.2 ms a MB: more than most kernels here take to
+fill them. So the memory of an earlier frame's buffers serves the next frame's.
+"""
+
+import math
+import threading
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+
+PAGE = 4096  # bytes
+SMALL = 1 << 18  # bytes; smaller arrays are left to NumPy
+MOST_IDLE = 1 << 28  # bytes that the pool keeps; a frame of 1024 x 1024 pixels takes about 100 MB
+
+
+class _Pool:
+    """Blocks of memory that wait for their next use."""
+
+    def __init__(self) -> None:
+        self._idle: dict[int, list[Array]] = {}  # by size
+        self._lock = threading.RLock()  # a block may be released at any time
+
+    def acquire(self, size: int) -> Array:
+        """Return a block of `size` bytes, all its pages mapped."""
+        with self._lock:
+            idle = self._idle.get(size)
+            if idle:
+                return idle.pop()
+        block = np.empty(size, np.uint8)
+        block[::PAGE] = 0  # pages first touched by several threads at once cost several times as much
+        return block
+
+    def release(self, block: Array) -> None:
+        """Keep a block for its next use; the pool is emptied first where it would grow too large."""
+        with self._lock:
+            if block.nbytes + sum(size * len(blocks) for size, blocks in self._idle.items()) > MOST_IDLE:
+                self._idle.clear()
+            self._idle.setdefault(block.nbytes, []).append(block)
+
+
+class _PooledBlock:
+    """A block as NumPy sees it: the base of every array on it, released with the last of them."""
+
+    def __init__(self, pool: _Pool, block: Array) -> None:
+        self._pool, self._block = pool, block
+        self.__array_interface__ = block.__array_interface__
+
+    def __del__(self) -> None:
+        self._pool.release(self._block)
+
+
+_pool = _Pool()
+
+
+def plane(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
+    """Allocate an uninitialised array from the pool.
+
+    Result: C-contiguous, of any content.
+    """
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size < SMALL:
+        return np.empty(shape, dtype)
+    return np.asarray(_PooledBlock(_pool, _pool.acquire(size))).view(dtype).reshape(shape)

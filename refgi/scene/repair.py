@@ -1,0 +1,158 @@
+"""Validation and repair of meshes as read, and of lights.
+
+Errors: a shape that is not a mesh, a coordinate that is not finite, an index without a vertex. Repaired: zero-area
+faces are dropped, vertex normals are brought to unit length, and a vertex whose normal is zero or not finite gets the
+mean of its faces' normals.
+
+Lights without power are left out, with a count; a scene needs at least one with power.
+"""
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from refgi.errors import InputError, RefgiWarning, expect
+from refgi.scene.mesh import Batch, Mesh, batches, missing_normals
+from refgi.scene.model import DirectionalLight, Geometry, Light
+from refgi.scene.values import Array
+
+# A face counts as flat when twice its area is lost in the rounding of the cross product that gives it.
+FLAT = 16 * float(np.finfo(np.float64).eps)
+SMALLEST_USUAL, LARGEST_USUAL = 0.01, 1000.0  # m across
+
+
+def repaired_all(meshes: Sequence[Mesh], where: Callable[[int], str], faults: list[str]) -> tuple[list[Mesh], int]:
+    """Return the meshes of a file as `repaired` returns each, the sound small ones looked at together.
+
+    `where`: returns file and object of the mesh of some number, for the error's text. `faults`: gets the text of the
+    error for each mesh that `repaired` refuses. Result: as many; those that are refused stay as they were. Result:
+    number of faces dropped.
+    """
+    remaining, done, dropped = list(meshes), np.zeros(len(meshes), np.bool_), 0
+    for batch in batches(meshes):
+        good = _needs_no_repair(batch)
+        done[batch.members] = good
+        if batch.normals is not None:
+            usable = np.repeat(good, np.diff(batch.first_vertex))[:, None]
+            normals = np.where(usable, batch.normals, 1.0)
+            normals /= np.linalg.norm(normals, axis=1)[:, None]
+            for k in np.flatnonzero(good).tolist():
+                number, part = batch.members[k], slice(batch.first_vertex[k], batch.first_vertex[k + 1])
+                remaining[number] = dataclasses.replace(meshes[number], normals=normals[part])
+    for number in np.flatnonzero(~done).tolist():
+        try:
+            remaining[number], flat = repaired(meshes[number], where(number))
+            dropped += flat
+        except InputError as error:
+            faults.append(str(error))
+    return remaining, dropped
+
+
+def _needs_no_repair(batch: Batch) -> Array:
+    """Return (k,) which meshes are sound and have neither flat faces nor missing normals."""
+    good = batch.sound()
+    if not good.all():
+        return np.zeros(len(good), np.bool_)  # an index may lead out of the batch
+    faces = batch.faces + np.repeat(batch.first_vertex[:-1], np.diff(batch.first_face))[:, None]
+    good &= ~batch.any_face(zero_area(batch.vertices, faces))
+    return good if batch.normals is None else good & ~batch.any_vertex(missing_normals(batch.normals))
+
+
+def repaired(mesh: Mesh, where: str) -> tuple[Mesh, int]:
+    """Return the mesh without its zero-area faces and with unit vertex normals.
+
+    `mesh`: a mesh as read. `where`: file and object, for the error's text. Result: the same object where nothing had to
+    change. Result: number of faces dropped. Raises `InputError` if coordinates are not finite, indices out of range, or
+    no face has an area.
+    """
+    mesh.expect_sound(where)
+    flat = zero_area(mesh.vertices, mesh.faces)
+    dropped = int(np.count_nonzero(flat))
+    expect(dropped < len(mesh.faces), f"{where}: faces", "at least one with an area", f"{dropped} of zero area")
+    if dropped:
+        mesh = dataclasses.replace(mesh, faces=mesh.faces[~flat])
+    if mesh.normals is not None:
+        mesh = dataclasses.replace(mesh, normals=unit_normals(mesh))
+    return mesh, dropped
+
+
+def warn_of_flat_faces(count: int, where: str) -> None:
+    """Say how many zero-area faces were passed over, if any.
+
+    `where`: the scene or file they came from.
+    """
+    if count:
+        noun = "face" if count == 1 else "faces"
+        warnings.warn(RefgiWarning(f"{where}: {count} {noun} of zero area skipped"), stacklevel=3)
+
+
+def warn_of_unit(geometry: Geometry, where: str) -> None:
+    """Say that a file's unit may not be the metre, if its size is no usual one.
+
+    `where`: the file they came from.
+    """
+    if not SMALLEST_USUAL <= geometry.diagonal <= LARGEST_USUAL:
+        text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are read as metres. If the file has another unit "
+                "of s metres, scale its objects in a scene file: \"transform\": "
+                "[s, 0, 0, 0,  0, s, 0, 0,  0, 0, s, 0,  0, 0, 0, 1], such as s = 0.001 for millimetres")
+        warnings.warn(RefgiWarning(text), stacklevel=4)
+
+
+def zero_area(vertices: Array, faces: Array) -> Array:
+    """Return which faces have no area beyond rounding.
+
+    `vertices` (n, 3): positions, m. `faces` (m, 3): vertex indices. Returns (m,) bool: true where the cross product of
+    two edges vanishes against their lengths.
+    """
+    a, b, c = (np.asarray(vertices, np.float64)[faces[:, k]] for k in range(3))
+    scale = np.abs(b - a).max(axis=1, initial=0.0) * np.abs(c - a).max(axis=1, initial=0.0)
+    return np.asarray(np.abs(np.cross(b - a, c - a)).max(axis=1, initial=0.0) <= FLAT * scale)
+
+
+def unit_normals(mesh: Mesh) -> Array:
+    """Return the vertex normals at unit length, those that are missing filled in from the faces.
+
+    `mesh`: a mesh with normals. Returns (n, 3) float64: unit vectors; (0, 1, 0) at a vertex that no face with an area
+    uses.
+    """
+    normals = np.asarray(mesh.normals, np.float64)
+    missing = missing_normals(normals)
+    if missing.any():
+        normals = np.where(missing[:, None], mean_face_normals(mesh.vertices, mesh.faces), normals)
+    return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
+
+
+def mean_face_normals(vertices: Array, faces: Array) -> Array:
+    """Return the area-weighted mean of the normals of the faces around each vertex.
+
+    `vertices` (n, 3): positions, m. `faces` (m, 3): vertex indices. Returns (n, 3) float64: unit vectors; (0, 1, 0)
+    where the mean vanishes.
+    """
+    a, b, c = (np.asarray(vertices, np.float64)[faces[:, k]] for k in range(3))
+    cross = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    total = np.stack([np.bincount(faces.ravel(), cross[:, k], len(vertices)) for k in range(3)], axis=1)
+    length = np.linalg.norm(total, axis=1)
+    total[length == 0] = (0.0, 1.0, 0.0)
+    length[length == 0] = 1.0
+    return np.asarray(total / length[:, None])
+
+
+def lights_with_power(lights: Sequence[Light], where: str) -> tuple[Light, ...]:
+    """Return the lights that have power.
+
+    `lights`: all lights of a scene. `where`: file and key, for texts. Result: in the given order, at least one. Raises
+    `InputError` if none has power: the picture would be silently black.
+    """
+    remaining = tuple(light for light in lights if max(_power(light)) > 0)
+    without = f"{len(lights)} without" if lights else "none"
+    expect(bool(remaining), where, "at least one light of power above 0", without)
+    if dropped := len(lights) - len(remaining):
+        noun = "light" if dropped == 1 else "lights"
+        warnings.warn(RefgiWarning(f"{where}: {dropped} {noun} of zero power left out"), stacklevel=3)
+    return remaining
+
+
+def _power(light: Light) -> tuple[float, float, float]:
+    return light.irradiance if isinstance(light, DirectionalLight) else light.intensity

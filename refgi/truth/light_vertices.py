@@ -1,0 +1,165 @@
+"""Light vertices: directly lit surface points, found by fresh rays from every light; the senders of the light side.
+
+Phi = rho I(l) Omega for a spot or point light, rho E_perp A_perp for a directional one (papers' calibrated radiometry):
+no cosine and no distance. A point whose material has a lobe appears twice, once for each part. Points come in sets, one
+for each set of rays; within a set diffuse parts stand before lobes, in blocks of their own.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.lobes import lobe_norm
+from refgi.radiometry import DIRECTIONAL, radiant_intensity
+from refgi.rays import MISS, Tracer
+from refgi.scene import LightTable
+from refgi.truth.light_grid import LightRays
+from refgi.truth.paths import CHUNK
+from refgi.truth.surfaces import Surfaces, face_normal, height_above, shading_normal
+
+Array = npt.NDArray[Any]
+
+BLOCK = 32  # points whose contributions are summed before a pick looks inside
+
+
+class LightVertices(NamedTuple):
+    """Senders, as float32 arrays."""
+
+    position: Array  # (3, n), m
+    axis: Array  # (3, n) unit vector of the emission: shading normal, or mirror direction of a lobe
+    normal: Array  # (3, n) shading normal
+    facing: Array  # (3, n) face normal on the side of the light
+    power: Array  # (n,) largest channel of Phi / pi, W/sr
+    colour: Array  # (3, n) Phi / pi over `power`
+    exponent: Array  # (n,) of cos around the axis: 1 for the diffuse part
+    peak: Array  # (n,) pattern on the axis: 1, or (P + 1) / (2 K)
+    bound: Array  # (n,) largest geometry term left to the light side, 1/m^2
+    ray: Array  # (n,) int32: which ray found it, counted through the lights
+    lobe: Array  # (n,) bool: a lobe, not a diffuse part
+
+
+class PointSets(NamedTuple):
+    """Sets of light vertices, each padded with dark points to whole blocks."""
+
+    points: LightVertices
+    starts: Array  # (sets, 3) int64, in blocks: first diffuse one, first of lobes, one past the last
+
+
+def trace_light_vertices(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays,
+                     bound: float) -> LightVertices:
+    """Trace one light's rays to light vertices.
+
+    `surfaces`: the scene's triangles and materials. `bound`: largest geometry term in units of 1 / footprint; inf for
+    no bound. Result: diffuse parts, then lobes if the scene has any, each in the order of the rays; power 0 where a ray
+    finds nothing that reflects.
+    """
+    # a lamp may lie in a surface: start just beyond it
+    beyond = tracer.offsets(rays.origins)
+    origins = (rays.origins + beyond[:, None] * rays.directions).astype(np.float32)
+    directions = rays.directions.astype(np.float32)
+    count = len(origins)
+    triangle_id, distance = np.empty(count, np.int32), np.empty(count, np.float32)
+    tracer.fill_closest(origins, directions, np.full(count, np.inf, np.float32), triangle_id, distance)
+    distance += beyond.astype(np.float32)
+    kinds = 2 if surfaces.specular.any() else 1
+    points = _allocate(kinds * count)
+    points.ray[:] = np.tile(np.arange(k * count, (k + 1) * count), kinds)
+    points.lobe[count:] = True
+    _fill_vertices(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance, rays.weight),
+          (rays.measure, bound), points)
+    return points
+
+
+def join(parts: list[LightVertices], sets: int, per_set: int) -> PointSets:
+    """Sort the light vertices of several lights into their sets, each padded with dark points to whole blocks.
+
+    `sets`: sets of rays that each light has sent.
+    """
+    together = parts[0] if len(parts) == 1 else LightVertices(
+        *(np.concatenate(fields, axis=-1) for fields in zip(_allocate(0), *parts, strict=True)))
+    bright = np.flatnonzero(together.power)
+    group = (2 * (together.ray // per_set % sets) + together.lobe)[bright]
+    counts = np.bincount(group, minlength=2 * sets)
+    blocks = np.concatenate([[0], np.cumsum(-(-counts // BLOCK))])
+    order = np.argsort(group, kind="stable")
+    place = np.arange(len(order)) + np.repeat(blocks[:-1] * BLOCK - (np.cumsum(counts) - counts), counts)
+    points = _allocate(int(blocks[-1]) * BLOCK)
+    _copy_vertices(together, bright[order], place, points)
+    return PointSets(points, np.stack([blocks[:-2:2], blocks[1:-1:2], blocks[2::2]], axis=1))
+
+
+def _allocate(count: int) -> LightVertices:
+    position, axis, normal, facing, colour = (np.zeros((3, count), np.float32) for _ in range(5))
+    power, exponent, peak, bound = (np.zeros(count, np.float32) for _ in range(4))
+    return LightVertices(position, axis, normal, facing, power, colour, exponent, peak, bound,
+                         np.zeros(count, np.int32), np.zeros(count, np.bool_))
+
+
+@kernel
+def _copy_vertices(source: LightVertices, order: Array, place: Array, points: LightVertices) -> None:
+    for k in range(len(order)):
+        i, j = order[k], place[k]
+        for c in range(3):
+            points.position[c, j] = source.position[c, i]
+            points.axis[c, j] = source.axis[c, i]
+            points.normal[c, j] = source.normal[c, i]
+            points.facing[c, j] = source.facing[c, i]
+            points.colour[c, j] = source.colour[c, i]
+        points.power[j], points.exponent[j], points.peak[j] = source.power[i], source.exponent[i], source.peak[i]
+        points.bound[j], points.ray[j], points.lobe[j] = source.bound[i], source.ray[i], source.lobe[i]
+
+
+@kernel(parallel=True)
+def _fill_vertices(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
+          scale: tuple[float, float], points: LightVertices) -> None:
+    """Fill the diffuse part of ray i at i and its lobe after all diffuse parts; dark ones keep a power of 0."""
+    count = len(hits[2])
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _fill_span(surfaces, lights, k, hits, scale, points, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
+
+
+@kernel
+def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
+               scale: tuple[float, float], points: LightVertices, span: tuple[int, int]) -> None:
+    origins, directions, triangle_id, distances, weights = hits
+    measure, bound = scale
+    for i in range(span[0], span[1]):
+        if triangle_id[i] == MISS:
+            continue
+        triangle = triangle_id[i]
+        material = surfaces.material_of_face[triangle]
+        d = (directions[i, 0], directions[i, 1], directions[i, 2])
+        t = np.float64(distances[i])
+        y = (origins[i, 0] + t * d[0], origins[i, 1] + t * d[1], origins[i, 2] + t * d[2])
+        g = face_normal(surfaces, triangle, d[0], d[1], d[2])
+        height = height_above(surfaces, triangle, y, g)
+        y = (y[0] - height * g[0], y[1] - height * g[1], y[2] - height * g[2])
+        n = shading_normal(surfaces, triangle, y, g)
+        cos_in = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
+        mirrored = (d[0] + 2 * cos_in * n[0], d[1] + 2 * cos_in * n[1], d[2] + 2 * cos_in * n[2])
+        if lights.kind[k] == DIRECTIONAL:
+            light, area = (lights.intensity[k, 0], lights.intensity[k, 1], lights.intensity[k, 2]), measure
+        else:
+            light, area = radiant_intensity(lights, k, d[0], d[1], d[2]), measure * t * t
+        for part in range(len(points.power) // len(triangle_id)):
+            rho = surfaces.diffuse[material] if part == 0 else surfaces.specular[material]
+            # Phi / pi, Phi = rho I(l) Omega
+            share = measure * weights[i] / np.pi
+            flux = (rho[0] * light[0] * share, rho[1] * light[1] * share, rho[2] * light[2] * share)
+            power = max(flux[0], flux[1], flux[2])
+            if power <= 0:
+                continue
+            exponent = 1.0 if part == 0 else surfaces.exponent[material]
+            used = part * len(triangle_id) + i
+            points.power[used] = power
+            points.exponent[used] = exponent
+            points.peak[used] = 1.0 if part == 0 else np.pi * lobe_norm(cos_in, exponent)
+            points.bound[used] = bound / area
+            for c in range(3):
+                points.position[c, used] = y[c]
+                points.axis[c, used] = n[c] if part == 0 else mirrored[c]
+                points.normal[c, used] = n[c]
+                points.facing[c, used] = g[c]
+                points.colour[c, used] = flux[c] / power

@@ -1,0 +1,87 @@
+"""Every figure of the 2006 paper, made tiny: what it holds, and that the printed numbers are the paper's."""
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.papers.workbench import errors_of
+
+
+@pytest.fixture
+def figures(reproduced):
+    return reproduced("sii")[1]
+
+
+def ratios(figure):
+    return {bar.label: bar.paper for one in figure.ratios for bar in one.bars}
+
+
+# as printed: frames per second of Figures 4, 11 and 12 and Table 3, milliseconds of Tables 1 and 2
+@pytest.mark.parametrize(("key", "label", "ratio"), [
+    ("fig4", "glass ball, back faces alone", 150 / 95), ("fig11", "5 %", 54 / 14), ("fig11", "7 %", 74 / 14),
+    ("fig12", "RSM, 308 samples", 44 / 14), ("fig12", "RSM, 156 samples", 82 / 14),
+    ("fig12", "SII, 768 lights, 5 %", 48 / 14), ("fig12", "SII, 768 lights, 10 %", 83 / 14),
+    ("fig12", "SII, 108 lights, 5 %", 254 / 14),
+    ("table1", "dynamic light, static camera", 10.8 / 10.4), ("table1", "static light, dynamic camera", 9.3 / 10.4),
+    ("table1", "static scene, just render", 6.9 / 10.4),
+    ("table2", "A, 4096 samples, 4 levels", 3.484 / 0.123), ("table2", "B, 1024 samples, 1 level", 0.111 / 0.123),
+    ("table3", "full resolution", 37 / 27), ("table3", "half resolution", 85 / 63),
+])
+def test_the_papers_ratios_are_the_printed_ones(figures, key, label, ratio):
+    assert ratios(figures[key])[label] == pytest.approx(ratio, rel=1e-12)
+
+
+@pytest.mark.parametrize(("key", "is_speed"), [("fig4", True), ("fig12", True), ("table1", False)])
+def test_ratios_here_are_those_of_the_times_in_the_table(figures, key, is_speed):
+    milliseconds = [row[1] for row in figures[key].tables[0].rows]
+    for bar, own in zip(figures[key].ratios[0].bars, milliseconds, strict=True):
+        assert bar.here == pytest.approx(milliseconds[0] / own if is_speed else own / milliseconds[0])
+
+
+def test_errors_are_shares_of_the_references_mean():
+    reference = np.zeros((3, 2, 2))
+    reference[:, 0] = (1.0, 3.0)  # mean 2 over the covered row
+    covered = np.array([[True, True], [False, False]])
+    assert errors_of(reference + 0.2, reference, covered) == pytest.approx((10.0, 10.0, -10.0))
+    assert errors_of(reference * (1, 0), reference, covered) == pytest.approx((100 * math.sqrt(4.5) / 2, 75.0, 75.0))
+    assert all(map(math.isnan, errors_of(reference, 0 * reference, covered)))
+
+
+def test_the_overdraw_is_that_of_figure_8(figures):
+    rows = {name: (here, paper) for name, here, paper in figures["fig8"].tables[0].rows}
+    assert rows["fragments a light"][1] == pytest.approx(42667, abs=1)  # 512^2 * 125 / 768
+    here, paper = rows["mean overdraw"]
+    assert here == pytest.approx(paper, rel=0.1)  # the reference length is sought on 64 x 64 pixels
+
+
+def test_a_larger_cut_loses_more(figures):
+    lost = [row[-1] for row in figures["fig11"].tables[0].rows]
+    drawn = [row[4] for row in figures["fig11"].tables[0].rows]
+    assert lost[0] == 0
+    assert lost == sorted(lost)
+    assert drawn == sorted(drawn, reverse=True)
+
+
+@pytest.mark.feature("SII-29")
+def test_what_rests_is_not_drawn_again(figures, evidence):
+    """Table 1: which stages a frame runs is checked, how long they take is only told."""
+    rows = {row[0]: row for row in figures["table1"].tables[0].rows}
+    reused = {title: set(row[-1].split(", ")) for title, row in rows.items()}
+    light, camera = "rsm.reflective_shadow_map", "rsm.gbuffer"
+    both, moving_light, moving_camera, still = rows
+    assert not {light, camera} & reused[both]
+    assert camera in reused[moving_light]
+    assert light not in reused[moving_light]
+    assert {light, "rsm.warp"} & reused[moving_camera]
+    assert camera not in reused[moving_camera]
+    assert {light, camera} <= reused[still]
+    evidence("Table 1 at 32 x 32: " + ", ".join(f"{title} {row[1]:.0f} ms" for title, row in rows.items()))
+
+
+@pytest.mark.feature("SII-29")
+def test_warps_are_timed_by_method_samples_and_level(figures, evidence):
+    rows = figures["table2"].tables[0].rows
+    assert [row[0][:1] for row in rows[:4]] == ["A", "A", "B", "B"]
+    assert all(cell > 0 for row in rows[:4] for cell in row[1:5])
+    evidence("Table 2, levels 1 and 4: " + ", ".join(f"{row[0]} {row[1]:.2f} and {row[4]:.2f} ms" for row in rows[:4]))

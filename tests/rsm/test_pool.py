@@ -1,0 +1,67 @@
+"""Buffer pool: memory is reused, never while an array still refers to it."""
+
+import gc
+import threading
+
+import numpy as np
+
+from refgi.rsm import pool
+from refgi.rsm.pool import plane
+
+SHAPE = (3, 256, 320)
+
+
+def place(array):
+    return array.__array_interface__["data"][0]
+
+
+def test_memory_is_reused_once_no_array_refers_to_it():
+    first = plane(SHAPE, np.float32)
+    where = place(first)
+    row = first[1, 2:5].T  # a view keeps the whole block
+    del first
+    second = plane(SHAPE, np.float32)
+    assert place(second) != where
+    row[:] = 7
+    second[:] = 1
+    assert (row == 7).all()
+    del row
+    gc.collect()
+    assert place(plane(SHAPE, np.float32)) == where
+
+
+def test_pooled_arrays_are_ordinary_arrays():
+    for shape, dtype in ((SHAPE, np.float64), ((700, 900), np.bool_), ((1, 1), np.float32), ((3, 0, 0), np.float32)):
+        one = plane(shape, dtype)
+        assert (one.shape, one.dtype) == (shape, dtype)
+        assert one.flags.c_contiguous
+        assert one.flags.writeable
+        one[...] = 1
+
+
+def test_idle_memory_is_bounded(monkeypatch):
+    monkeypatch.setattr(pool, "MOST_IDLE", 3 << 20)
+    idle = pool._Pool()
+    blocks = [idle.acquire(1 << 20) for _ in range(5)]
+    for count, block in enumerate(blocks, 1):
+        idle.release(block)
+        assert sum(len(waiting) for waiting in idle._idle.values()) == (count if count <= 3 else count - 3)
+
+
+def test_threads_never_get_the_same_memory():
+    wrong = []
+
+    def work(number):
+        for _ in range(200):
+            one = plane(SHAPE, np.int32)
+            one[0, :2] = number
+            one[2, -1] = number
+            if (one[0, :2] != number).any() or (one[2, -1] != number).any():
+                wrong.append(number)
+
+    workers = [threading.Thread(target=work, args=(number,)) for number in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert not wrong

@@ -25,7 +25,7 @@ PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "trimesh"
             "click", "rich", "pydantic", "jinja2", "flip-evaluator")
 GIT_SECONDS = 10.0
 DIRTY = "-dirty"
-VERSION = 1  # of the record; its key is `provenance`
+VERSION = 2  # of the record; its key is `provenance`
 UNITS = {"irradiance": "W/m^2", "radiance": "W/m^2/sr", "variance": "(W/m^2)^2", "seconds": "s", "ledger": "W"}
 CONTENT = "irradiance.*: indirect, without albedo/pi; R, G, B: emission + albedo/pi (direct + indirect)"
 

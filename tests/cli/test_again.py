@@ -194,7 +194,7 @@ def test_what_is_no_picture_of_refgi_is_refused_by_name(tmp_path):
     assert refused(run("--again", foreign), "foreign.exr", "refgi wrote", "another program's")
     assert refused(run("--again", bare), "bare.exr", "the record of how a picture was made")
     assert refused(run("--again", damaged), "damaged.exr")
-    assert refused(run("--again", newer), "newer.exr: provenance", "version 1", "2")
+    assert refused(run("--again", newer), "newer.exr: provenance", "version 2", "3")
     assert refused(run("--again", tmp_path / "none.exr"), "none.exr")
 
 

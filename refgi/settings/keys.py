@@ -153,6 +153,32 @@ def find_key(settings: Settings, key: str) -> Leaf:
     raise InputError(f"{key!r} is not a setting of {type(settings).__name__}{hint}", key=key)
 
 
+def meant(settings: Settings, leaf: Leaf, value: Any) -> Leaf:
+    """Return where a value belongs: a choice given what is none of its names stands for its most important setting.
+
+    Parameters
+    ----------
+    settings : Settings
+        Whose choices count.
+    leaf : Leaf
+        The key that was found.
+    value : object
+        Its value, or the text of it.
+
+    Returns
+    -------
+    Leaf
+        The same, or the principal setting of what is chosen now.
+    """
+    kinds = choices_of(leaf.hint)
+    if not kinds or value is None or isinstance(value, Settings) or value in (*kinds, "none"):
+        return leaf
+    kind = kinds.get(flat(settings).get(leaf.key) or "")
+    if kind is None or not kind.PRINCIPAL:
+        return leaf
+    return next(one for one in leaves(type(settings)) if one.key == f"{leaf.key}.{kind.PRINCIPAL}")
+
+
 def _principals(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
     """Return, for every part that a bare value may stand for, the key of that value."""
     for field in dataclasses.fields(kind):

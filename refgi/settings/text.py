@@ -7,7 +7,7 @@ from typing import Any, TypeVar, get_args, get_origin
 
 from refgi.errors import InputError
 from refgi.settings.fields import Settings, choices_of, may_be_none
-from refgi.settings.keys import PRINTED, SEED, find_key, raise_all, replaced
+from refgi.settings.keys import PRINTED, SEED, find_key, meant, raise_all, replaced
 from refgi.settings.tree import Leaf, leaves
 
 S = TypeVar("S", bound=Settings)
@@ -48,7 +48,7 @@ def from_text(base: S, pairs: Iterable[str]) -> S:
                 seeds = [leaf for leaf in leaves(type(base)) if leaf.key.rpartition(".")[2] == SEED]
                 values[key] = _read(seeds[0] if seeds else find_key(base, key), text)
             else:
-                leaf = find_key(base, key)
+                leaf = meant(base, find_key(base, key), text.lower() if text.lower() in ABSENT else text)
                 values[leaf.key] = _read(leaf, text)
         except InputError as error:
             errors.append(error)

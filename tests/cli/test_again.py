@@ -189,7 +189,7 @@ def test_what_is_no_picture_of_refgi_is_refused_by_name(tmp_path):
     foreign, bare, damaged, newer = (tmp_path / f"{name}.exr" for name in ("foreign", "bare", "damaged", "newer"))
     OpenEXR.File({"type": OpenEXR.scanlineimage}, {"R": plane}).write(str(foreign))
     write_exr(bare, {"R": plane}, {"n": 1})
-    write_exr(newer, {"R": plane}, {"provenance": 2, "method": "sii"})
+    write_exr(newer, {"R": plane}, {"provenance": 3, "method": "sii"})
     damaged.write_bytes(newer.read_bytes()[:-20])
     assert refused(run("--again", foreign), "foreign.exr", "refgi wrote", "another program's")
     assert refused(run("--again", bare), "bare.exr", "the record of how a picture was made")

@@ -40,6 +40,8 @@ class BackProjection(Settings):
 
 @dataclasses.dataclass(frozen=True)
 class Pcf(Settings):
+    PRINCIPAL = "texels"
+
     texels: int = setting(5, "width", least=1, most=31)
 
 
@@ -69,6 +71,14 @@ def test_short_keys_mean_the_same(key):
 @pytest.mark.parametrize("value", ["pcf", Pcf()])
 def test_a_choice_is_made_by_name_or_instance(value):
     assert of(MethodSettings, shadow=value) == MethodSettings(shadow=Pcf())
+
+
+def test_a_choice_stands_for_its_principal_setting():
+    pcf = MethodSettings(shadow=Pcf())
+    assert replaced(pcf, {"shadow": 9}).shadow == from_text(pcf, ["shadow=9"]).shadow == Pcf(9)
+    assert from_text(pcf, ["shadow=none"]).shadow is None
+    with pytest.raises(InputError, match="shadow: expected none or csm"):  # has none
+        from_text(MethodSettings(), ["shadow=9"])
 
 
 def test_settings_of_a_choice_go_with_it():

@@ -174,7 +174,7 @@ def test_what_lies_outside_the_discs_of_gathering_is_told(radius):
     at = Frame(scene, width=24, height=24, rsm_resolution=24)
     _, said = told(gather, at, of(GatherSettings, radius=radius))
     assert said[0][0] == pytest.approx(outside_share(at, radius), abs=NEAR)
-    assert said[0][1].startswith(f"gather: radius {radius:g} of a map's width takes")
+    assert said[0][1].startswith(f"gather: disc.radius {radius:g} of a map's width takes")
 
 
 def test_a_disc_over_the_whole_map_loses_nothing():

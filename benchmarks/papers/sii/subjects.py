@@ -31,8 +31,10 @@ def full_sum(bench: Workbench, scene: str) -> Array:
 
 
 def splats(bench: Workbench, scene: str, **changes: Any) -> SiiSettings:
-    """Return settings of 768 lights and 5 %, but for `changes`, under the scene's reference length."""
-    return of(SiiSettings, **{"cut_share": PAPER_CUT, "reference_length": reference_length(bench, scene)} | changes)
+    """Return settings of 768 lights and 5 %, but for `changes`, under the scene's reference length; 0 % is no cut."""
+    share = changes.pop("cut_share", PAPER_CUT)
+    cut = {"cut_share": share, "reference_length": reference_length(bench, scene)} if share else {"cut": "none"}
+    return of(SiiSettings, **cut | changes)
 
 
 def reference_length(bench: Workbench, scene: str) -> float:

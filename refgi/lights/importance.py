@@ -25,7 +25,7 @@ Array = npt.NDArray[Any]
 Kind = Literal["flux", "peak", "openness"]
 
 
-@stage("rsm.importance")
+@stage("lights.importance")
 def importance(
     rsm: Rsm, kind: Kind = "flux", openness: Array | None = None, floor: float = 0.05, defensive: float = 0.0
 ) -> Array:

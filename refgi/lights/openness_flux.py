@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 
-@stage("splat.scale_flux")
+@stage("lights.scale_flux")
 def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Array]":
     """Scale each light's flux by 1 - O.
 
@@ -51,7 +51,7 @@ def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Ar
     return scaled, power(lights) - power(scaled)
 
 
-@stage("splat.roulette")
+@stage("lights.roulette")
 def roulette(lights: "PixelLights", openness: Array, floor: float, seed: int) -> "PixelLights":
     """Keep each light with chance p = max(floor, 1 - O) and divide its flux by p.
 

@@ -94,7 +94,7 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettin
 
     warp = _map_lights(settings).warp
     if warp is None:
-        skip("rsm.warp", "lights follow their pattern alone")
+        skip("lights.warp", "lights follow their pattern alone")
         return None
     maps = []
     for rsm in rsms:

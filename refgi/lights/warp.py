@@ -39,7 +39,7 @@ class Warp:
                self.levels)
 
 
-@stage("rsm.warp")
+@stage("lights.warp")
 def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tuple[Array, Array]:
     """Warp points of the unit square over several maps that are stacked along rows.
 

@@ -35,7 +35,7 @@ class Receivers(NamedTuple):
     covered: Array  # (h, w) bool, whether there is a surface
 
 
-@stage("splat.irradiance")
+@stage("pairs.sum")
 def irradiance(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
 ) -> Array:
@@ -127,7 +127,7 @@ def checked(
     _check(receivers, lights, settings, footprint)
     packed = pack(lights, settings, footprint, receivers.position.dtype)
     if packed.lobes is None:
-        skip("splat.lobes", "no pixel light is glossy")
+        skip("pairs.lobes", "no pixel light is glossy")
     return packed
 
 

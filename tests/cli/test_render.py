@@ -97,7 +97,7 @@ def test_json_is_the_only_thing_on_stdout(tmp_path):
     assert content["files"] == [str(tmp_path / "a.exr")]
     assert content["non_finite_pixels"] == 0
     assert content["warnings"] == []
-    assert {"rsm.gbuffer", "splat.irradiance"} <= {line["name"] for line in content["stages"]}
+    assert {"rsm.gbuffer", "pairs.sum"} <= {line["name"] for line in content["stages"]}
 
 
 def test_float64_and_threads(tmp_path):

@@ -27,6 +27,7 @@ from benchmarks.papers.hssil.subjects import (
 )
 from benchmarks.papers.hssil.temporal import left
 from benchmarks.papers.workbench import FULL, Workbench, seen_by
+from refgi.settings import of
 from refgi.sssil import HssilSettings
 from refgi.sssil.temporal.filter import TemporalSettings
 from tests.benchmarks.papers.conftest import SMALL

@@ -296,4 +296,4 @@ def test_who_does_not_ask_does_not_pay(frames):
     frame = frames("cornell_box")
     with observe() as log:
         sii(frame, of(SiiSettings, lights=32, cut_irradiance=0.1))
-    assert not {"splat.ledger", "splat.cut"} & {run.name for run in log.runs}
+    assert not {"sii.ledger", "sii.cut_irradiance"} & {run.name for run in log.runs}

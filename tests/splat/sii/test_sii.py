@@ -162,8 +162,8 @@ def test_several_lights_add_up(box):
 def test_lobe_code_is_skipped_without_glossy_materials(box):
     with observe() as log:
         sii(box, SiiSettings())
-    assert log.status("splat.lobes") == ["skipped"]
-    assert log.status("splat.irradiance") == ["ran"]
+    assert log.status("pairs.lobes") == ["skipped"]
+    assert log.status("pairs.sum") == ["ran"]
 
 
 @pytest.mark.parametrize("change", [
@@ -207,7 +207,7 @@ def test_without_the_weight_a_picture_has_its_lights_share_of_the_texels(box, la
 def test_scene_without_glass_is_not_searched_for_refraction(box):
     with observe() as log:
         with_it = sii(box, of(SiiSettings, lights=64))
-    assert log.status("rsm.refraction") == ["skipped"]
+    assert log.status("lights.refraction") == ["skipped"]
     np.testing.assert_array_equal(with_it, sii(box, of(SiiSettings, lights=64, refraction="none")))
 
 

@@ -60,7 +60,7 @@ def pack_solids(solids: Solids, back: Array, *, hollow: bool = False, nearest: b
         return packed.astype(back.dtype)
 
 
-@stage("splat.bins", kept=False)  # of receivers that are gathered anew
+@stage("sii.bins", kept=False)  # of receivers that are gathered anew
 def list_lights(position: Array, normal: Array, solids: Array) -> Array:
     """List the lights whose bound may reach each tile of receivers.
 

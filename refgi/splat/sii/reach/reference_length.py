@@ -102,7 +102,7 @@ def with_reference_length(receivers: Receivers, lights: "PixelLights", settings:
         cut, reference_length=length)))
 
 
-@stage("splat.reference_length")
+@stage("sii.reference_length")
 def reference_length(receivers: Receivers, lights: "PixelLights", pairs: PairSettings) -> float:
     """Return the length under which lights cut at 5 % count at 125 / 768 of the pixels on average.
 

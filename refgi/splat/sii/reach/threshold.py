@@ -138,7 +138,7 @@ def light_range(
     return Range(square.astype(dtype), np.maximum(scale, 1e-30).astype(dtype), outside)
 
 
-@stage("splat.cut_loss")
+@stage("sii.cut_loss")
 def cut_loss(
     light: Array, receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None
 ) -> float:

@@ -80,16 +80,16 @@ def test_every_pixel_sums_its_lights_under_their_visibility(side, count, assignm
     to = picture(to, 17, 19)
     to.covered[rng.random((17, 19)) < 0.2] = False
     lights = PixelLights(*(None if part is None else part[:, :count] for part in lights[:3]), None, None, None, count)
-    of = rng.integers(0, 6, count)
+    owner = rng.integers(0, 6, count)
     settings = of(ValSettings, visibility="none", assignment=assignment)
-    result = clustered_irradiance(to, to.normal, lights, grouped(of, 6), None, settings, visibility_of=striped,
+    result = clustered_irradiance(to, to.normal, lights, grouped(owner, 6), None, settings, visibility_of=striped,
                                   interleaving=side)
     expected = np.zeros_like(result)
     for y, x in np.argwhere(to.covered):
         at, up = to.position[:, y, x], to.normal[:, y, x]
-        for i in lights_of(x, y, side, count, of if assignment == "cluster" else None):
+        for i in lights_of(x, y, side, count, owner if assignment == "cluster" else None):
             pair = eq2.pair(at, up, lights.position[:, i], lights.normal[:, i], lights.flux[:, i])
-            expected[:, y, x] += side**2 * pair * striped(of[i], at, up)
+            expected[:, y, x] += side**2 * pair * striped(owner[i], at, up)
     error = np.abs(result - expected).max() / expected.max()
     assert error < ROUNDING
     evidence(f"n = {side}, {count} lights by {assignment}: {error:.1e} off the literal sum")

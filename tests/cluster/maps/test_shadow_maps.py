@@ -36,7 +36,7 @@ def maps_of(shape, areas, dtype=np.float32, **changed):
 @pytest.mark.parametrize("rule", ["keep", "planes", "ball"])
 def test_drawn_maps_are_those_of_rays(rule, alone, evidence):
     changed = {"near_geometry": rule, "occluders_alone": alone, "behind": "dual_paraboloid"}
-    drawn, traced = (maps_of(SCENE, LIGHTS, maps=maps, **changed) for maps in ("raster", "rays"))
+    drawn, traced = (maps_of(SCENE, LIGHTS, renderer=kind, **changed) for kind in ("raster", "rays"))
     assert drawn.left_out == traced.left_out
     assert (drawn.left_out > 0) == (rule != "keep")
     np.testing.assert_array_equal(drawn.map_of, traced.map_of)

@@ -27,6 +27,7 @@ from refgi.lights.footprints import with_equal_solid_angles
 from refgi.scene import Camera, Material, Scene, SpotLight
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import Mesh, merge
+from refgi.settings import of
 from refgi.splat.gather import GatherSettings, gather
 from refgi.splat.multires import MultiresSettings, multires
 
@@ -90,7 +91,7 @@ def beside_path_tracing(bench: Workbench, scene: str) -> Figure:
     made = {"multires": ("multiresolution splatting", multires(frame, settings)),
             "naive": ("the same lights, every pixel", full_sum(frame, settings)),
             "gather": ("gathering, 1024 samples",
-                       gather(frame, GatherSettings(samples=1024, grid=0, radius=WHOLE_MAP))),
+                       gather(frame, of(GatherSettings, samples=1024, interpolation="none", radius=WHOLE_MAP))),
             "multires_bare": ("multiresolution, no clamp", multires(frame, bare)),
             "texels_clamped": ("every texel, clamped", every_texel(frame, settings)),
             "texels": ("every texel, no clamp", every_texel(frame, bare)),

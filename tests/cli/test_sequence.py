@@ -70,7 +70,7 @@ def test_frames_are_what_python_computes(way, tmp_path):
         assert told["frames"][number]["reused"] == step.reused
     assert imageio.v3.imread(tmp_path / "new" / "way_00003.png").shape == (10, 12, 3)
     attributes = read_exr(tmp_path / "new" / "way_00003.exr")[1]
-    assert (attributes["frame"], attributes["of"], attributes["settings"]["lights"]) == (3, 4, 16)
+    assert (attributes["frame"], attributes["of"], attributes["settings"]["lights.count"]) == (3, 4, 16)
 
 
 @pytest.mark.parametrize(("method", "asked", "used"), [("vpl", [], "exact"), ("sii", [], "map"),
@@ -164,8 +164,8 @@ def test_another_method_is_not_filtered_unless_asked(way, tmp_path):
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    (["--temporal", "weight=2"], ["weight: expected a share"]),
-    (["--temporal", "wieght=0.5"], ["is not a setting of the temporal filter", "weight"]),
+    (["--temporal", "weight=2"], ["weight: expected a number, 0 to 0.9999"]),
+    (["--temporal", "wieght=0.5"], ["is not a setting of TemporalSettings", "weight"]),
     (["--temporal", "weight=0.5", "--no-temporal"], ["--no-temporal"]),
     (["--set", "samplse=3"], ["samples"]),
     (["--resume", "--format", "png"], ["--resume"]),
@@ -235,6 +235,6 @@ def test_a_loss_that_changes_along_the_path_is_warned_of_once(way, tmp_path):
                  "exr", "--out", tmp_path / "out", "--json")
     assert result.exit_code == 0, result.output
     (warning,) = json.loads(result.stdout)["warnings"]
-    assert re.fullmatch(r"gather: radius .* takes \d+ to \d+ % of the indirect light", warning)
+    assert re.fullmatch(r"gather: disc\.radius .* takes \d+ to \d+ % of the indirect light", warning)
     assert result.stderr.count("refgi: warning: ") == 1
     assert result.stderr.count("refgi: warning, over the whole run: ") == 1

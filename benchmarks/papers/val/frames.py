@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.papers.records import Bar, Cell, Figure, Picture, Ratios, Table, relative
 from benchmarks.papers.val.subjects import (
+    AREA_LIGHTS,
     ATRIUM,
     BOX,
     HORSE,
@@ -47,8 +48,8 @@ def one_frame(bench: Workbench, name: str, fps: float) -> Figure:
     gallery.indirect("indirect", "indirect light alone", block, light[block], ways[block])
     gallery.indirect("full", "indirect light alone", full, light[full], ways[full])
     return Figure(
-        facts=(scene.description, f"{scene.face_count} faces", f"{frame.width}² pixels", f"{ways[block].lights} lights",
-               f"{ways[block].area_lights} area lights"), pictures=gallery.pictures,
+        facts=(scene.description, f"{scene.face_count} faces", f"{frame.width}² pixels",
+               f"{ways[block].lights.count} lights", f"{AREA_LIGHTS} area lights"), pictures=gallery.pictures,
         tables=[Table("Whole frames; error in % of the mean irradiance: of all lights against a ray to each, of "
                       "interleaving against all lights at every pixel",
                       ("", "ms", "fps", "fps, paper", "RMSE", "MAE", "darker by"),
@@ -75,7 +76,7 @@ def four_scenes(bench: Workbench, faces: dict[str, str], fps: dict[str, float]) 
         gallery.camera(name.replace(" ", "_"), title, f"{scenes[name].face_count} faces",
                        val(gallery.frame, block[name]), block[name])
     return Figure(
-        facts=(f"{timed_size(bench)}² pixels", f"{block[BOX].lights} lights", f"{block[BOX].area_lights} area lights",
+        facts=(f"{timed_size(bench)}² pixels", f"{block[BOX].lights.count} lights", f"{AREA_LIGHTS} area lights",
                "whole frames, nothing kept from one to the next", f"medians of {bench.few}"), pictures=shown,
         ratios=[relative("frames per second, relative to the Cornell box",
                          {TITLES[name]: one for name, one in rate.items()},
@@ -131,8 +132,8 @@ def steps(bench: Workbench) -> Figure:
 
     return Figure(
         facts=(*(f"{TITLES[name]}: {scene_of(bench, name).face_count} faces" for name in (HORSE, ATRIUM)),
-               f"{timed_size(bench)}² pixels", f"{settings[usual].lights} lights",
-               f"{settings[usual].area_lights} area lights"),
+               f"{timed_size(bench)}² pixels", f"{settings[usual].lights.count} lights",
+               f"{AREA_LIGHTS} area lights"),
         ratios=[Ratios("per cent of a frame's time, Cornell Horse, interleaved", [
             Bar(step.title, 100 * spent[usual][step.title] / spent[usual]["frame"], 100 * step.paper_ms / paper)
             for step in STEPS])],

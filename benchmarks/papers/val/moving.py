@@ -1,6 +1,5 @@
 """Scenes that move: how far pictures and area lights jump from frame to frame; Figures 11 and 12."""
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -127,7 +126,7 @@ def sequence(bench: Workbench, scene_at: Callable[[float], Scene], step: float) 
     span = step * (count - 1)
     frames = [seen_by(bench, scene_at(span * k / (count - 1)), MOVING) for k in range(count)]
     settings = settings_of(bench)
-    few = dataclasses.replace(settings, area_lights=FEW)
+    few = settings_of(bench, clusters_count=FEW)
     ways = {RESTARTED: (settings, clustered_along(frames, settings, warm=False)),
             WARM: (settings, clustered_along(frames, settings, warm=True)),
             FEWER: (few, clustered_along(frames, few, warm=False))}

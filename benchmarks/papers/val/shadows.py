@@ -83,7 +83,7 @@ def _one_cluster(view: View, settings: ValSettings, diagonal: float) -> Clustere
     lights = PixelLights(position.astype(np.float32), np.repeat(normal[:, None], count, 1).astype(np.float32),
                          np.full((3, count), FLUX / count, np.float32), None, None, None, count)
     found = cluster(lights.position, lights.normal, 1, diagonal=diagonal)
-    return Clustered(lights, found, area_lights(lights, found, settings))
+    return Clustered(lights, found, area_lights(lights, found, settings.area))
 
 
 def small_and_large(bench: Workbench, views: tuple[View, ...], fps: float) -> Figure:
@@ -107,7 +107,7 @@ def small_and_large(bench: Workbench, views: tuple[View, ...], fps: float) -> Fi
                      1 / seconds[view.name], fps))
     return Figure(
         facts=("the four-legged body on a floor", f"{frame.scene.face_count} faces", f"{frame.width}² pixels",
-               f"map of {settings.map_resolution}² texels"), pictures=shown,
+               f"map of {settings.maps.resolution}² texels"), pictures=shown,
         tables=[Table("Size of the lamp and of its area light; error against rays in % of the mean; map and light",
                       ("", "side, m", "area light, m", "RMSE", "MAE", "darker by", "ms", "fps", "fps, paper"), rows)],
         notes=("The shadow of the larger light is wider and softer, as in the paper. Against rays the pictures are "
@@ -140,15 +140,14 @@ def failures(bench: Workbench, views: tuple[View, ...], ways: dict[str, dict[str
         return ", ".join(f"{value:.1f}" for value in rmse[way]) + " %"
 
     return Figure(
-        facts=("one lamp, one map", f"{frame.width}² pixels", f"map of {settings.map_resolution}² texels"),
+        facts=("one lamp, one map", f"{frame.width}² pixels", f"map of {settings.maps.resolution}² texels"),
         pictures=shown,
         tables=[Table("RMSE against rays in % of the mean, with parts of the method replaced",
                       ("", *(view.title for view in views)), [(way, *off) for way, off in rmse.items()])],
         notes=(
-            f"The three pictures are {said(PUBLISHED)} off as published. With summed areas, which know no steps "
-            f"between mip levels, it is {said('4 terms, summed areas')}. Every texel of the disc comes to "
-            f"{said('4 terms, every texel')}.",
-            f"Sixteen terms, whose bias is a quarter, come to {said('16 terms, summed areas')}; the exact step, with "
+            f"The three pictures are {said(PUBLISHED)} off as published. Every texel of the disc in place of mip "
+            f"levels comes to {said('4 terms, every texel')}.",
+            f"Sixteen terms, whose bias is a quarter, come to {said('16 terms, every texel')}; the exact step, with "
             f"the receiver's plane and the cone towards the light, to {said(STEP)}. One hard shadow comes to "
             f"{said('one hard shadow')}.",
             "What is left with the exact step is the method's one mean depth of blockers and its round filter for a "
@@ -197,7 +196,7 @@ def soft_and_crisp(bench: Workbench, titles: dict[str, str]) -> Figure:
 
 
 def _measured(frame: Frame, settings: ValSettings, exact: Array) -> Soft:
-    free, light = val(frame, dataclasses.replace(settings, visibility="none")), val(frame, settings)
+    free, light = val(frame, dataclasses.replace(settings, visibility=None)), val(frame, settings)
     covered, areas = frame.gbuffer.covered, clustered(frame, settings).areas
     used = areas.members > 0
     size = 100 * float(areas.delta[used].mean()) if used.any() else 0.0

@@ -97,17 +97,6 @@ def _check(lights: "PixelLights", openness: Array) -> None:
 
 
 def power(lights: "PixelLights") -> Array:
-    """Return the flux of all lights.
-
-    Parameters
-    ----------
-    lights : PixelLights
-        N' lights.
-
-    Returns
-    -------
-    (3,) ndarray of float64
-        W, diffuse and lobe together.
-    """
+    """Return the flux of all lights, diffuse and lobe together, (3,) W in float64."""
     flux: Array = lights.flux.sum(axis=1, dtype=np.float64)
     return flux if lights.lobe_flux is None else flux + lights.lobe_flux.sum(axis=1, dtype=np.float64)

@@ -144,18 +144,7 @@ def map_shares(rsms: Sequence[Rsm], count: int | None, pattern: Pattern) -> list
 
 
 def equal_shares(count: int, parts: int) -> list[int]:
-    """Return how many of `count` things each of some parts gets, the first ones one more where it does not divide.
-
-    Parameters
-    ----------
-    count, parts : int
-        Things, and parts to give them to.
-
-    Returns
-    -------
-    list of int
-        One number a part.
-    """
+    """Return `parts` shares of `count` things, the first ones one more where it does not divide."""
     return [count // parts + (index < count % parts) for index in range(parts)]
 
 

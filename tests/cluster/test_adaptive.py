@@ -34,7 +34,7 @@ def lights(frame):
 def error_of_picture(frame, lights, areas, maps, settings):
     """RMSE over the mean against a shadow ray for each light, over all pixels."""
     buffer = frame.gbuffer
-    exact = vpl(frame, of(VplSettings, lights=settings.lights)).astype(np.float64)
+    exact = vpl(frame, of(VplSettings, lights=settings.lights.count)).astype(np.float64)
     facing = facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)
     made = clustered_irradiance(Receivers(buffer.position, buffer.normal, buffer.covered), facing, lights, areas, maps,
                                 settings)

@@ -27,7 +27,8 @@ from refgi.settings import replaced
 from refgi.sssil import HssilSettings
 
 FREE = "none"
-NAMES = {FREE: "v = 1, as published", "bitmask": "bitmask of the screen", "rays": "a ray to each sample"}  # visibility
+NAMES: dict[str, str] = {FREE: "v = 1, as published", "bitmask": "bitmask of the screen",
+                         "rays": "a ray to each sample"}
 MANY = 1024  # samples: next to no noise is left
 THICKNESS = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # share of the diagonal
 
@@ -133,10 +134,10 @@ FRAMES = "the mean of 19 frames"  # the temporal filter with a = 0.9 takes away 
 def chain(frame: Frame) -> dict[str, HssilSettings]:
     """Return settings from every pixel lighting every pixel to the published ones, one thing changed at a time."""
     published = smaller(frame)
-    count, discs = published.sampling.levels, every_pixel(published)
-    levels = replaced(discs, {"levels": count + 2, "downsample": "average"})
+    discs = every_pixel(published)
+    levels = replaced(discs, {"levels": published.sampling.levels + 2, "downsample": "average"})
     closest = replaced(levels, {"downsample": "closest"})
-    reach = every_texel(published, start="full", levels=count + 1)
+    reach = every_texel(published, start="full", levels=published.sampling.levels + 1)
     return {"pixels": replaced(discs, {"form_factor": "point"}), "discs": discs, "levels": levels,
             "closest": closest, "reach": reach, "start": every_texel(published), "samples": published}
 

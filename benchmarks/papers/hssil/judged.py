@@ -66,7 +66,8 @@ def point_or_disc(bench: Workbench, scene: str, line: float) -> Figure:
               for key in (POINT, DISC, DISC_LIMIT, *TRUTHS)]
     return Figure(
         facts=(frame.scene.description, f"{frame.width}² pixels", f"radius {settings.sampling.radius:g}",
-               "4 levels from full resolution", "64 samples a level, every pixel its own", "direct light with a shadow ray a pixel",
+               "4 levels from full resolution", "64 samples a level, every pixel its own",
+               "direct light with a shadow ray a pixel",
                f"path tracing with {bench.scale.truth_samples} samples a pixel"), pictures=gallery.pictures,
         tables=[Table("Errors in % of the mean, against path tracing in which only what the camera sees shines and "
                       "nothing blocks", ("", "RMSE", "MAE", "darker by", "highest above it along the line, %",
@@ -141,7 +142,8 @@ def several_cameras(bench: Workbench, scene: str, ways: dict[str, dict[str, Any]
     least = min(float((one - light[ONE]).min()) for one in light.values())
     return Figure(
         facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels",
-               f"{base.sampling.levels} levels from half resolution, every texel", f"path tracing with {bench.scale.truth_samples} samples a pixel"),
+               f"{base.sampling.levels} levels from half resolution, every texel",
+               f"path tracing with {bench.scale.truth_samples} samples a pixel"),
         pictures=gallery.pictures,
         tables=[Table("Light and error in % of the mean of path tracing in which nothing blocks",
                       ("", "light", "RMSE", "of the missing light, back", "ms, 64 samples"), rows)],

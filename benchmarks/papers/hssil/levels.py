@@ -19,7 +19,7 @@ from refgi.compare.maps import DIVERGING, Scale, luminance
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.settings import of, replaced
-from refgi.sssil import HssilSettings, SamplingSettings
+from refgi.sssil import HssilSettings
 from refgi.sssil.crown.pattern import offsets_at
 from refgi.sssil.crown.reach import coverage
 
@@ -44,12 +44,12 @@ def crowns(bench: Workbench) -> Figure:
     return Figure(
         facts=(f"radius {sampling.radius:g}", f"{sampling.levels} levels", f"{sampling.samples} samples in a crown, "
                f"{sampling.inner} in the disc", f"means over {rows} rows of receivers"),
-        pictures=(Picture("samples", "the samples of one receiver", "squares: texels of their level", _placed(sampling),
+        pictures=(Picture("samples", "the samples of one receiver", "squares: texels of their level", _placed(settings),
                           settings=settings),
                   mapped("coverage", "coverage by 64 samples", said, sampled, everywhere, COVERAGE),
                   mapped("exact", "coverage by every texel", said, exact, everywhere, COVERAGE)),
         tables=[Table("Crowns", ("", "from, texels of the first level", "to", "samples", "texels for each sample",
-                                 "covered within, mean"), _crowns(sampling, sampled, texels))],
+                                 "covered within, mean"), _crowns(settings, sampled, texels))],
         plots=[Plot(curves_plot(curves, Axes("distance, texels of the first level", "times covered")),
                     "How often a pair of pixels at a distance is covered: once but where circles cut coarse texels.")],
         notes=(
@@ -67,9 +67,8 @@ def covered(settings: HssilSettings, rows: int) -> Array:
 
     Offsets go as far as the last crown reaches; `rows` of receivers draw samples.
     """
-    sampling = settings.sampling
-    side = round((sampling.radius or 1) * 2**sampling.levels) + 1
-    return coverage(sampling, (side, side), rows)
+    side = round((settings.sampling.radius or 1) * 2**settings.sampling.levels) + 1
+    return coverage(settings.sampling, (side, side), rows)
 
 
 def profile(times: Array) -> list[float]:
@@ -87,33 +86,33 @@ def _distance(times: Array) -> Array:
     return rounded
 
 
-def _placed(sampling: SamplingSettings) -> npt.NDArray[np.uint8]:
+def _placed(settings: HssilSettings) -> npt.NDArray[np.uint8]:
     """Draw the samples of one receiver as squares of their texels, each level in its colour.
 
     A pixel is a texel of the first level; rings show where crowns begin and end.
     """
-    radius = sampling.radius or 1
-    reach = round(radius * 2**sampling.levels)
-    colours = palette(sampling.levels)
+    radius = settings.sampling.radius or 1
+    reach = round(radius * 2**settings.sampling.levels)
+    colours = palette(settings.sampling.levels)
     pixels = np.full((2 * reach + 1, 2 * reach + 1, 3), GROUND)
     row, column = np.indices(pixels.shape[:2]) - reach
     distance = np.hypot(row, column)
-    for k in range(sampling.levels + 1):
+    for k in range(settings.sampling.levels + 1):
         pixels[np.abs(distance - radius * 2**k) < 0.5 + reach / 640] = RINGS
-    for k in reversed(range(sampling.levels)):
-        for ox, oy in 2**k * offsets_at(sampling, k, sampling.first_level + k, 0, 0):
+    for k in reversed(range(settings.sampling.levels)):
+        for ox, oy in 2**k * offsets_at(settings.sampling, k, settings.sampling.first_level + k, 0, 0):
             top, left = (max(0, reach + o - 2**k // 2) for o in (oy, ox))
             pixels[top : top + 2**k, left : left + 2**k] = colours[k]
     return (255 * pixels + 0.5).astype(np.uint8)
 
 
-def _crowns(sampling: SamplingSettings, times: Array, texels: float) -> list[tuple[Cell, ...]]:
-    radius, distance = sampling.radius or 1, _distance(times)
+def _crowns(settings: HssilSettings, times: Array, texels: float) -> list[tuple[Cell, ...]]:
+    radius, distance = settings.sampling.radius or 1, _distance(times)
     rows: list[tuple[Cell, ...]] = []
-    for k in range(sampling.levels):
+    for k in range(settings.sampling.levels):
         near, far = (0.0 if k == 0 else radius * 2**k), radius * 2 ** (k + 1)
         within = (distance >= near) & (distance < far)
-        samples = sampling.samples + (sampling.inner if k == 0 else 0)
+        samples = settings.sampling.samples + (settings.sampling.inner if k == 0 else 0)
         rows.append((f"level {k + 1}", near, far, samples, texels, float(times[within].mean())))
     return rows
 
@@ -149,7 +148,7 @@ def level_by_level(bench: Workbench, scene: str, levels: int, line: float) -> Fi
     share = [100 * mean / (sum(means) or 1.0) for mean in means]
     gallery.camera("direct", "direct light", "a vertical spot", np.zeros_like(parts.whole))
     for k, light in enumerate(parts.single):
-        near, far = _crown(settings.sampling, k)
+        near, far = _crown(settings, k)
         rows.append((f"level {k + 1}", near, far, means[k], share[k]))
         if k < SHOWN:
             gallery.indirect(f"level{k + 1}", f"level {k + 1}", f"{near:g} to {far:g} pixels away", light,
@@ -174,10 +173,10 @@ def level_by_level(bench: Workbench, scene: str, levels: int, line: float) -> Fi
             "receiver whose crown has left it gets nothing from that level, and all from the next."))
 
 
-def _crown(sampling: SamplingSettings, index: int) -> tuple[float, float]:
+def _crown(settings: HssilSettings, index: int) -> tuple[float, float]:
     """Return where a level's samples lie, in pixels from the receiver."""
-    assert sampling.radius is not None
-    near = sampling.radius * 2.0 ** (sampling.first_level + index)
+    assert settings.sampling.radius is not None
+    near = settings.sampling.radius * 2.0 ** (settings.sampling.first_level + index)
     return (0.0 if index == 0 else round(near, 1)), round(2 * near, 1)
 
 

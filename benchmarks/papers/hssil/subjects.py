@@ -119,7 +119,7 @@ def scaled_radius(frame: Frame, radius: float) -> float:
 
 def every_texel(settings: HssilSettings, **changes: Any) -> HssilSettings:
     """Return settings that take each texel of disc and crowns once: the limit of many samples, without noise."""
-    return replaced(settings, {"pattern": "all", **changes})
+    return replaced(settings, {"pattern": "all"} | changes)
 
 
 def every_pixel(settings: HssilSettings) -> HssilSettings:
@@ -143,10 +143,9 @@ def ready(frame: Frame) -> Frame:
 
 def reach_of(frame: Frame, settings: HssilSettings) -> float:
     """Return how far samples reach in diagonals of the picture; from 1 on every pixel can light every other one."""
-    sampling = settings.sampling
-    if sampling.radius is None:
+    if settings.sampling.radius is None:
         return 1.0
-    pixels = sampling.radius * 2.0 ** (sampling.levels + sampling.first_level)
+    pixels = settings.sampling.radius * 2.0 ** (settings.sampling.levels + settings.sampling.first_level)
     return pixels / math.hypot(frame.width, frame.height)
 
 

@@ -13,6 +13,7 @@ from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, i
 from refgi.frame import Frame
 from refgi.lights import importance_pyramid
 from refgi.lights.selection import choose_lights, importance_maps
+from refgi.lights.settings import LightSettings
 from refgi.lights.warp import warp_samples
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.sampling import halton
@@ -83,7 +84,7 @@ def instant_radiosity(bench: Workbench, scene: str, lights: int, sources: dict[A
     covered, truth = gallery.covered, bench.traced(frame).mean
     rows, blocked, noise = [], {}, {}
     for source, title in sources.items():
-        settings = of(SiiSettings, lights=lights, source=source, cut="none")
+        settings = of(SiiSettings, lights=lights, source=source)
         splatted, shadowed = sii(frame, settings), _shadow_rays(frame, settings)
         blocked[source] = errors_of(splatted, shadowed, covered)
         noise[source] = errors_of(shadowed, truth, covered)
@@ -117,16 +118,15 @@ def _shadow_rays(frame: Frame, settings: SiiSettings) -> Array:
 def warped(bench: Workbench, scene: str, lights: int, seeds: tuple[int, ...]) -> Figure:
     """Figure 7: where the hierarchical warp puts lights, by level and method, and what that does to the picture."""
     frame, full = bench.frame(scene), full_sum(bench, scene)
-    base = of(SiiSettings, lights=lights, cut="none")
-    by_openness = {"importance": "openness"}
-    maps = importance_maps(frame, frame.rsms, replaced(base, {"warp": "A", **by_openness}).lights)
+    base = of(SiiSettings, lights=lights)
+    maps = importance_maps(frame, frame.rsms, of(LightSettings, warp="A", importance="openness"))
     assert maps is not None  # the pattern is warped
     importance = maps[0]
     points, pyramid = halton(lights), importance_pyramid(importance)
 
     def errors(method: Any, levels: int) -> tuple[float, float]:
-        warp = {} if method == "none" else {"warp": method, "warp_levels": levels, **by_openness}
-        off = [errors_of(sii(frame, replaced(base, {"lights_seed": seed, **warp})), full, frame.gbuffer.covered)[:2]
+        warp = {} if method == "none" else {"warp": method, "warp_levels": levels, "importance": "openness"}
+        off = [errors_of(sii(frame, replaced(base, warp | {"seed": seed})), full, frame.gbuffer.covered)[:2]
                for seed in seeds]
         rmse, mae = np.mean(off, axis=0)
         return float(rmse), float(mae)

@@ -32,7 +32,7 @@ def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further
                    kinds: dict[str, str]) -> Figure:
     """Figure 10: more and more area lights, to one for every light; beside it a ray to each and path tracing.
 
-    The exact step, which reads every texel, is looked at up to the paper's number of area lights.
+    PCSS, which reads every texel, is drawn up to the paper's number of area lights.
     """
     frame, settings = frame_of(bench, scene, JUDGED), settings_of(bench)
     right, traced = shadowed(bench, frame, settings), bench.traced(frame).mean
@@ -80,7 +80,7 @@ def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further
             f"From 2 to {AREA_LIGHTS} area lights the RMSE against a ray to each light falls from "
             f"{rmse['csm', 2]:.1f} to {rmse['csm', AREA_LIGHTS]:.1f} % of the mean, about as their "
             f"number to the {slope:.2f}. One hard shadow for each area light comes to "
-            f"{rmse['hard', 2]:.1f} and {rmse['hard', AREA_LIGHTS]:.1f} %, and the exact step to "
+            f"{rmse['hard', 2]:.1f} and {rmse['hard', AREA_LIGHTS]:.1f} %, and PCSS to "
             f"{rmse['pcss', 2]:.1f} and {rmse['pcss', AREA_LIGHTS]:.1f} %: what soft shadows gain in RMSE, the "
             "bias of four terms takes back the more, the smaller the area lights; what is left of their worth is that "
             "bands turn into gradients.",

@@ -30,6 +30,7 @@ from refgi.cluster.val import val
 from refgi.frame import Frame
 from refgi.lights import PixelLights
 from refgi.scene import Scene
+from refgi.settings import replaced
 from refgi.stages import Memory, observe
 
 FEW = 8  # area lights
@@ -126,7 +127,7 @@ def sequence(bench: Workbench, scene_at: Callable[[float], Scene], step: float) 
     span = step * (count - 1)
     frames = [seen_by(bench, scene_at(span * k / (count - 1)), MOVING) for k in range(count)]
     settings = settings_of(bench)
-    few = settings_of(bench, clusters_count=FEW)
+    few = replaced(settings, {"clusters.count": FEW})
     ways = {RESTARTED: (settings, clustered_along(frames, settings, warm=False)),
             WARM: (settings, clustered_along(frames, settings, warm=True)),
             FEWER: (few, clustered_along(frames, few, warm=False))}

@@ -29,11 +29,11 @@ from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import Clusters, ValSettings
-from refgi.cluster.val import face_normals, receivers_of, val
+from refgi.cluster.val import face_normals, val
 from refgi.frame import Frame
 from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights
-from refgi.pairs.settings import DistanceClamp
+from refgi.pairs.irradiance import Receivers
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, load_scene
 from refgi.scene.builtin.cornell import CAMERA, cornell_box, shell
@@ -164,14 +164,15 @@ class Clustered(NamedTuple):
 def settings_of(bench: Workbench, **changes: Any) -> ValSettings:
     """Return the paper's settings for the sum of all lights at every pixel; a small run has fewer lights."""
     lights = min(MOST_LIGHTS, max(FEWEST_LIGHTS, 2 * bench.scale.size))
-    usual: dict[str, Any] = {"lights": lights, "clusters_count": AREA_LIGHTS, "maps": bench.scale.rsm_resolution,
-                             "interleaving": 1}
+    usual: dict[str, Any] = {"lights": lights, "clusters.count": AREA_LIGHTS, "interleaving": 1,
+                             "maps.resolution": bench.scale.rsm_resolution}
     return of(ValSettings, **(usual | changes))
 
 
 def clamped(bench: Workbench, scene: Scene, **changes: Any) -> ValSettings:
     """Return the paper's settings with a least distance that keeps near lights dim, for the sum of all lights."""
-    return settings_of(bench, clamp=DistanceClamp(CLAMP * scene.geometry.diagonal), **changes)
+    clamp: dict[str, Any] = {"clamp": "distance", "clamp_value": CLAMP * scene.geometry.diagonal}
+    return settings_of(bench, **(clamp | changes))
 
 
 def published(bench: Workbench, scene: Scene) -> ValSettings:
@@ -191,11 +192,12 @@ def timed_size(bench: Workbench) -> int:
 
 def clustered(frame: Frame, settings: ValSettings, start: Clustering | None = None) -> Clustered:
     """Choose lights and group them; `start` has clusters of another frame to start from."""
-    lights, kind = choose_lights(frame, settings.lights), settings.clusters
+    lights = choose_lights(frame, settings.lights)
+    kind = settings.clusters
     assert isinstance(kind, Clusters)
     found = cluster(lights.position, lights.normal, kind.count, distance=kind.distance,
-                    weights=(kind.position_weight, kind.normal_weight),
-                    diagonal=frame.illuminated_extent.diagonal, rounds=kind.rounds, start=start)
+                    weights=(kind.position_weight, kind.normal_weight), diagonal=frame.illuminated_extent.diagonal,
+                    rounds=kind.rounds, start=start)
     return Clustered(lights, found, area_lights(lights, found, settings.area))
 
 
@@ -210,22 +212,23 @@ def clustered_along(frames: list[Frame], settings: ValSettings, *, warm: bool) -
 def maps_of(frame: Frame, found: Clustered, settings: ValSettings) -> ShadowMaps:
     """Draw what each area light sees: one map for each that may be occluded."""
     tracer = frame.tracer if settings.maps.renderer == "rays" else None
-    return shadow_maps(frame.scene.geometry, found.areas, settings.maps, frame.dtype, tracer,
-                       ends_of(frame, found.lights))
+    ends = ends_of(frame, found.lights)
+    return shadow_maps(frame.scene.geometry, found.areas, settings.maps, frame.dtype, tracer, ends)
 
 
 def lit_by(frame: Frame, found: Clustered, settings: ValSettings, maps: ShadowMaps | None = None) -> Array:
     """Return irradiance (3, h, w) of all of the given lights at every pixel, by given clusters and maps."""
     maps = maps_of(frame, found, settings) if maps is None else maps
-    visibility_of = reference_visibility(frame, found.lights, found.areas, maps, settings)
-    return clustered_irradiance(receivers_of(frame), face_normals(frame), found.lights, found.areas, maps, settings,
-                                visibility_of=visibility_of)
+    to = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    by_reference = reference_visibility(frame, found.lights, found.areas, maps, settings)
+    return clustered_irradiance(to, face_normals(frame), found.lights, found.areas, maps, settings,
+                                visibility_of=by_reference)
 
 
 def shadowed(bench: Workbench, frame: Frame, settings: ValSettings) -> Array:
     """Return the same lights with a shadow ray each: what more and more area lights converge to."""
-    count = settings.lights.count
-    return bench.once(("shadowed", frame, count), lambda: vpl(frame, of(VplSettings, lights=count)))
+    lights = settings.lights.count
+    return bench.once(("shadowed", frame, lights), lambda: vpl(frame, of(VplSettings, lights=lights)))
 
 
 def rays_to(frame: Frame, lights: PixelLights) -> Array:

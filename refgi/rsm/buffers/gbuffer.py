@@ -172,17 +172,7 @@ class GBuffer:
 def values_at(channel: Array, texel: Array) -> Array:
     """Return a channel's values at some texels.
 
-    Parameters
-    ----------
-    channel : (..., h, w) ndarray
-        The channel.
-    texel : (n,) ndarray of int
-        Texels, row * w + column.
-
-    Returns
-    -------
-    (..., n) ndarray
-        The values.
+    `channel` (..., h, w): the channel. `texel` (n,) int: texels, row * w + column. Returns (..., n): the values.
     """
     return channel.reshape(*channel.shape[:-2], -1)[..., texel]
 

@@ -29,7 +29,7 @@ from benchmarks.papers.hssil.temporal import left
 from benchmarks.papers.workbench import FULL, Workbench, seen_by
 from refgi.settings import of
 from refgi.sssil import HssilSettings
-from refgi.sssil.temporal import TemporalSettings
+from refgi.sssil.settings import TemporalSettings
 from tests.benchmarks.papers.conftest import SMALL
 
 PRINTED = {  # Figure 6: sampling, upsampling, compositing, total, on the 8800 GTS and the GTX 260, ms

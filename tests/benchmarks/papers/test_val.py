@@ -168,9 +168,9 @@ def test_single_area_lights_add_up(figures):
 
 def test_more_area_lights_come_nearer_to_a_ray_to_each(figures):
     rows = table(figures["fig10"])
-    series = {int(name): row["series of 4 terms"] for name, row in rows.items() if name.isdigit()}
+    series = {int(name): row["CSM, 4 terms"] for name, row in rows.items() if name.isdigit()}
     assert series[2] > series[30] > series[max(series)]  # the ends of the paper's row, and a light each
-    assert rows[str(max(series))]["series of 4 terms"] == rows[str(max(series))]["one hard shadow"]  # of size 0
+    assert rows[str(max(series))]["CSM, 4 terms"] == rows[str(max(series))]["one hard shadow"]  # of size 0
 
 
 def test_a_narrow_spot_is_crisp(figures):

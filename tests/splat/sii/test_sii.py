@@ -13,6 +13,7 @@ from refgi.lights.settings import LightSettings
 from refgi.scene import SpotLight, load_scene
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
+from refgi.splat.sii import METHOD
 from refgi.stages import observe
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -227,3 +228,12 @@ def test_settings_are_checked():
                    {"openness_floor": 0, "openness_flux": "roulette"}, {"reference_length": 1e-300}):
         with pytest.raises(InputError, match=next(iter(change)).replace("_", ".")):
             of(SiiSettings, **change)
+
+
+def test_preset_of_the_paper_is_its_printed_values(box):
+    """Sec. 4 and Fig. 12: 768 lights with filtered flux, cut at 5 %; the default cuts nothing."""
+    paper = METHOD.preset("paper")
+    assert paper == of(SiiSettings, lights=768, filtered=True, cut_share=0.05, bound="ellipsoid")
+    by_hand = sii(box, of(SiiSettings, filtered=True, cut_share=0.05, bound="full"))
+    np.testing.assert_array_equal(sii(box, paper), by_hand)
+    assert METHOD.preset("default").reach.cut is None

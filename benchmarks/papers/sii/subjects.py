@@ -16,6 +16,7 @@ from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.reach.fragments import Fragments, fragments
 from refgi.splat.sii.reach.reference_length import PAPER_CUT, PAPER_LIGHTS
 from refgi.splat.sii.reach.reference_length import reference_length as reference_length_of
+from refgi.splat.sii.settings import RelativeCut
 
 BOX = "cornell_sphere:faces=17000"  # as many faces as the scenes of a game in 2006
 CAUSTIC = of(SiiSettings, lights=4096, warp="B", warp_levels=3, importance="peak", cut_share=PAPER_CUT,
@@ -30,9 +31,13 @@ def full_sum(bench: Workbench, scene: str) -> Array:
     return bench.once(("full sum", scene), lambda: sii(bench.frame(scene), every))
 
 
-def splats(bench: Workbench, scene: str, **changes: Any) -> SiiSettings:
-    """Return settings of 768 lights and 5 %, but for `changes`, under the scene's reference length."""
-    return of(SiiSettings, **{"cut_share": PAPER_CUT, "reference_length": reference_length(bench, scene)} | changes)
+def splats(bench: Workbench, scene: str, share: float = PAPER_CUT, **changes: Any) -> SiiSettings:
+    """Return settings of 768 lights, but for `changes`, cut at a share of I_0 under the scene's reference length.
+
+    A share of 0 cuts nothing.
+    """
+    cut = RelativeCut(share, reference_length(bench, scene)) if share > 0 else None
+    return of(SiiSettings, cut=cut, **changes)
 
 
 def reference_length(bench: Workbench, scene: str) -> float:

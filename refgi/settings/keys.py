@@ -63,7 +63,7 @@ def replaced(settings: S, values: Mapping[str, Any]) -> S:
     for key, value in values.items():
         try:
             shared = _shared(settings, key, value, values)
-            found |= {find_key(settings, key).key: value} if shared is None else shared
+            found |= {meant(settings, find_key(settings, key), value).key: value} if shared is None else shared
         except InputError as error:
             errors.append(error)
     made: S = _rebuilt(settings, _nested(found), "", errors)
@@ -226,7 +226,7 @@ def _rebuilt(settings: Any, tree: dict[str, Any], prefix: str, errors: list[Inpu
             continue
         if inner:
             part = changes[name]
-            if part is None and (fitting := _having(hint, inner)):
+            if part is None and "" not in node and (fitting := _having(hint, inner)):
                 part = fitting
             unknown = [one for one in inner if part is None or not hasattr(part, one)]
             chosen = "none" if part is None else part.name()

@@ -71,7 +71,7 @@ def cut_off(bench: Workbench, scene: str, shares: tuple[int, ...], fps: dict[int
     """Figure 11: the cut-off I_low (in % of I_0; 0 cuts nothing): speed, error and energy lost."""
     frame, full = bench.frame(scene), full_sum(bench, scene)
     gallery, covered = Gallery(frame, full), frame.gbuffer.covered
-    settings = {share: splats(bench, scene, cut_share=share / 100) for share in shares}
+    settings = {share: splats(bench, scene, share / 100) for share in shares}
     seconds = interleaved({share: partial(sii, frame, one) for share, one in settings.items()}, bench.scale.repeats)
     made = {share: sii(frame, one) for share, one in settings.items()}
     drawn = {share: float(counted(frame, one).overdraw[covered].mean()) for share, one in settings.items()}
@@ -118,7 +118,7 @@ def gathering(bench: Workbench, scene: str, samples: dict[int, float],
              for n, fps in samples.items()]
     cases.append(Case("gather_whole", f"RSM, {most} samples, whole map",
                       of(GatherSettings, samples=most, grid=grid, radius=WHOLE_MAP)))
-    cases += [Case(f"sii{n}_{x}", f"SII, {n} lights, {x} %", splats(bench, scene, lights=n, cut_share=x / 100), fps)
+    cases += [Case(f"sii{n}_{x}", f"SII, {n} lights, {x} %", splats(bench, scene, x / 100, lights=n), fps)
               for (n, x), fps in splatted.items()]
     run: dict[str, Any] = {c.name: partial(gather if isinstance(c.settings, GatherSettings) else sii, frame, c.settings)
                            for c in cases}
@@ -162,7 +162,7 @@ def every_light(bench: Workbench, scene: str, lights: int, shares: tuple[int, ..
     """
     frame, full = bench.frame(scene), full_sum(bench, scene)
     covered = frame.gbuffer.covered
-    run = {share: partial(sii, frame, splats(bench, scene, lights=lights, cut_share=share / 100)) for share in shares}
+    run = {share: partial(sii, frame, splats(bench, scene, share / 100, lights=lights)) for share in shares}
     seconds = interleaved(run, bench.scale.repeats)
     rows = [(f"{share} %" if share else "0: every light at every pixel", 1e3 * seconds[share], 1 / seconds[share],
              fps.get(share), *errors_of(work(), full, covered)) for share, work in run.items()]

@@ -16,6 +16,7 @@ from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.reach.fragments import Fragments, fragments
 from refgi.splat.sii.reach.reference_length import PAPER_CUT, PAPER_LIGHTS
 from refgi.splat.sii.reach.reference_length import reference_length as reference_length_of
+from refgi.splat.sii.settings import RelativeCut
 
 BOX = "cornell_sphere:faces=17000"  # as many faces as the scenes of a game in 2006
 CAUSTIC = of(SiiSettings, lights=4096, warp="B", warp_levels=3, importance="peak", cut_share=PAPER_CUT,

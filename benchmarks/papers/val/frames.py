@@ -48,8 +48,8 @@ def one_frame(bench: Workbench, name: str, fps: float) -> Figure:
     gallery.indirect("indirect", "indirect light alone", block, light[block], ways[block])
     gallery.indirect("full", "indirect light alone", full, light[full], ways[full])
     return Figure(
-        facts=(scene.description, f"{scene.face_count} faces", f"{frame.width}² pixels", f"{ways[block].lights} lights",
-               f"{AREA_LIGHTS} area lights"), pictures=gallery.pictures,
+        facts=(scene.description, f"{scene.face_count} faces", f"{frame.width}² pixels",
+               f"{ways[block].lights.count} lights", f"{AREA_LIGHTS} area lights"), pictures=gallery.pictures,
         tables=[Table("Whole frames; error in % of the mean irradiance: of all lights against a ray to each, of "
                       "interleaving against all lights at every pixel",
                       ("", "ms", "fps", "fps, paper", "RMSE", "MAE", "darker by"),
@@ -132,7 +132,7 @@ def steps(bench: Workbench) -> Figure:
 
     return Figure(
         facts=(*(f"{TITLES[name]}: {scene_of(bench, name).face_count} faces" for name in (HORSE, ATRIUM)),
-               f"{timed_size(bench)}² pixels", f"{settings[usual].lights} lights",
+               f"{timed_size(bench)}² pixels", f"{settings[usual].lights.count} lights",
                f"{AREA_LIGHTS} area lights"),
         ratios=[Ratios("per cent of a frame's time, Cornell Horse, interleaved", [
             Bar(step.title, 100 * spent[usual][step.title] / spent[usual]["frame"], 100 * step.paper_ms / paper)

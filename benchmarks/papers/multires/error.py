@@ -1,6 +1,5 @@
 """How far pictures are off: surface detail (Figure 11), beside path tracing (Figure 13), at edges (Figure 15)."""
 
-import dataclasses
 import math
 from functools import partial
 from typing import Any
@@ -15,6 +14,7 @@ from benchmarks.papers.multires.subjects import (
     every_texel,
     frame_of,
     full_sum,
+    least_distance,
     scene_of,
     settings_of,
     unclamped,
@@ -27,6 +27,7 @@ from refgi.lights.footprints import with_equal_solid_angles
 from refgi.scene import Camera, Material, Scene, SpotLight
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import Mesh, merge
+from refgi.settings import of, replaced
 from refgi.splat.gather import GatherSettings, gather
 from refgi.splat.multires import MultiresSettings, multires
 
@@ -61,7 +62,7 @@ def surface_detail(bench: Workbench, scene: str, cases: tuple[Case, ...]) -> Fig
     better = "less" if off["detail"].rmse < off["high"].rmse else "more"
     return Figure(
         facts=(model.description, f"{model.face_count} faces", f"times and subsplats at {2 * bench.scale.size}²",
-               f"{settings['low'].lights} lights"),
+               f"{settings['low'].lights.count} lights"),
         pictures=gallery.pictures,
         ratios=(relative("frames per second, relative to a threshold of 0.25",
                          {c.title: 1 / seconds[c.name] for c in cases}, {c.title: c.printed for c in cases}),
@@ -86,11 +87,11 @@ def beside_path_tracing(bench: Workbench, scene: str) -> Figure:
     frame, settings = frame_of(bench, scene), settings_of(bench, scene)
     unshadowed, truth = (bench.traced(frame, visibility=visible).mean for visible in (False, True))
     gallery, bare = Gallery(frame, unshadowed), unclamped(settings)
-    equal = dataclasses.replace(bare, as_published=frozenset({"equal_solid_angle"}))
+    equal = replaced(bare, {"as_published": "equal_solid_angle"})
     made = {"multires": ("multiresolution splatting", multires(frame, settings)),
             "naive": ("the same lights, every pixel", full_sum(frame, settings)),
             "gather": ("gathering, 1024 samples",
-                       gather(frame, GatherSettings(samples=1024, grid=0, radius=WHOLE_MAP))),
+                       gather(frame, of(GatherSettings, samples=1024, radius=WHOLE_MAP, interpolation=None))),
             "multires_bare": ("multiresolution, no clamp", multires(frame, bare)),
             "texels_clamped": ("every texel, clamped", every_texel(frame, settings)),
             "texels": ("every texel, no clamp", every_texel(frame, bare)),
@@ -110,7 +111,8 @@ def beside_path_tracing(bench: Workbench, scene: str) -> Figure:
         ("multires", "naive"), ("texels_clamped", "texels"), ("equal", "texels")))
     solid, every = _solid_angle_ratios(frame), against["texels"]
     return Figure(
-        facts=(scene, f"{settings.lights} lights, clamped at {settings.clamp_value:.3g} m"), pictures=gallery.pictures,
+        facts=(scene, f"{settings.lights.count} lights, clamped at {least_distance(settings):.3g} m"),
+        pictures=gallery.pictures,
         tables=(Table("Errors, in % of the mean irradiance",
                       ("", *(f"{what}, {which} visibility" for which in ("no", "with")
                              for what in ("RMSE", "MAE", "darker by"))),
@@ -157,7 +159,8 @@ def edges(bench: Workbench, scene: str, rules: dict[str, dict[str, Any]], second
     for name, title, plate, selected in (("border", "edge on a border", _level_plate(), ("no rule", "rim")),
                                       ("diagonal", "diagonal edge", _tilted_plate(), ("no rule", "corner", "literal"))):
         frame = seen_by(bench, _before_a_wall(plate))
-        settings = {rule: MultiresSettings(clamp="distance", clamp_value=0.1, **one) for rule, one in rules.items()}
+        settings = {rule: of(MultiresSettings, clamp="distance", clamp_value=0.1, **one)
+                    for rule, one in rules.items()}
         made = {rule: multires(frame, one) for rule, one in settings.items()}
         full, near = full_sum(frame, settings["no rule"]), _near_the_edge(frame)
         gallery = Gallery(frame, full, shown)
@@ -165,7 +168,7 @@ def edges(bench: Workbench, scene: str, rules: dict[str, dict[str, Any]], second
         for key, (said, light) in titled.items():
             gallery.indirect(key, said, "interpolated", light)
         gallery.indirect(f"{name}_blocks", f"{title}, no rule", "not interpolated",
-                         multires(frame, dataclasses.replace(settings["no rule"], upsampling="nearest")))
+                         multires(frame, replaced(settings["no rule"], {"upsampling": "nearest"})))
         gallery.errors(titled, full)
         rows += [(f"{title}, {rule}", count_of(frame, one), errors_of(made[rule], full, gallery.covered).rmse,
                   errors_of(made[rule], full, gallery.covered & near).rmse) for rule, one in settings.items()]

@@ -24,6 +24,7 @@ from benchmarks.papers.records import Bar, Figure, Picture, Plot, Ratios, Table
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved, seen_by
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.scene import Scene
+from refgi.settings import replaced
 from refgi.splat.multires import MultiresSettings, multires
 
 STEP, MOVES = 0.01, 5  # m that the light moves between two frames; how often
@@ -34,7 +35,7 @@ def by_threshold(bench: Workbench, scene: str, thresholds: tuple[float, ...], re
     """Figure 10: frame rate over the normal threshold, by indirect resolution; to `flat` the paper sees no effect."""
     frame, base = frame_of(bench, scene, LARGE), settings_of(bench, scene)
     covered, full = frame.gbuffer.covered, full_sum(frame, base)
-    settings = {(side, t): dataclasses.replace(base, finest=level, normal_threshold=t)
+    settings = {(side, t): replaced(base, {"finest": level, "normal_threshold": t})
                 for side, level in levels_of(frame, resolutions).items() for t in thresholds}
     work: dict[Any, Any] = {key: partial(multires, frame, one) for key, one in settings.items()}
     seconds = interleaved(work | {"rest": without_indirect(bench, scene_of(bench, scene))}, bench.scale.repeats)
@@ -81,7 +82,7 @@ def by_threshold(bench: Workbench, scene: str, thresholds: tuple[float, ...], re
 def by_lights(bench: Workbench, scene: str, counts: tuple[int, ...], resolutions: tuple[int, ...]) -> Figure:
     """Figure 14 and Section 5.1: frame rate over the number of lights (n x n), and flicker when they move."""
     frame, base = frame_of(bench, scene, LARGE), settings_of(bench, scene)
-    settings = {(side, n): dataclasses.replace(base, lights=n * n, finest=level)
+    settings = {(side, n): replaced(base, {"lights": n * n, "finest": level})
                 for side, level in levels_of(frame, resolutions).items() for n in counts}
     work: dict[Any, Any] = {key: partial(multires, frame, one) for key, one in settings.items()}
     seconds = interleaved(work | {"rest": without_indirect(bench, scene_of(bench, scene))}, bench.scale.repeats)
@@ -89,7 +90,7 @@ def by_lights(bench: Workbench, scene: str, counts: tuple[int, ...], resolutions
     subsplats = {side: count_of(frame, settings[side, counts[0]]) for side in sides}
     lights = [n * n for n in counts]
     curves = [Curve(f"{side}²", lights, [1 / (seconds["rest"] + seconds[side, n]) for n in counts]) for side in sides]
-    flicker = _flicker(bench, scene_of(bench, scene), [dataclasses.replace(base, lights=n) for n in lights])
+    flicker = _flicker(bench, scene_of(bench, scene), [replaced(base, {"lights": n}) for n in lights])
     pairs = [float(subsplats[side] * n) for side in sides for n in lights]
     taken = [1e3 * seconds[side, n] for side in sides for n in counts]
     slope, fixed = np.polyfit(pairs, taken, 1)
@@ -143,7 +144,7 @@ def by_scene(bench: Workbench, titles: dict[str, str], parts: tuple[int, ...],
              fps: dict[int, tuple[int, ...]]) -> Figure:
     """Table 2: frame rates of several scenes at parts of the picture's side; in the paper by cells along a side."""
     frames, side = {name: frame_of(bench, name, LARGE) for name in titles}, LARGE * bench.scale.size
-    settings = {(name, side // n): dataclasses.replace(settings_of(bench, name), finest=level)
+    settings = {(name, side // n): settings_of(bench, name, finest=level)
                 for name, frame in frames.items()
                 for n, level in levels_of(frame, tuple(side // part for part in parts)).items()}
     seconds = interleaved({key: drawing(bench, scene_of(bench, key[0]), one) for key, one in settings.items()},
@@ -197,6 +198,6 @@ def by_scene(bench: Workbench, titles: dict[str, str], parts: tuple[int, ...],
 def _errors_with_and_without_clamp(bench: Workbench, name: str, settings: MultiresSettings) -> list[float]:
     frame, off = frame_of(bench, name, LARGE), []
     for one in (settings, unclamped(settings)):
-        full = bench.once(("full sum", name, one.clamp), partial(full_sum, frame, one))
+        full = bench.once(("full sum", name, one.pairs.clamp), partial(full_sum, frame, one))
         off.append(errors_of(multires(frame, one), full, frame.gbuffer.covered).rmse)
     return off

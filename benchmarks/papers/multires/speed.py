@@ -1,6 +1,5 @@
 """Speed at like error: ways to find discontinuities along a fly-through (Figure 9), error over speed-up."""
 
-import dataclasses
 import statistics
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -14,6 +13,7 @@ from benchmarks.papers.multires.subjects import (
     drawing,
     frame_of,
     full_sum,
+    least_distance,
     scene_of,
     settings_of,
     share_of_pixels,
@@ -26,7 +26,8 @@ from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import Scene
-from refgi.splat.multires import MultiresSettings, multires
+from refgi.settings import flat, replaced
+from refgi.splat.multires import ByError, MultiresSettings, multires
 from refgi.splat.multires.error_target.error_driven import error_driven
 
 # eye and target on the way, m: towards the body, close past it, over it and back
@@ -37,6 +38,7 @@ WAY = np.array([
 ])
 STEPS = {"derivative_threshold": (0.4, 0.2, 0.1, 0.05, 0.025, 0.0125),
          "curvature_threshold": (1.2, 0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.00625)}
+FORMS = {"depth": "range", "derivative": "slope", "normal": "range", "curvature": "chord"}
 THRESHOLDS, FINE = (0.05, 0.1, 0.25, 0.5, 1.0, 1.4), 0.1  # normal thresholds, alone and beside fewer cells
 DIAGONALS = ("off", "corner", "literal", "full8")
 COARSEST = (16, 32, 64, 128, 256)  # cells along a side that no refinement is needed for
@@ -93,7 +95,7 @@ def flight(bench: Workbench, scene: str, ways: Iterable[tuple[str, str]], variat
                 f"{name} {taken / first:.2f}" for name, taken in zip(list(flights)[1:], others, strict=True)) + ". The "
             "paper finds the derivative slightly slower at like quality and curvature slower by more, for gradual "
             "bends need a very low threshold. Curvature came to "
-            f"{flights['depth, curvature'].settings.curvature_threshold:g} here: this body's scales bend from pixel to "
+            f"{flights['depth, curvature'].thresholds[1]:g} here: this body's scales bend from pixel to "
             "pixel, which neighbouring normals see well.",
             "Thresholds were halved until the RMSE over three views was no larger than that of depth and normals; the "
             f"largest left is {flights[worst].rmse:.2f} % ({worst}) against {base.rmse:.2f} %. The paper's were set by "
@@ -120,10 +122,12 @@ def _flights(bench: Workbench, scene: str, views: list[Scene], ways: Iterable[tu
 
     flights, allowed = {}, rmse(base)
     for criteria in ways:
-        settings, keys = dataclasses.replace(base, criteria=frozenset(criteria)), [f"{c}_threshold" for c in criteria]
+        chosen = {f"subsplats.criteria.{name}": form if name in criteria else None for name, form in FORMS.items()}
+        settings, keys = replaced(base, chosen), [f"{c}_threshold" for c in criteria]
         for key in (key for key in keys if key in STEPS):
             settings = _coarsest(settings, key, rmse, allowed)
-        thresholds = tuple(getattr(settings, key) for key in keys)
+        values = flat(settings)
+        thresholds = tuple(values[f"subsplats.criteria.{name}.threshold"] for name in criteria)
         flights[", ".join(criteria)] = Flight(thresholds, settings, rmse(settings), [], [])
     for view in views:
         frame = seen_by(bench, view, LARGE)
@@ -137,8 +141,7 @@ def _flights(bench: Workbench, scene: str, views: list[Scene], ways: Iterable[tu
 def _coarsest(settings: MultiresSettings, key: str, rmse: Callable[[MultiresSettings], float],
               allowed: float) -> MultiresSettings:
     for threshold in STEPS[key]:
-        changed: Any = {key: threshold}
-        settings = dataclasses.replace(settings, **changed)
+        settings = replaced(settings, {key: threshold})
         if rmse(settings) <= allowed:
             break
     return settings
@@ -163,7 +166,7 @@ def error_over_speed(bench: Workbench, scenes: tuple[str, ...]) -> Figure:
     shown: list[Picture] = []
     for scene in scenes:
         gallery, settings = Gallery(frame_of(bench, scene), shown=shown), settings_of(bench, scene)
-        gallery.camera(scene, scene, f"clamped at {settings.clamp_value:.3g} m", multires(gallery.frame, settings),
+        gallery.camera(scene, scene, f"clamped at {least_distance(settings):.3g} m", multires(gallery.frame, settings),
                        settings)
     for (scene, clamped), (points, seconds) in cases.items():
         title = f"{scene}, {'clamped' if clamped else 'no clamp'}"
@@ -195,9 +198,11 @@ def _measured(bench: Workbench, scene: str, clamped: bool) -> tuple[list[Point],
 
 def _light_and_savings(frame: Frame, settings: MultiresSettings) -> tuple[Array, float]:
     """Return irradiance, and all pairs over those that it took."""
-    if settings.target_error is None:
+    subsplats, pairs = settings.subsplats, settings.effective_pairs
+    if not isinstance(subsplats, ByError):
         return multires(frame, settings), 1 / share_of_pixels(subsplats_of(frame, settings), frame.gbuffer.covered)
-    driven = error_driven(frame.gbuffer, choose_lights(frame, settings), settings, footprints(frame, settings))
+    lights, footprint = choose_lights(frame, settings.lights), footprints(frame, settings.lights, pairs)
+    driven = error_driven(frame.gbuffer, lights, subsplats, pairs, footprint, settings.lights.seed)
     return driven.irradiance, driven.full_pairs / max(1, driven.pairs)
 
 
@@ -212,7 +217,9 @@ def _plots(title: str, points: list[Point]) -> list[Plot]:
 
 
 def _points(base: MultiresSettings) -> list[Point]:
-    replace: Any = partial(dataclasses.replace, base)
+    def replace(**values: Any) -> MultiresSettings:
+        return replaced(base, values)
+
     thresholds, levels, diagonals, cells, driven = FAMILIES
     return [
         *(Point(thresholds, f"normal threshold {t:g}", replace(normal_threshold=t)) for t in THRESHOLDS),
@@ -220,7 +227,7 @@ def _points(base: MultiresSettings) -> list[Point]:
         *(Point(diagonals, f"diagonal rule {name}", replace(diagonal=name)) for name in DIAGONALS),
         *(Point(cells, f"from {n}² cells, normal threshold {FINE:g}", replace(coarsest=n, normal_threshold=FINE))
           for n in COARSEST),
-        *(Point(driven, f"target error {100 * t:g} %", replace(target_error=t)) for t in TARGETS)]
+        *(Point(driven, f"target error {100 * t:g} %", replace(subsplats=ByError(t))) for t in TARGETS)]
 
 
 def _notes_of_points(cases: dict[tuple[str, bool], list[Point]]) -> tuple[str, ...]:
@@ -234,7 +241,8 @@ def _notes_of_points(cases: dict[tuple[str, bool], list[Point]]) -> tuple[str, .
                        f"every pixel ({best.said})"))
         gains.append(f"{1 - points[0].rmse / points[1].rmse:.0%} less ({scene}{'' if clamped else ', no clamp'})")
     driven = [p for points in cases.values() for p in points if p.family == FAMILIES[-1]]
-    kept = sum(p.rmse <= 100 * (p.settings.target_error or np.inf) for p in driven)
+    kept = sum(isinstance(p.settings.subsplats, ByError) and p.rmse <= 100 * p.settings.subsplats.target
+               for p in driven)
     return (
         "; ".join(said) + ".",
         f"Error-driven refinement keeps its target in {kept} of {len(driven)} runs. Its time and pairs take in what "

@@ -23,13 +23,15 @@ from benchmarks.papers.workbench import Subjects, Workbench, seen_by, whole_fram
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import Receivers, irradiance
+from refgi.pairs.settings import DistanceClamp
 from refgi.scene import Scene, load_scene
 from refgi.scene.builtin.cornell import CAMERA, shell
 from refgi.scene.builtin.stage import GLAZE, VASE, walls
 from refgi.scene.builtin.surfaces import lathe, patch, sphere
 from refgi.scene.model import Camera, Material, Mesh, SpotLight, merge
 from refgi.scene.repair import mean_face_normals
-from refgi.splat.multires import MultiresSettings, multires, shared_subsplats
+from refgi.settings import of, replaced
+from refgi.splat.multires import ByGeometry, ByIrradiance, MultiresSettings, multires, shared_subsplats
 from refgi.splat.multires.refinement.grid import Subsplats
 
 TEAPOT, BUDDHA, DRAGON, BUNNIES = "simple", "carved", "serpent", "flock"
@@ -120,12 +122,20 @@ scene_of, frame_of = _SUBJECTS.scene_of, _SUBJECTS.frame_of
 def settings_of(bench: Workbench, scene: str, **changes: Any) -> MultiresSettings:
     """Return the paper's settings, but for `changes`, with a distance clamp that suits a scene's size."""
     clamp: dict[str, Any] = {"clamp": "distance", "clamp_value": CLAMP * scene_of(bench, scene).geometry.diagonal}
-    return MultiresSettings(**(clamp | changes))
+    return of(MultiresSettings, **(clamp | changes))
 
 
 def unclamped(settings: MultiresSettings) -> MultiresSettings:
     """Return settings without a clamp."""
-    return dataclasses.replace(settings, clamp="none", clamp_value=0.0)
+    return replaced(settings, {"clamp": None})
+
+
+def least_distance(settings: MultiresSettings) -> float:
+    """Return the least distance of the clamp, m."""
+    clamp = settings.pairs.clamp
+    assert isinstance(clamp, DistanceClamp)
+    assert clamp.value is not None
+    return clamp.value
 
 
 def drawing(bench: Workbench, scene: Scene, settings: MultiresSettings) -> Callable[[], Array]:
@@ -144,8 +154,11 @@ def without_indirect(bench: Workbench, scene: Scene) -> Callable[[], Array]:
 
 
 def subsplats_of(frame: Frame, settings: MultiresSettings) -> Subsplats:
-    """Return the subsplats that all lights share: the leaves."""
-    return shared_subsplats(frame.gbuffer, settings)
+    """Return the subsplats that all lights share, or start from: the leaves."""
+    chosen = settings.subsplats
+    shared = chosen.start if isinstance(chosen, ByIrradiance) else chosen
+    assert isinstance(shared, ByGeometry)
+    return shared_subsplats(frame.gbuffer, shared)
 
 
 def count_of(frame: Frame, settings: MultiresSettings) -> int:
@@ -156,12 +169,14 @@ def count_of(frame: Frame, settings: MultiresSettings) -> int:
 def full_sum(frame: Frame, settings: MultiresSettings) -> Array:
     """Return the same lights summed at every pixel: what subsplats converge to."""
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
-    return irradiance(receivers, choose_lights(frame, settings), settings, footprints(frame, settings))
+    pairs = settings.effective_pairs
+    footprint = footprints(frame, settings.lights, pairs)
+    return irradiance(receivers, choose_lights(frame, settings.lights), pairs, footprint)
 
 
 def every_texel(frame: Frame, settings: MultiresSettings) -> Array:
     """Return the sum over every texel of the shadow maps: what lights converge to as their number grows."""
-    return full_sum(frame, dataclasses.replace(settings, pattern="all"))
+    return full_sum(frame, replaced(settings, {"pattern": "all"}))
 
 
 def levels_of(frame: Frame, resolutions: tuple[int, ...]) -> dict[int, int]:

@@ -1,6 +1,5 @@
 """What subsplats are: their refinement pass by pass, how they become a picture, lists of each light's own."""
 
-import dataclasses
 import time
 from functools import partial
 from itertools import pairwise
@@ -25,11 +24,12 @@ from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, i
 from refgi.compare.maps import Scale
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
-from refgi.splat.multires import MultiresSettings, multires
+from refgi.settings import flat, replaced
+from refgi.splat.multires import ByGeometry, ByIrradiance, Criteria, MultiresSettings, multires
 from refgi.splat.multires.light_lists.per_light import per_light_counts
 from refgi.splat.multires.refinement.grid import Subsplats, level_picture
 from refgi.splat.multires.settings import Upsampling
-from refgi.splat.multires.subsplats.evaluate import at_subsplats, evaluate
+from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 
 PICTURE_LIGHTS = 256  # of Table 1's pictures
@@ -39,8 +39,8 @@ def passes(bench: Workbench, scene: str) -> Figure:
     """Figure 5: the subsplats that each refinement pass leaves as they are, and all of them together."""
     frame, settings = frame_of(bench, scene), settings_of(bench, scene)
     gallery, subsplats = Gallery(frame, full_sum(frame, settings)), subsplats_of(frame, settings)
-    points, normals = at_subsplats(frame.gbuffer, subsplats, settings.representative)
-    values = evaluate(points, normals, choose_lights(frame, settings), settings)
+    points, normals = representative_points(frame.gbuffer, subsplats)
+    values = evaluate(points, normals, choose_lights(frame, settings.lights), settings.pairs)
     blocks = np.asarray(upsample(values, subsplats, gallery.covered, "nearest"))
     for level in range(subsplats.top, -1, -1):
         _add_level(gallery, subsplats, level, blocks)
@@ -48,12 +48,14 @@ def passes(bench: Workbench, scene: str) -> Figure:
                    Scale(0.0, 1.0, "viridis", "level"))
     gallery.indirect("blocks", "their sum", "one value a subsplat", blocks)
     gallery.indirect("upsampled", "interpolated", "what the method shows", multires(frame, settings), settings)
+    values_by_key = flat(settings)
+    thresholds = {name: values_by_key[f"subsplats.criteria.{name}.threshold"] for name in ("depth", "normal")}
     rows, share = _passes(subsplats), share_of_pixels(subsplats, gallery.covered)
     growth = [row[3] for row in rows if isinstance(row[3], float)]
     said = f"{min(growth):.2f} to {max(growth):.2f}" if growth else "no"
     return Figure(
-        facts=(scene, f"{settings.lights} lights", f"depth threshold {settings.depth_threshold:g}",
-               f"normal threshold {settings.normal_threshold:g}", f"{len(subsplats.pixel)} subsplats",
+        facts=(scene, f"{settings.lights.count} lights", f"depth threshold {thresholds['depth']:g}",
+               f"normal threshold {thresholds['normal']:g}", f"{len(subsplats.pixel)} subsplats",
                f"{share:.1%} of the pixels"),
         pictures=gallery.pictures,
         tables=[Table("Subsplats a pass", ("resolution", "in the list", "of the whole grid", "times as many as before",
@@ -102,8 +104,8 @@ def _filled(subsplats: Subsplats, level: int) -> int:
 def upsampling(bench: Workbench, scene: str, ways: dict[str, str]) -> Figure:
     """Figure 7: a picture from subsplats by nearest neighbour and by naive bilinear interpolation, against the tent."""
     frame, base = frame_of(bench, scene), settings_of(bench, scene)
-    settings = {way: dataclasses.replace(base, upsampling=way) for way in get_args(Upsampling)}
-    settings["filter_all"] = dataclasses.replace(base, as_published=frozenset({"ams_filter_all"}))
+    settings = {way: replaced(base, {"upsampling": way}) for way in get_args(Upsampling)}
+    settings["filter_all"] = replaced(base, {"as_published": "ams_filter_all"})
     full, bare = full_sum(frame, settings["tent"]), full_sum(frame, unclamped(settings["tent"]))
     gallery, seconds = Gallery(frame, full), _upsampling_seconds(bench, scene)
     made = {way: multires(frame, one) for way, one in settings.items()}
@@ -116,7 +118,7 @@ def upsampling(bench: Workbench, scene: str, ways: dict[str, str]) -> Figure:
     gallery.errors({way: (title, made[way]) for way, title in ways.items()}, full)
     best = min(off, key=lambda way: off[way].rmse)
     return Figure(
-        facts=(scene, f"{settings['tent'].lights} lights", "errors against the same lights at every pixel"),
+        facts=(scene, f"{settings['tent'].lights.count} lights", "errors against the same lights at every pixel"),
         pictures=gallery.pictures,
         tables=[Table("Time at twice the size, and errors in % of the mean irradiance", (
             "upsampling", "ms", "RMSE", "MAE", "energy lost", "RMSE, no clamp", "MAE, no clamp"), rows)],
@@ -134,7 +136,8 @@ def upsampling(bench: Workbench, scene: str, ways: dict[str, str]) -> Figure:
 def _upsampling_seconds(bench: Workbench, scene: str) -> dict[str, float]:
     frame, settings = frame_of(bench, scene, LARGE), settings_of(bench, scene)
     subsplats, covered = subsplats_of(frame, settings), frame.gbuffer.covered
-    values = evaluate(*at_subsplats(frame.gbuffer, subsplats), choose_lights(frame, settings), settings)
+    points, normals = representative_points(frame.gbuffer, subsplats)
+    values = evaluate(points, normals, choose_lights(frame, settings.lights), settings.pairs)
     work: dict[str, Any] = {way: partial(upsample, values, subsplats, covered, way) for way in get_args(Upsampling)}
     work["filter_all"] = partial(upsample, values, subsplats, covered, "tent", filter_all=True)
     return interleaved(work, bench.scale.repeats)
@@ -197,33 +200,37 @@ def _counted(bench: Workbench, scene: str, threshold: float, resolutions: tuple[
              sides: tuple[int, ...]) -> dict[tuple[int, int], Entry]:
     """Count each entry of the table once."""
     frame = frame_of(bench, scene, LARGE)
-    base = settings_of(bench, scene, per_light="light", light_threshold=threshold)
+    base = settings_of(bench, scene, subsplats=ByIrradiance(threshold=threshold))
     found: dict[tuple[int, int], Entry] = {}
     for n in (n for n in sides if n <= frame.rsm_resolution):
-        settings = dataclasses.replace(base, lights=n * n)
-        lights = choose_lights(frame, settings)
+        settings = replaced(base, {"lights": n * n})
+        lights = choose_lights(frame, settings.lights)
         for side, level in levels_of(frame, resolutions).items():
-            one = dataclasses.replace(settings, finest=level)
+            one = ByIrradiance(finest=level, threshold=threshold)
             if not found:
-                per_light_counts(frame.gbuffer, lights, one, None, None)  # compiles
+                per_light_counts(frame.gbuffer, lights, one, settings.pairs)  # compiles
             started = time.perf_counter()
-            subsplats = int(per_light_counts(frame.gbuffer, lights, one, None, None).sum())
+            subsplats = int(per_light_counts(frame.gbuffer, lights, one, settings.pairs).sum())
             found[side, n] = Entry(subsplats, lights.position.shape[1], time.perf_counter() - started)
     return found
 
 
 def _pictures(bench: Workbench, scene: str, threshold: float) -> tuple[list[Picture], dict[str, tuple[int, Errors]]]:
     frame = frame_of(bench, scene)
-    ways = {"shared": ("shared", "one list for all"), "light": ("light", "a list for each light"),
-            "shared_then_light": ("then_light", "shared list, then each light")}
-    settings = {way: settings_of(bench, scene, lights=PICTURE_LIGHTS, per_light=way, light_threshold=threshold,
-                                 finest=max(0, (bench.scale.size // 256).bit_length() - 1)) for way in ways}
+    finest = max(0, (bench.scale.size // 256).bit_length() - 1)
+    ways: dict[str, tuple[str, Any]] = {
+        "shared": ("one list for all", ByGeometry(finest=finest)),
+        "light": ("a list for each light", ByIrradiance(finest=finest, threshold=threshold)),
+        "then_light": ("shared list, then each light",
+                       ByIrradiance(finest=finest, threshold=threshold, criteria=Criteria()))}
+    settings = {name: settings_of(bench, scene, lights=PICTURE_LIGHTS, subsplats=subsplats)
+                for name, (_, subsplats) in ways.items()}
     full = full_sum(frame, settings["shared"])
     gallery, off = Gallery(frame, full), {}
-    for way, (name, title) in ways.items():
-        light = multires(frame, settings[way])
-        off[title] = count, error = _pairs(frame, settings[way]), errors_of(light, full, gallery.covered)
-        gallery.indirect(name, title, f"{count} subsplats, RMSE {error.rmse:.1f} %", light, settings[way])
+    for name, (title, _) in ways.items():
+        light = multires(frame, settings[name])
+        off[title] = count, error = _pairs(frame, settings[name]), errors_of(light, full, gallery.covered)
+        gallery.indirect(name, title, f"{count} subsplats, RMSE {error.rmse:.1f} %", light, settings[name])
     gallery.indirect("full", "every pixel", "the same lights", full)
     gallery.camera("seen", "with direct light", "as the paper's Figure 6", full)
     return gallery.pictures, off
@@ -231,8 +238,8 @@ def _pictures(bench: Workbench, scene: str, threshold: float) -> tuple[list[Pict
 
 def _pairs(frame: Frame, settings: MultiresSettings) -> int:
     """Return how many subsplats the lists of all lights hold."""
-    lights = choose_lights(frame, settings)
-    if settings.per_light == "shared":
+    lights, subsplats = choose_lights(frame, settings.lights), settings.subsplats
+    if not isinstance(subsplats, ByIrradiance):
         return count_of(frame, settings) * int(lights.position.shape[1])
-    start = subsplats_of(frame, settings) if settings.per_light == "shared_then_light" else None
-    return int(per_light_counts(frame.gbuffer, lights, settings, None, start).sum())
+    start = None if subsplats.criteria is None else subsplats_of(frame, settings)
+    return int(per_light_counts(frame.gbuffer, lights, subsplats, settings.pairs, None, start).sum())

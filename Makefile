@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # a file's tests run in one process, so that few kernels are compiled twice
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: demo test test-all check evidence bench docs clean
+.PHONY: demo test quick test-all check evidence bench docs clean
 
 demo: $(VENV)/run.stamp
 	$(BIN)/refgi compare cornell_box --out out/
@@ -13,6 +13,9 @@ demo: $(VENV)/run.stamp
 
 test: $(VENV)/dev.stamp
 	$(PYTEST)
+
+quick: $(VENV)/dev.stamp
+	$(PYTEST) -m quick
 
 test-all: $(VENV)/dev.stamp
 	$(PYTEST) --all

@@ -62,12 +62,12 @@ def _left_out(shape: Geometry, areas: AreaLights, repeats: int) -> Iterator[Row]
     def draw(settings: ValSettings) -> None:
         moved = areas._replace(center=areas.center + 1e-9 * next(frames))  # new maps of the same triangles
         with observe(memory=memory):
-            shadow_maps(shape, moved, settings, np.float32)
+            shadow_maps(shape, moved, settings.maps, np.float32)
 
     for rule in ("keep", "planes", "ball"):
         for alone in (False, True):
             settings = of(ValSettings, near_geometry=rule, occluders_alone=alone)
-            maps = shadow_maps(shape, areas, settings, np.float32)
+            maps = shadow_maps(shape, areas, settings.maps, np.float32)
             note = f"{len(maps.depth)} maps, {maps.left_out / MAPS:.0f} triangles a map left out"
             taken = seconds(lambda: draw(settings), repeats)  # noqa: B023
             yield Row(f"near_geometry {rule}, occluders alone {alone}", 1e3 * taken, "ms", "", note)

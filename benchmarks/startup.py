@@ -1,38 +1,85 @@
-"""From the shell: help, cold start with an empty kernel cache, second start."""
+"""From the shell: help, the first picture with an empty kernel cache, the second start, and what an edit recompiles.
+
+Cold starts are timed in turn with those of an earlier commit, on the same machine; so is the demo, unless --quick.
+"""
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 from benchmarks.harness import Row
 
-REFGI = [sys.executable, "-m", "refgi"]
-RENDER = [*REFGI, "render", "cornell_box", "--method", "sii", "--size", "512x512", "--out"]
+ROOT = Path(__file__).parents[1]
+EARLIER = "d69759e"  # before kernels were compiled as parts of their callers
+PICTURE = ["render", "cornell_box", "--method", "sii", "--size", "512x512", "--out"]
+DEMO = ["compare", "cornell_box", "--out"]
 
 
 def rows(quick: bool) -> Iterator[Row]:
     runs = 3 if quick else 5
-    yield Row("refgi --help", _median(runs, [*REFGI, "--help"]), "s", "<= 0.3")
-    numba = _median(runs, [sys.executable, "-c", "import numba"])
+    yield Row("refgi --help", _median(runs, lambda: _seconds(ROOT, ["--help"])), "s", "<= 0.3")
+    numba = _median(runs, lambda: _timed([sys.executable, "-c", "import numba"], None))
     yield Row("bare import of numba", numba, "s")
     with tempfile.TemporaryDirectory() as folder:
-        environment = os.environ | {"REFGI_CACHE_DIR": f"{folder}/cache"}
-        render = [*RENDER, f"{folder}/picture.exr"]
-        yield Row("cold start to first picture", _seconds(render, environment), "s", "<= 40",
-                  "cornell_box, 512x512, sii, empty cache")
-        second = sorted(_seconds(render, environment) for _ in range(runs))[runs // 2]
+        second = _median(runs, lambda: _seconds(ROOT, [*PICTURE, f"{folder}/a.exr", "--force"], f"{folder}/cache"))
         yield Row("second start", second, "s")
         yield Row("second start above import of numba", second - numba, "s", "<= 1.5")
+        yield Row("kernels compiled after an edit of scene/material.py", _compiled_after_edit(folder), "kernels",
+                  "<= 0")
+        yield from _beside(folder, "first picture, empty cache", PICTURE, "picture.exr", 0.3)
+        if not quick:
+            yield from _beside(folder, "demo, empty cache", DEMO, "demo", 0.25)
 
 
-def _median(runs: int, command: list[str]) -> float:
-    return sorted(_seconds(command) for _ in range(runs))[runs // 2]
+def _compiled_after_edit(folder: str) -> int:
+    """Return how many kernels a copy of the sources compiles when its materials are another file."""
+    copy = Path(folder) / "copy"
+    shutil.copytree(ROOT / "refgi", copy / "refgi", ignore=shutil.ignore_patterns("__pycache__"))
+    material = copy / "refgi" / "scene" / "material.py"
+    material.write_text(material.read_text() + "\n\nEDITED = True\n")
+    before = len(list(Path(f"{folder}/cache").iterdir()))
+    _seconds(copy, [*PICTURE, f"{folder}/edited.exr"], f"{folder}/cache")
+    return len(list(Path(f"{folder}/cache").iterdir())) - before
 
 
-def _seconds(command: list[str], environment: dict[str, str] | None = None) -> float:
+def _beside(folder: str, name: str, arguments: list[str], out: str, aim: float) -> Iterator[Row]:
+    """Time a command with an empty cache, and that of the earlier commit, in turn."""
+    now = _seconds(ROOT, [*arguments, f"{folder}/now_{out}"], f"{folder}/cold_{out}")
+    yield Row(name, now, "s")
+    if (earlier := _checkout(folder)) is None:
+        return
+    then = _seconds(earlier, [*arguments, f"{folder}/then_{out}"], f"{folder}/earlier_{out}")
+    yield Row(f"{name}, over that of {EARLIER}", now / then, "", f"<= {aim}", f"{then:.1f} s there")
+
+
+def _checkout(folder: str) -> Path | None:
+    """Return the sources of the earlier commit, or None where there is no history."""
+    place = Path(folder) / "earlier"
+    if not place.is_dir():
+        place.mkdir()
+        archive = subprocess.run(["git", "-C", str(ROOT), "archive", EARLIER, "refgi"], capture_output=True,
+                                 check=False)
+        if archive.returncode:
+            return None
+        subprocess.run(["tar", "-x", "-C", str(place)], input=archive.stdout, check=True)
+    return place if (place / "refgi").is_dir() else None
+
+
+def _seconds(sources: Path, arguments: list[str], cache: str = "") -> float:
+    environment = os.environ | {"PYTHONPATH": str(sources)} | ({"REFGI_CACHE_DIR": cache} if cache else {})
+    return _timed([sys.executable, "-m", "refgi", *arguments], environment, sources)
+
+
+def _timed(command: list[str], environment: dict[str, str] | None, folder: Path | None = None) -> float:
     started = time.perf_counter()
-    subprocess.run(command, check=True, capture_output=True, env=environment)
+    subprocess.run(command, check=True, capture_output=True, env=environment, cwd=folder)
     return time.perf_counter() - started
+
+
+def _median(runs: int, measure: Callable[[], float]) -> float:
+    return sorted(measure() for _ in range(runs))[runs // 2]

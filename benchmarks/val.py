@@ -28,7 +28,7 @@ PAPER = {"cornell_horse": 19.7, "sponza": 13.4}  # frames a second, Table 1
 PARTS = {  # stages of each line of Table 2, and the paper's ms on cornell_horse
     "deferred rendering": (("rsm.gbuffer", "rsm.resolve", "rsm.shadow_map_visibility", "rsm.direct_irradiance",
                             "frame.compose"), 0.4),
-    "VPL generation": (("rsm.reflective_shadow_map", "rsm.pixel_lights"), 0.1),
+    "VPL generation": (("rsm.reflective_shadow_map", "lights.choose"), 0.1),
     "clustering": (("cluster.kmeans", "cluster.area_lights"), 0.5),
     "depth maps": (("cluster.shadow_maps",), 4.2),
     "indirect light": (("cluster.irradiance",), 35.0),
@@ -59,7 +59,8 @@ def _frames(name: str, size: int, repeats: int, paper: float) -> Iterator[Row]:
 
     for label, aim, settings in (
             ("8 x 8 interleaved and blurred", f"> {paper}", of(ValSettings, interleaving=8)),
-            ("the same, lights dealt out by cluster", f"> {paper}", of(ValSettings, interleaving=8, dealing="cluster")),
+            ("the same, lights assigned by cluster", f"> {paper}",
+             of(ValSettings, interleaving=8, assignment="cluster")),
             ("every light at every pixel", "", of(ValSettings, interleaving=1))):
         def draw(how: ValSettings = settings) -> None:
             frame(how)
@@ -93,7 +94,8 @@ def _errors(name: str, size: int) -> Iterator[Row]:
     yield Row(f"{name}: no visibility", *_relative(unshadowed, truth, frame), "")
     for label, settings in (("every light", of(ValSettings, interleaving=1)),
                             ("8 x 8", of(ValSettings, interleaving=8)),
-                            ("exact step", of(ValSettings, interleaving=1, visibility="step"))):
+                            ("PCF", of(ValSettings, interleaving=1, visibility="pcf")),
+                            ("PCSS", of(ValSettings, interleaving=1, visibility="pcss"))):
         yield Row(f"{name}: 30 area lights, {label}", *_relative(val(frame, settings), truth, frame), "")
 
 

@@ -207,6 +207,18 @@ def _dtype(requested: npt.DTypeLike) -> np.dtype[Any]:
 
 @stage("rays.build")
 def _tracer(geometry: Any) -> "Tracer":
+    """Build Embree's acceleration structure.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+
+    Returns
+    -------
+    Tracer
+        Traces closest hits and occlusion.
+    """
     from refgi.rays import Tracer
 
     return Tracer(geometry)

@@ -2,15 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
 from refgi.errors import InputError
 from refgi.settings import Settings
-
-if TYPE_CHECKING:
-    from refgi.frame import Frame
 
 Array = npt.NDArray[Any]
 
@@ -23,11 +20,11 @@ class Method(NamedTuple):
 
     name: str  # short, as on the command line
     summary: str  # one line
-    function: Callable[["Frame", Any], Array]  # frame and settings to (3, h, w) indirect irradiance, W/m^2
+    function: Callable[[Any, Any], Array]  # frame and settings to (3, h, w) indirect irradiance, W/m^2
     settings: type[Settings]
     visibility: bool  # whether it knows what blocks indirect light
-    ledger: Callable[["Frame", Any], Any] | None = None  # accounts for the power of the lights
-    estimate: Callable[["Frame", Any], Any] | None = None  # gives the picture with its own error
+    ledger: Callable[[Any, Any], Any] | None = None  # accounts for the power of the lights
+    estimate: Callable[[Any, Any], Any] | None = None  # gives the picture with its own error
     memory: Callable[[Any, tuple[int, int], int], int] | None = None  # bytes that settings add to a picture
     presets: Mapping[str, Settings] = NONE  # named settings beside the default; "paper": the values printed
 
@@ -40,7 +37,7 @@ class Method(NamedTuple):
                              f"got {name!r}", key="preset")
         return self.presets[name]
 
-    def compute(self, frame: "Frame", settings: Any) -> tuple[Array, Any]:
+    def compute(self, frame: Any, settings: Any) -> tuple[Array, Any]:
         """Return the indirect irradiance in the frame's dtype, and the estimate it is the mean of, if it is one."""
         if self.estimate is None:
             return self.function(frame, settings), None

@@ -7,6 +7,7 @@ through `skip`, what was left out and why. Nothing else in refgi times, caches o
 
 import dataclasses
 import functools
+import inspect
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
@@ -20,6 +21,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 Status = Literal["ran", "reused", "skipped"]
 
+STAGES: dict[str, Callable[..., Any]] = {}  # every stage that is imported, by name
 KEPT_RESULTS = 8  # per stage: one per light of a scene with several, without hoarding buffers
 SMALL_ARRAY = 4096  # elements up to which two distinct arrays are compared by value
 
@@ -33,7 +35,7 @@ class Run:
     seconds: float = 0.0  # including the stages called inside
     depth: int = 0  # how many stages enclose it
     reason: str = ""
-    inputs: Mapping[str, Any] | None = None  # kept only when recording
+    inputs: Mapping[str, Any] | None = None  # by parameter, defaults among them; kept only when recording
     output: Any = None
 
 
@@ -86,7 +88,7 @@ def stage(name: str, *, kept: bool = True) -> Callable[[Callable[P, R]], Callabl
     Parameters
     ----------
     name : str
-        The step's name in logs and test vectors, such as ``"splat.irradiance"``.
+        The step's name in logs and test vectors, package.verb_or_noun and no other stage's, such as ``"pairs.sum"``.
     kept : bool
         Whether a `Memory` keeps its results; not worth it where the inputs are made anew in every call.
 
@@ -105,6 +107,10 @@ def stage(name: str, *, kept: bool = True) -> Callable[[Callable[P, R]], Callabl
             return _observed(log, name, function, args, kwargs, log.memory if kept else None)
 
         call.stage_name = name  # type: ignore[attr-defined]
+        known = STAGES.setdefault(name, call)
+        if (known.__module__, known.__qualname__) != (function.__module__, function.__qualname__):
+            raise ValueError(f"stage {name!r}: {function.__qualname__} of {function.__module__} has the name of "
+                             f"{known.__qualname__} of {known.__module__}")
         return call
 
     return decorate
@@ -189,12 +195,33 @@ def _observed(
         log._open.pop()
     if log.progress is not None:
         log.progress(name, 1.0)
-    named = {str(k): v for k, v in (*enumerate(args), *kwargs.items())} if log.record else None
-    run = Run(name, "ran", seconds, log._depth, inputs=named, output=output if log.record else None)
+    run = Run(name, "ran", seconds, log._depth)
+    if log.record:
+        run = dataclasses.replace(run, inputs=_inputs(function, args, kwargs), output=_recorded(output))
     log.runs.insert(position, run)
     if memory is not None:
         memory.keep(name, inputs, output)
     return output
+
+
+def _inputs(function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
+    """Return what a stage was called with, by parameter."""
+    bound = inspect.signature(function).bind(*args, **kwargs)
+    bound.apply_defaults()
+    return {name: _recorded(value) for name, value in bound.arguments.items()}
+
+
+def _recorded(value: Any) -> Any:
+    """Return a value as a log keeps it: what computes its arrays on first use gives them all, unobserved."""
+    if type(value) in (tuple, list):
+        return type(value)(map(_recorded, value))
+    if not hasattr(value, "recorded"):
+        return value
+    token = _log.set(None)
+    try:
+        return value.recorded()
+    finally:
+        _log.reset(token)
 
 
 def _same(a: Any, b: Any) -> bool:

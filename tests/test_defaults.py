@@ -23,7 +23,7 @@ BOX = load_scene("cornell_box")
 KINDS = (BOX.lights[0], PointLight((0.3, 0.4, 0.3), (0.1, 0.1, 0.1)),
          DirectionalLight((0.3, -0.2, 0.9), (1.0, 1.0, 1.0)))
 TINY = {"width": 16, "height": 14, "rsm_resolution": 16}
-FEW = {"truth": TruthSettings(samples=16), "val": of(ValSettings, map_resolution=16)}  # else at its defaults
+FEW = {"truth": TruthSettings(samples=16), "val": of(ValSettings, maps_resolution=16)}  # else at its defaults
 
 
 def mixed(count):
@@ -52,8 +52,8 @@ RAYS = [
     (of(SiiSettings, openness_flux="scale"), True), (of(SiiSettings, warp="A", importance="openness"), True),
     (of(SiiSettings, warp="A"), False), (GatherSettings(), False), (MultiresSettings(), False),
     (of(MultiresSettings, visibility="rays"), True), (of(MultiresSettings, source="walk"), True),
-    (ValSettings(), False), (of(ValSettings, maps="rays"), True), (of(ValSettings, behind="raytrace"), True),
-    (of(ValSettings, visibility="rectangle"), True), (of(ValSettings, visibility="members"), True),
+    (ValSettings(), False), (of(ValSettings, renderer="rays"), True), (of(ValSettings, behind="raytrace"), True),
+    (of(ValSettings, visibility="rays_rectangle"), True), (of(ValSettings, visibility="rays_vpls"), True),
     (of(ValSettings, source="walk"), True), (of(ValSettings, visibility="back_projection"), False),
     (HssilSettings(), False),
     (of(HssilSettings, visibility="rays"), True), (of(HssilSettings, visibility="bitmask"), False), (object(), False)]

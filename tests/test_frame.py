@@ -87,7 +87,7 @@ def test_frames_of_an_animation_share_what_did_not_change(scene, moves):
     names = {run.name for run in log.runs if run.status == "reused"}
     assert ("rsm.reflective_shadow_map" in names) == ("light" not in moves)
     assert ("rsm.gbuffer" in names) == ("camera" not in moves)
-    assert ("splat.irradiance" in names) == ("frame.compose" in names) == (not moves)
+    assert ("pairs.sum" in names) == ("frame.compose" in names) == (not moves)
 
 
 def test_several_lights_add_up(scene):

@@ -14,9 +14,9 @@ from refgi.truth.vpl import VplSettings
 
 
 @pytest.mark.parametrize(("make", "said"), [
-    (lambda: of(GatherSettings, samples=10**9), "samples: expected a whole number, 1 to 268,435,456, got 1000000000"),
+    (lambda: of(GatherSettings, samples=10**9), "samples: expected a whole number, 1 to 268,435,456, got"),
     (lambda: of(VplSettings, batch=2**31), "batch: expected a whole number, 1 to 1,073,741,824, got 2147483648"),
-    (lambda: of(SiiSettings, cut_share=1e10), "share: expected a number, 0 to 1e+09, got"),
+    (lambda: of(SiiSettings, cut_share=1e10), "share: expected a number, 0 < x <= 1e+09, got"),
     (lambda: DirectionalLight((1e200, 0, 0), (1, 1, 1)), "direction: expected a finite vector, not zero, up to 1e+100"),
     (lambda: Camera((0, 0, 0), (0, 0, 1), (0, 1e200, 0)), "up: expected a finite vector, not zero, up to 1e+100"),
     (lambda: rotation_about((0, 1e200, 0), 1.0), "axis: expected a finite vector, not zero, up to 1e+100"),

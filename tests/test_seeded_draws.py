@@ -163,7 +163,8 @@ def test_samples_of_the_error_target_of_val(seed, monkeypatch):
     lights = choose_pixel_lights(frame.rsms, count=16, pattern="halton")
     monkeypatch.setattr(adaptive, "SAMPLES", 100)
     monkeypatch.setattr(adaptive, "_by_rays", lambda *_: np.zeros((3, 100), np.float32))
-    position = adaptive._samples(frame, lights, of(ValSettings, seed=seed, target_error=0.1)).receivers.position
+    settings = of(ValSettings, seed=seed, clusters="adaptive", target_error=0.1)
+    position = adaptive._samples(frame, lights, settings).receivers.position
     surface = np.flatnonzero(frame.gbuffer.covered)
     drawn = [surface[math.floor((k + draw(seed, 6, k)) * len(surface) / 100)] for k in range(100)]
     np.testing.assert_array_equal(position[:, 0], frame.gbuffer.position.reshape(3, -1)[:, drawn])

@@ -43,8 +43,42 @@ def test_recording_keeps_inputs_and_output():
     values = np.arange(3.0)
     with stages.observe(record=True) as log:
         result = double(values, options=Options())
-    assert log.runs[0].inputs == {"0": values, "options": Options()}
+    assert list(log.runs[0].inputs) == ["values", "options"]
+    assert log.runs[0].inputs["values"] is values
     assert log.runs[0].output is result
+
+
+class Lazy:
+    def __init__(self):
+        self.made = 0
+
+    def recorded(self):
+        self.made += 1
+        return {"values": double(np.ones(2))}
+
+
+@stages.stage("test.lazy")
+def lazy(buffers, count=3):  # noqa: ARG001
+    return buffers[0]
+
+
+def test_recording_resolves_lazy_buffers_without_logging_that():
+    buffer = Lazy()
+    with stages.observe() as log:
+        lazy((buffer,))
+    assert buffer.made == 0
+    with stages.observe(record=True) as log:
+        lazy((buffer,))
+    assert [run.name for run in log.runs] == ["test.lazy"]
+    assert log.runs[0].inputs["count"] == 3
+    assert log.runs[0].inputs["buffers"][0]["values"].tolist() == log.runs[0].output["values"].tolist() == [2, 2]
+
+
+def test_a_name_is_that_of_one_stage():
+    with pytest.raises(ValueError, match=r"stage 'test\.double': .*other of .* has the name of double of"):
+        @stages.stage("test.double")
+        def other(values):
+            return values
 
 
 def test_skip_is_logged_where_it_happens():

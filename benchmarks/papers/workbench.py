@@ -109,7 +109,7 @@ class Redrawing(Memory):
 
     def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
         """Return whether a result for these inputs is kept, and the result; of splats none is."""
-        return (False, None) if name.startswith("splat.") else super().recall(name, inputs)
+        return (False, None) if name.startswith(("sii.", "multires.", "pairs.")) else super().recall(name, inputs)
 
 
 def interleaved(work: Mapping[K, Callable[[], object]], repeats: int) -> dict[K, float]:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, Literal, get_args, get_origin
 
 from benchmarks.sameness.multires_keys import multires_keys
+from benchmarks.sameness.val_keys import val_keys
 from refgi.methods import METHODS
 from refgi.scene import Camera
 from refgi.settings import Settings, choices_of, flat, leaves, replaced
@@ -16,14 +17,19 @@ VIEWS = {"cornell_side": Camera((0.5, 0.3, -0.6), (0.2, 0.2, 0.3)),
          "stage_side": Camera((0.9, 0.4, 0.9), (0.0, 0.1, 0.0))}
 # names of the ledger that are no short keys today, and values that have another name
 RENAMED: dict[str, dict[str, str]] = {
+    "val": {"dealing": "interleaving.assignment", "area_lights": "clusters.count", "map_resolution": "maps.resolution",
+            "maps": "maps.renderer", "extent": "area.extent", "receiver_plane": "visibility.constant_bias"},
     "sii": {"i_low": "reach.cut.share", "irradiance_low": "reach.cut.irradiance", "mesh_faces": "reach.bound.faces",
             "stochastic_range": "reach.stochastic"},
 }
 # single values that are another key's value today
 RENAMED_CASES: dict[tuple[str, str, Any], tuple[str, Any]] = {("gather", "grid", 0): ("interpolation", "none")}
-RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {("truth", "emitters"): {"seen": "visible"}}
+RENAMED_VALUES: dict[tuple[str, str], dict[Any, Any]] = {
+    ("truth", "emitters"): {"seen": "visible"},
+    ("val", "visibility"): {"series": "csm", "step": "pcss", "rectangle": "rays_rectangle", "members": "rays_vpls"}}
 # of methods whose names became choices: what names together are today
-TRANSLATIONS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {"multires": multires_keys}
+TRANSLATIONS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
+    "multires": multires_keys, "val": val_keys}
 
 
 def settings_of(method: str, **named: Any) -> Any:

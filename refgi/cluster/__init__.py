@@ -3,24 +3,24 @@
 `val` (Dong, Grosch, Ritschel, Kautz and Seidel 2009) groups pixel lights by k-means into area lights, draws one
 paraboloid shadow map for each and filters it into soft visibility, which the lights of a cluster share.
 
-`clustering` makes the area lights, `maps` what they see, `filters` means over parts of a map, `visibility` soft shadows
-of them, `lighting` the picture. `adaptive` says how many area lights are enough; `reference` holds what each of these
-steps is measured against, and what it costs.
+`clustering` makes the area lights, `maps` their shadow maps, `filters` the prefilters of these, `visibility` hard
+shadows, PCF, PCSS and convolution shadow maps, `lighting` the picture. `adaptive` finds a number of area lights;
+`reference` holds the references of these steps and the error of each.
 """
 
-from refgi.cluster.clustering.kmeans import Clusters, cluster
+from refgi.cluster.clustering.kmeans import Clustering, cluster
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
-from refgi.cluster.memory import extra_bytes
-from refgi.cluster.settings import ValSettings
-from refgi.cluster.val import val
+from refgi.cluster.settings import PRESETS, ValSettings
+from refgi.cluster.val import extra_bytes, val
 from refgi.method import Method
 
 __all__ = [
+    "PRESETS",
     "AreaLights",
-    "Clusters",
+    "Clustering",
     "ShadowMaps",
     "ValSettings",
     "area_lights",
@@ -33,4 +33,4 @@ __all__ = [
 
 METHOD = Method(
     "val", "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights", val, ValSettings,
-    visibility=True, memory=extra_bytes)
+    visibility=True, memory=extra_bytes, presets=PRESETS)

@@ -1,9 +1,9 @@
-"""As many area lights as an error of visibility asks for: what Dong et al. leave as future work (Sec. 8).
+"""Number of area lights by a target error of visibility, which Dong et al. leave as future work (Sec. 8).
 
 At some pixels the light of all pixel lights is summed twice: with a shadow ray for each, and under the visibility of
 their area lights. Area lights are doubled until the two are near enough to each other, and one step back is tried.
 
-From pixel lights to area lights and what each of them sees: Sec. 5 and the maps of Sec. 6.
+`group_lights` makes area lights of pixel lights and draws their maps (Sec. 5, 6).
 """
 
 import dataclasses
@@ -20,7 +20,8 @@ from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
-from refgi.cluster.reference import member_visibility, reference_visibility
+from refgi.cluster.reference import reference_visibility, vpl_visibility
+from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters
 from refgi.draws import AREA_LIGHT_SAMPLES, draws
 from refgi.errors import RefgiWarning, expect
 from refgi.jit import threads
@@ -36,14 +37,13 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-WITHOUT_MAPS = ("none", "members", "rectangle")  # kinds of visibility that look at no map
 SAMPLES = 2048  # pixels: what one in a thousand adds is seen
 DEVIATIONS = 1.645  # standard errors from the estimate to its bound: 95 %
 MOST_TEXELS = 1 << 28  # of all maps together: 1 GB in float32
 BACK = 0.75  # of the area lights that were enough: the one step back
 
 
-def grouped(
+def group_lights(
     frame: "Frame", lights: "PixelLights", settings: "ValSettings", count: int, footprint: Array | None = None
 ) -> tuple[AreaLights, ShadowMaps | None]:
     """Group pixel lights into area lights and draw what occludes them.
@@ -68,15 +68,17 @@ def grouped(
     ShadowMaps or None
         What each sees; None where the kind of visibility does not ask.
     """
-    clusters = cluster(lights.position, lights.normal, count, distance=settings.distance,
-                       weights=(settings.position_weight, settings.normal_weight),
-                       diagonal=frame.illuminated_extent.diagonal, rounds=settings.rounds)
-    areas = area_lights(lights, clusters, settings, footprint)
-    if settings.visibility in WITHOUT_MAPS:
-        skip("cluster.shadow_maps", f"visibility {settings.visibility!r} looks at none")
+    kind = settings.clusters
+    clusters = cluster(lights.position, lights.normal, count, distance=kind.distance,
+                       weights=(kind.position_weight, kind.normal_weight), diagonal=frame.illuminated_extent.diagonal,
+                       rounds=kind.rounds)
+    areas = area_lights(lights, clusters, settings.area, footprint)
+    if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
+        chosen = "none" if settings.visibility is None else settings.visibility.name()
+        skip("cluster.shadow_maps", f"visibility {chosen!r} reads none")
         return areas, None
-    tracer = frame.tracer if settings.maps == "rays" else None
-    return areas, shadow_maps(frame.scene.geometry, areas, settings, frame.dtype, tracer, ends_of(frame, lights))
+    tracer = frame.tracer if settings.maps.renderer == "rays" else None
+    return areas, shadow_maps(frame.scene.geometry, areas, settings.maps, frame.dtype, tracer, ends_of(frame, lights))
 
 
 class Trial(NamedTuple):
@@ -104,7 +106,7 @@ class Attempt(NamedTuple):
     maps: ShadowMaps | None
 
 
-class Samples(NamedTuple):
+class PixelSamples(NamedTuple):
     """Pixels at which the light is known."""
 
     receivers: Receivers  # (3, 1, n) and (1, n)
@@ -115,7 +117,7 @@ class Samples(NamedTuple):
 
 
 @stage("cluster.adaptive")
-def enough_area_lights(
+def count_for_error(
     frame: "Frame", lights: "PixelLights", settings: "ValSettings", footprint: Array | None = None
 ) -> Adaptive:
     """Find how many area lights bring the error of visibility below a target.
@@ -123,11 +125,11 @@ def enough_area_lights(
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The scene with its buffers.
     lights : PixelLights
         N lights.
     settings : ValSettings
-        `target_error`, and all that makes the visibility of an area light.
+        `clusters.target_error`, and all that makes the visibility of an area light.
     footprint : (N,) ndarray, optional
         Surface area of each light, m^2, where a cluster of one light is its footprint.
 
@@ -149,25 +151,26 @@ def enough_area_lights(
     M that was enough is tried. The error need not fall with every step, and at M = N that of the maps is left. What
     fewer than one pixel in 700 suffer, the singular light of a corner say, may be met by none of the samples.
     """
-    expect(settings.target_error is not None, "target_error", "a share of the mean", settings.target_error)
-    assert settings.target_error is not None
+    kind = settings.clusters
+    expect(isinstance(kind, AdaptiveClusters), "clusters", "adaptive", kind.name())
+    assert isinstance(kind, AdaptiveClusters)
     samples = _samples(frame, lights, settings)
     total = lights.position.shape[1]
 
     def attempt(count: int) -> Attempt:
-        areas, maps, made = _make(frame, lights, settings, footprint, samples, count)
-        return Attempt(_judge(made, samples, count), areas, maps)
+        areas, maps, made = _light_samples(frame, lights, settings, footprint, samples, count)
+        return Attempt(_estimate(made, samples, count), areas, maps)
 
-    most = max(1, min(total, MOST_TEXELS // settings.map_resolution**2))
-    best, trail = _seek(attempt, most, settings.target_error)
-    if best.trial.bound > settings.target_error:
-        said = (f"no number of area lights tried has an error below {settings.target_error:g}: "
+    most = max(1, min(total, MOST_TEXELS // settings.maps.resolution**2))
+    best, trail = _double_and_step_back(attempt, most, kind.target_error)
+    if best.trial.bound > kind.target_error:
+        message = (f"no number of area lights tried has an error below {kind.target_error:g}: "
                 f"{best.trial.area_lights} of {total} come nearest, with {best.trial.error:.3g}")
-        warnings.warn(RefgiWarning(said), stacklevel=2)
+        warnings.warn(RefgiWarning(message), stacklevel=2)
     return Adaptive(best.areas, best.maps, best.trial.error, tuple(trail))
 
 
-def _seek(attempt: Callable[[int], Attempt], most: int, target: float) -> tuple[Attempt, list[Trial]]:
+def _double_and_step_back(attempt: Callable[[int], Attempt], most: int, target: float) -> tuple[Attempt, list[Trial]]:
     """Double the area lights until they are enough, then try one step back; return the best and all trials."""
     best = attempt(1)
     trail, count = [best.trial], 1
@@ -184,20 +187,20 @@ def _seek(attempt: Callable[[int], Attempt], most: int, target: float) -> tuple[
     return best, trail
 
 
-def _make(
-    frame: "Frame", lights: "PixelLights", settings: "ValSettings", footprint: Array | None, samples: Samples,
+def _light_samples(
+    frame: "Frame", lights: "PixelLights", settings: "ValSettings", footprint: Array | None, samples: PixelSamples,
     count: int,
 ) -> tuple[AreaLights, ShadowMaps | None, Array]:
     """Return area lights, their maps and the light at the samples."""
-    areas, maps = grouped(frame, lights, settings, count, footprint)
-    given = reference_visibility(frame, lights, areas, maps, settings)
-    rays = frame.tracer if settings.behind == "raytrace" else None
+    areas, maps = group_lights(frame, lights, settings, count, footprint)
+    visibility_of = reference_visibility(frame, lights, areas, maps, settings)
+    rays = frame.tracer if settings.maps.behind == "raytrace" else None
     light = clustered_irradiance(samples.receivers, samples.facing, lights, areas, maps, settings,
-                                 footprint=samples.footprint, given=given, rays=rays)
+                                 footprint=samples.footprint, visibility_of=visibility_of, rays=rays)
     return areas, maps, light[:, 0]
 
 
-def _samples(frame: "Frame", lights: "PixelLights", settings: "ValSettings") -> Samples:
+def _samples(frame: "Frame", lights: "PixelLights", settings: "ValSettings") -> PixelSamples:
     """Draw pixels, one from each of as many equal parts of the surface seen, and light them by rays."""
     position, normal, triangle_id, covered = frame.gbuffer.resolve("position", "normal", "triangle_id", "covered")
     surface = np.flatnonzero(covered)
@@ -211,7 +214,7 @@ def _samples(frame: "Frame", lights: "PixelLights", settings: "ValSettings") -> 
     facing = facing_normals(frame.scene.geometry, triangle_id.reshape(-1)[None, at], normals)
     area = footprints(frame, settings.lights, settings.pairs)
     exact = _by_rays(frame, lights, settings, receivers, facing, area)
-    return Samples(receivers, facing, exact, area, len(at) / max(1, len(surface)))
+    return PixelSamples(receivers, facing, exact, area, len(at) / max(1, len(surface)))
 
 
 def _by_rays(
@@ -221,14 +224,14 @@ def _by_rays(
     """Return the light of all lights with a ray for each: every light is its own cluster."""
     alone = cluster(lights.position, lights.normal, max(1, lights.position.shape[1]),
                     diagonal=frame.illuminated_extent.diagonal)
-    areas = area_lights(lights, alone, dataclasses.replace(settings, single_light="point"))
+    areas = area_lights(lights, alone, dataclasses.replace(settings.area, single_light="point"))
     with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
         light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,
-                                     given=member_visibility(frame, lights, areas, "even"))
+                                     visibility_of=vpl_visibility(frame, lights, areas, "even"))
     return light[:, 0]
 
 
-def _judge(made: Array, samples: Samples, count: int) -> Trial:
+def _estimate(made: Array, samples: PixelSamples, count: int) -> Trial:
     """Estimate the error of all pixels from that of the samples."""
     square = ((made.astype(np.float64) - samples.exact) ** 2).mean(axis=0)
     mean, n = float(samples.exact.mean(dtype=np.float64)) if samples.exact.size else 0.0, len(square)

@@ -1,142 +1,225 @@
-"""What clustered visibility can be set to."""
+"""Settings of clustered visibility (`val`), composed of small classes; a choice is one class of several."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import ClassVar, Literal
-
-import numpy as np
 
 from refgi.errors import expect
 from refgi.lights.settings import MOST_LIGHTS, LightSettings, MapLights, expect_footprints
 from refgi.pairs.settings import PairSettings
-from refgi.scene.values import is_count, is_number
 from refgi.settings import Settings, setting
 
 Distance = Literal["raw", "normalised", "squared"]
 Axes = Literal["fixed", "pca", "min_area"]
 Extent = Literal["root", "longer", "shorter"]
-Visibility = Literal["series", "step", "hard", "back_projection", "rectangle", "members", "none"]
-Prefilter = Literal["mip", "sat", "brute"]
-Rescale = Literal["none", "scale2", "plateau"]
-Behind = Literal["visible", "dual_paraboloid", "raytrace"]
-NearGeometry = Literal["keep", "planes", "ball"]
-Dealing = Literal["index", "cluster"]
-Blur = Literal["none", "box", "geometry"]
-Depths = Literal["log_map", "map", "scene"]
+DepthScaleName = Literal["log_map", "map", "scene"]
+Assignment = Literal["index", "cluster"]
 
-PUBLISHED_AREA_LIGHTS = 30
 MOST_TERMS = 64
 MOST_BLOCK = 64  # pixels
 LARGEST_MAP = 4096  # texels
-# least and most of each number
-COUNTS = (("area_lights", 1, MOST_LIGHTS), ("rounds", 1, 1000), ("map_resolution", 1, LARGEST_MAP),
-          ("terms", 1, MOST_TERMS))
-FLAGS = ("unbiased_area", "foreshortened", "occluders_alone", "receiver_plane", "cone")
-# least and most of each number that may have a fraction, and what it is; the least target is about what rays for a
-# thousand pixels can tell
-NUMBERS = {
-    "position_weight": (0.0, 1e6, "a weight"), "normal_weight": (0.0, 1e6, "a weight"),
-    "target_error": (1e-4, 1e6, "a share of the mean"),
-    "near_distance": (0.0, 100.0, "a share of the cluster's radius"), "bias": (0.0, 0.25, "a share of the depth range"),
-    "attenuation": (0.0, 100.0, "a factor"),
-    "blur_extent": (0.0, 10.0, "a share of the diagonal"), "blur_cosine": (-1.0, 1.0, "a cosine")}
-MAY_BE_NONE = frozenset({"target_error", "bias"})
+WIDEST_KERNEL = 255  # texels
+LARGEST_WEIGHT = 1e6
+LARGEST_BIAS = 0.25
+
+
+@dataclasses.dataclass(frozen=True)
+class KMeansSettings(Settings):
+    """K-means over position and normal (Sec. 5.1): d = w_x dx + w_a dalpha."""
+
+    distance: Distance = setting(
+        "normalised", "distance in shares of the scene's diagonal and of pi, as printed (raw), or squared", study=True)
+    position_weight: float = setting(0.7, "w_x", least=0.0, most=LARGEST_WEIGHT, study=True)
+    normal_weight: float = setting(0.3, "w_a", least=0.0, most=LARGEST_WEIGHT, study=True)
+    rounds: int = setting(50, "most rounds; fewer where no light changes its cluster", least=1, most=1000, study=True)
+
+    def check(self) -> None:
+        """Check that something is weighed."""
+        expect(self.position_weight + self.normal_weight > 0, "position_weight",
+               "more than 0 beside a normal_weight of 0", self.position_weight)
+
+
+@dataclasses.dataclass(frozen=True)
+class Clusters(KMeansSettings):
+    """A number of clusters."""
+
+    NAME = "fixed"
+
+    count: int = setting(30, "area lights", least=1, most=MOST_LIGHTS)
+
+
+@dataclasses.dataclass(frozen=True)
+class AdaptiveClusters(KMeansSettings):
+    """As many clusters as bring the estimated error of visibility below a target (beyond the paper)."""
+
+    NAME = "adaptive"
+
+    # the least is about what rays for a thousand pixels can tell
+    target_error: float = setting(0.1, "RMSE of visibility, as a share of the mean", least=1e-4, most=1e6)
+
+
+@dataclasses.dataclass(frozen=True)
+class AreaLightSettings(Settings):
+    """The rectangle of a cluster, whose extent is the paper's Delta (Sec. 6)."""
+
+    axes: Axes = setting("fixed", "axes of the rectangle in its plane: of the map, of the lights, or of least area",
+                         study=True)
+    extent: Extent = setting("root", "Delta: root of the area, longer or shorter side", study=True)
+    unbiased_area: bool = setting(False, "the rectangle grows by what a sample of n lights misses", study=True)
+    foreshortened: bool = setting(False, "Delta shrinks with the cosine towards the receiver", study=True)
+    single_light: Literal["point", "footprint"] = setting(
+        "point", "a cluster of one light is a point, or has its light's footprint", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class ShadowMapSettings(Settings):
+    """The paraboloid map of each area light (Sec. 4.2, 6)."""
+
+    PRINCIPAL = "resolution"
+
+    resolution: int = setting(256, "texels a side", least=1, most=LARGEST_MAP)
+    renderer: Literal["raster", "rays"] = setting("raster", "what finds the depths", study=True)
+    near_geometry: Literal["keep", "planes", "ball"] = setting(
+        "ball", "left out near the centre: nothing, planes that pass there, or hits within a ball", study=True)
+    near_distance: float = setting(0.6, "how near, as a share of the cluster's radius", least=0.0, most=100.0,
+                                   study=True)
+    occluders_alone: bool = setting(True, "leave out triangles that nothing lies behind", study=True)
+    behind: Literal["visible", "dual_paraboloid", "raytrace"] = setting(
+        "visible", "what receivers behind an area light see of it: all, or by a second map, or by rays")
+
+
+@dataclasses.dataclass(frozen=True)
+class Csm(Settings):
+    """Convolution shadow maps: a Fourier series of the depth test, prefiltered (Sec. 4.1)."""
+
+    terms: int = setting(4, "M, terms of the series", least=1, most=MOST_TERMS)
+    depth_scale: DepthScaleName = setting(
+        "log_map", "depths between what a map holds, by logarithm or in metres, or up to the scene's end",
+        study=True)
+    prefilter: Literal["mip", "brute"] = setting("mip", "mean over a disc: mip map, or every texel", study=True)
+    bias: float | None = setting(None, "share of the depth range; none: where the series is 1 for the first time",
+                                 least=0.0, most=LARGEST_BIAS, study=True)
+    attenuation: float = setting(0.0, "A of the terms' attenuation", least=0.0, most=100.0, study=True)
+    rescale: Literal["none", "scale2", "plateau"] = setting("none", "what undoes the attenuation", study=True)
+    quantisation: Literal["none", "published"] = setting("none", "8 and 16 bits of the published textures", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class ConstantBias(Settings):
+    """Receivers are moved towards the light by a share of the depth range."""
+
+    value: float = setting(0.0, "share of the depth range", least=0.0, most=LARGEST_BIAS)
+    scale: DepthScaleName = setting("log_map", "scale of depths that the share is of")
+
+
+@dataclasses.dataclass(frozen=True)
+class Pcss(Settings):
+    """Percentage closer soft shadows: blocker search, then percentage closer filtering, texel by texel."""
+
+    cone: bool = setting(True, "blockers lie within the cone from the receiver to the light", study=True)
+    constant_bias: ConstantBias | None = setting(
+        None, "compare with the receiver's biased distance; none: with its tangent plane", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Pcf(Settings):
+    """Percentage closer filtering: a fixed kernel of binary depth tests around the receiver's texel."""
+
+    texels: int = setting(5, "side of the kernel, odd", least=1, most=WIDEST_KERNEL, unit="texels")
+
+    def check(self) -> None:
+        """Check that the kernel has a middle."""
+        expect(self.texels % 2 == 1, "texels", "an odd number", self.texels)
+
+
+@dataclasses.dataclass(frozen=True)
+class Hard(Settings):
+    """One depth test towards the centre of the area light."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BackProjection(Settings):
+    """The texels of the map, projected back onto the rectangle."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RaysRectangle(Settings):
+    """Rays to points of the rectangle."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RaysVpls(Settings):
+    """A ray to each pixel light of the cluster."""
+
+
+Visibility = Csm | Pcss | Pcf | Hard | BackProjection | RaysRectangle | RaysVpls
+BY_MAPS = (Csm, Pcss, Pcf, Hard)  # kinds that kernels find by one map
+WITHOUT_MAPS = (RaysRectangle, RaysVpls)
+
+
+@dataclasses.dataclass(frozen=True)
+class InterleavingSettings(Settings):
+    """Each pixel of a block of n x n sums one light of n^2 (Sec. 6)."""
+
+    PRINCIPAL = "block"
+
+    block: int | None = setting(None, "n; 1: all lights; none: all where that is no more than 2^30 pairs, else 8",
+                                least=1, most=MOST_BLOCK, unit="pixels")
+    assignment: Assignment = setting("index", "lights of a pixel: every n^2-th, or runs of a cluster", study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class BoxBlur(Settings):
+    """The mean of all n x n pixels."""
+
+    NAME = "box"
+
+
+@dataclasses.dataclass(frozen=True)
+class GeometryBlur(Settings):
+    """The mean of those of n x n pixels that lie on the same surface (Sec. 6)."""
+
+    NAME = "geometry"
+
+    extent: float = setting(0.1, "how far apart, as a share of the scene's diagonal", least=0.0, most=10.0)
+    cosine: float = setting(0.8, "least cosine between normals", least=-1.0, most=1.0)
 
 
 @dataclasses.dataclass(frozen=True)
 class ValSettings(Settings):
-    """What `val` can be set to; the defaults are the paper's, those of docs/methods/val where it is silent.
-
-    Clustering: `area_lights` clusters by a `distance` ("raw" as printed, "normalised" by the scene's diagonal and pi,
-    or "squared") of weights `position_weight` and `normal_weight`, for at most `rounds` rounds. `target_error` (share
-    of the mean, RMSE) adds area lights until the error of visibility is estimated to be below it.
-
-    Area lights: rectangles along `axes`; one `extent` of it is the paper's Delta. `unbiased_area` enlarges it by what
-    a sample of n lights misses, `foreshortened` narrows it towards the receiver, `single_light` is what a cluster of
-    one light is. Maps of `map_resolution` texels a side from `maps` ("raster" or "rays") leave out what is near the
-    centre, `near_geometry` (a "ball", or "planes" that pass there) within a share `near_distance` of the cluster's
-    radius, and with `occluders_alone` what nothing lies behind. `behind` says what receivers behind an area light see
-    of it.
-
-    Visibility: "series" of `terms` terms with the filter `prefilter`, the exact "step", one "hard" test towards the
-    centre, or by reference: the map projected back ("back_projection"), rays to the "rectangle", rays to the
-    "members"; or "none". The series compares depths on a `depth_scale` from the nearest to the farthest of what a map
-    holds, by their logarithm ("log_map") or in metres ("map"), or from 0 to the far end of the scene's extent
-    ("scene"). A receiver is moved by `bias` (share of the depth range; none: where the series is 1 for the first
-    time); `attenuation` is that of the series' terms and `rescale` what becomes of it; `quantisation` is that of the
-    published textures. The step counts what lies before the `receiver_plane` and within the `cone`.
-
-    `interleaving` n sums one light of n^2 at each pixel of n x n (8 as published; 1: all; none: all where that is no
-    more than 2^30 pairs, else 8), and `blur` joins them, within `blur_extent` of the scene's diagonal and above
-    `blur_cosine` between normals.
-    """
+    """What `val` can be set to; the defaults are the paper's, those of docs/methods/val where it is silent."""
 
     lights: LightSettings = setting(LightSettings(count=1024), "pixel lights")
     pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
-    area_lights: int = PUBLISHED_AREA_LIGHTS
-    target_error: float | None = None
-    distance: Distance = "normalised"
-    position_weight: float = 0.7
-    normal_weight: float = 0.3
-    rounds: int = 50
-    axes: Axes = "fixed"
-    extent: Extent = "root"
-    unbiased_area: bool = False
-    foreshortened: bool = False
-    single_light: Literal["point", "footprint"] = "point"
-    map_resolution: int = 256
-    maps: Literal["raster", "rays"] = "raster"
-    near_geometry: NearGeometry = "ball"
-    near_distance: float = 0.6
-    occluders_alone: bool = True
-    behind: Behind = "visible"
-    visibility: Visibility = "series"
-    terms: int = 4
-    depth_scale: Depths = "log_map"
-    prefilter: Prefilter = "mip"
-    bias: float | None = None
-    attenuation: float = 0.0
-    rescale: Rescale = "none"
-    quantisation: Literal["none", "published"] = "none"
-    receiver_plane: bool = True
-    cone: bool = True
-    interleaving: int | None = None
-    dealing: Dealing = "index"
-    blur: Blur = "geometry"
-    blur_extent: float = 0.1
-    blur_cosine: float = 0.8
+    clusters: Clusters | AdaptiveClusters = setting(Clusters(), "how many area lights")
+    area: AreaLightSettings = setting(AreaLightSettings(), "the rectangle of an area light")
+    maps: ShadowMapSettings = setting(ShadowMapSettings(), "shadow maps")
+    visibility: Visibility | None = setting(Csm(), "soft shadow of an area light; none: no shadows")
+    interleaving: InterleavingSettings = setting(InterleavingSettings(), "interleaved sampling")
+    blur: BoxBlur | GeometryBlur | None = setting(GeometryBlur(), "what joins interleaved pixels")
     as_published: frozenset[str] = setting(frozenset(), "forms to use as printed", study=True)
 
     SWITCHES: ClassVar[frozenset[str]] = frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"})
 
     def check(self) -> None:
-        """Check ranges, and what fields ask of each other."""
-        for key, least, most in COUNTS:
-            count = getattr(self, key)
-            expect(is_count(count) and least <= count <= most, key, f"a whole number, {least} to {most:,}", count)
+        """Check what parts ask of each other."""
         expect_footprints(self.lights, self.pairs)
-        for key in FLAGS:
-            expect(isinstance(getattr(self, key), bool | np.bool_), key, "true or false", getattr(self, key))
-        for key, (low, high, what) in NUMBERS.items():
-            value = getattr(self, key)
-            expect((value is None and key in MAY_BE_NONE) or (is_number(value) and low <= value <= high), key,
-                   f"{'none or ' if key in MAY_BE_NONE else ''}{what}, {low:g} to {high:g}", value)
-        expect(self.position_weight + self.normal_weight > 0, "position_weight",
-               "more than 0 beside a normal_weight of 0", self.position_weight)
-        expect(self.interleaving is None or (is_count(self.interleaving) and 1 <= self.interleaving <= MOST_BLOCK),
-               "interleaving", f"none or 1 to {MOST_BLOCK} pixels", self.interleaving)
-        expect(self.single_light == "point" or isinstance(self.lights.source, MapLights), "single_light",
-               "'point' with the source 'walk'", self.single_light)
-        self._expect_heeded()
+        expect(self.area.single_light == "point" or isinstance(self.lights.source, MapLights), "area.single_light",
+               "'point' with the source 'walk'", self.area.single_light)
+        expect(self.visibility is not None or isinstance(self.clusters, Clusters), "visibility",
+               "another one with clusters 'adaptive'", "none")
 
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return self.lights.traces_rays or self.maps == "rays" or self.behind == "raytrace" or self.visibility in (
-            "rectangle", "members")
+        return (self.lights.traces_rays or self.maps.renderer == "rays" or self.maps.behind == "raytrace"
+                or isinstance(self.visibility, RaysRectangle | RaysVpls))
 
-    def _expect_heeded(self) -> None:
-        """Refuse what a target for the error would not heed."""
-        if self.target_error is not None:
-            expect(self.area_lights == PUBLISHED_AREA_LIGHTS, "area_lights",
-                   "no number beside target_error, which finds it", self.area_lights)
-            expect(self.visibility != "none", "visibility", "another one with target_error", self.visibility)
+
+# Sec. 5.1, 6 and 7: d in metres and radians, basis of 8 and 16 bits, blocks of 8 x 8 pixels, angles as printed
+PRESETS: Mapping[str, ValSettings] = {
+    "paper": ValSettings(
+        clusters=Clusters(distance="raw"), visibility=Csm(terms=4, quantisation="published"),
+        interleaving=InterleavingSettings(8),
+        as_published=frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"})),
+}

@@ -2,15 +2,17 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numba
 import numpy.typing as npt
 
-from refgi.cluster.adaptive import enough_area_lights, grouped
+from refgi.cluster.adaptive import MOST_TEXELS, count_for_error, group_lights
 from refgi.cluster.clustering.rectangle import AreaLights
+from refgi.cluster.filters.eight import EIGHT
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
 from refgi.lights.selection import choose_lights, footprints, light_footprints, light_maps
 from refgi.lights.settings import MapLights
 from refgi.pairs.irradiance import Receivers
@@ -26,6 +28,7 @@ Array = npt.NDArray[Any]
 
 PAIRS_IN_FULL = 1 << 30  # about a quarter of a second on two cores
 PUBLISHED_BLOCK = 8  # pixels
+LISTED_FLOATS = 24  # of a pixel, where receivers are gathered by lists: measured, and a fifth more
 
 
 def val(frame: "Frame", settings: ValSettings) -> Array:
@@ -34,7 +37,7 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The scene with its buffers.
     settings : ValSettings
         Which lights, how they are clustered and how an area light's visibility is found.
 
@@ -44,24 +47,25 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
         Indirect irradiance, W/m^2, linear RGB.
     """
     lights = choose_lights(frame, settings.lights)  # Sec. 6, VPL generation
-    areas, maps = clustered(frame, lights, settings)
+    areas, maps = cluster_lights(frame, lights, settings)
     block = block_side(frame, lights, settings)
-    light = lit(frame, lights, areas, maps, settings, block)  # Sec. 4 and 6
-    if block == 1 or settings.blur == "none":
-        skip("cluster.blur", "every pixel sums all lights" if block == 1 else "left out by the settings")
+    light = light_pixels(frame, lights, areas, maps, settings, block)  # Sec. 4 and 6
+    if block == 1 or settings.blur is None:
+        skip("cluster.blur", "every pixel sums all lights" if block == 1 else "off in the settings")
         return light
-    return blur(light, surface(frame), block, settings, frame.visible_extent.diagonal)  # Sec. 6, geometry-aware blur
+    # Sec. 6, geometry-aware blur
+    return blur(light, receivers_of(frame), block, settings.blur, frame.visible_extent.diagonal)
 
 
-def lit(
+def light_pixels(
     frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: ShadowMaps | None, settings: ValSettings, block: int
 ) -> Array:
-    """Light every pixel by pixel lights that are grouped already.
+    """Light every pixel by pixel lights that are clustered already.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen.
+        The scene with its buffers.
     lights : PixelLights
         The pixel lights.
     areas : AreaLights
@@ -79,14 +83,16 @@ def lit(
         Indirect irradiance, W/m^2, not blurred.
     """
     footprint = footprints(frame, settings.lights, settings.pairs)
-    warn_of_clamp(surface(frame), lights, settings.pairs, footprint, "val")
+    warn_of_clamp(receivers_of(frame), lights, settings.pairs, footprint, "val")
     return clustered_irradiance(
-        surface(frame), facing(frame), lights, areas, maps, settings, footprint=footprint,
-        given=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
-        rays=frame.tracer if settings.behind == "raytrace" else None)
+        receivers_of(frame), face_normals(frame), lights, areas, maps, settings, footprint=footprint,
+        visibility_of=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
+        rays=frame.tracer if settings.maps.behind == "raytrace" else None)
 
 
-def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> tuple[AreaLights, ShadowMaps | None]:
+def cluster_lights(
+    frame: "Frame", lights: "PixelLights", settings: ValSettings
+) -> tuple[AreaLights, ShadowMaps | None]:
     """Group pixel lights into as many area lights as asked for, or as an error asks for, and draw their maps.
 
     Parameters
@@ -105,20 +111,20 @@ def clustered(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> t
     ShadowMaps or None
         What each sees; None where nothing asks for it.
     """
-    if settings.target_error is not None:
-        chosen = enough_area_lights(frame, lights, settings, areas_of_lights(frame, settings))
+    if isinstance(settings.clusters, AdaptiveClusters):
+        chosen = count_for_error(frame, lights, settings, light_areas(frame, settings))
         return chosen.areas, chosen.maps
-    skip("cluster.adaptive", "the number of area lights is given")
-    return grouped(frame, lights, settings, settings.area_lights, areas_of_lights(frame, settings))  # Sec. 5
+    skip("cluster.adaptive", "the number of area lights is set")
+    return group_lights(frame, lights, settings, settings.clusters.count, light_areas(frame, settings))  # Sec. 5
 
 
-def areas_of_lights(frame: "Frame", settings: ValSettings) -> Array | None:
+def light_areas(frame: "Frame", settings: ValSettings) -> Array | None:
     """Return the surface that each pixel light stands for, where a cluster of one light has its light's size.
 
     Parameters
     ----------
     frame : Frame
-        The scene, lit.
+        The scene with its buffers.
     settings : ValSettings
         What the lights were chosen by.
 
@@ -127,7 +133,7 @@ def areas_of_lights(frame: "Frame", settings: ValSettings) -> Array | None:
     (N,) ndarray or None
         Area, m^2.
     """
-    if settings.single_light == "point" or not isinstance(settings.lights.source, MapLights):
+    if settings.area.single_light == "point" or not isinstance(settings.lights.source, MapLights):
         return None
     return light_footprints(light_maps(frame, settings.lights.source), settings.lights)
 
@@ -149,18 +155,18 @@ def block_side(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> 
     int
         Pixels.
     """
-    if settings.interleaving is not None:
-        return settings.interleaving
+    if settings.interleaving.block is not None:
+        return settings.interleaving.block
     return 1 if frame.width * frame.height * lights.flux.shape[1] <= PAIRS_IN_FULL else PUBLISHED_BLOCK
 
 
-def surface(frame: "Frame") -> Receivers:
+def receivers_of(frame: "Frame") -> Receivers:
     """Return the points that a frame's pixels see.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen.
+        The scene with its buffers.
 
     Returns
     -------
@@ -170,13 +176,13 @@ def surface(frame: "Frame") -> Receivers:
     return Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
 
 
-def facing(frame: "Frame") -> Array:
+def face_normals(frame: "Frame") -> Array:
     """Return the normals of the triangles that a frame's pixels see.
 
     Parameters
     ----------
     frame : Frame
-        The scene, seen.
+        The scene with its buffers.
 
     Returns
     -------
@@ -185,3 +191,50 @@ def facing(frame: "Frame") -> Array:
     """
     buffer = frame.gbuffer
     return facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)
+
+
+def extra_bytes(settings: ValSettings, size: tuple[int, int], float_bytes: int) -> int:
+    """Estimate the memory that area lights add to a picture: shadow maps, and these filtered.
+
+    Parameters
+    ----------
+    settings : ValSettings
+        How many area lights, and what their maps are.
+    size : tuple of 2 ints
+        Width and height of the picture, pixels.
+    float_bytes : int
+        4 or 8.
+
+    Returns
+    -------
+    int
+        Bytes, rather too many than too few.
+    """
+    texels, count = settings.maps.resolution**2, _most_maps(settings)
+    sides = 2 if settings.maps.behind == "dual_paraboloid" else 1
+    depth = 2 * count * sides * texels * float_bytes  # twice: maps on which there is nothing are dropped by a copy
+    filtered = 0
+    if isinstance(settings.visibility, Csm):
+        at_once = min(count, numba.get_num_threads() + 1)  # one of them is read from
+        filtered = at_once * texels * _filtered_bytes(settings.visibility, float_bytes)
+    return depth + filtered + size[0] * size[1] * LISTED_FLOATS * float_bytes
+
+
+def _most_maps(settings: ValSettings) -> int:
+    if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
+        return 0
+    most, source = max(1, MOST_TEXELS // settings.maps.resolution**2), settings.lights.source
+    count = settings.clusters.count if isinstance(settings.clusters, Clusters) else most
+    if isinstance(source, MapLights):
+        return count if source.pattern == "all" else min(count, settings.lights.count)
+    return min(count, settings.lights.count * source.bounces)
+
+
+def _filtered_bytes(csm: Csm, float_bytes: int) -> int:
+    """Return the bytes of one filtered map for each of its texels."""
+    channels = 4 * csm.terms + 2  # basis, basis-z, mean depth, and the depth itself
+    if csm.prefilter == "brute":
+        return channels * float_bytes
+    basis = -(-2 * csm.terms // EIGHT) * EIGHT
+    above = 2 * basis + 3  # basis, basis-z, mean, least and most depth: a third of the texels lies above the map's own
+    return (1 + above // 3) * float_bytes

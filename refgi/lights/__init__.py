@@ -1,4 +1,4 @@
-"""Pixel lights (VPLs): from maps or light paths, warped, thinned in the open (SII Sec. 3.5 to 3.7).
+"""Pixel lights (VPLs): from maps or light paths, warped, fewer in the open (SII Sec. 3.5 to 3.7).
 
 `pixel_lights` takes texels of reflective shadow maps as point lights, with T/N on each, which the papers do not state;
 `warp` draws them after their `importance`, `footprints` says what part of the map and of the surface each stands for,

@@ -32,25 +32,7 @@ DEMO_CONSTANT = 1.5  # pi over the 2 pi / 3 sr of a square 90 degree frustum
 
 
 def cells_of_grid(maps: Projection, count: int) -> Array:
-    """Return the grid cell that holds each texel's centre.
-
-    Parameters
-    ----------
-    maps : Projection
-        k stacked maps.
-    count : int
-        k n^2 cells: n x n on each map, row by row, map by map.
-
-    Returns
-    -------
-    (H * W,) ndarray of int
-        Cell of each texel.
-
-    Raises
-    ------
-    InputError
-        If there are more cells than texels along a side.
-    """
+    """Return the cell (H * W,) of each texel's centre, of `count` = k n^2: n x n on each of k maps, row by row."""
     n = math.isqrt(count // maps.maps)
     shorter = min(maps.height, maps.width)
     expect(n <= shorter, "count", f"at most {maps.maps * shorter**2} with filtering", count)
@@ -61,19 +43,9 @@ def cells_of_grid(maps: Projection, count: int) -> Array:
 
 
 def cells_of_nearest(maps: Projection, texel: Array) -> Array:
-    """Return the nearest chosen texel of each texel, on its own map as long as that has one.
+    """Return the index into `texel` (N,) of the chosen texel nearest to each texel, (H * W,).
 
-    Parameters
-    ----------
-    maps : Projection
-        The stacked maps.
-    texel : (N,) ndarray of int
-        Chosen texels, indices into the flattened maps; of equal or equally near ones the first gets the texel.
-
-    Returns
-    -------
-    (H * W,) ndarray of int
-        Index into `texel` of each texel.
+    On its own map as long as that has one; of equal or equally near ones the first gets the texel.
     """
     from scipy.spatial import cKDTree
 
@@ -91,42 +63,15 @@ def cells_of_nearest(maps: Projection, texel: Array) -> Array:
 
 
 def cell_sums(flux: Array, cell: Array, count: int) -> Array:
-    """Return the flux of each cell.
-
-    Parameters
-    ----------
-    flux : (3, H, W) ndarray
-        Flux of each texel, W.
-    cell : (H * W,) ndarray of int
-        Cell of each texel.
-    count : int
-        Number of cells.
-
-    Returns
-    -------
-    (3, count) ndarray
-        W, summed in float64.
-    """
+    """Return the flux of each cell, (3, count) W, summed in float64: flux (3, H, W), cell of each texel (H * W,)."""
     sums = [np.bincount(cell, channel.reshape(-1), minlength=count) for channel in flux]
     return np.stack(sums).astype(flux.dtype)
 
 
 def texels_with_flux(texel: Array, cell: Array, has_flux: Array) -> Array:
-    """Return the texel that stands for each cell: the chosen one, or where that is dark the nearest one with flux.
+    """Return the texel that stands for each cell: the chosen one (N,), or if that is dark the nearest with flux.
 
-    Parameters
-    ----------
-    texel : (N,) ndarray of int
-        Chosen texels.
-    cell : (H * W,) ndarray of int
-        Cell of each texel.
-    has_flux : (H, W) ndarray of bool
-        Which texels have flux.
-
-    Returns
-    -------
-    (N,) ndarray of int
-        As `texel` where the whole cell is dark; of equally near texels the first.
+    As `texel` where the whole cell is dark; of equally near texels the first.
     """
     width = has_flux.shape[1]
     emits = has_flux.reshape(-1)
@@ -141,18 +86,9 @@ def texels_with_flux(texel: Array, cell: Array, has_flux: Array) -> Array:
 
 
 def texel_areas(rsm: "Rsm") -> Array:
-    """Return the area of surface behind each texel that reflects anything.
+    """Return the area of surface behind each texel that reflects anything, (H, W) m^2 in the map's dtype; else 0.
 
-    Parameters
-    ----------
-    rsm : Rsm
-        A map.
-
-    Returns
-    -------
-    (H, W) ndarray
-        m^2, in the map's dtype; 0 where nothing is reflected. A directional light's texels have an area in place of a
-        solid angle, and d is 1.
+    A directional light's texels have an area in place of a solid angle, and d is 1.
     """
     from refgi.scene import DirectionalLight
 
@@ -184,17 +120,9 @@ def _fill_areas(
 
 
 def with_equal_solid_angles(rsm: "Rsm") -> "Rsm":
-    """Return a map with the flux its texels would have if all that the light shines into subtended the same.
+    """Return a map with the flux its texels would have if all that the light reaches subtended the same solid angle.
 
-    Parameters
-    ----------
-    rsm : Rsm
-        A map with exact solid angles.
-
-    Returns
-    -------
-    Rsm
-        With solid angles and fluxes scaled; the solid angle of the whole map is unchanged.
+    The solid angle of the whole map is unchanged.
     """
     from refgi.rsm.buffers.light_projection import incident_flux
 

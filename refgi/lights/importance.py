@@ -25,7 +25,7 @@ Array = npt.NDArray[Any]
 Kind = Literal["flux", "peak", "openness"]
 
 
-@stage("rsm.importance")
+@stage("lights.importance")
 def importance(
     rsm: Rsm, kind: Kind = "flux", openness: Array | None = None, floor: float = 0.05, defensive: float = 0.0
 ) -> Array:
@@ -153,20 +153,7 @@ def importance_pyramid(importance: Array) -> tuple[Array, ...]:
 
 
 def packed(pyramid: tuple[Array, ...], levels: int) -> Levels:
-    """Put the first `levels` levels below S_0 into one array.
-
-    Parameters
-    ----------
-    pyramid : tuple of ndarray
-        S_0 .. S_L.
-    levels : int
-        At most L.
-
-    Returns
-    -------
-    Levels
-        For `cell_sum`.
-    """
+    """Put the first `levels` levels below S_0 of a pyramid into one array, for `cell_sum`."""
     coarse = [sums.reshape(-1) for sums in pyramid[: min(levels + 1, len(pyramid) - 1)]]
     return Levels(np.concatenate([np.empty(0), *coarse]), pyramid[-1], len(pyramid) - 1)
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 
-@stage("splat.scale_flux")
+@stage("lights.scale_flux")
 def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Array]":
     """Scale each light's flux by 1 - O.
 
@@ -51,7 +51,7 @@ def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Ar
     return scaled, power(lights) - power(scaled)
 
 
-@stage("splat.roulette")
+@stage("lights.roulette")
 def roulette(lights: "PixelLights", openness: Array, floor: float, seed: int) -> "PixelLights":
     """Keep each light with chance p = max(floor, 1 - O) and divide its flux by p.
 
@@ -97,17 +97,6 @@ def _check(lights: "PixelLights", openness: Array) -> None:
 
 
 def power(lights: "PixelLights") -> Array:
-    """Return the flux of all lights.
-
-    Parameters
-    ----------
-    lights : PixelLights
-        N' lights.
-
-    Returns
-    -------
-    (3,) ndarray of float64
-        W, diffuse and lobe together.
-    """
+    """Return the flux of all lights, diffuse and lobe together, (3,) W in float64."""
     flux: Array = lights.flux.sum(axis=1, dtype=np.float64)
     return flux if lights.lobe_flux is None else flux + lights.lobe_flux.sum(axis=1, dtype=np.float64)

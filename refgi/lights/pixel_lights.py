@@ -32,7 +32,7 @@ Array = npt.NDArray[Any]
 Pattern = Literal["grid", "halton", "all", "random"]
 
 
-@stage("rsm.pixel_lights")
+@stage("lights.choose")
 def choose_pixel_lights(
     rsms: Sequence[Rsm],
     *,
@@ -139,23 +139,12 @@ def map_shares(rsms: Sequence[Rsm], count: int | None, pattern: Pattern) -> list
         return shares
     cells = [_nearest_grid(share, rsm.projection.maps) for share, rsm in zip(shares, rsms, strict=True)]
     if cells != shares:
-        skip("rsm.grid_cells", f"{sum(cells)} texels for {count}: n x n on each map of {len(rsms)} lights")
+        skip("lights.grid_cells", f"{sum(cells)} texels for {count}: n x n on each map of {len(rsms)} lights")
     return cells
 
 
 def equal_shares(count: int, parts: int) -> list[int]:
-    """Return how many of `count` things each of some parts gets, the first ones one more where it does not divide.
-
-    Parameters
-    ----------
-    count, parts : int
-        Things, and parts to give them to.
-
-    Returns
-    -------
-    list of int
-        One number a part.
-    """
+    """Return `parts` shares of `count` things, the first ones one more where it does not divide."""
     return [count // parts + (index < count % parts) for index in range(parts)]
 
 

@@ -131,17 +131,38 @@ def refracted(
     expect(mode in get_args(Mode), "mode", "'back_face' or 'two_interface'", mode)
     expect(0 <= exponent <= SHARPEST, "exponent", f"a Phong exponent from 0 to {SHARPEST:g}", exponent)
     if not materials.ior.any():
-        skip("rsm.refraction", "no material is glass")
+        skip("lights.refraction", "no material is glass")
         return rsm
     expect(mode == "back_face" or tracer is not None, "tracer", "one for the mode 'two_interface'", None)
     return _refracted(rsm, geometry, materials, exponent, tracer if mode == "two_interface" else None, fresnel)
 
 
-@stage("rsm.refraction")
+@stage("lights.refraction")
 def _refracted(
     rsm: Rsm, geometry: Geometry, materials: MaterialTable, exponent: float, tracer: RayTracer | None, fresnel: bool
 ) -> Rsm:
-    """Find the exits of the light through glass texels and put lobes there."""
+    """Find the exits of the light through glass texels and put lobes there.
+
+    Parameters
+    ----------
+    rsm : Rsm
+        The map of one light.
+    geometry : Geometry
+        The triangles.
+    materials : MaterialTable
+        Their materials; `ior` > 0 is glass.
+    exponent : float
+        Phong exponent of the lobes.
+    tracer : RayTracer or None
+        Finds the exit of each refracted ray; None: back faces in the map's own projection, as published.
+    fresnel : bool
+        Whether each interface transmits its Fresnel share.
+
+    Returns
+    -------
+    Rsm
+        The map with texels of glass replaced by their exits: positions, m, and lobes with their flux, W.
+    """
     glass = materials.ior[geometry.material_of_face] > 0
     texel = np.flatnonzero(np.append(glass, False)[rsm.triangle_id.reshape(-1)])  # the last for -1, no surface
     if not len(texel):

@@ -25,7 +25,7 @@ def choose_lights(frame: "Frame", settings: LightSettings) -> "PixelLights":
     Parameters
     ----------
     frame : Frame
-        The scene, lit.
+        The scene and its buffers.
     settings : LightSettings
         Where lights come from, and how many.
 
@@ -42,7 +42,7 @@ def choose_lights(frame: "Frame", settings: LightSettings) -> "PixelLights":
         lights = pixel_lights(rsms, settings, importance_maps(frame, rsms, settings))
         if "sii_no_tn" in source.as_published:
             lights = _without_weight(lights, rsms, settings)
-    return thinned(frame, lights, settings)
+    return with_openness(frame, lights, settings)
 
 
 def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
@@ -51,7 +51,7 @@ def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
     Parameters
     ----------
     frame : Frame
-        The scene, lit.
+        The scene and its buffers.
     settings : MapLights
         Says how glass refracts.
 
@@ -74,7 +74,7 @@ def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
 
 
 def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettings) -> list[Array] | None:
-    """Return what each texel is worth to the warp (Sec. 3.5).
+    """Return the importance of each texel for the warp (Sec. 3.5).
 
     Parameters
     ----------
@@ -94,34 +94,19 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettin
 
     warp = _map_lights(settings).warp
     if warp is None:
-        skip("rsm.warp", "lights follow their pattern alone")
+        skip("lights.warp", "lights follow their pattern alone")
         return None
     maps = []
     for rsm in rsms:
         free = None
         if warp.importance == "openness":
-            free = _openness(frame, rsm.position, rsm.normal, settings, _lit(rsm))
+            free = _openness(frame, rsm.position, rsm.normal, settings, _has_flux(rsm))
         maps.append(importance(rsm, warp.importance, free, settings.openness.floor, warp.defensive))
     return maps
 
 
-def thinned(frame: "Frame", lights: "PixelLights", settings: LightSettings) -> "PixelLights":
-    """Darken or remove lights in the open, if the settings ask for it (Sec. 3.6).
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene, whose triangles block what is not open.
-    lights : PixelLights
-        The lights.
-    settings : LightSettings
-        Says how.
-
-    Returns
-    -------
-    PixelLights
-        What is left of them.
-    """
+def with_openness(frame: "Frame", lights: "PixelLights", settings: LightSettings) -> "PixelLights":
+    """Return lights scaled by 1 - openness or thinned by roulette with it, if the settings ask for it (Sec. 3.6)."""
     from refgi.lights.openness_flux import power, roulette, scale_flux
     from refgi.pairs.loss import lost_share, warn_of_loss
 
@@ -166,7 +151,7 @@ def pixel_lights(
     settings : LightSettings
         Number, pattern, seed, filtering and warp.
     importance : sequence of (H, W) ndarray, optional
-        What each texel is worth to the warp.
+        Importance of each texel for the warp.
 
     Returns
     -------
@@ -191,20 +176,7 @@ def _map_lights(settings: LightSettings) -> MapLights:
 
 
 def drawn_from_maps(rsms: "Sequence[Rsm]", settings: LightSettings) -> list[int]:
-    """Return N, how many texels the settings draw from each map.
-
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
-    settings : LightSettings
-        Number and pattern.
-
-    Returns
-    -------
-    list of int
-        One number a map.
-    """
+    """Return N, how many texels the settings draw from each map."""
     from refgi.lights.pixel_lights import map_shares
 
     pattern = _map_lights(settings).pattern
@@ -223,22 +195,7 @@ def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: Ligh
 
 
 def footprints(frame: "Frame", settings: LightSettings, pairs: "PairSettings") -> Array | None:
-    """Return the surface area of each light of `choose_lights`, where the clamp asks for it.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene, lit.
-    settings : LightSettings
-        What the lights were chosen by.
-    pairs : PairSettings
-        The clamp.
-
-    Returns
-    -------
-    (N,) ndarray or None
-        Area, m^2.
-    """
+    """Return the surface area (N,), m^2, of each light of `choose_lights` where the clamp needs it, else None."""
     if not pairs.needs_footprints:
         return None
     rsms = light_maps(frame, _map_lights(settings))
@@ -277,7 +234,7 @@ def _with_area_as_flux(rsm: "Rsm") -> "Rsm":
     return rsm._replace(flux=np.broadcast_to(area, rsm.flux.shape), lobe_flux=None, lobe_axis=None, lobe_exponent=None)
 
 
-def _lit(rsm: "Rsm") -> Array:
+def _has_flux(rsm: "Rsm") -> Array:
     """Return where a map reflects anything, (H, W) bool."""
-    lit: Array = np.asarray(rsm.flux.any(axis=0))
-    return lit if rsm.lobe_flux is None else lit | rsm.lobe_flux.any(axis=0)
+    diffuse: Array = np.asarray(rsm.flux.any(axis=0))
+    return diffuse if rsm.lobe_flux is None else diffuse | rsm.lobe_flux.any(axis=0)

@@ -50,7 +50,7 @@ class PathVertices(NamedTuple):
     lobe_exponent: Array  # (n,)
 
 
-@stage("walk.lights")
+@stage("lights.walk")
 def walk_lights(
     tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", lights: "LightTable", paths: int,
     bounces: int = 1, seed: int = 0,

@@ -39,7 +39,7 @@ class Warp:
                self.levels)
 
 
-@stage("rsm.warp")
+@stage("lights.warp")
 def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tuple[Array, Array]:
     """Warp points of the unit square over several maps that are stacked along rows.
 
@@ -123,20 +123,7 @@ def warp_samples(points: Array, pyramid: tuple[Array, ...], levels: int, method:
 
 
 def texel_of(coordinate: Array, size: int) -> Array:
-    """Return the texel that holds each coordinate in [0, 1).
-
-    Parameters
-    ----------
-    coordinate : (n,) ndarray
-        In [0, 1).
-    size : int
-        Texels along the side.
-
-    Returns
-    -------
-    (n,) ndarray of int64
-        From 0 to size - 1.
-    """
+    """Return the texel, 0 to size - 1, that holds each coordinate (n,) in [0, 1)."""
     return np.asarray(np.minimum((coordinate * size).astype(np.int64), size - 1))
 
 

@@ -28,14 +28,14 @@ PAIRS_AT_ONCE = 1 << 31  # between two reports of progress
 
 
 class Receivers(NamedTuple):
-    """The points that are lit."""
+    """Points to light."""
 
     position: Array  # (3, h, w) world space, m
     normal: Array  # (3, h, w) unit vectors
     covered: Array  # (h, w) bool, whether there is a surface
 
 
-@stage("splat.irradiance")
+@stage("pairs.sum")
 def irradiance(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
 ) -> Array:
@@ -44,7 +44,7 @@ def irradiance(
     Parameters
     ----------
     receivers : Receivers
-        Points that are lit; their dtype is that of the result.
+        Points to light; their dtype is that of the result.
     lights : PixelLights
         Lights to sum.
     settings : PairSettings
@@ -79,16 +79,9 @@ def irradiance(
 
 
 def add_lights(position: Array, normal: Array, packed: Packed, irradiance: Array) -> None:
-    """Add every light, uncut, to points in the order in which they are given.
+    """Add every packed light, uncut, to points (3, n) in their order; neighbours should follow each other.
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Points; neighbours should follow each other. Contiguous.
-    packed : Packed
-        Lights, in the same dtype.
-    irradiance : (3, n) ndarray
-        W/m^2; zeros, which are filled.
+    `irradiance` (3, n), W/m^2, holds zeros before.
     """
     if packed.diffuse.shape[1] > 1 and packed.spheres is not None:
         sum_spheres(position, normal, packed.diffuse, packed.spheres, None, irradiance)
@@ -101,12 +94,12 @@ def add_lights(position: Array, normal: Array, packed: Packed, irradiance: Array
 def checked(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None
 ) -> Packed:
-    """Check what a sum over pairs is given and pack its lights.
+    """Check the arguments of a sum over pairs and pack its lights.
 
     Parameters
     ----------
     receivers : Receivers
-        Points that are lit.
+        Points to light.
     lights : PixelLights
         Lights to sum.
     settings : PairSettings
@@ -127,7 +120,7 @@ def checked(
     _check(receivers, lights, settings, footprint)
     packed = pack(lights, settings, footprint, receivers.position.dtype)
     if packed.lobes is None:
-        skip("splat.lobes", "no pixel light is glossy")
+        skip("pairs.lobes", "no pixel light is glossy")
     return packed
 
 
@@ -137,12 +130,12 @@ def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, A
     Parameters
     ----------
     receivers : Receivers
-        Points that are lit.
+        Points to light.
     packed : Packed
         The lights; their number says how many pixels go at a time.
     add : callable
-        Given positions and normals (3, n) of receivers, their flat indices (n,) in the picture and zeros (3, n), to
-        which it adds. All but the last call have whole tiles.
+        Called with positions and normals (3, n) of receivers, their flat indices (n,) in the picture and zeros (3, n),
+        to which it adds. All but the last call have whole tiles.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""How much light a setting takes from a picture, told from some of its pixels.
+"""Share of light that a setting removes from a picture, estimated from some of its pixels.
 
-A clamp or a cut is a bias that no picture shows. The share it takes is that of two sums over the same lights, with the
-setting and without, at pixels that are the same in every run. Without a clamp a few near pairs hold much of the sum, so
-the share is as good as the sample: within 3 of 100 in the tests.
+A clamp or a cut is a bias that no picture shows. The share it removes is that of two sums over the same lights, with
+the setting and without, at pixels that are the same in every run. Without a clamp a few near pairs hold much of the
+sum, so the share is as good as the sample: within 3 of 100 in the tests.
 """
 
 import dataclasses
@@ -26,7 +26,7 @@ Array = npt.NDArray[Any]
 
 PAIRS = 1 << 20  # about as many are summed: a millisecond's work
 LEAST_SAMPLED = 2048  # pixels, however many lights there are
-LEAST_LOSS = 0.02  # share of the light below which a loss is not worth a warning
+LEAST_LOSS = 0.02  # share of the light below which a loss gives no warning
 
 
 class Sample(NamedTuple):
@@ -38,19 +38,10 @@ class Sample(NamedTuple):
 
 
 def sample_pixels(receivers: Receivers, count: int) -> Sample:
-    """Take pixels with a surface from all over a picture, the same ones in every run.
+    """Sample pixels with a surface from all over a picture, the same ones in every run.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    count : int
-        How many; all where there are fewer.
-
-    Returns
-    -------
-    Sample
-        One pixel out of each of `count` equal stretches of the picture's blocks, at van der Corput's place in it.
+    One out of each of `count` equal stretches of the picture's blocks, at van der Corput's place in it; all where there
+    are fewer.
     """
     places = block_by_block(np.asarray(receivers.covered, np.bool_))
     count = min(count, len(places))
@@ -67,46 +58,14 @@ def _van_der_corput(count: int) -> Array:
 
 
 def sample_for(receivers: Receivers, lights: "PixelLights", *, least: int = LEAST_SAMPLED) -> Sample:
-    """Take as many pixels of a picture as some lights allow: few lights cost little and leave a sum with high peaks.
-
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    lights : PixelLights
-        The lights that are summed there.
-    least : int
-        Pixels to take in any case.
-
-    Returns
-    -------
-    Sample
-        Of about PAIRS pairs.
-    """
+    """Sample about PAIRS / N pixels for N lights, at least `least`: few lights cost little and have high peaks."""
     return sample_pixels(receivers, max(least, PAIRS // max(1, lights.flux.shape[1])))
 
 
 def light_at(
     sample: Sample, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
 ) -> float:
-    """Return the mean over pixels and channels of the irradiance of all lights, uncut.
-
-    Parameters
-    ----------
-    sample : Sample
-        The pixels.
-    lights : PixelLights
-        Lights to sum.
-    settings : PairSettings
-        How one light lights one receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-
-    Returns
-    -------
-    float
-        W/m^2; 0 for no pixels.
-    """
+    """Return the mean irradiance (W/m^2) of all lights, uncut, over sampled pixels and channels; 0 for no pixels."""
     sums = np.zeros_like(sample.position)
     add_lights(sample.position, sample.normal, pack(lights, settings, footprint, sums.dtype), sums)
     return float(sums.mean(dtype=np.float64)) if sums.size else 0.0
@@ -116,7 +75,7 @@ def light_at(
 def clamp_loss(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
 ) -> float:
-    """Return the share of the light that a clamp takes from a picture; below 0 where it adds some.
+    """Return the share of the light that a clamp removes from a picture; below 0 where it adds some.
 
     Parameters
     ----------
@@ -140,44 +99,14 @@ def clamp_loss(
 
 
 def lost_share(whole: float, left: float) -> float:
-    """Return the share of some light that is lost.
-
-    Parameters
-    ----------
-    whole, left : float
-        The light without the setting and with it, in one unit.
-
-    Returns
-    -------
-    float
-        0 where there is no light.
-    """
+    """Return 1 - left / whole, two sums in one unit; 0 where there is no light."""
     return 1 - left / whole if whole > 0 else 0.0
 
 
 def warn_of_clamp(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None, method: str
 ) -> None:
-    """Warn where the clamp takes more than `LEAST_LOSS` of the light.
-
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    lights : PixelLights
-        Lights to sum.
-    settings : PairSettings
-        The clamp.
-    footprint : (N,) ndarray or None
-        Surface area each light stands for, m^2.
-    method : str
-        Whose setting it is.
-
-    Warns
-    -----
-    RefgiWarning
-        With setting and share.
-    """
+    """Warn where the clamp of a method removes more than `LEAST_LOSS` of the light of a picture."""
     if settings.clamp is not None and settings.clamps:
         value = getattr(settings.clamp, "value", None)
         warn_of_loss(clamp_loss(receivers, lights, settings, footprint),
@@ -185,19 +114,6 @@ def warn_of_clamp(
 
 
 def warn_of_loss(share: float, setting: str) -> None:
-    """Warn where a setting takes more than `LEAST_LOSS` of the light.
-
-    Parameters
-    ----------
-    share : float
-        What it takes.
-    setting : str
-        Method, key and value.
-
-    Warns
-    -----
-    RefgiWarning
-        With setting and share.
-    """
+    """Warn where `setting` (method, key and value) removes more than `LEAST_LOSS` of the light."""
     if share > LEAST_LOSS:
         warnings.warn(RefgiWarning(f"{setting} takes {100 * share:.0f} % of the indirect light"), stacklevel=3)

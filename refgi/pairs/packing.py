@@ -1,4 +1,4 @@
-"""Pixel lights as the arrays kernels read: offset, normals reversed, constants folded into the flux.
+"""Packing of pixel lights into the arrays that kernels read: offset, normals reversed, constants folded into flux.
 
 Everything is computed in float64 and rounded once, to the dtype of the receivers.
 """
@@ -44,24 +44,7 @@ class Packed(NamedTuple):
 
 
 def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None, dtype: npt.DTypeLike) -> Packed:
-    """Pack the lights that shine, each part for its kernel.
-
-    Parameters
-    ----------
-    lights : PixelLights
-        Lights.
-    settings : PairSettings
-        How one light lights one receiver.
-    footprint : (N,) ndarray or None
-        Surface area each light stands for, m^2.
-    dtype : dtype
-        Of the kernels.
-
-    Returns
-    -------
-    Packed
-        Without lights that have no flux.
-    """
+    """Pack the lights that have flux, each part for its kernel; `footprint` (N,) is the area each stands for, m^2."""
     shines: Array = (lights.flux != 0).any(axis=0)
     glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
     diffuse = pack_diffuse(lights, settings, dtype, shines)
@@ -79,24 +62,11 @@ def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None,
 
 
 def pack_diffuse(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:
-    """Pack lights for `sum_pairs`: offset position, reversed normal, flux / pi; then a black one.
+    """Pack the M chosen lights for `sum_pairs`, (9, M + 1): offset position, reversed normal, flux / pi.
 
-    Parameters
-    ----------
-    lights : PixelLights
-        Lights.
-    settings : PairSettings
-        Says offset and pi.
-    dtype : dtype
-        Of the result; computed in float64.
-    chosen : (N,) ndarray of bool
-        Which lights.
-
-    Returns
-    -------
-    (9, M + 1) ndarray
-        The M chosen lights and a black one.
+    The last one is black. Computed in float64.
     """
+    # Eq. (1), over pi unless as printed
     scale = 1.0 if "sii_no_pi" in settings.as_published else 1.0 / math.pi
     packed = np.concatenate([*_place(lights, settings, chosen), np.asarray(lights.flux[:, chosen], np.float64) * scale])
     packed = np.concatenate([packed, np.zeros((9, 1))], axis=1)
@@ -109,28 +79,15 @@ def _place(lights: "PixelLights", settings: PairSettings, chosen: Array) -> tupl
 
 
 def pack_lobes(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:
-    """Pack glossy lights for `add_lobes`: offset position, reversed normal, reversed axis, exponent, flux times norm.
+    """Pack the K chosen lights for `add_lobes`, (13, K): offset position, reversed normal and axis, P, flux times norm.
 
-    Parameters
-    ----------
-    lights : PixelLights
-        Lights.
-    settings : PairSettings
-        Says offset and norm.
-    dtype : dtype
-        Of the result; computed in float64.
-    chosen : (N,) ndarray of bool
-        Which lights.
-
-    Returns
-    -------
-    (13, M) ndarray
-        Packed lights.
+    Computed in float64.
     """
     flux, axis, exponent = _lobes(lights, chosen)
     cos_theta = (np.asarray(lights.normal[:, chosen], np.float64) * axis).sum(axis=0)
     norm = np.empty_like(exponent)
     _fill_norms(cos_theta, exponent, NORMS[settings.lobe.norm], norm)
+    # Eq. (3), the norm in the flux
     packed = np.concatenate([*_place(lights, settings, chosen), -axis, exponent[None], _finite(flux * norm, dtype)])
     return packed.astype(dtype, order="C")
 
@@ -154,26 +111,7 @@ def _lobes(lights: "PixelLights", chosen: Array) -> tuple[Array, Array, Array]:
 
 
 def pack_clamp(settings: PairSettings, footprint: Array | None, chosen: Array, count: int, dtype: Any) -> Clamp:
-    """Say for the kernels how near pairs are kept finite.
-
-    Parameters
-    ----------
-    settings : PairSettings
-        Says the mode and its value.
-    footprint : (N,) ndarray or None
-        Surface area each light stands for, m^2.
-    chosen : (N,) ndarray of bool
-        Which lights.
-    count : int
-        How many lights were packed.
-    dtype : dtype
-        Of the kernels.
-
-    Returns
-    -------
-    Clamp
-        With neutral values for the modes not in use.
-    """
+    """Pack the clamp of `count` packed lights, with neutral values for the modes not in use."""
     softness = np.zeros(count, dtype)
     mode = settings.clamp
     if isinstance(mode, DiscClamp) and footprint is not None:
@@ -184,24 +122,7 @@ def pack_clamp(settings: PairSettings, footprint: Array | None, chosen: Array, c
 
 
 def pack_spheres(scale: float, footprint: Array, chosen: Array, dtype: Any) -> Array:
-    """Size virtual spherical lights: pi r^2 is `scale` times the footprint.
-
-    Parameters
-    ----------
-    scale : float
-        Factor.
-    footprint : (N,) ndarray
-        Surface area each light stands for, m^2.
-    chosen : (N,) ndarray of bool
-        Which lights.
-    dtype : dtype
-        Of the kernels.
-
-    Returns
-    -------
-    (M,) ndarray
-        r^2 of the M chosen lights, m^2.
-    """
+    """Return r^2 (M,), m^2, of the chosen virtual spherical lights: pi r^2 is `scale` times the footprint (N,), m^2."""
     square: Array = footprint[chosen] * (scale / math.pi)
     return _finite(square, dtype).astype(dtype)
 
@@ -212,24 +133,7 @@ def _finite(values: Array, dtype: npt.DTypeLike) -> Array:
 
 
 def pack_widening(lights: "PixelLights", settings: PairSettings, dtype: Any, chosen: Array) -> Widening | None:
-    """Say for the kernels how exponents fall near the light (SII Sec. 3.3).
-
-    Parameters
-    ----------
-    lights : PixelLights
-        Lights.
-    settings : PairSettings
-        Says distance, slope and norm.
-    dtype : dtype
-        Of the kernels.
-    chosen : (N,) ndarray of bool
-        Which lights.
-
-    Returns
-    -------
-    Widening or None
-        None where exponents stay.
-    """
+    """Pack the widening of exponents near the chosen lights (SII Sec. 3.3); None where exponents stay."""
     if settings.lobe.widening == 0:
         return None
     _, axis, _ = _lobes(lights, chosen)

@@ -87,7 +87,7 @@ class Senders(NamedTuple):
     lobe_norm: Array  # (n or 0,) 1/sr
 
 
-@stage("shadowed.sum")
+@stage("pairs.shadowed_sum")
 def shadowed_sum(
     tracer: Tracer, to: RayReceivers, lights: "PixelLights", *, visibility: bool = True, batch: int = BATCH
 ) -> Array:

@@ -25,55 +25,21 @@ ROUNDING = 32.0  # units of rounding of |d| that a cosine computed from d may be
 
 
 def block_by_block(covered: Array) -> Array:
-    """Return the flat indices of covered pixels, block by block.
-
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-
-    Returns
-    -------
-    (n,) ndarray of int64
-        Indices.
-    """
+    """Return the flat indices of covered pixels (h, w), block by block, (n,) int64."""
     places = np.empty(covered.size, np.int64)
     count = _fill(covered, _path(), places)
     return places[:count]
 
 
 def taken(plane: Array, places: Array) -> Array:
-    """Return the values of three channels at some pixels.
-
-    Parameters
-    ----------
-    plane : (3, h, w) ndarray
-        Values.
-    places : (n,) ndarray of int64
-        Flat indices.
-
-    Returns
-    -------
-    (3, n) ndarray
-        The values there.
-    """
+    """Return the values of three channels (3, h, w) at pixels of flat indices (n,), (3, n)."""
     values = np.empty((3, len(places)), plane.dtype)
     _take(np.ascontiguousarray(plane).reshape(3, -1), places, values)
     return values
 
 
 def put(plane: Array, places: Array, values: Array) -> None:
-    """Store the values of three channels at some pixels.
-
-    Parameters
-    ----------
-    plane : (3, h, w) ndarray
-        Changed; contiguous.
-    places : (n,) ndarray of int64
-        Flat indices, each once.
-    values : (3, n) ndarray
-        What to store.
-    """
+    """Store the values (3, n) of three channels at pixels of distinct flat indices (n,) of a contiguous plane."""
     _put(values, places, plane.reshape(3, -1))
 
 

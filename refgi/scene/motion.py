@@ -203,7 +203,24 @@ def near_origin(scene: Scene) -> tuple[Scene, Vector]:
 
 @stage("scene.move")
 def _moved_geometry(geometry: Geometry, origin: Vector) -> Geometry:
-    """Subtract `origin`; a stage, so that frames of an animation go on sharing one geometry."""
+    """Move triangles so that `origin` becomes the origin.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    origin : tuple of 3 floats
+        World space, m.
+
+    Returns
+    -------
+    Geometry
+        The moved triangles.
+
+    Notes
+    -----
+    A stage, so that frames of an animation go on sharing one geometry.
+    """
     return dataclasses.replace(geometry, vertices=np.asarray(geometry.vertices, np.float64) - origin)
 
 

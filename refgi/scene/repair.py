@@ -94,7 +94,7 @@ def warn_of_unit(geometry: Geometry, where: str) -> None:
     `where`: the file they came from.
     """
     if not SMALLEST_USUAL <= geometry.diagonal <= LARGEST_USUAL:
-        text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are read as metres. If the file has another unit "
+        text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are taken as metres. If the file has another unit "
                 "of s metres, scale its objects in a scene file: \"transform\": "
                 "[s, 0, 0, 0,  0, s, 0, 0,  0, 0, s, 0,  0, 0, 0, 1], such as s = 0.001 for millimetres")
         warnings.warn(RefgiWarning(text), stacklevel=4)

@@ -62,7 +62,8 @@ def replaced(settings: S, values: Mapping[str, Any]) -> S:
     found: dict[str, Any] = {}
     for key, value in values.items():
         try:
-            found |= _shared(settings, key, value, values) or {find_key(settings, key).key: value}
+            shared = _shared(settings, key, value, values)
+            found |= {find_key(settings, key).key: value} if shared is None else shared
         except InputError as error:
             errors.append(error)
     made: S = _rebuilt(settings, _nested(found), "", errors)
@@ -70,14 +71,14 @@ def replaced(settings: S, values: Mapping[str, Any]) -> S:
     return made
 
 
-def _shared(settings: Settings, key: str, value: Any, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a key sets that is meant for every part of a tree: the seed, and printed forms."""
+def _shared(settings: Settings, key: str, value: Any, values: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return what a key sets that is meant for every part of a tree, the seed or printed forms; None for other keys."""
     if key == PRINTED and not any(other.endswith(f".{PRINTED}") for other in values):
         return _printed_forms(settings, value)
     if key == SEED and not any(other.endswith(f".{SEED}") for other in values):
         return {leaf.key: value for leaf in leaves(type(settings)) if leaf.key.rpartition(".")[2] == SEED
-                and leaf.key in flat(settings)}
-    return {}
+                and leaf.key in flat(settings)} or None
+    return None
 
 
 def _printed_forms(settings: Settings, names: Any) -> dict[str, Any]:

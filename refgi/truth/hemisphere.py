@@ -101,21 +101,9 @@ def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, 
            shadows: Shadows) -> None:
     """Next-event estimation: write the shadow ray from each hit point to one light, and its contribution.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        The scene.
-    lights : LightTable
-        The lights, float64.
-    k : int
-        Which light.
-    limits : tuple of 3 floats
-        Bound on G in units of 1 / footprint (0: none), measure of one light direction (sr or m^2), and the
-        tracer's grain: how far rays start above faces (m).
-    paths : Paths
-        What was found.
-    shadows : Shadows
-        Origins, directions, reach and contribution are filled; the reach is 0 where nothing contributes.
+    `limits`: bound on G in units of 1 / footprint (0: none), measure of one light direction (sr or m^2), and the
+    tracer's grain: how far rays start above faces (m). `shadows`: origins, directions, reach and contribution are
+    filled; the reach is 0 where nothing contributes.
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):

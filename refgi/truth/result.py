@@ -38,15 +38,7 @@ class Moments(NamedTuple):
 def no_passes(values: int) -> Moments:
     """Return the moments of no passes.
 
-    Parameters
-    ----------
-    values : int
-        How many values a pass has.
-
-    Returns
-    -------
-    Moments
-        All zero.
+    `values`: how many values a pass has.
     """
     return Moments(np.zeros((), np.int64), np.zeros((3, values)), np.zeros((3, values)), np.zeros(values, np.int64))
 
@@ -54,12 +46,7 @@ def no_passes(values: int) -> Moments:
 def add_pass(moments: Moments, values: Array) -> None:
     """Add one pass to the moments (Welford).
 
-    Parameters
-    ----------
-    moments : Moments
-        Updated.
-    values : (3, n) float64 ndarray
-        What the pass found, W/m^2.
+    `values` (3, n) float64: what the pass found, W/m^2.
     """
     moments.passes[...] += 1
     finite = np.asarray(np.isfinite(values).all(axis=0))
@@ -70,17 +57,8 @@ def add_pass(moments: Moments, values: Array) -> None:
 def blocks_of(pixel: Array, shape: tuple[int, ...]) -> tuple[Array, tuple[int, int]]:
     """Return which block of 8 x 8 pixels each pixel lies in.
 
-    Parameters
-    ----------
-    pixel : (r,) ndarray
-        Flat indices into the picture.
-    shape : tuple of 2 ints
-        Rows and columns of the picture.
-
-    Returns
-    -------
-    (r,) ndarray, tuple of 2 ints
-        Flat index of each pixel's block, and rows and columns of blocks.
+    `pixel` (r,): flat indices into the picture. `shape`: rows and columns of the picture. Returns (r,), tuple of 2
+    ints: flat index of each pixel's block, and rows and columns of blocks.
     """
     rows, columns = (-(-size // BLOCK_SIDE) for size in shape)
     return pixel // shape[1] // BLOCK_SIDE * columns + pixel % shape[1] // BLOCK_SIDE, (rows, columns)
@@ -89,20 +67,9 @@ def blocks_of(pixel: Array, shape: tuple[int, ...]) -> tuple[Array, tuple[int, i
 def with_means(values: Array, block: Array, blocks: int) -> Array:
     """Append the means over blocks and over all receivers.
 
-    Parameters
-    ----------
-    values : (3, r) float64 ndarray
-        Irradiance of a pass, W/m^2.
-    block : (r,) int ndarray
-        Which block each receiver counts for.
-    blocks : int
-        How many there are.
-
-    Returns
-    -------
-    (3, r + blocks + 1) ndarray
-        The values, the means of the finite ones over each block and over all: 0 without
-        receivers, NaN where none is finite.
+    `values` (3, r) float64: irradiance of a pass, W/m^2. `block` (r,) int: which block each receiver counts for.
+    `blocks`: how many there are. Returns (3, r + blocks + 1): the values, the means of the finite ones over each block
+    and over all: 0 without receivers, NaN where none is finite.
     """
     finite = np.isfinite(values).all(axis=0)
     block, doubled = np.append(block, np.full(len(block), blocks)), np.tile(values, 2)  # the picture is one block more
@@ -211,23 +178,9 @@ def result_of(moments: Moments, pixel: Array, shape: tuple[int, ...], blocks: tu
               per_pass: int) -> TruthResult:
     """Return moments as pictures.
 
-    Parameters
-    ----------
-    moments : Moments
-        Of receivers, blocks and picture.
-    pixel : (r,) ndarray
-        Flat index of each receiver into the picture.
-    shape : tuple of 2 ints
-        Rows and columns of the picture.
-    blocks : tuple of (r,) ndarray and tuple of 2 ints
-        Block of each receiver; rows and columns of blocks.
-    per_pass : int
-        Samples of each receiver in a pass.
-
-    Returns
-    -------
-    TruthResult
-        Zero without surface.
+    `moments`: of receivers, blocks and picture. `pixel` (r,): flat index of each receiver into the picture. `shape`:
+    rows and columns of the picture. `blocks`: block of each receiver; rows and columns of blocks. `per_pass`: samples
+    of each receiver in a pass.
     """
     (block, grid), r = blocks, len(pixel)
     mean, variance = np.zeros((3, *shape)), np.zeros((3, *shape))

@@ -167,23 +167,8 @@ def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_
             settings: TruthSettings) -> Task:
     """Prepare the inputs of every pass.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    tracer : Tracer
-        Its rays.
-    position, normal : (3, h, w) ndarray
-        The G-buffer's, world space.
-    triangle_id : (h, w) int ndarray
-        Which triangle each pixel sees; -1 for none.
-    settings : TruthSettings
-        How.
-
-    Returns
-    -------
-    Task
-        With the densities that the pilot found.
+    `position`, `normal` (3, h, w): the G-buffer's, world space. `triangle_id` (h, w) int: which triangle each pixel
+    sees; -1 for none. Result: with the densities that the pilot found.
     """
     points = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
     set_of = sets_of(points.pixel, triangle_id.shape[1], settings.interleave)

@@ -22,7 +22,7 @@ VIEW = ["--eye", "0.278,0.3,-0.7", "--vfov-deg", "43.7", "--light",
 SETTINGS = {
     "sii": ["lights=24", "pattern=halton", "seed=3"],
     "multires": ["lights=49", "coarsest=8", "normal_threshold=0.3"],
-    "val": ["lights=32", "area_lights=3", "map_resolution=16", "near_distance=0.35"],
+    "val": ["lights=32", "clusters.count=3", "maps.resolution=16", "near_distance=0.35"],
     "hssil": ["samples=8", "levels=3", "radius=none", "depth_sigma=0.03"],
     "gather": ["samples=24", "radius=0.2", "seed=5"],
     "vpl": ["lights=8", "seed=2"],

@@ -186,9 +186,9 @@ def test_explain_shows_the_four_rows_of_table_1(evidence):
     told = json.loads(run("explain", "cornell_box", *TINY, "--set", "lights=16", "--json").stdout)
     rows = told["animation"]
     assert set(rows["light and camera still"].values()) <= {"reused", "skipped"}
-    assert rows["light and camera still"]["splat.irradiance"] == "reused"
+    assert rows["light and camera still"]["pairs.sum"] == "reused"
     assert rows["camera moves"]["rsm.reflective_shadow_map"] == "reused"
-    assert rows["camera moves"]["splat.irradiance"] == "runs"
+    assert rows["camera moves"]["pairs.sum"] == "runs"
     assert rows["light moves"]["rsm.gbuffer"] == "reused"
     assert rows["light moves"]["rsm.reflective_shadow_map"] == "runs"
     assert {rows["light and camera move"][stage] for stage in ("rsm.gbuffer", "rsm.reflective_shadow_map")} == {"runs"}
@@ -218,7 +218,7 @@ def test_explain_warns_of_the_frame_asked_for_alone(tmp_path):
 
 def test_explain_refuses_maps_that_do_not_fit(monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
-    told = run("explain", "cornell_box", *TINY, "--method", "val", "--set", "map_resolution=4096")
+    told = run("explain", "cornell_box", *TINY, "--method", "val", "--set", "maps.resolution=4096")
     assert told.exit_code == 2
     assert "for the settings of val" in told.stderr
 

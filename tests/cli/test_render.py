@@ -97,7 +97,7 @@ def test_json_is_the_only_thing_on_stdout(tmp_path):
     assert content["files"] == [str(tmp_path / "a.exr")]
     assert content["non_finite_pixels"] == 0
     assert content["warnings"] == []
-    assert {"rsm.gbuffer", "splat.irradiance"} <= {line["name"] for line in content["stages"]}
+    assert {"rsm.gbuffer", "pairs.sum"} <= {line["name"] for line in content["stages"]}
 
 
 def test_float64_and_threads(tmp_path):
@@ -169,9 +169,10 @@ def test_a_size_that_does_not_fit_is_refused_with_both_figures(tmp_path, monkeyp
 
 @pytest.mark.usefixtures("never_computes")
 @pytest.mark.parametrize("how", [
-    ("map_resolution=4096", "area_lights=30"), ("map_resolution=4096", "area_lights=1", "terms=64"),
-    ("map_resolution=2048", "area_lights=40", "behind=dual_paraboloid"), ("pattern=all", "area_lights=5000"),
-    ("map_resolution=4096", "area_lights=2", "prefilter=sat"), ("target_error=0.1", "map_resolution=1024"),
+    ("maps.resolution=4096", "clusters.count=30"), ("maps.resolution=4096", "clusters.count=1", "terms=64"),
+    ("maps.resolution=2048", "clusters.count=40", "behind=dual_paraboloid"), ("pattern=all", "clusters.count=5000"),
+    ("maps.resolution=4096", "clusters.count=2", "prefilter=brute"),
+    ("clusters=adaptive", "target_error=0.1", "maps.resolution=1024"),
 ], ids=str)
 def test_maps_of_area_lights_that_do_not_fit_are_refused(how, tmp_path, monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 2 * 10**9)
@@ -180,7 +181,9 @@ def test_maps_of_area_lights_that_do_not_fit_are_refused(how, tmp_path, monkeypa
                    "for the settings of val", "2,000,000,000 are available")
 
 
-@pytest.mark.parametrize("how", [{}, {"map_resolution": 4096, "visibility": "members"}, {"target_error": 0.1}], ids=str)
+@pytest.mark.parametrize("how", [{}, {"maps.resolution": 4096, "visibility": "rays_vpls"},
+                                 {"clusters": "adaptive", "target_error": 0.1}],
+                         ids=str)
 def test_what_fits_is_not_refused_for_its_maps(how, monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
     scene = load_scene("cornell_box").with_camera(width=24, height=24)

@@ -1,12 +1,11 @@
 """As many area lights as an error asks for: the estimate is the picture's error, and more are taken for less of it."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from refgi.cluster.adaptive import Trial, _judge, _seek, enough_area_lights
+from refgi.cluster.adaptive import Trial, _double_and_step_back, _estimate, count_for_error
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError, RefgiWarning
@@ -15,10 +14,10 @@ from refgi.lights.selection import choose_lights
 from refgi.pairs.irradiance import Receivers
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.truth.vpl import VplSettings, vpl
 
-SETTINGS = of(ValSettings, lights=96, map_resolution=64, target_error=0.1)
+SETTINGS = of(ValSettings, lights=96, maps_resolution=64, clusters="adaptive", target_error=0.1)
 ROUNDING = 1e-4  # of the error: float32 sums, and rays that graze an edge from either way of setting them up
 
 
@@ -29,13 +28,13 @@ def frame():
 
 @pytest.fixture(scope="module")
 def lights(frame):
-    return choose_lights(frame, SETTINGS)
+    return choose_lights(frame, SETTINGS.lights)
 
 
 def error_of_picture(frame, lights, areas, maps, settings):
     """RMSE over the mean against a shadow ray for each light, over all pixels."""
     buffer = frame.gbuffer
-    exact = vpl(frame, of(VplSettings, lights=settings.lights)).astype(np.float64)
+    exact = vpl(frame, of(VplSettings, lights=settings.lights.count)).astype(np.float64)
     facing = facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)
     made = clustered_irradiance(Receivers(buffer.position, buffer.normal, buffer.covered), facing, lights, areas, maps,
                                 settings)
@@ -47,8 +46,8 @@ def error_of_picture(frame, lights, areas, maps, settings):
 def test_a_lower_target_takes_more_area_lights_and_is_met(frame, lights, evidence):
     chosen = []
     for target in (0.3, 0.1, 0.04):
-        settings = dataclasses.replace(SETTINGS, target_error=target)
-        found = enough_area_lights(frame, lights, settings)
+        settings = replaced(SETTINGS, {"target_error": target})
+        found = count_for_error(frame, lights, settings)
         error = error_of_picture(frame, lights, found.areas, found.maps, settings)
         # 32 x 32 pixels are all looked at: the estimate is the picture's error
         assert error == pytest.approx(found.error, rel=ROUNDING)
@@ -64,7 +63,7 @@ def test_a_sample_of_the_pixels_bounds_the_error_of_all(frame, lights, monkeypat
     monkeypatch.setattr("refgi.cluster.adaptive.SAMPLES", 200)
     met, figures = 0, []
     for seed in range(4):
-        found = enough_area_lights(frame, lights, dataclasses.replace(SETTINGS, target_error=0.3, seed=seed))
+        found = count_for_error(frame, lights, replaced(SETTINGS, {"target_error": 0.3, "seed": seed}))
         error = error_of_picture(frame, lights, found.areas, found.maps, SETTINGS)
         trial = found.trail[-1]
         met += error <= trial.bound
@@ -77,13 +76,13 @@ def test_a_sample_of_the_pixels_bounds_the_error_of_all(frame, lights, monkeypat
 def test_what_cannot_be_reached_comes_as_near_as_it_can(frame, lights):
     total = lights.position.shape[1]
     with pytest.warns(RefgiWarning, match=f"of {total} come nearest"):
-        found = enough_area_lights(frame, lights, dataclasses.replace(SETTINGS, target_error=1e-4))
+        found = count_for_error(frame, lights, replaced(SETTINGS, {"target_error": 1e-4}))
     assert [trial.area_lights for trial in found.trail] == [1, 2, 4, 8, 16, 32, 64, total]
     assert found.error == min(trial.error for trial in found.trail)
 
 
 def test_reruns_are_the_same_bits(frame, lights):
-    runs = [enough_area_lights(frame, lights, dataclasses.replace(SETTINGS, target_error=0.2)) for _ in range(2)]
+    runs = [count_for_error(frame, lights, replaced(SETTINGS, {"target_error": 0.2})) for _ in range(2)]
     assert runs[0].trail == runs[1].trail
     np.testing.assert_array_equal(runs[0].areas.of, runs[1].areas.of)
     np.testing.assert_array_equal(runs[0].maps.depth, runs[1].maps.depth)
@@ -91,22 +90,22 @@ def test_reruns_are_the_same_bits(frame, lights):
 
 def test_the_settings_of_the_picture_are_those_of_the_trials(frame, lights):
     trails = {}
-    for key, value in (("behind", "visible"), ("behind", "raytrace"), ("visibility", "members"), ("clamp", "disc")):
-        settings = dataclasses.replace(SETTINGS, **{key: value})
-        trails[value] = [trial.error for trial in enough_area_lights(frame, lights, settings).trail]
+    for key, value in (("behind", "visible"), ("behind", "raytrace"), ("visibility", "rays_vpls"), ("clamp", "disc")):
+        settings = replaced(SETTINGS, {key: value})
+        trails[value] = [trial.error for trial in count_for_error(frame, lights, settings).trail]
     usual = trails.pop("visible")
     assert all(trail != usual for trail in trails.values())
-    assert trails["members"][0] < usual[0]  # the share of the lights seen, weighed by flux, is nearer than any map
+    assert trails["rays_vpls"][0] < usual[0]  # the share of the lights seen, weighed by flux, is nearer than any map
 
 
 def test_a_target_is_needed(frame, lights):
-    with pytest.raises(InputError, match="target_error: expected"):
-        enough_area_lights(frame, lights, dataclasses.replace(SETTINGS, target_error=None))
+    with pytest.raises(InputError, match="clusters: expected adaptive"):
+        count_for_error(frame, lights, replaced(SETTINGS, {"clusters": "fixed"}))
 
 
 def test_no_light_has_no_error(frame, lights):
     dark = lights._replace(position=lights.position[:, :0], normal=lights.normal[:, :0], flux=lights.flux[:, :0])
-    found = enough_area_lights(frame, dark, SETTINGS)
+    found = count_for_error(frame, dark, SETTINGS)
     assert found.error == 0
     assert found.areas.delta.shape == (0,)
 
@@ -127,7 +126,7 @@ class Known:
     (0.01, [1, 2, 4, 8, 16, 32, 50], 50)])  # fmt: skip
 def test_doubling_and_one_step_back(target, tried, best):
     attempt = Known()
-    found, trail = _seek(attempt, 50, target)
+    found, trail = _double_and_step_back(attempt, 50, target)
     assert attempt.tried == tried == [trial.area_lights for trial in trail]
     assert found.trial.area_lights == best
 
@@ -138,10 +137,10 @@ def test_the_error_of_known_differences():
 
     exact = np.full((3, 4), 2.0)
     made = exact + np.array([1.0, -1.0, 1.0, -1.0])
-    assert _judge(made, samples(exact, 1.0), 5) == Trial(5, 0.5, 0.5)
+    assert _estimate(made, samples(exact, 1.0), 5) == Trial(5, 0.5, 0.5)
     half = exact + np.array([2.0, 0.0, 0.0, 0.0])  # squares 4, 0, 0, 0: mean 1, standard deviation 2
-    trial = _judge(half, samples(exact, 0.5), 5)
+    trial = _estimate(half, samples(exact, 0.5), 5)
     assert trial.error == 0.5
     assert trial.bound == pytest.approx(math.sqrt(1 + 1.645 * 2 * math.sqrt(0.5 / 4)) / 2)
-    assert _judge(made, samples(np.zeros((3, 4)), 1.0), 5).error == math.inf
-    assert _judge(exact, samples(exact, 1.0), 5).error == 0.0
+    assert _estimate(made, samples(np.zeros((3, 4)), 1.0), 5).error == math.inf
+    assert _estimate(exact, samples(exact, 1.0), 5).error == 0.0

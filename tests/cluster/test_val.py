@@ -5,23 +5,30 @@ import dataclasses
 import numpy as np
 import pytest
 
-from refgi.cluster import ValSettings, val
+from refgi.cluster import PRESETS, ValSettings, val
+from refgi.cluster.settings import GeometryBlur
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
 from refgi.stages import observe
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
-SMALL = {"lights": 64, "area_lights": 6, "map_resolution": 32}
-TO_AN_ERROR = {"area_lights": 30, "target_error": 0.3}  # the number is left as it is where an error finds it
+SMALL = {"lights": 64, "maps_resolution": 32}
+TO_AN_ERROR = {"clusters": "adaptive", "target_error": 0.3}
 SUM = {np.float32: 2e-6, np.float64: 1e-12}  # another order of summation, relative to the brightest pixel
 # a moved or scaled scene: lights beside a texel's border may take its neighbour's depth; away from those it is rounding
 SCALED = 1e-5
+
+
+def small(how):
+    """Few lights, few area lights and small maps."""
+    number = {} if how.get("clusters") == "adaptive" else {"clusters_count": 6}
+    return of(ValSettings, **SMALL | number | how)
 
 
 def frame(name="cornell_sphere:faces=400", width=33, height=27, **options):
@@ -37,8 +44,8 @@ def test_it_is_in_the_table_of_methods(ball):
     method = find_method("val")
     function, settings = method.function, method.settings
     assert (function, settings) == (val, ValSettings)
-    picture = render(ball.scene, "val", of(ValSettings, **SMALL), width=33, height=27, rsm_resolution=64)
-    np.testing.assert_array_equal(picture.irradiance, val(ball, of(ValSettings, **SMALL)))
+    picture = render(ball.scene, "val", small({}), width=33, height=27, rsm_resolution=64)
+    np.testing.assert_array_equal(picture.irradiance, val(ball, small({})))
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -46,7 +53,7 @@ def test_it_is_in_the_table_of_methods(ball):
 def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
     """Oracle: `sii` without a cut, at equal lights."""
     at = frame(dtype=dtype)
-    plain = val(at, of(ValSettings, visibility="none", **SMALL))
+    plain = val(at, small({"visibility": "none"}))
     full = sii(at, of(SiiSettings, lights=64))
     off = np.abs(plain - full).max() / full.max()
     assert off <= SUM[dtype]
@@ -54,18 +61,17 @@ def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
 
 
 @pytest.mark.parametrize("how", [
-    {}, {"visibility": "step"}, {"visibility": "hard"}, {"visibility": "members"}, {"visibility": "rectangle"},
-    {"visibility": "back_projection"}, {"prefilter": "sat"}, {"prefilter": "brute"}, {"interleaving": 4},
+    {}, {"visibility": "pcss"}, {"visibility": "hard"}, {"visibility": "rays_vpls"}, {"visibility": "rays_rectangle"},
+    {"visibility": "back_projection"}, {"visibility": "pcf"}, {"prefilter": "brute"}, {"interleaving": 4},
     {"quantisation": "published"}, {"behind": "dual_paraboloid"}, {"behind": "raytrace"}, {"clamp": "disc"},
-    {"single_light": "footprint"}, {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"maps": "rays"},
+    {"single_light": "footprint"}, {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"renderer": "rays"},
     TO_AN_ERROR, {"distance": "raw"}, {"distance": "squared"}, {"axes": "pca"}, {"axes": "min_area"},
     {"as_published": ("val_alpha", "val_search_solid_angle")}, {"as_published": ("val_alpha_over_pi",)},
 ], ids=str)
 def test_every_setting_gives_a_picture_between_darkness_and_the_unshadowed(ball, how):
-    settings = of(ValSettings, **SMALL | how)
+    settings = small(how)
     light = val(ball, settings)
-    most = val(ball, dataclasses.replace(settings, visibility="none", behind="visible", target_error=None,
-                                         interleaving=settings.interleaving))
+    most = val(ball, replaced(settings, {"visibility": "none", "behind": "visible", "clusters": "fixed"}))
     covered = ball.gbuffer.covered
     assert light.shape == (3, 27, 33)
     assert light.dtype == np.float32
@@ -78,7 +84,7 @@ def test_every_setting_gives_a_picture_between_darkness_and_the_unshadowed(ball,
 
 @pytest.mark.feature("REF-19")
 def test_threads_change_no_bit(evidence):
-    settings = of(ValSettings, interleaving=4, **SMALL)
+    settings = small({"interleaving": 4})
     pictures = []
     for count in (1, 2):
         with threads(count):
@@ -89,7 +95,7 @@ def test_threads_change_no_bit(evidence):
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (5, 1), (17, 9)])
 def test_pictures_of_any_size(size):
-    light = val(frame(width=size[0], height=size[1]), of(ValSettings, interleaving=8, **SMALL))
+    light = val(frame(width=size[0], height=size[1]), small({"interleaving": 8}))
     assert light.shape == (3, size[1], size[0])
     assert np.isfinite(light).all()
 
@@ -104,8 +110,8 @@ def test_the_unit_of_length_does_not_matter(ball, scale):
     light = dataclasses.replace(scene.lights[0], position=tuple(scale * np.array(scene.lights[0].position)))
     large = Frame(dataclasses.replace(scene, geometry=shape, camera=camera, lights=(light,)), width=33, height=27,
                   rsm_resolution=64)
-    expected = val(ball, of(ValSettings, **SMALL)).astype(float)
-    got = val(large, of(ValSettings, **SMALL)).astype(float) * scale**2
+    expected = val(ball, small({})).astype(float)
+    got = val(large, small({})).astype(float) * scale**2
     off = np.abs(got - expected).max(axis=0)
     assert np.median(off) <= SCALED * expected.max()
     assert (off > SCALED * expected.max()).mean() < 0.01
@@ -115,43 +121,59 @@ def test_a_light_that_hits_nothing_gives_darkness(ball):
     light = dataclasses.replace(ball.scene.lights[0], position=(0.0, 1e4, 0.0), direction=(0.0, 1.0, 0.0))
     dark = Frame(ball.scene.with_lights(light), width=9, height=9, rsm_resolution=16)
     for how in ({}, {"interleaving": 8}, TO_AN_ERROR):
-        assert not val(dark, of(ValSettings, **SMALL | how)).any()
+        assert not val(dark, small(how)).any()
 
 
 def test_more_area_lights_than_lights_are_hard_shadows_of_each(ball):
-    each = val(ball, of(ValSettings, **SMALL | {"area_lights": 1000}))
-    hard = val(ball, of(ValSettings, **SMALL | {"area_lights": 64, "visibility": "hard"}))
+    each = val(ball, small({"clusters_count": 1000}))
+    hard = val(ball, small({"clusters_count": 64, "visibility": "hard"}))
     np.testing.assert_array_equal(each, hard)
 
 
 def test_what_is_not_needed_does_not_run(ball):
     """Full sums are not blurred, visibility by rays draws no maps, an empty convex room neither."""
     with observe() as log:
-        val(ball, of(ValSettings, **SMALL))
+        val(ball, small({}))
     assert log.status("cluster.blur") == ["skipped"]
     assert log.status("cluster.adaptive") == ["skipped"]
     with observe() as log:
-        val(ball, of(ValSettings, visibility="none", **SMALL))
+        val(ball, small({"visibility": "none"}))
     assert log.status("cluster.shadow_maps") == ["skipped"]
 
 
+IN = {"target_error": {"clusters": "adaptive"}, "cone": {"visibility": "pcss"}, "texels": {"visibility": "pcf"},
+      "constant_bias_value": {"visibility": "pcss", "constant_bias": "constant_bias"}}  # choices that have a setting
+
+
 @pytest.mark.parametrize(("key", "value"), [
-    ("area_lights", 0), ("area_lights", 1.5), ("terms", 0), ("terms", 65), ("map_resolution", 0), ("rounds", 0),
+    ("constant_bias_value", 0.3), ("clusters_count", 0), ("clusters_count", 1.5),
+    ("terms", 0), ("terms", 65), ("maps_resolution", 0), ("rounds", 0),
     ("distance", "euclid"), ("visibility", "soft"), ("prefilter", "gauss"), ("bias", -0.1), ("bias", float("nan")),
-    ("position_weight", -1), ("normal_weight", float("inf")), ("attenuation", -1), ("interleaving", 0),
-    ("interleaving", 65), ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0), ("target_error", float("nan")),
+    ("position_weight", -1), ("normal_weight", float("inf")), ("attenuation", -1), ("interleaving_block", 0),
+    ("interleaving_block", 65), ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0),
+    ("target_error", float("nan")),
     ("position_weight", "much"), ("bias", "some"), ("cone", None), ("occluders_alone", "no"), ("near_distance", -1),
-    ("as_published", {"val_beta"}), ("dealing", "cards"), ("behind", "mirror"), ("near_geometry", "some"),
-    ("axes", "x"), ("extent", "area")])
+    ("as_published", {"val_beta"}), ("assignment", "cards"), ("texels", 4), ("texels", 0),
+    ("behind", "mirror"), ("near_geometry", "some"),
+    ("axes", "x"), ("area_extent", "area"), ("clusters", "many"), ("renderer", "gpu")])
 def test_a_setting_that_cannot_be_is_named(key, value):
-    with pytest.raises(InputError, match=key):
-        of(ValSettings, **{key: value})
+    with pytest.raises(InputError, match=rf"{key.rpartition('_')[2]}: expected"):
+        of(ValSettings, **IN.get(key, {}) | {key: value})
 
 
 @pytest.mark.parametrize(("key", "how"), [
     ("single_light", {"single_light": "footprint", "source": "walk"}),
-    ("area_lights", {"area_lights": 12, "target_error": 0.1}),
-    ("visibility", {"visibility": "none", "target_error": 0.1})])
+    ("clusters.count", {"clusters": "adaptive", "count": 12}), ("clusters.target_error", {"target_error": 0.1}),
+    ("visibility.terms", {"visibility": "pcss", "terms": 4}), ("blur.extent", {"blur": "box", "blur_extent": 0.1}),
+    ("visibility", {"visibility": "none", "clusters": "adaptive"})])
 def test_settings_that_do_not_go_together_are_refused(key, how):
     with pytest.raises(InputError, match=key):
         of(ValSettings, **how)
+
+
+def test_the_preset_of_the_paper_has_the_printed_values(ball):
+    paper = PRESETS["paper"]
+    assert (paper.lights.count, paper.clusters.count, paper.visibility.terms) == (1024, 30, 4)
+    assert (paper.maps.resolution, paper.interleaving.block, paper.blur) == (256, 8, GeometryBlur(0.1, 0.8))
+    assert paper.as_published == ValSettings.SWITCHES
+    assert np.isfinite(val(ball, replaced(paper, SMALL))).all()

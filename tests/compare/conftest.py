@@ -59,8 +59,8 @@ def make_comparison(scene, height=36, width=48):
     variance = (0.02 * ideal) ** 2
     noisy = ideal + rng.standard_normal(ideal.shape) * np.sqrt(variance)
     brighter = noisy * 1.3
-    runs = (Run("rsm", "ran", 0.012, 0), Run("splat.irradiance", "ran", 0.2, 1),
-            Run("splat.lobes", "skipped", reason="no glossy material"))
+    runs = (Run("rsm", "ran", 0.012, 0), Run("pairs.sum", "ran", 0.2, 1),
+            Run("pairs.lobes", "skipped", reason="no glossy material"))
     samples = np.full((height, width), 64)
     references = {name: Reference(name, Knobs(), mean, variance, np.full(3, 4e-6), samples, mean / 4, 2.5, runs,
                                   estimate={"estimate": {"passes": 2}})

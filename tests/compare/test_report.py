@@ -97,7 +97,7 @@ def test_noise_is_marked_and_errors_are_not(html):
 
 def test_stages_settings_and_reasons_are_told(html):
     text = " ".join(Outline(html).text)
-    for said in ("splat.irradiance", "no glossy material", "pattern", "grid", "truth without visibility"):
+    for said in ("pairs.sum", "no glossy material", "pattern", "grid", "truth without visibility"):
         assert said in text
 
 

@@ -180,7 +180,7 @@ def test_a_grid_that_is_rounded_is_logged_with_the_number_used():
     with observe() as log:
         choose_pixel_lights([box_map(), box_map(16)], count=32, pattern="grid")
         choose_pixel_lights([box_map(), box_map(16)], count=256, pattern="grid")
-    assert [run.reason for run in log.runs if run.name == "rsm.grid_cells"] == [
+    assert [run.reason for run in log.runs if run.name == "lights.grid_cells"] == [
         "242 texels for 256: n x n on each map of 2 lights"]
 
 

@@ -193,7 +193,7 @@ def test_without_glass_the_map_comes_back_itself():
     with observe() as log:
         assert refracted(rsm, geometry, table) is rsm
         assert refracted(rsm, geometry, table, "two_interface") is rsm  # asks for no tracer
-    assert [(run.name, run.status) for run in log.runs] == 2 * [("rsm.refraction", "skipped")]
+    assert [(run.name, run.status) for run in log.runs] == 2 * [("lights.refraction", "skipped")]
     roofed = glass_ball(rectangle((-2, 1, 2), (4, 0, 0), (0, 0, -4), WHITE, "roof"))
     rsm, glass = through(roofed, DOWN, "back_face")
     assert glass is rsm  # the light sees no glass

@@ -276,8 +276,26 @@ def hard(area, seen, x, facing):
     return 0.0 if before and is_blocked(area, seen, x, facing, row, column) else 1.0
 
 
-def step(area, seen, x, facing, cone=True):
-    """Return V by the true step: search, mean depth of blockers, share of the final disc that is free."""
+def pcf(area, seen, x, facing, texels):
+    """Return the share of texels x texels around the one that x falls into that do not hide x."""
+    if is_behind(area, x):
+        return 1.0
+    n, half = len(seen.depth), texels // 2
+    s, t, _ = disc_of_cone(area, x, 0.0)
+    own = nearest_texel(n, s, t)
+    tested, blocked = 0, 0
+    for row in range(own[0] - half, own[0] + half + 1):
+        for column in range(own[1] - half, own[1] + half + 1):
+            a, b = texel_place(n, row, column)
+            if 0 <= row < n and 0 <= column < n and ((row, column) == own or a * a + b * b <= 1):
+                before = seen.depth[row][column] < length(minus(x, area.center)) * (1 - SLACK)
+                tested += 1
+                blocked += before and is_blocked(area, seen, x, facing, row, column)
+    return 1 - blocked / tested
+
+
+def pcss(area, seen, x, facing, cone=True):
+    """Return V by depth tests of texels: search, mean depth of blockers, share of the final disc that is free."""
     d = length(minus(x, area.center))
     if is_behind(area, x) or seen.near >= d:
         return 1.0
@@ -339,7 +357,7 @@ def off_scale(t, seen, kind, bias):
     return seen.near + t / top * (far - seen.near)
 
 
-def series(area, seen, x, terms, kind="log_map"):
+def csm(area, seen, x, terms, kind="log_map"):
     """Return V by M terms of the Fourier series of the step, prefiltered over discs, depths on a scale of some kind."""
     d = length(minus(x, area.center))
     if is_behind(area, x) or seen.near >= d:

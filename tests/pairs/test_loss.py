@@ -77,7 +77,7 @@ def test_each_method_tells_of_its_clamp():
                                    (multires, of(MultiresSettings, lights=LIGHTS, supersampled=True), "multires"),
                                    (multires, of(MultiresSettings, lights=LIGHTS, subsplats="irradiance"), "multires"),
                                    (multires, of(MultiresSettings, lights=LIGHTS, subsplats=ByError(0.3)), "multires"),
-                                   (val, of(ValSettings, lights=LIGHTS, clamp="disc", map_resolution=16), "val")):
+                                   (val, of(ValSettings, lights=LIGHTS, clamp="disc", maps_resolution=16), "val")):
         share = 100 * (1 - full(at, settings) / full(at, settings, PairSettings()))
         _, said = told(method, at, settings)
         assert said[0][0] == pytest.approx(share, abs=NEAR)

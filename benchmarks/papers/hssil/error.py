@@ -1,6 +1,5 @@
 """Beyond the paper: what leaving out visibility costs, and which of its approximations costs how much."""
 
-import dataclasses
 from collections.abc import Mapping
 from functools import partial
 from itertools import pairwise
@@ -24,12 +23,12 @@ from refgi.compare.maps import error_scale, luminance
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.compare.report import number
 from refgi.frame import Frame
+from refgi.settings import replaced
 from refgi.sssil import HssilSettings
-from refgi.sssil.settings import Visibility
 
-FREE: Visibility = "none"
-NAMES: dict[Visibility, str] = {FREE: "v = 1, as published", "bitmask": "bitmask of the screen",
-                                "rays": "a ray to each sample"}
+FREE = "none"
+NAMES: dict[str, str] = {FREE: "v = 1, as published", "bitmask": "bitmask of the screen",
+                         "rays": "a ray to each sample"}
 MANY = 1024  # samples: next to no noise is left
 THICKNESS = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # share of the diagonal
 
@@ -38,12 +37,12 @@ class Judged(NamedTuple):
     """One scene by all ways to know what lies between."""
 
     frame: Frame
-    settings: dict[Visibility, HssilSettings]
-    light: dict[Visibility, Array]  # of many samples
+    settings: dict[str, HssilSettings]
+    light: dict[str, Array]  # of many samples
     exact: Array  # path tracing, seen emitters
-    off: dict[Visibility, Errors]
-    off_usual: dict[Visibility, Errors]  # of the paper's samples
-    seconds: dict[Visibility, float]
+    off: dict[str, Errors]
+    off_usual: dict[str, Errors]  # of the paper's samples
+    seconds: dict[str, float]
     noise: float  # standard error of path tracing, % of the mean
     sweep: dict[float, float]  # RMSE of the bitmask by thickness
 
@@ -63,20 +62,20 @@ def visibility(bench: Workbench, scenes: tuple[str, ...]) -> Figure:
     curves += [Curve(f"{title}, {NAMES[key]}", [THICKNESS[0], THICKNESS[-1]], [one.off[key].rmse] * 2, True)
                for title, one in found.items() for key in (FREE, "rays")]
     first = next(iter(found.values()))
-    samples = first.settings[FREE].samples
+    samples = first.settings[FREE].sampling.samples
 
     def each(value: Any) -> str:
         return " and ".join(value(one) for one in found.values())
 
-    def rmse(key: Visibility) -> str:
+    def rmse(key: str) -> str:
         return each(lambda one: f"{one.off[key].rmse:.1f}")
 
-    def cost(key: Visibility) -> str:
+    def cost(key: str) -> str:
         return each(lambda one: f"{one.seconds[key] / one.seconds[FREE]:.1f}")
 
     return Figure(
         facts=(*(one.frame.scene.description for one in found.values()), f"{first.frame.width}² pixels",
-               f"{first.settings[FREE].levels} levels from half resolution", f"{MANY} samples",
+               f"{first.settings[FREE].sampling.levels} levels from half resolution", f"{MANY} samples",
                f"path tracing with {bench.scale.truth_samples} samples a pixel"), pictures=shown,
         tables=[Table("Error in % of the mean, against path tracing in which only what the camera sees shines",
                       ("", "mean, W/m²", "RMSE", "MAE", "darker by", f"RMSE, {samples} samples", f"ms, {samples} "
@@ -99,14 +98,14 @@ def visibility(bench: Workbench, scenes: tuple[str, ...]) -> Figure:
 def _judged(bench: Workbench, name: str) -> Judged:
     frame = frame_of(bench, name, JUDGED)
     base = smaller(frame, 1, radius=None)  # all light that the picture can give: what is left is visibility
-    settings = {key: dataclasses.replace(base, visibility=key) for key in NAMES}
-    many = {key: dataclasses.replace(one, samples=MANY) for key, one in settings.items()}
+    settings = {key: replaced(base, {"visibility": key}) for key in NAMES}
+    many = {key: replaced(one, {"samples": MANY}) for key, one in settings.items()}
     light, usual = ({key: light_of(frame, one) for key, one in ways.items()} for ways in (many, settings))
-    truth, covered = bench.traced(frame, emitters="seen"), frame.gbuffer.covered
+    truth, covered = bench.traced(frame, emitters="visible"), frame.gbuffer.covered
     off, off_usual = ({key: errors_of(one, truth.mean, covered) for key, one in made.items()}
                       for made in (light, usual))
     seconds = interleaved({key: partial(light_of, frame, one) for key, one in settings.items()}, bench.few)
-    sweep = {share: errors_of(light_of(frame, dataclasses.replace(many["bitmask"], thickness=share)), truth.mean,
+    sweep = {share: errors_of(light_of(frame, replaced(many["bitmask"], {"thickness": share})), truth.mean,
                               covered).rmse for share in THICKNESS}
     return Judged(frame, settings, light, truth.mean, off, off_usual, seconds, standard_error(truth, covered), sweep)
 
@@ -136,10 +135,10 @@ def chain(frame: Frame) -> dict[str, HssilSettings]:
     """Return settings from every pixel lighting every pixel to the published ones, one thing changed at a time."""
     published = smaller(frame)
     discs = every_pixel(published)
-    levels = dataclasses.replace(discs, levels=published.levels + 2, downsample="average")
-    closest = dataclasses.replace(levels, downsample="closest")
-    reach = every_texel(published, start="full", levels=published.levels + 1)
-    return {"pixels": dataclasses.replace(discs, form_factor="point"), "discs": discs, "levels": levels,
+    levels = replaced(discs, {"levels": published.sampling.levels + 2, "downsample": "average"})
+    closest = replaced(levels, {"downsample": "closest"})
+    reach = every_texel(published, start="full", levels=published.sampling.levels + 1)
+    return {"pixels": replaced(discs, {"form_factor": "point"}), "discs": discs, "levels": levels,
             "closest": closest, "reach": reach, "start": every_texel(published), "samples": published}
 
 
@@ -182,7 +181,7 @@ def split(bench: Workbench, scenes: tuple[str, ...], shown: tuple[str, ...],
 
     return Figure(
         facts=(f"{frame.width}² pixels", f"path tracing with {bench.scale.truth_samples} samples a pixel",
-               f"{usual.levels} levels of half resolution, a radius of {usual.radius:.3g}: texels as "
+               f"{usual.sampling.levels} levels of half resolution, a radius of {usual.sampling.radius:.3g}: texels as "
                "small beside their distance, and as much of the picture, as by the paper's settings at 1280 x 720"),
         pictures=gallery.pictures,
         tables=(Table("What each approximation changes in the picture before it, in % of the mean of path tracing: "
@@ -209,8 +208,8 @@ def split(bench: Workbench, scenes: tuple[str, ...], shown: tuple[str, ...],
 def _split(bench: Workbench, name: str, variants: Mapping[str, Mapping[str, Any]]) -> Split:
     frame = frame_of(bench, name, JUDGED)
     truth = bench.traced(frame)
-    made = {"truth": truth.mean, "seen": bench.traced(frame, emitters="seen").mean,
-            "open": bench.traced(frame, emitters="seen", visibility=False).mean}
+    made = {"truth": truth.mean, "seen": bench.traced(frame, emitters="visible").mean,
+            "open": bench.traced(frame, emitters="visible", visibility=False).mean}
     made |= {key: light_of(frame, settings) for key, settings in chain(frame).items()}
     varied = {title: light_of(frame, smaller(frame, **changes)) for title, changes in variants.items()
               if title != FRAMES} | {FRAMES: expected_light(frame, smaller(frame), 19)}

@@ -24,6 +24,7 @@ from benchmarks.papers.workbench import Gallery, Workbench, errors_of, mean_of, 
 from refgi.compare.maps import luminance
 from refgi.compare.plot import Axes, curves_plot
 from refgi.frame import Frame
+from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 
 POINT, DISC, POINT_LIMIT, DISC_LIMIT = "point", "disc", "point_limit", "disc_limit"
@@ -32,8 +33,8 @@ NAMES = {POINT: "Eq. 3, 64 samples", DISC: "Eq. 4, 64 samples", POINT_LIMIT: "Eq
 SEEN, OPEN, ALL = "seen", "open", "all"
 TRUTHS: dict[str, tuple[str, str, dict[str, Any]]] = {
     OPEN: ("path tracing, v = 1", "what the camera sees shines, nothing blocks",
-           {"emitters": "seen", "visibility": False}),
-    SEEN: ("path tracing, seen emitters", "what the camera sees shines", {"emitters": "seen"}),
+           {"emitters": "visible", "visibility": False}),
+    SEEN: ("path tracing, seen emitters", "what the camera sees shines", {"emitters": "visible"}),
     ALL: ("path tracing", "everything shines", {})}
 ONE, SIDES, PLACED, MORE = "one", "sides", "placed", "more"
 CAMERAS = {ONE: "one camera", SIDES: "two side views besides", PLACED: "one camera placed besides",
@@ -44,7 +45,7 @@ def point_or_disc(bench: Workbench, scene: str, line: float) -> Figure:
     """Figure 5: Eq. 3 and Eq. 4 against path tracing, by exact direct light, along a line (share of the height)."""
     frame = frame_of(bench, scene, LARGE, shadows="exact")
     settings = settings_of_figure_5(frame)
-    point = dataclasses.replace(settings, form_factor="point")
+    point = replaced(settings, {"form_factor": "point"})
     ways = {POINT: point, DISC: settings, POINT_LIMIT: every_texel(point), DISC_LIMIT: every_texel(settings)}
     truths = {key: bench.traced(frame, **changes) for key, (*_, changes) in TRUTHS.items()}
     made = {key: light_of(frame, one) for key, one in ways.items()}
@@ -64,8 +65,9 @@ def point_or_disc(bench: Workbench, scene: str, line: float) -> Figure:
     curves = [scan_line(names[key], light[key], row, dashed=key in TRUTHS)
               for key in (POINT, DISC, DISC_LIMIT, *TRUTHS)]
     return Figure(
-        facts=(frame.scene.description, f"{frame.width}² pixels", f"radius {settings.radius:g}", "4 levels from full "
-               "resolution", "64 samples a level, every pixel its own", "direct light with a shadow ray a pixel",
+        facts=(frame.scene.description, f"{frame.width}² pixels", f"radius {settings.sampling.radius:g}",
+               "4 levels from full resolution", "64 samples a level, every pixel its own",
+               "direct light with a shadow ray a pixel",
                f"path tracing with {bench.scale.truth_samples} samples a pixel"), pictures=gallery.pictures,
         tables=[Table("Errors in % of the mean, against path tracing in which only what the camera sees shines and "
                       "nothing blocks", ("", "RMSE", "MAE", "darker by", "highest above it along the line, %",
@@ -93,7 +95,7 @@ def settings_of_figure_5(frame: Frame) -> HssilSettings:
 
     Every pixel has its own samples, so that noise shows along the line.
     """
-    return HssilSettings(radius=scaled_radius(frame, RADIUS_FIGURE_5), start="full", pattern="pixel")
+    return of(HssilSettings, radius=scaled_radius(frame, RADIUS_FIGURE_5), start="full", pattern="pixel")
 
 
 def _highest(light: Array, right: Array, row: int) -> float:
@@ -114,7 +116,7 @@ def several_cameras(bench: Workbench, scene: str, ways: dict[str, dict[str, Any]
     """Figure 9: a basket whose lit side the camera does not see, by one camera and by several."""
     frame = wide_frame(bench, scene, LARGE / 2)
     base = every_texel(smaller(frame, 1, radius=None))  # what is missing is what is not seen
-    settings = {key: dataclasses.replace(base, **changes) for key, changes in ways.items()}
+    settings = {key: replaced(base, changes) for key, changes in ways.items()}
     light = {key: light_of(frame, one) for key, one in settings.items()}
     seconds = {key: _seconds(frame, one) for key, one in settings.items()}
     free, exact = bench.traced(frame, visibility=False).mean, bench.traced(frame).mean
@@ -139,8 +141,9 @@ def several_cameras(bench: Workbench, scene: str, ways: dict[str, dict[str, Any]
     cost = {key: taken / seconds[ONE] for key, taken in seconds.items()}
     least = min(float((one - light[ONE]).min()) for one in light.values())
     return Figure(
-        facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", f"{base.levels} levels from half "
-               "resolution, every texel", f"path tracing with {bench.scale.truth_samples} samples a pixel"),
+        facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels",
+               f"{base.sampling.levels} levels from half resolution, every texel",
+               f"path tracing with {bench.scale.truth_samples} samples a pixel"),
         pictures=gallery.pictures,
         tables=[Table("Light and error in % of the mean of path tracing in which nothing blocks",
                       ("", "light", "RMSE", "of the missing light, back", "ms, 64 samples"), rows)],
@@ -157,6 +160,6 @@ def several_cameras(bench: Workbench, scene: str, ways: dict[str, dict[str, Any]
 
 def _seconds(frame: Frame, settings: HssilSettings) -> float:
     """Return the time of the paper's samples."""
-    usual = dataclasses.replace(settings, pattern="row")
+    usual = replaced(settings, {"pattern": "row"})
     light_of(frame, usual)  # compiles what it needs
     return seconds_of(lambda: light_of(frame, usual))

@@ -1,6 +1,5 @@
 """What levels do: where their samples lie (Figure 2), and what light each adds (Figure 4)."""
 
-import dataclasses
 import math
 from typing import NamedTuple
 
@@ -19,6 +18,7 @@ from benchmarks.papers.workbench import Gallery, Workbench, mapped, mean_of, pal
 from refgi.compare.maps import DIVERGING, Scale, luminance
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
+from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.pattern import offsets_at
 from refgi.sssil.crown.reach import coverage
@@ -31,18 +31,19 @@ SHOWN = 4  # levels, the paper's
 
 def crowns(bench: Workbench) -> Figure:
     """Figure 2: where samples lie, and how often the levels cover each pair of pixels."""
-    settings = HssilSettings(radius=max(2.0, RADIUS * bench.scale.size / 512))
-    assert settings.radius is not None
+    settings = of(HssilSettings, radius=max(2.0, RADIUS * bench.scale.size / 512))
+    sampling = settings.sampling
+    assert sampling.radius is not None
     rows = ROWS * bench.scale.repeats
     sampled, exact = covered(settings, rows), covered(every_texel(settings), 1)
     curves = [Curve(name, range(len(values)), values) for name, values in (
         ("64 samples, mean of many rows", profile(sampled)), ("every texel", profile(exact)))]
     everywhere, said = np.ones(sampled.shape, bool), "white: once; red: more often"
-    texels = 3 * math.pi * settings.radius**2 / settings.samples
-    inside = _distance(sampled) < settings.radius * 2**settings.levels * (1 - 0.5**settings.levels)
+    texels = 3 * math.pi * sampling.radius**2 / sampling.samples
+    inside = _distance(sampled) < sampling.radius * 2**sampling.levels * (1 - 0.5**sampling.levels)
     return Figure(
-        facts=(f"radius {settings.radius:g}", f"{settings.levels} levels", f"{settings.samples} samples in a crown, "
-               f"{settings.inner} in the disc", f"means over {rows} rows of receivers"),
+        facts=(f"radius {sampling.radius:g}", f"{sampling.levels} levels", f"{sampling.samples} samples in a crown, "
+               f"{sampling.inner} in the disc", f"means over {rows} rows of receivers"),
         pictures=(Picture("samples", "the samples of one receiver", "squares: texels of their level", _placed(settings),
                           settings=settings),
                   mapped("coverage", "coverage by 64 samples", said, sampled, everywhere, COVERAGE),
@@ -66,8 +67,8 @@ def covered(settings: HssilSettings, rows: int) -> Array:
 
     Offsets go as far as the last crown reaches; `rows` of receivers draw samples.
     """
-    side = round((settings.radius or 1) * 2**settings.levels) + 1
-    return coverage(settings, (side, side), rows)
+    side = round((settings.sampling.radius or 1) * 2**settings.sampling.levels) + 1
+    return coverage(settings.sampling, (side, side), rows)
 
 
 def profile(times: Array) -> list[float]:
@@ -90,28 +91,28 @@ def _placed(settings: HssilSettings) -> npt.NDArray[np.uint8]:
 
     A pixel is a texel of the first level; rings show where crowns begin and end.
     """
-    radius = settings.radius or 1
-    reach = round(radius * 2**settings.levels)
-    colours = palette(settings.levels)
+    radius = settings.sampling.radius or 1
+    reach = round(radius * 2**settings.sampling.levels)
+    colours = palette(settings.sampling.levels)
     pixels = np.full((2 * reach + 1, 2 * reach + 1, 3), GROUND)
     row, column = np.indices(pixels.shape[:2]) - reach
     distance = np.hypot(row, column)
-    for k in range(settings.levels + 1):
+    for k in range(settings.sampling.levels + 1):
         pixels[np.abs(distance - radius * 2**k) < 0.5 + reach / 640] = RINGS
-    for k in reversed(range(settings.levels)):
-        for ox, oy in 2**k * offsets_at(settings, k, settings.first_level + k, 0, 0):
+    for k in reversed(range(settings.sampling.levels)):
+        for ox, oy in 2**k * offsets_at(settings.sampling, k, settings.sampling.first_level + k, 0, 0):
             top, left = (max(0, reach + o - 2**k // 2) for o in (oy, ox))
             pixels[top : top + 2**k, left : left + 2**k] = colours[k]
     return (255 * pixels + 0.5).astype(np.uint8)
 
 
 def _crowns(settings: HssilSettings, times: Array, texels: float) -> list[tuple[Cell, ...]]:
-    radius, distance = settings.radius or 1, _distance(times)
+    radius, distance = settings.sampling.radius or 1, _distance(times)
     rows: list[tuple[Cell, ...]] = []
-    for k in range(settings.levels):
+    for k in range(settings.sampling.levels):
         near, far = (0.0 if k == 0 else radius * 2**k), radius * 2 ** (k + 1)
         within = (distance >= near) & (distance < far)
-        samples = settings.samples + (settings.inner if k == 0 else 0)
+        samples = settings.sampling.samples + (settings.sampling.inner if k == 0 else 0)
         rows.append((f"level {k + 1}", near, far, samples, texels, float(times[within].mean())))
     return rows
 
@@ -131,8 +132,8 @@ class Parts(NamedTuple):
 
 def parts_of(frame: Frame, settings: HssilSettings) -> Parts:
     """Light a frame by one level after another, and by the paper's four together."""
-    single = [light_of(frame, dataclasses.replace(settings, only_level=k)) for k in range(settings.levels)]
-    return Parts(single, light_of(frame, dataclasses.replace(settings, levels=SHOWN)))
+    single = [light_of(frame, replaced(settings, {"only_level": k})) for k in range(settings.sampling.levels)]
+    return Parts(single, light_of(frame, replaced(settings, {"levels": SHOWN})))
 
 
 def level_by_level(bench: Workbench, scene: str, levels: int, line: float) -> Figure:
@@ -151,13 +152,14 @@ def level_by_level(bench: Workbench, scene: str, levels: int, line: float) -> Fi
         rows.append((f"level {k + 1}", near, far, means[k], share[k]))
         if k < SHOWN:
             gallery.indirect(f"level{k + 1}", f"level {k + 1}", f"{near:g} to {far:g} pixels away", light,
-                             dataclasses.replace(settings, only_level=k))
+                             replaced(settings, {"only_level": k}))
     gallery.indirect("levels", "levels 1 to 4", "indirect light", parts.whole)
     gallery.camera("seen", "with direct light", "what the camera receives", parts.whole)
     gallery.indirect("further", "levels 5 and 6", "what four levels do not reach", np.sum(parts.single[SHOWN:], axis=0))
     return Figure(
         facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", "half resolution",
-               f"radius {settings.radius:g} texels", f"{settings.samples} samples a level"), pictures=gallery.pictures,
+               f"radius {settings.sampling.radius:g} texels", f"{settings.sampling.samples} samples a level"),
+        pictures=gallery.pictures,
         tables=[Table("Light by level", ("", "from, pixels away", "to", "mean, W/m²", "% of six levels"), rows)],
         plots=[Plot(curves_plot(curves, Axes("pixel", "irradiance, W/m²")),
                     f"Luminance along row {row + 1}, level by level.")],
@@ -173,8 +175,8 @@ def level_by_level(bench: Workbench, scene: str, levels: int, line: float) -> Fi
 
 def _crown(settings: HssilSettings, index: int) -> tuple[float, float]:
     """Return where a level's samples lie, in pixels from the receiver."""
-    assert settings.radius is not None
-    near = settings.radius * 2.0 ** (settings.first_level + index)
+    assert settings.sampling.radius is not None
+    near = settings.sampling.radius * 2.0 ** (settings.sampling.first_level + index)
     return (0.0 if index == 0 else round(near, 1)), round(2 * near, 1)
 
 

@@ -126,7 +126,7 @@ def five_setups(bench: Workbench) -> Figure:
     said = f"relative to {SETUPS[0].title} (paper: {CARDS[1]})"
     return Figure(
         facts=(scene_of(bench, HALL).description, f"{frame.width} x {frame.height} pixels",
-               f"radius {settings_of(frame).radius:g} texels", f"medians of {bench.scale.repeats}",
+               f"radius {settings_of(frame).sampling.radius:g} texels", f"medians of {bench.scale.repeats}",
                "from the G-buffer and direct light to the picture"),
         ratios=(relative(f"time of sampling, {said}", sampling, {setup.title: setup.gather[1] for setup in SETUPS}),
                 relative(f"time of the whole pass, {said}", total, {setup.title: setup.total[1] for setup in SETUPS})),

@@ -14,7 +14,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from refgi.scene.health import mean_face_normals
 
 from benchmarks.papers.records import Array
 from benchmarks.papers.val.subjects import atrium, horse
@@ -27,6 +26,8 @@ from refgi.scene.builtin.atrium_pieces import shrub
 from refgi.scene.builtin.cornell import cornell_box
 from refgi.scene.builtin.surfaces import patch, rectangle
 from refgi.scene.model import merge
+from refgi.scene.repair import mean_face_normals
+from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 from refgi.truth import TruthResult
@@ -97,7 +98,7 @@ def wide_frame(bench: Workbench, name: str, factor: float = LARGE) -> Frame:
 
 def settings_of(frame: Frame, **changes: Any) -> HssilSettings:
     """Return the paper's settings with a radius that reaches as much of this picture as the paper's of 1280 x 720."""
-    return HssilSettings(**({"radius": scaled_radius(frame, RADIUS)} | changes))
+    return of(HssilSettings, **({"radius": scaled_radius(frame, RADIUS)} | changes))
 
 
 def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
@@ -108,7 +109,7 @@ def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
     share = math.hypot(frame.width, frame.height) / math.hypot(WIDE * PAPER_HEIGHT, PAPER_HEIGHT)
     levels = max(1, round(4 + math.log2(share)))
     radius = max(1.0, RADIUS * share * 2.0 ** (4 - levels))
-    return HssilSettings(**({"radius": radius, "levels": max(1, levels + further)} | changes))
+    return of(HssilSettings, **({"radius": radius, "levels": max(1, levels + further)} | changes))
 
 
 def scaled_radius(frame: Frame, radius: float) -> float:
@@ -118,7 +119,7 @@ def scaled_radius(frame: Frame, radius: float) -> float:
 
 def every_texel(settings: HssilSettings, **changes: Any) -> HssilSettings:
     """Return settings that take each texel of disc and crowns once: the limit of many samples, without noise."""
-    return dataclasses.replace(settings, **({"pattern": "all"} | changes))
+    return replaced(settings, {"pattern": "all"} | changes)
 
 
 def every_pixel(settings: HssilSettings) -> HssilSettings:
@@ -142,15 +143,15 @@ def ready(frame: Frame) -> Frame:
 
 def reach_of(frame: Frame, settings: HssilSettings) -> float:
     """Return how far samples reach in diagonals of the picture; from 1 on every pixel can light every other one."""
-    if settings.radius is None:
+    if settings.sampling.radius is None:
         return 1.0
-    pixels = settings.radius * 2.0 ** (settings.levels + settings.first_level)
+    pixels = settings.sampling.radius * 2.0 ** (settings.sampling.levels + settings.sampling.first_level)
     return pixels / math.hypot(frame.width, frame.height)
 
 
 def noise_of(frame: Frame, settings: HssilSettings, first: Array) -> float:
     """Return the standard deviation (W/m^2) of a picture, by another one with other random numbers."""
-    other = light_of(frame, dataclasses.replace(settings, seed=settings.seed + 1))
+    other = light_of(frame, replaced(settings, {"seed": settings.sampling.seed + 1}))
     return math.sqrt(0.5 * np.mean((first.astype(np.float64) - other)[:, frame.gbuffer.covered] ** 2))
 
 
@@ -161,7 +162,7 @@ def expected_light(frame: Frame, settings: HssilSettings, seeds: int) -> Array:
     """
     total = np.zeros((3, frame.height, frame.width))
     for seed in range(seeds):
-        total += light_of(frame, dataclasses.replace(settings, seed=FAR_SEED + seed))
+        total += light_of(frame, replaced(settings, {"seed": FAR_SEED + seed}))
     return total / seeds
 
 

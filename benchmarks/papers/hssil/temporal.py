@@ -12,7 +12,7 @@ from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.scene import Scene
 from refgi.sssil import HssilSettings
-from refgi.sssil.temporal.filter import TemporalSettings
+from refgi.sssil.settings import TemporalSettings
 from refgi.sssil.temporal.sequence import Sequence
 from refgi.stages import observe
 
@@ -61,7 +61,8 @@ def filtered(bench: Workbench, scene: str) -> Figure:
     calm = found[MOVING][RAW].change / max(found[MOVING][RECURSIVE].change, 1e-30)
     return Figure(
         facts=(frame.scene.description, f"{frame.width} x {frame.height} pixels", f"{count} frames",
-               "half resolution", f"{settings.levels} levels", f"{settings.samples} samples, others in each frame",
+               "half resolution", f"{settings.sampling.levels} levels",
+               f"{settings.sampling.samples} samples, others in each frame",
                "a = 0.9"), pictures=gallery.pictures,
         tables=[Table(f"Noise in % of the mean, against the mean of {bench.scale.truth_samples} pictures with other "
                       "samples; flicker: how it changes from frame to frame", (

@@ -5,7 +5,6 @@ unit of length is not stated, a reference length is chosen under which the splat
 as in the paper's Figure 8 (125 of 768). The colour plates are cited by the text as Figures 11 to 13.
 """
 
-import dataclasses
 from functools import partial
 
 from benchmarks.papers.records import Case, Entry
@@ -13,6 +12,7 @@ from benchmarks.papers.sii.cuts import cut_off, every_light, gathering, overdraw
 from benchmarks.papers.sii.lights import caustics, instant_radiosity, warped
 from benchmarks.papers.sii.subjects import BOX, CAUSTIC
 from benchmarks.papers.sii.times import moving_and_resting, warp_alone
+from refgi.settings import replaced
 
 FIGURES = (
     Entry("fig4", "Figure 4", "Caustics",
@@ -21,7 +21,7 @@ FIGURES = (
           make=partial(caustics, cases=(
               Case("ring", "metal ring", CAUSTIC, 95, "ring"),
               Case("glass", "glass ball, back faces alone", CAUSTIC, 150, "glass_ball"),
-              Case("glass_two", "glass ball, both faces", dataclasses.replace(CAUSTIC, refraction="two_interface"),
+              Case("glass_two", "glass ball, both faces", replaced(CAUSTIC, {"refraction": "two_interface"}),
                    scene="glass_ball")))),
     Entry("fig6", "Figure 6", "Splatting and instant radiosity",
           "Splatting beside instant radiosity in a ray tracer, both with 1000 lights of a quasi-random walk: the "

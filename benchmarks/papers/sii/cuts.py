@@ -1,6 +1,5 @@
 """How far splats reach: overdraw, the cut-off I_low, fluxes scaled by openness; gathering and the full sum beside."""
 
-import dataclasses
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -13,6 +12,7 @@ from benchmarks.papers.workbench import Gallery, Redrawing, Workbench, errors_of
 from refgi.compare.maps import Scale
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
+from refgi.settings import of, replaced
 from refgi.splat import GatherSettings, SiiSettings, gather, sii
 from refgi.splat.sii.reach.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
 from refgi.splat.sii.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW
@@ -71,7 +71,7 @@ def cut_off(bench: Workbench, scene: str, shares: tuple[int, ...], fps: dict[int
     """Figure 11: the cut-off I_low (in % of I_0; 0 cuts nothing): speed, error and energy lost."""
     frame, full = bench.frame(scene), full_sum(bench, scene)
     gallery, covered = Gallery(frame, full), frame.gbuffer.covered
-    settings = {share: splats(bench, scene, i_low=share / 100) for share in shares}
+    settings = {share: splats(bench, scene, cut_share=share / 100) for share in shares}
     seconds = interleaved({share: partial(sii, frame, one) for share, one in settings.items()}, bench.scale.repeats)
     made = {share: sii(frame, one) for share, one in settings.items()}
     drawn = {share: float(counted(frame, one).overdraw[covered].mean()) for share, one in settings.items()}
@@ -86,7 +86,7 @@ def cut_off(bench: Workbench, scene: str, shares: tuple[int, ...], fps: dict[int
     gallery.errors({f"ilow{n}": (f"I_low = {n} %", made[n]) for n in cut}, made[0])
     slope, fixed = np.polyfit([drawn[share] for share in cut], [1e3 * seconds[share] for share in cut], 1)
     return Figure(
-        facts=(scene, f"{settings[1].lights} lights", f"reference length {reference_length(bench, scene):.3g} m",
+        facts=(scene, f"{settings[1].lights.count} lights", f"reference length {reference_length(bench, scene):.3g} m",
                "error maps: against no cut"), pictures=gallery.pictures,
         ratios=[relative("frames per second, relative to 1 %", {f"{n} %": 1 / seconds[n] for n in fps},
                          {f"{n} %": rate for n, rate in fps.items()})],
@@ -114,11 +114,11 @@ def gathering(bench: Workbench, scene: str, samples: dict[int, float],
     """
     frame, full, truth = bench.frame(scene), full_sum(bench, scene), bench.traced(bench.frame(scene), visibility=False)
     gallery, grid, most = Gallery(frame, full), bench.scale.size // 8, max(samples)
-    cases = [Case(f"gather{n}", f"RSM, {n} samples", GatherSettings(samples=n, grid=grid), fps)
+    cases = [Case(f"gather{n}", f"RSM, {n} samples", of(GatherSettings, samples=n, grid=grid), fps)
              for n, fps in samples.items()]
     cases.append(Case("gather_whole", f"RSM, {most} samples, whole map",
-                      GatherSettings(samples=most, grid=grid, radius=WHOLE_MAP)))
-    cases += [Case(f"sii{n}_{x}", f"SII, {n} lights, {x} %", splats(bench, scene, lights=n, i_low=x / 100), fps)
+                      of(GatherSettings, samples=most, grid=grid, radius=WHOLE_MAP)))
+    cases += [Case(f"sii{n}_{x}", f"SII, {n} lights, {x} %", splats(bench, scene, lights=n, cut_share=x / 100), fps)
               for (n, x), fps in splatted.items()]
     run: dict[str, Any] = {c.name: partial(gather if isinstance(c.settings, GatherSettings) else sii, frame, c.settings)
                            for c in cases}
@@ -162,7 +162,7 @@ def every_light(bench: Workbench, scene: str, lights: int, shares: tuple[int, ..
     """
     frame, full = bench.frame(scene), full_sum(bench, scene)
     covered = frame.gbuffer.covered
-    run = {share: partial(sii, frame, splats(bench, scene, lights=lights, i_low=share / 100)) for share in shares}
+    run = {share: partial(sii, frame, splats(bench, scene, lights=lights, cut_share=share / 100)) for share in shares}
     seconds = interleaved(run, bench.scale.repeats)
     rows = [(f"{share} %" if share else "0: every light at every pixel", 1e3 * seconds[share], 1 / seconds[share],
              fps.get(share), *errors_of(work(), full, covered)) for share, work in run.items()]
@@ -192,7 +192,7 @@ def scaled_fluxes(bench: Workbench, scene: str, lights: int, fps: dict[str, tupl
     seconds = interleaved({key: _drawing(frame, s) for key, s in settings.items()}, bench.scale.repeats)
     made = {key: sii(frame, s) for key, s in settings.items()}
     gallery = Gallery(frame, made["full", "none"])
-    fragments: dict[str, int] = {s.openness_flux: counted(frame, s).total for s in settings.values()
+    fragments: dict[str, int] = {s.lights.openness.flux: counted(frame, s).total for s in settings.values()
                                  if not s.half_resolution}
     rows: list[tuple[Any, ...]] = []
     for size, (without, with_openness) in fps.items():
@@ -231,9 +231,10 @@ def scaled_fluxes(bench: Workbench, scene: str, lights: int, fps: dict[str, tupl
 def _by_resolution_and_flux(bench: Workbench, scene: str, lights: int) -> dict[tuple[str, str], SiiSettings]:
     frame = bench.frame(scene)
     base = splats(bench, scene, lights=lights, pattern="grid", openness_radius=RADIUS * frame.scene.geometry.diagonal)
-    base = dataclasses.replace(base, irradiance_low=low_irradiance(choose_lights(frame, base), base))
+    low = low_irradiance(choose_lights(frame, base.lights), base)
+    base = replaced(base, {"cut": "absolute", "cut_irradiance": low})
     kinds: tuple[Any, ...] = ("none", "scale", "roulette")
-    return {(size, kind): dataclasses.replace(base, half_resolution=size == "half", openness_flux=kind)
+    return {(size, kind): replaced(base, {"half_resolution": size == "half", "openness_flux": kind})
             for size in ("full", "half") for kind in kinds}
 
 

@@ -1,6 +1,5 @@
 """Which lights are splatted: caustics, lights of a walk and of the map, lights moved by importance."""
 
-import dataclasses
 import math
 from functools import partial
 from typing import Any
@@ -14,9 +13,11 @@ from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, i
 from refgi.frame import Frame
 from refgi.lights import importance_pyramid
 from refgi.lights.selection import choose_lights, importance_maps
+from refgi.lights.settings import LightSettings
 from refgi.lights.warp import warp_samples
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.sampling import halton
+from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
 
 BLOCK = 8  # pixels along a side, by whose means caustics are judged
@@ -63,7 +64,7 @@ def caustics(bench: Workbench, cases: tuple[Case, ...]) -> Figure:
 
 def _lobes(frame: Frame, settings: SiiSettings) -> int:
     """Return how many of the lights have lobes."""
-    flux = choose_lights(frame, settings).lobe_flux
+    flux = choose_lights(frame, settings.lights).lobe_flux
     return 0 if flux is None else int(flux.any(axis=0).sum())
 
 
@@ -83,7 +84,7 @@ def instant_radiosity(bench: Workbench, scene: str, lights: int, sources: dict[A
     covered, truth = gallery.covered, bench.traced(frame).mean
     rows, blocked, noise = [], {}, {}
     for source, title in sources.items():
-        settings = SiiSettings(lights=lights, source=source, i_low=0.0)
+        settings = of(SiiSettings, lights=lights, source=source)
         splatted, shadowed = sii(frame, settings), _shadow_rays(frame, settings)
         blocked[source] = errors_of(splatted, shadowed, covered)
         noise[source] = errors_of(shadowed, truth, covered)
@@ -110,22 +111,23 @@ def instant_radiosity(bench: Workbench, scene: str, lights: int, sources: dict[A
 def _shadow_rays(frame: Frame, settings: SiiSettings) -> Array:
     buffer, light = frame.gbuffer, np.zeros((3, frame.height, frame.width), frame.dtype)
     to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
-    light.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, choose_lights(frame, settings))
+    light.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, choose_lights(frame, settings.lights))
     return light
 
 
 def warped(bench: Workbench, scene: str, lights: int, seeds: tuple[int, ...]) -> Figure:
     """Figure 7: where the hierarchical warp puts lights, by level and method, and what that does to the picture."""
     frame, full = bench.frame(scene), full_sum(bench, scene)
-    base = SiiSettings(lights=lights, i_low=0.0, importance="openness")
-    maps = importance_maps(frame, frame.rsms, dataclasses.replace(base, warp="A"))
+    base = of(SiiSettings, lights=lights)
+    maps = importance_maps(frame, frame.rsms, of(LightSettings, warp="A", importance="openness"))
     assert maps is not None  # the pattern is warped
     importance = maps[0]
     points, pyramid = halton(lights), importance_pyramid(importance)
 
     def errors(method: Any, levels: int) -> tuple[float, float]:
-        off = [errors_of(sii(frame, dataclasses.replace(base, warp=method, warp_levels=levels, seed=seed)), full,
-                         frame.gbuffer.covered)[:2] for seed in seeds]
+        warp = {} if method == "none" else {"warp": method, "warp_levels": levels, "importance": "openness"}
+        off = [errors_of(sii(frame, replaced(base, warp | {"seed": seed})), full, frame.gbuffer.covered)[:2]
+               for seed in seeds]
         rmse, mae = np.mean(off, axis=0)
         return float(rmse), float(mae)
 

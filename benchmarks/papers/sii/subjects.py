@@ -5,42 +5,42 @@ splats reach. The reference length of a scene is chosen so that splats of 5 % ha
 lights a pixel, from a picture of one size so that all figures of a scene share it.
 """
 
-import dataclasses
 from typing import Any
 
 from benchmarks.papers.records import Array
 from benchmarks.papers.workbench import Workbench
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
+from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.reach.fragments import Fragments, fragments
 from refgi.splat.sii.reach.reference_length import PAPER_CUT, PAPER_LIGHTS
 from refgi.splat.sii.reach.reference_length import reference_length as reference_length_of
 
 BOX = "cornell_sphere:faces=17000"  # as many faces as the scenes of a game in 2006
-CAUSTIC = SiiSettings(lights=4096, warp="B", warp_levels=3, importance="peak", i_low=PAPER_CUT,
-                      reference_length=1.0)  # Figure 4, Table 1
-UNCUT = SiiSettings(i_low=0.0)
+CAUSTIC = of(SiiSettings, lights=4096, warp="B", warp_levels=3, importance="peak", cut_share=PAPER_CUT,
+             reference_length=1.0)  # Figure 4, Table 1
+UNCUT = SiiSettings()
 COARSE = 64  # pixels along a side of the picture that the reference length is chosen by
 
 
 def full_sum(bench: Workbench, scene: str) -> Array:
     """Return the uncut sum over every texel of the shadow maps: what pixel lights converge to."""
-    every = dataclasses.replace(UNCUT, pattern="all")
+    every = replaced(UNCUT, {"pattern": "all"})
     return bench.once(("full sum", scene), lambda: sii(bench.frame(scene), every))
 
 
 def splats(bench: Workbench, scene: str, **changes: Any) -> SiiSettings:
     """Return settings of 768 lights and 5 %, but for `changes`, under the scene's reference length."""
-    return SiiSettings(**{"i_low": PAPER_CUT, "reference_length": reference_length(bench, scene)} | changes)
+    return of(SiiSettings, **{"cut_share": PAPER_CUT, "reference_length": reference_length(bench, scene)} | changes)
 
 
 def reference_length(bench: Workbench, scene: str) -> float:
     """Return the reference length (m) under which 768 splats of 5 % have the overdraw of Figure 8."""
     def length() -> float:
-        frame, settings = bench.frame(scene, width=COARSE, height=COARSE), SiiSettings(lights=PAPER_LIGHTS)
+        frame, settings = bench.frame(scene, width=COARSE, height=COARSE), of(SiiSettings, lights=PAPER_LIGHTS)
         receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
-        return reference_length_of(receivers, choose_lights(frame, settings), settings)
+        return reference_length_of(receivers, choose_lights(frame, settings.lights), settings.pairs)
 
     return bench.once(("reference length", scene), length)
 
@@ -49,4 +49,4 @@ def counted(frame: Frame, settings: SiiSettings) -> Fragments:
     """Count the fragments of a frame's splats: the overdraw map and what it adds up to."""
     buffer = frame.gbuffer
     receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
-    return fragments(receivers, choose_lights(frame, settings), settings, None, buffer.projection)
+    return fragments(receivers, choose_lights(frame, settings.lights), settings, None, buffer.projection)

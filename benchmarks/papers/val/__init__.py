@@ -38,10 +38,11 @@ FIGURES = (
                        (1.6, 2.2, 1.6), (0.0, 0.1, -0.6), "board"),
                   View("contact", "contact, from near", (0.5, 2.9, 0.5), DOWN, 0.8, (0.9, 0.5, 1.3),
                        (0.25, 0.12, 0.0))),
-              ways={"as published: 4 terms, mip": {}, "4 terms, summed areas": {"prefilter": "sat"},
+              ways={"as published: 4 terms, mip": {},
                     "4 terms, every texel": {"prefilter": "brute"},
-                    "16 terms, summed areas": {"prefilter": "sat", "terms": 16},
-                    "exact step": {"visibility": "step"}, "one hard shadow": {"visibility": "hard"}})),
+                    "16 terms, every texel": {"prefilter": "brute", "terms": 16},
+                    "PCSS": {"visibility": "pcss"}, "PCF": {"visibility": "pcf"},
+                    "one hard shadow": {"visibility": "hard"}})),
     Entry("fig6", "Figure 6", "Clusters by position and by normals",
           "Clustered by position alone, groups of lights lie around the edges of the box and have lights of several "
           "normals; with the angle between normals in the distance they are planar.",
@@ -64,7 +65,7 @@ FIGURES = (
           "With 2 to 30 area lights indirect light comes ever nearer to the picture with a hard shadow for every light "
           "and to path tracing; few already convince.", columns=5,
           make=partial(by_area_lights, scene=HORSE, shown=(2, 4, 8, 16, AREA_LIGHTS), further=(128, 512, 1024),
-                       kinds={"series": "series of 4 terms", "step": "exact step", "hard": "one hard shadow"})),
+                       kinds={"csm": "CSM, 4 terms", "pcss": "PCSS", "hard": "one hard shadow"})),
     Entry("fig11", "Figure 11", "Bodies walking through an atrium",
           "Several animated dragons in Sponza, 100 thousand faces in all, at 14 frames per second; light that bounces "
           "off the back wall dominates.", columns=3,
@@ -86,10 +87,11 @@ FIGURES = (
           "and buffers take 2 %.", make=steps),
     Entry("error", "Error, split", "Beyond the paper",
           "The paper has no such table: it shows the difference to a hard shadow for every light, in one picture.",
-          make=partial(split, shown=("members", "step", "mip"), steps={
+          make=partial(split, shown=("rays_vpls", "pcss", "mip"), steps={
               "lights": "pixel lights for all light, near ones clamped",
-              "members": "clusters: the share of lights seen",
-              "rectangle": "their bounding rectangle", "back_projection": "one map from its centre, projected back",
-              "step": "one mean blocker, one disc", "series": "series of 4 terms", "sat": "squares for discs",
-              "mip": "mip levels for squares", "interleaved": "interleaving and blur"})),
+              "rays_vpls": "clusters: the share of visible lights",
+              "rays_rectangle": "their bounding rectangle",
+              "back_projection": "one map from its centre, projected back",
+              "pcss": "one mean blocker, one disc", "csm": "series of 4 terms",
+              "mip": "mip levels for discs", "interleaved": "interleaving and blur"})),
 )

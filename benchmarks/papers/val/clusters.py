@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from benchmarks.papers.records import Array, Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.val.moving import mean_motion, motion
 from benchmarks.papers.val.subjects import (
+    AREA_LIGHTS,
     SMALL,
     Clustered,
     clustered,
@@ -154,7 +155,7 @@ def to_the_ceiling(bench: Workbench, scene: str, starts: dict[str, str], distanc
     step = moves["normalised", "restart"]
     return Figure(
         facts=(scene_of(bench, scene).description, f"{len(frames)} frames, to the ceiling and back",
-               f"{settings['raw'].lights} lights", f"{settings['raw'].area_lights} clusters"), pictures=shown,
+               f"{settings['raw'].lights.count} lights", f"{AREA_LIGHTS} clusters"), pictures=shown,
         tables=[Table("Clusters with lights, and how far things move between two frames in % of the scene's diagonal",
                       ("", "on the wall", "on the ceiling", "back on the wall", "lights, mean", "centres, mean",
                        "centres, 95 %", "centres, farthest"),

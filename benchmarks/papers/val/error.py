@@ -32,20 +32,20 @@ def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further
                    kinds: dict[str, str]) -> Figure:
     """Figure 10: more and more area lights, to one for every light; beside it a ray to each and path tracing.
 
-    The exact step, which reads every texel, is looked at up to the paper's number of area lights.
+    PCSS, which reads every texel, is drawn up to the paper's number of area lights.
     """
     frame, settings = frame_of(bench, scene, JUDGED), settings_of(bench)
     right, traced = shadowed(bench, frame, settings), bench.traced(frame).mean
-    gallery, most = Gallery(frame, right), settings.lights
+    gallery, most = Gallery(frame, right), settings.lights.count
     rmse: dict[tuple[str, int], float] = {}  # % of the mean, against a ray to each light
     truth, seconds = {}, {}  # of the series: MAE against path tracing, s
     for m in (*shown, *(n for n in further if shown[-1] < n < most), most):
-        for kind in kinds if m <= AREA_LIGHTS else ("series", "hard") if m == most else ("series",):
+        for kind in kinds if m <= AREA_LIGHTS else ("csm", "hard") if m == most else ("csm",):
             started = time.perf_counter()
-            light = val(frame, settings_of(bench, area_lights=m, visibility=kind))
+            light = val(frame, settings_of(bench, clusters_count=m, visibility=kind))
             taken = time.perf_counter() - started
             rmse[kind, m] = errors_of(light, right, gallery.covered).rmse
-            if kind == "series":
+            if kind == "csm":
                 seconds[m], truth[m] = taken, errors_of(light, traced, gallery.covered).mae
                 if m in shown:
                     gallery.indirect(f"areas{m}", f"{m} area lights", f"RMSE {rmse[kind, m]:.1f} %", light)
@@ -53,7 +53,7 @@ def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further
                     usual = light
     title = f"{AREA_LIGHTS} area lights"
     block = val(frame, published(bench, frame.scene))
-    gallery.indirect("rays", "a ray to each light", f"{settings.lights} lights", right)
+    gallery.indirect("rays", "a ray to each light", f"{settings.lights.count} lights", right)
     gallery.indirect("traced", "path tracing", "without pixel lights", traced)
     gallery.indirect("interleaved", f"{title}, interleaved", "8 x 8 and blurred", block)
     gallery.camera("seen", title, "with direct light", usual)
@@ -67,9 +67,9 @@ def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further
                     [rmse[kind, m] for m in counts if (kind, m) in rmse], kind == "hard")
               for kind, said in kinds.items()]
     curves.append(Curve("series, MAE against path tracing", counts, [truth[m] for m in counts], True))
-    slope = float(np.polyfit(np.log(shown), np.log([rmse["series", m] for m in shown]), 1)[0])
+    slope = float(np.polyfit(np.log(shown), np.log([rmse["csm", m] for m in shown]), 1)[0])
     return Figure(
-        facts=(frame.scene.description, f"{frame.width}² pixels", f"{settings.lights} lights",
+        facts=(frame.scene.description, f"{frame.width}² pixels", f"{settings.lights.count} lights",
                f"path tracing with {bench.scale.truth_samples} samples a pixel"), pictures=gallery.pictures,
         tables=[Table("RMSE in % of the mean, by number of area lights",
                       ("area lights", *kinds.values(), "series, MAE against path tracing", "ms, series"),
@@ -78,13 +78,13 @@ def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further
                     "Error against a ray to each light over the number of area lights.")],
         notes=(
             f"From 2 to {AREA_LIGHTS} area lights the RMSE against a ray to each light falls from "
-            f"{rmse['series', 2]:.1f} to {rmse['series', AREA_LIGHTS]:.1f} % of the mean, about as their "
+            f"{rmse['csm', 2]:.1f} to {rmse['csm', AREA_LIGHTS]:.1f} % of the mean, about as their "
             f"number to the {slope:.2f}. One hard shadow for each area light comes to "
-            f"{rmse['hard', 2]:.1f} and {rmse['hard', AREA_LIGHTS]:.1f} %, and the exact step to "
-            f"{rmse['step', 2]:.1f} and {rmse['step', AREA_LIGHTS]:.1f} %: what soft shadows gain in RMSE, the "
+            f"{rmse['hard', 2]:.1f} and {rmse['hard', AREA_LIGHTS]:.1f} %, and PCSS to "
+            f"{rmse['pcss', 2]:.1f} and {rmse['pcss', AREA_LIGHTS]:.1f} %: what soft shadows gain in RMSE, the "
             "bias of four terms takes back the more, the smaller the area lights; what is left of their worth is that "
             "bands turn into gradients.",
-            f"With {most} area lights it is {rmse['series', most]:.1f} %: each light is then its own area light "
+            f"With {most} area lights it is {rmse['csm', most]:.1f} %: each light is then its own area light "
             "without a size, one texel of a depth map is compared, and only the map's texels are left of the error. "
             "Between, clusters of two or three lights still have the series' bias, which does not shrink with them.",
             f"Against path tracing the MAE of the same lights with rays is {vpl_off:.1f} %, of {title} "
@@ -118,7 +118,7 @@ def split(bench: Workbench, steps: dict[str, str], shown: tuple[str, ...]) -> Fi
 
     return Figure(
         facts=(f"{gallery.frame.width}² pixels", f"path tracing with {bench.scale.truth_samples} samples a pixel",
-               f"{usual.lights} lights", f"{usual.area_lights} area lights"), pictures=gallery.pictures,
+               f"{usual.lights.count} lights", f"{AREA_LIGHTS} area lights"), pictures=gallery.pictures,
         tables=[Table("What each approximation changes in the picture before it, in % of the mean: root mean square, "
                       "and change of the mean", ("", *(f"{title}, RMS" for title in TITLES.values()),
                                                  *(f"{title}, mean" for title in TITLES.values())), rows)],

@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.papers.records import Bar, Cell, Figure, Picture, Ratios, Table, relative
 from benchmarks.papers.val.subjects import (
+    AREA_LIGHTS,
     ATRIUM,
     BOX,
     HORSE,
@@ -48,7 +49,7 @@ def one_frame(bench: Workbench, name: str, fps: float) -> Figure:
     gallery.indirect("full", "indirect light alone", full, light[full], ways[full])
     return Figure(
         facts=(scene.description, f"{scene.face_count} faces", f"{frame.width}² pixels", f"{ways[block].lights} lights",
-               f"{ways[block].area_lights} area lights"), pictures=gallery.pictures,
+               f"{AREA_LIGHTS} area lights"), pictures=gallery.pictures,
         tables=[Table("Whole frames; error in % of the mean irradiance: of all lights against a ray to each, of "
                       "interleaving against all lights at every pixel",
                       ("", "ms", "fps", "fps, paper", "RMSE", "MAE", "darker by"),
@@ -75,7 +76,7 @@ def four_scenes(bench: Workbench, faces: dict[str, str], fps: dict[str, float]) 
         gallery.camera(name.replace(" ", "_"), title, f"{scenes[name].face_count} faces",
                        val(gallery.frame, block[name]), block[name])
     return Figure(
-        facts=(f"{timed_size(bench)}² pixels", f"{block[BOX].lights} lights", f"{block[BOX].area_lights} area lights",
+        facts=(f"{timed_size(bench)}² pixels", f"{block[BOX].lights.count} lights", f"{AREA_LIGHTS} area lights",
                "whole frames, nothing kept from one to the next", f"medians of {bench.few}"), pictures=shown,
         ratios=[relative("frames per second, relative to the Cornell box",
                          {TITLES[name]: one for name, one in rate.items()},
@@ -102,10 +103,10 @@ class Step(NamedTuple):
 
 STEPS = (Step("deferred rendering", ("rsm.gbuffer", "rsm.resolve", "rsm.rasterize", "rsm.direct", "rsm.shadow_map",
                                      "rsm.facing", "frame."), 0.4),
-         Step("VPL generation", ("rsm.reflective", "rsm.pixel_lights", "rsm.refraction", "rsm.solid_angles"), 0.1),
+         Step("VPL generation", ("rsm.reflective", "lights.choose", "lights.refraction", "rsm.solid_angles"), 0.1),
          Step("VAL clustering", ("cluster.kmeans", "cluster.area_lights"), 0.5),
          Step("CSSM", ("cluster.shadow_maps", "cluster.occluders", "cluster.blockers", "rsm.paraboloid"), 4.2),
-         Step("indirect illumination", ("cluster.irradiance", "cluster.visibility", "splat."), 35.0),
+         Step("indirect illumination", ("cluster.irradiance", "cluster.visibility", "pairs."), 35.0),
          Step("geometry-aware blur", ("cluster.blur",), 10.7))
 REST = "all else"  # between stages: memory, arrays that are laid out anew
 ALL = "all lights"
@@ -132,7 +133,7 @@ def steps(bench: Workbench) -> Figure:
     return Figure(
         facts=(*(f"{TITLES[name]}: {scene_of(bench, name).face_count} faces" for name in (HORSE, ATRIUM)),
                f"{timed_size(bench)}² pixels", f"{settings[usual].lights} lights",
-               f"{settings[usual].area_lights} area lights"),
+               f"{AREA_LIGHTS} area lights"),
         ratios=[Ratios("per cent of a frame's time, Cornell Horse, interleaved", [
             Bar(step.title, 100 * spent[usual][step.title] / spent[usual]["frame"], 100 * step.paper_ms / paper)
             for step in STEPS])],

@@ -1,6 +1,5 @@
 """Scenes that move: how far pictures and area lights jump from frame to frame; Figures 11 and 12."""
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -31,6 +30,7 @@ from refgi.cluster.val import val
 from refgi.frame import Frame
 from refgi.lights import PixelLights
 from refgi.scene import Scene
+from refgi.settings import replaced
 from refgi.stages import Memory, observe
 
 FEW = 8  # area lights
@@ -127,7 +127,7 @@ def sequence(bench: Workbench, scene_at: Callable[[float], Scene], step: float) 
     span = step * (count - 1)
     frames = [seen_by(bench, scene_at(span * k / (count - 1)), MOVING) for k in range(count)]
     settings = settings_of(bench)
-    few = dataclasses.replace(settings, area_lights=FEW)
+    few = replaced(settings, {"clusters.count": FEW})
     ways = {RESTARTED: (settings, clustered_along(frames, settings, warm=False)),
             WARM: (settings, clustered_along(frames, settings, warm=True)),
             FEWER: (few, clustered_along(frames, few, warm=False))}

@@ -42,7 +42,7 @@ FLOOR, BOARD = Material("floor", (0.7, 0.7, 0.7)), Material("board", (0.6, 0.45,
 HALF = 1.8  # m, half a side of the floor: what is far sets the bias of the series
 GRID = 12  # lights along a side of a lamp
 FLUX = 40.0  # W, of a lamp
-PUBLISHED, STEP = "as published: 4 terms, mip", "exact step"
+PUBLISHED, STEP = "as published: 4 terms, mip", "PCSS"
 SHADOW, DEEP = 0.9, 0.1  # of the light that would come without occlusion: less is a shadow, less than that its core
 
 
@@ -83,7 +83,7 @@ def _one_cluster(view: View, settings: ValSettings, diagonal: float) -> Clustere
     lights = PixelLights(position.astype(np.float32), np.repeat(normal[:, None], count, 1).astype(np.float32),
                          np.full((3, count), FLUX / count, np.float32), None, None, None, count)
     found = cluster(lights.position, lights.normal, 1, diagonal=diagonal)
-    return Clustered(lights, found, area_lights(lights, found, settings))
+    return Clustered(lights, found, area_lights(lights, found, settings.area))
 
 
 def small_and_large(bench: Workbench, views: tuple[View, ...], fps: float) -> Figure:
@@ -107,7 +107,7 @@ def small_and_large(bench: Workbench, views: tuple[View, ...], fps: float) -> Fi
                      1 / seconds[view.name], fps))
     return Figure(
         facts=("the four-legged body on a floor", f"{frame.scene.face_count} faces", f"{frame.width}² pixels",
-               f"map of {settings.map_resolution}² texels"), pictures=shown,
+               f"map of {settings.maps.resolution}² texels"), pictures=shown,
         tables=[Table("Size of the lamp and of its area light; error against rays in % of the mean; map and light",
                       ("", "side, m", "area light, m", "RMSE", "MAE", "darker by", "ms", "fps", "fps, paper"), rows)],
         notes=("The shadow of the larger light is wider and softer, as in the paper. Against rays the pictures are "
@@ -134,25 +134,24 @@ def failures(bench: Workbench, views: tuple[View, ...], ways: dict[str, dict[str
         gallery.indirect(f"{view.name}_published", view.title, f"RMSE {rmse[PUBLISHED][-1]:.1f} %", made[PUBLISHED])
         gallery.indirect(f"{view.name}_rays", f"{view.title}, by rays", "what is right", right)
         gallery.errors({f"{view.name}_published": (view.title, made[PUBLISHED])}, right)
-        gallery.indirect(f"{view.name}_step", f"{view.title}, exact step", f"RMSE {rmse[STEP][-1]:.1f} %", made[STEP])
+        gallery.indirect(f"{view.name}_step", f"{view.title}, PCSS", f"RMSE {rmse[STEP][-1]:.1f} %", made[STEP])
 
     def said(way: str) -> str:
         return ", ".join(f"{value:.1f}" for value in rmse[way]) + " %"
 
     return Figure(
-        facts=("one lamp, one map", f"{frame.width}² pixels", f"map of {settings.map_resolution}² texels"),
+        facts=("one lamp, one map", f"{frame.width}² pixels", f"map of {settings.maps.resolution}² texels"),
         pictures=shown,
         tables=[Table("RMSE against rays in % of the mean, with parts of the method replaced",
                       ("", *(view.title for view in views)), [(way, *off) for way, off in rmse.items()])],
         notes=(
-            f"The three pictures are {said(PUBLISHED)} off as published. With summed areas, which know no steps "
-            f"between mip levels, it is {said('4 terms, summed areas')}. Every texel of the disc comes to "
-            f"{said('4 terms, every texel')}.",
-            f"Sixteen terms, whose bias is a quarter, come to {said('16 terms, summed areas')}; the exact step, with "
+            f"The three pictures are {said(PUBLISHED)} off as published. Every texel of the disc, which knows no "
+            f"steps between mip levels, comes to {said('4 terms, every texel')}.",
+            f"Sixteen terms, whose bias is a quarter, come to {said('16 terms, every texel')}; PCSS, with "
             f"the receiver's plane and the cone towards the light, to {said(STEP)}. One hard shadow comes to "
             f"{said('one hard shadow')}.",
-            "What is left with the exact step is the method's one mean depth of blockers and its round filter for a "
-            "square light; next to contacts the published series lets light through where the step does not, as the "
+            "What is left with PCSS is the method's one mean depth of blockers and its round filter for a "
+            "square light; next to contacts the published series lets light through where PCSS does not, as the "
             "paper says of its own."))
 
 
@@ -182,8 +181,8 @@ def soft_and_crisp(bench: Workbench, titles: dict[str, str]) -> Figure:
                                               f"{one.exact:.0f} % of the shadow", exact)
     wide, narrow = found["wide"], found["narrow"]
     return Figure(
-        facts=("the four-legged body in the Cornell box", f"{settings.lights} lights", "spots of equal flux at the "
-               "left wall", f"judged at {small.width}²"), pictures=shown,
+        facts=("the four-legged body in the Cornell box", f"{settings.lights.count} lights",
+               "spots of equal flux at the left wall", f"judged at {small.width}²"), pictures=shown,
         tables=[Table("Shadows: pixels that get less than 90 % of what would come without occlusion, and how many of "
                       "them get more than 10 %", ("", "size of an area light, cm", "penumbra, %",
                                                   "penumbra by rays, %", "RMSE, % of the mean"),
@@ -197,7 +196,7 @@ def soft_and_crisp(bench: Workbench, titles: dict[str, str]) -> Figure:
 
 
 def _measured(frame: Frame, settings: ValSettings, exact: Array) -> Soft:
-    free, light = val(frame, dataclasses.replace(settings, visibility="none")), val(frame, settings)
+    free, light = val(frame, dataclasses.replace(settings, visibility=None)), val(frame, settings)
     covered, areas = frame.gbuffer.covered, clustered(frame, settings).areas
     used = areas.members > 0
     size = 100 * float(areas.delta[used].mean()) if used.any() else 0.0

@@ -22,14 +22,14 @@ import numpy as np
 
 from benchmarks.papers.records import Array
 from benchmarks.papers.workbench import Subjects, Workbench, whole_frame
-from refgi.cluster.clustering.kmeans import Clusters, cluster
+from refgi.cluster.clustering.kmeans import Clustering, cluster
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.reference import reference_visibility
-from refgi.cluster.settings import ValSettings
-from refgi.cluster.val import facing, val
+from refgi.cluster.settings import Clusters, ValSettings
+from refgi.cluster.val import face_normals, val
 from refgi.frame import Frame
 from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights
@@ -39,6 +39,7 @@ from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, load_scene
 from refgi.scene.builtin.cornell import CAMERA, cornell_box, shell
 from refgi.scene.builtin.metaballs import HALF_SIZE, MIDDLE, Balls, blob, metaballs
 from refgi.scene.model import merge
+from refgi.settings import of
 from refgi.truth.vpl import VplSettings, vpl
 
 HORSE, CORNER, BOX, ATRIUM, BLOB, MARCH = "horse", "corner", "plain box", "atrium", "blob", "march"
@@ -156,16 +157,16 @@ class Clustered(NamedTuple):
     """Pixel lights and what stands for their visibility."""
 
     lights: PixelLights
-    clusters: Clusters
+    clusters: Clustering
     areas: AreaLights
 
 
 def settings_of(bench: Workbench, **changes: Any) -> ValSettings:
     """Return the paper's settings for the sum of all lights at every pixel; a small run has fewer lights."""
     lights = min(MOST_LIGHTS, max(FEWEST_LIGHTS, 2 * bench.scale.size))
-    usual: dict[str, Any] = {"lights": lights, "area_lights": AREA_LIGHTS, "map_resolution": bench.scale.rsm_resolution,
-                             "interleaving": 1}
-    return ValSettings(**(usual | changes))
+    usual: dict[str, Any] = {"lights": lights, "clusters.count": AREA_LIGHTS, "interleaving": 1,
+                             "maps.resolution": bench.scale.rsm_resolution}
+    return of(ValSettings, **(usual | changes))
 
 
 def clamped(bench: Workbench, scene: Scene, **changes: Any) -> ValSettings:
@@ -189,13 +190,15 @@ def timed_size(bench: Workbench) -> int:
     return PAPER_SIZE if bench.scale.size >= PAPER_SIZE / 2 else bench.scale.size
 
 
-def clustered(frame: Frame, settings: ValSettings, start: Clusters | None = None) -> Clustered:
+def clustered(frame: Frame, settings: ValSettings, start: Clustering | None = None) -> Clustered:
     """Choose lights and group them; `start` has clusters of another frame to start from."""
-    lights = choose_lights(frame, settings)
-    found = cluster(lights.position, lights.normal, settings.area_lights, distance=settings.distance,
-                    weights=(settings.position_weight, settings.normal_weight),
-                    diagonal=frame.lit_extent.diagonal, rounds=settings.rounds, start=start)
-    return Clustered(lights, found, area_lights(lights, found, settings))
+    lights = choose_lights(frame, settings.lights)
+    kind = settings.clusters
+    assert isinstance(kind, Clusters)
+    found = cluster(lights.position, lights.normal, kind.count, distance=kind.distance,
+                    weights=(kind.position_weight, kind.normal_weight), diagonal=frame.illuminated_extent.diagonal,
+                    rounds=kind.rounds, start=start)
+    return Clustered(lights, found, area_lights(lights, found, settings.area))
 
 
 def clustered_along(frames: list[Frame], settings: ValSettings, *, warm: bool) -> list[Clustered]:
@@ -208,22 +211,24 @@ def clustered_along(frames: list[Frame], settings: ValSettings, *, warm: bool) -
 
 def maps_of(frame: Frame, found: Clustered, settings: ValSettings) -> ShadowMaps:
     """Draw what each area light sees: one map for each that may be occluded."""
-    tracer = frame.tracer if settings.maps == "rays" else None
-    return shadow_maps(frame.scene.geometry, found.areas, settings, frame.dtype, tracer, ends_of(frame, found.lights))
+    tracer = frame.tracer if settings.maps.renderer == "rays" else None
+    ends = ends_of(frame, found.lights)
+    return shadow_maps(frame.scene.geometry, found.areas, settings.maps, frame.dtype, tracer, ends)
 
 
 def lit_by(frame: Frame, found: Clustered, settings: ValSettings, maps: ShadowMaps | None = None) -> Array:
     """Return irradiance (3, h, w) of all of the given lights at every pixel, by given clusters and maps."""
     maps = maps_of(frame, found, settings) if maps is None else maps
     to = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
-    given = reference_visibility(frame, found.lights, found.areas, maps, settings)
-    return clustered_irradiance(to, facing(frame), found.lights, found.areas, maps, settings, given=given)
+    by_reference = reference_visibility(frame, found.lights, found.areas, maps, settings)
+    return clustered_irradiance(to, face_normals(frame), found.lights, found.areas, maps, settings,
+                                visibility_of=by_reference)
 
 
 def shadowed(bench: Workbench, frame: Frame, settings: ValSettings) -> Array:
     """Return the same lights with a shadow ray each: what more and more area lights converge to."""
-    lights = settings.lights
-    return bench.once(("shadowed", frame, lights), lambda: vpl(frame, VplSettings(lights=lights)))
+    lights = settings.lights.count
+    return bench.once(("shadowed", frame, lights), lambda: vpl(frame, of(VplSettings, lights=lights)))
 
 
 def rays_to(frame: Frame, lights: PixelLights) -> Array:

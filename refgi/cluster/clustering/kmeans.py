@@ -1,6 +1,6 @@
 """Clusters of lights by k-means over position and normal (Sec. 5): the mapping C(i) from light to area light.
 
-What a clustering is worth: how much normals differ in a cluster (Fig. 6), how many clusters are in use (Fig. 8).
+What a clustering is contribution: how much normals differ in a cluster (Fig. 6), how many clusters are in use (Fig. 8).
 """
 
 import math
@@ -22,7 +22,7 @@ SMALL = 1 << 20  # pairs of lights and area lights up to which waking other thre
 SLACK = 1e-12  # share of the largest distance: thousands of roundings
 
 
-class Clusters(NamedTuple):
+class Clustering(NamedTuple):
     """M clusters of N lights; those without members stand where they last had some."""
 
     center: Array  # (3, M) float64, m
@@ -36,8 +36,8 @@ class Clusters(NamedTuple):
 @stage("cluster.kmeans")
 def cluster(
     position: Array, normal: Array, count: int, *, distance: Distance = "normalised",
-    weights: tuple[float, float] = (0.7, 0.3), diagonal: float, rounds: int = 50, start: Clusters | None = None,
-) -> Clusters:
+    weights: tuple[float, float] = (0.7, 0.3), diagonal: float, rounds: int = 50, start: Clustering | None = None,
+) -> Clustering:
     """Group lights by k-means with ``d = w_x |x - c| + w_a angle(n, n_c)``.
 
     Parameters
@@ -57,12 +57,12 @@ def cluster(
         Of the scene, m; not used when raw.
     rounds : int
         Most rounds; fewer when no light changes its cluster any more.
-    start : Clusters, optional
+    start : Clustering, optional
         Where the clusters begin, M of them; light floor(k N / M) for cluster k where absent.
 
     Returns
     -------
-    Clusters
+    Clustering
         C(i) is the cluster at least distance, the lowest on ties.
 
     Raises
@@ -111,15 +111,15 @@ def _finite(values: Array, name: str) -> Array:
     return array
 
 
-def _each_its_own(lights: Array) -> Clusters:
+def _each_its_own(lights: Array) -> Clustering:
     count = lights.shape[1]
-    return Clusters(lights[:3].copy(), lights[3:].copy(), np.ones(count, np.int64), np.arange(count, dtype=np.int32), 0,
-                    np.zeros(1))
+    return Clustering(lights[:3].copy(), lights[3:].copy(), np.ones(count, np.int64),
+                      np.arange(count, dtype=np.int32), 0, np.zeros(1))
 
 
 def _run(
     lights: Array, areas: Array, distance: Distance, weights: tuple[float, float], diagonal: float, rounds: int
-) -> Clusters:
+) -> Clustering:
     total, count = lights.shape[1], areas.shape[1]
     metric = _metric(distance, weights, diagonal, np.ptp(np.hstack([lights, areas])[:3], axis=1).sum())
     with threads(1 if total * count <= SMALL else None):
@@ -130,7 +130,7 @@ def _run(
             np.empty((workers, LINES, TILE)), np.empty((workers, count)), np.empty((workers, 2, TILE), np.int64))
         objective = np.zeros(rounds + 1)
         done = iterate(state, metric, rounds, objective)
-    return Clusters(areas[:3].copy(), areas[3:].copy(), state.members, state.of, done, objective[: done + 1])
+    return Clustering(areas[:3].copy(), areas[3:].copy(), state.members, state.of, done, objective[: done + 1])
 
 
 def _metric(distance: Distance, weights: tuple[float, float], diagonal: float, span: float) -> Metric:
@@ -144,14 +144,14 @@ def _metric(distance: Distance, weights: tuple[float, float], diagonal: float, s
     return Metric(position, angle, distance == "squared", SLACK * float(position * span + angle * math.pi))
 
 
-def mean_angle(normal: Array, clusters: Clusters) -> float:
+def mean_angle(normal: Array, clusters: Clustering) -> float:
     """Return the mean over lights of the angle between a light's normal and its cluster's.
 
     Parameters
     ----------
     normal : (3, N) ndarray
         Unit normals of the lights.
-    clusters : Clusters
+    clusters : Clustering
         Their clusters.
 
     Returns
@@ -166,12 +166,12 @@ def mean_angle(normal: Array, clusters: Clusters) -> float:
     return float(np.arctan2(across, along).mean())
 
 
-def in_use(clusters: Clusters) -> int:
+def in_use(clusters: Clustering) -> int:
     """Return how many clusters have lights.
 
     Parameters
     ----------
-    clusters : Clusters
+    clusters : Clustering
         The clusters.
 
     Returns

@@ -1,4 +1,4 @@
-"""How far a light is from an area light: position and normal, weighed against each other (Sec. 5.1).
+"""Distance of a pixel light from a cluster: position and normal, weighted (Sec. 5.1).
 
 d = w_x |x - c| + w_a angle(n, n_c), the printed form, or d = w_x |x - c|^2 + w_a |n - n_c|^2. Weights arrive with their
 units taken in, and whether to square. Angles are exact to rounding everywhere: near 0 and pi the arc cosine of a dot
@@ -15,22 +15,9 @@ HALF_PI = 0.5 * math.pi
 
 @kernel
 def angle(dot: Any, apart: Any) -> Any:
-    """Return the angle between two unit vectors without branches.
+    """Return the angle between two unit vectors, 0 to pi within 1e-15, without branches.
 
-    Parameters
-    ----------
-    dot : float
-        Their dot product.
-    apart : float
-        Squared length of their difference, of the sum instead where `dot` is negative.
-
-    Returns
-    -------
-    float
-        0 to pi, within 1e-15.
-
-    Notes
-    -----
+    From their dot product and the squared length of their difference, of the sum instead where `dot` is negative:
     2 asin(apart^(1/2) / 2), or pi less that, beyond 60 degrees off the perpendicular, and pi/2 - asin(dot) within.
     asin(s) = s + s z P(z) with z = s^2 <= 1/4; P is of degree 11.
     """
@@ -58,48 +45,21 @@ def linear(
     x: Any, y: Any, z: Any, nx: Any, ny: Any, nz: Any, cx: Any, cy: Any, cz: Any, ax: Any, ay: Any, az: Any,
     per_metre: Any, per_radian: Any,
 ) -> Any:
-    """Return w_x |x - c| + w_a angle(n, n_c).
-
-    Parameters
-    ----------
-    x, y, z, nx, ny, nz : float
-        Position, m, and unit normal.
-    cx, cy, cz, ax, ay, az : float
-        Position, m, and unit normal of the area light.
-    per_metre, per_radian : float
-        Weights.
-
-    Returns
-    -------
-    float
-        Distance.
-    """
+    """Return w_x |x - c| + w_a angle(n, n_c) of a light (x, y, z; n) and an area light (c; a); m, unit normals."""
     dx, dy, dz = x - cx, y - cy, z - cz
     dot = nx * ax + ny * ay + nz * az
     side = math.copysign(1.0, dot)
     ex, ey, ez = nx - side * ax, ny - side * ay, nz - side * az
     turn = angle(dot, ex * ex + ey * ey + ez * ez)
+    # Sec. 5.1: d = w_x dx + w_a dalpha
     return per_metre * math.sqrt(dx * dx + dy * dy + dz * dz) + per_radian * turn
 
 
 @kernel
 def fill_linear(lights: Any, count: int, other: Any, k: int, per_metre: float, per_radian: float, out: Any) -> None:
-    """Fill the distances of lights to one area light.
+    """Fill out[:count] with w_x |x - c| + w_a angle(n, n_c) of lights (6, r) and area light k of `other` (6, M).
 
-    Parameters
-    ----------
-    lights : (6, r) ndarray
-        Positions and unit normals.
-    count : int
-        How many of them.
-    other : (6, M) ndarray
-        Area lights.
-    k : int
-        Which of them.
-    per_metre, per_radian : float
-        Weights.
-    out : (r,) ndarray
-        Filled as far as `count`.
+    Rows are position, m, and unit normal.
     """
     x, y, z, nx, ny, nz = lights[0], lights[1], lights[2], lights[3], lights[4], lights[5]
     cx, cy, cz, ax, ay, az = other[0, k], other[1, k], other[2, k], other[3, k], other[4, k], other[5, k]
@@ -114,22 +74,9 @@ def fill_linear(lights: Any, count: int, other: Any, k: int, per_metre: float, p
 
 @kernel
 def fill_squares(lights: Any, count: int, other: Any, k: int, per_area: float, per_square: float, out: Any) -> None:
-    """Fill w_x |x - c|^2 + w_a |n - n_c|^2 of lights and one area light.
+    """Fill out[:count] with w_x |x - c|^2 + w_a |n - n_c|^2 of lights (6, r) and area light k of `other` (6, M).
 
-    Parameters
-    ----------
-    lights : (6, r) ndarray
-        Positions and unit normals.
-    count : int
-        How many of them.
-    other : (6, M) ndarray
-        Area lights.
-    k : int
-        Which of them.
-    per_area, per_square : float
-        Weights.
-    out : (r,) ndarray
-        Filled as far as `count`.
+    Rows are position, m, and unit normal.
     """
     x, y, z, nx, ny, nz = lights[0], lights[1], lights[2], lights[3], lights[4], lights[5]
     cx, cy, cz, ax, ay, az = other[0, k], other[1, k], other[2, k], other[3, k], other[4, k], other[5, k]

@@ -1,10 +1,8 @@
-"""The area light of each cluster (Sec. 6): the bounding rectangle of its lights, projected onto its plane.
+"""Virtual area lights (VALs, Sec. 4, 5, 6): the bounding rectangle of each cluster's lights, projected onto its plane.
 
-Along which axes the bounding rectangle of a cluster lies in its plane: fixed, of the lights, or of least area.
-
-The paper names none. A square turned by 45 degrees fills twice its area of fixed axes.
-
-A virtual area light stands for the visibility of the lights of one cluster (Sec. 4, 5).
+A virtual area light stands for the visibility of the lights of one cluster. Its rectangle lies along fixed axes, those
+of the lights, or those of least area; the paper names none. A square turned by 45 degrees fills twice its area of fixed
+axes.
 """
 
 import math
@@ -14,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.clustering.kmeans import Clusters
-from refgi.cluster.settings import Axes, Extent, ValSettings
+from refgi.cluster.clustering.kmeans import Clustering
+from refgi.cluster.settings import AreaLightSettings, Axes, Extent
 from refgi.errors import expect
 from refgi.stages import stage
 
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 ROUND = 1e-9  # a spread this near to that of a disc has no direction
-Given = Callable[[int, Array, Array], Array]  # (area light, points (3, n), facing (3, n)) -> V (n,)
+VisibilityFunction = Callable[[int, Array, Array], Array]  # (area light, points (3, n), facing (3, n)) -> V (n,)
 UPRIGHT = 0.999  # |y| of a normal from which a map's up is -z, as for all maps
 FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line, of no width but the rounding of its lights
 
@@ -65,8 +63,8 @@ def _of_least_area(flat: Array) -> float:
     length = np.hypot(*edges)
     if len(length) < 2 or not length.any():
         return 0.0
-    (c, d), kept = (edges / np.where(length > 0, length, 1)), length > 0
-    c, d = c[kept, None], d[kept, None]
+    (c, d), proper = (edges / np.where(length > 0, length, 1)), length > 0
+    c, d = c[proper, None], d[proper, None]
     along, across = c * corners[0] + d * corners[1], c * corners[1] - d * corners[0]
     best = int(np.argmin(np.ptp(along, axis=1) * np.ptp(across, axis=1)))
     return math.atan2(float(d[best, 0]), float(c[best, 0]))
@@ -108,7 +106,7 @@ class AreaLights(NamedTuple):
 
 @stage("cluster.area_lights")
 def area_lights(
-    lights: "PixelLights", clusters: Clusters, settings: ValSettings, footprint: Array | None = None
+    lights: "PixelLights", clusters: Clustering, settings: AreaLightSettings, footprint: Array | None = None
 ) -> AreaLights:
     """Return the rectangle that stands for each cluster.
 
@@ -116,9 +114,9 @@ def area_lights(
     ----------
     lights : PixelLights
         N lights.
-    clusters : Clusters
+    clusters : Clustering
         Their clusters.
-    settings : ValSettings
+    settings : AreaLightSettings
         Axes, extent, correction for sampling, and what a single light is.
     footprint : (N,) ndarray, optional
         Surface area of each light, m^2; for single lights that are their footprint.
@@ -186,7 +184,7 @@ def map_frames(normal: Array) -> Array:
     return np.stack([right, np.cross(forward, right), forward], axis=1)
 
 
-def _grouped(position: Array, clusters: Clusters) -> tuple[Array, Array, Array]:
+def _grouped(position: Array, clusters: Clustering) -> tuple[Array, Array, Array]:
     """Return the clusters in use, the lights of each in turn from its centre, and where each begins."""
     order = np.argsort(clusters.of, kind="stable")
     used = np.flatnonzero(clusters.members)
@@ -194,7 +192,7 @@ def _grouped(position: Array, clusters: Clusters) -> tuple[Array, Array, Array]:
     return used, position[:, order] - clusters.center[:, clusters.of[order]], starts
 
 
-def _axes(away: Array, frames: Array, clusters: Clusters, axes: Axes) -> Array:
+def _axes(away: Array, frames: Array, clusters: Clustering, axes: Axes) -> Array:
     """Return the axes of every rectangle, (M, 2, 3)."""
     turned = np.ascontiguousarray(frames[:, :2])
     if axes == "fixed":

@@ -17,7 +17,7 @@ from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
 
-TILE = 256  # lights looked at together
+TILE = 256  # lights compared together
 LINES = 9  # of scratch: six of lights, then distances to an area light, to the own one, to the nearest
 ZERO_MEAN = 1e-9  # a mean normal shorter than this has no direction
 
@@ -49,23 +49,10 @@ class Rounds(NamedTuple):
 
 @kernel
 def iterate(state: Rounds, metric: Metric, rounds: int, objective: Array) -> int:
-    """Run k-means until no light changes its area light, or for a number of rounds.
+    """Run k-means until no light changes its area light, or for a number of rounds; return the rounds of means made.
 
-    Parameters
-    ----------
-    state : Rounds
-        The start; becomes the result.
-    metric : Metric
-        The distance.
-    rounds : int
-        Most rounds of means.
-    objective : (rounds + 1,) ndarray
-        Filled with the sum of all distances at the start and after each round.
-
-    Returns
-    -------
-    int
-        Rounds of means made.
+    `state` becomes the result; `objective` (rounds + 1,) is filled with the sum of all distances at the start and after
+    each round.
     """
     done = 0
     while True:

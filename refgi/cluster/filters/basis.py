@@ -5,21 +5,19 @@ S_k = sin(c_k t), C_k = cos(c_k t), c_k = (2k - 1) pi, from the first pair by tu
     S_k+1 = S_k cos(2 pi t) + C_k sin(2 pi t),   C_k+1 = C_k cos(2 pi t) - S_k sin(2 pi t).
 
 t is the depth over the range of the series, 0 to less than 1 (the rest keeps the far end from wrapping around to the
-near one); where nothing is seen it is the far end. The paper's channels are the 2 M of the basis and the 2 M of the
+near one); where the map is empty it is the far end. The paper's channels are the 2 M of the basis and the 2 M of the
 "basis-z"; the mean of (1 - f) t needs the plain t as well.
 
-What is left of the basis in the published textures: 8 bits for sines and cosines, 16 for those times z (Sec. 6).
+The published textures have 8 bits for sines and cosines, 16 for those times z (Sec. 6).
 
 8 bits store [-1, 1] as 0 .. 255; the paper does not say how, this is the mapping of normalised textures. Each number
 is off by 1/255 at most, so V is off by sum_k 2 sqrt(2) / (255 c_k) at most: 0.0059 with 4 terms. 16 bits are the
 IEEE format of 11 significant ones, rounded to nearest, ties to even.
 
-What the square beyond the unit disc holds, for filters that cannot leave it out.
-
-The disc is the hemisphere before the light, and a square map has a fifth of its texels beyond it. Holding nothing
-they are lit, so that light leaks in over the rim. `mirrored` texels hold what lies in the direction mirrored at the
-light's plane, (s, t) / (s^2 + t^2): the filter then sees nothing but the hemisphere, as the sum over the texels of
-the disc does.
+The square beyond the unit disc, for filters that cannot leave it out: the disc is the hemisphere before the light, and
+a square map has a fifth of its texels beyond it. Holding nothing its texels would let light leak in over the rim.
+`mirrored` texels hold what lies in the direction mirrored at the light's plane, (s, t) / (s^2 + t^2): the filter then
+sees nothing but the hemisphere, as the sum over the texels of the disc does.
 """
 
 import functools
@@ -45,18 +43,7 @@ INSIDE = 1.5  # texels from the rim, within which the centre of a texel lies in 
 
 @kernel
 def eight_bits(value: Any) -> Any:
-    """Return what a texture of 8 bits keeps of a number.
-
-    Parameters
-    ----------
-    value : float
-        Number of [-1, 1].
-
-    Returns
-    -------
-    float
-        The nearest of 256 evenly spaced numbers from -1 to 1.
-    """
+    """Return the nearest of 256 evenly spaced numbers from -1 to 1: a number of [-1, 1] in a texture of 8 bits."""
     real = type(value)
     step = math.floor((value + real(1.0)) * real(0.5 * STEPS) + real(HALF_STEP))
     return real(step) * real(2.0 / STEPS) - real(1.0)
@@ -64,18 +51,7 @@ def eight_bits(value: Any) -> Any:
 
 @kernel
 def half_precision(value: Any) -> Any:
-    """Return what a float of 16 bits keeps of a number.
-
-    Parameters
-    ----------
-    value : float
-        Number within 65504 in size.
-
-    Returns
-    -------
-    float
-        The nearest half, of two equally near ones the even.
-    """
+    """Return the nearest float of 16 bits, of two equally near ones the even, of a number within 65504 in size."""
     real = type(value)
     _, exponent = math.frexp(value)
     spacing = math.ldexp(1.0, max(exponent - 1, LEAST_EXPONENT) - 10)
@@ -84,34 +60,16 @@ def half_precision(value: Any) -> Any:
 
 @kernel
 def normalise(depth: Array, scale: DepthScale, out: Array) -> None:
-    """Turn the distances of a map into depths of the series.
-
-    Parameters
-    ----------
-    depth : (n, n) ndarray
-        Radial distance, m; inf where nothing is seen.
-    scale : DepthScale
-        What depth a distance is.
-    out : (n, n) ndarray
-        Filled with t; `scale.most` where nothing is seen.
-    """
+    """Fill `out` (n, n) with t of the distances `depth` (n, n), m; `scale.most` where the map is empty (inf)."""
     for i in range(depth.shape[0]):
         series_depths(scale, depth[i], out[i], depth.shape[1])
 
 
 @kernel
 def sine_cosine(t: Any) -> tuple[Any, Any]:
-    """Return sin(pi t) and cos(pi t) of a depth.
+    """Return sin(pi t) and cos(pi t) for t from -1/4 (a depth less the largest bias) to 1.
 
-    Parameters
-    ----------
-    t : float
-        -1/4 (a depth less the largest bias) to 1, float32 or float64.
-
-    Returns
-    -------
-    tuple of 2 floats
-        Within 2.4e-7 (float64: 4e-16) from 0 on, 4.5e-7 (8e-16) below.
+    Within 2.4e-7 (float64: 4e-16) from 0 on, 4.5e-7 (8e-16) below.
     """
     real = type(t)
     u = t - real(0.5)
@@ -131,39 +89,16 @@ def sine_cosine(t: Any) -> tuple[Any, Any]:
 
 @kernel
 def turned(sine: Any, cosine: Any, by_sine: Any, by_cosine: Any) -> tuple[Any, Any]:
-    """Return sine and cosine of the sum of two angles.
-
-    Parameters
-    ----------
-    sine, cosine : float
-        Of the one angle.
-    by_sine, by_cosine : float
-        Of the other.
-
-    Returns
-    -------
-    tuple of 2 floats
-        From S_k, C_k and the sine and cosine of 2 pi t, S_k+1 and C_k+1.
-    """
+    """Return sine and cosine of the sum of two angles: from S_k, C_k and those of 2 pi t, S_k+1 and C_k+1."""
     return sine * by_cosine + cosine * by_sine, cosine * by_cosine - sine * by_sine
 
 
 @kernel
 def fill_basis(depth: Array, terms: int, quantised: bool, basis: Array, basis_z: Array) -> None:
-    """Write the basis and the basis-z of every texel of a map.
+    """Fill basis and basis-z of every texel of a map of t, (n, n).
 
-    Parameters
-    ----------
-    depth : (n, n) ndarray
-        t.
-    terms : int
-        M.
-    quantised : bool
-        Keep 8 bits of the basis and 16 of the basis-z.
-    basis : (n, n, 2 M) ndarray
-        Filled with S_1 .. S_M, C_1 .. C_M.
-    basis_z : (n, n, 2 M + 1) ndarray
-        Filled with t S_1 .. t S_M, t C_1 .. t C_M, t.
+    `basis` (n, n, 2 M): S_1 .. S_M, C_1 .. C_M; `basis_z` (n, n, 2 M + 1): t S_1 .. t S_M, t C_1 .. t C_M, t.
+    `quantised` rounds to 8 bits and 16.
     """
     for i in range(depth.shape[0]):
         for j in range(depth.shape[1]):
@@ -211,15 +146,7 @@ def beyond_disc(size: int, mirrored: bool) -> Array:
 
 @kernel
 def fill_beyond(pairs: Array, depth: Array) -> None:
-    """Copy depths to the texels beyond the unit disc.
-
-    Parameters
-    ----------
-    pairs : (count, 2) ndarray
-        As from `beyond_disc`.
-    depth : (n, n) ndarray
-        Changed in place.
-    """
+    """Copy depths of a map (n, n) to the texels beyond the unit disc, by pairs (count, 2) of `beyond_disc`."""
     n = len(depth)
     for k in range(len(pairs)):
         target, source = pairs[k, 0], pairs[k, 1]

@@ -1,4 +1,4 @@
-"""Means texel by texel: what mip maps and summed areas stand for, at a cost that grows with the disc.
+"""Brute-force prefilter: means texel by texel, at a cost that grows with the disc; the reference of the mip map.
 
 The disc takes the texels whose centres it holds, within the unit disc, or the one it lies in. The box is the square
 around the disc, at least a texel wide; texels count by the area of them that it holds, those beyond the unit disc
@@ -14,13 +14,13 @@ from numba import types
 
 from refgi.cluster.filters.basis import beyond_disc, fill_basis, fill_beyond, normalise
 from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.filters.eight import room_of
+from refgi.cluster.filters.eight import stack_array
 from refgi.cluster.settings import MOST_TERMS
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
 
-SUMS = room_of(1, 4 * MOST_TERMS + 1, types.float64)
+SUMS = stack_array(1, 4 * MOST_TERMS + 1, types.float64)
 
 
 class Brute(NamedTuple):
@@ -37,7 +37,7 @@ class Brute(NamedTuple):
 def brutes(
     size: int, terms: int, dtype: npt.DTypeLike, *, box: bool = False, quantised: bool = False, mirrored: bool = False
 ) -> Brute:
-    """Make room for one map.
+    """Allocate the filters of one map.
 
     Parameters
     ----------
@@ -65,17 +65,7 @@ def brutes(
 
 @kernel
 def build_brute(depth: Array, scale: DepthScale, brute: Brute) -> None:
-    """Fill the channels of one map.
-
-    Parameters
-    ----------
-    depth : (n, n) ndarray
-        Radial distance, m; inf where nothing is seen.
-    scale : DepthScale
-        As in `basis.normalise`.
-    brute : Brute
-        Filled.
-    """
+    """Fill the channels of one map of radial distances, (n, n), m; inf where it is empty."""
     normalise(depth, scale, brute.depth)
     fill_beyond(brute.beyond, brute.depth)
     fill_basis(brute.depth, brute.basis.shape[2] // 2, brute.quantised, brute.basis, brute.basis_z)
@@ -83,30 +73,14 @@ def build_brute(depth: Array, scale: DepthScale, brute: Brute) -> None:
 
 @kernel
 def brute_means(
-    brute: Brute, s: Array, t: Array, radius: Array, wanted: Array, count: int, with_z: bool, out: Array
+    brute: Brute, s: Array, t: Array, radius: Array, active: Array, count: int, with_z: bool, out: Array
 ) -> None:
-    """Read the means of the channels over a disc for each lane of a tile.
-
-    Parameters
-    ----------
-    brute : Brute
-        One map.
-    s, t, radius : (lanes,) ndarray
-        Centre and radius of the discs, in units of the map's half side.
-    wanted : (lanes,) ndarray
-        Lanes to read.
-    count : int
-        Lanes in use.
-    with_z : bool
-        All 4 M + 1 channels instead of the first 2 M.
-    out : (channels, lanes) ndarray
-        Filled where wanted.
-    """
+    """Fill out (channels, lanes) with the means over the disc of each active lane; as `mip.mip_means`."""
     n, channels = len(brute.depth), brute.basis.shape[2]
     real, sums = s.dtype.type, SUMS(s)[0]
     used = 2 * channels + 1 if with_z else channels
     for i in range(count):
-        if not wanted[i]:
+        if not active[i]:
             continue
         for c in range(used):
             sums[c] = 0.0

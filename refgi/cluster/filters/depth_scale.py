@@ -1,4 +1,4 @@
-"""From distances to depths of the series and back: the scale that a depth map is compared on (Sec. 4.1).
+"""Depth scale: from distances to depths of the series and back, the scale that a depth map is compared on (Sec. 4.1).
 
 The series' bias is a share of its range, so the scale says how near a blocker may come to a receiver and still cast a
 shadow. The paper takes depths of [0, 1] and does not say of what. What a map holds are its occluders alone: on a scale
@@ -66,19 +66,7 @@ def depth_scale(kind: str, near: float, far: float, scene_far: float, most: floa
 
 @kernel
 def series_depths(scale: DepthScale, distance: Array, depth: Array, count: int) -> None:
-    """Turn distances into depths of the series.
-
-    Parameters
-    ----------
-    scale : DepthScale
-        The scale.
-    distance : (>= count,) ndarray
-        Distances, m; inf where nothing is seen.
-    depth : (>= count,) ndarray
-        Filled with t, 0 to `scale.most`.
-    count : int
-        How many.
-    """
+    """Fill depth[:count] with t, 0 to `scale.most`, of distances, m; inf where the map is empty."""
     real = distance.dtype.type
     origin, slope, most, zero = real(scale.origin), real(scale.slope), real(scale.most), real(0.0)
     if scale.logarithmic:
@@ -96,20 +84,7 @@ def series_depths(scale: DepthScale, distance: Array, depth: Array, count: int) 
 
 @kernel
 def series_distance(scale: DepthScale, depth: Any) -> Any:
-    """Return the distance that a depth of the series stands for.
-
-    Parameters
-    ----------
-    scale : DepthScale
-        The scale.
-    depth : float
-        t.
-
-    Returns
-    -------
-    float
-        Distance, m, in the type of `depth`.
-    """
+    """Return the distance, m, that a depth t of the series stands for."""
     real = type(depth)
     along = depth / real(scale.slope)
     return real(scale.origin) * exp2(along) if scale.logarithmic else along + real(scale.origin)

@@ -1,8 +1,8 @@
-"""Eight numbers in one register, for kernels whose SIMD lanes are a texel's channels.
+"""Vectors of 8 lanes for kernels whose SIMD lanes are a texel's channels.
 
-The compiler joins loops over pixels into SIMD lanes by itself. Sums over a few texels of 8 channels each are too
-short for that: it would check anew for every texel whether what is written overlaps what is read. Here a kernel says
-it: `load`, `add`, `scale`, `store` and `transpose` work on 8 neighbours at once, in plain IEEE arithmetic. `room` is
+The compiler joins loops over pixels into SIMD lanes by itself. Sums over a few texels of 8 channels each are too short
+for that: it would check anew for every texel whether what is written overlaps what is read. Here a kernel says it:
+`load`, `add`, `scale`, `store` and `transpose` work on 8 neighbours at once, in plain IEEE arithmetic. `stack_array` is
 memory of the kernel's own stack, which needs no allocation and overlaps nothing. None of it checks bounds.
 """
 
@@ -134,23 +134,23 @@ def _transpose(_: Any, rows: Any) -> Emitted:
     return rows(rows), emit
 
 
-def room_of(rows: int, lanes: int, kind: Any = None) -> Any:
-    """Return a function for kernels that gives room on their stack, the same room for every call in one kernel.
+def stack_array(rows: int, lanes: int, kind: Any = None) -> Any:
+    """Return a function for kernels that gives scratch on their stack, the same scratch for every call in one kernel.
 
     Parameters
     ----------
     rows, lanes : int
         Its shape.
     kind : numba type, optional
-        Of its numbers; absent, that of the array the function is given.
+        Of its numbers; absent, that of the array the function gets.
 
     Returns
     -------
     callable
-        ``room(like)``: a (rows, lanes) array that holds anything.
+        ``scratch(like)``: a (rows, lanes) array that holds anything.
     """
 
-    def room(_: Any, like: Any) -> Emitted:
+    def scratch(_: Any, like: Any) -> Emitted:
         array_type = types.Array(kind or like.dtype, 2, "C")
 
         def emit(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
@@ -168,7 +168,7 @@ def room_of(rows: int, lanes: int, kind: Any = None) -> Any:
 
         return array_type(like), emit
 
-    return intrinsic(room)
+    return intrinsic(scratch)
 
 
 load: Any = intrinsic(_load)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import types
 
-from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store_at, transpose
+from refgi.cluster.filters.eight import EIGHT, add, load, scale, stack_array, store_at, transpose
 from refgi.cluster.filters.mip_build import build_mip, build_mips
 from refgi.cluster.filters.pyramid import CHUNK, DIRECT, LEVEL, MAP, Mip, add_level_0, mip_of, mips
 from refgi.elementary import log2p1
@@ -27,39 +27,27 @@ WIDEST = 4.0  # radius from which on a disc holds the whole map
 FINE, COARSE, FINE_SIDE, COARSE_SIDE = range(4)  # rows of whole numbers, before LEVEL and DIRECT
 # rows of weights: 4 of the finer level, 4 of the coarser, 4 of texels of the map itself; then what they are made of
 X, Y, SHARE = MAP + 4, MAP + 5, MAP + 6
-WHOLE, WEIGHTS, SUMS = room_of(6, CHUNK, types.int32), room_of(15, CHUNK), room_of(EIGHT, EIGHT)
+WHOLE, WEIGHTS, SUMS = stack_array(6, CHUNK, types.int32), stack_array(15, CHUNK), stack_array(EIGHT, EIGHT)
 
 
 @kernel
 def mip_means(
-    mip: Mip, s: Array, t: Array, radius: Array, wanted: Array, count: int, with_z: bool, out: Array
+    mip: Mip, s: Array, t: Array, radius: Array, active: Array, count: int, with_z: bool, out: Array
 ) -> None:
-    """Read the means of the channels over a disc for each lane of a tile.
+    """Fill out (channels, lanes) with the means over the disc of each active lane among the first `count`.
 
-    Parameters
-    ----------
-    mip : Mip
-        One map's pyramid.
-    s, t, radius : (lanes,) ndarray
-        Centre and radius of the discs, in units of the map's half side.
-    wanted : (lanes,) ndarray
-        Lanes to read.
-    count : int
-        Lanes in use.
-    with_z : bool
-        All 4 M + 1 channels instead of the first 2 M.
-    out : (channels, lanes) ndarray
-        Filled where wanted; what the first `count` lanes held elsewhere is lost.
+    `s`, `t` and `radius` (lanes,) are centres and radii in units of the map's half side; `with_z` reads all 4 M + 1
+    channels instead of the first 2 M. What the first `count` lanes held elsewhere is lost.
     """
     whole, weights, sums = WHOLE(s), WEIGHTS(s), SUMS(s)
     n, top, channels = len(mip.depth), len(mip.first) - 1, 2 * mip.terms
     for start in range(0, count, CHUNK):
         lanes = min(CHUNK, count - start)
         place = slice(start, start + lanes)
-        _find_levels(mip.shift, n, top, s[place], t[place], radius[place], wanted[place], whole, weights)
+        _find_levels(mip.shift, n, top, s[place], t[place], radius[place], active[place], whole, weights)
         for which in range(2):
             _find_texels(n, top, lanes, which, whole, weights)
-        some, direct = _find_starts(mip.first, wanted[place], whole)
+        some, direct = _find_starts(mip.first, active[place], whole)
         if not some:
             continue
         if direct:
@@ -77,12 +65,12 @@ def mip_means(
 
 @kernel
 def _find_levels(
-    shift: float, size: int, coarsest: int, s: Array, t: Array, radius: Array, wanted: Array, whole: Array,
+    shift: float, size: int, coarsest: int, s: Array, t: Array, radius: Array, active: Array, whole: Array,
     weights: Array,
 ) -> None:
     """Find each lane's finer level and the coarser one's share, and its place in texels of the map.
 
-    A lane that is not wanted reads the coarsest level.
+    A lane that is not active reads the coarsest level.
     """
     real = s.dtype.type
     n, top, none, half, one = real(size), real(coarsest), real(0.0), real(0.5), real(1.0)
@@ -90,12 +78,12 @@ def _find_levels(
         weights[SHARE, lane] = log2p1(max(none, min(real(WIDEST), radius[lane]) * n - one)) + real(shift)
     for lane in range(len(s)):
         level = min(max(none, weights[SHARE, lane]), top)
-        level = level if wanted[lane] else top
+        level = level if active[lane] else top
         fine = np.int32(level)
         whole[LEVEL, lane], weights[SHARE, lane] = fine, level - real(fine)
     for lane in range(len(s)):
         x, y = (s[lane] + one) * half * n, (t[lane] + one) * half * n
-        weights[X, lane], weights[Y, lane] = (x if wanted[lane] else none), (y if wanted[lane] else none)
+        weights[X, lane], weights[Y, lane] = (x if active[lane] else none), (y if active[lane] else none)
 
 
 @kernel
@@ -124,17 +112,17 @@ def _find_texels(size: int, coarsest: int, lanes: int, which: int, whole: Array,
 
 
 @kernel
-def _find_starts(first: Array, wanted: Array, whole: Array) -> tuple[bool, bool]:
-    """Add where levels start; return whether any lane is wanted, and whether any reads the map itself."""
+def _find_starts(first: Array, active: Array, whole: Array) -> tuple[bool, bool]:
+    """Add where levels start; return whether any lane is active, and whether any reads the map itself."""
     some, direct, top = False, False, len(first) - 1
-    for lane in range(len(wanted)):
+    for lane in range(len(active)):
         level = whole[LEVEL, lane]
-        some |= wanted[lane] != 0
+        some |= active[lane] != 0
         direct |= level == 0
         whole[DIRECT, lane] = whole[FINE, lane]
         whole[FINE, lane] = whole[FINE, lane] + np.int32(first[level]) if level > 0 else np.int32(0)
         whole[COARSE, lane] += np.int32(first[min(level + 1, top)])
-    for lane in range(len(wanted), -(-len(wanted) // EIGHT) * EIGHT):  # to a multiple of 8
+    for lane in range(len(active), -(-len(active) // EIGHT) * EIGHT):  # to a multiple of 8
         for row in range(6):
             whole[row, lane] = 0
     return some, direct

@@ -18,30 +18,23 @@ from refgi.cluster.filters.basis import (
     turned,
 )
 from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.filters.eight import EIGHT, add, load, room_of, scale, store
+from refgi.cluster.filters.eight import EIGHT, add, load, scale, stack_array, store
 from refgi.cluster.filters.pyramid import Mip, mip_of
 from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
 
 CHUNK = 64  # texels of level 1 made at once
-DEPTHS, SINES, COSINES = (room_of(4, CHUNK) for _ in range(3))
-BY_SINES, BY_COSINES = (room_of(4, CHUNK) for _ in range(2))
-MEANS = room_of(4, CHUNK)
+DEPTHS, SINES, COSINES = (stack_array(4, CHUNK) for _ in range(3))
+BY_SINES, BY_COSINES = (stack_array(4, CHUNK) for _ in range(2))
+MEANS = stack_array(4, CHUNK)
 
 
 @kernel(parallel=True)
 def build_mips(depth: Array, scales: DepthScale, several: Mip) -> None:
-    """Fill the pyramids of several maps.
+    """Fill the pyramids of several maps of radial distances (K, n, n), m; inf where they are empty.
 
-    Parameters
-    ----------
-    depth : (K, n, n) ndarray
-        Radial distances, m; inf where nothing is seen.
-    scales : DepthScale
-        As in `basis.normalise`; `origin` and `slope` are (K,) ndarrays.
-    several : Mip
-        Filled; with a leading axis of K at least.
+    `scales.origin` and `scales.slope` are (K,) arrays; `several` has a leading axis of K at least.
     """
     for k in prange(len(depth)):
         scale = DepthScale(scales.logarithmic, scales.origin[k], scales.slope[k], scales.most)
@@ -50,17 +43,7 @@ def build_mips(depth: Array, scales: DepthScale, several: Mip) -> None:
 
 @kernel
 def build_mip(depth: Array, scale: DepthScale, mip: Mip) -> None:
-    """Fill one pyramid.
-
-    Parameters
-    ----------
-    depth : (n, n) ndarray
-        Radial distance, m; inf where nothing is seen.
-    scale : DepthScale
-        As in `basis.normalise`.
-    mip : Mip
-        Filled.
-    """
+    """Fill one pyramid from a map of radial distances (n, n), m; inf where it is empty."""
     normalise(depth, scale, mip.depth)
     fill_beyond(mip.beyond, mip.depth)
     if len(depth) == 1:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.filters.basis import beyond_disc, eight_bits, half_precision, sine_cosine, turned
-from refgi.cluster.filters.eight import EIGHT, room_of
+from refgi.cluster.filters.eight import EIGHT, stack_array
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
@@ -25,7 +25,7 @@ SLACK = 4  # texels behind the last level: the right and lower neighbours of its
 CHUNK = 128  # receivers whose texels and weights are kept at once
 LEVEL, DIRECT = 4, 5  # rows of whole numbers: the finer level, and the first texel of the map where that is 0
 MAP = 8  # first of 4 rows of weights of texels of the map
-DEPTHS, SINES, COSINES, BY_SINES, BY_COSINES = (room_of(1, CHUNK) for _ in range(5))
+DEPTHS, SINES, COSINES, BY_SINES, BY_COSINES = (stack_array(1, CHUNK) for _ in range(5))
 
 
 class Mip(NamedTuple):
@@ -68,7 +68,7 @@ def mips(
     count: int, size: int, terms: int, dtype: npt.DTypeLike, *, shift: float = 0.0, quantised: bool = False,
     mirrored: bool = False,
 ) -> Mip:
-    """Make room for the pyramids of several maps.
+    """Allocate the filters of the pyramids of several maps.
 
     Parameters
     ----------
@@ -100,20 +100,7 @@ def mips(
 
 @kernel
 def mip_of(several: Mip, k: Any) -> Mip:
-    """Return one of several pyramids.
-
-    Parameters
-    ----------
-    several : Mip
-        With a leading axis.
-    k : int
-        Which.
-
-    Returns
-    -------
-    Mip
-        Views of that pyramid.
-    """
+    """Return views of pyramid k of several."""
     return Mip(several.depth[k], several.basis[k], several.basis_z[k], several.mean_depth[k], several.first,
                several.terms, several.shift, several.quantised, several.beyond)
 
@@ -122,22 +109,8 @@ def mip_of(several: Mip, k: Any) -> Mip:
 def add_level_0(mip: Mip, with_z: bool, lanes: int, whole: Array, weights: Array, out: Array, start: int) -> None:
     """Add what lanes read of the map itself; those that read none of it have weights of 0.
 
-    Parameters
-    ----------
-    mip : Mip
-        One map's pyramid.
-    with_z : bool
-        All 4 M + 1 channels instead of the first 2 M.
-    lanes : int
-        Lanes of the chunk.
-    whole : (6, CHUNK) ndarray
-        Int32; rows LEVEL and DIRECT count.
-    weights : (15, CHUNK) ndarray
-        Rows MAP to MAP + 3: of texels left and right, above and below.
-    out : (channels, tile) ndarray
-        Added to.
-    start : int
-        Lane of the tile that the chunk begins with.
+    Rows LEVEL and DIRECT of `whole` (6, CHUNK) and MAP to MAP + 3 of `weights` (15, CHUNK), of texels left and right,
+    above and below, count. Adds to `out` (channels, tile) from lane `start` on.
     """
     if mip.quantised:
         _add_rounded(mip.depth, mip.terms, with_z, lanes, whole, weights, out, start)

@@ -1,8 +1,8 @@
-"""Geometry-aware blur: the mean over n x n pixels of the same surface (Sec. 6, Laine et al. 2007).
+"""Geometry-aware blur, a joint bilateral box filter: the mean over n x n pixels of the same surface (Sec. 6).
 
-A pixel q counts for p where ``|x_q - x_p| <= extent`` and ``<n_p . n_q> >= cosine``. All weights are 1: a window of
-n x n pixels sees each subset of lights once wherever it lies, and any other kernel would leave the pattern of the
-subsets in the picture. At the rim of the picture the window is moved inwards, for the same reason.
+[Laine et al. 2007] A pixel q counts for p where ``|x_q - x_p| <= extent`` and ``<n_p . n_q> >= cosine``. All weights
+are 1: a window of n x n pixels sees each subset of lights once wherever it lies, and any other kernel would leave the
+pattern of the subsets in the picture. At the rim of the picture the window is moved inwards, for the same reason.
 
 Threads take tiles of TALL x WIDE pixels with their surroundings; the pixels of a row are the SIMD lanes. Where bounds
 say that all pixels around a tile count for each other, nothing is compared.
@@ -13,23 +13,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.lighting.blur_tile import COLUMNS, END, FAR, TALL, WIDE, E, N, X, alike, load_pixels
-from refgi.cluster.settings import MOST_BLOCK
+from refgi.cluster.lighting.blur_tile import COLUMNS, END, FAR, TALL, WIDE, E, N, X, is_one_surface, load_pixels
+from refgi.cluster.settings import MOST_BLOCK, GeometryBlur
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
 from refgi.stages import stage
 
 if TYPE_CHECKING:
-    from refgi.cluster.settings import ValSettings
+    from refgi.cluster.settings import BoxBlur
 
 Array = npt.NDArray[Any]
 
-TASKS = 64  # parts that tiles are dealt to, whatever the number of threads
+TASKS = 64  # parts that tiles are split into, whatever the number of threads
 
 
 @stage("cluster.blur")
-def blur(irradiance: Array, receivers: Receivers, size: int, settings: "ValSettings", diagonal: float) -> Array:
+def blur(
+    irradiance: Array, receivers: Receivers, size: int, settings: "BoxBlur | GeometryBlur", diagonal: float
+) -> Array:
     """Average irradiance over n x n pixels of the same surface.
 
     Parameters
@@ -37,11 +39,11 @@ def blur(irradiance: Array, receivers: Receivers, size: int, settings: "ValSetti
     irradiance : (3, h, w) ndarray
         W/m^2.
     receivers : Receivers
-        The points that are lit; their dtype is that of the result.
+        Receivers; their dtype is that of the result.
     size : int
         n, 1 to 64: pixels along a side of the window.
-    settings : ValSettings
-        Says how far apart points of one surface may be and how their normals may differ; "box" does not ask.
+    settings : BoxBlur or GeometryBlur
+        How far apart points of one surface may be and how their normals may differ; a box asks neither.
     diagonal : float
         Of the scene, m.
 
@@ -67,9 +69,10 @@ def blur(irradiance: Array, receivers: Receivers, size: int, settings: "ValSetti
     expect(values.shape == position.shape, "irradiance", f"shape {position.shape}", values.shape)
     expect(1 <= size <= MOST_BLOCK, "size", f"1 to {MOST_BLOCK} pixels", size)
     real = position.dtype.type
-    everywhere = settings.blur == "box"
-    extent = FAR / 4 if everywhere else min(settings.blur_extent * diagonal, FAR / 4)
-    cosine = settings.blur_cosine if settings.blur_cosine > -1 and not everywhere else -np.inf
+    extent, cosine = FAR / 4, -np.inf
+    if isinstance(settings, GeometryBlur):
+        extent = min(settings.extent * diagonal, FAR / 4)
+        cosine = settings.cosine if settings.cosine > -1 else -np.inf
     result = np.empty_like(values)
     _blur(values, position, normal, covered, size, real(extent) ** 2, real(cosine), result)
     return result
@@ -84,14 +87,14 @@ def _blur(
     across = (width + WIDE - 1) // WIDE
     tiles = across * ((height + TALL - 1) // TALL)
     for task in prange(TASKS):
-        room = np.empty((TALL + size - 1, END), position.dtype)  # once: pages of memory cost more than their use
+        scratch = np.empty((TALL + size - 1, END), position.dtype)  # once: pages of memory cost more than their use
         sums = np.empty((4, WIDE), position.dtype)
         for t in range(np.int64(task), tiles, TASKS):
             top, left = t // across * TALL, t % across * WIDE
             tall, wide = min(TALL, height - top), min(WIDE, width - left)
-            tile = room[: tall + size - 1]
+            tile = scratch[: tall + size - 1]
             load_pixels(tile, irradiance, position, normal, covered, top - size // 2, left - size // 2, wide, size)
-            whole = alike(tile, wide + size - 1, square_extent, cosine)
+            whole = is_one_surface(tile, wide + size - 1, square_extent, cosine)
             for row in range(tall):
                 if whole:
                     _add_all(tile, row, size, sums)

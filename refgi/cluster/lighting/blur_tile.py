@@ -1,4 +1,4 @@
-"""Tiles of a picture with their surroundings, as the blur reads them."""
+"""ReceiverTiles of a picture with their surroundings, as the blur reads them."""
 
 from typing import Any
 
@@ -22,22 +22,11 @@ def load_pixels(
     tile: Array, irradiance: Array, position: Array, normal: Array, covered: Array, top: int, left: int, wide: int,
     size: int,
 ) -> None:
-    """Copy a tile with its surroundings; what lies outside the picture is taken from n pixels further inside.
+    """Copy a tile with its surroundings; outside the picture, from n pixels further inside (n = `size`).
 
-    Parameters
-    ----------
-    tile : (rows, END) ndarray
-        Filled; planes of irradiance, position and normal next to each other in each row.
-    irradiance, position, normal : (3, h, w) ndarray
-        The picture.
-    covered : (h, w) ndarray of bool
-        Whether there is a surface; positions without one are put far away.
-    top, left : int
-        Pixel of the tile's first row and column; may lie outside.
-    wide : int
-        Pixels along a row, without the surroundings.
-    size : int
-        n, of the window.
+    Fills `tile` (rows, END): planes of irradiance, position and normal, each (3, h, w), next to each other in each row.
+    Positions of pixels that are not `covered` are put FAR away. `top` and `left` may lie outside the picture; `wide` is
+    without the surroundings.
     """
     height, width = covered.shape
     last = wide + size - 1
@@ -93,24 +82,11 @@ def _within(place: int, count: int, size: int) -> int:
 
 
 @kernel
-def alike(tile: Array, wide: int, square_extent: Any, cosine: Any) -> bool:
-    """Tell whether all pixels around a tile are sure to count for each other.
+def is_one_surface(tile: Array, wide: int, square_extent: Any, cosine: Any) -> bool:
+    """Return whether all pixels around a tile of `load_pixels` surely count for each other.
 
-    Parameters
-    ----------
-    tile : (rows, END) ndarray
-        Of `load_pixels`.
-    wide : int
-        Pixels along a row, with the surroundings.
-    square_extent : float
-        Square of the farthest distance, m^2.
-    cosine : float
-        Least cosine between normals; -inf: any.
-
-    Returns
-    -------
-    bool
-        By bounds: where it is False they may count all the same.
+    By bounds: where it is False they may count all the same. `wide` is with the surroundings; `square_extent`, m^2; a
+    `cosine` of -inf asks for none.
     """
     real = tile.dtype.type
     one = real(1.0)

@@ -1,8 +1,8 @@
 """All pixel lights under the visibility of their area lights (Sec. 4): E(x) = sum_i E_i(x) V_C(i)(x).
 
 Area light by area light, so that what is read of one shadow map stays near the processor: the light of its members,
-then V where there is any. Diffuse lights under the map of the hemisphere ahead, the published case, go tile by tile;
-everything else takes the longer way, by lists of receivers, to the same bits.
+then V where there is any. Diffuse lights under one map go tile by tile in one kernel. Glossy and sphere lights, and
+visibility that is found in Python (by rays, back projection, from behind), go by lists of receivers, to the same bits.
 """
 
 from collections.abc import Iterator
@@ -13,23 +13,25 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.clustering.rectangle import AreaLights, Given
-from refgi.cluster.lighting.area_sum import Tiles, add_hard, add_soft, add_unshadowed, bound_tiles
+from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
+from refgi.cluster.filters.prefilter import allocate_filters, build_filters
+from refgi.cluster.lighting.area_sum import ReceiverTiles, add_shadowed, add_unshadowed, bound_tiles
 from refgi.cluster.lighting.interleave import (
     SUBSET,
     MemberLights,
     Subsets,
     add_members,
-    dealt,
+    assigned_subsets,
+    gather_pixels,
     member_lights,
-    put,
+    scatter_pixels,
     subsets,
-    take,
 )
-from refgi.cluster.visibility.filtered import build, room_for
-from refgi.cluster.visibility.look import choices, numbers_of, scale_of
+from refgi.cluster.settings import BY_MAPS, Csm
+from refgi.cluster.visibility.evaluate import visibility
+from refgi.cluster.visibility.search_region import scale_of
 from refgi.cluster.visibility.series import series
-from refgi.cluster.visibility.visible import visibility
+from refgi.cluster.visibility.shadow import filter_channels, shadow_of
 from refgi.errors import expect
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.stages import report_progress, stage
@@ -46,15 +48,15 @@ Array = npt.NDArray[Any]
 @stage("cluster.irradiance")
 def clustered_irradiance(
     receivers: Receivers, facing: Array, lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",
-    settings: "ValSettings", footprint: Array | None = None, given: Given | None = None, interleaving: int = 1,
-    rays: "Tracer | None" = None,
+    settings: "ValSettings", footprint: Array | None = None, visibility_of: VisibilityFunction | None = None,
+    interleaving: int = 1, rays: "Tracer | None" = None,
 ) -> Array:
     """Sum the irradiance of every pixel light under the visibility of its area light.
 
     Parameters
     ----------
     receivers : Receivers
-        Points that are lit; their dtype is that of the result.
+        Receivers; their dtype is that of the result.
     facing : (3, h, w) ndarray
         Normals of the triangles that the points lie on.
     lights : PixelLights
@@ -62,12 +64,12 @@ def clustered_irradiance(
     areas : AreaLights
         The area lights; `of` says which is whose.
     maps : ShadowMaps or None
-        Their shadow maps; not read for visibility "none" or where V is given.
+        Their shadow maps; not read without visibility or where `visibility_of` is there.
     settings : ValSettings
         How one light lights one receiver, and how visibility is found.
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    given : callable, optional
+    visibility_of : callable, optional
         V from elsewhere: (m, points (3, n), facing (3, n)) -> (n,).
     interleaving : int
         n: each pixel of n x n sums its own lights, n^2 times; 1: all.
@@ -95,98 +97,109 @@ def clustered_irradiance(
            np.shape(facing))
     packed = checked(receivers, lights, settings.pairs, footprint)
     parts = subsets(np.asarray(receivers.covered, np.bool_), interleaving)
-    subset = dealt(areas.of, interleaving, settings.dealing)
+    subset = assigned_subsets(areas.of, interleaving, settings.interleaving.assignment)
     members = member_lights(packed, areas.of, len(areas.members), subset, interleaving**2)
-    by_tiles = _goes_by_tiles(members, settings, given)
-    tiles = _tiles(receivers, None if by_tiles and not _any_hard(areas, settings) else facing, parts)
+    by_tiles = _goes_by_tiles(members, settings, visibility_of)
+    tiles = _tiles(receivers, None if by_tiles and not _reads_facing(areas, settings) else facing, parts)
     sums = np.zeros_like(tiles.position)
     if by_tiles:
         _add_by_tiles(tiles, members, areas, maps, settings, sums)
     else:
-        _add_by_lists(tiles, parts, members, _visibility(areas, maps, settings, given, rays), sums)
+        _add_by_lists(tiles, parts, members, _visibility(areas, maps, settings, visibility_of, rays), sums)
     result = np.zeros(np.shape(receivers.position), sums.dtype)
-    put(sums, parts, sums.dtype.type(interleaving**2), result.reshape(3, -1))
+    scatter_pixels(sums, parts, sums.dtype.type(interleaving**2), result.reshape(3, -1))
     return result
 
 
-def _tiles(receivers: Receivers, facing: Array | None, parts: Subsets) -> Tiles:
-    """Sort receivers into tiles; their triangles' normals, which hard tests alone ask for, only where given."""
+def _tiles(receivers: Receivers, facing: Array | None, parts: Subsets) -> ReceiverTiles:
+    """Sort receivers into tiles; with their triangles' normals where a shadow reads them."""
     real = np.asarray(receivers.position).dtype
     planes = [np.empty((3, len(parts.places) if plane is not None else 0), real)
               for plane in (receivers.position, receivers.normal, facing)]
     for plane, values in zip((receivers.position, receivers.normal, facing), planes, strict=True):
         if plane is not None:
-            take(np.ascontiguousarray(plane, real).reshape(3, -1), parts, values)
+            gather_pixels(np.ascontiguousarray(plane, real).reshape(3, -1), parts, values)
     position, normal, faces = planes
     low, high = np.empty((2, parts.tiles.shape[1], 6), real)
-    tiles = Tiles(position, normal, faces, parts.tiles, low, high)
+    tiles = ReceiverTiles(position, normal, faces, parts.tiles, low, high)
     bound_tiles(tiles)
     return tiles
 
 
-def _goes_by_tiles(members: MemberLights, settings: "ValSettings", given: Given | None) -> bool:
-    """Tell whether tiles can be lit and shadowed at once."""
-    return (members.packed.spheres is None and members.packed.lobes is None and given is None
-            and settings.visibility in ("series", "hard", "none") and settings.behind == "visible")
+def _goes_by_tiles(members: MemberLights, settings: "ValSettings", visibility_of: VisibilityFunction | None) -> bool:
+    """Return whether one kernel can light and shadow tiles."""
+    return (members.packed.spheres is None and members.packed.lobes is None and visibility_of is None
+            and (settings.visibility is None or isinstance(settings.visibility, BY_MAPS))
+            and settings.maps.behind == "visible")
 
 
-def _any_hard(areas: AreaLights, settings: "ValSettings") -> bool:
-    """Tell whether any area light casts a hard shadow."""
-    points = (areas.delta == 0) & (areas.members > 0)
-    return settings.visibility == "hard" or (settings.visibility == "series" and bool(points.any()))
+def _reads_facing(areas: AreaLights, settings: "ValSettings") -> bool:
+    """Return whether any area light's shadow reads the normals of triangles: all but CSM do."""
+    if settings.visibility is None or not isinstance(settings.visibility, Csm):
+        return settings.visibility is not None
+    return bool(((areas.delta == 0) & (areas.members > 0)).any())
 
 
-def _lit_tiles(tiles: Tiles, start: Array) -> Tiles:
+def _with_lights(tiles: ReceiverTiles, start: Array) -> ReceiverTiles:
     """Leave out tiles whose subset holds none of an area light's members."""
-    lit = np.diff(start)[tiles.tiles[SUBSET]] > 0
-    if lit.all():
+    with_lights = np.diff(start)[tiles.tiles[SUBSET]] > 0
+    if with_lights.all():
         return tiles
-    return tiles._replace(tiles=np.compress(lit, tiles.tiles, axis=1), low=tiles.low[lit], high=tiles.high[lit])
+    return tiles._replace(tiles=np.compress(with_lights, tiles.tiles, axis=1), low=tiles.low[with_lights],
+                          high=tiles.high[with_lights])
 
 
 def _add_by_tiles(
-    tiles: Tiles, members: MemberLights, areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings",
+    tiles: ReceiverTiles, members: MemberLights, areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings",
     sums: Array,
 ) -> None:
     """Add every area light to receivers, tile by tile."""
-    lights, clamp, sizes = members.packed.diffuse, members.packed.clamp, choices(settings)
-    weight = series(settings).weight.astype(sums.dtype)
+    lights, clamp = members.packed.diffuse, members.packed.clamp
     shining = np.flatnonzero(members.start[:, 0] < members.start[:, -1])
-    map_of = np.full(len(members.start), -1) if maps is None or settings.visibility == "none" else maps.map_of
-    hard = (areas.delta == 0) | (settings.visibility == "hard")
-    filters = _filtered(maps, map_of[shining[(map_of[shining] >= 0) & ~hard[shining]]], settings)
-    for done, m in enumerate(shining):
-        start, k = members.start[m], int(map_of[m])
-        lit = _lit_tiles(tiles, start)
-        if k < 0 or maps is None:
-            add_unshadowed(lit, lights, clamp, start, sums)
-        elif hard[m]:
-            add_hard(lit, lights, clamp, start, maps.depth[k], maps.center[k], maps.frame[k], sums)
+    for done, (m, shadow) in enumerate(_shadows(maps, areas, shining, settings)):
+        start = members.start[m]
+        if shadow is None:
+            add_unshadowed(_with_lights(tiles, start), lights, clamp, start, sums)
         else:
-            numbers, scale = numbers_of(maps, k, float(areas.delta[m]), settings), scale_of(maps, k, settings)
-            add_soft(lit, lights, clamp, start, numbers, sizes, scale, weight, next(filters), sums)
+            add_shadowed(_with_lights(tiles, start), lights, clamp, start, shadow, filter_channels(shadow), sums)
         report_progress((done + 1) / len(shining))
 
 
-def _filtered(maps: "ShadowMaps | None", wanted: Array, settings: "ValSettings") -> Iterator[Any]:
+def _shadows(
+    maps: "ShadowMaps | None", areas: AreaLights, shining: Array, settings: "ValSettings"
+) -> Iterator[tuple[int, Any]]:
+    """Return some area lights with their shadows; None for those that nothing occludes."""
+    map_of = np.full(len(areas.delta), -1) if maps is None or settings.visibility is None else maps.map_of
+    filtered = (map_of >= 0) & (areas.delta != 0) & isinstance(settings.visibility, Csm)
+    filters = _filters(maps, map_of[shining[filtered[shining]]], settings)
+    for m in shining:
+        if maps is None or map_of[m] < 0:
+            yield m, None
+        else:
+            yield m, shadow_of(maps, areas, m, settings, filters=next(filters) if filtered[m] else None)
+
+
+def _filters(maps: "ShadowMaps | None", chosen: Array, settings: "ValSettings") -> Iterator[Any]:
     """Filter some maps in their order, a few ahead: one map is too little for more than one thread."""
-    if maps is None or len(wanted) == 0:
+    if maps is None or len(chosen) == 0:
         return
     known, workers = maps, numba.get_num_threads()
+    csm, box = settings.visibility, "val_alpha_over_pi" in settings.as_published
+    assert isinstance(csm, Csm)
+    buffers = [allocate_filters(known.depth.shape[1], known.depth.dtype, csm, box)
+               for _ in range(min(workers, len(chosen)))]
 
-    rooms = [room_for(known.depth.shape[1], known.depth.dtype, settings) for _ in range(min(workers, len(wanted)))]
-
-    def filtered(k: int, room: Any) -> Any:
-        return build(known.depth[k], scale_of(known, k, settings), settings, room)
+    def build(k: int, buffer: Any) -> Any:
+        return build_filters(known.depth[k], scale_of(known, k, csm.depth_scale, series(csm)), csm, box, buffer)
 
     with ThreadPoolExecutor(workers) as pool:
-        for first in range(0, len(wanted), workers):  # what is filtered before is in use no more
-            some = wanted[first : first + workers]
-            yield from pool.map(filtered, some, rooms[: len(some)])
+        for first in range(0, len(chosen), workers):  # what was filtered before is no longer in use
+            some = chosen[first : first + workers]
+            yield from pool.map(build, some, buffers[: len(some)])
 
 
 def _add_by_lists(
-    tiles: Tiles, parts: Subsets, members: MemberLights, seen: Given, sums: Array
+    tiles: ReceiverTiles, parts: Subsets, members: MemberLights, visibility_of: VisibilityFunction, sums: Array
 ) -> None:
     """Add every area light to receivers: the light of its members first, then V where there is any."""
     packed = members.packed
@@ -197,23 +210,24 @@ def _add_by_lists(
             add_unshadowed(tiles, packed.diffuse, packed.clamp, start, part)
         else:
             add_members(tiles.position, tiles.normal, parts, members, m, part)
-        lit = np.flatnonzero(part.any(axis=0))
-        if len(lit):
-            sums[:, lit] += part[:, lit] * np.asarray(seen(m, tiles.position[:, lit], tiles.facing[:, lit]), sums.dtype)
+        places = np.flatnonzero(part.any(axis=0))
+        if len(places):
+            visible = visibility_of(m, tiles.position[:, places], tiles.facing[:, places])
+            sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
         report_progress((m + 1) / len(members.start))
 
 
 def _visibility(
-    areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings", given: Given | None,
+    areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings", visibility_of: VisibilityFunction | None,
     rays: "Tracer | None",
-) -> Given:
-    """Return what tells V of an area light at some points."""
-    if given is not None:
-        return given
+) -> VisibilityFunction:
+    """Return the function that finds V of an area light at some points."""
+    if visibility_of is not None:
+        return visibility_of
 
-    def seen(m: int, points: Array, facing: Array) -> Array:
-        if maps is None or settings.visibility == "none":
+    def by_maps(m: int, points: Array, facing: Array) -> Array:
+        if maps is None or settings.visibility is None:
             return np.ones(points.shape[1], points.dtype)
         return visibility(maps, areas, m, points, facing, settings, rays)
 
-    return seen
+    return by_maps

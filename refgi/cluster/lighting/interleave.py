@@ -21,11 +21,11 @@ from refgi.pairs.pair_sum import TILE, Clamp
 from refgi.pairs.tiles import BLOCK
 
 if TYPE_CHECKING:
-    from refgi.cluster.settings import Dealing
+    from refgi.cluster.settings import Assignment
 
 Array = npt.NDArray[Any]
 
-RUNS = 3  # of lights next to each other that a pixel takes where they are dealt out by cluster
+RUNS = 3  # of lights next to each other that a pixel takes where they are assigned by cluster
 FIRST, SIZE, SUBSET = 0, 1, 2  # rows of tiles
 
 
@@ -73,7 +73,7 @@ def subsets(covered: Array, side: int) -> Subsets:
     return Subsets(places, start, np.take(every, by_place, axis=1))
 
 
-def dealt(area_of: Array, side: int, dealing: "Dealing") -> Array:
+def assigned_subsets(area_of: Array, side: int, assignment: "Assignment") -> Array:
     """Say which subset each light belongs to.
 
     Parameters
@@ -82,8 +82,8 @@ def dealt(area_of: Array, side: int, dealing: "Dealing") -> Array:
         C(i), the area light of each.
     side : int
         n, pixels along a side of a block.
-    dealing : {"index", "cluster"}
-        Light i to the subset i mod n^2; or lights sorted by area light, cut into equal runs and these dealt out in
+    assignment : {"index", "cluster"}
+        Light i to the subset i mod n^2; or lights sorted by area light, cut into equal runs and these assigned in
         turn, `RUNS` to each subset, fewer where lights are few.
 
     Returns
@@ -99,15 +99,15 @@ def dealt(area_of: Array, side: int, dealing: "Dealing") -> Array:
     """
     count, subset_count = len(area_of), side * side
     lights = np.arange(count)
-    if dealing == "index":
+    if assignment == "index":
         return lights % subset_count
     runs = min(RUNS, max(count // subset_count, 1)) * subset_count
     subset = np.empty(count, np.int64)
-    subset[np.argsort(area_of, kind="stable")] = _far_apart(side)[lights * runs // max(count, 1) % subset_count]
+    subset[np.argsort(area_of, kind="stable")] = _dithered_order(side)[lights * runs // max(count, 1) % subset_count]
     return subset
 
 
-def _far_apart(side: int) -> Array:
+def _dithered_order(side: int) -> Array:
     """Return the places of a block in the order of Bayer's dither: halves, quarters and so on cover it evenly."""
     y, x = np.mgrid[:side, :side]
     rank = np.zeros_like(x)
@@ -143,18 +143,8 @@ def _fill(covered: Array, side: int, start: Array, places: Array) -> None:
 
 
 @kernel(parallel=True)
-def take(plane: Array, parts: Subsets, values: Array) -> None:
-    """Copy three channels into the order of subsets.
-
-    Parameters
-    ----------
-    plane : (3, h w) ndarray
-        Of a picture.
-    parts : Subsets
-        The order.
-    values : (3, n) ndarray
-        Filled.
-    """
+def gather_pixels(plane: Array, parts: Subsets, values: Array) -> None:
+    """Copy three channels of a picture, (3, h w), into the order of subsets, `values` (3, n)."""
     tiles, places = parts.tiles, parts.places
     for t in prange(tiles.shape[1]):
         for c in range(3):
@@ -163,20 +153,8 @@ def take(plane: Array, parts: Subsets, values: Array) -> None:
 
 
 @kernel(parallel=True)
-def put(values: Array, parts: Subsets, factor: Any, plane: Array) -> None:
-    """Copy three channels, times a factor, back into the order of a picture.
-
-    Parameters
-    ----------
-    values : (3, n) ndarray
-        In the order of subsets.
-    parts : Subsets
-        That order.
-    factor : float
-        n^2: how many subsets each stands for.
-    plane : (3, h w) ndarray
-        Of a picture; changed where there is a surface.
-    """
+def scatter_pixels(values: Array, parts: Subsets, factor: Any, plane: Array) -> None:
+    """Copy three channels (3, n), times a factor, from the order of subsets into a picture, (3, h w)."""
     tiles, places = parts.tiles, parts.places
     for t in prange(tiles.shape[1]):
         for c in range(3):

@@ -1,7 +1,6 @@
-"""What area lights see: paraboloid maps of distances, and the hard test for what is hidden from their centre."""
+"""Paraboloid shadow maps of area lights (Sec. 4.2, 6), and the triangles that they are drawn from."""
 
-from refgi.cluster.maps.hard import hard_visibility
 from refgi.cluster.maps.occluders import Blockers, blockers, occluders
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 
-__all__ = ["Blockers", "ShadowMaps", "blockers", "hard_visibility", "occluders", "shadow_maps"]
+__all__ = ["Blockers", "ShadowMaps", "blockers", "occluders", "shadow_maps"]

@@ -1,4 +1,4 @@
-"""Which triangles can block anything: those on the hull of what takes part cannot.
+"""Occluders: triangles that can lie between pixel lights and receivers; those on the convex hull of both cannot.
 
 Light goes from pixel lights to what the camera sees. A triangle whose plane has all of both on one side meets a segment
 between them at an end of it at most. Floors, walls and ceilings of a closed room are of this kind, and often make up
@@ -36,7 +36,7 @@ class Blockers(NamedTuple):
 
     vertices: Array  # (n, 3) float64, m
     faces: Array  # (m, 3) int32
-    laid: Chunks  # the same, as maps are drawn from
+    chunks: Chunks  # the same, as maps are drawn from
 
 
 class Ends(NamedTuple):
@@ -52,7 +52,7 @@ def ends_of(frame: "Frame", lights: "PixelLights") -> Ends:
     Parameters
     ----------
     frame : Frame
-        What is seen.
+        The camera's view.
     lights : PixelLights
         N lights.
 
@@ -61,9 +61,9 @@ def ends_of(frame: "Frame", lights: "PixelLights") -> Ends:
     Ends
         Vertices of the triangles that the camera sees, places of the lights, and the scene's extent.
     """
-    geometry, seen = frame.scene.geometry, np.zeros(frame.scene.face_count + 1, np.bool_)
-    seen[frame.gbuffer.triangle_id] = True  # -1, no triangle, is the last place
-    used = _used(len(geometry.vertices), geometry.faces[seen[:-1]])
+    geometry, visible = frame.scene.geometry, np.zeros(frame.scene.face_count + 1, np.bool_)
+    visible[frame.gbuffer.triangle_id] = True  # -1, no triangle, is the last place
+    used = _used(len(geometry.vertices), geometry.faces[visible[:-1]])
     places = np.asarray(lights.position, np.float64).T
     return Ends(np.ascontiguousarray(np.concatenate([geometry.vertices[used], places])), frame.extent)
 
@@ -87,7 +87,7 @@ def everywhere(geometry: Geometry) -> Ends:
 
 @stage("cluster.occluders")
 def occluders(geometry: Geometry, ends: Ends | None = None, touching: bool = False) -> Array:
-    """Tell which triangles may lie between two points.
+    """Return which triangles may lie between two points.
 
     Parameters
     ----------
@@ -135,15 +135,15 @@ def blockers(geometry: Geometry, alone: bool, ends: Ends | None = None) -> Block
     Blockers
         The triangles, in mesh order.
     """
-    kept = geometry.faces[occluders(geometry, ends, not alone)]
-    used = _used(len(geometry.vertices), kept)
+    selected = geometry.faces[occluders(geometry, ends, not alone)]
+    used = _used(len(geometry.vertices), selected)
     vertices = np.ascontiguousarray(geometry.vertices[used], np.float64)
-    faces = np.ascontiguousarray((np.cumsum(used) - 1)[kept], np.int32)
+    faces = np.ascontiguousarray((np.cumsum(used) - 1)[selected], np.int32)
     return Blockers(vertices, faces, chunks(vertices, faces))
 
 
 def _used(count: int, faces: Array) -> Array:
-    """Tell which of `count` vertices triangles use."""
+    """Return which of `count` vertices triangles use."""
     used = np.zeros(count, np.bool_)
     used[faces] = True
     return used
@@ -191,7 +191,7 @@ def _hull(points: Array) -> Array:
 
 @kernel(parallel=True)
 def _on_border(vertices: Array, faces: Array, points: Array, tolerance: float, border: Array) -> None:
-    """Tell which planes have all points on one side, up to a tolerance."""
+    """Return which planes have all points on one side, up to a tolerance."""
     for face in prange(len(faces)):
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
         ax, ay, az = vertices[i, 0], vertices[i, 1], vertices[i, 2]

@@ -1,10 +1,10 @@
-"""What each area light sees: paraboloid maps of the distance to the nearest occluder (Sec. 4.2, 6).
+"""Paraboloid shadow maps: the distance from each area light's centre to the nearest occluder (Sec. 4.2, 6).
 
 A map looks along the area light's normal from its centre, lifted a little off the surface. The centre of a cluster
 may lie inside geometry, so what is near it must be ignored (Sec. 5.1, Fig. 7); the paper does not say how near.
 Here it is a share `near_distance` of the cluster's radius, and `near_geometry` says what within it is left out.
 
-The maps' twin: each texel's distance by a ray through its centre.
+`traced_maps` finds the same distances by a ray through each texel's centre.
 """
 
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.maps.occluders import Blockers, Ends, blockers
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import ShadowMapSettings
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.extent import Extent
@@ -53,7 +53,7 @@ def traced_maps(
     Returns
     -------
     distance : (k, n, n) ndarray
-        Distance, m; inf where nothing is seen and outside the disc.
+        Distance, m; inf where the map is empty and outside the disc.
     nearest : (k,) ndarray
         Float64: smallest distance on each map, m; inf where nothing is.
     left_out : (k,) ndarray
@@ -63,10 +63,10 @@ def traced_maps(
     distance, left_out = np.full((projection.maps, n, n), np.inf, dtype), np.zeros(projection.maps, np.int64)
     directions, inside = _texel_directions(n)
     for m in range(projection.maps):
-        kept, left_out[m] = _kept(drawn, projection, m, ignored)
-        if kept.all():
-            tracer = tracer or _tracer(drawn, kept)
-        rays = tracer if kept.all() and tracer else _tracer(drawn, kept)
+        selected, left_out[m] = _select(drawn, projection, m, ignored)
+        if selected.all():
+            tracer = tracer or _tracer(drawn, selected)
+        rays = tracer if selected.all() and tracer else _tracer(drawn, selected)
         toward, start = directions @ projection.frame[m], ignored.ball[m]
         hits = rays.closest(projection.origin[m] + start * toward, toward)
         distance[m][inside] = hits.distance + start
@@ -82,8 +82,8 @@ def _texel_directions(n: int) -> tuple[Array, Array]:
     return local[inside], inside
 
 
-def _kept(drawn: Blockers, projection: Projection, m: int, ignored: Ignored) -> tuple[Array, int]:
-    """Tell which planes do not pass too near the centre; count what reaches ahead and is ignored."""
+def _select(drawn: Blockers, projection: Projection, m: int, ignored: Ignored) -> tuple[Array, int]:
+    """Return which planes do not pass too near the centre; count what reaches ahead and is ignored."""
     corners = drawn.vertices[drawn.faces] - projection.origin[m]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     height = np.abs((normal * corners[:, 0]).sum(axis=1))
@@ -93,11 +93,11 @@ def _kept(drawn: Blockers, projection: Projection, m: int, ignored: Ignored) -> 
     return ~near_plane, int((ahead & (near_plane | inside)).sum())
 
 
-def _tracer(drawn: Blockers, kept: Array) -> "Tracer":
+def _tracer(drawn: Blockers, selected: Array) -> "Tracer":
     from refgi.rays import Tracer
     from refgi.scene import Geometry
 
-    faces = drawn.faces[kept]
+    faces = drawn.faces[selected]
     return Tracer(Geometry(drawn.vertices, faces, np.zeros(len(faces), np.int32)))
 
 
@@ -119,8 +119,8 @@ class ShadowMaps(NamedTuple):
 
 @stage("cluster.shadow_maps")
 def shadow_maps(
-    geometry: Geometry, areas: AreaLights, settings: ValSettings, dtype: npt.DTypeLike, tracer: "Tracer | None" = None,
-    ends: Ends | None = None,
+    geometry: Geometry, areas: AreaLights, settings: ShadowMapSettings, dtype: npt.DTypeLike,
+    tracer: "Tracer | None" = None, ends: Ends | None = None,
 ) -> ShadowMaps:
     """Draw a paraboloid map of distances for every area light that something may occlude.
 
@@ -130,12 +130,12 @@ def shadow_maps(
         The triangles.
     areas : AreaLights
         M area lights.
-    settings : ValSettings
+    settings : ShadowMapSettings
         Size and kind of the maps, and what is left out of them.
     dtype : dtype
         Float32 or float64.
     tracer : Tracer, optional
-        Rays against `geometry`, for ``maps == "rays"``; made where it is needed and absent.
+        Rays against `geometry`, for ``renderer == "rays"``; made where it is needed and absent.
     ends : Ends, optional
         Where light begins and ends; absent: anywhere in the scene.
 
@@ -152,9 +152,9 @@ def shadow_maps(
     expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
     extent = Extent(*geometry.bounds) if ends is None else ends.extent
     drawn, both = blockers(geometry, settings.occluders_alone, ends), settings.behind == "dual_paraboloid"
-    lit = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
-    center = np.ascontiguousarray((areas.center + LIFT * extent.largest * areas.normal)[:, lit].T)
-    frame, radius = areas.frame[lit], settings.near_distance * areas.radius[lit]
+    used = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
+    center = np.ascontiguousarray((areas.center + LIFT * extent.largest * areas.normal)[:, used].T)
+    frame, radius = areas.frame[used], settings.near_distance * areas.radius[used]
     rays = tracer if len(drawn.faces) == len(geometry.faces) else None
     depth, near, left_out = _draw(drawn, center, frame, radius, settings, dtype, rays)
     behind = near_behind = None
@@ -163,7 +163,7 @@ def shadow_maps(
         behind, near_behind, more = _draw(drawn, center, BACKWARD @ frame, radius, settings, dtype, rays)
         needed, left_out = needed | np.isfinite(near_behind), left_out + more
     map_of = np.full(len(areas.members), -1, np.int32)
-    map_of[lit[needed]] = np.arange(needed.sum())
+    map_of[used[needed]] = np.arange(needed.sum())
     if (map_of < 0).any():
         skip("cluster.depth_maps", f"nothing occludes {(map_of < 0).sum()} of {len(map_of)} area lights")
     maps = ShadowMaps(depth, map_of, center, frame, near, _farthest(depth), _farthest_corner(extent, center), behind,
@@ -197,21 +197,21 @@ def _farthest_in_columns(depth: Array, columns: Array) -> None:
 
 def _without(maps: ShadowMaps, needed: Array) -> ShadowMaps:
     """Drop the maps on which there is nothing."""
-    kept: dict[str, Any] = {name: values[needed] for name, values in maps._asdict().items()
+    shown: dict[str, Any] = {name: values[needed] for name, values in maps._asdict().items()
                             if name not in ("map_of", "left_out") and values is not None}
-    return maps._replace(**kept)
+    return maps._replace(**shown)
 
 
 def _draw(
-    drawn: Blockers, center: Array, frame: Array, radius: Array, settings: ValSettings, dtype: npt.DTypeLike,
+    drawn: Blockers, center: Array, frame: Array, radius: Array, settings: ShadowMapSettings, dtype: npt.DTypeLike,
     tracer: "Tracer | None",
 ) -> tuple[Array, Array, Array]:
     """Return maps, the smallest distance on each, and how many triangles each leaves out."""
-    n = settings.map_resolution
+    n = settings.resolution
     projection = Projection(PARABOLOID, n, n, center, np.ascontiguousarray(frame), np.ones(2), np.inf)
     none = np.zeros_like(radius)
     rule = settings.near_geometry
     ignored = Ignored(radius if rule == "planes" else none, radius if rule == "ball" else none)
-    if settings.maps == "rays":
+    if settings.renderer == "rays":
         return traced_maps(projection, drawn, ignored, dtype, tracer)
-    return distance_maps(projection, drawn.laid, dtype, ignored)
+    return distance_maps(projection, drawn.chunks, dtype, ignored)

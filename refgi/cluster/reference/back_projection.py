@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.clustering.rectangle import AreaLights, Given
-from refgi.cluster.maps.hard import SLACK
+from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
+from refgi.cluster.visibility.pcf import SLACK
 from refgi.jit import kernel, prange
 
 Array = npt.NDArray[Any]
@@ -34,7 +34,9 @@ class Patches(NamedTuple):
     depth: Array  # (k,) float64, m
 
 
-def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, rays: Given | None = None) -> Given:
+def back_projection_visibility(
+    areas: AreaLights, maps: ShadowMaps, rays: VisibilityFunction | None = None
+) -> VisibilityFunction:
     """Return V of an area light from its map, projected back onto its rectangle.
 
     Parameters
@@ -63,7 +65,7 @@ def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, rays: Given |
         depth, frame = (maps.depth, maps.frame[k]) if sign > 0 else (maps.behind, BACKWARD @ maps.frame[k])
         return _patches(np.asarray(depth)[k], frame, _axes(areas, m) * turned)
 
-    def given(m: int, points: Array, facing: Array) -> Array:
+    def visibility_of(m: int, points: Array, facing: Array) -> Array:
         k, visible = maps.map_of[m], np.ones(points.shape[1])
         center = maps.center[k] if k >= 0 else areas.center[:, m]
         x = _axes(areas, m) @ (points.astype(np.float64) - center[:, None])
@@ -78,7 +80,7 @@ def back_projected_visibility(areas: AreaLights, maps: ShadowMaps, rays: Given |
             visible[x[2] <= 0] = rays(m, points[:, x[2] <= 0], facing[:, x[2] <= 0])
         return visible.astype(points.dtype)
 
-    return given
+    return visibility_of
 
 
 def _axes(areas: AreaLights, m: int) -> Array:

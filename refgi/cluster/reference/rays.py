@@ -1,37 +1,30 @@
 """Visibility of an area light's rectangle by rays: what every soft shadow approximates (Sec. 4.1, Fig. 4).
 
-Visibility of an area light as the share of its pixel lights that rays reach: what clustering alone leaves (Sec. 4).
-
-V_C(x) = sum over the cluster of w_i V(p_i, x) / sum of w_i. With w_i = L_i(x), what each light gives to x, the sum of
-the paper's third equation is that of its second, exactly: no error of clustering is left, and none of soft shadows.
-
 Rays from receivers to points on lights, many for each receiver, and what share of them arrives.
 """
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.clustering.rectangle import AreaLights, Given
+from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.maps.occluders import Blockers, Ends, blockers
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import ShadowMapSettings
 from refgi.rays import Tracer
 from refgi.sampling import halton
 from refgi.scene.model import Geometry
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 
 RAYS_AT_ONCE = 1 << 18
 SHORTEST = 1e-6  # of a ray: a reach of 0 would count as blocked
 POINTS = 256  # on each rectangle: at most 1/256 off for an edge along a side, about 1/60 for others
-Weights = Literal["even", "flux", "light"]
 
 
 class Ball(NamedTuple):
@@ -43,9 +36,9 @@ class Ball(NamedTuple):
 
 def free_share(
     tracer: "Tracer", points: Array, facing: Array, targets: Array, upward: Array,
-    worth: Callable[[Array, Array], Array] | None, grain: float, ball: Ball | None = None,
+    contribution: Callable[[Array, Array], Array] | None, grain: float, ball: Ball | None = None,
 ) -> Array:
-    """Return the share of each receiver's rays that arrives, each ray after its worth.
+    """Return the share of each receiver's rays that arrives, each ray weighted by its contribution.
 
     Parameters
     ----------
@@ -57,10 +50,10 @@ def free_share(
         Points on lights, m.
     upward : (3, k) or (3, 1) ndarray
         Unit normals at the targets, on the side that rays come from.
-    worth : callable or None
-        Given vectors (n, k, 3) from some receivers to the targets and their normals (n, 3), the weight (n, k) of each
-        ray, 0 or more; None: all the same. Rays of no worth, and those to targets below a receiver's surface, are
-        not traced.
+    contribution : callable or None
+        ``(toward (n, k, 3), up (n, 3)) -> (n, k)``: the weight of each ray, 0 or more, by vectors from some receivers
+        to the targets and the receivers' normals; None: all the same. Rays without weight, and those to targets below a
+        receiver's surface, are not traced.
     grain : float
         The scene tracer's: how far above their surfaces rays start and end, as `ray_offset` has it, m.
     ball : Ball, optional
@@ -69,7 +62,7 @@ def free_share(
     Returns
     -------
     (n,) ndarray
-        In the dtype of the points, 0 to 1; 1 where no ray is of any worth.
+        In the dtype of the points, 0 to 1; 1 where no ray has any weight.
     """
     from refgi.rays import STEPS
 
@@ -80,7 +73,7 @@ def free_share(
         at, up = points[:, part].T.astype(np.float64), facing[:, part].T.astype(np.float64)
         toward = targets.T[None] - at[:, None]
         above = np.einsum("nkc,nc->nk", toward, up) > 0
-        weight = np.where(above, 1.0 if worth is None else worth(toward, up), 0.0)
+        weight = np.where(above, 1.0 if contribution is None else contribution(toward, up), 0.0)
         reach = np.where(weight > 0, _way_to(ball, at, toward), 0.0)
         starts = at + STEPS * (np.abs(at).sum(axis=1, keepdims=True) + grain) * up
         lift = STEPS * (np.abs(targets).sum(axis=0) + grain + np.abs(toward).sum(axis=2))
@@ -114,8 +107,8 @@ def _way_to(ball: Ball | None, at: Array, toward: Array) -> Any:
 
 
 def rectangle_visibility(
-    frame: "Frame", areas: AreaLights, settings: ValSettings, points: int = POINTS, ends: Ends | None = None
-) -> Given:
+    frame: "Frame", areas: AreaLights, settings: ShadowMapSettings, points: int = POINTS, ends: Ends | None = None
+) -> VisibilityFunction:
     """Return V of an area light as the share of its rectangle that a receiver sees.
 
     Parameters
@@ -124,7 +117,7 @@ def rectangle_visibility(
         The scene.
     areas : AreaLights
         The area lights.
-    settings : ValSettings
+    settings : ShadowMapSettings
         What blocks near an area light, and what is seen from behind it.
     points : int
         Points on each rectangle, spread evenly.
@@ -150,7 +143,7 @@ def rectangle_visibility(
     def tracer_of(m: int) -> Tracer:
         return tracer_without_near(frame, drawn, areas, m, settings)
 
-    def given(m: int, points: Array, facing: Array) -> Array:
+    def visibility_of(m: int, points: Array, facing: Array) -> Array:
         tracer, visible = tracer_of(m), np.ones(points.shape[1], points.dtype)
         radius = settings.near_distance * float(areas.radius[m])
         ball = Ball(areas.center[:, m], radius) if settings.near_geometry == "ball" else None
@@ -162,7 +155,7 @@ def rectangle_visibility(
                                      side * areas.normal[:, m, None], None, frame.tracer.grain, ball)
         return visible
 
-    return given
+    return visibility_of
 
 
 def rectangle_points(areas: AreaLights, m: int, on_square: Array) -> Array:
@@ -188,7 +181,7 @@ def rectangle_points(areas: AreaLights, m: int, on_square: Array) -> Array:
 
 
 def tracer_without_near(
-    frame: "Frame", drawn: Blockers, areas: AreaLights, m: int, settings: ValSettings
+    frame: "Frame", drawn: Blockers, areas: AreaLights, m: int, settings: ShadowMapSettings
 ) -> Tracer:
     """Return rays against what an area light's map is drawn from.
 
@@ -202,7 +195,7 @@ def tracer_without_near(
         The area lights.
     m : int
         Which.
-    settings : ValSettings
+    settings : ShadowMapSettings
         Whether planes near the centre are left out.
 
     Returns
@@ -224,57 +217,3 @@ def _even(count: int) -> Array:
     """Return Hammersley's points: as many distinct lines each way as there are points."""
     second = halton(count, bases=(2,))[:, 0] + 0.5 / count
     return np.stack([(np.arange(count) + 0.5) / count, second])
-
-
-def member_visibility(
-    frame: "Frame", lights: "PixelLights", areas: AreaLights, weights: Weights = "flux"
-) -> Given:
-    """Return V of an area light as the share of its lights that a receiver sees.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene, whose triangles block.
-    lights : PixelLights
-        The lights.
-    areas : AreaLights
-        Their clusters.
-    weights : {"even", "flux", "light"}
-        What a light counts: all alike; by its flux; by the light it would give a diffuse receiver, with both cosines
-        and the distance.
-
-    Returns
-    -------
-    callable
-        ``(m, points (3, n), facing (3, n)) -> (n,)``, in the dtype of the points.
-
-    Notes
-    -----
-    Lights that face away from a receiver, or lie below its surface, give it nothing and do not count; where none is
-    left V is 1. There is no rule for receivers behind the area light: each light has a normal of its own. A light's
-    flux is the sum over its channels, diffuse and glossy.
-    """
-    position, normal = (np.asarray(a, np.float64) for a in (lights.position, lights.normal))
-    flux = np.asarray(lights.flux, np.float64).sum(axis=0)
-    if lights.lobe_flux is not None:
-        flux = flux + np.asarray(lights.lobe_flux, np.float64).sum(axis=0)
-    order = np.argsort(areas.of, kind="stable")
-    first = np.searchsorted(areas.of[order], np.arange(len(areas.members) + 1))
-
-    def given(m: int, points: Array, facing: Array) -> Array:
-        of = order[first[m] : first[m + 1]]
-
-        def worth(toward: Array, up: Array) -> Array:
-            away: Array = -np.einsum("nkc,ck->nk", toward, normal[:, of])
-            if weights != "light":
-                counted: Array = np.where(away > 0, flux[of] if weights == "flux" else 1.0, 0.0)
-                return counted
-            square = np.einsum("nkc,nkc->nk", toward, toward)
-            above = np.einsum("nkc,nc->nk", toward, up)
-            faced = (away > 0) & (above > 0)
-            given_light: Array = np.divide(flux[of] * away * above, square**2, out=np.zeros_like(square), where=faced)
-            return given_light
-
-        return free_share(frame.tracer, points, facing, position[:, of], normal[:, of], worth, frame.tracer.grain)
-
-    return given

@@ -1,15 +1,14 @@
-"""What each approximation costs: pictures from exact shadows to the published method, one step apart (Sec. 7, Fig. 10).
+"""Error of each approximation: pictures from exact shadows to the published method, one step apart (Sec. 7, Fig. 10).
 
 Each picture takes one approximation more than the one before it, all with the same pixel lights and clusters:
 
 - lights: as many pixel lights as asked for, a ray each, for all the light there is; what sampling costs,
-- members: V of an area light is the share of its lights that rays reach; clustering,
-- rectangle: rays to the bounding rectangle instead, past what lies too near; the shape of the light,
+- rays_vpls: V of an area light is the share of its lights that rays reach; clustering,
+- rays_rectangle: rays to the bounding rectangle instead, past what lies too near; the shape of the light,
 - back_projection: one paraboloid map from the centre instead of rays; what one view and its texels miss,
-- step: one mean depth of blockers and one disc of the map around the receiver; single blocker and kernel,
-- series: M terms for the step, over the same discs; the series,
-- sat: squares for the discs, by summed areas; box filter,
-- mip: levels of a pyramid for squares; prefilter,
+- pcss: one mean depth of blockers and one disc of the map around the receiver; single blocker and kernel,
+- csm: M terms for the step, over the same discs; the series,
+- mip: levels of a pyramid for discs; prefilter,
 - interleaved: one light of n^2 at each pixel, and the blur.
 
 The whole error is the sum of the steps. Were they independent, its root mean square would be the root of the sum of
@@ -26,9 +25,18 @@ import numpy.typing as npt
 from refgi.cluster.clustering.rectangle import AreaLights, map_frames
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.reference.rays import member_visibility
-from refgi.cluster.settings import ValSettings
-from refgi.cluster.val import PUBLISHED_BLOCK, clustered, facing, lit, surface
+from refgi.cluster.reference.vpls import vpl_visibility
+from refgi.cluster.settings import (
+    BackProjection,
+    Csm,
+    GeometryBlur,
+    Pcss,
+    RaysRectangle,
+    RaysVpls,
+    ValSettings,
+    Visibility,
+)
+from refgi.cluster.val import PUBLISHED_BLOCK, cluster_lights, face_normals, light_pixels, receivers_of
 from refgi.errors import expect
 from refgi.lights.selection import choose_lights, footprints
 
@@ -38,15 +46,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
-STEPS: dict[str, dict[str, Any]] = {
-    "members": {"visibility": "members"},
-    "rectangle": {"visibility": "rectangle"},
-    "back_projection": {"visibility": "back_projection"},
-    "step": {"visibility": "step"},
-    "series": {"visibility": "series", "prefilter": "brute"},
-    "sat": {"visibility": "series", "prefilter": "sat"},
-    "mip": {"visibility": "series", "prefilter": "mip"},
-}
+STEPS = ("rays_vpls", "rays_rectangle", "back_projection", "pcss", "csm", "mip")
 
 
 class Step(NamedTuple):
@@ -104,9 +104,9 @@ def split_error(
     Parameters
     ----------
     frame : Frame
-        The scene, seen and lit.
+        The scene with its buffers.
     settings : ValSettings
-        The method's; `visibility`, `prefilter` and `interleaving` are the steps'.
+        The method's; `visibility` and `interleaving` are the steps', with the series of `Csm` where it is chosen.
     truth : (3, h, w) ndarray, optional
         One-bounce irradiance, W/m^2, from which the first step starts; without, steps start from exact shadows.
     block : int
@@ -123,15 +123,20 @@ def split_error(
         If the first picture has no light to be a share of.
     """
     lights = choose_lights(frame, settings.lights)
-    base = dataclasses.replace(settings, visibility="series", prefilter="mip")
-    areas, maps = clustered(frame, lights, base)
+    csm = dataclasses.replace(settings.visibility, prefilter="mip") if isinstance(settings.visibility, Csm) else Csm()
+    base = dataclasses.replace(settings, visibility=csm)
+    areas, maps = cluster_lights(frame, lights, base)
     pictures = {} if truth is None else {"truth": truth}
+    kinds: dict[str, Visibility] = {
+        "rays_vpls": RaysVpls(), "rays_rectangle": RaysRectangle(), "back_projection": BackProjection(),
+        "pcss": Pcss(), "csm": dataclasses.replace(csm, prefilter="brute"), "mip": csm}
     pictures["lights"] = exact_shadows(frame, lights, base)
-    for name, changes in STEPS.items():
-        pictures[name] = lit(frame, lights, areas, maps, dataclasses.replace(base, **changes), 1)
-    interleaved, seen = lit(frame, lights, areas, maps, base, block), surface(frame)
-    pictures["interleaved"] = blur(interleaved, seen, block, base, frame.visible_extent.diagonal)
-    covered = np.asarray(seen.covered, np.bool_)
+    for name in STEPS:
+        pictures[name] = light_pixels(frame, lights, areas, maps, dataclasses.replace(base, visibility=kinds[name]), 1)
+    interleaved, receivers = light_pixels(frame, lights, areas, maps, base, block), receivers_of(frame)
+    pictures["interleaved"] = blur(interleaved, receivers, block, base.blur or GeometryBlur(),
+                                   frame.visible_extent.diagonal)
+    covered = np.asarray(receivers.covered, np.bool_)
     return ErrorSplit(steps_between(pictures, covered), pictures, covered)
 
 
@@ -170,7 +175,7 @@ def exact_shadows(frame: "Frame", lights: "PixelLights", settings: ValSettings) 
     Parameters
     ----------
     frame : Frame
-        The scene, seen.
+        The scene, receivers.
     lights : PixelLights
         N lights.
     settings : ValSettings
@@ -186,9 +191,9 @@ def exact_shadows(frame: "Frame", lights: "PixelLights", settings: ValSettings) 
     frames, none = map_frames(normal), np.zeros((2, count))
     single = AreaLights(position, normal, frames, none, frames[:, :2], none, none[0], none[0], np.ones(count, np.int64),
                         np.arange(count, dtype=np.int32))
-    return clustered_irradiance(surface(frame), facing(frame), lights, single, None, settings,
+    return clustered_irradiance(receivers_of(frame), face_normals(frame), lights, single, None, settings,
                                 footprint=footprints(frame, settings.lights, settings.pairs),
-                                given=member_visibility(frame, lights, single))
+                                visibility_of=vpl_visibility(frame, lights, single))
 
 
 def _rms(values: Array) -> float:

@@ -1,1 +1,1 @@
-"""How much of an area light a point sees (Sec. 4.1, 4.2): convolution shadow maps and the exact step."""
+"""Visibility of an area light by its map (Sec. 4.1, 4.2): hard shadows, PCF, PCSS and convolution shadow maps."""

@@ -1,6 +1,6 @@
 """The depth comparison as a Fourier series, which can be filtered before it is compared (Sec. 4.1).
 
-[lit] = step(z - d) becomes f_M(d, z) = 1/2 + 2 sum_k (L_k / c_k) sin(c_k (z - d)), a product of what the receiver
+step(z - d) becomes f_M(d, z) = 1/2 + 2 sum_k (L_k / c_k) sin(c_k (z - d)), a product of what the receiver
 knows (d) and what the map stores (z): its mean over a filter needs the means of sin(c_k z) and cos(c_k z) alone.
 
 Symbols: c_k = (2k - 1) pi, k = 1 .. M; L_k = exp(-A (k / M)^2) the attenuation; w_k = 2 L_k / c_k; b bias; d, z depths
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import Csm
 
 Array = npt.NDArray[Any]
 
@@ -65,6 +65,7 @@ def weights(terms: int, attenuation: float = 0.0) -> Array:
         Factors of sin(c_k (z - d)).
     """
     damping = np.exp(-attenuation * (np.arange(1, terms + 1) / terms) ** 2)
+    # Sec. 4.1: f(d, z) = 1/2 + 2 sum_k (1 / c_k) sin(c_k (z - d)), c_k = (2k - 1) pi
     return np.asarray(2.0 * damping / frequencies(terms))
 
 
@@ -136,13 +137,13 @@ def _known(terms: int, attenuation: float, rescale: str, bias: float | None) -> 
     return Series(weight, first, search, final, 1.0 - first - max(first, search), gain)
 
 
-def series(settings: ValSettings) -> Series:
+def series(settings: Csm) -> Series:
     """Return the series that settings ask for.
 
     Parameters
     ----------
-    settings : ValSettings
-        `terms`, `attenuation`, `rescale` and `bias` count.
+    settings : Csm
+        Terms, attenuation, rescaling and bias.
 
     Returns
     -------

@@ -136,6 +136,11 @@ class GBuffer:
                                            self.visibility.triangle_id, self.dtype, tuple(missing)))  # fmt: skip
         return tuple(self._channels[n] if n in self._channels else getattr(self, n) for n in names)
 
+    def recorded(self) -> dict[str, Array]:
+        """Return every channel by name, as logs keep them."""
+        names = (*ChannelMask._fields, "triangle_id", "covered")
+        return dict(zip(names, self.resolve(*names), strict=True))
+
     def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
         """Return channels at some texels alone, computing there those not yet known.
 
@@ -167,17 +172,7 @@ class GBuffer:
 def values_at(channel: Array, texel: Array) -> Array:
     """Return a channel's values at some texels.
 
-    Parameters
-    ----------
-    channel : (..., h, w) ndarray
-        The channel.
-    texel : (n,) ndarray of int
-        Texels, row * w + column.
-
-    Returns
-    -------
-    (..., n) ndarray
-        The values.
+    `channel` (..., h, w): the channel. `texel` (n,) int: texels, row * w + column. Returns (..., n): the values.
     """
     return channel.reshape(*channel.shape[:-2], -1)[..., texel]
 
@@ -230,7 +225,28 @@ def _resolve(
     dtype: np.dtype[Any],
     names: tuple[str, ...],
 ) -> dict[str, Array]:
-    """Return the named channels, computed in one pass."""
+    """Compute channels of the visible surface in one pass.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    materials : MaterialTable
+        Their materials.
+    projection : Projection
+        The view.
+    triangle_id : (h, w) ndarray of int32
+        Visible triangle of each texel, -1 for none.
+    dtype : dtype
+        Of the channels.
+    names : tuple of str
+        Channels to compute.
+
+    Returns
+    -------
+    dict of str to (h, w) or (3, h, w) ndarray
+        The channels by name, units as `GBuffer` states them.
+    """
     planes = _planes(names, triangle_id.shape, dtype)
     channels = ChannelMask(*(name in names for name in ChannelMask._fields))
     resolve(_surface(geometry, materials, dtype), projection, triangle_id, channels, planes, numba.get_num_threads())

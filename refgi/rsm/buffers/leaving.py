@@ -16,7 +16,7 @@ NONE = np.zeros((0, 0), np.int32)
 
 
 def leaving_radiance(irradiance: Array, extra: Array | None, buffer: GBuffer, materials: MaterialTable) -> Array:
-    """Return what the camera receives: L = L_e + albedo/pi (E + more).
+    """Return what the camera receives: L = L_e + albedo/pi (E + extra).
 
     Parameters
     ----------

@@ -126,6 +126,11 @@ class Rsm:
         self._view.resolve(*(name for name in names if name in VIEW_CHANNELS and name not in self._known))
         return tuple(self._whole(name) for name in names)
 
+    def recorded(self) -> dict[str, Any]:
+        """Return the light and every channel by name, as logs keep them."""
+        names = ("triangle_id", "covered", "depth", "position", "normal", "solid_angle", "flux", *LOBE)
+        return {"light": self.light} | {name: getattr(self, name) for name in names}
+
     def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
         """Return channels at some texels alone, computing there those not yet known.
 

@@ -60,25 +60,10 @@ def distance_maps(
 ) -> tuple[Array, Array, Array]:
     """Measure the distance to the nearest of some triangles on paraboloid maps.
 
-    Parameters
-    ----------
-    projection : Projection
-        k paraboloid maps of n x n texels.
-    triangles : Chunks
-        The triangles.
-    dtype : dtype
-        Float32 or float64.
-    ignored : Ignored, optional
-        What lies too near the centres to count; nothing where absent.
-
-    Returns
-    -------
-    distance : (k, n, n) ndarray
-        Distance, m; inf without surface and outside the disc.
-    nearest : (k,) ndarray
-        Float64: smallest distance on each map, m; inf where nothing is.
-    left_out : (k,) ndarray
-        Int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in its ball.
+    `projection`: k paraboloid maps of n x n texels. `ignored`: what lies too near the centres to count; nothing where
+    absent. Returns `distance` (k, n, n): distance, m; inf without surface and outside the disc. `nearest` (k,):
+    float64: smallest distance on each map, m; inf where nothing is. `left_out` (k,): int64: triangles that reach into
+    each map's hemisphere and are ignored for their planes or lie in its ball.
     """
     n, none = projection.width, np.zeros(projection.maps)
     distance = plane((projection.maps * n, max(n, BLOCK)), dtype)

@@ -53,20 +53,9 @@ def draw_paraboloids(
 ) -> None:
     """Draw triangles on every paraboloid map, inside the hemisphere's disc.
 
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
-    vertices : (n, 3) ndarray
-        World space, m.
-    faces : (m, 3) ndarray
-        Vertices of each triangle.
-    workers : int
-        Threads; maps are assigned to them round-robin.
-    nearness : (H, max(W, BLOCK)) ndarray
-        Float32, receives 1/tau; 0 where nothing is.
-    ids : (H, max(W, BLOCK)) ndarray
-        Int32, receives the triangle's id.
+    `vertices` (n, 3): world space, m. `faces` (m, 3): vertices of each triangle. `workers`: threads; maps are assigned
+    to them round-robin. `nearness` (H, max(W, BLOCK)): float32, receives 1/tau; 0 where nothing is. `ids` (H, max(W,
+    BLOCK)): int32, receives the triangle's id.
     """
     triangles, none = chunks(vertices, faces), np.zeros(projection.maps)
     scratch = np.zeros((workers, 1, nearness.shape[1]), np.int32)
@@ -79,25 +68,11 @@ def draw_distances(
 ) -> tuple[Array, Array]:
     """Draw triangles on every paraboloid map and turn nearness into distance.
 
-    Parameters
-    ----------
-    projection : Projection
-        The maps.
-    triangles : Chunks
-        The triangles.
-    ignored : Ignored
-        What lies too near the centres to count.
-    workers : int
-        Threads; maps are assigned to them round-robin.
-    distance : (H, max(W, BLOCK)) ndarray
-        Float32 or float64, of any content; receives the distance, m, inf where nothing is and outside the disc.
-
-    Returns
-    -------
-    nearest : (k,) ndarray
-        Float64: smallest distance on each map, m; inf where nothing is.
-    left_out : (k,) ndarray
-        Int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in its ball.
+    `ignored`: what lies too near the centres to count. `workers`: threads; maps are assigned to them round-robin.
+    `distance` (H, max(W, BLOCK)): float32 or float64, of any content; receives the distance, m, inf where nothing is
+    and outside the disc. Returns `nearest` (k,): float64: smallest distance on each map, m; inf where nothing is.
+    `left_out` (k,): int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in
+    its ball.
     """
     left_out, nearest = np.zeros(projection.maps, np.int64), np.full(projection.maps, np.inf)
     scratch = np.zeros((workers, projection.height, distance.shape[1]), np.int32)

@@ -97,17 +97,7 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
 def scratch(workers: int, vertices: int) -> Scratch:
     """Allocate scratch arrays for workers that draw whole maps.
 
-    Parameters
-    ----------
-    workers : int
-        How many run at once.
-    vertices : int
-        Vertices of the geometry.
-
-    Returns
-    -------
-    Scratch
-        Uninitialised arrays.
+    `workers`: how many run at once. `vertices`: vertices of the geometry.
     """
     return Scratch(
         plane((workers, vertices, 4), np.float64),
@@ -120,23 +110,9 @@ def scratch(workers: int, vertices: int) -> Scratch:
 def bands(corners: Array, cells: Array, faces: Array, width: int, height: int, rows: int) -> Bands:
     """List the triangles of each band of rows.
 
-    Parameters
-    ----------
-    corners : (n, 4) ndarray
-        Projected vertices.
-    cells : (n, 4) ndarray of int
-        The texels that each lies between.
-    faces : (m, 3) ndarray
-        Vertices of each triangle.
-    width, height : int
-        Size of the map.
-    rows : int
-        Height of a band.
-
-    Returns
-    -------
-    Bands
-        The lists, in mesh order.
+    `corners` (n, 4): projected vertices. `cells` (n, 4) int: the texels that each lies between. `faces` (m, 3):
+    vertices of each triangle. `width`, `height`: size of the map. `rows`: height of a band. Result: the lists, in mesh
+    order.
     """
     boxes = plane((len(faces), 4), np.uint16)
     band_of = np.arange(height, dtype=np.int32) // np.int32(rows)

@@ -103,19 +103,9 @@ def gather_discs(
 
 
 def centers(rsm: "Rsm", points: Array) -> Array:
-    """Return where in the map each point gathers: at its own place, or from outside at the nearest place towards it.
+    """Return where in the map each point (3, n) gathers: continuous row and column (2, n) on the stacked maps, float64.
 
-    Parameters
-    ----------
-    rsm : Rsm
-        The map.
-    points : (3, n) ndarray
-        World space, m.
-
-    Returns
-    -------
-    (2, n) ndarray of float64
-        Row and column, continuous, on the stacked maps.
+    A point outside the map gathers at the nearest place on its border.
     """
     row, column, _ = rsm.project(points)
     center = np.stack([row, column]).astype(np.float64)

@@ -28,7 +28,7 @@ Array = npt.NDArray[Any]
 LEAST_WEIGHT = 0.05  # of 1, sum of weights below which a pixel is evaluated by itself
 
 
-@stage("splat.half_resolution")
+@stage("sii.half_resolution")
 def half_resolution(
     receivers: Receivers, evaluate: Callable[[Receivers], Array], *, joint: bool = True
 ) -> Array:

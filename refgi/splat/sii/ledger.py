@@ -112,7 +112,7 @@ class Ledger:
         return np.asarray(self.emitted - sum(row.watts for row in self.rows if row.is_part))
 
 
-@stage("splat.ledger")
+@stage("sii.ledger")
 def energy_ledger(frame: "Frame", settings: "SiiSettings") -> Ledger:
     """Account for the power of the lights under `sii`.
 

@@ -47,21 +47,9 @@ class LightTerms(NamedTuple):
 
 
 def light_terms(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") -> LightTerms:
-    """Return what the first surface does with a light's power.
+    """Return what the first surface does with a light's power: sums over all texels of its map, in float64.
 
-    Parameters
-    ----------
-    rsm : Rsm
-        What the light sees; where glass refracts, the map that says so.
-    geometry : Geometry
-        The triangles that it sees.
-    materials : MaterialTable
-        Their materials.
-
-    Returns
-    -------
-    LightTerms
-        Sums over all texels, in float64.
+    Where glass refracts, `rsm` is the map that has its lobes.
     """
     strength = _strength(rsm.light)
     glass = np.asarray(materials.ior) > 0
@@ -79,20 +67,7 @@ def light_terms(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") ->
 
 
 def emitted_power(light: "Light", projection: "Projection") -> Array:
-    """Return the power of a light in closed form.
-
-    Parameters
-    ----------
-    light : Light
-        Spot, point or directional.
-    projection : Projection
-        Its map, whose area a directional light falls through.
-
-    Returns
-    -------
-    (3,) ndarray
-        W, float64.
-    """
+    """Return the power of a light in closed form, (3,) W; a directional light's is that through its map's area."""
     from refgi.scene import DirectionalLight, SpotLight
 
     if isinstance(light, DirectionalLight):
@@ -181,21 +156,9 @@ class ScreenTerms(NamedTuple):
 
 
 def screen_terms(frame: "Frame", lights: "PixelLights", settings: "SiiSettings") -> ScreenTerms:
-    """Sum what arrives on the visible surface, and by each thing that keeps light from it.
+    """Return what arrives on the visible surface and what each setting keeps from it.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    lights : PixelLights
-        As `sii` has them.
-    settings : SiiSettings
-        Those of `sii`.
-
-    Returns
-    -------
-    ScreenTerms
-        Each line from sums of its own; what a setting has no part in is 0 and costs no sum.
+    Each term is a sum of its own; that of a setting not in use is 0 and costs nothing.
     """
     screen = _Screen(frame, lights, settings)
     full, none = screen.pairs(), np.zeros(3)

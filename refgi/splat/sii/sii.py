@@ -95,20 +95,40 @@ def splat(
         As `irradiance`; or if the bound lacks its map.
     """
     if settings.reach.cut is None:
-        skip("splat.bins", "no cut: every light reaches every pixel")
+        skip("sii.bins", "no cut: every light reaches every pixel")
         return irradiance(receivers, lights, settings.pairs, footprint)
     return _splat(receivers, lights, settings, footprint, projection)
 
 
-@stage("splat.irradiance")
+@stage("sii.splat")
 def _splat(
     receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
     projection: "Projection | None",
 ) -> Array:
+    """Sum the irradiance of the pairs within range (SII Eq. 2, Sec. 3.4).
+
+    Parameters
+    ----------
+    receivers : Receivers
+        Points (3, h, w), world space, m, and unit normals.
+    lights : PixelLights
+        N lights.
+    settings : SiiSettings
+        Cut, bound, and how one light lights one receiver.
+    footprint : (N,) ndarray or None
+        Surface area of each light, m^2.
+    projection : Projection or None
+        The map the receivers are seen on.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2, linear RGB, without albedo/pi and visibility.
+    """
     return _sum_in_range(receivers, lights, settings, footprint, projection, outside=False)
 
 
-@stage("splat.cut")
+@stage("sii.cut_irradiance")
 def cut_irradiance(
     receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None
 ) -> Array:

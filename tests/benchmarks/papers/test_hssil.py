@@ -27,8 +27,9 @@ from benchmarks.papers.hssil.subjects import (
 )
 from benchmarks.papers.hssil.temporal import left
 from benchmarks.papers.workbench import FULL, Workbench, seen_by
+from refgi.settings import of
 from refgi.sssil import HssilSettings
-from refgi.sssil.temporal.filter import TemporalSettings
+from refgi.sssil.settings import TemporalSettings
 from tests.benchmarks.papers.conftest import SMALL
 
 PRINTED = {  # Figure 6: sampling, upsampling, compositing, total, on the 8800 GTS and the GTX 260, ms
@@ -74,9 +75,8 @@ def test_a_full_run_has_the_papers_sizes():
     timed, judged = wide_frame(full, BASKET), frame_of(full, BASKET, LARGE)
     assert (timed.width, timed.height) == (1280, 720)
     assert (judged.width, judged.height) == (720, 720)
-    assert settings_of(timed) == HssilSettings(radius=20.0)
-    assert dataclasses.astuple(settings_of_figure_5(judged)) == dataclasses.astuple(
-        HssilSettings(radius=40.0, start="full", pattern="pixel"))
+    assert settings_of(timed) == of(HssilSettings, radius=20.0)
+    assert settings_of_figure_5(judged) == of(HssilSettings, radius=40.0, start="full", pattern="pixel")
 
 
 def test_smaller_pictures_reach_as_much_by_fewer_levels():

@@ -73,7 +73,7 @@ def test_what_rests_is_not_drawn_again(figures, evidence):
     assert not {light, camera} & reused[both]
     assert camera in reused[moving_light]
     assert light not in reused[moving_light]
-    assert {light, "rsm.warp"} & reused[moving_camera]
+    assert {light, "lights.warp"} & reused[moving_camera]
     assert camera not in reused[moving_camera]
     assert {light, camera} <= reused[still]
     evidence("Table 1 at 32 x 32: " + ", ".join(f"{title} {row[1]:.0f} ms" for title, row in rows.items()))

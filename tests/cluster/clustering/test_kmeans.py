@@ -1,11 +1,11 @@
-"""Clusters of lights: against the literal twin, and what must hold whatever the lights (Dong et al. 2009, Sec. 5)."""
+"""Clustering of lights: against the literal twin, and what must hold whatever the lights (Dong et al. 2009, Sec. 5)."""
 
 import math
 
 import numpy as np
 import pytest
 
-from refgi.cluster.clustering.kmeans import Clusters, cluster, in_use, mean_angle
+from refgi.cluster.clustering.kmeans import Clustering, cluster, in_use, mean_angle
 from refgi.cluster.clustering.metric import angle
 from refgi.errors import InputError
 from refgi.stages import observe
@@ -103,7 +103,7 @@ def test_the_lowest_cluster_wins_a_tie():
     position[0] = [-1, -1, 0, 1, 1]  # the middle one is as far from both
     normal = np.repeat([[0.0], [0.0], [1.0]], 5, axis=1)
     for first, expected in (((-1.0, 1.0), 0), ((1.0, -1.0), 0)):
-        start = Clusters(np.array([first, (0, 0), (0, 0)], float), normal[:, :2], np.zeros(2, np.int64),
+        start = Clustering(np.array([first, (0, 0), (0, 0)], float), normal[:, :2], np.zeros(2, np.int64),
                          np.zeros(5, np.int32), 0, np.zeros(1))
         for mode in MODES:
             found = cluster(position, normal, 2, distance=mode, diagonal=1.0, rounds=1, start=start)
@@ -118,7 +118,8 @@ def test_clusters_start_at_light_k_n_over_m():
     for count in (1, 2, 7, 30, position.shape[1] - 1):
         at = [k * position.shape[1] // count for k in range(count)]
         unit = normal / np.linalg.norm(normal, axis=0)
-        start = Clusters(position[:, at], unit[:, at], np.zeros(count, np.int64), np.zeros(1, np.int32), 0, np.zeros(1))
+        start = Clustering(position[:, at], unit[:, at], np.zeros(count, np.int64), np.zeros(1, np.int32), 0,
+                           np.zeros(1))
         one = cluster(position, normal, count, diagonal=1.0)
         two = cluster(position, normal, count, diagonal=1.0, start=start)
         assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
@@ -233,7 +234,7 @@ def test_a_cluster_whose_normals_cancel_keeps_its_normal(mode, turns):
     position, normal = np.zeros((3, len(turns) + 1)), np.zeros((3, len(turns) + 1))
     position[0] = [*(0.1 * i for i in range(len(turns))), 9.0]
     normal[:2] = np.cos(np.radians([*turns, 0])), np.sin(np.radians([*turns, 0]))
-    start = Clusters(np.array([[0.05, 9.0], [0.0, 0.0], [0.0, 0.0]]), np.array([[0.0, 1.0], [0.6, 0.0], [0.8, 0.0]]),
+    start = Clustering(np.array([[0.05, 9.0], [0.0, 0.0], [0.0, 0.0]]), np.array([[0.0, 1.0], [0.6, 0.0], [0.8, 0.0]]),
                      np.zeros(2, np.int64), np.zeros(3, np.int32), 0, np.zeros(1))
     found = cluster(position, normal, 2, distance=mode, weights=(0.9, 0.1), diagonal=1.0, start=start)
     assert found.of.tolist() == [0] * len(turns) + [1]

@@ -1,4 +1,4 @@
-"""Clusters of a spot that moves from a wall to the ceiling (Fig. 8): kept from frame to frame they are lost."""
+"""Clustering of a spot that moves from a wall to the ceiling (Fig. 8): kept from frame to frame they are lost."""
 
 from itertools import pairwise
 

@@ -1,17 +1,17 @@
 """The rectangle of each cluster (Dong et al. 2009, Sec. 6): its size, place and axes, and what a sample makes of it."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from refgi.cluster.clustering.kmeans import Clusters, cluster
+from refgi.cluster.clustering.kmeans import Clustering, cluster
 from refgi.cluster.clustering.rectangle import area_lights, map_frames
 from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError
 from refgi.lights import PixelLights
 from refgi.rsm.raster.projection import paraboloid_projection
+from refgi.settings import replaced
 from tests.naive import kmeans as naive
 
 PUBLISHED = ValSettings()
@@ -31,7 +31,7 @@ def grouped(position, normal, of, count):
     axis = np.stack([np.bincount(of, weights=n, minlength=count) for n in normal])
     length = np.linalg.norm(axis, axis=0)
     axis = np.where(length > 0, axis / np.where(length > 0, length, 1), [[0.0], [1.0], [0.0]])
-    return Clusters(center, axis, members, of.astype(np.int32), 0, np.zeros(1))
+    return Clustering(center, axis, members, of.astype(np.int32), 0, np.zeros(1))
 
 
 def one_cluster(position, normal):
@@ -51,7 +51,7 @@ def areas_of_samples(n, clusters, **options):
     position = on_plane(frame, 2 * rng.random(n * clusters), 0.5 * rng.random(n * clusters))
     normals = np.repeat(normal, n * clusters, axis=1)
     given = grouped(position, normals, np.arange(n * clusters) // n, clusters)
-    found = area_lights(lights_at(position, normals), given, dataclasses.replace(PUBLISHED, **options))
+    found = area_lights(lights_at(position, normals), given, replaced(PUBLISHED, options).area)
     return found.side[0] * found.side[1]
 
 
@@ -76,7 +76,7 @@ def test_a_rectangle_of_known_size_is_found(axes, evidence):
         s, t = (grid.ravel() for grid in np.meshgrid(np.linspace(1.0, 3.0, 6), np.linspace(-0.25, 0.5, 4)))
         position = on_plane(frame, s, t)
         found = area_lights(lights_at(position, position), one_cluster(position, normal),
-                            dataclasses.replace(PUBLISHED, axes=axes))
+                            replaced(PUBLISHED, {"axes": axes}).area)
         sides = sorted(found.side[:, 0])
         worst = max(worst, abs(sides[0] - 0.75), abs(sides[1] - 2.0))
         assert found.delta[0] == pytest.approx(math.sqrt(1.5), abs=ROUNDING)
@@ -95,7 +95,7 @@ def test_a_turned_square_doubles_its_area_of_fixed_axes(evidence):
     areas = {}
     for axes in ("fixed", "min_area"):
         found = area_lights(lights_at(position, position), one_cluster(position, (0, 1, 0)),
-                            dataclasses.replace(PUBLISHED, axes=axes))
+                            replaced(PUBLISHED, {"axes": axes}).area)
         areas[axes] = float(found.side.prod())
     assert areas["fixed"] == pytest.approx(4.0, abs=ROUNDING)
     assert areas["min_area"] == pytest.approx(2.0, abs=ROUNDING)
@@ -109,7 +109,7 @@ def test_every_light_lies_in_its_rectangle_as_in_the_twin(axes):
     position, normal = rng.random((3, 200)), rng.normal(size=(3, 200))
     normal /= np.linalg.norm(normal, axis=0)
     clusters = cluster(position, normal, 12, diagonal=1.7)
-    found = area_lights(lights_at(position, normal), clusters, dataclasses.replace(PUBLISHED, axes=axes))
+    found = area_lights(lights_at(position, normal), clusters, replaced(PUBLISHED, {"axes": axes}).area)
     for m in range(12):
         mine = position[:, clusters.of == m].T.tolist()
         right, down = found.axes[m]
@@ -130,7 +130,7 @@ def test_pca_follows_the_longer_spread():
     s, t = (grid.ravel() for grid in np.meshgrid(np.linspace(-2, 2, 9), np.linspace(-0.5, 0.5, 5)))
     position = on_plane(frame, math.cos(turn) * s - math.sin(turn) * t, math.sin(turn) * s + math.cos(turn) * t)
     found = area_lights(lights_at(position, position), one_cluster(position, (0, 0, 1)),
-                        dataclasses.replace(PUBLISHED, axes="pca"))
+                        replaced(PUBLISHED, {"axes": "pca"}).area)
     np.testing.assert_allclose(found.side[:, 0], [4.0, 1.0], atol=ROUNDING)
     np.testing.assert_allclose(found.axes[0, 0], math.cos(turn) * frame[0] + math.sin(turn) * frame[1], atol=ROUNDING)
 
@@ -139,7 +139,7 @@ def test_pca_follows_the_longer_spread():
 def test_one_size_of_two_sides(extent, expected):
     position = np.array([[0.0, 2.0, 0.0, 2.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.75, 0.75]])
     found = area_lights(lights_at(position, position), one_cluster(position, (0, 1, 0)),
-                        dataclasses.replace(PUBLISHED, extent=extent))
+                        replaced(PUBLISHED, {"area_extent": extent}).area)
     assert found.delta[0] == pytest.approx(expected, abs=ROUNDING)
 
 
@@ -158,30 +158,30 @@ def test_a_single_light_is_a_point_or_its_footprint():
     normals = np.repeat([[0.0], [1.0], [0.0]], 3, axis=1)
     clusters = grouped(position, normals, np.array([0, 1, 1]), 3)
     lights, footprint = lights_at(position, normals), np.array([0.25, 9.0, 9.0])
-    point = area_lights(lights, clusters, PUBLISHED, footprint)
+    point = area_lights(lights, clusters, PUBLISHED.area, footprint)
     assert point.delta.tolist() == pytest.approx([0.0, 1.0, 0.0])
-    spread = area_lights(lights, clusters, dataclasses.replace(PUBLISHED, single_light="footprint"), footprint)
+    spread = area_lights(lights, clusters, replaced(PUBLISHED, {"single_light": "footprint"}).area, footprint)
     assert spread.delta.tolist() == pytest.approx([0.5, 1.0, 0.0])
     assert spread.side[:, 0].tolist() == [0.5, 0.5]
     with pytest.raises(InputError, match="footprint: expected"):
-        area_lights(lights, clusters, dataclasses.replace(PUBLISHED, single_light="footprint"))
+        area_lights(lights, clusters, replaced(PUBLISHED, {"single_light": "footprint"}).area)
 
 
 @pytest.mark.parametrize("axes", ["fixed", "pca", "min_area"])
 @pytest.mark.parametrize("unbiased", [False, True])
 def test_degenerate_clusters_are_finite(axes, unbiased):
-    settings = dataclasses.replace(PUBLISHED, axes=axes, unbiased_area=unbiased)
+    settings = replaced(PUBLISHED, {"axes": axes, "unbiased_area": unbiased})
     position = np.zeros((3, 9))
     position[0, 4:] = [1.0, 1.25, 1.5, 1.75, 2.0]  # four in one place, five on a line, one of none
     normals = np.repeat([[0.0], [1.0], [0.0]], 9, axis=1)
     given = grouped(position, normals, np.array([0] * 4 + [2] * 5), 3)
-    found = area_lights(lights_at(position, normals), given, settings)
+    found = area_lights(lights_at(position, normals), given, settings.area)
     assert all(np.isfinite(part).all() for part in found)
     assert found.delta.tolist() == [0.0, 0.0, 0.0]
     assert found.radius.tolist() == [0.0, 0.0, 0.5]
     assert found.side[:, 2].max() == pytest.approx(1.5 if unbiased else 1.0, abs=ROUNDING)
     none = area_lights(lights_at(position[:, :0], normals[:, :0]),
-                       cluster(position[:, :0], normals[:, :0], 5, diagonal=1.0), settings)
+                       cluster(position[:, :0], normals[:, :0], 5, diagonal=1.0), settings.area)
     assert none.delta.shape == (0,)
     assert none.frame.shape == (0, 3, 3)
 
@@ -196,6 +196,6 @@ def test_lights_in_a_row_have_no_width_whatever_their_rounding(axes):
     normals = np.repeat(normals / np.linalg.norm(normals, axis=0), 3, axis=1)
     position = (start + along * np.array([0.0, 0.3, 1.0])).reshape(3, -1).astype(np.float32).astype(np.float64)
     given = grouped(position, normals, np.arange(120) // 3, 40)
-    found = area_lights(lights_at(position, normals), given, dataclasses.replace(PUBLISHED, axes=axes))
+    found = area_lights(lights_at(position, normals), given, replaced(PUBLISHED, {"axes": axes}).area)
     assert not found.delta.any()
     assert (found.side.max(axis=0) > 0.1).all()

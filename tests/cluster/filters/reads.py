@@ -5,7 +5,7 @@ import numpy as np
 from refgi.cluster.filters.brute import brute_means, brutes, build_brute
 from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.mip import build_mip, mip_means, mip_of, mips
-from refgi.cluster.filters.sat import build_sat, sat_means, sats
+from tests.cluster.filters.sat import build_sat, sat_means, sats
 
 MOST = 0.85  # far end of the range of depths
 

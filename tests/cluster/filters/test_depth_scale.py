@@ -7,11 +7,10 @@ import pytest
 
 from refgi.cluster.filters.depth_scale import depth_scale, series_depths, series_distance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
-from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.look import scale_of
+from refgi.cluster.settings import ConstantBias, Csm, Pcss
+from refgi.cluster.visibility.pcss import blocker_test
+from refgi.cluster.visibility.search_region import scale_of
 from refgi.cluster.visibility.series import above_half, series
-from refgi.cluster.visibility.step import rules
-from refgi.settings import of
 
 EXACT = 1e-14
 OVERSHOOT = 0.1  # of the series, 9 % of its height
@@ -50,7 +49,7 @@ def test_distances_of_depths(kind):
                                       {"attenuation": 2.0, "rescale": "plateau"}])
 def test_no_comparison_wraps_around(kind, settings, evidence):
     """Differences of biased depths stay within 1 - b* of 0, where the series is past its last crossing at most."""
-    chain = series(of(ValSettings, **settings))
+    chain = series(Csm(**settings))
     z = np.concatenate([np.geomspace(NEAR, FAR, 40), np.geomspace(FAR, 1e6, 20), [np.inf]])
     t = depths(depth_scale(kind, NEAR, FAR, SCENE, chain.range), z)
     assert (np.diff(t) >= 0).all()
@@ -64,7 +63,7 @@ def test_no_comparison_wraps_around(kind, settings, evidence):
 
 
 def test_few_terms_leave_the_map_half_of_the_range():
-    chain = series(of(ValSettings, terms=1))
+    chain = series(Csm(terms=1))
     assert chain.range < 0.5
     scale = depth_scale("log_map", NEAR, FAR, SCENE, chain.range)
     assert depths(scale, [FAR])[0] == pytest.approx(chain.range / 2, abs=EXACT)
@@ -79,7 +78,7 @@ def test_maps_of_one_distance_or_of_none_at_the_centre(kind):
         assert (np.diff(t) >= 0).all()
         assert t[-1] == 0.8
     plate = depth_scale("map", 1.0, 1.0, SCENE, 0.8)
-    assert depths(plate, [1.0 + 1e-3])[0] < series(ValSettings()).first  # a thousandth farther is no shadow yet
+    assert depths(plate, [1.0 + 1e-3])[0] < series(Csm()).first  # a thousandth farther is no shadow yet
 
 
 def two_sided():
@@ -92,19 +91,18 @@ def two_sided():
 def test_each_hemisphere_has_the_scale_of_its_own_map():
     maps = two_sided()
     for kind in KINDS:
-        settings = of(ValSettings, depth_scale=kind)
-        end = series(settings).range
-        assert scale_of(maps, 0, settings) == depth_scale(kind, 1.0, 2.0, 20.0, end)
-        assert scale_of(maps, 0, settings, behind=True) == depth_scale(kind, 3.0, 12.0, 20.0, end)
+        chain = series(Csm())
+        end = chain.range
+        assert scale_of(maps, 0, kind, chain) == depth_scale(kind, 1.0, 2.0, 20.0, end)
+        assert scale_of(maps, 0, kind, chain, behind=True) == depth_scale(kind, 3.0, 12.0, 20.0, end)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_steps_bias_is_one_of_the_same_scale(kind):
+def test_the_bias_of_pcss_is_one_of_the_same_scale(kind):
     """A receiver at d is compared at the distance whose depth is t(d) - b."""
-    settings = of(ValSettings, depth_scale=kind, bias=0.1)
-    scale = scale_of(two_sided(), 0, settings)
-    rule = rules(settings, scale)
+    scale = scale_of(two_sided(), 0, kind, series(Csm(bias=0.1)))
+    test = blocker_test(Pcss(constant_bias=ConstantBias(0.1, kind)), scale)
     for d in (1.3, 1.5, 2.0):
-        moved = depths(scale, [rule.share * d - rule.bias])[0]
+        moved = depths(scale, [test.share * d - test.bias])[0]
         assert moved == pytest.approx(max(depths(scale, [d])[0] - 0.1, 0.0), abs=EXACT)
-    assert rules(of(ValSettings, depth_scale=kind), scale)[2:] == (1.0, 0.0)
+    assert blocker_test(Pcss(constant_bias=ConstantBias(0.0, kind)), scale)[2:] == (1.0, 0.0)

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from refgi.cluster.lighting.blur import blur
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import BoxBlur, GeometryBlur
 from refgi.jit import threads
 from refgi.pairs.irradiance import Receivers
-from refgi.settings import of
 from tests.naive.interleaving import blurred, window
 
 ROUNDING = 1e-12  # of means of some dozen float64 values, relative to the largest
@@ -40,11 +39,11 @@ def test_equals_the_twin(height, width, side, evidence):
     rng = np.random.default_rng(height)
     to, light = rough(rng, height, width), rng.random((3, height, width))
     expected = blurred(light, *to, side, 1.0, 0.8)
-    result = blur(light, to, side, ValSettings(), DIAGONAL)
+    result = blur(light, to, side, GeometryBlur(), DIAGONAL)
     error = np.abs(result - expected).max()
     evidence(f"{width} x {height}, n = {side}: {error:.1e} off the loops")
     assert error < ROUNDING
-    box = blur(light, to, side, of(ValSettings, blur="box"), DIAGONAL)
+    box = blur(light, to, side, BoxBlur(), DIAGONAL)
     assert np.abs(box - blurred(light, *to, side, np.inf, -2.0)).max() < ROUNDING
 
 
@@ -54,7 +53,7 @@ def test_a_constant_stays_to_the_bit(real, evidence):
     rng = np.random.default_rng(3)
     for to in (plane(33, 70, real), rough(rng, 33, 70, real)):
         light = np.broadcast_to(np.array([0.1, 1 / 3, 7e5], real).reshape(3, 1, 1), to.position.shape)
-        result = blur(light, to, 8, ValSettings(), DIAGONAL)
+        result = blur(light, to, 8, GeometryBlur(), DIAGONAL)
         assert np.array_equal(result, np.where(to.covered, light, 0))
     evidence("constant field: 0 bits of difference")
 
@@ -67,8 +66,8 @@ def test_nothing_leaks_across_an_edge(evidence):
     deep = flat._replace(position=flat.position - 1.5 * np.array([0, 0, 1], np.float32).reshape(3, 1, 1) * right)
     turned = flat._replace(normal=np.where(right, np.array([1, 0, 0], np.float32).reshape(3, 1, 1), flat.normal))
     for to in (deep, turned):
-        assert np.array_equal(blur(light, to, 8, ValSettings(), DIAGONAL), light)
-    assert not np.array_equal(blur(light, flat, 8, ValSettings(), DIAGONAL), light)
+        assert np.array_equal(blur(light, to, 8, GeometryBlur(), DIAGONAL), light)
+    assert not np.array_equal(blur(light, flat, 8, GeometryBlur(), DIAGONAL), light)
     evidence("a step of 1e7 across an edge in depth, in normal: 0 bits leak")
 
 
@@ -80,7 +79,7 @@ def test_without_comparisons_where_bounds_decide(real):
     below = to._replace(normal=to.normal.copy())
     below.normal[:, 60:] = np.array([1, 0, 0]).reshape(3, 1, 1)
     for side in (8, 5):
-        alike, compared = (blur(light, some, side, ValSettings(), 100.0) for some in (to, below))
+        alike, compared = (blur(light, some, side, GeometryBlur(), 100.0) for some in (to, below))
         assert np.array_equal(alike[:, :56], compared[:, :56])
         assert not np.array_equal(alike[:, 57:], compared[:, 57:])
 
@@ -90,8 +89,8 @@ def test_single_precision_and_threads():
     to, light = rough(rng, 50, 150), rng.random((3, 50, 150)).astype(np.float32)
     near = Receivers(to.position.astype(np.float32), to.normal.astype(np.float32), to.covered)
     with threads(1):
-        one = blur(light, near, 8, ValSettings(), DIAGONAL)
-    assert np.array_equal(one, blur(light, near, 8, ValSettings(), DIAGONAL))
+        one = blur(light, near, 8, GeometryBlur(), DIAGONAL)
+    assert np.array_equal(one, blur(light, near, 8, GeometryBlur(), DIAGONAL))
     exact = blurred(light, near.position.astype(np.float64), near.normal, near.covered, 8, 1.0, 0.8)
     off = np.abs(one - exact).max(axis=0)
     # where a comparison is decided by rounding, another set of pixels counts

@@ -3,7 +3,10 @@
 import numpy as np
 
 from refgi.cluster.clustering.rectangle import AreaLights
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.evaluate import visibility
 from refgi.rsm.raster.projection import paraboloid_projection
+from refgi.settings import of
 
 
 def area_lights(center, normal, radius=0.0, members=None):
@@ -29,3 +32,8 @@ def surface_points(geometry, count, rng):
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     points = corners[face, 0] * (1 - u - v) + corners[face, 1] * u + corners[face, 2] * v
     return np.ascontiguousarray(points.T), np.ascontiguousarray((cross[face] / area[face, None]).T)
+
+
+def hard_visibility(maps, areas, m, points, facing):
+    """V by one depth test."""
+    return visibility(maps, areas, m, points, facing, of(ValSettings, visibility="hard"))

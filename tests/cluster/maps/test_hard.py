@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.maps import ShadowMaps, hard_visibility, shadow_maps
-from refgi.cluster.maps.hard import SLACK
+from refgi.cluster.maps import ShadowMaps, shadow_maps
 from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.pcf import SLACK
 from refgi.errors import InputError
 from refgi.rays import Tracer
 from refgi.scene import load_scene
 from refgi.settings import of
-from tests.cluster.maps.lights import area_lights, surface_points
+from tests.cluster.maps.lights import area_lights, hard_visibility, surface_points
 from tests.naive import hard_map
 from tests.rsm.shapes import geometry, soup
 
@@ -29,8 +29,8 @@ def test_every_receiver_as_its_literal_twin(dtype, close):
     rng = np.random.default_rng(5)
     shape = soup(rng, 30)
     lights = area_lights(rng.normal(size=(3, 3)) * 0.3, rng.normal(size=(3, 3)))
-    settings = of(ValSettings, map_resolution=24, near_geometry="keep")
-    maps = shadow_maps(shape, lights, settings, dtype)
+    settings = of(ValSettings, maps_resolution=24, near_geometry="keep")
+    maps = shadow_maps(shape, lights, settings.maps, dtype)
     points, normals = (array.astype(dtype) for array in surface_points(shape, 90, rng))
     checked = hidden = 0
     for m in range(3):
@@ -65,7 +65,7 @@ def test_against_shadow_rays(evidence):
     blocked = _blocked(tracer, points[:, i], facing[:, i], at[:, m], normal[:, m])
     errors, away = [], []
     for size in (64, 128, 256, 512):
-        maps = shadow_maps(scene, lights, of(ValSettings, map_resolution=size), np.float32)
+        maps = shadow_maps(scene, lights, of(ValSettings, maps_resolution=size).maps, np.float32)
         seen = np.stack([hard_visibility(maps, lights, k, points, facing) for k in range(24)])[lit] == 1
         wrong = np.flatnonzero(seen == blocked)
         pairs = points[:, i[wrong]], facing[:, i[wrong]], at[:, m[wrong]], normal[:, m[wrong]]
@@ -110,8 +110,8 @@ def _near_silhouette(tracer, points, facing, light, normal, angle):
 def test_a_lone_plane_never_shadows_itself(dtype, evidence):
     plane = geometry([[-9, 1, -9], [9, 1, -9], [0, 1, 15]], [[0, 1, 2]])
     light = area_lights([[0.1, 0, 0.2]], [[0.3, 1, 0.1]])
-    settings = of(ValSettings, map_resolution=32, occluders_alone=False)
-    maps = shadow_maps(plane, light, settings, dtype)
+    settings = of(ValSettings, maps_resolution=32, occluders_alone=False)
+    maps = shadow_maps(plane, light, settings.maps, dtype)
     points, normals = (array.astype(dtype) for array in surface_points(plane, 5000, np.random.default_rng(2)))
     assert (hard_visibility(maps, light, 0, points, normals) == 1).all()
     evidence("V = 1 at 5000 points of a lone plane, map of 32^2, no bias")
@@ -122,7 +122,7 @@ def test_behind_an_area_light_all_is_visible_unless_there_is_a_map():
     light, below = area_lights([[0, 0, 0]], [[0, 1, 0]]), np.array([[0.0, -2, 0], [0, 2, 0]]).T
     facing = np.array([[0.0, 1, 0], [0, -1, 0]]).T
     for behind, expected in (("visible", 1), ("dual_paraboloid", 0)):
-        maps = shadow_maps(plate, light, of(ValSettings, behind=behind, occluders_alone=False), np.float64)
+        maps = shadow_maps(plate, light, of(ValSettings, behind=behind, occluders_alone=False).maps, np.float64)
         assert hard_visibility(maps, light, 0, below, facing).tolist() == [expected, 1]
 
 

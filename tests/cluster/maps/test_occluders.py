@@ -8,12 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from refgi.cluster.maps.occluders import Ends, blockers, ends_of, everywhere, occluders
-from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
+from refgi.lights.settings import LightSettings
 from refgi.rsm.buffers.extent import Extent
 from refgi.scene import load_scene
-from refgi.settings import of
 from refgi.stages import Memory, observe
 from tests.cluster.maps.lights import surface_points
 from tests.rsm.shapes import geometry
@@ -169,7 +168,7 @@ def test_what_lies_outside_of_all_that_takes_part_blocks_nothing(half):
 def test_light_ends_where_the_camera_looks_and_where_it_begins():
     scene = load_scene("cornell_box")
     frame = Frame(scene, width=16, height=16, rsm_resolution=32)
-    lights = choose_lights(frame, of(ValSettings, lights=20))
+    lights = choose_lights(frame, LightSettings(20))
     seen = np.unique(frame.gbuffer.triangle_id[frame.gbuffer.covered])
     assert 0 < len(seen) < scene.face_count
     corners = scene.geometry.vertices[np.unique(scene.geometry.faces[seen])]

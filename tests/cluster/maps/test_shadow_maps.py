@@ -1,19 +1,18 @@
 """Maps of area lights: the same by rays, none where nothing occludes, and what lies near the centre kept or lost."""
 
-import dataclasses
 
 import numba
 import numpy as np
 import pytest
 
-from refgi.cluster.maps import hard_visibility, shadow_maps
+from refgi.cluster.maps import shadow_maps
 from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError
 from refgi.rays import Tracer
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.stages import observe
-from tests.cluster.maps.lights import area_lights, surface_points
+from tests.cluster.maps.lights import area_lights, hard_visibility, surface_points
 from tests.cluster.maps.test_occluders import box, together
 from tests.rsm.shapes import geometry, soup
 
@@ -22,14 +21,14 @@ from tests.rsm.shapes import geometry, soup
 GRAZING = 2e-5
 ON_A_SILHOUETTE = 5e-4  # share of texels so near an edge that float32 sees another triangle, or so grazing
 IN_A_CORNER = 0.02  # share of points within a texel of a corner of the room, 48 texels across
-SMALL = of(ValSettings, map_resolution=48)
+SMALL = of(ValSettings, maps_resolution=48)
 SCENE = load_scene("cornell_sphere:faces=1500").geometry
 LIGHTS = area_lights([[0.1, 0.3, 0.2], [0.4, 0.5, 0.1], [0.3, 0.05, 0.4], [0.25, 0.3, 0.3]],
                      [[1, 0.2, -0.3], [0, -1, 0], [-0.5, 0.8, 0.1], [0, 0.2, -1]], radius=0.09)
 
 
 def maps_of(shape, areas, dtype=np.float32, **changed):
-    return shadow_maps(shape, areas, dataclasses.replace(SMALL, **changed), dtype)
+    return shadow_maps(shape, areas, replaced(SMALL, changed).maps, dtype)
 
 
 @pytest.mark.feature("VAL-03", "VAL-22")
@@ -54,9 +53,9 @@ def test_drawn_maps_are_those_of_rays(rule, alone, evidence):
 
 @pytest.mark.parametrize("alone", [True, False])
 def test_rays_of_the_frame_serve_where_nothing_is_left_out(alone):
-    settings = dataclasses.replace(SMALL, maps="rays", occluders_alone=alone, near_geometry="keep")
-    given = shadow_maps(SCENE, LIGHTS, settings, np.float32, Tracer(SCENE))
-    np.testing.assert_array_equal(given.depth, shadow_maps(SCENE, LIGHTS, settings, np.float32).depth)
+    settings = replaced(SMALL, {"renderer": "rays", "occluders_alone": alone, "near_geometry": "keep"})
+    given = shadow_maps(SCENE, LIGHTS, settings.maps, np.float32, Tracer(SCENE))
+    np.testing.assert_array_equal(given.depth, shadow_maps(SCENE, LIGHTS, settings.maps, np.float32).depth)
 
 
 def test_what_a_map_says_of_itself():
@@ -132,7 +131,7 @@ def test_the_shadow_of_an_object_near_the_centre_is_kept_or_lost(rule, near_one,
     # a plate 0.1 above the cluster's centre, and one 1 above; the cluster reaches 0.3
     shape = together(floor, plate(0, 0.1), plate(0.8, 1))
     light = area_lights([[0, 0, 0]], [[0, 1, 0]], radius=0.3)
-    maps = maps_of(shape, light, near_geometry=rule, map_resolution=128)
+    maps = maps_of(shape, light, near_geometry=rule, maps_resolution=128)
     receivers = np.array([[0.0, 2, 0], [1.6, 2, 0], [-1.2, 2, 0.3]]).T
     seen = hard_visibility(maps, light, 0, receivers, np.array([[0.0, -1, 0]] * 3).T)
     np.testing.assert_array_equal(seen, [near_one, far_one, 1])
@@ -144,7 +143,7 @@ def test_a_ball_cuts_surfaces_and_shows_what_lies_beyond():
                       [[0, 1, 2], [3, 4, 5]])
     light = area_lights([[0, 0, 0]], [[0, 1, 0]], radius=1.2)
     maps = maps_of(sheets, light, np.float64, near_geometry="ball", near_distance=1.0, occluders_alone=False,
-                   map_resolution=65)
+                   maps_resolution=65)
     middle, frame = maps.depth[0][32], maps.frame[0]
     s = (2 * np.arange(65) + 1) / 65 - 1
     cosine = (1 - s * s) / (1 + s * s)
@@ -163,7 +162,7 @@ def test_any_size_and_any_number_of_threads_give_the_same_bits(size, dtype):
     for count in (1, before):
         numba.set_num_threads(count)
         try:
-            maps = maps_of(shape, areas, dtype, map_resolution=size, near_geometry="ball")
+            maps = maps_of(shape, areas, dtype, maps_resolution=size, near_geometry="ball")
         finally:
             numba.set_num_threads(before)
         assert maps.depth.shape[1:] == (size, size)

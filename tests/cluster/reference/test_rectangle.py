@@ -1,6 +1,5 @@
 """Rays to a rectangle and its map projected back: what counts, what does not, and how the two agree."""
 
-import dataclasses
 
 import numba
 import numpy as np
@@ -9,18 +8,18 @@ import pytest
 from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
 from refgi.cluster.maps.shadow_maps import shadow_maps
-from refgi.cluster.reference import back_projected_visibility, rectangle_visibility, reference_visibility
+from refgi.cluster.reference import back_projection_visibility, rectangle_visibility, reference_visibility
 from refgi.cluster.reference.rays import rectangle_points
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from tests.naive import truth
 
 # nothing near six large clusters, so that rays to a rectangle and one view from its centre meet the same surfaces
-SETTINGS = of(ValSettings, lights=200, area_lights=6, map_resolution=128, near_geometry="planes", near_distance=1.0)
+SETTINGS = of(ValSettings, lights=200, clusters_count=6, maps_resolution=128, near_geometry="planes", near_distance=1.0)
 PAIRS = 150
 # rms over area lights and pixels: one view from the centre misses what hides behind the nearest surface, and patches
 # are a texel of 128 wide
@@ -31,11 +30,11 @@ ONE_VIEW = 0.12
 def box():
     """Return frame, lights, area lights, and the surface points with the normals of their triangles."""
     frame = Frame(load_scene("cornell_box"), width=24, height=24, rsm_resolution=64, dtype=np.float64)
-    lights = choose_lights(frame, SETTINGS)
+    lights = choose_lights(frame, SETTINGS.lights)
     clusters = cluster(lights.position, lights.normal, 6, diagonal=frame.scene.geometry.diagonal)
     buffer = frame.gbuffer
     facing = facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)
-    return frame, lights, area_lights(lights, clusters, SETTINGS), buffer.position[:, buffer.covered], facing[
+    return frame, lights, area_lights(lights, clusters, SETTINGS.area), buffer.position[:, buffer.covered], facing[
         :, buffer.covered]  # fmt: skip
 
 
@@ -46,8 +45,8 @@ def height_above(areas, m, points):
 @pytest.mark.feature("REF-15")
 def test_one_point_of_the_rectangle_is_a_ray_against_every_triangle(box, evidence):
     frame, _, areas, points, facing = box
-    settings = dataclasses.replace(SETTINGS, near_geometry="keep", behind="raytrace")
-    given, geometry = rectangle_visibility(frame, areas, settings, points=1), frame.scene.geometry
+    settings = replaced(SETTINGS, {"near_geometry": "keep", "behind": "raytrace"})
+    given, geometry = rectangle_visibility(frame, areas, settings.maps, points=1), frame.scene.geometry
     rng = np.random.default_rng(2)
     wrong, blocked = 0, 0
     for _ in range(PAIRS):
@@ -70,8 +69,8 @@ def test_one_point_of_the_rectangle_is_a_ray_against_every_triangle(box, evidenc
 @pytest.mark.feature("REF-15")
 def test_the_map_projected_back_agrees_with_rays(box, evidence):
     frame, _, areas, points, facing = box
-    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
-    traced, projected = rectangle_visibility(frame, areas, SETTINGS), back_projected_visibility(areas, maps)
+    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)
+    traced, projected = rectangle_visibility(frame, areas, SETTINGS.maps), back_projection_visibility(areas, maps)
     off = []
     for m in range(6):
         a, b = traced(m, points, facing), projected(m, points, facing)
@@ -88,20 +87,20 @@ def test_behind_the_area_light(box, evidence):
     frame, _, areas, points, facing = box
     for m in range(6):
         back = height_above(areas, m, points) <= 0
-        published = rectangle_visibility(frame, areas, SETTINGS)(m, points, facing)
-        traced = rectangle_visibility(frame, areas, dataclasses.replace(SETTINGS, behind="raytrace"))(m, points, facing)
+        published = rectangle_visibility(frame, areas, SETTINGS.maps)(m, points, facing)
+        traced = rectangle_visibility(frame, areas, replaced(SETTINGS, {"behind": "raytrace"}).maps)(m, points, facing)
         assert (published[back] == 1).all()
         assert np.array_equal(published[~back], traced[~back])
-    both = dataclasses.replace(SETTINGS, behind="dual_paraboloid")
-    rays = rectangle_visibility(frame, areas, dataclasses.replace(both, behind="raytrace"))
-    maps = shadow_maps(frame.scene.geometry, areas, both, np.float64)
+    both = replaced(SETTINGS, {"behind": "dual_paraboloid"})
+    rays = rectangle_visibility(frame, areas, replaced(both, {"behind": "raytrace"}).maps)
+    maps = shadow_maps(frame.scene.geometry, areas, both.maps, np.float64)
     off, wide = [], 0
     for m in range(6):
         back = height_above(areas, m, points) < -1e-3
-        seen = back_projected_visibility(areas, maps)(m, points[:, back], facing[:, back])
+        seen = back_projection_visibility(areas, maps)(m, points[:, back], facing[:, back])
         off += list(seen - rays(m, points[:, back], facing[:, back]))
         wide += (seen < 1).sum()
-        by_rays = back_projected_visibility(areas, maps, rays)(m, points[:, back], facing[:, back])
+        by_rays = back_projection_visibility(areas, maps, rays)(m, points[:, back], facing[:, back])
         assert np.array_equal(by_rays, rays(m, points[:, back], facing[:, back]))
     evidence(f"behind 6 area lights: V is 1 as published; the map of the hemisphere behind, projected back, is "
              f"{np.sqrt(np.mean(np.square(off))):.3f} (rms) off rays at {len(off)} receivers")
@@ -114,7 +113,7 @@ def test_near_geometry_is_left_out_or_kept(box, evidence):
     frame, _, areas, points, facing = box
     mean = {}
     for rule in ("keep", "ball", "planes"):
-        given = rectangle_visibility(frame, areas, dataclasses.replace(SETTINGS, near_geometry=rule))
+        given = rectangle_visibility(frame, areas, replaced(SETTINGS, {"near_geometry": rule}).maps)
         mean[rule] = [given(m, points, facing).mean() for m in range(6)]
     evidence("mean V of a rectangle, near geometry kept, cut by a ball, left out by planes: "
              + ", ".join(f"{np.mean(mean[rule]):.3f}" for rule in ("keep", "ball", "planes")))
@@ -126,10 +125,10 @@ def test_near_geometry_is_left_out_or_kept(box, evidence):
 
 def test_same_bits_for_any_threads_and_any_split(box):
     frame, lights, areas, points, facing = box
-    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
+    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)
     before = numba.get_num_threads()
-    for mode in ("members", "rectangle", "back_projection"):
-        given = reference_visibility(frame, lights, areas, maps, dataclasses.replace(SETTINGS, visibility=mode))
+    for mode in ("rays_vpls", "rays_rectangle", "back_projection"):
+        given = reference_visibility(frame, lights, areas, maps, replaced(SETTINGS, {"visibility": mode}))
         whole = given(2, points, facing)
         numba.set_num_threads(1)
         parts = [given(2, points[:, part], facing[:, part]) for part in (slice(0, 7), slice(7, 7), slice(7, None))]

@@ -1,6 +1,5 @@
 """What each approximation costs: steps that add up, from exact shadows to the published picture."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -12,20 +11,20 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 # near pairs clamped at a twentieth of the scene's metre: else the error of sampling is that of a pixel beside a light
 # the scale of depths that the limits below were measured with
-SETTINGS = of(ValSettings, lights=128, area_lights=12, map_resolution=64, clamp="distance", clamp_value=0.1,
+SETTINGS = of(ValSettings, lights=128, clusters_count=12, maps_resolution=64, clamp="distance", clamp_value=0.1,
                        depth_scale="scene", near_distance=0.5)
 ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
-# the root of summed squares over the error of all seven steps of visibility: 1 for independent ones, 7^-1/2 where all
+# the root of summed squares over the error of all six steps of visibility: 1 for independent ones, 6^-1/2 where all
 # are alike (Cauchy and Schwarz), without bound where they cancel: 3.1 on cornell_horse, whose rectangle darkens what
 # one view from its centre brightens
-LEAST_ROOT = 7**-0.5 - ROUNDING
+LEAST_ROOT = 6**-0.5 - ROUNDING
 MOST_ROOT = 2.0  # in the boxes, where blockers are simple
 
 
@@ -33,7 +32,7 @@ MOST_ROOT = 2.0  # in the boxes, where blockers are simple
 def test_the_picture_of_exact_shadows_is_that_of_vpl(evidence):
     frame = Frame(load_scene("cornell_box"), width=20, height=20, rsm_resolution=64)
     settings = of(ValSettings, lights=100)
-    exact = exact_shadows(frame, choose_lights(frame, settings), settings)
+    exact = exact_shadows(frame, choose_lights(frame, settings.lights), settings)
     reference = vpl(frame, of(VplSettings, lights=100))
     off = np.abs(exact - reference).max() / reference.max()
     evidence(f"100 area lights of one light each, V by rays: {off:.1e} of the maximum off the method vpl")
@@ -44,13 +43,13 @@ def judge(name, frame, settings, samples, evidence):
     """Split a frame's error, record it and check how the steps add up."""
     reference = trace_truth(frame, TruthSettings(samples=samples)).mean
     found = split_error(frame, settings, reference, block=4)
-    whole, root = found.together("members", "mip")
+    whole, root = found.together("rays_vpls", "mip")
     evidence(f"{name}, rmse / mean of truth: " + ", ".join(f"{step.name} {step.rmse:.3f}" for step in found.steps)
              + f"; steps of visibility together {whole:.3f}, root of their squares {root:.3f} ({root / whole:.2f}); "
              f"all {found.whole:.3f}, root {found.root_of_squares:.3f}")
     assert [step.name for step in found.steps] == ["lights", *STEPS, "interleaved"]
     assert all(0 < step.rmse < 1 for step in found.steps[1:])  # of few lights in a large scene more may be missing
-    assert whole <= sum(found.steps[i].rmse for i in range(1, 8)) + ROUNDING  # triangle inequality
+    assert whole <= sum(found.steps[i].rmse for i in range(1, 1 + len(STEPS))) + ROUNDING  # triangle inequality
     assert root / whole > LEAST_ROOT
     return found, root / whole
 
@@ -90,7 +89,7 @@ def test_steps_of_known_pictures():
 
 def test_without_truth_and_with_rays_behind():
     frame = Frame(load_scene("cornell_box"), width=8, height=8, rsm_resolution=32)
-    settings = dataclasses.replace(SETTINGS, lights=32, area_lights=3, map_resolution=16, behind="raytrace")
+    settings = replaced(SETTINGS, {"lights": 32, "clusters_count": 3, "maps_resolution": 16, "behind": "raytrace"})
     found = split_error(frame, settings, block=2)
     assert next(iter(found.pictures)) == "lights"
     assert all(np.isfinite(picture).all() and (picture >= 0).all() for picture in found.pictures.values())

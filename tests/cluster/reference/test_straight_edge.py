@@ -1,6 +1,5 @@
 """A square light behind a straight edge: the penumbra is Delta (d - z) / z wide, and V across it is a ramp."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -8,15 +7,15 @@ import pytest
 
 from refgi.cluster.clustering.rectangle import AreaLights, map_frames
 from refgi.cluster.maps.shadow_maps import shadow_maps
-from refgi.cluster.reference import back_projected_visibility, rectangle_visibility
+from refgi.cluster.reference import back_projection_visibility, rectangle_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
-from refgi.settings import of
+from refgi.settings import of, replaced
 
 EDGE, RECEIVER = 1.0, 3.0  # distances of the edge and the receivers from the light, m
 PLACES = (0.0, 0.07, 0.19, 0.31)  # of the edge, m: 0 is where texels of all levels of a map meet
-SETTINGS = of(ValSettings, depth_scale="scene", near_distance=0.5, map_resolution=256)
+SETTINGS = of(ValSettings, depth_scale="scene", near_distance=0.5, maps_resolution=256)
 # 256 points hide behind an edge along a side one by one
 RAYS = 1.01 / 256
 # half a texel of 256 by which patches reach over the edge, as a share of the penumbra on the map, and half a cell of 32
@@ -26,9 +25,8 @@ PROJECTED = {0.2: 0.05, 0.5: 0.05}
 STEP = {0.2: 0.10, 0.5: 0.05}  # from the ramp of a disc, which is 0.050 from that of the square
 # from the ramp of the square; the series adds its bias and ripple, and the mip map its levels: between texels it is a
 # tent twice as wide as at their border, which is where the first edge lies
-LIMITS = {("step", 4, "brute"): {0.2: 0.14, 0.5: 0.10}, ("series", 16, "brute"): {0.2: 0.16, 0.5: 0.16},
-          ("series", 4, "brute"): {0.2: 0.16, 0.5: 0.12}, ("series", 4, "sat"): {0.2: 0.13, 0.5: 0.10},
-          ("series", 4, "mip"): {0.2: 0.30, 0.5: 0.23}}  # fmt: skip
+LIMITS = {("pcss", 4, "brute"): {0.2: 0.14, 0.5: 0.10}, ("csm", 16, "brute"): {0.2: 0.16, 0.5: 0.16},
+          ("csm", 4, "brute"): {0.2: 0.16, 0.5: 0.12}, ("csm", 4, "mip"): {0.2: 0.30, 0.5: 0.23}}  # fmt: skip
 
 
 def square(x, y, z, half_x, half_y):
@@ -80,9 +78,9 @@ def disc_ramp(u):
 def test_rays_and_the_map_projected_back_give_the_ramp(delta, evidence):
     frame, areas = Frame(scene(), dtype=np.float64), square_light(delta)
     points, facing, exact, width = receivers(delta)
-    traced = rectangle_visibility(frame, areas, SETTINGS)(0, points, facing)
-    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS, np.float64)
-    projected = back_projected_visibility(areas, maps)(0, points, facing)
+    traced = rectangle_visibility(frame, areas, SETTINGS.maps)(0, points, facing)
+    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)
+    projected = back_projection_visibility(areas, maps)(0, points, facing)
     off = np.abs(traced - exact).max(), np.abs(projected - exact).max()
     evidence(f"Delta {delta}: penumbra {width:.2f} m, rays {width_of(points[0], traced):.3f}, map projected back "
              f"{width_of(points[0], projected):.3f}; V at most {off[0]:.4f} and {off[1]:.3f} off the ramp")
@@ -94,21 +92,22 @@ def test_rays_and_the_map_projected_back_give_the_ramp(delta, evidence):
 @pytest.mark.feature("VAL-19")
 @pytest.mark.parametrize("delta", [0.2, 0.5])
 def test_the_chain_follows_the_ramp(delta, evidence):
-    from refgi.cluster.visibility.visible import visibility
+    from refgi.cluster.visibility.evaluate import visibility
 
     areas, figures = square_light(delta), {}
     for edge in PLACES:
         points, facing, exact, width = receivers(delta, edge)
-        maps, disc = shadow_maps(scene(edge).geometry, areas, SETTINGS, np.float32), disc_ramp(2 * exact - 1)
+        maps, disc = shadow_maps(scene(edge).geometry, areas, SETTINGS.maps, np.float32), disc_ramp(2 * exact - 1)
         for mode, terms, prefilter in LIMITS:
-            settings = dataclasses.replace(SETTINGS, visibility=mode, terms=terms, prefilter=prefilter)
+            series = {"terms": terms, "prefilter": prefilter} if mode == "csm" else {}
+            settings = replaced(SETTINGS, {"visibility": mode} | series)
             v = visibility(maps, areas, 0, points, facing, settings)
             figures.setdefault((mode, terms, prefilter), []).append(
                 (width_of(points[0], v) / width, np.abs(v - exact).max(), np.abs(v - disc).max()))
     evidence(f"Delta {delta}, penumbra {width:.2f} m, {width_of(points[0], disc) / width:.3f} of it for a disc: "
-             + "; ".join(f"{mode}{'' if mode == 'step' else f' M={terms} {prefilter}'} {min(r):.3f} to {max(r):.3f} "
+             + "; ".join(f"{mode}{'' if mode == 'pcss' else f' M={terms} {prefilter}'} {min(r):.3f} to {max(r):.3f} "
                          f"of it, V at most {max(off):.3f} off" for (mode, terms, prefilter), found in figures.items()
                          for r, off, _ in [zip(*found, strict=True)]))
     for kind, limit in LIMITS.items():
         assert max(off for _, off, _ in figures[kind]) < limit[delta]
-    assert max(off for _, _, off in figures["step", 4, "brute"]) < STEP[delta]
+    assert max(off for _, _, off in figures["pcss", 4, "brute"]) < STEP[delta]

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.maps.hard import hard_visibility
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.visible import visibility
+from refgi.cluster.visibility.evaluate import visibility
 from refgi.errors import InputError
 from refgi.rays import Tracer
 from refgi.settings import of
+from tests.cluster.maps.lights import hard_visibility
 from tests.cluster.visibility.plates import lit_by, map_of_plates, on_plane
 from tests.rsm.shapes import geometry
 
@@ -32,8 +32,8 @@ def test_shadow_breaks_off_at_the_light_s_plane(evidence):
     facing = np.repeat([[-1.0], [0.0], [0.0]], 41, axis=1)
     seen = {}
     for behind in ("visible", "dual_paraboloid", "raytrace"):
-        settings = of(ValSettings, behind=behind, visibility="step", map_resolution=128)
-        maps = shadow_maps(scene, areas, settings, np.float64)
+        settings = of(ValSettings, behind=behind, visibility="pcss", maps_resolution=128)
+        maps = shadow_maps(scene, areas, settings.maps, np.float64)
         tracer = Tracer(scene) if behind == "raytrace" else None
         seen[behind] = visibility(maps, areas, 0, points, facing, settings, tracer)
     middle = slice(18, 23)
@@ -55,10 +55,10 @@ def test_no_light_leaks_in_over_the_rim(evidence):
     half = np.sqrt(0.5)  # the map's corners, not its edges, lie that way
     areas = areas._replace(frame=np.array([[[half, half, 0.0], [-half, half, 0.0], [0.0, 0.0, 1.0]]]))
     seen = {}
-    for prefilter, dtype in (("brute", np.float64), ("sat", np.float32), ("mip", np.float32)):
-        settings = of(ValSettings, behind="dual_paraboloid", prefilter=prefilter, map_resolution=128,
+    for prefilter, dtype in (("brute", np.float64), ("mip", np.float32)):
+        settings = of(ValSettings, behind="dual_paraboloid", prefilter=prefilter, maps_resolution=128,
                       depth_scale="scene")
-        maps = shadow_maps(scene, areas, settings, np.float64)
+        maps = shadow_maps(scene, areas, settings.maps, np.float64)
         maps = maps._replace(depth=maps.depth.astype(dtype), behind=maps.behind.astype(dtype))
         seen[prefilter] = float(visibility(maps, areas, 0, points, -points, settings)[0])
     assert max(seen.values()) < 0.02
@@ -73,7 +73,7 @@ def test_rays_are_asked_for():
     with pytest.raises(InputError, match="m: expected an area light"):
         visibility(maps, areas, 1, points, normals, ValSettings())
     with pytest.raises(InputError, match="visibility"):
-        visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="members"))
+        visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="rays_vpls"))
 
 
 def test_light_without_extent_casts_the_hard_shadow():
@@ -82,7 +82,7 @@ def test_light_without_extent_casts_the_hard_shadow():
     areas, maps = lit_by(map_of_plates(64, plates, 3.0), 0.0, 6.4)
     hard = hard_visibility(maps, areas, 0, points, normals)
     assert set(np.unique(hard)) == {0.0, 1.0}
-    for mode in ("series", "step", "hard"):
+    for mode in ("csm", "pcss", "pcf", "hard"):
         assert np.array_equal(visibility(maps, areas, 0, points, normals, of(ValSettings, visibility=mode)), hard)
     none = visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="none"))
     unmapped = visibility(maps._replace(map_of=np.array([-1])), areas, 0, points, normals, ValSettings())

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.series import above_half, first_lit, plateau, series, weights
-from refgi.settings import of
 from tests.naive import soft_shadow as naive
 
 EXACT = 1e-13  # sums of up to 64 sines in another order
@@ -50,7 +49,7 @@ def test_bias_is_the_first_crossing_of_one(evidence):
     for terms, known in ((4, 0.0763), (8, 0.0383), (16, 0.0192)):
         assert found[terms] == pytest.approx(known, abs=PRINTED)
         assert found[terms] == pytest.approx(naive.first_one(terms), abs=1e-12)
-        assert series(of(ValSettings, terms=terms)).bias == found[terms]
+        assert series(Csm(terms=terms)).bias == found[terms]
     evidence("b* = " + ", ".join(f"{b:.4f} (M = {m})" for m, b in found.items()))
 
 
@@ -59,7 +58,7 @@ def test_bias_is_the_first_crossing_of_one(evidence):
 @pytest.mark.parametrize("attenuation", [0.0, 0.5, 1.0, 2.0, 100.0])
 @pytest.mark.parametrize("rescale", ["none", "plateau"])
 def test_no_difference_of_depths_wraps_around(terms, attenuation, rescale):
-    chain = series(of(ValSettings, terms=terms, attenuation=attenuation, rescale=rescale))
+    chain = series(Csm(terms=terms, attenuation=attenuation, rescale=rescale))
     assert chain.range == pytest.approx(1 - 2 * chain.first)
     assert 0.17 < chain.range < 1
     lit = np.linspace(chain.first, 1 - chain.first, 101)
@@ -72,7 +71,7 @@ def test_depths_that_wrap_around_without_a_narrower_range():
     w = weights(4)
     assert float(above_half(1.0, w)) == pytest.approx(0.0, abs=1e-12)  # 1/2 again
     assert np.allclose(above_half(1 - np.linspace(0, 1, 33), w), above_half(np.linspace(0, 1, 33), w), atol=1e-14)
-    assert series(ValSettings()).range == pytest.approx(0.847, abs=DIGITS)
+    assert series(Csm()).range == pytest.approx(0.847, abs=DIGITS)
 
 
 @pytest.mark.feature("VAL-18")
@@ -88,16 +87,16 @@ def test_attenuation_lowers_the_plateau(evidence):
 @pytest.mark.feature("VAL-18")
 def test_plateau_is_stretched_to_one():
     for attenuation in (1.0, 2.0, 5.0):
-        chain = series(of(ValSettings, attenuation=attenuation, rescale="plateau"))
+        chain = series(Csm(attenuation=attenuation, rescale="plateau"))
         lit = above_half(np.linspace(chain.first, 1 - chain.first, 2001), chain.weight)
         assert 0.47 < lit.mean() < 0.51
         assert np.array_equal(chain.weight, weights(4, attenuation) / (2 * plateau(weights(4, attenuation))))
-    assert np.array_equal(series(of(ValSettings, rescale="plateau")).weight, weights(4))  # nothing to stretch
+    assert np.array_equal(series(Csm(rescale="plateau")).weight, weights(4))  # nothing to stretch
 
 
 @pytest.mark.feature("VAL-18")
 def test_doubled_series_needs_no_bias(evidence):
-    chain = series(of(ValSettings, rescale="scale2"))
+    chain = series(Csm(rescale="scale2"))
     assert (chain.bias, chain.gain) == (0.0, 2.0)
     assert chain.search_bias == chain.first
     seen = {gap: float(np.clip(2 * (0.5 + above_half(-gap, chain.weight)), 0, 1)) for gap in (0.0, 0.01, 0.05, 0.1)}
@@ -113,8 +112,8 @@ def test_series_gap_of_twice_the_bias_is_needed_for_full_shadow():
 
 
 def test_bias_of_the_settings_counts():
-    chain = series(of(ValSettings, bias=0.2))
+    chain = series(Csm(bias=0.2))
     assert chain.bias == chain.search_bias == 0.2
     assert chain.range == pytest.approx(1 - chain.first - 0.2)
-    assert series(of(ValSettings, bias=0.0)).range == series(ValSettings()).range
-    assert math.isclose(series(of(ValSettings, bias=0.0)).first, series(ValSettings()).first)
+    assert series(Csm(bias=0.0)).range == series(Csm()).range
+    assert math.isclose(series(Csm(bias=0.0)).first, series(Csm()).first)

@@ -20,15 +20,15 @@ CHANGE = 1e-5  # of the mean: what a plane that nobody sees may change of any pi
 HALVES = (1e1, 1e3, 1e5, 1e8)  # m
 SIZE = {"width": 24, "height": 24, "rsm_resolution": 64}
 LIGHTS = {"lights": 64}
-VAL = {**LIGHTS, "area_lights": 6, "map_resolution": 64}
+VAL = {**LIGHTS, "clusters_count": 6, "maps_resolution": 64}
 ROUNDING = 1e-6  # float32 at a metre or two
 
 # method, and its defaults and the settings that are shares of the scene's size
 CASES = [
     ("sii", LIGHTS), ("multires", LIGHTS), ("val", VAL), ("val", {**VAL, "distance": "squared"}),
     ("val", {**VAL, "depth_scale": "map"}), ("val", {**VAL, "depth_scale": "scene"}),
-    ("val", {**VAL, "interleaving": 4, "blur_extent": 0.05}), ("val", {**VAL, "visibility": "step"}),
-    ("val", {**VAL, "visibility": "step", "receiver_plane": False, "bias": 0.05}),
+    ("val", {**VAL, "interleaving": 4, "blur_extent": 0.05}), ("val", {**VAL, "visibility": "pcss"}),
+    ("val", {**VAL, "visibility": "pcss", "constant_bias": "constant_bias", "constant_bias_value": 0.05}),
     ("val", {**VAL, "visibility": "hard"}),
     ("val", {**VAL, "occluders_alone": False}), ("val", {**VAL, "behind": "dual_paraboloid"}),
     ("val", {**VAL, "visibility": "back_projection"}), ("hssil", {}), ("hssil", {"visibility": "bitmask"}),

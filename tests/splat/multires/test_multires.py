@@ -218,7 +218,7 @@ def test_the_table_of_methods_knows_it():
     assert not find_method("multires").visibility
     with observe() as log:
         render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
-    assert log.status("splat.refine") == ["ran"]
+    assert log.status("multires.refine") == ["ran"]
 
 
 @pytest.mark.parametrize(("change", "asked"), [

@@ -179,8 +179,8 @@ def test_pairs_are_subsplats_times_lights(atrium, evidence):
             settings = clamped(atrium, lights=n * n, finest=finest)
             with observe(record=True) as log:
                 multires(atrium, settings)
-            run, = (run for run in log.runs if run.name == "splat.irradiance")
-            points, _, lights = run.inputs["0"], run.inputs["1"], run.inputs["2"]
+            run, = (run for run in log.runs if run.name == "multires.evaluate")
+            points, _, lights = run.inputs["points"], run.inputs["normals"], run.inputs["lights"]
             assert points.shape[1] == subsplats(atrium, finest=finest)
             assert lights.flux.shape[1] == choose_lights(atrium, settings.lights).flux.shape[1]
             reported.append((points.shape[1] * lights.flux.shape[1], 1e3 * run.seconds))

@@ -13,6 +13,7 @@ from refgi.lights.settings import LightSettings
 from refgi.scene import SpotLight, load_scene
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
+from refgi.splat.sii import METHOD
 from refgi.stages import observe
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -162,8 +163,8 @@ def test_several_lights_add_up(box):
 def test_lobe_code_is_skipped_without_glossy_materials(box):
     with observe() as log:
         sii(box, SiiSettings())
-    assert log.status("splat.lobes") == ["skipped"]
-    assert log.status("splat.irradiance") == ["ran"]
+    assert log.status("pairs.lobes") == ["skipped"]
+    assert log.status("pairs.sum") == ["ran"]
 
 
 @pytest.mark.parametrize("change", [
@@ -207,7 +208,7 @@ def test_without_the_weight_a_picture_has_its_lights_share_of_the_texels(box, la
 def test_scene_without_glass_is_not_searched_for_refraction(box):
     with observe() as log:
         with_it = sii(box, of(SiiSettings, lights=64))
-    assert log.status("rsm.refraction") == ["skipped"]
+    assert log.status("lights.refraction") == ["skipped"]
     np.testing.assert_array_equal(with_it, sii(box, of(SiiSettings, lights=64, refraction="none")))
 
 
@@ -227,3 +228,12 @@ def test_settings_are_checked():
                    {"openness_floor": 0, "openness_flux": "roulette"}, {"reference_length": 1e-300}):
         with pytest.raises(InputError, match=next(iter(change)).replace("_", ".")):
             of(SiiSettings, **change)
+
+
+def test_preset_of_the_paper_is_its_printed_values(box):
+    """Sec. 4 and Fig. 12: 768 lights with filtered flux, cut at 5 %; the default cuts nothing."""
+    paper = METHOD.preset("paper")
+    assert paper == of(SiiSettings, lights=768, filtered=True, cut_share=0.05, bound="ellipsoid")
+    by_hand = sii(box, of(SiiSettings, filtered=True, cut_share=0.05, bound="full"))
+    np.testing.assert_array_equal(sii(box, paper), by_hand)
+    assert METHOD.preset("default").reach.cut is None

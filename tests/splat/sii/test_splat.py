@@ -115,7 +115,7 @@ def test_every_bound_gives_the_same_picture(corner, real, glossy, evidence):
                 counts[bound] = fragments(receivers, lights, settings, None, view)
                 np.testing.assert_array_equal(counts[bound].overdraw, counts["full"].overdraw)
         order = [count.evaluated for count in counts.values()]
-        assert how.widening > 0 or order[0] > order[1] > order[2] > order[3]
+        assert how.pairs.lobe.widening > 0 or order[0] > order[1] > order[2] > order[3]
         assert not np.array_equal(pictures["full"], irradiance(receivers, lights, how.pairs))
         figures = ", ".join(f"{bound} {counts[bound].evaluated / counts['full'].total:.2f}" for bound in counts)
         evidence(f"{np.dtype(real).name}{', lobes' * glossy}: equal bits; pairs evaluated a fragment: {figures}")
@@ -234,7 +234,7 @@ def test_loss_follows_the_closed_form(evidence):
                 receivers, area = plane(distance)
                 settings = of(SiiSettings, cut_share=x, reference_length=1.0)
                 full = (row(irradiance(receivers, light, settings.pairs))[0] * area).sum()
-                lost = (row(cut_irradiance(receivers, light, settings.pairs))[0] * area).sum() / full
+                lost = (row(cut_irradiance(receivers, light, settings))[0] * area).sum() / full
                 expected = (distance * math.sqrt(x)) ** (2 * (exponent + 1) / (exponent + 2))
                 assert lost == pytest.approx(expected, abs=EDGE * (exponent + 1))
                 if i == 1:

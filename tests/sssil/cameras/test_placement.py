@@ -105,7 +105,7 @@ def nothing_missed():
 def test_where_nothing_is_to_be_gained_there_are_no_cameras(scene):
     with observe() as log:
         assert place_cameras(small(scene, width=200, height=150), 3) == ()
-    assert any(run.status == "skipped" and "shows what lights it" in run.reason for run in log.runs)
+    assert any(run.status == "skipped" and "shows all surfaces that light it" in run.reason for run in log.runs)
 
 
 def test_a_view_straight_down_has_an_upward_direction():

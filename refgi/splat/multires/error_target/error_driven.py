@@ -146,7 +146,7 @@ class ErrorDriven(NamedTuple):
         return refine(self.split, self.covered, "off")
 
 
-@stage("splat.error_driven")
+@stage("multires.error_driven")
 def error_driven(
     buffer: "GBuffer", lights: "PixelLights", settings: "ByError", pairs: "PairSettings",
     footprint: Array | None = None, seed: int = 0,
@@ -198,8 +198,8 @@ def error_driven(
     number = lights.flux.shape[1]
     evaluated = np.count_nonzero(exact.is_known) * number + near.pairs
     full_pairs = np.count_nonzero(receivers.covered) * number
-    skip("splat.full_sum", f"{evaluated / max(1, full_pairs):.1%} of its pairs, {count} trials: the error is at most "
-                           f"{found.high:.2%} of the mean")
+    skip("multires.full_sum", f"{evaluated / max(1, full_pairs):.1%} of its pairs, {count} trials: the error is at "
+                              f"most {found.high:.2%} of the mean")
     return ErrorDriven(picture, tuple(trials.split), receivers.covered, *found, threshold, count, evaluated, full_pairs)
 
 

@@ -94,7 +94,7 @@ class BlendWeights(NamedTuple):
     normal_error: Array  # (h_l+1, w_l+1), sum of squares over each coarser cell's pixels: interpolated normal - normal
 
 
-@stage("splat.blends")
+@stage("multires.blends")
 def blend_weights(levels: tuple[SurfaceLevel, ...]) -> tuple[BlendWeights, ...]:
     """Return the weights of the coarser neighbours of every cell.
 

@@ -41,7 +41,7 @@ def near_irradiance_at(irradiance: Array, has_near: Array, c: int, row: int, col
     return irradiance[c, row, column] if has_near[row // SIDE, column // SIDE] else irradiance.dtype.type(0.0)
 
 
-@stage("splat.near")
+@stage("multires.near")
 def near_light(receivers: Receivers, packed: Packed, most: float) -> NearLight:
     """Sum what single lights give each receiver beyond a bound, and by their lobes, at full resolution.
 

@@ -87,9 +87,20 @@ class Trials:
         exact.evaluate(pixel[~exact.is_known[pixel]])
         fill_coarsest(top.representative_pixel, *self._values, self._irradiance[-1])
 
-    @stage("splat.trial")
+    @stage("multires.trial")
     def run(self, threshold: float) -> None:
-        """Refine from the coarsest level down wherever stopping would cost more than `threshold`^2, W^2/m^4."""
+        """Refine from the coarsest level down wherever stopping would cost more than a threshold.
+
+        Parameters
+        ----------
+        threshold : float
+            Root of the squared error that a cell may leave, W/m^2.
+
+        Returns
+        -------
+        None
+            `split` says which cells are refined.
+        """
         for level in range(len(self._levels) - 2, 0, -1):
             here, blend, split = self._levels[level], self._blends[level], self.split[level + 1]
             coarse, irradiance = self._irradiance[level], self._irradiance[level - 1]
@@ -118,9 +129,15 @@ class Trials:
         for split in self.split[1:]:
             split[:] = True
 
-    @stage("splat.assemble")
+    @stage("multires.assemble")
     def picture(self) -> Array:
-        """Evaluate the pixels of the last split cells and return the picture, (3, h, w), W/m^2."""
+        """Evaluate the pixels of the last split cells and join all levels.
+
+        Returns
+        -------
+        (3, h, w) ndarray
+            Irradiance, W/m^2, linear RGB.
+        """
         self._exact.evaluate(self._exact.unlit(self.split[1], self._levels[0]))
         result, blend = np.empty_like(self._exact.irradiance), self._blends[0]
         fill_picture(self._irradiance[0], blend.weight, blend.across, self.split[1], self._levels[0].covered,

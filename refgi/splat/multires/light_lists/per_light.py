@@ -40,7 +40,7 @@ BATCH_BYTES = 1 << 28  # bytes for the lists of a batch of lights, unless one li
 SMALL_PICTURE = 1 << 18  # pixels up to which threads would wait for each other longer than they upsample one light
 
 
-@stage("splat.per_light")
+@stage("multires.per_light")
 def per_light(
     buffer: "GBuffer", lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings",
     footprint: Array | None = None, start: Subsplats | None = None, *, filter_all: bool = False,

@@ -36,7 +36,7 @@ CHANNELS = {"depth": ("depth",), "derivative": ("depth",), "normal": ("normal",)
 CHUNK = 4096  # cells that a thread takes at once
 
 
-@stage("splat.depth_ranges")
+@stage("multires.depth_ranges")
 def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mipmap:
     """Return the least and largest depth within each cell (Sec. 3.2.1).
 
@@ -61,7 +61,7 @@ def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mipmap
     return Mipmap(low, high, mip.lows, mip.highs)
 
 
-@stage("splat.normal_ranges")
+@stage("multires.normal_ranges")
 def normal_ranges(normal: Array, covered: Array, top: int, rim: int = 0) -> Mipmap:
     """Return the least and largest of each component of the normals within each cell (Sec. 3.2.2).
 
@@ -149,7 +149,7 @@ def _over_columns(least: Array, most: Array, rim: int, low: Array, high: Array) 
             high[j] = max(high[j], max(most[2 * j + k], most[2 * j + 2 * rim + 1 - k]))
 
 
-@stage("splat.criteria")
+@stage("multires.criteria")
 def discontinuities(buffer: "GBuffer", criteria: "Criteria", top: int, finest: int = 0) -> tuple[Array, ...]:
     """Return which cells of each level hold a discontinuity.
 

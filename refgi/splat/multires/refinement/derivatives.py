@@ -32,7 +32,7 @@ Array = npt.NDArray[Any]
 BESIDE, DISTANCE, BELOW = range(3)
 
 
-@stage("splat.depth_slopes")
+@stage("multires.depth_slopes")
 def depth_slopes(depth: Array, covered: Array, top: int) -> Mipmap:
     """Return the steepest relative change of depth within each cell, sqrt((dz/dx)^2 + (dz/dy)^2) / z (Sec. 3.2.1).
 
@@ -60,7 +60,7 @@ def depth_slopes(depth: Array, covered: Array, top: int) -> Mipmap:
     return _max_mip(values, sizes)
 
 
-@stage("splat.curvatures")
+@stage("multires.curvatures")
 def curvatures(normal: Array, position: Array, covered: Array, top: int, rate: bool = False) -> Mipmap:
     """Return the largest change of normal between neighbouring pixels within each cell (Eq. 1).
 

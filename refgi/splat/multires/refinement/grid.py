@@ -91,7 +91,7 @@ def representative(covered: Array, level: int, i: int, j: int) -> int:
     return found
 
 
-@stage("splat.representatives")
+@stage("multires.representatives")
 def representatives(covered: Array, top: int) -> tuple[Array, ...]:
     """Return the representative pixel of each cell of each level.
 

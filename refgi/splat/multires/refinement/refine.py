@@ -93,7 +93,7 @@ class _Columns(NamedTuple):
     leaf: Array  # (n,) bool, levels 0 to top
 
 
-@stage("splat.refine")
+@stage("multires.refine")
 def refine(
     discontinuous: tuple[Array, ...], covered: Array, diagonal: Diagonal = "corner",
     traversal: Traversal = "single_pass",

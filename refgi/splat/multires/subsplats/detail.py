@@ -13,7 +13,7 @@ from refgi.stages import stage
 Array = npt.NDArray[Any]
 
 
-@stage("splat.detail")
+@stage("multires.detail")
 def surface_detail(
     irradiance: Array, position: Array, normal: Array, covered: Array, eye: npt.ArrayLike, a: float
 ) -> Array:

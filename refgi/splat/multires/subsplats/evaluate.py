@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 
-@stage("splat.representative_points")
+@stage("multires.representative_points")
 def representative_points(
     buffer: "GBuffer", subsplats: Subsplats, representative: Representative = "pixel"
 ) -> tuple[Array, Array]:
@@ -57,7 +57,7 @@ def representative_points(
     return points, normals
 
 
-@stage("splat.irradiance")
+@stage("multires.evaluate")
 def evaluate(
     points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
 ) -> Array:
@@ -130,7 +130,7 @@ def _average_cell(
     normals[0, k], normals[1, k], normals[2, k] = p / length, q / length, r / length
 
 
-@stage("splat.visible")
+@stage("multires.evaluate_visible")
 def evaluate_visible(
     tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights"
 ) -> Array:

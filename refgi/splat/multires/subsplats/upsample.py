@@ -78,7 +78,7 @@ def _sort(level: Array, row: Array, bases: Array, starts: Array, order: Array) -
         places[key] += 1
 
 
-@stage("splat.upsample")
+@stage("multires.upsample")
 def upsample(
     values: Array, subsplats: Subsplats, covered: Array, mode: Upsampling = "tent", *, filter_all: bool = False,
     corner_rule: bool = True,

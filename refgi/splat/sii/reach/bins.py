@@ -60,7 +60,7 @@ def pack_solids(solids: Solids, back: Array, *, hollow: bool = False, nearest: b
         return packed.astype(back.dtype)
 
 
-@stage("splat.bins", kept=False)  # of receivers that are gathered anew
+@stage("sii.bins", kept=False)  # of receivers that are gathered anew
 def list_lights(position: Array, normal: Array, solids: Array) -> Array:
     """List the lights whose bound may reach each tile of receivers.
 
@@ -82,18 +82,7 @@ def list_lights(position: Array, normal: Array, solids: Array) -> Array:
 
 
 def of_whole_tiles(listed: Array) -> Array:
-    """Return the lists of tiles of TILE receivers: of any of their parts.
-
-    Parameters
-    ----------
-    listed : (m, N) ndarray of bool
-        Lists of tiles of LANES receivers.
-
-    Returns
-    -------
-    (ceil(m LANES / TILE), N) ndarray of bool
-        Lists of tiles of TILE receivers.
-    """
+    """Return the light lists of tiles of TILE receivers from those (m, N) of their parts of LANES: of any of them."""
     parts = TILE // LANES
     whole = listed[::parts].copy()
     for part in range(1, parts):

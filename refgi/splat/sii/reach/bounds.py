@@ -98,21 +98,10 @@ def tangent_ellipsoid(exponent: npt.ArrayLike, tangent_point: float = TANGENT_PO
 
 
 def half_ball_radius(square_range: Array, widening: float, literal: bool = False) -> Array:
-    """Return the radius of the half ball about a widened lobe's axis that, with the ellipsoid of P, holds its region.
+    """Return the radius (m) of the half ball that, with the ellipsoid of P, holds the region of a widened lobe.
 
-    Parameters
-    ----------
-    square_range : (...) ndarray
-        R_0^2, m^2.
-    widening : float
-        The distance a within which the exponent falls, m; 0: nowhere.
-    literal : bool
-        The exponent falls as printed, without end away from the light.
-
-    Returns
-    -------
-    (...) ndarray
-        min(a, R_0), m: beyond a the exponent is P, and beyond R_0 nothing is significant (E-SII-14).
+    min(a, R_0): beyond a = `widening` (m) the exponent is P, and beyond R_0 nothing is significant (E-SII-14). With
+    `literal` the exponent falls as printed, without end away from the light.
     """
     radius: Array = np.sqrt(square_range)
     return radius if literal and widening > 0 else np.minimum(radius, widening)
@@ -122,27 +111,10 @@ def light_solids(
     position: Array, axis: Array, exponent: Array, square: Array, tangent: bool, widening: float = 0.0,
     literal: bool = False,
 ) -> Solids:
-    """Return the bounds of some lights.
+    """Return the bounds of lights at `position` (3, N, m) about `axis` (3, N: normal or lobe axis), in float64.
 
-    Parameters
-    ----------
-    position, axis : (3, N) ndarray
-        Of the lights; the axis is the normal of a diffuse light and the axis of a lobe.
-    exponent : (N,) ndarray
-        n: 1 for diffuse lights.
-    square : (N,) ndarray
-        R_0^2 = I_0 / I_low, m^2.
-    tangent : bool
-        Use tangent ellipsoids; else those of the appendix.
-    widening : float
-        The distance within which exponents fall, m; 0: nowhere.
-    literal : bool
-        They fall as printed.
-
-    Returns
-    -------
-    Solids
-        In float64.
+    `exponent` (N,) is n, 1 for diffuse lights, `square` (N,) R_0^2 in m^2; `tangent` picks tangent ellipsoids over
+    those of the appendix. Exponents fall within `widening` (m), with `literal` as printed.
     """
     ellipsoid = (tangent_ellipsoid if tangent else appendix_ellipsoid)(exponent)
     square = np.asarray(square, np.float64)

@@ -78,22 +78,7 @@ def _shape(cosine: float, r: float, exponent: float, widening: Widening | None, 
 
 
 def with_reference_length(receivers: Receivers, lights: "PixelLights", settings: SiiSettings) -> SiiSettings:
-    """Return settings whose cut is in full: with the reference length of a picture where they need one and give none.
-
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    lights : PixelLights
-        Its lights.
-    settings : SiiSettings
-        Any.
-
-    Returns
-    -------
-    SiiSettings
-        The same, or with a `reference_length`.
-    """
+    """Return settings whose relative cut has its reference length: that of the picture where they give none."""
     cut = settings.reach.cut
     if not isinstance(cut, RelativeCut) or cut.reference_length is not None:
         return settings
@@ -102,7 +87,7 @@ def with_reference_length(receivers: Receivers, lights: "PixelLights", settings:
         cut, reference_length=length)))
 
 
-@stage("splat.reference_length")
+@stage("sii.reference_length")
 def reference_length(receivers: Receivers, lights: "PixelLights", pairs: PairSettings) -> float:
     """Return the length under which lights cut at 5 % count at 125 / 768 of the pixels on average.
 

@@ -82,21 +82,9 @@ def _tangents(across: Array, ahead: Array, radius: Array) -> tuple[Array, Array]
 
 
 def tiles_of_quads(quads: Array, places: Array, width: int) -> Array:
-    """Return which tiles of receivers have pixels in which rectangles.
+    """Return which tiles of LANES receivers have pixels in which rectangles (4, N), (ceil(n / LANES), N) bool.
 
-    Parameters
-    ----------
-    quads : (4, N) ndarray
-        Rectangles.
-    places : (n,) ndarray of int64
-        Flat indices of the receivers' pixels, tile after tile.
-    width : int
-        Of the picture.
-
-    Returns
-    -------
-    (ceil(n / LANES), N) ndarray of bool
-        Whether the rectangle around a tile's pixels meets the light's.
+    `places` (n,) are the flat indices of the receivers' pixels in a picture `width` pixels wide, tile after tile.
     """
     starts = np.arange(0, len(places), LANES)
     (top, bottom), (left, right) = ((np.minimum.reduceat(part, starts)[:, None] + 0.5 - SLACK,
@@ -107,19 +95,9 @@ def tiles_of_quads(quads: Array, places: Array, width: int) -> Array:
 
 
 def tiles_of_pixels(mask: Array, places: Array) -> Array:
-    """Return which tiles of receivers have pixels in a mask.
+    """Return which tiles of LANES receivers have pixels in a mask (h, w), (ceil(n / LANES),) bool.
 
-    Parameters
-    ----------
-    mask : (h, w) ndarray of bool
-        Pixels.
-    places : (n,) ndarray of int64
-        Flat indices of the receivers' pixels, tile after tile.
-
-    Returns
-    -------
-    (ceil(n / LANES),) ndarray of bool
-        Whether any is.
+    `places` (n,) are the flat indices of the receivers' pixels, tile after tile.
     """
     tiles: Array = np.logical_or.reduceat(mask.reshape(-1)[places], np.arange(0, len(places), LANES))
     return tiles
@@ -178,25 +156,9 @@ def inflation(vertices: Array, triangles: Array) -> float:
 
 
 def covered_pixels(projection: "Projection", solids: Solids, k: int, faces: int, inflate: bool) -> Array:
-    """Draw the bound of one light.
+    """Rasterize the mesh bound of light k and return the pixels whose line of sight meets it, (h, w) bool.
 
-    Parameters
-    ----------
-    projection : Projection
-        The map of the receivers.
-    solids : Solids
-        Bounds of the lights.
-    k : int
-        Which light.
-    faces : int
-        Of the mesh.
-    inflate : bool
-        Make it enclose the ellipsoid.
-
-    Returns
-    -------
-    (h, w) ndarray of bool
-        Pixels whose line of sight meets the mesh; all of them when the eye is inside.
+    `faces` triangles are made to enclose the ellipsoid by `inflate`. All pixels when the eye is inside.
     """
     from refgi.rsm import rasterize
     from refgi.scene.model import Geometry

@@ -56,39 +56,13 @@ def low_irradiance(lights: "PixelLights", settings: SiiSettings) -> float:
 
 
 def all_peaks(packed: Packed) -> tuple[Array, Array]:
-    """Return the scalar peak intensity I_0 of all packed lights: the largest channel.
-
-    Parameters
-    ----------
-    packed : Packed
-        The lights.
-
-    Returns
-    -------
-    diffuse : (M + 1,) ndarray of float64
-        Of the diffuse lights and the black one, W/sr.
-    lobes : (K,) ndarray of float64
-        Of the lobes, W/sr.
-    """
+    """Return I_0 (W/sr, largest channel, float64) of packed diffuse lights, the black one last, and of lobes."""
     lobes = np.zeros((3, 0)) if packed.lobes is None else packed.lobes.lights[10:13]
     return packed.diffuse[6:9].max(axis=0).astype(np.float64), lobes.max(axis=0).astype(np.float64)
 
 
 def threshold(peak: Array, reach: ReachSettings) -> float:
-    """Return I_low for lights of these peak intensities.
-
-    Parameters
-    ----------
-    peak : (N,) ndarray
-        I_0 of all lights, W/sr.
-    reach : ReachSettings
-        The cut: share and reference length, or the irradiance itself.
-
-    Returns
-    -------
-    float
-        Irradiance, W/m^2.
-    """
+    """Return I_low (W/m^2) for lights of these peak intensities (N,), W/sr."""
     if isinstance(reach.cut, AbsoluteCut):
         return reach.cut.irradiance or 0.0
     return 0.0 if reach.cut is None else reach.cut.share * float(peak.max(initial=0.0)) / _length(reach.cut) ** 2
@@ -104,27 +78,9 @@ def _length(cut: RelativeCut) -> float:
 def light_range(
     peak: Array, low: float, reach: ReachSettings, part: int, dtype: npt.DTypeLike, outside: bool = False
 ) -> Range:
-    """Return how far lights reach.
+    """Return R_0^2 and xi of lights with these peak intensities (N,), W/sr.
 
-    Parameters
-    ----------
-    peak : (N,) ndarray
-        I_0 of each light, W/sr.
-    low : float
-        I_low, W/m^2; counts as at least `LEAST_THRESHOLD`.
-    reach : ReachSettings
-        Whether the range is random, the seed, and the cut's printed form.
-    part : int
-        DIFFUSE or GLOSSY.
-    dtype : dtype
-        Of the kernels.
-    outside : bool
-        Sum what the cut loses.
-
-    Returns
-    -------
-    Range
-        R_0^2 and xi of each light.
+    `low` is I_low (W/m^2, at least `LEAST_THRESHOLD`), `part` DIFFUSE or GLOSSY; `outside` sums what the cut removes.
     """
     square = peak / max(low, LEAST_THRESHOLD)
     if isinstance(reach.cut, RelativeCut) and "per_light_ilow" in reach.cut.as_published:
@@ -138,7 +94,7 @@ def light_range(
     return Range(square.astype(dtype), np.maximum(scale, 1e-30).astype(dtype), outside)
 
 
-@stage("splat.cut_loss")
+@stage("sii.cut_loss")
 def cut_loss(
     light: Array, receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None
 ) -> float:
@@ -171,25 +127,9 @@ def cut_loss(
 def warn_of_cut(
     light: Array, receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None
 ) -> None:
-    """Warn where the threshold of `sii` leaves out more than `LEAST_LOSS` of the light.
+    """Warn where the cut of `sii` removes more than `LEAST_LOSS` of the light of a picture.
 
-    Parameters
-    ----------
-    light : (3, h, w) ndarray
-        The picture's irradiance, W/m^2.
-    receivers : Receivers
-        Its points.
-    lights : PixelLights
-        Its lights.
-    settings : SiiSettings
-        The cut. A stochastic one removes no light in the mean and gives no warning.
-    footprint : (N,) ndarray or None
-        Surface area each light stands for, m^2.
-
-    Warns
-    -----
-    RefgiWarning
-        With setting and share.
+    A stochastic cut removes none in the mean and gives no warning.
     """
     cut = settings.reach.cut
     if cut is None or settings.reach.stochastic:

@@ -91,7 +91,7 @@ def test_pairs_are_saved_and_all_counted(monkeypatch):
     monkeypatch.setattr(module, "near_light", lambda *how: near.append(near_light(*how)) or near[-1])
     with observe() as log:
         found = driven(frame.gbuffer, lights, settings, area)
-    said = next(run.reason for run in log.runs if run.name == "splat.full_sum")
+    said = next(run.reason for run in log.runs if run.name == "multires.full_sum")
     assert said.startswith(f"{found.pairs / found.full_pairs:.1%} of its pairs")
     points = np.concatenate(evaluated)
     assert len(np.unique(points, axis=0)) == len(points)  # no pixel twice

@@ -28,7 +28,7 @@ class Sat(NamedTuple):
 
 
 def sats(size: int, terms: int, dtype: npt.DTypeLike, *, quantised: bool = False, mirrored: bool = False) -> Sat:
-    """Make room for one map.
+    """Make scratch for one map.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def build_sat(depth: Array, scale: DepthScale, sat: Sat) -> None:
 
 @kernel
 def sat_means(
-    sat: Sat, s: Array, t: Array, radius: Array, wanted: Array, count: int, with_z: bool, out: Array
+    sat: Sat, s: Array, t: Array, radius: Array, active: Array, count: int, with_z: bool, out: Array
 ) -> None:
     """Read the means of the channels over the box around a disc for each lane of a tile.
 
@@ -94,20 +94,20 @@ def sat_means(
         One map's table.
     s, t, radius : (lanes,) ndarray
         Centre and radius of the discs, in units of the map's half side.
-    wanted : (lanes,) ndarray
+    active : (lanes,) ndarray
         Lanes to read.
     count : int
         Lanes in use.
     with_z : bool
         All 4 M + 1 channels instead of the first 2 M.
     out : (channels, lanes) ndarray
-        Filled where wanted.
+        Filled where active.
     """
     n, terms = len(sat.depth), sat.sums.shape[2] // 4
     real = s.dtype.type
     channels = 4 * terms + 1 if with_z else 2 * terms
     for i in range(count):
-        if not wanted[i]:
+        if not active[i]:
             continue
         half = max(0.5, 0.5 * radius[i] * n)
         x, y = min(max(0.0, 0.5 * n * (s[i] + 1.0)), 1.0 * n), min(max(0.0, 0.5 * n * (t[i] + 1.0)), 1.0 * n)

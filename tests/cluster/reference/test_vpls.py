@@ -5,7 +5,7 @@ import pytest
 
 from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
-from refgi.cluster.reference import member_visibility
+from refgi.cluster.reference import vpl_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
@@ -23,7 +23,7 @@ PAIRS = 400
 def box():
     """Return frame, lights, receivers and the sum that `vpl` takes."""
     frame = Frame(load_scene("cornell_box"), width=20, height=20, rsm_resolution=64)
-    lights = choose_lights(frame, SETTINGS)
+    lights = choose_lights(frame, SETTINGS.lights)
     lights = lights._replace(flux=np.broadcast_to(lights.flux.mean(axis=0), lights.flux.shape))  # all of one colour
     buffer = frame.gbuffer
     to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
@@ -32,7 +32,7 @@ def box():
 
 def areas_of(frame, lights, count):
     clusters = cluster(lights.position, lights.normal, count, diagonal=frame.scene.geometry.diagonal)
-    return area_lights(lights, clusters, SETTINGS)
+    return area_lights(lights, clusters, SETTINGS.area)
 
 
 def light_of_each(to, lights):
@@ -59,7 +59,7 @@ def test_visibility_of_each_light_is_that_of_vpl(box, evidence):
     count = lights.flux.shape[1]
     areas = areas_of(frame, lights, count)
     assert (areas.members == 1).all()
-    off = np.abs(with_visibility(to, lights, areas, member_visibility(frame, lights, areas)) - reference[0]).max()
+    off = np.abs(with_visibility(to, lights, areas, vpl_visibility(frame, lights, areas)) - reference[0]).max()
     evidence(f"{count} lights, {count} clusters, {len(reference[0])} receivers: sum with V off by "
              f"{off / reference[0].max():.1e} of the maximum of vpl's")
     assert off < ROUNDING * reference[0].max()
@@ -69,7 +69,7 @@ def test_visibility_of_each_light_is_that_of_vpl(box, evidence):
 def test_visibility_of_pairs_is_that_of_a_ray_against_every_triangle(box, evidence):
     frame, lights, to, _ = box
     areas, geometry = areas_of(frame, lights, lights.flux.shape[1]), frame.scene.geometry
-    given = member_visibility(frame, lights, areas)
+    given = vpl_visibility(frame, lights, areas)
     rng = np.random.default_rng(1)
     wrong, blocked, tried = 0, 0, 0
     for _ in range(PAIRS):
@@ -94,7 +94,7 @@ def test_weighted_by_their_light_the_lights_of_a_cluster_give_the_exact_sum(box,
     for count in (1, 4, 16):
         areas = areas_of(frame, lights, count)
         for weights in ("light", "flux", "even"):
-            light = with_visibility(to, lights, areas, member_visibility(frame, lights, areas, weights))
+            light = with_visibility(to, lights, areas, vpl_visibility(frame, lights, areas, weights))
             errors[count, weights] = np.sqrt(np.mean((light - reference[0]) ** 2)) / reference[0].mean()
     evidence("rmse / mean of vpl for 1, 4, 16 clusters: " + "; ".join(
         f"by {weights} {', '.join(f'{errors[count, weights]:.1e}' for count in (1, 4, 16))}"
@@ -107,7 +107,7 @@ def test_weighted_by_their_light_the_lights_of_a_cluster_give_the_exact_sum(box,
 def test_any_dtype_and_any_place(box):
     frame, lights, to, _ = box
     areas = areas_of(frame, lights, 8)
-    given = member_visibility(frame, lights, areas, "light")
+    given = vpl_visibility(frame, lights, areas, "light")
     for dtype in (np.float32, np.float64):
         points = np.ascontiguousarray(np.concatenate([lights.position, to.position[:, :5]], axis=1), dtype)
         facing = np.ascontiguousarray(np.concatenate([lights.normal, to.facing[:, :5]], axis=1), dtype)

@@ -1,15 +1,30 @@
-"""Soft shadows by the step itself: against plain loops, against area sampling, and the rules it needs."""
+"""Percentage closer soft shadows: against plain loops, against area sampling, and the depth test they need."""
 
 import numpy as np
 import pytest
 
 from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.look import DEPTH, NEAREST, RADIUS, choices, look, numbers_of
-from refgi.cluster.visibility.step import rules, step_lanes
-from refgi.cluster.visibility.visible import visibility
+from refgi.cluster.settings import ConstantBias, ValSettings
+from refgi.cluster.visibility.evaluate import visibility
+from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, compare_texels
+from refgi.cluster.visibility.search_region import (
+    DEPTH,
+    NEAREST,
+    RADIUS,
+    filter_sizing,
+    find_search_regions,
+    light_constants,
+)
 from refgi.settings import of
-from tests.cluster.visibility.plates import are_shares, lit_by, map_of_plates, on_plane, rooms, square_share
+from tests.cluster.visibility.plates import (
+    are_shares,
+    lit_by,
+    map_of_plates,
+    on_plane,
+    scratch_arrays,
+    shadow_by_summed_areas,
+    square_share,
+)
 from tests.naive import soft_shadow as naive
 
 ROUNDING = 1e-13  # a count over a count
@@ -24,13 +39,14 @@ METRES = DepthScale(False, 0.0, 1.0, 1.0)  # depths of the series are metres
 
 def shadow(areas, maps, points, normals, **settings):
     """V; on the scene's scale, whose bias is a known length, where the settings name none."""
-    return visibility(maps, areas, 0, points, normals, of(ValSettings, **{"depth_scale": "scene", **settings}))
+    scale = {} if "visibility" in settings else {"depth_scale": "scene"}
+    return visibility(maps, areas, 0, points, normals, of(ValSettings, **scale | settings))
 
 
 @pytest.mark.feature("VAL-12")
 @pytest.mark.parametrize("plane", [True, False])
 @pytest.mark.parametrize("cone", [True, False])
-def test_step_is_its_literal_twin(plane, cone):
+def test_pcss_is_its_literal_twin(plane, cone):
     slope = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
     depth = map_of_plates(24, PLATES, 2.8, slope)
     points, normals = on_plane(3.0, 2.2, 7)
@@ -38,11 +54,12 @@ def test_step_is_its_literal_twin(plane, cone):
     normals[:] = -slope[:, None]
     for delta in (0.3, 1.2):
         areas, maps = lit_by(depth, delta, FAR)
-        got = shadow(areas, maps, points, normals, visibility="step", receiver_plane=plane, cone=cone)
+        kind = {"visibility": "pcss", "cone": cone, "constant_bias": None if plane else ConstantBias()}
+        got = shadow(areas, maps, points, normals, **kind)
         expected = [naive.step_shadow(depth.tolist(), p, -slope, delta, cone, plane)[0] for p in points.T]
         assert np.abs(got - expected).max() < ROUNDING
         assert np.array_equal(
-            got, shadow(areas, maps, points, -normals, visibility="step", receiver_plane=plane, cone=cone))
+            got, shadow(areas, maps, points, -normals, **kind))
 
 
 @pytest.mark.feature("VAL-13")
@@ -51,18 +68,18 @@ def test_mean_depth_is_that_of_the_blockers(evidence):
     depth = map_of_plates(48, [(-0.3, -0.06, -0.5, 0.5, 0.3)], 0.7)
     points, normals = on_plane(0.7, 0.15, 5)
     _, maps = lit_by(depth, 0.3, 2.0)
-    settings = of(ValSettings, visibility="step", cone=False)
-    numbers, (_, room, _, todo, visible) = numbers_of(maps, 0, 0.3, settings), rooms(25, 1)
-    chosen, rule = choices(settings), rules(settings, METRES)
-    count = look(numbers, chosen, points, 25, np.ones(25, np.bool_), todo, visible, room)
-    step_lanes(numbers, chosen, rule, depth, normals, 25, todo, visible, room)
+    settings = of(ValSettings, visibility="pcss", cone=False)
+    constants, (_, scratch, _, pending, visible) = light_constants(maps, 0, 0.3), scratch_arrays(25, 1)
+    chosen, test = filter_sizing(settings), blocker_test(settings.visibility, METRES)
+    count = find_search_regions(constants, chosen, points, 25, np.ones(25, np.bool_), pending, visible, scratch)
+    compare_texels(PcssShadow(constants, chosen, test, depth), normals, 25, pending, visible, scratch)
     expected = [naive.step_shadow(depth.tolist(), p, (0, 0, -1), 0.3, cone=False) for p in points.T]
     found = [k for k in range(25) if expected[k][1] is not None]
     assert count == 25
     assert len(found) > 5
-    assert np.allclose(room[DEPTH, found], [expected[k][1] for k in found], rtol=1e-14)
+    assert np.allclose(scratch[DEPTH, found], [expected[k][1] for k in found], rtol=1e-14)
     assert np.allclose(visible, [v for v, _ in expected], atol=ROUNDING)
-    means = room[DEPTH, found]
+    means = scratch[DEPTH, found]
     evidence(f"z_avg of blockers at 0.3 before 0.7: {means.min():.3f} .. {means.max():.3f}, as the plain loop's")
 
 
@@ -72,21 +89,20 @@ def table(delta):
     areas, maps = lit_by(map_of_plates(256, PLATES, 3.0, dtype=np.float32), delta, FAR)
     truth = square_share(points, delta, PLATES, 24)
     rows = {
-        "constant bias": {"visibility": "step", "receiver_plane": False, "cone": False},
-        "plane": {"visibility": "step", "cone": False},
-        "plane, cone": {"visibility": "step"},
-        "plane, published kernels": {"visibility": "step", "cone": False, "as_published": PUBLISHED},
-        "M = 4": {"prefilter": "sat"},
-        "M = 4, published kernels": {"prefilter": "sat", "as_published": PUBLISHED},
-        "M = 16": {"prefilter": "sat", "terms": 16},
+        "constant bias": {"visibility": "pcss", "constant_bias": ConstantBias(), "cone": False},
+        "plane": {"visibility": "pcss", "cone": False},
+        "plane, cone": {"visibility": "pcss"},
+        "plane, published kernels": {"visibility": "pcss", "cone": False, "as_published": PUBLISHED},
         "M = 4, mip": {"prefilter": "mip"},
     }
-    return {name: float(np.sqrt(((shadow(areas, maps, points, normals, **row) - truth) ** 2).mean()))
-            for name, row in rows.items()}
+    boxes = {"M = 4": {}, "M = 4, published kernels": {"as_published": PUBLISHED}, "M = 16": {"terms": 16}}
+    found = {name: shadow(areas, maps, points, normals, **row) for name, row in rows.items()} | {
+        name: shadow_by_summed_areas(areas, maps, points, depth_scale="scene", **row) for name, row in boxes.items()}
+    return {name: float(np.sqrt(((v - truth) ** 2).mean())) for name, v in found.items()}
 
 
 @pytest.mark.feature("VAL-14")
-def test_step_needs_the_receivers_plane(evidence):
+def test_pcss_needs_the_receivers_plane(evidence):
     off = {delta: table(delta) for delta in (0.2, 0.5, 1.0)}
     for delta, bound in ((0.2, 0.04), (0.5, 0.04), (1.0, 0.05)):  # 0.036, 0.033, 0.050 by another hand
         assert off[delta]["plane, cone"] < bound
@@ -111,13 +127,15 @@ def test_blockers_near_the_light_escape_the_published_search(evidence):
     covers, found = {}, {}
     for name, switches, near in (("published", SEARCH, maps.near[0]), ("radial", frozenset(), maps.near[0]),
                                  ("axial", frozenset(), 0.2)):
-        settings = of(ValSettings, visibility="step", cone=False, as_published=switches)
-        numbers, (_, room, _, todo, visible) = numbers_of(maps, 0, 1.0, settings), rooms(1, 1)
-        numbers[NEAREST] = near
-        look(numbers, choices(settings), point, 1, np.ones(1, np.bool_), todo, visible, room)
-        covers[name] = 0.2 * np.tan(2 * np.arctan(room[RADIUS, 0]))
-        step_lanes(numbers, choices(settings), rules(settings, METRES), maps.depth[0], normal, 1, todo, visible, room)
-        found[name] = bool(room[DEPTH, 0] > 0)
+        settings = of(ValSettings, visibility="pcss", cone=False, as_published=switches)
+        constants, (_, scratch, _, pending, visible) = light_constants(maps, 0, 1.0), scratch_arrays(1, 1)
+        constants[NEAREST] = near
+        find_search_regions(constants, filter_sizing(settings), point, 1, np.ones(1, np.bool_), pending, visible,
+                            scratch)
+        covers[name] = 0.2 * np.tan(2 * np.arctan(scratch[RADIUS, 0]))
+        pcss = PcssShadow(constants, filter_sizing(settings), blocker_test(settings.visibility, METRES), maps.depth[0])
+        compare_texels(pcss, normal, 1, pending, visible, scratch)
+        found[name] = bool(scratch[DEPTH, 0] > 0)
     assert covers["published"] == pytest.approx(0.025, abs=1e-6)
     assert not found["published"]
     assert covers["axial"] == pytest.approx(0.475, abs=1e-6)
@@ -137,7 +155,7 @@ def test_cone_leaves_out_blockers_beside_the_light(evidence):
     maps = maps._replace(near=np.array([0.3]))
     truth = square_share(points, 1.0, plates, 24)
     off = {name: float(np.sqrt(((shadow(areas, maps, points, normals, **row) - truth) ** 2).mean()))
-           for name, row in {"cone": {"visibility": "step"}, "no cone": {"visibility": "step", "cone": False},
+           for name, row in {"cone": {"visibility": "pcss"}, "no cone": {"visibility": "pcss", "cone": False},
                              "M = 4": {"prefilter": "brute"}}.items()}
     assert off["cone"] < 0.15
     assert off["no cone"] > 0.4
@@ -157,14 +175,14 @@ def test_a_lone_plane_sees_the_whole_light(dtype, evidence):
         normals = np.repeat(-up[:, None], 60, axis=1)
         for delta in (0.1, 2.0, 50.0):
             areas, maps = lit_by(depth, delta, 12.0)
-            assert (shadow(areas, maps, points, normals, visibility="step") == 1).all()
-            assert (shadow(areas, maps, points, normals, visibility="step", cone=False) == 1).all()
+            assert (shadow(areas, maps, points, normals, visibility="pcss") == 1).all()
+            assert (shadow(areas, maps, points, normals, visibility="pcss", cone=False) == 1).all()
     flat = map_of_plates(64, [], 2.0, dtype=dtype)
     areas, maps = lit_by(flat, 2.0, 12.0)
     points, normals = on_plane(2.0, 4.0, 9)
-    without = shadow(areas, maps, points, normals, visibility="step", receiver_plane=False, cone=False)
+    without = shadow(areas, maps, points, normals, visibility="pcss", constant_bias=ConstantBias(), cone=False)
     assert without.min() < 0.6
-    evidence(f"V = 1 exactly, {np.dtype(dtype).name}; without the plane's rule down to {without.min():.2f}")
+    evidence(f"V = 1 exactly, {np.dtype(dtype).name}; without the plane's test down to {without.min():.2f}")
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -179,6 +197,7 @@ def test_any_receiver_sees_a_share(dtype):
         depth = map_of_plates(17, plates, plane, dtype=dtype)
         for delta in (0.0, 1e-9, 0.5, 1e6):
             areas, maps = lit_by(depth, delta, FAR)
-            for extra in ({}, {"cone": False, "as_published": PUBLISHED}, {"receiver_plane": False, "bias": 0.25}):
-                got = shadow(areas, maps, points, normals, visibility="step", **extra)
+            for extra in ({}, {"cone": False, "as_published": PUBLISHED},
+                          {"constant_bias": ConstantBias(0.25, "scene")}):
+                got = shadow(areas, maps, points, normals, visibility="pcss", **extra)
                 assert are_shares(got, dtype)

@@ -1,0 +1,106 @@
+"""Visibility of an area light at any points, by its map (Sec. 4.1, 5.1)."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.clustering.rectangle import AreaLights
+from refgi.cluster.maps.shadow_maps import ShadowMaps
+from refgi.cluster.reference.rays import Ball, free_share, rectangle_points
+from refgi.cluster.settings import BY_MAPS, ValSettings
+from refgi.cluster.visibility.search_region import SCRATCH_ROWS, Scratch
+from refgi.cluster.visibility.shadow import filter_channels, shadow_of, shadow_tile
+from refgi.errors import expect
+from refgi.jit import kernel, prange
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.rays import Tracer
+
+Array = npt.NDArray[Any]
+
+TILE = 256  # receivers a thread works on at once
+BESIDE = (np.arange(4) + 0.5) / 4  # points along a side of the rectangle that rays from behind end at
+
+
+@stage("cluster.visibility", kept=False)
+def visibility(
+    maps: ShadowMaps, areas: AreaLights, m: int, points: Array, facing: Array, settings: ValSettings,
+    tracer: "Tracer | None" = None,
+) -> Array:
+    """Return how much of one area light each point sees.
+
+    Parameters
+    ----------
+    maps : ShadowMaps
+        The maps.
+    areas : AreaLights
+        The area lights that the maps were drawn for.
+    m : int
+        Which area light.
+    points : (3, n) ndarray
+        World space, m.
+    facing : (3, n) ndarray
+        Normals of their surfaces; on the lit side for rays, else on either.
+    settings : ValSettings
+        `visibility` is one of `BY_MAPS` or None; `maps.behind` says what points behind the area light see.
+    tracer : Tracer, optional
+        Rays against the scene, for points behind the area light and ``maps.behind == "raytrace"``.
+
+    Returns
+    -------
+    (n,) ndarray
+        V, 0 to 1, in the dtype of the maps.
+
+    Raises
+    ------
+    InputError
+        If there is no such area light, a mode is asked for that works without maps, or rays without a tracer.
+
+    Notes
+    -----
+    An area light without extent casts a hard shadow. Points behind its plane see it whole (Sec. 5.1), unless a second
+    map or rays to its rectangle say otherwise; nothing within `near_distance` of the centre blocks such rays.
+    """
+    expect(0 <= m < len(areas.members), "m", f"an area light, 0 to {len(areas.members) - 1}", m)
+    kind = settings.visibility
+    expect(kind is None or isinstance(kind, BY_MAPS), "visibility", "none, csm, pcss, pcf or hard",
+           kind and kind.name())
+    traced = settings.maps.behind == "raytrace" and kind is not None
+    expect(not traced or tracer is not None, "tracer", "rays where behind is 'raytrace'", tracer)
+    points = np.ascontiguousarray(points, maps.depth.dtype)
+    facing = np.ascontiguousarray(facing, maps.depth.dtype)
+    visible, k = np.ones(points.shape[1], points.dtype), int(maps.map_of[m])
+    if kind is not None and k >= 0:  # the maps ahead and behind: each sees its own hemisphere alone
+        for near, behind in ((maps.near, False), (maps.near_behind, True)):
+            if near is not None and np.isfinite(near[k]):
+                shadow = shadow_of(maps, areas, m, settings, behind)
+                _shadow_tiles(shadow, filter_channels(shadow), points, facing, visible)
+    if traced and tracer is not None:
+        back = areas.normal[:, m] @ (points - areas.center[:, m, None]) <= 0
+        radius = settings.maps.near_distance * float(areas.radius[m])
+        visible[back] = _by_rays(tracer, areas, m, radius, points[:, back], facing[:, back])
+    return visible
+
+
+def _by_rays(tracer: "Tracer", areas: AreaLights, m: int, radius: float, points: Array, facing: Array) -> Array:
+    targets = rectangle_points(areas, m, np.array(np.meshgrid(BESIDE, BESIDE)).reshape(2, -1))
+    ball = Ball(areas.center[:, m], radius)
+    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], None, tracer.grain, ball)
+
+
+@kernel(parallel=True)
+def _shadow_tiles(shadow: Any, channels: int, points: Array, facing: Array, visible: Array) -> None:
+    """Lower `visible` to V where that is less."""
+    count, real = points.shape[1], points.dtype
+    for tile in prange((count + TILE - 1) // TILE):
+        first = np.int64(tile) * TILE
+        size = min(TILE, count - first)
+        active, here = np.ones(TILE, np.bool_), np.empty(TILE, real)
+        scratch = Scratch(np.empty(TILE, np.bool_), np.empty((SCRATCH_ROWS, TILE), real),
+                          np.empty((channels, TILE), real))
+        part, normals = points[:, first : first + size], facing[:, first : first + size]
+        shadow_tile(shadow, part, normals, size, active, here, scratch)
+        for i in range(size):
+            visible[first + i] = min(visible[first + i], here[i])

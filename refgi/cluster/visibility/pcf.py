@@ -1,0 +1,95 @@
+"""Hard shadows and percentage closer filtering (PCF): binary depth tests of the texels around a receiver.
+
+A receiver falls into one texel of an area light's map. The hard test compares that texel alone; PCF compares all of a
+square of fixed width around it and returns the share that does not hide the receiver (Reeves, Salesin and Cook 1987).
+
+A texel holds the distance along its own centre's direction, not along the receiver's. So the receiver is moved there as
+well, on its tangent plane: of a surface that the map itself holds, no texel is nearer than its own plane, and sloping
+surfaces need no bias.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
+from refgi.jit import kernel
+
+Array = npt.NDArray[Any]
+
+SLACK = 1e-3  # share of its distance that a surface must lie before the receiver to hide it
+
+
+class PcfShadow(NamedTuple):
+    """One map and the width of the kernel."""
+
+    depth: Array  # (n, n) m; inf where the map is empty
+    center: Array  # (3,) float64, m
+    frame: Array  # (3, 3) float64: rows right, down, forward
+    reach: Any  # texels on each side of the receiver's own; 0: the hard test
+
+
+def pcf_shadow(maps: ShadowMaps, k: int, texels: int, behind: bool = False) -> PcfShadow:
+    """Return map k, ahead or behind, with a kernel of texels x texels (odd)."""
+    depth, frame = (maps.behind, BACKWARD @ maps.frame[k]) if behind else (maps.depth, maps.frame[k])
+    assert depth is not None
+    return PcfShadow(depth[k], maps.center[k], frame, np.int64(texels // 2))
+
+
+@kernel
+def pcf_tile(
+    shadow: PcfShadow, points: Array, facing: Array, size: int, active: Array, visible: Array, scratch: Any  # noqa: ARG001
+) -> None:
+    """Fill V = 1 - blocked / tested for the active ones of `size` receivers; 1 behind the map's plane.
+
+    The receiver's own texel counts always, others where they lie in the hemisphere. `points` and `facing` are
+    (3, >= size), world space, m, and normals on either side.
+    """
+    depth, center, frame, reach = shadow.depth, shadow.center, shadow.frame, shadow.reach
+    real = points.dtype.type
+    one, half = real(1), real(0.5)
+    cx, cy, cz = real(center[0]), real(center[1]), real(center[2])
+    rx, ry, rz = real(frame[0, 0]), real(frame[0, 1]), real(frame[0, 2])
+    dx, dy, dz = real(frame[1, 0]), real(frame[1, 1]), real(frame[1, 2])
+    fx, fy, fz = real(frame[2, 0]), real(frame[2, 1]), real(frame[2, 2])
+    n = depth.shape[0]
+    side = real(n)
+    for i in range(size):
+        visible[i] = one
+        vx, vy, vz = points[0, i] - cx, points[1, i] - cy, points[2, i] - cz
+        x, y, z = rx * vx + ry * vy + rz * vz, dx * vx + dy * vy + dz * vz, fx * vx + fy * vy + fz * vz
+        if not (active[i] and z > real(0)):
+            continue
+        distance = math.sqrt(x * x + y * y + z * z)
+        scale = one / (distance + z)
+        column = min(int((x * scale + one) * half * side), n - 1)
+        row = min(int((y * scale + one) * half * side), n - 1)
+        nx, ny, nz = facing[0, i], facing[1, i], facing[2, i]
+        # along right, down, forward
+        a, b, c = rx * nx + ry * ny + rz * nz, dx * nx + dy * ny + dz * nz, fx * nx + fy * ny + fz * nz
+        height = a * x + b * y + c * z
+        tested, blocked = 0, 0
+        for v in range(max(row - reach, 0), min(row + reach, n - 1) + 1):
+            t = (real(v) + half) / side * real(2) - one
+            for u in range(max(column - reach, 0), min(column + reach, n - 1) + 1):
+                s = (real(u) + half) / side * real(2) - one
+                if s * s + t * t > one and (u != column or v != row):
+                    continue
+                tested += 1
+                blocked += _hides(depth[v, u], s, t, a, b, c, height, distance)
+        visible[i] = one - real(blocked) / real(tested)
+
+
+@kernel
+def _hides(depth: Any, s: Any, t: Any, a: Any, b: Any, c: Any, height: Any, distance: Any) -> bool:
+    """Return whether a depth lies before the tangent plane along its texel's direction, and before the receiver."""
+    real = type(s)
+    one = real(1)
+    length = one + s * s + t * t
+    slope = (real(2) * (a * s + b * t) + c * (real(2) - length)) / length
+    limit = distance
+    if height * slope > real(0):
+        limit = min(distance, height / slope)
+    return bool(depth < limit * real(1 - SLACK))

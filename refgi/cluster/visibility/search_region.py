@@ -1,0 +1,184 @@
+"""Search regions of the blocker search (Sec. 4.1, 4.2), and the scratch and constants that all passes share.
+
+Receivers are the SIMD lanes. The rows of a tile's scratch hold what one pass leaves to the next.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.filters.depth_scale import DepthScale, depth_scale
+from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
+from refgi.cluster.settings import DepthScaleName, ValSettings
+from refgi.cluster.visibility.kernel_size import (
+    cone_tangent,
+    disc,
+    published_square,
+    solid_angle_tangent,
+)
+from refgi.cluster.visibility.series import Series
+from refgi.jit import kernel
+
+Array = npt.NDArray[Any]
+
+# rows of a tile's scratch
+X, Y, Z, D, EXTENT = 0, 1, 2, 3, 4  # receiver in the map's frame, its distance, the light's size towards it; m
+S, T, RADIUS = 5, 6, 7  # the disc it searches or filters, in [-1, 1] units
+SINE, COSINE, STEP_SINE, STEP_COSINE = 8, 9, 10, 11  # of c_k d' for the current k, of 2 pi d'
+SHADE, DEPTH = 12, 13  # sums over k; the latter becomes z_avg, m
+ON_SERIES = 14  # t(d), the receiver's distance on the series' scale
+SCRATCH_ROWS = 15
+# places in the constants of an area light
+CENTER, FRAME, DELTA, NEAREST, SEARCH_BIAS, BIAS, GAIN = 0, 3, 12, 13, 14, 15, 16
+CONSTANTS = 17
+
+
+class Scratch(NamedTuple):
+    """Scratch of one tile of receivers."""
+
+    pending: Array  # (TILE,) bool: receivers that may be shadowed
+    rows: Array  # (SCRATCH_ROWS, TILE)
+    means: Array  # (channels, TILE): of the filtered map; no rows for unfiltered ones
+
+
+class FilterSizing(NamedTuple):
+    """How filters are sized."""
+
+    alpha: bool  # the printed angle of the penumbra
+    alpha_over_pi: bool  # squares of side alpha / pi
+    solid_angle: bool  # the search of blockers half-way
+    foreshortened: bool  # the light's size as the receiver sees it
+
+
+def filter_sizing(settings: ValSettings) -> FilterSizing:
+    """Return how settings size filters.
+
+    Parameters
+    ----------
+    settings : ValSettings
+        `as_published` and `area.foreshortened` count.
+
+    Returns
+    -------
+    FilterSizing
+        One flag each.
+    """
+    published = settings.as_published
+    return FilterSizing("val_alpha" in published, "val_alpha_over_pi" in published,
+                   "val_search_solid_angle" in published, settings.area.foreshortened)
+
+
+def light_constants(
+    maps: ShadowMaps, k: int, delta: float, chain: Series | None = None, behind: bool = False
+) -> Array:
+    """Return the constants of one area light and its map that kernels read.
+
+    Parameters
+    ----------
+    maps : ShadowMaps
+        The maps.
+    k : int
+        The map.
+    delta : float
+        Size of its area light, m.
+    chain : Series, optional
+        Its biases and gain, for convolution shadow maps.
+    behind : bool
+        Of the map of the hemisphere behind.
+
+    Returns
+    -------
+    (CONSTANTS,) ndarray
+        In the dtype of the maps; see the places named above.
+    """
+    constants = np.zeros(CONSTANTS, maps.depth.dtype)
+    near = maps.near if maps.near_behind is None or not behind else maps.near_behind
+    constants[CENTER : CENTER + 3] = maps.center[k]
+    constants[FRAME : FRAME + 9] = (BACKWARD @ maps.frame[k] if behind else maps.frame[k]).ravel()
+    constants[DELTA], constants[NEAREST] = delta, near[k]
+    if chain is not None:
+        constants[SEARCH_BIAS], constants[BIAS], constants[GAIN] = chain.search_bias, chain.bias, chain.gain
+    return constants
+
+
+def scale_of(maps: ShadowMaps, k: int, kind: DepthScaleName, chain: Series, behind: bool = False) -> DepthScale:
+    """Return the scale on which depths of one map are compared.
+
+    Parameters
+    ----------
+    maps : ShadowMaps
+        The maps.
+    k : int
+        The map; it holds something.
+    kind : {"log_map", "map", "scene"}
+        As in `depth_scale`.
+    chain : Series
+        Its range of depths.
+    behind : bool
+        Of the map of the hemisphere behind.
+
+    Returns
+    -------
+    DepthScale
+        From metres to the series' scale.
+    """
+    near, far = (maps.near_behind, maps.far_behind) if behind else (maps.near, maps.far)
+    assert near is not None
+    assert far is not None
+    return depth_scale(kind, float(near[k]), float(far[k]), float(maps.scene_far[k]), chain.range)
+
+
+@kernel
+def find_search_regions(
+    constants: Array, sizing: FilterSizing, points: Array, size: int, active: Array, pending: Array, visible: Array,
+    rows: Array,
+) -> int:
+    """Find the disc in which each active receiver searches for blockers; return how many may be shadowed.
+
+    Receivers behind the area light's plane see it whole (Sec. 5.1), those nearer than the nearest depth as well: the
+    others are flagged `pending`. Fills `rows` X to RADIUS, and `visible` with 1.
+    """
+    real = points.dtype.type
+    zero, one, near, delta = real(0.0), real(1.0), constants[NEAREST], constants[DELTA]
+    cx, cy, cz = constants[CENTER], constants[CENTER + 1], constants[CENTER + 2]
+    rx, ry, rz = constants[FRAME], constants[FRAME + 1], constants[FRAME + 2]
+    dx, dy, dz = constants[FRAME + 3], constants[FRAME + 4], constants[FRAME + 5]
+    fx, fy, fz = constants[FRAME + 6], constants[FRAME + 7], constants[FRAME + 8]
+    for i in range(size):
+        px, py, pz = points[0, i] - cx, points[1, i] - cy, points[2, i] - cz
+        d = math.sqrt(px * px + py * py + pz * pz)
+        x, y, z = px * rx + py * ry + pz * rz, px * dx + py * dy + pz * dz, px * fx + py * fy + pz * fz
+        ahead = active[i] & (z > zero) & (d > near)
+        pending[i] = ahead
+        visible[i] = one
+        d = d if ahead else one
+        z = z if ahead else one
+        extent = delta * math.sqrt(z / d) if sizing.foreshortened else delta
+        rows[X, i], rows[Y, i], rows[Z, i], rows[D, i], rows[EXTENT, i] = x, y, z, d, extent
+        rows[RADIUS, i] = solid_angle_tangent(extent, d) if sizing.solid_angle else cone_tangent(extent, d, near)
+    place_filters(sizing.alpha_over_pi, size, rows)
+    return count_true(pending, size)
+
+
+@kernel
+def place_filters(squares: bool, size: int, rows: Array) -> None:
+    """Turn the tangents of cones in row RADIUS into rows S to RADIUS, or squares of side alpha / pi."""
+    if squares:
+        for i in range(size):
+            where = published_square(rows[X, i], rows[Y, i], rows[Z, i], rows[D, i], rows[RADIUS, i])
+            rows[S, i], rows[T, i], rows[RADIUS, i] = where
+    else:
+        for i in range(size):  # without a call of the library of C, these are SIMD lanes
+            where = disc(rows[X, i], rows[Y, i], rows[Z, i], rows[D, i], rows[RADIUS, i])
+            rows[S, i], rows[T, i], rows[RADIUS, i] = where
+
+
+@kernel
+def count_true(flags: Array, size: int) -> int:
+    """Return how many of the first `size` flags are set."""
+    count = 0
+    for i in range(size):
+        count += 1 if flags[i] else 0
+    return count

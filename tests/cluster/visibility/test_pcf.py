@@ -1,0 +1,80 @@
+"""Percentage closer filtering: against plain loops, one texel against the hard test, and what must hold anywhere."""
+
+import numpy as np
+import pytest
+
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.evaluate import visibility
+from refgi.settings import of
+from tests.cluster.visibility.plates import are_shares, lit_by, map_of_plates, on_plane
+from tests.naive import val as naive
+
+ROUNDING = 1e-14  # of a count over a count
+PLATES = [(-0.6, -0.1, -0.3, 0.3, 1.0), (0.1, 0.6, -0.3, 0.3, 1.0)]
+FAR = 6.4
+
+
+def pcf(areas, maps, points, normals, texels):
+    """V by texels x texels depth tests."""
+    return visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="pcf", texels=texels))
+
+
+@pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("texels", [1, 3, 7, 31])
+def test_pcf_is_its_literal_twin(texels, evidence):
+    n, slope = 24, np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
+    depth = map_of_plates(n, PLATES, 2.8, slope)
+    points, _ = on_plane(3.0, 2.2, 9)
+    points[2] = (2.8 - slope[0] * points[0] - slope[1] * points[1]) / slope[2]
+    points = np.concatenate([points, -points[:, :3]], axis=1)  # some behind the light
+    normals = np.repeat(-slope[:, None], points.shape[1], axis=1)
+    areas, maps = lit_by(depth, 0.5, FAR)
+    area = naive.AreaLight([0.0] * 3, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.5, 0.3, [])
+    seen = naive.Map(depth.tolist(), float(depth.min()), FAR, FAR)
+    expected = np.array([naive.pcf(area, seen, x.tolist(), (-slope).tolist(), texels) for x in points.T])
+    got = pcf(areas, maps, points, normals, texels)
+    assert np.abs(got - expected).max() <= ROUNDING
+    assert np.array_equal(pcf(areas, maps, points, -normals, texels), got)  # normals on either side
+    assert len(np.unique(expected)) > (1 if texels == 1 else 3)
+    evidence(f"{texels} x {texels} texels: {np.abs(got - expected).max():.1e} off plain loops, V {got.min():.2f} to 1")
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_one_texel_is_the_hard_test(dtype):
+    rng = np.random.default_rng(3)
+    areas, maps = lit_by(map_of_plates(48, PLATES, 3.0, dtype=dtype), 0.5, FAR)
+    points, normals = rng.uniform(-3, 3, (3, 400)).astype(dtype), rng.normal(size=(3, 400)).astype(dtype)
+    hard = visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="hard"))
+    assert np.array_equal(pcf(areas, maps, points, normals, 1), hard)
+    assert set(np.unique(hard)) == {0.0, 1.0}
+
+
+@pytest.mark.feature("VAL-22")
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_lone_plane_is_wholly_visible(dtype):
+    """No surface shadows itself, however wide the kernel and however steep the surface."""
+    for slope in ((0.0, 0.0, 1.0), (0.5, 0.3, 1.0)):
+        normal = np.array(slope) / np.linalg.norm(slope)
+        areas, maps = lit_by(map_of_plates(64, [], 2.0, normal, dtype=dtype), 0.5, 50.0)
+        points, normals = on_plane(2.0, 1.2, 21)
+        points[2] = (2.0 - normal[0] * points[0] - normal[1] * points[1]) / normal[2]
+        normals[:] = -normal[:, None]
+        for texels in (1, 5, 21):
+            assert (pcf(areas, maps, points.astype(dtype), normals.astype(dtype), texels) == 1).all()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_any_receiver_sees_a_share(dtype):
+    rng = np.random.default_rng(5)
+    extreme = np.array([[0, 0, 0], [0, 0, 1e-20], [1, 0, 0], [1, 1, -1e-9], [0, 0, -2], [0, 0, 100], [4, 5, 1e-12],
+                        [1e-8, 0, 1e-8], [0, 0, 3], [3, 0, 1e-6]]).T
+    points = np.concatenate([extreme, rng.uniform(-3, 3, (3, 300))], axis=1).astype(dtype)
+    normals = rng.normal(size=points.shape).astype(dtype)
+    for plates, plane in ((PLATES, 3.0), ([], None), ([(-50, 50, -50, 50, 1e-3)], None), ([], 3.0)):
+        areas, maps = lit_by(map_of_plates(17, plates, plane, dtype=dtype), 0.5, FAR)
+        for texels in (1, 5, 255):
+            got = pcf(areas, maps, points, normals, texels)
+            assert are_shares(got, dtype)
+            assert (got[points[2] <= 0] == 1).all()
+            order = rng.permutation(points.shape[1])
+            assert np.array_equal(pcf(areas, maps, points[:, order], normals[:, order], texels), got[order])

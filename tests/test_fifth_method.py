@@ -1,0 +1,101 @@
+"""Property tests of a method that another package brings: docs/new_method.md, installed and used as printed there."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from refgi.image import read_exr
+
+PAGE = Path(__file__).parents[1] / "docs" / "new_method.md"
+TINY = ["--size", "24x18", "--rsm-resolution", "24"]
+
+
+def block(language: str) -> str:
+    """Return the page's first block of code in a language."""
+    found = re.search(rf"```{language}\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert found
+    return found[1]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """Install the page's package from a wheel, which needs no build backend."""
+    folder = tmp_path_factory.mktemp("fifth")
+    entry = re.search(r'\[project\.entry-points\."refgi\.methods"\]\n(.*)', block("toml"))[1].replace('"', "")
+    files = {
+        "ambient/__init__.py": block("python"),
+        "ambient-1.0.dist-info/METADATA": "Metadata-Version: 2.1\nName: ambient\nVersion: 1.0\n",
+        "ambient-1.0.dist-info/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\n"
+                                       "Tag: py3-none-any\n",
+        "ambient-1.0.dist-info/entry_points.txt": f"[refgi.methods]\n{entry}\n"}
+    files["ambient-1.0.dist-info/RECORD"] = "".join(f"{name},,\n" for name in files)
+    with zipfile.ZipFile(folder / "ambient-1.0-py3-none-any.whl", "w") as wheel:
+        for name, text in files.items():
+            wheel.writestr(name, text)
+    install = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--target",
+               str(folder / "site"), str(folder / "ambient-1.0-py3-none-any.whl")]
+    subprocess.run(install, check=True)
+    return folder / "site"
+
+
+def refgi(site, *arguments, code=0):
+    paths = [str(site), str(PAGE.parents[1])]
+    done = subprocess.run([sys.executable, "-m", "refgi", *map(str, arguments)], capture_output=True, text=True,
+                          check=False, env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)})
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def test_it_renders(site, tmp_path):
+    for share, name in ((0.2, "a.exr"), (0.4, "b.exr")):
+        refgi(site, "render", "cornell_box", *TINY, "--method", "ambient", "--set", f"share={share}", "--out",
+              tmp_path / name)
+    planes, record = read_exr(tmp_path / "a.exr")
+    twice = read_exr(tmp_path / "b.exr")[0]
+    assert record["settings"] == {"share": 0.2}
+    assert planes["irradiance.R"].max() > 0
+    lit = planes["irradiance.R"] > 0
+    assert abs(twice["irradiance.R"][lit] / planes["irradiance.R"][lit] - 2).max() < 1e-6
+    again = refgi(site, "render", "--again", tmp_path / "a.exr")
+    assert "the same to the bit" in again.stdout
+
+
+def test_it_is_compared(site, tmp_path):
+    done = refgi(site, "compare", "cornell_box", *TINY, "--methods", "sii,ambient", "--set", "sii.lights=16", "--set",
+                 "truth.samples=24", "--out", tmp_path / "out", "--json")
+    content = json.loads(done.stdout)
+    assert set(content["methods"]) == {"sii", "ambient"}
+    assert len(content["methods"]["ambient"]["against"]) == 2  # truth, and truth without visibility
+    assert "ambient" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+
+
+def test_it_is_explained(site):
+    content = json.loads(refgi(site, "explain", "cornell_box", *TINY, "--method", "ambient", "--preset", "dim",
+                               "--json").stdout)
+    assert "ambient.spread" in {line["name"] for line in content["stages"]}
+    assert content["settings"]["share"] == 0.1
+
+
+def test_it_is_listed_with_its_settings(site):
+    assert "ambient" in json.loads(refgi(site, "info", "--json").stdout)["methods"]
+    content = json.loads(refgi(site, "settings", "ambient", "--json").stdout)
+    assert content["schema"]["properties"]["share"]["maximum"] == 1.0
+    assert content["presets"]["dim"] == {"share": 0.1}
+    assert "share" in refgi(site, "render", "cornell_box", "--method", "ambient", "--set", "shares=2", "--out", "x.exr",
+                            code=2).stderr
+
+
+def test_one_that_cannot_be_imported_is_one_error(tmp_path):
+    info = tmp_path / "broken-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[refgi.methods]\nbroken = nowhere:METHOD\nsii = nowhere:METHOD\n")
+    done = refgi(tmp_path, "render", "cornell_box", *TINY, "--method", "broken", "--out", tmp_path / "a.exr", code=2)
+    assert "method broken: nowhere:METHOD cannot be imported" in done.stderr
+    refgi(tmp_path, "settings", "sii")  # no other package takes the place of refgi's own

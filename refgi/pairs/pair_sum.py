@@ -61,28 +61,40 @@ def geometry_term(dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, nx: Any,
 
 
 @kernel
-def clamped_term(
-    dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, nx: Any, ny: Any, nz: Any, clamp: Clamp, k: int
-) -> Any:
-    """Return the geometry term of one pair with light k as a clamp keeps it finite, 1/m^2."""
-    real = type(dx)
-    zero = real(0.0)
-    square, cl, cx = pair_cosines(dx, dy, dz, lx, ly, lz, nx, ny, nz)
-    square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
-    softened = (square if square > clamp.least else clamp.least) + clamp.softness[k]
-    term = ((cl if cl > zero else zero) / square) * ((cx if cx > zero else zero) / softened)
-    return term if term < clamp.bound else clamp.bound
+def limits_of(clamp: Clamp | None, k: int) -> Any:
+    """Return least square, softness and bound of light k, or None.
+
+    Loops over lanes take these scalars from outside: an array read inside would keep them from running in lanes.
+    """
+    if clamp is None:
+        return None
+    return clamp.least, clamp.softness[k], clamp.bound
 
 
 @kernel
-def pair_term(light: Any, receiver: Any, clamp: Clamp | None, k: int) -> Any:
-    """Return the geometry term of packed light k and a receiver (position, normal), clamped or not, 1/m^2."""
+def clamped_term(
+    dx: Any, dy: Any, dz: Any, lx: Any, ly: Any, lz: Any, nx: Any, ny: Any, nz: Any, limits: Any
+) -> Any:
+    """Return the geometry term of one pair as a clamp's `limits_of` its light keep it finite, 1/m^2."""
+    real = type(dx)
+    least, softness, bound = limits
+    zero = real(0.0)
+    square, cl, cx = pair_cosines(dx, dy, dz, lx, ly, lz, nx, ny, nz)
+    square = square if square > real(LEAST_SQUARE) else real(LEAST_SQUARE)
+    softened = (square if square > least else least) + softness
+    term = ((cl if cl > zero else zero) / square) * ((cx if cx > zero else zero) / softened)
+    return term if term < bound else bound
+
+
+@kernel
+def pair_term(light: Any, receiver: Any, limits: Any) -> Any:
+    """Return the geometry term of a packed light and a receiver (position, normal), 1/m^2; `limits` None: unclamped."""
     x, y, z, nx, ny, nz = receiver
     dx, dy, dz = light[0] - x, light[1] - y, light[2] - z
     lx, ly, lz = light[3], light[4], light[5]
-    if clamp is None:
+    if limits is None:
         return geometry_term(dx, dy, dz, lx, ly, lz, nx, ny, nz)
-    return clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, clamp, k)
+    return clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, limits)
 
 
 @kernel
@@ -136,9 +148,10 @@ def add_listed(tile: Array, lights: Array, clamp: Clamp | None, chosen: Array, l
     for pair in range(0, listed, 2):
         a, b = chosen[pair], chosen[pair + 1]
         one, two = load_light(lights, a), load_light(lights, b)
+        limits_a, limits_b = limits_of(clamp, a), limits_of(clamp, b)
         for i in range(TILE):
             receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-            g1, g2 = pair_term(one, receiver, clamp, a), pair_term(two, receiver, clamp, b)
+            g1, g2 = pair_term(one, receiver, limits_a), pair_term(two, receiver, limits_b)
             # Eq. (2); written out: a loop over the channels would cost the compiler its even split into lanes
             tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
             tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]

@@ -23,6 +23,7 @@ from refgi.pairs.pair_sum import (
     Clamp,
     X,
     close_group,
+    limits_of,
     load_light,
     load_tile,
     pair_cosines,
@@ -107,10 +108,11 @@ def sum_pairs_in_range(
                 a, b = chosen[pair], chosen[pair + 1]
                 one, two = load_light(lights, a), load_light(lights, b)
                 square_a, square_b = reach.square[a], reach.square[b]
+                limits_a, limits_b = limits_of(clamp, a), limits_of(clamp, b)
                 for i in range(LANES):
                     receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-                    g1 = _term_in_range(one, receiver, clamp, a, square_a)
-                    g2 = _term_in_range(two, receiver, clamp, b, square_b)
+                    g1 = _term_in_range(one, receiver, limits_a, square_a)
+                    g2 = _term_in_range(two, receiver, limits_b, square_b)
                     # Eq. (2); written out: a loop over the channels would cost the compiler its even split into lanes
                     tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
                     tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
@@ -139,10 +141,11 @@ def sum_weighted_pairs(
             for k in range(group, min(group + GROUP, lights.shape[1] - 1)):
                 if listed[block, k]:
                     one, square, xi = load_light(lights, k), reach.square[k], reach.scale[k]
+                    limits = limits_of(clamp, k)
                     for i in range(LANES):
                         x, y, z, nx, ny, nz = (tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i],
                                                tile[NX + 1, i], tile[NX + 2, i])
-                        g = _weighted_term(one, (x, y, z, nx, ny, nz), clamp, k, square, xi, reach.outside)
+                        g = _weighted_term(one, (x, y, z, nx, ny, nz), limits, square, xi, reach.outside)
                         tile[SUM, i] = tile[SUM, i] + g * one[6]
                         tile[SUM + 1, i] = tile[SUM + 1, i] + g * one[7]
                         tile[SUM + 2, i] = tile[SUM + 2, i] + g * one[8]
@@ -171,16 +174,14 @@ def _list_chosen(listed: Array, block: int, first: int, last: int, chosen: Array
 
 
 @kernel
-def _term_in_range(light: Any, receiver: Any, clamp: Clamp | None, k: int, square_range: Any) -> Any:
+def _term_in_range(light: Any, receiver: Any, limits: Any, square_range: Any) -> Any:
     dx, dy, dz = light[0] - receiver[0], light[1] - receiver[1], light[2] - receiver[2]
-    term = pair_term(light, receiver, clamp, k)
+    term = pair_term(light, receiver, limits)
     return term if reached(dx, dy, dz, light[3], light[4], light[5], square_range) else type(dx)(0.0)
 
 
 @kernel
-def _weighted_term(
-    light: Any, receiver: Any, clamp: Clamp | None, k: int, square_range: Any, scale: Any, outside: bool
-) -> Any:
+def _weighted_term(light: Any, receiver: Any, limits: Any, square_range: Any, scale: Any, outside: bool) -> Any:
     dx, dy, dz = light[0] - receiver[0], light[1] - receiver[1], light[2] - receiver[2]
-    term = pair_term(light, receiver, clamp, k)
+    term = pair_term(light, receiver, limits)
     return term * range_factor(dx, dy, dz, light[3], light[4], light[5], square_range, scale, outside)

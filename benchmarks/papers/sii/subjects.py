@@ -31,11 +31,13 @@ def full_sum(bench: Workbench, scene: str) -> Array:
     return bench.once(("full sum", scene), lambda: sii(bench.frame(scene), every))
 
 
-def splats(bench: Workbench, scene: str, **changes: Any) -> SiiSettings:
-    """Return settings of 768 lights and 5 %, but for `changes`, under the scene's reference length; 0 % is no cut."""
-    share = changes.pop("cut_share", PAPER_CUT)
-    cut = {"cut_share": share, "reference_length": reference_length(bench, scene)} if share else {"cut": "none"}
-    return of(SiiSettings, **cut | changes)
+def splats(bench: Workbench, scene: str, share: float = PAPER_CUT, **changes: Any) -> SiiSettings:
+    """Return settings of 768 lights, but for `changes`, cut at a share of I_0 under the scene's reference length.
+
+    A share of 0 cuts nothing.
+    """
+    cut = RelativeCut(share, reference_length(bench, scene)) if share > 0 else None
+    return of(SiiSettings, cut=cut, **changes)
 
 
 def reference_length(bench: Workbench, scene: str) -> float:

@@ -94,7 +94,7 @@ def test_a_clamp_takes_light_from_around_the_lights_alone(box, evidence):
     assert peaks[1] < peaks[2] < peaks[0]
 
 
-@pytest.mark.filterwarnings("ignore:gather. radius .* of the indirect light")  # one of the pictures is of such a disc
+@pytest.mark.filterwarnings("ignore:gather. disc.radius .* of the indirect light")  # of one of the pictures
 @pytest.mark.feature("AMS-18")
 def test_against_gathering_shadowed_lights_and_truth(box, evidence):
     """Picture: RMSE over the mean of the truth, of each way with and without visibility."""

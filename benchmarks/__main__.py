@@ -19,7 +19,7 @@ from rich.table import Table
 from benchmarks.harness import Row
 
 FOLDER = Path(__file__).parent
-NOT_TOPICS = {"__init__", "__main__", "harness"}
+NOT_TOPICS = {"__init__", "__main__", "harness", "signatures"}
 
 
 def topics() -> list[str]:

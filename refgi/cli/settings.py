@@ -111,7 +111,9 @@ def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[st
 @speech
 @click.pass_obj
 def _settings(session: Session, /, method: str, preset: str, everything: bool) -> None:
-    """List what METHOD can be set to: keys for --set, values, what they take and what they are.
+    """List what a method can be set to by --set.
+
+    Shows keys, values, what they take and what they are.
 
     A key may be shortened to what tells it apart from the others: terms for visibility.terms.
     """

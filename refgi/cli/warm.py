@@ -22,7 +22,10 @@ FEW = 4  # kernels that a run compiles faster by itself than other processes sta
 @speech
 @click.pass_obj
 def _warm(session: Session, /, methods: str | None, dtype: str, processes: int | None) -> None:
-    """Compile the kernels of methods at their defaults, on all cores, and keep them on disk."""
+    """Compile kernels ahead, on all cores.
+
+    Those that methods need at their defaults; they are kept on disk.
+    """
     from refgi.jit.ahead import compile_ahead
     from refgi.methods import METHODS, find_method
 

@@ -245,7 +245,7 @@ def test_compare_writes_everything_and_prints_a_table(tmp_path):
     assert {"index.html", "results.json", "sii.exr", "sii.png", "sii_error.png", "truth.exr"} <= {
         path.name for path in folder.iterdir()}
     content = json.loads((folder / "results.json").read_text())
-    assert content["methods"]["sii"]["settings"]["lights"] == 16
+    assert content["methods"]["sii"]["settings"]["lights.count"] == 16
     assert content["references"]["truth"]["settings"]["samples"] == 24
     assert content["size"] == [12, 10]
     assert content["methods"]["sii"]["ledger"]["rows"]["arrived"][0] > 0

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import sys
 import types
 import warnings
 
@@ -16,8 +15,10 @@ from refgi.compare import comparison as module
 from refgi.compare.flip import Flip
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
-from refgi.methods import METHODS, Method
+from refgi.method import Method
+from refgi.methods import METHODS
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight, load_scene
+from refgi.settings import Settings, setting
 from refgi.stages import stage
 from refgi.truth import TruthSettings
 
@@ -27,9 +28,9 @@ SIZE = {"width": 20, "height": 16, "rsm_resolution": 32}
 
 
 @dataclasses.dataclass(frozen=True)
-class FakeSettings:
-    level: float = 0.25
-    fails: bool = False
+class FakeSettings(Settings):
+    level: float = setting(0.25, "irradiance everywhere", unit="W/m^2")
+    fails: bool = setting(False, "raises an error")
 
 
 @stage("fake.even")
@@ -47,10 +48,7 @@ def fake_method(frame, settings):
 @pytest.fixture
 def fakes(monkeypatch):
     """Two methods: `blind` knows no visibility, `seeing` does."""
-    home = types.ModuleType("fake_methods")
-    home.fake, home.FakeSettings = fake_method, FakeSettings
-    monkeypatch.setitem(sys.modules, "fake_methods", home)
-    table = {name: Method(name, "fake_methods:fake", "FakeSettings", sees, f"fake that is {name}")
+    table = {name: Method(name, f"fake that is {name}", fake_method, FakeSettings, visibility=sees)
              for name, sees in (("blind", False), ("seeing", True))} | {"truth": METHODS["truth"]}
     monkeypatch.setattr(module, "flip", lambda *_: Flip(skipped="left out"))  # it has tests of its own
     for place in (module, refgi.methods):
@@ -150,8 +148,7 @@ def test_a_ledger_is_asked_for_only_where_files_are_written(box, truth_settings,
         row = types.SimpleNamespace(name="emitted", watts=np.ones(3), meaning="", is_part=False)
         return types.SimpleNamespace(rows=[row], difference=np.zeros(3))
 
-    sys.modules["fake_methods"].account = account
-    fakes["seeing"] = fakes["seeing"]._replace(ledger="fake_methods:account")
+    fakes["seeing"] = fakes["seeing"]._replace(ledger=account)
     assert compare(box, truth_settings=truth_settings, **SIZE).results["seeing"].ledger is None
     assert not asked
     compare(box, truth_settings=truth_settings, out=tmp_path, **SIZE)

@@ -44,6 +44,7 @@ class Clusters(KMeansSettings):
     """A number of clusters."""
 
     NAME = "fixed"
+    PRINCIPAL = "count"
 
     count: int = setting(30, "area lights", least=1, most=MOST_LIGHTS)
 

@@ -319,9 +319,9 @@ def test_the_record_says_everything(tmp_path):
     file = tmp_path / "a.exr"
     run("cornell_box", *TINY, *SII, *VIEW, "--seed", "7", "--exposure", "0.5", "--out", file)
     record = read_exr(file)[1]
-    assert (record["provenance"], record["method"], record["exposure"]) == (1, "sii", 0.5)
+    assert (record["provenance"], record["method"], record["exposure"]) == (2, "sii", 0.5)
     assert record["options"] == {"dtype": "float32", "rsm_resolution": 16, "shadows": "map"}
-    assert (record["settings"]["lights"], record["settings"]["seed"]) == (16, 7)
+    assert (record["settings"]["lights.count"], record["settings"]["lights.seed"]) == (16, 7)
     scene = record["scene"]
     assert (scene["source"], scene["faces"], scene["files"]) == ("cornell_box", 30, {})
     assert (scene["camera"]["width"], scene["camera"]["height"]) == (12, 10)

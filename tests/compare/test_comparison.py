@@ -4,6 +4,7 @@ import dataclasses
 import json
 import types
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ SIZE = {"width": 20, "height": 16, "rsm_resolution": 32}
 
 @dataclasses.dataclass(frozen=True)
 class FakeSettings(Settings):
-    level: float = setting(0.25, "irradiance everywhere", unit="W/m^2")
+    level: Any = setting(0.25, "irradiance everywhere; also what is no number")
     fails: bool = setting(False, "raises an error")
 
 

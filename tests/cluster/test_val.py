@@ -155,7 +155,7 @@ IN = {"target_error": {"clusters": "adaptive"}, "cone": {"visibility": "pcss"}, 
     ("position_weight", "much"), ("bias", "some"), ("cone", None), ("occluders_alone", "no"), ("near_distance", -1),
     ("as_published", {"val_beta"}), ("assignment", "cards"), ("texels", 4), ("texels", 0),
     ("behind", "mirror"), ("near_geometry", "some"),
-    ("axes", "x"), ("area_extent", "area"), ("clusters", "many"), ("renderer", "gpu")])
+    ("axes", "x"), ("area_extent", "area"), ("clusters_count", "many"), ("renderer", "gpu")])
 def test_a_setting_that_cannot_be_is_named(key, value):
     with pytest.raises(InputError, match=rf"{key.rpartition('_')[2]}: expected"):
         of(ValSettings, **IN.get(key, {}) | {key: value})

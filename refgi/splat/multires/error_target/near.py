@@ -15,7 +15,7 @@ from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.packing import Packed
-from refgi.pairs.pair_sum import NX, SUM, Clamp, X, clamped_term, geometry_term, limits_of
+from refgi.pairs.pair_sum import NX, SUM, Clamp, X, limits_of, pair_term
 from refgi.pairs.tiles import block_by_block, put, taken
 from refgi.rsm.pool import plane
 from refgi.splat.multires.refinement.grid import level_shape
@@ -163,12 +163,8 @@ def _sum_near(tile: Array, lights: Array, clamp: Clamp | None, bound: Array, nea
         red, green, blue = lights[6, k], lights[7, k], lights[8, k]
         limits = limits_of(clamp, k)
         for i in range(SIDE * SIDE):
-            dx, dy, dz = px - at[X, i], py - at[X + 1, i], pz - at[X + 2, i]
-            nx, ny, nz = at[NX, i], at[NX + 1, i], at[NX + 2, i]
-            if limits is None:
-                g = geometry_term(dx, dy, dz, lx, ly, lz, nx, ny, nz)
-            else:
-                g = clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, limits)
+            receiver = at[X, i], at[X + 1, i], at[X + 2, i], at[NX, i], at[NX + 1, i], at[NX + 2, i]
+            g = pair_term((px, py, pz, lx, ly, lz), receiver, limits)
             over = g - b if g > b else zero  # max(0, g - b)
             at[SUM, i] += over * red
             at[SUM + 1, i] += over * green

@@ -14,7 +14,7 @@ from refgi.pairs.lobe_culling import LIMIT, bound_lobes
 from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.lobe_sum import add_lobe
 from refgi.pairs.packing import Packed
-from refgi.pairs.pair_sum import NX, ROWS, SUM, Clamp, X, clamped_term, geometry_term, limits_of
+from refgi.pairs.pair_sum import NX, ROWS, SUM, Clamp, X, limits_of, pair_term
 from refgi.pairs.sphere_sum import TERM, cut_cones, whole_cones
 
 Array = npt.NDArray[Any]
@@ -71,12 +71,8 @@ def _add_diffuse(tile: Array, size: int, lights: Array, k: int, clamp: Clamp | N
     else:
         limits = limits_of(clamp, k)
         for i in range(size):
-            dx, dy, dz = x - tile[X, i], y - tile[X + 1, i], z - tile[X + 2, i]
-            nx, ny, nz = tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-            if limits is None:
-                tile[TERM, i] = geometry_term(dx, dy, dz, lx, ly, lz, nx, ny, nz)
-            else:
-                tile[TERM, i] = clamped_term(dx, dy, dz, lx, ly, lz, nx, ny, nz, limits)
+            receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
+            tile[TERM, i] = pair_term((x, y, z, lx, ly, lz), receiver, limits)
     for i in range(size):
         # Eq. (2): E += (Phi / pi) g
         tile[SUM, i] += tile[TERM, i] * red

@@ -7,7 +7,8 @@ never all held.
 
 `RayReceivers` are the points to light: position, shading normal, face normal and the origin of their shadow rays.
 
-Symbols: d vector from receiver to light, c_l and c_x cosines of light and receiver, not divided by the length of d, V visibility.
+Symbols: d vector from receiver to light, c_l and c_x cosines of light and receiver, not divided by the length of d,
+V visibility.
 """
 
 import math

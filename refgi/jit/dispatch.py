@@ -10,6 +10,7 @@ import gc
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
+from numba.core.analysis import compute_cfg_from_blocks
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
@@ -28,10 +29,17 @@ OPTIONS = {"nopython": True, "nogil": True, "fastmath": False, "error_model": "n
 
 
 class CalleeLibrary(JITCodeLibrary):
-    """LLVM code of a callee: linked into its callers, neither optimised nor made native by itself."""
+    """LLVM code of a callee: linked into its callers, not made native by itself.
+
+    Loops are optimised before that: as a part of a large caller the compiler would no longer find that their arrays do
+    not overlap, and run them one number at a time. What has no loop is optimised in its callers alone.
+    """
+
+    has_loops = False
 
     def _optimize_final_module(self) -> None:
-        pass
+        if self.has_loops:
+            super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
@@ -51,6 +59,7 @@ class CalleeLowering(NativeLowering):
     def run_pass(self, state: Any) -> bool:
         """Lower, and register the result for callers."""
         state.library = CalleeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.has_loops = bool(compute_cfg_from_blocks(state.func_ir.blocks).loops())
         state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
         super().run_pass(state)
         state.library.finalize()

@@ -2,8 +2,8 @@
 
 Numba keys its disk cache by the source file of a kernel alone, so a change in an imported kernel leaves a stale caller
 behind. Here the key covers the kernel's own bytecode and constants, the kernels it calls, the values of the globals it
-reads, and the versions of whatever compiles it; comments, docstrings, line numbers and the rest of its module are not
-part of it. Intrinsics, and overloads registered by `refgi.jit.by_type`, count with their code as well.
+reads, and versions and sources of what compiles it; comments, docstrings, line numbers and the rest of its module are
+no part of it. Intrinsics, and overloads registered by `refgi.jit.by_type`, count with their code as well.
 """
 
 import hashlib
@@ -21,6 +21,7 @@ import numba
 import numpy as np
 
 LIBRARIES = sys.stdlib_module_names | {"llvmlite", "numba", "numpy"}  # known by their versions
+COMPILERS = ("dispatch.py", "bands.py")  # of this package
 OVERLOADS = "__overloads__"  # attribute of a function that stands for others, by argument types
 EXACT = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
 
@@ -48,7 +49,9 @@ def code_key(function: Callable[..., Any]) -> str:
 def _platform() -> str:
     features = llvmlite.binding.get_host_cpu_features().flatten()
     bounds = os.environ.get("NUMBA_BOUNDSCHECK", "")
-    return f"{sys.version_info[:2]} {numba.__version__} {llvmlite.__version__} {np.__version__} {features} {bounds}"
+    ours = hashlib.sha256(b"".join(Path(__file__).with_name(name).read_bytes() for name in COMPILERS))
+    return (f"{sys.version_info[:2]} {numba.__version__} {llvmlite.__version__} {np.__version__} {features} {bounds} "
+            f"{ours.hexdigest()}")
 
 
 def _function(function: Callable[..., Any], known: set[int]) -> Iterator[str]:

@@ -14,6 +14,13 @@ hypothesis.settings.register_profile("refgi", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("refgi")
 
 ROOT = Path(__file__).parents[1]
+# what `make quick` runs: a minute with warm kernels
+QUICK = (
+    "tests/settings", "tests/image", "tests/scene/test_scenefile", "tests/compare", "tests/provenance",
+    "tests/test_stages.py", "tests/test_draws.py", "tests/test_limits.py", "tests/test_docstrings.py",
+    "tests/jit/test_bands.py", "tests/jit/test_kernel.py", "tests/cli/test_settings.py", "tests/cli/test_render.py",
+    "tests/pairs/test_pair_sum.py", "tests/pairs/test_clamps.py", "tests/sssil/crown/test_pattern.py",
+    "tests/cluster/clustering", "tests/lights/test_warp.py")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--evidence", action="store_true", help="print feature id, test and measured figure")
@@ -26,7 +33,11 @@ def pytest_configure() -> None:
         import trimesh  # noqa: F401
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.nodeid.startswith(QUICK):
+            item.add_marker("quick")
     if not config.getoption("--all"):
         slow = [item for item in items if item.get_closest_marker("slow")]
         if slow:

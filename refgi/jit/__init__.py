@@ -5,7 +5,7 @@ gives infinity instead of a branch. That costs little when pixels are the SIMD l
 the bit for every thread count and on every machine with the same arithmetic.
 
 A kernel that is called from Python is optimised, made native and kept on disk. A kernel that is called from another
-kernel is only lowered: it is optimised as a part of its caller.
+kernel is only lowered, and optimised by itself where it has loops; the rest happens as a part of its caller.
 """
 
 from collections.abc import Callable

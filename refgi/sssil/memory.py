@@ -43,6 +43,7 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
 
     Examples
     --------
+    >>> from refgi.sssil.settings import SamplingSettings
     >>> level_bytes(HssilSettings(SamplingSettings(start="full", levels=1)), 100, 4)
     4800
     """

@@ -1,0 +1,151 @@
+"""Cases of wiring: settings that a method must heed, and the scenes on which heeding them shows.
+
+A case sets some keys. What is asked of it: the picture is that of the method assembled by hand (`tests/naive`), and
+each of its keys alone, put back to its default, makes another picture. `uncovered` lists what no case of a method sets,
+from the settings classes, so that a new field without a case fails.
+"""
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Any, Literal, get_args, get_origin
+
+import numpy as np
+
+from refgi.frame import Frame
+from refgi.scene import Camera, DirectionalLight, Material, Mesh, PointLight, Scene, SpotLight, merge
+from refgi.settings import of
+from refgi.settings.fields import choices_of, hints, is_choice, may_be_none, members
+from tests.truth.scenes import rectangle
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+# strongest and weakest differ by a factor of 8 and in hue, so that neither order nor channel can be mistaken
+LAMPS = (
+    SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.4, 0.8, (4.0, 2.6, 1.3)),
+    PointLight((0.2, 0.9, 0.3), (0.10, 0.25, 0.5)),
+    DirectionalLight((-0.5, -0.9, -0.3), (0.5, 0.3, 0.9)),
+)
+# rolled: no two pixels are mirror images
+VIEW = Camera((1.7, 1.4, 1.5), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(70))
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """Settings under test.
+
+    `values` are the keys under test; `over` holds what it takes for them to matter, which other cases test. `scene`
+    names one of `SCENES`, `frame` are options of `Frame`. `same` says why the picture stays as it is without
+    `values`, if it does: a bound, an order of passes.
+    """
+
+    values: Mapping[str, Any]
+    over: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    scene: str = "lamps"
+    frame: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    same: str = ""
+
+    def settings(self, kind: type, base: Mapping[str, Any] = NOTHING) -> Any:
+        """Return the settings of the case over those that make every case small."""
+        return of(kind, **{**base, **self.over, **self.values})
+
+    def without(self, kind: type, base: Mapping[str, Any] = NOTHING) -> Iterator[tuple[str, Any]]:
+        """Yield each key under test, and the settings with that key as its default has it."""
+        for key in self.values:
+            rest = {other: value for other, value in self.values.items()
+                    if other != key and not other.startswith(f"{key}.")}
+            yield key, of(kind, **{**base, **self.over, **rest})
+
+    def seen(self) -> Frame:
+        """Return the frame of the case, in float64."""
+        options = {"width": 17, "height": 13, "rsm_resolution": 16, "dtype": np.float64} | dict(self.frame)
+        return Frame(SCENES[self.scene](), **options)
+
+
+def room(*lights, smooth=False, glass=False):
+    """A corner with a diffuse floor, a diffuse and glossy wall, and a purely glossy block before the other wall."""
+    glossy = Material("glossy", (0.3, 0.2, 0.4), (0.4, 0.5, 0.2), 12.0)
+    mirror = Material("purely glossy", (0.0, 0.0, 0.0), (0.7, 0.5, 0.6), 40.0)
+    floor, green = Material("floor", (0.6, 0.55, 0.4)), Material("green", (0.1, 0.6, 0.2))
+    meshes = [
+        rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), floor),
+        rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0), glossy),
+        rectangle((-1, 0, 1), (0, 0, -2), (0, 2, 0), green),
+        rectangle((-0.4, 0.5, -0.1), (0.6, 0, 0), (0, 0, -0.5), mirror),
+    ]
+    if smooth or glass:
+        meshes.append(ball((0.3, 0.35, -0.2), 0.3, Material("glass", (0, 0, 0), ior=1.5) if glass else
+                           Material("ball", (0.5, 0.3, 0.2), (0.2, 0.3, 0.4), 20.0)))
+    geometry, materials = merge(meshes, smooth=smooth)
+    return Scene("wiring", geometry, materials, VIEW, lights)
+
+
+def ball(center, radius, material):
+    """An octahedron's eight faces cut in four each, pushed out to a sphere."""
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = [(a, b, c) if np.linalg.det(axes[[a, b, c]]) > 0 else (a, c, b)
+             for a in (0, 3) for b in (1, 4) for c in (2, 5)]
+    corners = []
+    for face in faces:
+        p, q, r = axes[list(face)]
+        pq, qr, rp = p + q, q + r, r + p
+        corners += [p, pq, rp, pq, q, qr, rp, qr, r, pq, qr, rp]
+    vertices = np.asarray(corners, float)
+    vertices /= np.linalg.norm(vertices, axis=1)[:, None]
+    return Mesh(np.asarray(center) + radius * vertices, np.arange(len(vertices)).reshape(-1, 3),
+                vertices, material)
+
+
+SCENES = {
+    "lamps": lambda: room(*LAMPS),
+    "smooth": lambda: room(*LAMPS, smooth=True),
+    "glass": lambda: room(*LAMPS, glass=True),
+    "spot": lambda: room(LAMPS[0]),
+}
+
+
+def uncovered(kind: type, cases: Mapping[str, Case], base: Mapping[str, Any] = NOTHING) -> set[str]:
+    """Return what no case sets: fields, names of choices, of literals and of printed forms, but for the defaults."""
+    met = {setting for case in cases.values() for _, other in case.without(kind, base)
+           for setting in differences(case.settings(kind, base), other)}
+    return set(needed(kind)) - met
+
+
+def needed(kind: type) -> Iterator[str]:
+    """Yield what a class of settings has to have a case for, as `Owner.field` or `Owner.field = name`."""
+    for field in dataclasses.fields(kind):
+        hint, word = hints(kind)[field.name], f"{kind.__name__}.{field.name}"
+        plain = members(hint)[0]
+        if is_choice(hint):
+            yield from (f"{word} = {name}" for name in {*choices_of(hint), "none"} - {name_of(field.default)}
+                        if name != "none" or may_be_none(hint))
+        elif get_origin(plain) is frozenset:
+            yield from (f"{word} = {name}" for name in kind.SWITCHES)
+        elif get_origin(plain) is Literal:
+            yield from (f"{word} = {value}" for value in get_args(plain) if value != field.default)
+        elif not choices_of(hint):
+            yield word
+        for one in choices_of(hint).values():
+            yield from needed(one)
+
+
+def differences(one: Any, other: Any) -> Iterator[str]:
+    """Yield in what settings of one class differ, in the words of `needed`."""
+    for field in dataclasses.fields(one):
+        hint, word = hints(type(one))[field.name], f"{type(one).__name__}.{field.name}"
+        here, there = getattr(one, field.name), getattr(other, field.name)
+        if here == there:
+            continue
+        if is_choice(hint) and name_of(here) != name_of(there):
+            yield f"{word} = {name_of(here)}"
+        elif choices_of(hint):
+            yield from differences(here, there)
+        elif isinstance(here, frozenset):
+            yield from (f"{word} = {name}" for name in here ^ there)
+        else:
+            yield f"{word} = {here}" if get_origin(members(hint)[0]) is Literal else word
+
+
+def name_of(choice: Any) -> str:
+    """Return the name of what a choice holds."""
+    return "none" if choice is None else choice.name()

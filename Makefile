@@ -8,7 +8,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 .PHONY: demo test quick test-all check evidence bench docs clean
 
 demo: $(VENV)/run.stamp
-	$(BIN)/refgi compare cornell_box --out out/
+	$(BIN)/refgi compare cornell_box --methods sii,multires,val,hssil --out out/
 	@echo "open out/index.html; then try: $(BIN)/refgi render docs/examples/room.json --method sii --out out/"
 
 test: $(VENV)/dev.stamp

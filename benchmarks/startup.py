@@ -17,7 +17,7 @@ from benchmarks.harness import Row
 ROOT = Path(__file__).parents[1]
 EARLIER = "d69759e"  # before kernels were compiled as parts of their callers
 PICTURE = ["render", "cornell_box", "--method", "sii", "--size", "512x512", "--out"]
-DEMO = ["compare", "cornell_box", "--out"]
+DEMO = ["compare", "cornell_box", "--methods", "sii,multires,val,hssil", "--out"]  # of the Makefile
 
 
 def rows(quick: bool) -> Iterator[Row]:

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.lights.selection import choose_lights
+from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import Receivers, irradiance
 from refgi.splat.gather.gather import GatherSettings, gather
 from refgi.splat.multires.multires import multires
+from refgi.splat.multires.settings import MultiresSettings
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 from tests.splat.multires.choices import unclamped
 
@@ -30,7 +31,8 @@ def box():
 def every_pixel(frame, settings):
     buffer = frame.gbuffer
     receivers = Receivers(*buffer.resolve("position", "normal", "covered"))
-    return irradiance(receivers, choose_lights(frame, settings.lights), settings.effective_pairs)
+    pairs = settings.effective_pairs
+    return irradiance(receivers, choose_lights(frame, settings.lights), pairs, footprints(frame, settings.lights, pairs))
 
 
 def tent(picture, covered):
@@ -94,33 +96,45 @@ def test_a_clamp_takes_light_from_around_the_lights_alone(box, evidence):
     assert peaks[1] < peaks[2] < peaks[0]
 
 
-@pytest.mark.filterwarnings("ignore:gather. disc.radius .* of the indirect light")  # of one of the pictures
+@pytest.mark.filterwarnings("ignore:.* of the indirect light")  # of some of the pictures
 @pytest.mark.feature("AMS-18")
 def test_against_gathering_shadowed_lights_and_truth(box, evidence):
-    """Picture: RMSE over the mean of the truth, of each way with and without visibility."""
-    covered, passes = box.gbuffer.covered, {"samples": 24 * 16}
-    truths = {rays: trace_truth(box, TruthSettings(visibility=rays, **passes)) for rays in (True, False)}
-    light = unclamped(lights=1024)
-    pictures = {
-        "multires": {False: multires(box, light),
-                     True: multires(box, unclamped(lights=1024, visibility="rays"))},
-        "full sum": {False: every_pixel(box, light)},
-        "vpl": {True: vpl(box, of(VplSettings, lights=1024, pattern="grid"))},
-        "gather": {False: gather(box, of(GatherSettings, samples=4096, radius=WHOLE_MAP, interpolation="none"))},
-        "gather within 0.3 maps": {False: gather(box, of(GatherSettings, interpolation="none"))}}
-    table = {}
-    for name, kinds in pictures.items():
-        for rays, picture in kinds.items():
-            for against, truth in truths.items():
-                e = np.abs(picture - truth.mean)[:, covered]
-                best = np.sort(e.max(axis=0))[: int(0.99 * e.shape[1])]
-                table[name, rays, against] = math.sqrt((best**2).mean()) / truth.mean[:, covered].mean()
-    evidence("; ".join(f"{name}{' with rays' if rays else ''}: {table[name, rays, True]:.3f} from the truth, "
-                       f"{table[name, rays, False]:.3f} without visibility"
-                       for name, rays, against in table if against))
-    assert table["multires", True, True] < 0.5 * table["multires", False, True]
-    assert table["multires", False, False] < 0.5 * table["multires", False, True]
-    assert table["vpl", True, True] < table["multires", True, True]
-    assert table["gather", False, False] < table["full sum", False, False]  # four times as many texels
-    assert table["full sum", False, False] < table["multires", False, False] < 2 * table["full sum", False, False]
-    assert table["gather within 0.3 maps", False, True] > 2 * table["multires", False, True]
+    """Picture: plain RMSE over all pixels and channels over the mean of the truth, with and without visibility."""
+    light = of(MultiresSettings, lights=1024)
+    found = _errors(box, {
+        "multires": multires(box, light),
+        "multires with rays": multires(box, replaced(light, {"visibility": "rays"})),
+        "every pixel": every_pixel(box, light),
+        "vpl": vpl(box, of(VplSettings, lights=1024, pattern="grid")),
+        "every texel": gather(box, of(GatherSettings, samples=4096, radius=WHOLE_MAP, interpolation="none")),
+        "gather": gather(box, of(GatherSettings, interpolation="none"))})
+    evidence("; ".join(f"{name} {shadowed:.3f} from the truth, {bare:.3f} from that without visibility"
+                       for name, (shadowed, bare) in found.items()))
+    shadowed, bare = ({name: errors[k] for name, errors in found.items()} for k in (0, 1))
+    for name in ("multires", "every pixel", "every texel"):
+        assert bare[name] < 0.75 * shadowed[name]
+    assert shadowed["multires with rays"] < 0.9 * min(bare["multires with rays"], shadowed["multires"])
+    assert bare["every texel"] < 0.8 * bare["every pixel"]  # four times as many lights
+    assert bare["every pixel"] < bare["multires"] < 1.3 * bare["every pixel"]
+    assert bare["gather"] > 3 * bare["multires"]
+
+
+@pytest.mark.filterwarnings("ignore:.* of the indirect light")
+@pytest.mark.feature("AMS-18")
+def test_more_lights_come_nearer_to_the_truth_without_visibility(box, evidence):
+    """Picture: plain RMSE over the mean; what subsplats add is beside what lights leave."""
+    found = _errors(box, {(name, n): render(box, of(MultiresSettings, lights=n)) for n in (256, 1024, 4096)
+                          for name, render in (("multires", multires), ("every pixel", every_pixel))})
+    evidence("; ".join(f"{name}, {n} lights {bare:.3f}" for (name, n), (_, bare) in found.items()))
+    for name in ("multires", "every pixel"):
+        few, some, many = (found[name, n][1] for n in (256, 1024, 4096))
+        assert many < 0.8 * some < 0.8 * 0.8 * few
+
+
+def _errors(frame, pictures):
+    """Return for each picture the RMSE over the mean: to the truth, and to that without visibility."""
+    covered = frame.gbuffer.covered
+    truths = [trace_truth(frame, TruthSettings(samples=24 * 16, visibility=rays)).mean[:, covered]
+              for rays in (True, False)]
+    return {name: tuple(math.sqrt(((picture[:, covered] - truth) ** 2).mean()) / truth.mean() for truth in truths)
+            for name, picture in pictures.items()}

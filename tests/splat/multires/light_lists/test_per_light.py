@@ -29,7 +29,6 @@ from tests.splat.multires.choices import by_irradiance, unclamped
 TWIN = 1e-12  # float64 against unit vectors and printed terms; a lobe of exponent 20 takes 20 roundings to its power
 ROUNDING = 2.0**-24  # float32; a compensated sum of terms >= 0 is off by 2 of these, lobes are added to it at last
 WIDENING = 0.8  # m, of lobes in float64
-COUNTS = 0.25  # of Table 1's shares: of another scene, with the threshold that comes nearest
 
 
 class FakeBuffer(SimpleNamespace):
@@ -260,23 +259,28 @@ def buddha():
 
 
 @pytest.mark.feature("AMS-08")
-def test_counts_are_those_of_table_1(buddha, evidence):
-    """Property and paper: 256 N subsplats at 16^2, then 0.46, 0.21, 0.10 of the whole grid, growing by 1.8 to 2.0."""
-    printed = np.array([0.46, 0.21, 0.10])
+@pytest.mark.parametrize("threshold", [0.01, 0.02, 0.05])
+def test_counts_have_the_shape_of_table_1(buddha, threshold, evidence):
+    """Paper: 256 N subsplats at 16^2; then lines are refined (2 a level), not areas (4), for all N.
+
+    The paper gives no threshold, and its scene is another, so the share of the grid is told beside the printed one.
+    """
+    growths = []
     for count in (64, 144, 256):
         lights = choose_pixel_lights(buddha.rsms, count=count, pattern="grid")
         rows = []
         for finest in (3, 2, 1, 0):
-            settings = by_irradiance(clamp="geometry", clamp_value=25.0, subsplats_threshold=0.02, finest=finest)
+            settings = by_irradiance(clamp="geometry", clamp_value=25.0, subsplats_threshold=threshold, finest=finest)
             rows.append(int(counted(buddha.gbuffer, lights, settings).sum()))
         number = lights.position.shape[1]
-        assert rows[0] == 256 * number
+        growths.append(np.divide(rows[1:], rows[:-1]))
         share = np.array(rows[1:]) / (number * 256 * 4.0 ** np.arange(1, 4))
-        growth = np.divide(rows[1:], rows[:-1])
-        assert ((growth > 1.6) & (growth < 2.2)).all()
-        np.testing.assert_allclose(share, printed, rtol=COUNTS)
-        evidence(f"{number} lights: {rows} subsplats at 16^2 to 128^2, {np.round(share, 3)} of the grid (printed "
-                 f"{printed}), growth {np.round(growth, 2)} (printed 1.84, 1.83, 1.91)")
+        evidence(f"T {threshold:g}, {number} lights: {rows} subsplats at 16^2 to 128^2, growth "
+                 f"{np.round(growths[-1], 2)} (printed 1.84, 1.83, 1.91), {np.round(share, 2)} of the grid (printed "
+                 "0.46, 0.21, 0.10)")
+        assert rows[0] == 256 * number
+    assert 4 / 3 < np.min(growths) < np.max(growths) < 2.5
+    assert np.ptp(growths, axis=0).max() < 0.05  # Table 1's columns
 
 
 @pytest.mark.feature("AMS-08")

@@ -31,8 +31,8 @@ def box():
 def every_pixel(frame, settings):
     buffer = frame.gbuffer
     receivers = Receivers(*buffer.resolve("position", "normal", "covered"))
-    pairs = settings.effective_pairs
-    return irradiance(receivers, choose_lights(frame, settings.lights), pairs, footprints(frame, settings.lights, pairs))
+    lights, pairs = choose_lights(frame, settings.lights), settings.effective_pairs
+    return irradiance(receivers, lights, pairs, footprints(frame, settings.lights, pairs))
 
 
 def tent(picture, covered):

@@ -43,7 +43,7 @@ def multires(frame: "Frame", settings: MultiresSettings) -> Array:
         Indirect irradiance, W/m^2, linear RGB, without visibility unless by rays.
     """
     lights = choose_lights(frame, settings.lights)  # Sec. 3.1
-    footprint = _footprints(frame, lights, settings)
+    footprint = light_areas(frame, lights, settings)
     if not settings.supersampled:
         return _irradiance(frame, frame.gbuffer, lights, footprint, settings)
     double = _doubled(frame)  # Sec. 4: rendered at 2048^2 for 1024^2
@@ -120,8 +120,23 @@ def _evaluated(
     return values
 
 
-def _footprints(frame: "Frame", lights: "PixelLights", settings: MultiresSettings) -> Array | None:
-    """Return the footprint of each light, m^2: exact, or as the authors' demo has it."""
+def light_areas(frame: "Frame", lights: "PixelLights", settings: MultiresSettings) -> Array | None:
+    """Return the surface that each light stands for, where the clamp needs it: exact, or as the authors' demo has it.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene and its buffers.
+    lights : PixelLights
+        The lights.
+    settings : MultiresSettings
+        What they were chosen by, and the clamp.
+
+    Returns
+    -------
+    (N,) ndarray or None
+        Area, m^2.
+    """
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings.lights, settings.effective_pairs)
     return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings.lights))

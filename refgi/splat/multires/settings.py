@@ -186,7 +186,7 @@ class MultiresSettings(Settings):
         clamp = self.effective_pairs.clamp
         chosen = clamp and clamp.name()
         expect_footprints(self.lights, self.effective_pairs)
-        if self._has_shadow_rays:
+        if self.shadow_rays is not None:
             bare = PairSettings(clamp=self.pairs.clamp)
             expect(self.pairs == bare, "pairs", "defaults with visibility 'rays'", self.pairs)
             expect(clamp is None, "pairs.clamp", "none with visibility 'rays'", chosen)
@@ -203,18 +203,19 @@ class MultiresSettings(Settings):
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return self.lights.traces_rays or self._has_shadow_rays
+        return self.lights.traces_rays or self.shadow_rays is not None
 
     @property
-    def _has_shadow_rays(self) -> bool:
-        return isinstance(self.subsplats, ByGeometry) and self.subsplats.visibility is not None
+    def shadow_rays(self) -> Rays | None:
+        """How subsplats find by rays which lights they see, if they do."""
+        return self.subsplats.visibility if isinstance(self.subsplats, ByGeometry) else None
 
     @property
     def effective_pairs(self) -> PairSettings:
         """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints or rays are traced."""
         if not isinstance(self.pairs.clamp, AutoClamp):
             return self.pairs
-        bare = not self.lights.has_footprints or self._has_shadow_rays
+        bare = not self.lights.has_footprints or self.shadow_rays is not None
         return dataclasses.replace(self.pairs, clamp=None if bare else DiscClamp())
 
 

@@ -15,7 +15,7 @@ from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.settings import changed, leaves, of, replaced
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
 from refgi.splat.multires import ByError
-from refgi.splat.multires.multires import _footprints, _halved
+from refgi.splat.multires.multires import _halved, light_areas
 from refgi.splat.multires.refinement.grid import representatives
 from refgi.splat.multires.settings import PRESETS
 from refgi.stages import observe
@@ -198,7 +198,7 @@ def test_the_demos_disc_counts_the_lights_of_each_map(box):
     for index, (source, count) in enumerate(zip(at.scene.lights, (121, 150), strict=True)):
         here = lights.map_index == index
         square = ((lights.position[:, here].T - np.asarray(source.position)) ** 2).sum(axis=1)
-        np.testing.assert_allclose(_footprints(at, lights, settings)[here], math.pi * square / (1.5 * count), rtol=1e-6)
+        np.testing.assert_allclose(light_areas(at, lights, settings)[here], math.pi * square / (1.5 * count), rtol=1e-6)
 
 
 def test_cells_of_background_are_no_subsplats(box):

@@ -100,6 +100,7 @@ SCENES = {
     "lamps": lambda: room(*LAMPS),
     "smooth": lambda: room(*LAMPS, smooth=True),
     "glass": lambda: room(*LAMPS, glass=True),
+    "smooth glass": lambda: room(*LAMPS, smooth=True, glass=True),
     "spot": lambda: room(LAMPS[0]),
 }
 

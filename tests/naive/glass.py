@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tests.naive.openness import LIFT
 from tests.naive.refraction import bend
 from tests.naive.surface import face_normal, hit_of, unit
 
@@ -12,7 +13,7 @@ def exit_of(scene, lamp, front, mode):
     Result: position, outward normal, direction and the share that passes.
     """
     direction = direction_of(lamp, front)
-    hit = hit_of(scene, front - direction * 1e-6, direction)
+    hit = hit_of(scene, front - LIFT * direction, direction)
     index = hit.material.ior
     if face_normal(scene.geometry, hit.face) @ direction > 0:  # the lamp is inside
         out, share = bend(direction, hit.outward, index, 1.0)
@@ -21,7 +22,7 @@ def exit_of(scene, lamp, front, mode):
     if mode == "back_face":  # as published: the front is crossed unbent
         inside, left = direction, behind(scene, lamp, hit, direction)
     else:
-        left = hit_of(scene, hit.position + 1e-6 * inside, inside)
+        left = hit_of(scene, hit.position + LIFT * inside, inside)
     if left is None or not left.material.ior or face_normal(scene.geometry, left.face) @ inside < 0:
         return None
     out, share = bend(inside, left.outward, index, 1.0)
@@ -33,7 +34,7 @@ def behind(scene, lamp, front, direction):
     geometry = scene.geometry
     faces = [face for face in range(len(geometry.faces)) if not scene.materials[geometry.material_of_face[face]].ior
              or looks_away(geometry, face, lamp)]
-    return hit_of(scene, front.position + 1e-6 * direction, direction, faces)
+    return hit_of(scene, front.position + LIFT * direction, direction, faces)
 
 
 def looks_away(geometry, face, lamp):

@@ -76,7 +76,7 @@ def raw(rsm):
     lobe_flux, lobe_axis, lobe_exponent = (
         (dark, dark, dark[0]) if rsm.lobe_flux is None else (rsm.lobe_flux, rsm.lobe_axis, rsm.lobe_exponent))
     return LightMap(rsm.light, rsm.flux.shape[2], rows(rsm.position), rows(rsm.normal), rows(rsm.flux),
-                    rows(lobe_flux), rows(lobe_axis), np.array(lobe_exponent).ravel(), rsm.solid_angle.ravel())
+                    rows(lobe_flux), rows(lobe_axis), np.array(lobe_exponent).ravel(), rsm.solid_angle.ravel().copy())
 
 
 def send_through_glass(here, scene, triangle, incident, refraction):
@@ -93,6 +93,8 @@ def send_through_glass(here, scene, triangle, incident, refraction):
 def equalise(here, incident):
     """As printed: all texels that light falls on subtend the same solid angle, together what they did."""
     reached = incident.any(axis=1)
-    factor = here.solid_angle[reached].mean() / here.solid_angle[reached]
-    here.flux[reached] *= factor[:, None]
-    here.lobe_flux[reached] *= factor[:, None]
+    mean = here.solid_angle[reached].mean()
+    factor = mean / here.solid_angle[reached][:, None]
+    here.flux[reached] *= factor
+    here.lobe_flux[reached] *= factor
+    here.solid_angle[reached] = mean

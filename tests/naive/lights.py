@@ -81,12 +81,17 @@ def light_of_texel(here, index, texel, weight, share, source):
 
 
 def light_of_cell(here, index, texel, cell, share, source):
-    """Sum a cell at the chosen texel, or if that is dark at the cell's nearest with flux; as printed their mean."""
+    """Sum a cell at the chosen texel, or if that is dark at the cell's nearest with flux; as printed their mean.
+
+    A texel without a lobe reflects diffusely what the cell's lobes do.
+    """
     factor = share / here.texels if "sii_no_tn" in source.as_published else 1.0
     bright = [other for other in cell if any(here.flux[other]) or any(here.lobe_flux[other])]
     at = min(bright, key=lambda other: (square_between(here, texel, other), other)) if bright else texel
-    return Light(here.position[at], here.normal[at], factor * here.flux[cell].sum(axis=0),
-                 factor * here.lobe_flux[cell].sum(axis=0), here.lobe_axis[at], here.lobe_exponent[at],
+    diffuse, glossy = (factor * plane[cell].sum(axis=0) for plane in (here.flux, here.lobe_flux))
+    if not any(here.lobe_flux[at]):
+        diffuse, glossy = diffuse + glossy, np.zeros(3)
+    return Light(here.position[at], here.normal[at], diffuse, glossy, here.lobe_axis[at], here.lobe_exponent[at],
                  here.area[cell].sum(), index, at)
 
 

@@ -5,6 +5,7 @@ point i turns the set about its normal and shifts it in sin^2 of the polar angle
 """
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from tests.naive.draws import mix32
 from tests.naive.truth import nearest_hits
 
 WORD = 2**32
-LIFT = 1e-6  # m: a ray starts this far off its surface
+LIFT = 1e-8  # m: a ray starts this far off its surface
 
 
 def openness(geometry, position, normal, index, radius, rays, seed):
@@ -46,6 +47,7 @@ def basis(n):
             np.array([n[0] * n[1] * scale, sign + n[1] * n[1] * scale, -n[1]]))
 
 
+@cache
 def sobol_owen(index, dimension, seed):
     """Coordinate 0 or 1 of point `index`: shuffled by a scramble of its index, then scrambled itself (Burley 2020)."""
     key = mix32(seed ^ mix32(0x9E3779B9))

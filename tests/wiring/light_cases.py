@@ -7,6 +7,7 @@ from tests.wiring.cases import Case
 
 # 14, 13 and 13 of three lamps, which the grid rounds to 16, 6 (one on each face) and 16
 BASE = {"count": 40}
+LONG_RAYS = {"openness.radius": 1.0}  # the default's leave most lights open
 WARP_A, WARP_B = ({"source.warp": name, "source.warp.levels": 4} for name in "AB")
 
 
@@ -50,15 +51,32 @@ LIGHT_CASES = {
     "without T/N": Case({"source.as_published": frozenset({"sii_no_tn"})}),
     "cells without T/N": Case({"source.as_published": frozenset({"sii_no_tn"})}, {"source.filtered": True}),
     "equal solid angles": Case({"source.as_published": frozenset({"equal_solid_angle"})}),
+    "equal solid angles behind glass": Case({"source.as_published": frozenset({"equal_solid_angle"})}, {"count": 200},
+                                            scene="glass"),
+    "equal solid angles behind both interfaces": Case(
+        {"source.as_published": frozenset({"equal_solid_angle"})},
+        {"count": 200, "source.refraction": "two_interface"}, scene="glass"),
+    "cells behind glass": Case({"source.filtered": True}, {"count": 200}, scene="glass"),
+    "peaks behind glass": Case({"source.warp.importance": "peak"}, WARP_A, scene="glass"),
     "light paths": Case({"source": "walk"}),
     "three bounces": Case({"source.bounces": 3}, {"source": "walk"}),
     "shifted paths": Case({"seed": 5}, {"source": "walk", "source.bounces": 2}),
-    "scaled flux": Case({"openness.flux": "scale"}),
+    "scaled flux": Case({"openness.flux": "scale"}, {"count": 200}),
     "scaled paths": Case({"openness.flux": "scale"}, {"source": "walk", "source.bounces": 2}),
-    "roulette": Case({"openness.flux": "roulette"}),
-    "roulette by another seed": Case({"seed": 2}, {"openness.flux": "roulette"}),
+    "roulette": Case({"openness.flux": "roulette"}, {**LONG_RAYS, "count": 200}),
+    "roulette by another seed": Case({"seed": 2}, {**LONG_RAYS, "count": 200, "openness.flux": "roulette"}),
+    "roulette of paths": Case({"openness.flux": "roulette"}, {**LONG_RAYS, "source": "walk"}),
     "long rays": Case({"openness.radius": 1.0}, {"openness.flux": "scale"}),
-    "few rays": Case({"openness.rays": 5}, {"openness.flux": "scale", "openness.radius": 1.0}),
-    "a higher floor": Case({"openness.floor": 0.6}, {"openness.flux": "roulette"}),
+    "few rays": Case({"openness.rays": 5}, {**LONG_RAYS, "openness.flux": "scale"}),
+    "few rays of importance": Case({"openness.rays": 5},
+                                   {**WARP_A, **LONG_RAYS, "source.warp.importance": "openness"}),
+    "long rays of importance": Case({"openness.radius": 1.0}, {**WARP_A, "source.warp.importance": "openness"}),
+    "a higher floor": Case({"openness.floor": 0.6}, {**LONG_RAYS, "openness.flux": "roulette"}),
+    "scaled flux behind glass": Case({"openness.flux": "scale"}, {**LONG_RAYS, "count": 200}, scene="glass"),
+    "scaled flux of a smooth ball": Case({"openness.flux": "scale"}, {**LONG_RAYS, "count": 200}, scene="smooth"),
+    "a smooth ball": Case({"count": 200}, scene="smooth"),
+    "light paths on a smooth ball": Case({"source.bounces": 3}, {"source": "walk", "count": 100, "seed": 4},
+                                         scene="smooth"),
+    "light paths to glass": Case({"source.bounces": 2}, {"source": "walk", "count": 100}, scene="glass"),
     "a higher floor of importance": Case({"openness.floor": 0.6}, {**WARP_A, "source.warp.importance": "openness"}),
 }

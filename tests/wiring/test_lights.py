@@ -14,10 +14,14 @@ from tests.naive.lights import pixel_lights
 from tests.wiring.cases import uncovered
 from tests.wiring.light_cases import BASE, LIGHT_CASES
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 EXACT = 1e-9  # of the largest: sums of some thousand float64 numbers in another order
-EMBREE = 1e-5  # of the largest: rays of light paths, and those within glass, are float32
+# Embree's rays are float32 and start 1e-6 m off a surface: three bounces on walls and a ball put places and directions
+# 2e-5 off, one way within glass 1e-7, and with it what Fresnel's law lets through and the footprint
+PATHS, WITHIN_GLASS = 1e-4, 1e-6
 SHOWS = 1e-3  # of the largest: what a setting changes at least
 FOOTPRINTS = of(PairSettings, clamp="disc")  # a clamp that needs them
+PLACES = ("position", "normal", "lobe_axis")
 FIELDS = ("position", "normal", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")
 
 
@@ -33,7 +37,7 @@ def test_the_lights_are_those_of_the_twin(name):
     assert got.keys() == expected.keys()
     for field, values in expected.items():
         assert got[field].shape == values.shape, field
-        assert apart(got[field], values) <= (EMBREE if traces_bent_rays(settings) else EXACT), field
+        assert apart(got[field], values) <= tolerance(field, settings), field
 
 
 @pytest.mark.parametrize("name", LIGHT_CASES)
@@ -78,15 +82,19 @@ def by_the_twin(case, settings):
     return {field: np.array([getattr(light, field) for light in lights]).T for field in fields}
 
 
-def traces_bent_rays(settings):
-    """Whether places of lights are found by float32 rays; those of openness give counts alone."""
-    refraction = getattr(settings.source, "refraction", None)
-    return settings.source.name() == "walk" or (refraction is not None and refraction.name() == "two_interface")
+def tolerance(field, settings):
+    """Return how far a field may be off, as a share of its largest value."""
+    if settings.source.name() == "walk":
+        return PATHS if field in PLACES else EXACT
+    refraction = settings.source.refraction
+    traced = refraction is not None and refraction.name() == "two_interface"
+    return WITHIN_GLASS if traced and field in (*PLACES, "lobe_flux", "footprint") else EXACT
 
 
 def apart(got, expected):
-    """Return the largest difference, as a share of the largest value."""
-    return np.abs(got - expected).max(initial=0) / max(np.abs(expected).max(initial=0), 1e-300)
+    """Return the largest difference, as a share of the largest value of both."""
+    largest = max(np.abs(values).max(initial=0) for values in (got, expected))
+    return np.abs(got - expected).max(initial=0) / largest if largest else 0.0
 
 
 def differ(lights, others):

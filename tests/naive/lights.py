@@ -39,22 +39,27 @@ def pixel_lights(frame, arriving, settings):
     if settings.source.name() == "walk":
         found = [Light(*vertex) for vertex in walk(frame.scene, settings.count, settings.source.bounces, settings.seed)]
     else:
-        maps = maps_of(frame, arriving, settings.source)
-        shares = [share_of(settings, index, maps) for index in range(len(maps))]
-        found = [light for index, here in enumerate(maps)
-                 for light in lights_of_map(here, index, shares[index], frame, settings)]
+        found = [light for index, here in enumerate(maps_of(frame, arriving, settings.source))
+                 for light in lights_of_map(here, index, share_of(settings, index, frame.rsms), frame, settings)]
     lit = [light for light in found if any(light.flux) or any(light.lobe_flux)]
     return in_the_open(lit, frame, settings)
 
 
-def share_of(settings, index, maps):
+def drawn(frame, settings):
+    """Return N over all lamps, draws without flux included."""
+    if settings.source.name() == "walk":
+        return settings.count * settings.source.bounces
+    return sum(share_of(settings, index, frame.rsms) for index in range(len(frame.rsms)))
+
+
+def share_of(settings, index, rsms):
     """Return N of one map: an equal share, the first ones one more; of the grid the nearest k n^2, all its texels."""
-    share = settings.count // len(maps) + (index < settings.count % len(maps))
-    stacked = maps[index].stacked
+    share = settings.count // len(rsms) + (index < settings.count % len(rsms))
+    _, height, width = rsms[index].flux.shape
     if settings.source.pattern == "all":
-        return maps[index].texels
+        return height * width
     if settings.source.pattern == "grid":
-        return min((stacked * n * n for n in range(1, share + 2)), key=lambda cells: abs(cells - share))
+        return min((height // width * n * n for n in range(1, share + 2)), key=lambda cells: abs(cells - share))
     return share
 
 
@@ -62,14 +67,15 @@ def lights_of_map(here, index, share, frame, settings):
     """Return the N lights of one map, those without flux included."""
     source = settings.source
     if source.warp is None:
-        drawn = [(texel, 1.0) for texel in texels_of(here, index, share, settings)]
+        places = [(texel, 1.0) for texel in texels_of(here, index, share, settings)]
     else:
-        drawn = warped_texels(here, index, share, frame, settings)
+        places = warped_texels(here, index, share, frame, settings)
     if source.filtered:
-        cells = cells_of(here, drawn, share, on_grid=source.pattern == "grid" and source.warp is None)
+        on_grid = source.pattern == "grid" and source.warp is None
+        cells = cells_of(here, [texel for texel, _ in places], share, on_grid=on_grid)
         return [light_of_cell(here, index, texel, cell, share, source)
-                for (texel, _), cell in zip(drawn, cells, strict=True)]
-    return [light_of_texel(here, index, texel, weight, share, source) for texel, weight in drawn]
+                for (texel, _), cell in zip(places, cells, strict=True)]
+    return [light_of_texel(here, index, texel, weight, share, source) for texel, weight in places]
 
 
 def light_of_texel(here, index, texel, weight, share, source):
@@ -101,9 +107,8 @@ def square_between(here, one, other):
     return (row - row_there) ** 2 + (column - column_there) ** 2
 
 
-def cells_of(here, drawn, share, *, on_grid):
+def cells_of(here, chosen, share, *, on_grid):
     """Return the texels of each light's cell: those centres in it, or those nearest to it on its own stacked map."""
-    chosen = [texel for texel, _ in drawn]
     cells = [[] for _ in chosen]
     n, size = math.isqrt(share // here.stacked), here.width * here.width
     for texel in range(here.texels):
@@ -149,19 +154,19 @@ def texel_at(here, u, v):
 
 def warped_texels(here, index, share, frame, settings):
     """Return the warped pattern's texels and weights; v chooses the stacked map first."""
-    chosen = settings.source.warp
+    how = settings.source.warp
     importance = importance_of(here, frame, settings).reshape(here.stacked, here.width, here.width)
     sums = [pyramid(layer) for layer in importance]
-    levels = min(chosen.levels, len(sums[0]) - 1)
-    drawn = []
+    levels = min(how.levels, len(sums[0]) - 1)
+    places = []
     for u, v in points_of(here, index, share, settings):
         layer, v, w = layer_of(v, importance.sum(axis=(1, 2)))
-        u, v, factor = warp(u, v, sums[layer], levels, chosen.name())
-        drawn.append((texel_at(here, u, (layer + v) / here.stacked), w * factor))
-    if chosen.renormalise_weights:
-        total = sum(weight for _, weight in drawn)
-        drawn = [(texel, weight * share / total) for texel, weight in drawn]
-    return drawn
+        u, v, factor = warp(u, v, sums[layer], levels, how.name())
+        places.append((texel_at(here, u, (layer + v) / here.stacked), w * factor))
+    if how.renormalise_weights:
+        total = sum(weight for _, weight in places)
+        places = [(texel, weight * share / total) for texel, weight in places]
+    return places
 
 
 def layer_of(v, sums):

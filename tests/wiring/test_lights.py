@@ -10,7 +10,7 @@ from refgi.lights.settings import LightSettings
 from refgi.pairs.settings import PairSettings
 from refgi.rsm import incident_flux
 from refgi.settings import of
-from tests.naive.lights import pixel_lights
+from tests.naive.lights import drawn, pixel_lights
 from tests.wiring.cases import uncovered
 from tests.wiring.light_cases import BASE, LIGHT_CASES
 
@@ -36,7 +36,7 @@ def test_the_lights_are_those_of_the_twin(name):
     got, expected = chosen(case, settings), by_the_twin(case, settings)
     assert got.keys() == expected.keys()
     for field, values in expected.items():
-        assert got[field].shape == values.shape, field
+        assert np.shape(got[field]) == values.shape, field
         assert apart(got[field], values) <= tolerance(field, settings), field
 
 
@@ -63,7 +63,7 @@ def chosen(case, settings):
     """Return the planes of the lights that the method has, and their footprints."""
     frame, _ = frame_of(*frame_key(case))
     lights = choose_lights(frame, settings)
-    planes = {field: getattr(lights, field) for field in FIELDS}
+    planes = {field: getattr(lights, field) for field in (*FIELDS, "drawn")}
     if lights.lobe_flux is None:
         dark = np.zeros_like(lights.flux)
         planes |= {"lobe_flux": dark, "lobe_axis": dark, "lobe_exponent": dark[0]}
@@ -76,10 +76,12 @@ def chosen(case, settings):
 
 def by_the_twin(case, settings):
     """Return the same planes from the twin."""
-    lights = pixel_lights(*frame_of(*frame_key(case)), settings)
+    frame, arriving = frame_of(*frame_key(case))
+    lights = pixel_lights(frame, arriving, settings)
     fields = [*FIELDS, *(("texel", "map_index") if settings.source.name() == "rsm" else ()),
               *(("footprint",) if settings.has_footprints else ())]
-    return {field: np.array([getattr(light, field) for light in lights]).T for field in fields}
+    planes = {field: np.array([getattr(light, field) for light in lights]).T for field in fields}
+    return planes | {"drawn": np.array(drawn(frame, settings))}
 
 
 def tolerance(field, settings):

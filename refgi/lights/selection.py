@@ -62,15 +62,15 @@ def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
     """
     from refgi.lights.refraction import refracted
 
-    equal = "equal_solid_angle" in settings.as_published
-    rsms = tuple(map(with_equal_solid_angles, frame.rsms)) if equal else frame.rsms
-    if settings.refraction is None:
-        return rsms
-    mode: Any = settings.refraction.name()
-    traced = mode == "two_interface" and frame.materials.ior.any()
-    tracer = frame.tracer if traced else None
-    return tuple(refracted(rsm, frame.scene.geometry, frame.materials, mode, settings.refraction.exponent,
-                           tracer=tracer) for rsm in rsms)
+    rsms = frame.rsms
+    if settings.refraction is not None:
+        mode: Any = settings.refraction.name()
+        traced = mode == "two_interface" and frame.materials.ior.any()
+        tracer = frame.tracer if traced else None
+        rsms = tuple(refracted(rsm, frame.scene.geometry, frame.materials, mode, settings.refraction.exponent,
+                               tracer=tracer) for rsm in rsms)
+    # after refraction: what leaves glass has the solid angle of its texel too
+    return tuple(map(with_equal_solid_angles, rsms)) if "equal_solid_angle" in settings.as_published else rsms
 
 
 def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettings) -> list[Array] | None:

@@ -80,6 +80,13 @@ def room(*lights, smooth=False, glass=False):
     return Scene("wiring", geometry, materials, VIEW, lights)
 
 
+def painted(scene):
+    """The scene with reflectances on its glass, which reflects nothing all the same."""
+    return dataclasses.replace(scene, materials=tuple(
+        dataclasses.replace(one, diffuse=(0.3, 0.4, 0.5), specular=(0.2, 0.2, 0.1), exponent=9.0) if one.ior else one
+        for one in scene.materials))
+
+
 def ball(center, radius, material):
     """An octahedron's eight faces cut in four each, pushed out to a sphere."""
     axes = np.concatenate([np.eye(3), -np.eye(3)])
@@ -100,6 +107,8 @@ SCENES = {
     "lamps": lambda: room(*LAMPS),
     "smooth": lambda: room(*LAMPS, smooth=True),
     "glass": lambda: room(*LAMPS, glass=True),
+    "smooth glass": lambda: room(*LAMPS, smooth=True, glass=True),
+    "painted glass": lambda: painted(room(*LAMPS, glass=True)),
     "spot": lambda: room(LAMPS[0]),
 }
 

@@ -10,15 +10,23 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.lights.selection import light_footprints, pixel_lights
 from refgi.lights.settings import LightSettings
-from refgi.scene import SpotLight, load_scene
+from refgi.scene import Camera, DirectionalLight, Scene, SpotLight, load_scene, merge
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
 from refgi.splat.sii import METHOD
 from refgi.stages import observe
+from tests import lamps
+from tests.form_factors import polygon_form_factor
+from tests.truth.scenes import rectangle
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 ALL = of(SiiSettings, pattern="all")  # the sum without a cut
+FLOOR = [(0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1)]
+CELLS = 2e-3  # of the brightest pixel: the midpoint rule with 128 x 128 cells, the nearest of them 5 sides away
+DRAWS = 150
+STANDARD_ERRORS = 4.0  # of a mean: one in 16,000 means of unbiased estimates is farther off
+TELLING = 0.08  # largest standard error: another map's share is off by a third and more
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +73,23 @@ def test_irradiance_does_not_depend_on_the_number_of_lights(plates, evidence):
         assert abs(runs.mean() - reference) < 4 * error
         found.append(f"N = {count}: {runs.mean() / reference - 1:+.2%} +- {error / reference:.2%}")
     evidence("mean of 200 random sets against all texels: " + ", ".join(found))
+
+
+@pytest.mark.feature("SII-13")
+@pytest.mark.parametrize("how", [{"pattern": "random"}, {"pattern": "random", "warp": "A", "warp_levels": 2}], ids=str)
+def test_no_lamps_light_depends_on_the_number_of_lights(how, evidence):
+    """T/N is each map's own: three lamps of unlike kind and power, of one colour each, channel by channel."""
+    frame, clamp, found = lamps.corner(), {"clamp": "distance", "clamp_value": 0.2}, []
+    whole = sii(frame, of(SiiSettings, pattern="all", **clamp)).mean(axis=(1, 2))
+    for count in (6, 48, 384):
+        draws = np.array([sii(frame, of(SiiSettings, lights=count, seed=seed, **how, **clamp)).mean(axis=(1, 2))
+                          for seed in range(DRAWS)]) / whole
+        error = draws.std(axis=0, ddof=1) / math.sqrt(DRAWS)
+        assert (error < TELLING).all()
+        assert (np.abs(draws.mean(axis=0) - 1) < STANDARD_ERRORS * error).all()
+        found.append(f"N = {count}: " + ", ".join(f"{m - 1:+.1%} +- {e:.1%}"
+                                                  for m, e in zip(draws.mean(axis=0), error, strict=True)))
+    evidence("spot, point and sun, mean of many sets against all texels: " + "; ".join(found))
 
 
 @pytest.mark.feature("SII-10")
@@ -138,6 +163,42 @@ def test_clamps_and_offset_on_a_scene(box, evidence):
             assert (got <= plain * (1 + 1e-5)).all()
         found.append(f"{how} max {got.max():.3g} mean {got.mean() / plain.mean() - 1:+.1%}")
     evidence(f"none max {plain.max():.3g}; " + "; ".join(found))
+
+
+@pytest.fixture(scope="module")
+def lit_floor():
+    """A floor of the unit square, evenly lit by a sun straight above, and the wall at its edge, which the eye sees."""
+    geometry, materials = merge([rectangle((0, 0, 1), (1, 0, 0), (0, 0, -1)), rectangle((0, 0, 1), (0, 0, -1), (0, 1, 0))])
+    scene = Scene("wall", geometry, materials, Camera((2.0, 0.6, 0.4), (0.0, 0.4, 0.5), (0.0, 1.0, 0.0), 0.6),
+                  (DirectionalLight((0.0, -1.0, 0.0), (3.0, 2.0, 1.0)),))
+    return Frame(scene, width=40, height=40, rsm_resolution=128, dtype=np.float64)
+
+
+def on_wall(frame, offset=0.0):
+    """Irradiance of the wall's pixels by the floor's form factor, the floor an offset lower, and where those are."""
+    wall = frame.gbuffer.covered & (frame.gbuffer.normal[0] > 0.5)
+    places = frame.gbuffer.position[:, wall].T + [0.0, offset, 0.0]
+    factors = [polygon_form_factor(place, (1, 0, 0), FLOOR) for place in places]
+    (sun,) = frame.scene.lights
+    return np.outer(np.array(frame.materials.diffuse[0]) * sun.irradiance, factors), wall
+
+
+@pytest.mark.feature("SII-27")
+@pytest.mark.parametrize("offset", [0.04, 0.1, 0.3])
+def test_the_map_of_the_bias_of_an_offset_is_that_of_a_lower_floor(lit_floor, offset, evidence):
+    """Closed form: lights moved back by d light the wall as a floor d lower; E is at most that at the wall's foot."""
+    exact, wall = on_wall(lit_floor)
+    bias = sii(lit_floor, replaced(ALL, {"offset": offset}))[:, wall] - exact
+    expected = on_wall(lit_floor, offset)[0] - exact
+    off = np.abs(bias - expected).max() / exact.max()
+    (sun,) = lit_floor.scene.lights
+    foot = polygon_form_factor((0, offset, 0.5), (1, 0, 0), FLOOR) * 0.6 * sun.irradiance[0]
+    largest = (exact + bias)[0].max()
+    assert off < CELLS
+    assert 0.8 * foot < largest <= foot * (1 + CELLS)
+    evidence(f"offset {offset} m: bias {bias.mean() / exact.mean():+.1%} of the wall's light, {bias.min() / exact.max():+.1%} "
+             f"to {bias.max() / exact.max():+.1%} of the brightest pixel; its map within {off:.0e} of the closed form; largest E "
+             f"{largest:.3f}, bound {foot:.3f} W/m^2")
 
 
 def test_footprints_are_the_lit_area(plates):

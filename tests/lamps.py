@@ -1,0 +1,27 @@
+"""Three lamps of one colour each: a channel of the picture is one lamp's light, and a share taken of another one shows.
+
+They are of three kinds and unequal strength; their maps have 1, 6 and 1 faces.
+"""
+
+import numpy as np
+
+from refgi.frame import Frame
+from refgi.scene import DirectionalLight, PointLight, Scene, SpotLight, merge
+from tests.truth.scenes import WHITE, rectangle
+from tests.wiring.cases import VIEW
+
+RED = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.4, 0.8, (4.0, 0.0, 0.0))
+GREEN = PointLight((0.2, 0.9, 0.3), (0.0, 0.25, 0.0))
+BLUE = DirectionalLight((-0.5, -0.9, -0.3), (0.0, 0.0, 0.9))
+LAMPS = (RED, GREEN, BLUE)
+
+
+def corner(*lamps, material=WHITE, floor=None, camera=VIEW, **options):
+    """Return a frame, in float64, of a corner with a plate before it, all of one material but perhaps the floor."""
+    geometry, materials = merge([
+        rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), floor or material),
+        rectangle((-1, 0, -1), (2, 0, 0), (0, 2, 0), material),
+        rectangle((-1, 0, 1), (0, 0, -2), (0, 2, 0), material),
+        rectangle((-0.4, 0.5, -0.1), (0.6, 0, 0), (0, 0, -0.5), material)])
+    scene = Scene("corner", geometry, materials, camera, lamps or LAMPS)
+    return Frame(scene, **{"width": 17, "height": 13, "rsm_resolution": 16, "dtype": np.float64} | options)

@@ -14,7 +14,7 @@ from tests.pairs import sets
 UP = np.array([[0.0], [0.0], [1.0]])
 FLOOR = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 RADIANCE = 1.0  # of every sender; a sender of area A has the flux pi A
-NEAREST = 0.03  # of the bound: the nearest of 400 places a factor of 1.02 apart, on the foot of the wall but for 1 mm
+NEAREST = 1e-3  # of the bound: the nearest of 400 places, a factor of 1.02 apart
 
 
 def floor_lights(points):
@@ -170,7 +170,7 @@ def test_one_light_gives_a_wall_beside_it_no_more_than_its_bound(how, most, evid
 
     Both are attained, at the foot of the wall where x = d / sqrt 3, and on the diagonal up to r = m.
     """
-    apart, above = (part.reshape(-1) for part in np.meshgrid(np.geomspace(1e-3, 1, 400), np.geomspace(1e-3, 1, 400)))
+    apart, above = (part.reshape(-1) for part in np.meshgrid(np.geomspace(1e-3, 1, 400), np.geomspace(1e-5, 1, 600)))
     at = np.stack([-apart, 0 * apart, above])
     light = sets.lights(np.zeros((3, 1)), UP, math.pi)
     largest = light_on(at, np.array([[1.0], [0.0], [0.0]]), light, **how).max()

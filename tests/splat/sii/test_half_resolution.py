@@ -14,8 +14,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # th
 
 QUARTER = 0.26  # of the pixels: blocks on the edge of the picture and of surfaces are not whole
 ROUNDING = 1e-12  # of the brightest pixel
-# RMSE over the mean at 96 x 80: light that bends within a pixel, near lights in corners and at edges
-LIMITS = {"cornell_box": 0.05, "stage": 0.05, "atrium:faces=20000": 0.05}
+# RMSE over the mean at 96 x 80: light that bends within a block, in corners and on columns that are a few pixels wide
+LIMITS = {"cornell_box": 0.08, "stage": 0.13, "atrium:faces=20000": 0.3}
 
 
 def wall(height, width, real=np.float64):
@@ -154,7 +154,7 @@ def test_nothing_bleeds_over_edges_or_from_the_background(evidence):
 def scene(request):
     """A scene's name, the picture at full and at half resolution and what both are seen on, in float64."""
     frame = Frame(load_scene(request.param), width=96, height=80, rsm_resolution=96, dtype=np.float64)
-    full, half = (sii(frame, of(SiiSettings, lights=96, clamp="disc", half_resolution=how)) for how in (False, True))
+    full, half = (sii(frame, of(SiiSettings, pattern="all", clamp="disc", half_resolution=how)) for how in (False, True))
     return request.param, full, half, Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
 
 

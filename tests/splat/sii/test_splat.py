@@ -310,7 +310,7 @@ def turned_to(receivers, place):
 def test_the_map_sums_to_the_fragments_that_are_drawn(evidence):
     """Each part of each light is drawn alone on receivers turned towards it: where it leaves light is a fragment."""
     frame = lamps.corner(material=Material("glossy", (0.5, 0.4, 0.3), (0.3, 0.4, 0.5), 12.0), width=40, height=30)
-    settings = of(SiiSettings, lights=60, cut_share=0.05, reference_length=0.4)
+    settings = of(SiiSettings, lights=60, cut_share=0.05, reference_length=2.0)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     lights = choose_lights(frame, settings.lights)
     counted = fragments(receivers, lights, settings)

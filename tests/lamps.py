@@ -3,6 +3,9 @@
 They are of three kinds and unequal strength; their maps have 1, 6 and 1 faces.
 """
 
+import dataclasses
+import math
+
 import numpy as np
 
 from refgi.frame import Frame
@@ -25,3 +28,8 @@ def corner(*lamps, material=WHITE, floor=None, camera=VIEW, **options):
         rectangle((-0.4, 0.5, -0.1), (0.6, 0, 0), (0, 0, -0.5), material)])
     scene = Scene("corner", geometry, materials, camera, lamps or LAMPS)
     return Frame(scene, **{"width": 17, "height": 13, "rsm_resolution": 16, "dtype": np.float64} | options)
+
+
+def seen_under(degrees):
+    """Return the camera with another vertical field of view."""
+    return dataclasses.replace(VIEW, vfov=math.radians(degrees))

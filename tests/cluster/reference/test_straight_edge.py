@@ -25,7 +25,7 @@ PROJECTED = {0.2: 0.05, 0.5: 0.05}
 # The map knows the edge to half a texel, 1/17 and 1/42 of the penumbra: 0.075 and 0.030 where the ramp of a disc is
 # steepest. Blockers off the axis lie deeper than the edge as well.
 STEP = {0.2: 0.10, 0.5: 0.05}  # from the ramp of a disc, which is 0.050 from that of the square
-SHIFT = 0.02  # cells: a shift by half a cell of 32 is 0.5, by half a texel of 256 0.7
+SHIFT = 0.02  # cells: a shift by half a cell of 32 is 0.5, by half a texel of 128 1.5
 GAPS = 0.012  # of V; where patches of unlike depth leave gaps
 # from the ramp of the square; the series adds its bias and ripple, and the mip map its levels: between texels it is a
 # tent twice as wide as at their border, which is where the first edge lies
@@ -103,7 +103,7 @@ def mean_excess(turn, delta=0.5):
         points, facing, exact, _ = receivers(delta, edge)
         geometry = scene(edge).geometry
         turned = dataclasses.replace(geometry, vertices=np.ascontiguousarray(geometry.vertices @ turn.T))
-        maps = shadow_maps(turned, areas, SETTINGS.maps, np.float64)
+        maps = shadow_maps(turned, areas, replaced(SETTINGS, {"maps_resolution": 128}).maps, np.float64)
         v = back_projection_visibility(areas, maps)(0, np.ascontiguousarray(turn @ points), facing)
         excess.append((v - exact)[(exact > 0.1) & (exact < 0.9)].mean())
     return float(np.mean(excess))

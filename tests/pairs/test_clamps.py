@@ -166,7 +166,7 @@ def test_offset_keeps_the_largest_irradiance_finite_and_costs_bias(evidence):
     ({"clamp": "distance", "clamp_value": 0.05}, 1 / 2 / 0.05**2), ({"clamp": "geometry", "clamp_value": 70.0}, 70.0),
 ], ids=str)
 def test_one_light_gives_a_wall_beside_it_no_more_than_its_bound(how, most, evidence):
-    """Closed form: x h / (x^2 + h^2)^2 with h >= d is at most 3 sqrt 3 / 16 d^2; r >= m leaves cos cos / m^2 <= 1/2 m^2.
+    """Closed form: x h / (x^2 + h^2)^2 with h >= d is at most 3 sqrt 3 / 16 d^2; r >= m leaves at most 1/2 m^2.
 
     Both are attained, at the foot of the wall where x = d / sqrt 3, and on the diagonal up to r = m.
     """

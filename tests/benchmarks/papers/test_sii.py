@@ -122,8 +122,8 @@ def test_what_rests_is_not_drawn_again(figures, evidence):
 @pytest.mark.feature("SII-29")
 def test_what_rests_saves_work_in_the_order_of_the_table(figures, evidence):
     """Table 1 counted by what is kept, not by the clock: all of it moving keeps least, all of it resting most."""
-    inside = {"nothing", "rsm.solid_angles"}  # the latter is asked for where a map is drawn anew, and alone is no map
-    both, light, camera, still = (set(row[-1].split(", ")) - inside for row in figures["table1"].tables[0].rows)
+    no_buffer = {"nothing", "rsm.solid_angles"}  # the latter is asked for only where a map is drawn anew
+    both, light, camera, still = (set(row[-1].split(", ")) - no_buffer for row in figures["table1"].tables[0].rows)
     assert both < light < still
     assert both < camera < still
     evidence("Table 1, stages kept with light and camera, light, camera, nothing moving: "

@@ -6,7 +6,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.half_resolution import _block_pixels, half_resolution
 
@@ -154,7 +154,8 @@ def test_nothing_bleeds_over_edges_or_from_the_background(evidence):
 def scene(request):
     """A scene's name, the picture at full and at half resolution and what both are seen on, in float64."""
     frame = Frame(load_scene(request.param), width=96, height=80, rsm_resolution=96, dtype=np.float64)
-    full, half = (sii(frame, of(SiiSettings, pattern="all", clamp="disc", half_resolution=how)) for how in (False, True))
+    settings = of(SiiSettings, pattern="all", clamp="disc")
+    full, half = (sii(frame, replaced(settings, {"half_resolution": how})) for how in (False, True))
     return request.param, full, half, Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
 
 

@@ -168,7 +168,8 @@ def test_clamps_and_offset_on_a_scene(box, evidence):
 @pytest.fixture(scope="module")
 def lit_floor():
     """A floor of the unit square, evenly lit by a sun straight above, and the wall at its edge, which the eye sees."""
-    geometry, materials = merge([rectangle((0, 0, 1), (1, 0, 0), (0, 0, -1)), rectangle((0, 0, 1), (0, 0, -1), (0, 1, 0))])
+    floor, wall = rectangle((0, 0, 1), (1, 0, 0), (0, 0, -1)), rectangle((0, 0, 1), (0, 0, -1), (0, 1, 0))
+    geometry, materials = merge([floor, wall])
     scene = Scene("wall", geometry, materials, Camera((2.0, 0.6, 0.4), (0.0, 0.4, 0.5), (0.0, 1.0, 0.0), 0.6),
                   (DirectionalLight((0.0, -1.0, 0.0), (3.0, 2.0, 1.0)),))
     return Frame(scene, width=40, height=40, rsm_resolution=128, dtype=np.float64)
@@ -177,7 +178,7 @@ def lit_floor():
 def on_wall(frame, offset=0.0):
     """Irradiance of the wall's pixels by the floor's form factor, the floor an offset lower, and where those are."""
     wall = frame.gbuffer.covered & (frame.gbuffer.normal[0] > 0.5)
-    places = frame.gbuffer.position[:, wall].T + [0.0, offset, 0.0]
+    places = frame.gbuffer.position[:, wall].T + np.array([0.0, offset, 0.0])
     factors = [polygon_form_factor(place, (1, 0, 0), FLOOR) for place in places]
     (sun,) = frame.scene.lights
     return np.outer(np.array(frame.materials.diffuse[0]) * sun.irradiance, factors), wall
@@ -196,9 +197,9 @@ def test_the_map_of_the_bias_of_an_offset_is_that_of_a_lower_floor(lit_floor, of
     largest = (exact + bias)[0].max()
     assert off < CELLS
     assert 0.8 * foot < largest <= foot * (1 + CELLS)
-    evidence(f"offset {offset} m: bias {bias.mean() / exact.mean():+.1%} of the wall's light, {bias.min() / exact.max():+.1%} "
-             f"to {bias.max() / exact.max():+.1%} of the brightest pixel; its map within {off:.0e} of the closed form; largest E "
-             f"{largest:.3f}, bound {foot:.3f} W/m^2")
+    evidence(f"offset {offset} m: bias {bias.mean() / exact.mean():+.1%} of the wall's light, pixel by pixel "
+             f"{bias.min() / exact.max():+.1%} to {bias.max() / exact.max():+.1%} of the brightest, within {off:.0e} of the "
+             f"closed form; largest E {largest:.3f}, bound {foot:.3f} W/m^2")
 
 
 def test_footprints_are_the_lit_area(plates):

@@ -326,8 +326,8 @@ def test_the_map_sums_to_the_fragments_that_are_drawn(evidence):
     np.testing.assert_array_equal(counted.of_light, of_light)
     pairs = 2 * lights.flux.shape[1] * np.count_nonzero(receivers.covered)
     assert 0.05 < drawn.sum() / pairs < 0.6
-    evidence(f"three lamps, {of_light.size} lights with lobes: the map's {counted.overdraw.sum()} are the {drawn.sum()} "
-             f"fragments drawn, pixel by pixel and light by light, of {pairs} pairs")
+    evidence(f"three lamps, {of_light.size} lights with lobes: the map's {counted.overdraw.sum()} are the "
+             f"{drawn.sum()} fragments drawn, pixel by pixel and light by light, of {pairs} pairs")
 
 
 @pytest.mark.parametrize("widening", [0.0, 0.7])

@@ -1,6 +1,5 @@
 """sii on whole scenes: closed forms, number and pattern of lights, filtering, presets."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -10,20 +9,16 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.lights.selection import light_footprints, pixel_lights
 from refgi.lights.settings import LightSettings
-from refgi.scene import Camera, DirectionalLight, Scene, SpotLight, load_scene, merge
+from refgi.scene import SpotLight, load_scene
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
 from refgi.splat.sii import METHOD
 from refgi.stages import observe
 from tests import lamps
-from tests.form_factors import polygon_form_factor
-from tests.truth.scenes import rectangle
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 ALL = of(SiiSettings, pattern="all")  # the sum without a cut
-FLOOR = [(0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1)]
-CELLS = 2e-3  # of the brightest pixel: the midpoint rule with 128 x 128 cells, the nearest of them 5 sides away
 DRAWS = 120
 STANDARD_ERRORS = 4.0  # of a mean: one in 16,000 means of unbiased estimates is farther off
 TELLING = 0.1  # largest standard error: another map's share is 6 times or a sixth of the own
@@ -121,33 +116,6 @@ def test_presets_come_nearer_to_the_sum_over_all_texels(box, evidence):
     evidence("RMSE / mean: " + ", ".join(f"{n} lights {e:.3f}" for n, e in zip(presets, errors, strict=True)))
 
 
-@pytest.mark.feature("SII-03")
-def test_filtered_flux_is_steadier_under_a_moving_light(box, evidence):
-    """The light turns by a quarter of a texel a step. A texel enters or leaves the grid's choice at once, a cell's
-    sum by little."""
-    scene, light = box.scene, box.scene.lights[0]
-    step = 2 * math.tan(light.outer_half_angle) / 128 / 4
-    means = {False: [], True: []}
-    for k in range(24):
-        turned = np.asarray(light.direction) / np.linalg.norm(light.direction) + [k * step, 0, 0]
-        moved = scene.with_lights(dataclasses.replace(light, direction=tuple(turned)))
-        frame = Frame(moved, width=16, height=16, rsm_resolution=128)
-        for filtered in means:
-            how = of(SiiSettings, lights=64, pattern="grid", filtered=filtered, clamp="distance", clamp_value=0.05)
-            means[filtered].append(sii(frame, how).mean(axis=(1, 2)))
-
-    def unsteady(values):
-        return float(np.diff(values, 2, axis=0).std() / np.mean(values))  # what is left of a smooth change: nothing
-
-    plain, steady = unsteady(means[False]), unsteady(means[True])
-    assert steady < plain / 2
-    sums = [pixel_lights(box.rsms, of(LightSettings, count=64, pattern="grid", filtered=True)).flux.sum(axis=1),
-            box.rsms[0].flux.sum(axis=(1, 2))]
-    np.testing.assert_allclose(*sums, rtol=1e-5)  # float32 sums
-    evidence(f"std of the second difference of E over 24 quarter-texel steps: {plain:.3%} unfiltered, "
-             f"{steady:.3%} filtered; flux sum kept")
-
-
 @pytest.mark.feature("SII-27")
 @pytest.mark.feature("REF-08")
 def test_clamps_and_offset_on_a_scene(box, evidence):
@@ -163,43 +131,6 @@ def test_clamps_and_offset_on_a_scene(box, evidence):
             assert (got <= plain * (1 + 1e-5)).all()
         found.append(f"{how} max {got.max():.3g} mean {got.mean() / plain.mean() - 1:+.1%}")
     evidence(f"none max {plain.max():.3g}; " + "; ".join(found))
-
-
-@pytest.fixture(scope="module")
-def lit_floor():
-    """A floor of the unit square, evenly lit by a sun straight above, and the wall at its edge, which the eye sees."""
-    floor, wall = rectangle((0, 0, 1), (1, 0, 0), (0, 0, -1)), rectangle((0, 0, 1), (0, 0, -1), (0, 1, 0))
-    geometry, materials = merge([floor, wall])
-    scene = Scene("wall", geometry, materials, Camera((2.0, 0.6, 0.4), (0.0, 0.4, 0.5), (0.0, 1.0, 0.0), 0.6),
-                  (DirectionalLight((0.0, -1.0, 0.0), (3.0, 2.0, 1.0)),))
-    return Frame(scene, width=40, height=40, rsm_resolution=128, dtype=np.float64)
-
-
-def on_wall(frame, offset=0.0):
-    """Irradiance of the wall's pixels by the floor's form factor, the floor an offset lower, and where those are."""
-    wall = frame.gbuffer.covered & (frame.gbuffer.normal[0] > 0.5)
-    places = frame.gbuffer.position[:, wall].T + np.array([0.0, offset, 0.0])
-    factors = [polygon_form_factor(place, (1, 0, 0), FLOOR) for place in places]
-    (sun,) = frame.scene.lights
-    return np.outer(np.array(frame.materials.diffuse[0]) * sun.irradiance, factors), wall
-
-
-@pytest.mark.feature("SII-27")
-@pytest.mark.parametrize("offset", [0.04, 0.1, 0.3])
-def test_the_map_of_the_bias_of_an_offset_is_that_of_a_lower_floor(lit_floor, offset, evidence):
-    """Closed form: lights moved back by d light the wall as a floor d lower; E is at most that at the wall's foot."""
-    exact, wall = on_wall(lit_floor)
-    bias = sii(lit_floor, replaced(ALL, {"offset": offset}))[:, wall] - exact
-    expected = on_wall(lit_floor, offset)[0] - exact
-    off = np.abs(bias - expected).max() / exact.max()
-    (sun,) = lit_floor.scene.lights
-    foot = polygon_form_factor((0, offset, 0.5), (1, 0, 0), FLOOR) * 0.6 * sun.irradiance[0]
-    largest = (exact + bias)[0].max()
-    assert off < CELLS
-    assert 0.8 * foot < largest <= foot * (1 + CELLS)
-    evidence(f"offset {offset} m: bias {bias.mean() / exact.mean():+.1%} of the wall's light, pixel by pixel "
-             f"{bias.min() / exact.max():+.1%} to {bias.max() / exact.max():+.1%} of the brightest, within {off:.0e} of the "
-             f"closed form; largest E {largest:.3f}, bound {foot:.3f} W/m^2")
 
 
 def test_footprints_are_the_lit_area(plates):

@@ -23,6 +23,7 @@ from refgi.splat.sii.settings import SiiSettings
 from refgi.splat.sii.sii import cut_irradiance, splat
 from tests import lamps
 from tests.naive import bounds as naive
+from tests.naive.radiometry import lobe_fraction
 from tests.pairs import sets
 
 CUT = of(SiiSettings, cut_irradiance=0.05)
@@ -300,6 +301,11 @@ def alone(lights, k, part):
         flux=np.zeros_like(one.flux))
 
 
+def lobe_peak(cosine, exponent):
+    """Return the peak of a lobe of unit flux, (P + 1) / (2 pi K)."""
+    return (exponent + 1) / (2 * math.pi * lobe_fraction(math.acos(min(1.0, cosine)), exponent))
+
+
 def turned_to(receivers, place):
     """Return receivers that all face a place, so that no light there is below their horizon."""
     toward = place[:, :, None] - receivers.position
@@ -315,7 +321,10 @@ def test_the_map_sums_to_the_fragments_that_are_drawn(evidence):
     lights = choose_lights(frame, settings.lights)
     counted = fragments(receivers, lights, settings)
     drawn, of_light = np.zeros_like(counted.overdraw), np.zeros_like(counted.of_light)
-    absolute = of(SiiSettings, cut_irradiance=low_irradiance(lights, settings))
+    parts = (lights.flux.T, lights.lobe_flux.T, lights.normal.T, lights.lobe_axis.T)
+    peaks = [max(naive.peak(flux), naive.peak(lobe, lobe_peak(normal @ axis, 12.0)))
+             for flux, lobe, normal, axis in zip(*parts, strict=True)]
+    absolute = of(SiiSettings, cut_irradiance=0.05 * max(peaks) / 2.0**2)
     for k in range(lights.flux.shape[1]):
         for part in ("diffuse", "lobe"):
             one = alone(lights, k, part)

@@ -1,4 +1,4 @@
-"""Lights moved back along their normals: the picture's bias against exact irradiance, pixel by pixel."""
+"""Lights moved back along their normals, or with a least distance: the picture's bias against exact irradiance."""
 
 import numpy as np
 import pytest
@@ -51,3 +51,29 @@ def test_the_map_of_the_bias_of_an_offset_is_that_of_a_lower_floor(lit_floor, of
     evidence(f"offset {offset} m: bias {bias.mean() / exact.mean():+.1%} of the wall's light, pixel by pixel "
              f"{bias.min() / exact.max():+.1%} to {bias.max() / exact.max():+.1%} of the brightest, within {off:.0e} "
              f"of the closed form; largest E {largest:.3f}, bound {foot:.3f} W/m^2")
+
+
+def by_quadrature(places, least, n=800):
+    """Integrate cos cos / max(r, m)^2 over the floor by the midpoint rule, for points of the wall (k, 3)."""
+    x, z = np.meshgrid((np.arange(n) + 0.5) / n, (np.arange(n) + 0.5) / n)
+    square = (x**2 + y**2 + (z - depth) ** 2 for _, y, depth in places)
+    return np.array([(x * y / r2 / np.maximum(r2, least**2)).mean()
+                     for (_, y, _), r2 in zip(places, square, strict=True)])
+
+
+@pytest.mark.feature("SII-27")
+@pytest.mark.parametrize("least", [0.05, 0.2])
+def test_the_map_of_the_bias_of_a_least_distance_is_that_of_the_clamped_integral(lit_floor, least, evidence):
+    """Quadrature, of every twentieth pixel: the clamp takes light near the wall's foot alone and gives none."""
+    exact, wall = on_wall(lit_floor)
+    bias = (sii(lit_floor, of(SiiSettings, pattern="all", clamp="distance", clamp_value=least))[:, wall] - exact)[0]
+    places, (sun,) = lit_floor.gbuffer.position[:, wall].T, lit_floor.scene.lights
+    expected = by_quadrature(places[::20], least) * 0.6 / np.pi * sun.irradiance[0] - exact[0, ::20]
+    off = np.abs(bias[::20] - expected).max() / exact.max()
+    assert off < CELLS
+    assert bias.max() < CELLS * exact.max()
+    far = places[:, 1] > least
+    assert np.abs(bias[far]).max() < CELLS * exact.max() < -0.1 * bias.min()
+    evidence(f"least distance {least} m: bias {bias.mean() / exact[0].mean():+.1%} of the wall's light, pixel by pixel "
+             f"{bias.min() / exact.max():+.1%} to {bias.max() / exact.max():+.1%} of the brightest, within {off:.0e} "
+             "of the clamped integral, none above the least distance")

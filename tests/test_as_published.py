@@ -159,7 +159,7 @@ def demo_disc():
 
 def albedo_within_the_splat():
     """Albedo of the cell's own pixel (its middle one) over that of each pixel, without a filter."""
-    frame = lamps.corner(floor=Material("floor", (0.3, 0.45, 0.2)), width=32, height=32)
+    frame = lamps.corner(extra=lamps.tiles(16), width=32, height=32)
     settings = of(MultiresSettings, lights=48, coarsest=8, finest=2, upsampling="nearest")
     albedo = frame.gbuffer.albedo
     factor = albedo[:, 2::4, 2::4].repeat(4, axis=1).repeat(4, axis=2) / np.where(albedo > 0, albedo, 1)

@@ -14,7 +14,7 @@ from refgi.lights.selection import choose_lights
 from refgi.scene import Camera, DirectionalLight, Scene, merge
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.sii.ledger import energy_ledger
+from refgi.splat.sii.ledger import sii_ledger
 from refgi.splat.sii.reach.fragments import fragments
 from tests.form_factors import polygon_form_factor
 from tests.naive import eq2
@@ -70,10 +70,10 @@ def test_energy_lost_is_the_share_of_the_sky(wedge, hidden, evidence):
     """Closed form: the method's account has lost sum Phi (1 - F), F the form factor from a light to the wall."""
     flux = choose_lights(wedge, SETTINGS.lights).flux
     lost, total = (flux * (1 - hidden)).sum(axis=1), flux.sum(axis=1)
-    account = energy_ledger(wedge, SCALED)
+    account = sii_ledger(wedge, SCALED)
     np.testing.assert_allclose(account.scaled, lost, rtol=RAYS)
     np.testing.assert_allclose(account.lights, total - lost, rtol=5 * RAYS)  # the smaller part of the two
-    assert not energy_ledger(wedge, SETTINGS).scaled.any()
+    assert not sii_ledger(wedge, SETTINGS).scaled.any()
     evidence(f"floor beside a wall: {account.scaled[1] / total[1]:.2%} of the flux lost, sum Phi (1 - F) "
              f"{lost[1] / total[1]:.2%}; the paper says nothing of it")
 
@@ -107,6 +107,6 @@ def test_the_picture_is_that_of_the_scaled_fluxes(wedge, hidden, evidence):
 
 def test_in_the_open_nothing_is_left():
     floor = seen()
-    account = energy_ledger(floor, SCALED)
+    account = sii_ledger(floor, SCALED)
     assert not sii(floor, SCALED).any()
     np.testing.assert_allclose(account.scaled, choose_lights(floor, SETTINGS.lights).flux.sum(axis=1), rtol=1e-12)

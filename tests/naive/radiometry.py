@@ -16,9 +16,12 @@ def spot_intensity(axis_intensity, cos_angle, cos_inner, cos_outer):
     return axis_intensity * t * t * (3 - 2 * t)
 
 
+gauss_legendre = cache(np.polynomial.legendre.leggauss)
+
+
 def solid_angle_of_rectangle(density, x0, x1, y0, y1, nodes=64):
     """Integrate a solid-angle density over a rectangle of the image plane by Gauss-Legendre quadrature."""
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = gauss_legendre(nodes)
     u = 0.5 * (x0 + x1) + 0.5 * (x1 - x0) * x
     v = 0.5 * (y0 + y1) + 0.5 * (y1 - y0) * x
     return float(density(u[:, None], v[None, :]) @ w @ w) * 0.25 * (x1 - x0) * (y1 - y0)
@@ -32,7 +35,7 @@ def lobe_fraction(theta, exponent, nodes=400):
     with cos(theta) cos(a) + sin(theta) sin(a) cos(phi) > 0. The integrand bends at a = pi/2 - theta, where the
     circle first dips below; sin substitutions on both pieces take the square root out of it.
     """
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = gauss_legendre(nodes)
     turn = 0.5 * math.pi * (x + 1)
     weights = 0.5 * math.pi * w
     edge = math.pi / 2 - theta

@@ -1,5 +1,6 @@
 """A square light behind a straight edge: the penumbra is Delta (d - z) / z wide, and V across it is a ramp."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from refgi.cluster.clustering.rectangle import AreaLights, map_frames
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.reference import back_projection_visibility, rectangle_visibility
+from refgi.cluster.reference.back_projection import CELLS
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
@@ -23,6 +25,8 @@ PROJECTED = {0.2: 0.05, 0.5: 0.05}
 # The map knows the edge to half a texel, 1/17 and 1/42 of the penumbra: 0.075 and 0.030 where the ramp of a disc is
 # steepest. Blockers off the axis lie deeper than the edge as well.
 STEP = {0.2: 0.10, 0.5: 0.05}  # from the ramp of a disc, which is 0.050 from that of the square
+SHIFT = 0.02  # cells: a shift by half a cell of 32 is 0.5, by half a texel of 128 1.5
+GAPS = 0.012  # of V; where patches of unlike depth leave gaps
 # from the ramp of the square; the series adds its bias and ripple, and the mip map its levels: between texels it is a
 # tent twice as wide as at their border, which is where the first edge lies
 LIMITS = {("pcss", 4, "brute"): {0.2: 0.14, 0.5: 0.10}, ("csm", 16, "brute"): {0.2: 0.16, 0.5: 0.16},
@@ -87,6 +91,33 @@ def test_rays_and_the_map_projected_back_give_the_ramp(delta, evidence):
     assert off[0] < RAYS
     assert off[1] < PROJECTED[delta]
     assert width_of(points[0], traced) == pytest.approx(width, rel=0.02)
+
+
+def mean_excess(turn, delta=0.5):
+    """Return by how much V of the map projected back exceeds the ramp in the penumbra, with all but the light turned.
+
+    The mean over places of the edge, which texels cut by chance.
+    """
+    areas, excess = square_light(delta), []
+    for edge in np.linspace(0, 0.31, 16):
+        points, facing, exact, _ = receivers(delta, edge)
+        geometry = scene(edge).geometry
+        turned = dataclasses.replace(geometry, vertices=np.ascontiguousarray(geometry.vertices @ turn.T))
+        maps = shadow_maps(turned, areas, replaced(SETTINGS, {"maps_resolution": 128}).maps, np.float64)
+        v = back_projection_visibility(areas, maps)(0, np.ascontiguousarray(turn @ points), facing)
+        excess.append((v - exact)[(exact > 0.1) & (exact < 0.9)].mean())
+    return float(np.mean(excess))
+
+
+@pytest.mark.feature("REF-15")
+@pytest.mark.parametrize("along", [np.eye(3), np.eye(3)[[1, 0, 2]]], ids=["y", "x"])
+def test_the_map_projected_back_is_in_its_place(along, evidence):
+    """Property: an edge and its mirror image leave as much light; a shift gives to one what it takes from the other."""
+    one, other = (mean_excess(along @ np.diag([side, 1.0, 1.0])) for side in (1.0, -1.0))
+    shift, gaps = (one - other) / 2 * CELLS, (one + other) / 2
+    evidence(f"V as of a light {shift:+.2f} cells of {CELLS} aside; gaps between patches leave {gaps:+.4f} more of it")
+    assert abs(shift) < SHIFT
+    assert abs(gaps) < GAPS
 
 
 @pytest.mark.feature("VAL-19")

@@ -33,4 +33,4 @@ __all__ = [
 
 METHOD = Method(
     "val", "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights", val, ValSettings,
-    visibility=True, memory=extra_bytes, presets=PRESETS)
+    visibility=lambda settings: settings.visibility is not None, memory=extra_bytes, presets=PRESETS)

@@ -29,4 +29,4 @@ __all__ = [
 
 METHOD = Method(
     "multires", "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes",
-    multires, MultiresSettings, visibility=False, presets=PRESETS)
+    multires, MultiresSettings, visibility=lambda settings: settings.has_shadow_rays, presets=PRESETS)

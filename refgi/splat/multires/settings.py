@@ -186,7 +186,7 @@ class MultiresSettings(Settings):
         clamp = self.effective_pairs.clamp
         chosen = clamp and clamp.name()
         expect_footprints(self.lights, self.effective_pairs)
-        if self._has_shadow_rays:
+        if self.has_shadow_rays:
             bare = PairSettings(clamp=self.pairs.clamp)
             expect(self.pairs == bare, "pairs", "defaults with visibility 'rays'", self.pairs)
             expect(clamp is None, "pairs.clamp", "none with visibility 'rays'", chosen)
@@ -203,10 +203,11 @@ class MultiresSettings(Settings):
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return self.lights.traces_rays or self._has_shadow_rays
+        return self.lights.traces_rays or self.has_shadow_rays
 
     @property
-    def _has_shadow_rays(self) -> bool:
+    def has_shadow_rays(self) -> bool:
+        """Whether shadow rays say what blocks a light from a subsplat."""
         return isinstance(self.subsplats, ByGeometry) and self.subsplats.visibility is not None
 
     @property
@@ -214,7 +215,7 @@ class MultiresSettings(Settings):
         """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints or rays are traced."""
         if not isinstance(self.pairs.clamp, AutoClamp):
             return self.pairs
-        bare = not self.lights.has_footprints or self._has_shadow_rays
+        bare = not self.lights.has_footprints or self.has_shadow_rays
         return dataclasses.replace(self.pairs, clamp=None if bare else DiscClamp())
 
 

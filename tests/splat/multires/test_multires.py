@@ -215,7 +215,9 @@ def test_cells_of_background_are_no_subsplats(box):
 def test_the_table_of_methods_knows_it():
     picture = render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
     assert np.isfinite(picture.radiance).all()
-    assert not find_method("multires").visibility
+    method = find_method("multires")
+    assert not method.knows_visibility(MultiresSettings())
+    assert method.knows_visibility(of(MultiresSettings, visibility="rays"))
     with observe() as log:
         render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
     assert log.status("multires.refine") == ["ran"]

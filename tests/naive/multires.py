@@ -60,23 +60,31 @@ def shared_list(view, criteria, top, finest):
 
 
 def depth_range(view, criteria):
-    """Return the test max - min > t min of the depth."""
+    """Return the test max - min > t of the depth, t a length or a share of min."""
     if criteria.depth is None:
         return None
 
     def test(*cell):
         low, high = refinement.span(view.depth, view.covered, *cell, criteria.rim)
-        return high - low > criteria.depth.threshold * low
+        unit = 1 if criteria.depth.measure == "absolute" else low
+        return high - low > level_threshold(criteria.depth, cell[0]) * unit
 
     return test
 
 
 def depth_slope(view, criteria):
-    """Return the test of the largest sqrt((dz/dx)^2 + (dz/dy)^2) / z among a cell's pixels."""
+    """Return the test of the largest sqrt((dz/dx)^2 + (dz/dy)^2) among a cell's pixels, or of that over z."""
     if criteria.derivative is None:
         return None
-    slopes = everywhere(view, lambda *pixel: refinement.slope(view.depth, view.covered, *pixel))
-    return lambda *cell: slopes[refinement.pixels_of(slopes.shape, *cell)].max() > criteria.derivative.threshold
+    relative = criteria.derivative.measure != "absolute"
+    slopes = everywhere(view, lambda *pixel: refinement.slope(view.depth, view.covered, *pixel, relative))
+    return lambda *cell: (slopes[refinement.pixels_of(slopes.shape, *cell)].max()
+                          > level_threshold(criteria.derivative, cell[0]))
+
+
+def level_threshold(criterion, level):
+    """Return the threshold of a level's cells: the authors' demo has 3 / level of it."""
+    return criterion.threshold * 3 / level if criterion.measure == "demo" else criterion.threshold
 
 
 def normal_range(view, criteria):
@@ -148,7 +156,7 @@ def upsampled(covered, top, how, as_published, values):
     """Return the picture (3, h, w) of {cell: (3,)}; 0 where there is no surface."""
     filters = {"filter_all": "ams_filter_all" in as_published}
     if how == "tent":
-        pixels = upsample.tent(values, covered, top, **filters)
+        pixels = upsample.tent(values, covered, top, **filters, corner_rule="ams_all_corners" not in as_published)
     elif how == "demo":
         pixels = upsample.demo(values, covered, top, **filters)
     elif how == "nearest":

@@ -22,6 +22,7 @@ LEAST = 1e-3  # of the brightest pixel, that a key must change
 BASE = {"lights.count": 30, "subsplats.coarsest": 3}
 BARE = {"subsplats.criteria.depth": None, "subsplats.criteria.normal": None}
 DEPTH = {"subsplats.criteria.normal": None, "subsplats.criteria.depth.threshold": 0.3}
+SLOPE = BARE | {"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.1}
 SINGLE = {"subsplats": "irradiance"}
 SAME_LIST = "both ways find the same subsplats"
 
@@ -34,6 +35,10 @@ CASES = {
                        {"subsplats.criteria.depth": None, "subsplats.criteria.normal.threshold": 0.6}, scene="smooth"),
     "derivative": Case({"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.1},
                        BARE),
+    "depth in metres": Case({"subsplats.criteria.depth.measure": "absolute"}, DEPTH),
+    "depth of the demo": Case({"subsplats.criteria.depth.measure": "demo"}, DEPTH),
+    "derivative in metres": Case({"subsplats.criteria.derivative.measure": "absolute"}, SLOPE),
+    "derivative of the demo": Case({"subsplats.criteria.derivative.measure": "demo"}, SLOPE),
     "chord": Case({"subsplats.criteria.curvature": "chord", "subsplats.criteria.curvature.threshold": 0.5}, BARE,
                   scene="smooth"),
     "rate": Case({"subsplats.criteria.curvature": "rate", "subsplats.criteria.curvature.threshold": 4.0}, BARE,
@@ -70,6 +75,9 @@ CASES = {
     "ams_filter_all": Case({"as_published": {"ams_filter_all"}}, DEPTH),
     "irradiance ams_filter_all": Case({"as_published": {"ams_filter_all"}}, SINGLE),
     "demo ams_filter_all": Case({"as_published": {"ams_filter_all"}}, DEPTH | {"subsplats.upsampling": "demo"}),
+    "ams_all_corners": Case({"as_published": {"ams_all_corners"}}, DEPTH),
+    "irradiance ams_all_corners": Case({"as_published": {"ams_all_corners"}}, SINGLE),
+    "sii_openness": Case({"lights.openness.as_published": {"sii_openness"}}, {"lights.openness.flux": "scale"}),
     "count": Case({"lights.count": 50}),
     "seed": Case({"lights.seed": 7, "lights.pattern": "random"}),
     "auto": Case({"pairs.clamp": "auto"}, {"pairs.clamp": None}),

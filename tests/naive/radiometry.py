@@ -24,6 +24,9 @@ def solid_angle_of_rectangle(density, x0, x1, y0, y1, nodes=64):
     return float(density(u[:, None], v[None, :]) @ w @ w) * 0.25 * (x1 - x0) * (y1 - y0)
 
 
+gauss_legendre = cache(np.polynomial.legendre.leggauss)
+
+
 @cache
 def lobe_fraction(theta, exponent, nodes=400):
     """Share of the integral of cos^P over the half space of the lobe that lies above a surface tilted by theta.
@@ -32,7 +35,7 @@ def lobe_fraction(theta, exponent, nodes=400):
     with cos(theta) cos(a) + sin(theta) sin(a) cos(phi) > 0. The integrand bends at a = pi/2 - theta, where the
     circle first dips below; sin substitutions on both pieces take the square root out of it.
     """
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = gauss_legendre(nodes)
     turn = 0.5 * math.pi * (x + 1)
     weights = 0.5 * math.pi * w
     edge = math.pi / 2 - theta

@@ -103,6 +103,8 @@ SCENES = {
     "glass": lambda: room(*LAMPS, glass=True),
     "spot": lambda: room(LAMPS[0]),
     "bulbs": lambda: room(*LAMPS[:2]),
+    # the ball fills half of the height, so that neighbouring normals differ by little
+    "ball": lambda: room(*LAMPS, smooth=True).with_camera(eye=(0.9, 0.6, 0.4), target=(0.3, 0.35, -0.2)),
     "matte": lambda: room(*LAMPS, matte=True),
 }
 

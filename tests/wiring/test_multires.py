@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from refgi.lights.selection import choose_lights, footprints
-from refgi.pairs.settings import AutoClamp, DiscClamp
+from refgi.pairs.settings import AutoClamp, DiscClamp, DistanceClamp, GeometryClamp
 from refgi.splat import MultiresSettings, multires
+from refgi.splat.multires import ByGeometry
+from refgi.stages import observe
 from tests.naive import multires as naive
 from tests.wiring.cases import Case, uncovered
 
@@ -21,34 +23,38 @@ LEAST = 1e-3  # of the brightest pixel, that a key must change
 
 BASE = {"lights.count": 30, "subsplats.coarsest": 3}
 BARE = {"subsplats.criteria.depth": None, "subsplats.criteria.normal": None}
-DEPTH = {"subsplats.criteria.normal": None, "subsplats.criteria.depth.threshold": 0.3}
-SLOPE = BARE | {"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.1}
+DEPTH = {"subsplats.criteria.normal": None, "subsplats.criteria.depth.threshold": 0.4}  # cells of 1 to 4 pixels
+NORMAL = {"subsplats.criteria.depth": None, "subsplats.criteria.normal.threshold": 1.2}
+SLOPE = BARE | {"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.3}
 SINGLE = {"subsplats": "irradiance"}
 SAME_LIST = "both ways find the same subsplats"
 
 CASES = {
-    "geometry": Case({"subsplats.coarsest": 6}),
+    "geometry": Case({"subsplats.coarsest": 6}, {"subsplats.criteria.depth": None}),
     "finest": Case({"subsplats.finest": 2}),
-    "depth": Case({"subsplats.criteria.normal": None, "subsplats.criteria.depth.threshold": 0.3}),
-    "normal": Case({"subsplats.criteria.depth": None, "subsplats.criteria.normal.threshold": 1.2}, scene="smooth"),
-    "components": Case({"subsplats.criteria.normal.components": "xy"},
-                       {"subsplats.criteria.depth": None, "subsplats.criteria.normal.threshold": 0.6}, scene="smooth"),
-    "derivative": Case({"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.1},
+    "depth": Case(DEPTH, scene="smooth"),
+    "normal": Case(NORMAL, scene="ball"),
+    "components": Case({"subsplats.criteria.normal.components": "xy"}, NORMAL, scene="ball"),
+    "derivative": Case({"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.3},
                        BARE),
+    "chord": Case({"subsplats.criteria.curvature": "chord", "subsplats.criteria.curvature.threshold": 1.45}, BARE,
+                  scene="ball"),
+    "rate": Case({"subsplats.criteria.curvature": "rate", "subsplats.criteria.curvature.threshold": 8.0}, BARE,
+                 scene="ball"),
+    "all criteria": Case({"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.4,
+                          "subsplats.criteria.curvature": "rate", "subsplats.criteria.curvature.threshold": 10.0},
+                         {"subsplats.criteria.depth.threshold": 0.8, "subsplats.criteria.normal.threshold": 1.4},
+                         scene="ball"),
     "depth in metres": Case({"subsplats.criteria.depth.measure": "absolute"}, DEPTH),
     "depth of the demo": Case({"subsplats.criteria.depth.measure": "demo"}, DEPTH),
     "derivative in metres": Case({"subsplats.criteria.derivative.measure": "absolute"}, SLOPE),
     "derivative of the demo": Case({"subsplats.criteria.derivative.measure": "demo"}, SLOPE),
-    "chord": Case({"subsplats.criteria.curvature": "chord", "subsplats.criteria.curvature.threshold": 0.5}, BARE,
-                  scene="smooth"),
-    "rate": Case({"subsplats.criteria.curvature": "rate", "subsplats.criteria.curvature.threshold": 4.0}, BARE,
-                 scene="smooth"),
     "rim": Case({"subsplats.criteria.rim": 1}, DEPTH),
-    "rim of normals": Case({"subsplats.criteria.rim": 1}, {"subsplats.criteria.depth": None}),
-    "diagonal off": Case({"subsplats.criteria.diagonal": "off"}, DEPTH),
-    "diagonal literal": Case({"subsplats.criteria.diagonal": "literal"}, DEPTH),
-    "diagonal full8": Case({"subsplats.criteria.diagonal": "full8"}, DEPTH),
-    "list": Case({"subsplats.criteria.traversal": "list"}, DEPTH, same=SAME_LIST),
+    "rim of normals": Case({"subsplats.criteria.rim": 1}, NORMAL, scene="ball"),
+    "diagonal off": Case({"subsplats.criteria.diagonal": "off"}, DEPTH, scene="smooth"),
+    "diagonal literal": Case({"subsplats.criteria.diagonal": "literal"}, DEPTH, scene="smooth"),
+    "diagonal full8": Case({"subsplats.criteria.diagonal": "full8"}, DEPTH, scene="smooth"),
+    "list": Case({"subsplats.criteria.traversal": "list"}, DEPTH, scene="smooth", same=SAME_LIST),
     "mean": Case({"subsplats.representative": "mean"}, DEPTH),
     "rays": Case({"subsplats.visibility": "rays"}),
     "demo": Case({"subsplats.upsampling": "demo"}, DEPTH),
@@ -69,38 +75,57 @@ CASES = {
     "irradiance naive bilinear": Case({"subsplats.upsampling": "naive_bilinear"}, SINGLE),
     "detail": Case({"detail": 0.5}),
     "supersampled": Case({"supersampled": True}, {"detail": 0.5}),
-    "ams_disc": Case({"as_published": {"ams_disc"}}, {"lights.pattern": "halton", "lights.count": 31}, scene="bulbs"),
+    "ams_disc": Case({"as_published": {"ams_disc"}}, {"lights.source.pattern": "halton", "lights.count": 31},
+                     scene="bulbs"),
     "ams_disc on a grid": Case({"as_published": {"ams_disc"}}, scene="bulbs"),
     "ams_rho_in_splat": Case({"as_published": {"ams_rho_in_splat"}}, DEPTH),
     "ams_filter_all": Case({"as_published": {"ams_filter_all"}}, DEPTH),
     "irradiance ams_filter_all": Case({"as_published": {"ams_filter_all"}}, SINGLE),
     "demo ams_filter_all": Case({"as_published": {"ams_filter_all"}}, DEPTH | {"subsplats.upsampling": "demo"}),
-    "ams_all_corners": Case({"as_published": {"ams_all_corners"}}, DEPTH),
+    "ams_all_corners": Case({"as_published": {"ams_all_corners"}}, SLOPE),
+    "as printed": Case({"as_published": {"ams_filter_all", "ams_all_corners"}}, SLOPE),
     "irradiance ams_all_corners": Case({"as_published": {"ams_all_corners"}}, SINGLE),
     "sii_openness": Case({"lights.openness.as_published": {"sii_openness"}}, {"lights.openness.flux": "scale"}),
     "count": Case({"lights.count": 50}),
-    "seed": Case({"lights.seed": 7, "lights.pattern": "random"}),
+    "seed": Case({"lights.seed": 7, "lights.source.pattern": "random"}),
     "auto": Case({"pairs.clamp": "auto"}, {"pairs.clamp": None}),
     "auto of paths": Case({"lights.source": "walk"}),
     "auto of roulette": Case({"lights.openness.flux": "roulette", "lights.openness.radius": 2.0}),
-    "distance": Case({"pairs.clamp": "distance", "pairs.clamp.value": 0.5}),
-    "term": Case({"pairs.clamp": "geometry", "pairs.clamp.value": 3.0}),
-    "sphere": Case({"pairs.clamp": "sphere", "pairs.clamp.value": 2.0}, {"lights.count": 6}, scene="matte"),
+    "distance": Case({"pairs.clamp": DistanceClamp(0.5)}),
+    "term": Case({"pairs.clamp": GeometryClamp(3.0)}),
+    "sphere": Case({"pairs.clamp": "sphere", "pairs.clamp.value": 2.0},
+                   BARE | {"lights.count": 3}, scene="matte"),
     "offset": Case({"pairs.offset": 0.1}),
     "norm": Case({"pairs.lobe.norm": "full_lobe"}),
     "widening": Case({"pairs.lobe.widening": 1.5}),
 }
+# pictures of so many pixels that not all are samples of the error
+WIDE = {"width": 112, "height": 84}
+BY_ERROR = {"subsplats": "error", "subsplats.target": 0.02, "lights.count": 12}
+PROMISES = {
+    "error": Case({"subsplats": "error", "subsplats.target": 0.02}, {"lights.count": 12}, frame=WIDE),
+    "error coarsest": Case({"subsplats.coarsest": 25}, BY_ERROR, frame=WIDE),
+    "error seed": Case({"lights.seed": 2}, BY_ERROR, frame=WIDE),
+    "error distance": Case({"pairs.clamp": DistanceClamp(0.5)}, BY_ERROR, frame=WIDE),
+    "error detail": Case({"detail": 0.5}, BY_ERROR, frame=WIDE),
+}
+ALL = CASES | PROMISES
 TOLERANCE = {"rays": RAYS, "sphere": SPHERES}
 # what every method has in common is met by the cases of lights and pairs
 SHARED = ("LightSettings", "MapLights", "PathLights", "WarpA", "WarpB", "BackFace", "TwoInterface", "OpennessSettings",
           "PairSettings", "LobeSettings", "DistanceClamp", "GeometryClamp", "SphereClamp")
 
 
-@cache
 def frame_of(name, scale=1):
     """Return the frame of a case, also at a multiple of its size."""
-    case = CASES[name]
-    return dataclasses.replace(case, frame={"width": 17 * scale, "height": 13 * scale} | dict(case.frame)).seen()
+    case = ALL[name]
+    return seen(case.scene, **{"width": 17 * scale, "height": 13 * scale} | case.frame)
+
+
+@cache
+def seen(scene, **options):
+    """Return a frame that cases share."""
+    return Case({}, scene=scene, frame=options).seen()
 
 
 def clamp_of(settings):
@@ -154,7 +179,7 @@ def twin(name, settings):
 
 def test_every_field_has_a_case():
     """Property: no setting of the method's own is without a case."""
-    assert {word for word in uncovered(MultiresSettings, CASES, BASE) if not word.startswith(SHARED)} == set()
+    assert {word for word in uncovered(MultiresSettings, ALL, BASE) if not word.startswith(SHARED)} == set()
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -166,10 +191,44 @@ def test_the_twin(name):
                                atol=TOLERANCE.get(name, ROUNDING) * expected.max())
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", PROMISES)
+def test_the_promise(name):
+    """Oracle: the RMSE to the sum of all lights is within the target, and pixels evaluated one by one are that sum."""
+    frame, settings = frame_of(name), PROMISES[name].settings(MultiresSettings, BASE)
+    full, covered = full_sum(frame, settings), frame.gbuffer.covered
+    with observe(record=True) as log:
+        light = multires(frame, settings)
+    split = next(run.output for run in log.runs if run.name == "multires.error_driven").split
+    off = light - full
+    assert np.sqrt((off[:, covered] ** 2).mean()) <= settings.subsplats.target * full[:, covered].mean()
+    assert len(split) - 1 == naive.coarsest_level(covered.shape, settings.subsplats.coarsest)
+    finest = np.kron(split[1], np.ones((2, 2), bool))[:covered.shape[0], :covered.shape[1]] & covered
+    assert 0 < finest.sum() < covered.sum()
+    assert np.abs(off[:, finest]).max() <= ROUNDING * full.max()
+
+
+def full_sum(frame, settings):
+    """Return the sum of all lights at every pixel that shows a surface, times the surface detail."""
+    view = naive.view_of(frame.gbuffer)
+    plain = dataclasses.replace(settings, subsplats=ByGeometry(), detail=0.0)
+    return sums(frame, plain) * naive.surface_detail(view, frame.scene.camera.eye, settings.detail)
+
+
+@cache
+def sums(frame, settings):
+    """Return the sum of all lights at every pixel that shows a surface."""
+    view = naive.view_of(frame.gbuffer)
+    lights = naive.lights_of(*lights_of(frame, settings), settings.pairs, clamp_of(settings))
+    full = np.zeros((3, *view.covered.shape))
+    for i, j in zip(*np.nonzero(view.covered), strict=True):
+        full[:, i, j] = sum(light((view.position[:, i, j], view.normal[:, i, j])) for light in lights)
+    return full
+
+
+@pytest.mark.parametrize("name", ALL)
 def test_each_key_counts(name):
     """Property: a key put back to its default makes another picture, unless the case says why not."""
-    case = CASES[name]
+    case = ALL[name]
     render = partial(multires, frame_of(name))
     light = render(case.settings(MultiresSettings, BASE))
     for key, other in case.without(MultiresSettings, BASE):

@@ -136,6 +136,7 @@ def test_as_printed_flux_is_scaled_by_openness(chosen):
     np.testing.assert_allclose(lost, ((lights.flux + lights.lobe_flux) * (1 - share)).sum(axis=1), rtol=ROUNDING)
 
 
+@pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
 def test_printed_forms_of_openness_and_importance_are_settings():
     """Oracle: lights by hand, from the maps, the openness of their texels and the printed Phi P and Phi O."""
     frame = Case({}).seen()

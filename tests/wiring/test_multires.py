@@ -69,6 +69,7 @@ CASES = {
     "shared list of depth": Case({"subsplats.criteria.normal": None, "subsplats.criteria.depth.threshold": 0.3,
                                   "subsplats.criteria.diagonal": "full8"},
                                  SINGLE | {"subsplats.criteria": "geometry", "subsplats.threshold": 0.5}),
+    "shared list finest": Case({"subsplats.finest": 1}, SINGLE | {"subsplats.criteria": "geometry"}),
     "irradiance mean": Case({"subsplats.representative": "mean"}, SINGLE),
     "irradiance demo": Case({"subsplats.upsampling": "demo"}, SINGLE),
     "irradiance nearest": Case({"subsplats.upsampling": "nearest"}, SINGLE),

@@ -192,12 +192,19 @@ def surface_detail(view, eye, a):
 
 
 def halved(light, covered_large, covered):
-    """Return a picture at half the size: the mean of those of four pixels that show a surface (Sec. 4)."""
-    small = np.zeros((3, *covered.shape))
-    for i, j in zip(*np.nonzero(covered), strict=True):
+    """Return a picture at half the size: the mean of those of four pixels that show a surface (Sec. 4).
+
+    Where none of the four does, the mean of such means of the pixels around.
+    """
+    means = {}
+    for i, j in np.ndindex(*covered.shape):
         four = np.s_[2 * i:2 * i + 2, 2 * j:2 * j + 2]
         if covered_large[four].any():
-            small[:, i, j] = light[:, *four][:, covered_large[four]].mean(axis=1)
+            means[i, j] = light[:, *four][:, covered_large[four]].mean(axis=1)
+    small = np.zeros((3, *covered.shape))
+    for i, j in zip(*np.nonzero(covered), strict=True):
+        around = [means[i + a, j + b] for a in (-1, 0, 1) for b in (-1, 0, 1) if (i + a, j + b) in means]
+        small[:, i, j] = means[i, j] if (i, j) in means else np.mean(around, axis=0)
     return small
 
 

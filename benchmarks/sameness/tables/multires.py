@@ -14,7 +14,7 @@ TABLE = Table({"lights": 96, "coarsest": 6}, [
     vary("clamp", "disc", same="a disc is the default of auto"),
     vary("as_published", "ams_disc", "ams_rho_in_splat", "ams_filter_all", on=("cornell_box", "stage", "two_lamps")),
     vary("as_published", "ams_filter_all", per_light="light"),
-    vary("as_published", "ams_all_corners"),
+    vary("as_published", "ams_all_corners", on=("cornell_box",)),
     vary("as_published", "ams_all_corners", per_light="light"),
     vary("coarsest", 16),
     vary("coarsest", 3, 16, criteria=""),

@@ -34,4 +34,5 @@ __all__ = [
 
 METHOD = Method(
     "val", "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights", val, ValSettings,
-    visibility=True, ledger=val_ledger, memory=extra_bytes, presets=PRESETS)
+    visibility=lambda settings: settings.visibility is not None, ledger=val_ledger, memory=extra_bytes,
+    presets=PRESETS)

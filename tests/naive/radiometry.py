@@ -27,6 +27,9 @@ def solid_angle_of_rectangle(density, x0, x1, y0, y1, nodes=64):
     return float(density(u[:, None], v[None, :]) @ w @ w) * 0.25 * (x1 - x0) * (y1 - y0)
 
 
+gauss_legendre = cache(np.polynomial.legendre.leggauss)
+
+
 @cache
 def lobe_fraction(theta, exponent, nodes=400):
     """Share of the integral of cos^P over the half space of the lobe that lies above a surface tilted by theta.

@@ -62,10 +62,11 @@ class Case:
         return Frame(SCENES[self.scene](), **options)
 
 
-def room(*lights, smooth=False, glass=False):
+def room(*lights, smooth=False, glass=False, matte=False):
     """A corner with a diffuse floor, a diffuse and glossy wall, and a purely glossy block before the other wall."""
-    glossy = Material("glossy", (0.3, 0.2, 0.4), (0.4, 0.5, 0.2), 12.0)
-    mirror = Material("purely glossy", (0.0, 0.0, 0.0), (0.7, 0.5, 0.6), 40.0)
+    shine = 0 if matte else 1
+    glossy = Material("glossy", (0.3, 0.2, 0.4), (0.4 * shine, 0.5 * shine, 0.2 * shine), 12.0)
+    mirror = Material("purely glossy", (0.0, 0.0, 0.0), (0.7 * shine, 0.5 * shine, 0.6 * shine), 40.0)
     floor, green = Material("floor", (0.6, 0.55, 0.4)), Material("green", (0.1, 0.6, 0.2))
     meshes = [
         rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), floor),
@@ -110,6 +111,10 @@ SCENES = {
     "smooth glass": lambda: room(*LAMPS, smooth=True, glass=True),
     "painted glass": lambda: painted(room(*LAMPS, glass=True)),
     "spot": lambda: room(LAMPS[0]),
+    "bulbs": lambda: room(*LAMPS[:2]),
+    # the ball fills half of the height, so that neighbouring normals differ by little
+    "ball": lambda: room(*LAMPS, smooth=True).with_camera(eye=(0.9, 0.6, 0.4), target=(0.3, 0.35, -0.2)),
+    "matte": lambda: room(*LAMPS, matte=True),
 }
 
 

@@ -30,4 +30,5 @@ __all__ = [
 
 METHOD = Method(
     "multires", "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes",
-    multires, MultiresSettings, visibility=False, ledger=multires_ledger, presets=PRESETS)
+    multires, MultiresSettings, visibility=lambda settings: settings.shadow_rays is not None, ledger=multires_ledger,
+    presets=PRESETS)

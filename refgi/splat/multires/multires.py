@@ -55,18 +55,19 @@ def _irradiance(
 ) -> Array:
     """Return the irradiance at the pixels of one G-buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
     subsplats, pairs = settings.subsplats, settings.effective_pairs
-    filter_all = "ams_filter_all" in settings.as_published
+    printed: dict[str, bool] = {"filter_all": "ams_filter_all" in settings.as_published,
+                                "corner_rule": "ams_all_corners" not in settings.as_published}
     _resolve_channels(buffer, subsplats)
     warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), lights, pairs, footprint, "multires")
     if isinstance(subsplats, ByError):
         irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed).irradiance
     elif isinstance(subsplats, ByIrradiance):
         start = None if subsplats.start is None else shared_subsplats(buffer, subsplats.start)  # Sec. 6
-        irradiance = per_light(buffer, lights, subsplats, pairs, footprint, start, filter_all=filter_all)  # Sec. 3.3.1
+        irradiance = per_light(buffer, lights, subsplats, pairs, footprint, start, **printed)  # Sec. 3.3.1
     else:
         shared = shared_subsplats(buffer, subsplats)  # Sec. 3.2, 3.3
         values = _evaluated(frame, buffer, shared, lights, footprint, settings)  # Sec. 3.4
-        irradiance = upsample(values, shared, buffer.covered, subsplats.upsampling, filter_all=filter_all)  # Sec. 3.5
+        irradiance = upsample(values, shared, buffer.covered, subsplats.upsampling, **printed)  # Sec. 3.5
         if "ams_rho_in_splat" in settings.as_published:  # the picture's albedo is multiplied in again later
             albedo = buffer.albedo
             irradiance = np.divide(irradiance, albedo, out=np.zeros_like(irradiance), where=albedo > 0)

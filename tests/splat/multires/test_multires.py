@@ -215,7 +215,9 @@ def test_cells_of_background_are_no_subsplats(box):
 def test_the_table_of_methods_knows_it():
     picture = render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
     assert np.isfinite(picture.radiance).all()
-    assert not find_method("multires").visibility
+    method = find_method("multires")
+    assert not method.knows_visibility(MultiresSettings())
+    assert method.knows_visibility(of(MultiresSettings, visibility="rays"))
     with observe() as log:
         render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
     assert log.status("multires.refine") == ["ran"]
@@ -236,7 +238,7 @@ def test_depth_is_computed_only_where_a_criterion_looks_at_it(change, asked):
 BAD = {
     "subsplats.coarsest": [{"coarsest": 0}, {"coarsest": 1.5}],
     "subsplats.finest": [{"finest": -1}, {"finest": 17}, {"subsplats": "error", "subsplats.finest": 1}],
-    "subsplats.criteria.depth": [{"depth": "slope"}, {"depth.threshold": -1}],
+    "subsplats.criteria.depth": [{"depth": "slope"}, {"depth.threshold": -1}, {"depth.measure": "feet"}],
     "subsplats.criteria: not": [{"subsplats": "error", "normal_threshold": 1}, {"subsplats": "error", "rim": 1}],
     "subsplats.criteria.normal.threshold": [{"normal_threshold": math.nan}],
     "subsplats.criteria.normal.components": [{"normal_components": "z"}],
@@ -260,7 +262,9 @@ BAD = {
     "pairs": [{"visibility": "rays", "offset": 0.1}, {"visibility": "rays", "as_published": {"sii_no_pi"}}],
     "as_published": [{"as_published": {"ams_luck"}}, {"as_published": {"ams_disc"}, "clamp": "none"},
                      {"as_published": {"ams_rho_in_splat"}, "subsplats": "irradiance"},
-                     {"as_published": {"ams_filter_all"}, "subsplats": "error"}],
+                     {"as_published": {"ams_filter_all"}, "subsplats": "error"},
+                     {"as_published": {"ams_all_corners"}, "subsplats": "error"},
+                     {"as_published": {"ams_all_corners"}, "upsampling": "demo"}],
 }
 
 

@@ -97,7 +97,10 @@ class Campaign:
                              "--first", self._project.method_of(fault.file), limit=limit)
         if ended.code == 0:
             return SAME, "", ended.seconds
-        return SURVIVED, file.read_text() if ended.code == DIFFERENT else "pictures end early", ended.seconds
+        if ended.code == DIFFERENT:
+            return SURVIVED, file.read_text(), ended.seconds
+        how = "take too long" if ended.code is None else f"end with exit code {ended.code}"
+        return SURVIVED, f"that the pictures {how}", ended.seconds
 
     def _say(self, what: str) -> None:
         self._tell(what, 0.0)

@@ -71,7 +71,7 @@ def extreme(source: Source, node: ast.AST, _: Scope) -> Iterator[Edit]:
 
 
 def constant(source: Source, node: ast.AST, _: Scope) -> Iterator[Edit]:
-    """A number changed: 0.0 -> 1.0, others doubled; whole numbers are one more; True and False exchanged."""
+    """A number changed: 0.0 -> 1.0, others doubled, whole ones one more, in ranges one less; True for False."""
     parent = source.parents.get(node)
     if not isinstance(node, ast.Constant) or not isinstance(node.value, int | float):
         return
@@ -82,7 +82,8 @@ def constant(source: Source, node: ast.AST, _: Scope) -> Iterator[Edit]:
     if isinstance(node.value, bool):
         other = str(not node.value)
     elif isinstance(node.value, int):
-        other = str(node.value + 1)
+        shorter = isinstance(parent, ast.Call) and called(parent) in RANGES and node.value > 0
+        other = str(node.value - 1 if shorter else node.value + 1)  # a longer one would leave its array
     else:
         other = repr(2 * node.value) if node.value else "1.0"
     yield from source.replaced(source.start(node), source.end(node), other)

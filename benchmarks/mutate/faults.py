@@ -3,6 +3,7 @@
 import ast
 import hashlib
 import random
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from itertools import chain, zip_longest
@@ -81,11 +82,15 @@ def _in_turn(orders: Sequence[Sequence[Any]]) -> Iterator[Any]:
 
 
 def is_fault(text: str, fault: Fault) -> bool:
-    """Return whether a changed text is a program, and another one."""
-    try:
-        return ast.dump(ast.parse(fault.put_into(text))) != ast.dump(ast.parse(text))
-    except SyntaxError:
-        return False
+    """Return whether a changed text is a program, and another one; one that Python warns of is none."""
+    changed = fault.put_into(text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            compile(changed, fault.file, "exec")
+        except (SyntaxError, Warning):
+            return False
+    return ast.dump(ast.parse(changed)) != ast.dump(ast.parse(text))
 
 
 def _is_below(file: str, paths: Sequence[str]) -> bool:

@@ -17,7 +17,7 @@ class Project(NamedTuple):
     wiring_tests: str  # a folder of the tests of wiring, one file or more a method
     methods: Mapping[str, str]  # folder or file of the sources: the method that it alone belongs to
     pictures: str  # module that writes a hash of every picture: `-m MODULE FILE [--against KNOWN] [--first METHOD]`
-    judging: tuple[str, ...]  # folders that say which pictures there are
+    judging: tuple[str, ...]  # folders and files that say which pictures there are
 
     def sources(self) -> list[str]:
         """Return the Python files of the package."""
@@ -44,5 +44,5 @@ REFGI = Project(
              "refgi/cluster": "val", "refgi/sssil": "hssil", "refgi/sssil/temporal": "temporal",
              "refgi/truth": "truth", "refgi/truth/vpl.py": "vpl"},
     pictures="benchmarks.mutate.pictures",
-    judging=("benchmarks/sameness", "benchmarks/mutate"),
+    judging=("benchmarks/sameness", "benchmarks/mutate/pictures.py"),
 )

@@ -54,7 +54,7 @@ def hash_of(root: Path, files: Iterable[Path]) -> str:
 
 def _files(folders: Iterable[Path]) -> Iterator[Path]:
     for folder in folders:
-        yield from sorted(file for pattern in CODE for file in folder.rglob(pattern))
+        yield from [folder] if folder.is_file() else sorted(file for code in CODE for file in folder.rglob(code))
 
 
 class Results:

@@ -105,7 +105,9 @@ EXAMPLES = {
     "logic": ("y = a and b", {"y = a or b"}),
     "comparison": ("y = a < b", {"y = a <= b", "y = a > b"}),
     "extreme": ("y = np.maximum(a, b)", {"y = np.minimum(a, b)"}),
-    "constant": ("y = 0.5 * f(True, 2)", {"y = 1.0 * f(True, 2)", "y = 0.5 * f(False, 2)", "y = 0.5 * f(True, 3)"}),
+    "constant": ("y = 0.5 * f(True, 2, range(3))", {
+        "y = 1.0 * f(True, 2, range(3))", "y = 0.5 * f(False, 2, range(3))", "y = 0.5 * f(True, 3, range(3))",
+        "y = 0.5 * f(True, 2, range(2))"}),
     "index": ("y = a[1, :n, -1]", {"y = a[0, :n, -1]", "y = a[1, :n - 1, -1]", "y = a[1, :n, -2]"}),
     "negation": ("y = a if b or c else d", {"y = a if not (b or c) else d"}),
     "keyword": ("y = f(a, b=1, c=(2))", {"y = f(a, c=(2))", "y = f(a, b=1)"}),

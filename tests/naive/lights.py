@@ -183,7 +183,8 @@ def layer_of(v, sums):
 def importance_of(here, frame, settings):
     """Return the importance of each texel: Phi, Phi g(P) or Phi g(P) max(floor, 1 - O), and an even part of it."""
     kind, beta = settings.source.warp.importance, settings.source.warp.defensive
-    peak = 1.0 if kind == "flux" else (here.lobe_exponent[:, None] + 1) / 2
+    exponent = here.lobe_exponent[:, None]
+    peak = 1.0 if kind == "flux" else exponent if "sii_peak" in settings.source.as_published else (exponent + 1) / 2
     found = (here.flux + peak * here.lobe_flux).max(axis=1)
     if kind == "openness":
         reflects = np.flatnonzero(found)
@@ -193,14 +194,16 @@ def importance_of(here, frame, settings):
 
 
 def in_the_open(lights, frame, settings):
-    """Scale the lights' flux by 1 - O, or keep them with the chance max(floor, 1 - O) and divide by it (Sec. 3.6)."""
+    """Scale by 1 - O, as printed by O, or keep with the chance max(floor, 1 - O) and divide by it (Sec. 3.6)."""
     how = settings.openness
     if how.flux == "none" or not lights:
         return lights
     position, normal = (np.array([getattr(light, name) for light in lights]) for name in ("position", "normal"))
-    hidden = 1 - open_shares(position, normal, range(len(lights)), frame, settings)
+    free = open_shares(position, normal, range(len(lights)), frame, settings)
+    hidden = 1 - free
     if how.flux == "scale":
-        return [times(light, share) for light, share in zip(lights, hidden, strict=True)]
+        shares = free if "sii_openness" in how.as_published else hidden
+        return [times(light, share) for light, share in zip(lights, shares, strict=True)]
     chances = np.maximum(how.floor, hidden)
     return [times(light, 1 / chance) for k, (light, chance) in enumerate(zip(lights, chances, strict=True))
             if draw(settings.seed, ROULETTE, k) < chance]

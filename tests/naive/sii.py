@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from refgi.settings import replaced
 from tests.naive import raster
 from tests.naive.draws import draw
 from tests.naive.joint_bilateral import joint_bilateral
-from tests.naive.radiometry import lobe_fraction
+from tests.naive.radiometry import lobe_fractions
 from tests.naive.sphere import spherical_pair
 
 
@@ -37,7 +38,8 @@ def sii(frame, settings, lights, footprint=None):
 
 
 def cut_irradiance(frame, settings, lights, footprint=None):
-    """Return what `sii` leaves out at full resolution, (3, h, w)."""
+    """Return the pairs out of range, at full resolution, (3, h, w), whatever the bound."""
+    settings = replaced(settings, {"reach.bound": "full"})
     picture = np.zeros((3, *frame.gbuffer.covered.shape))
     picture[:, frame.gbuffer.covered] = irradiance(frame, settings, lights, footprint, outside=True)
     return picture
@@ -131,30 +133,30 @@ def intensity(part, w, r, pairs):
 
 def lobe(part, w, r, pairs):
     """Return c(P) <r . w>^P above the surface, 0 below it (Eq. 3), with exponents that fall near the light."""
-    exponent, of_norm = widened(part.exponent, r, pairs)
+    exponents, of_norms = widened(part.exponent, r, pairs)
     cosine = np.maximum(0, part.axis @ w)
-    norms = np.array([lobe_norm(part, one, pairs.lobe.norm) for one in np.broadcast_to(of_norm, r.shape)])
-    return np.where((part.normal @ w > 0) & (cosine > 0), norms * cosine**exponent, 0.0)
+    norms = lobe_norms(part, of_norms, pairs.lobe.norm)
+    return np.where((part.normal @ w > 0) & (cosine > 0), norms * cosine**exponents, 0.0)
 
 
 def widened(exponent, r, pairs):
-    """Return P' at the distances r, and the exponent whose norm it has (Sec. 3.3)."""
-    a = pairs.lobe.widening
+    """Return P' at the distances r, and the exponents whose norm it has (Sec. 3.3)."""
+    a, whole = pairs.lobe.widening, np.array([exponent])
     if a == 0:
-        return exponent, exponent
-    falling = exponent * np.minimum(1, r / a)
+        return whole, whole
     if "sii_widening" in pairs.as_published:
-        return np.minimum(exponent, exponent / (r * a)), exponent
-    return falling, exponent if "sii_widening_unnorm" in pairs.as_published else falling
+        return np.minimum(exponent, exponent / (r * a)), whole
+    falling = exponent * np.minimum(1, r / a)
+    return falling, whole if "sii_widening_unnorm" in pairs.as_published else falling
 
 
-def lobe_norm(part, exponent, norm):
+def lobe_norms(part, exponents, norm):
     """Return c(P): 1, (P + 1) / 2 pi or (P + 1) / (2 pi K)."""
     if norm == "none":
-        return 1.0
-    full = (exponent + 1) / (2 * math.pi)
+        return np.ones(len(exponents))
+    full = (exponents + 1) / (2 * math.pi)
     theta = math.acos(min(1.0, float(part.normal @ part.axis)))
-    return full if norm == "full_lobe" else full / lobe_fraction(theta, float(exponent))
+    return full if norm == "full_lobe" else full / lobe_fractions(theta, exponents)
 
 
 # ranges
@@ -198,8 +200,9 @@ def thresholds(x, settings, lights, found, strengths):
 
 def peak(part, pairs):
     """Return I_0, the largest channel's peak intensity."""
-    one = diffuse_peak(pairs) if part.exponent is None else lobe_norm(part, part.exponent, pairs.lobe.norm)
-    return part.flux.max() * one
+    if part.exponent is None:
+        return part.flux.max() * diffuse_peak(pairs)
+    return part.flux.max() * float(lobe_norms(part, np.array([part.exponent]), pairs.lobe.norm)[0])
 
 
 def reference_length(x, lights, brightest, strengths):

@@ -44,7 +44,8 @@ REACH_CASES = {
     "a share of discs": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.6},
                              over={"pairs.clamp": "disc"}),
     "a share of spheres": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.6},
-                               over={"pairs.clamp": "sphere"}, scene="matte", frame={"width": 7, "height": 5}),
+                               over={"pairs.clamp": "sphere", "lights.count": 12}, scene="matte",
+                               frame={"width": 6, "height": 5}),
     "half the resolution": Case({"half_resolution": True}),
     "half the resolution, cut": Case({"half_resolution": True}, over=CUT),
 }

@@ -14,7 +14,7 @@ PERSPECTIVE, ORTHOGRAPHIC, PARABOLOID = 0, 1, 2  # kinds of projections
 def gather(frame, settings):
     """Return the irradiance (3, h, w), and how many pixels ran the sum."""
     buffer, coarsely = frame.gbuffer, settings.interpolation
-    sums = every_sum(frame, settings.disc)
+    sums = every_sum(buffer, frame.rsms, settings.disc)
     if coarsely is None or coarsely.grid >= max(frame.width, frame.height):
         return sums, np.count_nonzero(buffer.covered)
     rows, columns = (middles(size, coarsely.grid) for size in buffer.covered.shape)
@@ -44,10 +44,10 @@ def interpolated(frame, coarsely, sums, rows, columns, i, j):
 
 
 def neighbours(middle, i):
-    """Return the coarse pixels before and after pixel i with their linear weights; beyond the outermost, that twice."""
-    before = max((k for k in middle if k <= i), default=middle[0])
-    after = min((k for k in middle if k > i), default=middle[-1])
-    t = min(1.0, max(0.0, (i - before) / (after - before))) if after > before else 0.0
+    """Return the coarse pixels around pixel i with their linear weights: the outermost two beyond the outermost."""
+    before = max([k for k in middle[:-1] if k <= i], default=middle[0])
+    after = min([k for k in middle if k > before], default=before)
+    t = min(1.0, max(0.0, (i - before) / max(1, after - before)))
     return (before, 1 - t), (after, t)
 
 
@@ -63,13 +63,12 @@ def visible_diagonal(frame):
     return np.linalg.norm(np.ptp(frame.gbuffer.position[:, frame.gbuffer.covered], axis=1))
 
 
-def every_sum(frame, disc):
+def every_sum(receivers, rsms, disc):
     """Run the sum at every covered pixel, over all maps, (3, h, w)."""
-    buffer, pattern = frame.gbuffer, disc_pattern(disc)
-    result = np.zeros(buffer.position.shape)
-    for i, j in np.argwhere(buffer.covered):
-        x, normal = buffer.position[:, i, j], buffer.normal[:, i, j]
-        result[:, i, j] = sum(disc_sum(rsm, disc, pattern, x, normal) for rsm in frame.rsms)
+    pattern, result = disc_pattern(disc), np.zeros(receivers.position.shape)
+    for i, j in np.argwhere(receivers.covered):
+        x, normal = receivers.position[:, i, j], receivers.normal[:, i, j]
+        result[:, i, j] = sum(disc_sum(rsm, disc, pattern, x, normal) for rsm in rsms)
     return result
 
 
@@ -107,13 +106,14 @@ def pair(x, normal, p, n):
 
 
 def place(projection, x):
-    """Return the row and column of a point on the stacked maps; those of the nearest place on the border outside."""
+    """Return the row and column of a point on the stacked maps; outside, where the way in meets its border."""
     local = [view @ (x - origin) for view, origin in zip(projection.frame, projection.origin, strict=True)]
     face = max(range(projection.maps), key=lambda k: local[k][2])
     right, down, forward = local[face]
     depth = {PERSPECTIVE: forward, ORTHOGRAPHIC: 1.0, PARABOLOID: np.linalg.norm(local[face]) + forward}[
         projection.kind]
-    row, column = ((share / (depth * half) + 1) / 2 * size for share, half, size in (
-        (down, projection.half[1], projection.height), (right, projection.half[0], projection.width)))
-    return (face * projection.height + min(max(row, 0.0), projection.height),
-            min(max(column, 0.0), projection.width))
+    across = np.array([down / projection.half[1], right / projection.half[0]])
+    farthest = np.abs(across).max()
+    on_map = farthest <= depth and (forward > 0 or projection.kind == ORTHOGRAPHIC)
+    row, column = (across / (depth if on_map else farthest) + 1) / 2 * (projection.height, projection.width)
+    return face * projection.height + row, column

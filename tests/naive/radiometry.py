@@ -49,5 +49,5 @@ def lobe_fractions(theta, exponents, nodes=400):
             continue
         cosine = -math.cos(theta) * np.cos(a) / np.maximum(math.sin(theta) * np.sin(a), 1e-300)
         azimuth = 2 * np.arccos(np.clip(cosine, -1, 1))
-        total += np.cos(a) ** np.reshape(exponents, (-1, 1)) @ (azimuth * np.sin(a) * da)
+        total += (azimuth * np.cos(a) ** np.reshape(exponents, (-1, 1)) * np.sin(a) * da).sum(axis=1)
     return total * (np.asarray(exponents) + 1) / (2 * math.pi)

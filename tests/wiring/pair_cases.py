@@ -7,7 +7,7 @@ PAIR_CASES = {
     "least distance": Case({"clamp": "distance", "clamp.value": 0.7}),
     "bounded geometry term": Case({"clamp": "geometry", "clamp.value": 0.4}),
     "discs": Case({"clamp": "disc"}),
-    "spheres": Case({"clamp": "sphere", "clamp.value": 4.0}, scene="matte", frame={"width": 7, "height": 5}),
+    "spheres": Case({"clamp": "sphere", "clamp.value": 4.0}, scene="matte", frame={"width": 6, "height": 5}),
     "lights behind their surface": Case({"offset": 0.15}),
     "lobes as printed": Case({"lobe.norm": "none"}),
     "lobes without the clamp's share": Case({"lobe.norm": "full_lobe"}),

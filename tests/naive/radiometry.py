@@ -6,6 +6,9 @@ from functools import cache
 import numpy as np
 
 
+gauss_rule = cache(np.polynomial.legendre.leggauss)
+
+
 def spot_intensity(axis_intensity, cos_angle, cos_inner, cos_outer):
     """I(a) = I0 t t (3 - 2 t), t = clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)."""
     if cos_angle < cos_outer:
@@ -37,7 +40,7 @@ def lobe_fractions(theta, exponents, nodes=400):
     with cos(theta) cos(a) + sin(theta) sin(a) cos(phi) > 0. The integrand bends at a = pi/2 - theta, where the
     circle first dips below; sin substitutions on both pieces take the square root out of it.
     """
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = gauss_rule(nodes)
     turn = 0.5 * math.pi * (x + 1)
     weights = 0.5 * math.pi * w
     edge = math.pi / 2 - theta

@@ -226,8 +226,10 @@ def drawn(frame, settings, part, square):
     height = (exponent / (exponent + 2)) ** (exponent / 4) * math.sqrt(2 / (exponent + 2))
     along = np.outer(vertices @ part.axis, part.axis)
     bodies = [part.position + radius * (center * part.axis + half_width * along + height * (vertices - along))]
-    if part.exponent is not None and settings.pairs.lobe.widening:  # the exponent is P from a on
-        bodies.append(part.position + min(settings.pairs.lobe.widening, radius) * vertices)
+    widening = settings.pairs.lobe.widening
+    if part.exponent is not None and widening:  # the exponent is P from a on, but as printed falls without end
+        ball = radius if "sii_widening" in settings.pairs.as_published else min(widening, radius)
+        bodies.append(part.position + ball * vertices)
     return np.any([met(frame, body, faces) for body in bodies], axis=0)
 
 

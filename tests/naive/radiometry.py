@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 
-
 gauss_rule = cache(np.polynomial.legendre.leggauss)
 
 

@@ -1,5 +1,7 @@
 """Wiring of `gather`: every setting reaches the picture as the whole-method twin has it."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -73,6 +75,14 @@ def check_each_key(case, base):
     for key, settings in case.without(GatherSettings, base):
         change = np.abs(gather(frame, settings) - picture).max() / picture.max()
         assert change > SEEN, key
+
+
+def test_likeness_is_a_share_of_what_is_seen():
+    """Of the visible points' box, which in a narrow view is smaller than that of the lit ones."""
+    scene = SCENES["lamps"]().with_camera(vfov=math.radians(25))
+    frame = Frame(scene, width=17, height=13, rsm_resolution=16, dtype=np.float64)
+    assert frame.visible_extent.diagonal < 0.8 * frame.extent.diagonal
+    check(frame, CASES["likeness of places"].settings(GatherSettings, BASE))
 
 
 SPOTS = {

@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
+from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.scene import Camera, DirectionalLight, Material, Mesh, PointLight, Scene, SpotLight, merge
 from refgi.settings import of
@@ -50,11 +51,19 @@ class Case:
         return of(kind, **{**base, **self.over, **self.values})
 
     def without(self, kind: type, base: Mapping[str, Any] = NOTHING) -> Iterator[tuple[str, Any]]:
-        """Yield each key under test, and the settings with that key as its default has it."""
-        for key in self.values:
-            rest = {other: value for other, value in self.values.items()
+        """Yield each key under test, and the settings with that key as its default has it.
+
+        A key without a default, a number that its choice must be given, has twice its value there.
+        """
+        for key, value in self.values.items():
+            rest = {other: kept for other, kept in self.values.items()
                     if other != key and not other.startswith(f"{key}.")}
-            yield key, of(kind, **{**base, **self.over, **rest})
+            try:
+                yield key, of(kind, **{**base, **self.over, **rest})
+            except InputError as error:
+                if error.key is None or not key.endswith(error.key):
+                    raise
+                yield key, of(kind, **{**base, **self.over, **rest, key: 2 * value})
 
     def seen(self) -> Frame:
         """Return the frame of the case, in float64."""
@@ -64,9 +73,8 @@ class Case:
 
 def room(*lights, smooth=False, glass=False, matte=False):
     """A corner with a diffuse floor, a diffuse and glossy wall, and a purely glossy block before the other wall."""
-    shine = 0 if matte else 1
-    glossy = Material("glossy", (0.3, 0.2, 0.4), (0.4 * shine, 0.5 * shine, 0.2 * shine), 12.0)
-    mirror = Material("purely glossy", (0.0, 0.0, 0.0), (0.7 * shine, 0.5 * shine, 0.6 * shine), 40.0)
+    glossy = Material("glossy", (0.3, 0.2, 0.4), (0, 0, 0) if matte else (0.4, 0.5, 0.2), 12.0)
+    mirror = Material("purely glossy", (0.0, 0.0, 0.0), (0, 0, 0) if matte else (0.7, 0.5, 0.6), 40.0)
     floor, green = Material("floor", (0.6, 0.55, 0.4)), Material("green", (0.1, 0.6, 0.2))
     meshes = [
         rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), floor),
@@ -116,6 +124,15 @@ SCENES = {
     "ball": lambda: room(*LAMPS, smooth=True).with_camera(eye=(0.9, 0.6, 0.4), target=(0.3, 0.35, -0.2)),
     "matte": lambda: room(*LAMPS, matte=True),
 }
+
+
+def under(part: str, cases: Mapping[str, Case], base: Mapping[str, Any] = NOTHING) -> dict[str, Case]:
+    """Return the cases of a part of a settings class as cases of the whole, over what else it takes."""
+    def whole(keys: Mapping[str, Any]) -> dict[str, Any]:
+        return {f"{part}.{key}": value for key, value in keys.items()}
+
+    return {name: dataclasses.replace(case, values=whole(case.values), over={**base, **whole(case.over)})
+            for name, case in cases.items()}
 
 
 def uncovered(kind: type, cases: Mapping[str, Case], base: Mapping[str, Any] = NOTHING) -> set[str]:

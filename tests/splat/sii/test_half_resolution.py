@@ -9,6 +9,7 @@ from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.half_resolution import _block_pixels, half_resolution
+from tests.naive.joint_bilateral import joint_bilateral
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
@@ -23,39 +24,6 @@ def wall(height, width, real=np.float64):
     y, x = np.mgrid[0:height, 0:width].astype(real)
     position = np.stack([x, y, np.zeros_like(x)])
     return Receivers(position, np.stack([np.zeros_like(x), np.zeros_like(x), np.ones_like(x)]), np.ones_like(x, bool))
-
-
-def literal(receivers, light):
-    """The joint filter by its formula, pixel by pixel, of light (h, w) or (h, w, 3)."""
-    position, normal, covered = receivers
-    height, width = covered.shape
-    chosen = {}
-    for top in range(0, height, 2):
-        for left in range(0, width, 2):
-            block = [(i, j) for i in (top, top + 1) for j in (left, left + 1) if i < height and j < width]
-            chosen[top // 2, left // 2] = next((place for place in block if covered[place]), None)
-    result = np.zeros_like(light)
-    for i, j in zip(*np.nonzero(covered), strict=True):
-        total, weights = 0.0, 0.0
-        for row, down in ((i // 2, 1 - i % 2 / 2), (i // 2 + 1, i % 2 / 2)):
-            for column, across in ((j // 2, 1 - j % 2 / 2), (j // 2 + 1, j % 2 / 2)):
-                place = chosen.get((row, column))
-                if place is None:
-                    continue
-                step = position[:, *place] - position[:, i, j]
-                away = np.linalg.norm(step)
-                sine = min(1.0, abs(normal[:, i, j] @ step) / away) if away else 0.0
-                cosine = max(0.0, normal[:, i, j] @ normal[:, *place])
-                weight = down * across * cosine**8 * (1 - sine) ** 2
-                weights, total = weights + weight, total + weight * light[place]
-        own = chosen[i // 2, j // 2] == (i, j)
-        result[i, j] = light[i, j] if own or weights < 0.05 else total / weights
-    return result
-
-
-def filtered(receivers, picture):
-    """The joint filter of a picture (3, h, w)."""
-    return np.moveaxis(literal(receivers, np.moveaxis(picture, 0, -1)), -1, 0)
 
 
 def of_positions(function):
@@ -83,9 +51,9 @@ def test_it_is_the_filter_of_the_formula(size, evidence):
     """Oracle: on random surfaces with holes, whole and odd sizes, against the literal twin."""
     receivers = rough(np.random.default_rng(3), *size)
     evaluate, _ = of_positions(lambda x, y, z: 1 + x + 2 * y * y - z)
-    light = evaluate(receivers)[0]
+    light = evaluate(receivers)
     got = half_resolution(receivers, evaluate)
-    error = np.abs(got - literal(receivers, light)).max()
+    error = np.abs(got - joint_bilateral(receivers, light)).max()
     assert error < 1e-12 * max(1.0, np.abs(light).max())
     assert not got[:, ~receivers.covered].any()
     evidence(f"{size}: {error:.0e} off the literal filter")
@@ -163,7 +131,7 @@ def scene(request):
 def test_the_method_at_half_resolution_is_the_filtered_picture(scene, evidence):
     """Oracle: the literal filter over the pixels of the picture at full resolution."""
     name, full, half, receivers = scene
-    off = np.abs(half - filtered(receivers, full)).max() / full.max()
+    off = np.abs(half - joint_bilateral(receivers, full)).max() / full.max()
     assert off < ROUNDING
     evidence(f"{name}: sii(half_resolution=True) is {off:.0e} of the maximum off the literal filter of sii")
 
@@ -179,7 +147,7 @@ def test_the_error_on_scenes_is_less_than_that_of_any_wrong_filter(scene, eviden
     flat = full.reshape(3, -1)
     blocks = flat[:, _block_pixels(receivers.covered)].repeat(2, axis=1).repeat(2, axis=2)
     wrong = {"none": blocks * receivers.covered,
-             "plain": filtered(wall(*receivers.covered.shape)._replace(covered=receivers.covered), full),
+             "plain": joint_bilateral(wall(*receivers.covered.shape)._replace(covered=receivers.covered), full),
              "a pixel right": np.roll(half, 1, axis=2) * receivers.covered,
              "a pixel down": np.roll(half, 1, axis=1) * receivers.covered}
     off = error(half)

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 LIFT = 1e-6  # m: ends of segments are lifted off their surfaces by that
-ENDS = 1e-6  # share of a segment at either end within which nothing blocks
 
 
 def corners_of(geometry):
@@ -30,7 +29,7 @@ def crossings(corners, starts, directions):
 def free(corners, starts, ends, most=1.0):
     """Tell between which places, off their surfaces, nothing lies within the share `most` of the way."""
     t = crossings(corners, starts, ends - starts)
-    return ~((t > ENDS) & (t < np.minimum(1 - ENDS, np.reshape(most, (-1, 1))))).any(axis=1)
+    return ~(t < np.minimum(1, np.reshape(most, (-1, 1)))).any(axis=1)
 
 
 def face_normals(geometry, triangle, toward):

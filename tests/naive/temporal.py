@@ -39,7 +39,7 @@ def moved_back(frame, before):
         back = position[:, *at] + weights @ (then - now)
         speed[at] = pixels_between(buffer.projection, position[:, *at], back)
         if geometry.vertex_normals is not None:
-            turned_now, turned_then = weights @ geometry.vertex_normals[corners], weights @ before.vertex_normals[corners]
+            turned_now, turned_then = (weights @ g.vertex_normals[corners] for g in (geometry, before))
         else:
             turned_now, turned_then = (np.cross(t[1] - t[0], t[2] - t[0]) for t in (now, then))
         side = math.copysign(1.0, turned_now @ normal[:, *at])

@@ -33,7 +33,7 @@ def scenes():
     """Return three frames of a room whose ball, camera and lamps move."""
     room = SCENES["smooth"]()
     ball = [material.name for material in room.materials].index("ball")
-    moving = np.unique(room.geometry.faces[room.geometry.material_id == ball])
+    moving = np.unique(room.geometry.faces[room.geometry.material_of_face == ball])
     for step in range(3):
         vertices, normals = room.geometry.vertices.copy(), room.geometry.vertex_normals.copy()
         turn = rotation(0.2 * step)

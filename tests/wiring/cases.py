@@ -96,9 +96,19 @@ def ball(center, radius, material):
                 vertices, material)
 
 
+def tilted(scene):
+    """Return a smooth scene with its vertex normals turned: far from those of the triangles, as on coarse meshes."""
+    axis, angle = np.array([0.36, 0.48, 0.8]), 0.6
+    normals = scene.geometry.vertex_normals
+    turned = (math.cos(angle) * normals + math.sin(angle) * np.cross(axis, normals)
+              + (1 - math.cos(angle)) * (normals @ axis)[:, None] * axis)
+    return dataclasses.replace(scene, geometry=dataclasses.replace(scene.geometry, vertex_normals=turned))
+
+
 SCENES = {
     "lamps": lambda: room(*LAMPS),
     "smooth": lambda: room(*LAMPS, smooth=True),
+    "tilted": lambda: tilted(room(*LAMPS, smooth=True)),
     "glass": lambda: room(*LAMPS, glass=True),
     "spot": lambda: room(LAMPS[0]),
 }

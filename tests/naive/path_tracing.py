@@ -21,12 +21,21 @@ class Rules(NamedTuple):
     """What is asked of the truth."""
 
     visibility: bool = True
-    camera: object = None  # projection of the camera that emitters must be visible to
+    visible: bool = False  # those points alone emit that the camera sees
     bounces: int = 1
 
 
-def irradiance(scene, receivers, rules, side, random):
+class World(NamedTuple):
+    """What there is: a scene, its camera's projection and what is asked."""
+
+    scene: object
+    view: object
+    rules: Rules
+
+
+def irradiance(scene, receivers, rules, side, random, view=None):
     """Return one estimate of E at receivers (position, normal, facing), (n, 3), by side x side strata of directions."""
+    world = World(scene, view, rules)
     position, normal, facing = receivers
     strata = np.stack(np.meshgrid(range(side), range(side))).reshape(2, -1, 1)
     u, v = (strata + random.random((2, side**2, len(normal)))) / side
@@ -35,7 +44,7 @@ def irradiance(scene, receivers, rules, side, random):
         w = cosine_direction(normal, u[k], v[k])
         above = np.flatnonzero((w * facing).sum(axis=1) > 0)
         start = position[above] + LIFT * facing[above]
-        total[above] += math.pi / side**2 * arriving(scene, start, w[above], rules, random)
+        total[above] += math.pi / side**2 * arriving(world, start, w[above], random)
     return total
 
 
@@ -47,24 +56,25 @@ def cosine_direction(axis, u, v):
     return x[:, None] * across + y[:, None] * np.cross(axis, across) + z[:, None] * axis
 
 
-def arriving(scene, start, w, rules, random):
+def arriving(world, start, w, random):
     """Return the radiance that arrives along -w, (n, 3): from the nearest surface, without visibility from all."""
-    far = crossings(corners_of(scene.geometry), start, w)
-    if rules.visibility:
+    far = crossings(corners_of(world.scene.geometry), start, w)
+    if world.rules.visibility:
         nearest = far.argmin(axis=1)
         ray = np.flatnonzero(np.isfinite(far.min(axis=1)))
         triangle = nearest[ray]
     else:
         ray, triangle = np.nonzero(np.isfinite(far))
     y = start[ray] + far[ray, triangle][:, None] * w[ray]
-    radiance = leaving(scene, y, triangle, -w[ray], rules, random)
+    radiance = leaving(world, y, triangle, -w[ray], random)
     result = np.zeros((len(start), 3))
     np.add.at(result, ray, radiance)
     return result
 
 
-def leaving(scene, y, triangle, v, rules, random):
+def leaving(world, y, triangle, v, random):
     """Return the radiance that leaves points of triangles along v, (n, 3)."""
+    scene, rules = world.scene, world.rules
     g = face_normals(scene.geometry, triangle, v)
     n = shading_normals(scene.geometry, triangle, y, g)
     start = y + LIFT * g
@@ -79,10 +89,10 @@ def leaving(scene, y, triangle, v, rules, random):
             light * cosine[:, None])[lit]
     if rules.bounces > 1:
         l = cosine_direction(g, *random.random((2, len(y))))  # noqa: E741
-        further = arriving(scene, start, l, rules._replace(bounces=rules.bounces - 1), random)
+        further = arriving(world._replace(rules=rules._replace(bounces=rules.bounces - 1)), start, l, random)
         radiance += reflected(scene, triangle, g, n, l, v) * math.pi * further
-    if rules.camera is not None:
-        radiance[~seen_by(rules.camera, scene, y, g)] = 0
+    if rules.visible:
+        radiance[~seen_by(world.view, scene, y, g)] = 0
     return radiance
 
 

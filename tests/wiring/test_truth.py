@@ -1,4 +1,4 @@
-"""Every setting of `truth`: the mean is that of an independent estimator, and heeding the setting shows in rays or bits.
+"""Every setting of `truth`: the mean is that of an independent estimator, heeding the setting shows in rays or bits.
 
 A setting of the estimate changes noise and no mean. So each case asks for the mean, over the picture and over blocks of
 8 x 8 pixels, that NumPy finds by itself (`tests/naive/path_tracing`); for other bits than without it; and for as many
@@ -74,7 +74,8 @@ def estimates(frame, rules):
     rounds = []
     for _ in range(ROUNDS):
         picture = np.full((3, frame.height, frame.width), np.nan)
-        picture[:, *at] = path_tracing.irradiance(frame.scene, receivers, rules, SIDE, random).T
+        estimate = path_tracing.irradiance(frame.scene, receivers, rules, SIDE, random, buffer.projection)
+        picture[:, *at] = estimate.T
         rounds.append(means(picture))
     return np.array(rounds)
 
@@ -86,10 +87,9 @@ def means(picture):
     return np.array([np.nanmean(part, axis=(1, 2)) for part in (picture, *blocks)]).T
 
 
-def rules_of(frame, settings):
+def rules_of(settings):
     """Return what is asked of the truth, apart from how."""
-    camera = frame.gbuffer.projection if settings.emitters == "visible" else None
-    return path_tracing.Rules(settings.visibility, camera, settings.bounces)
+    return path_tracing.Rules(settings.visibility, settings.emitters == "visible", settings.bounces)
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -102,8 +102,7 @@ def made(request):
 
 def test_the_mean(made, evidence):
     case, settings, result = made
-    frame = frame_of(case.scene)
-    rounds = estimates(frame, rules_of(frame, settings))
+    rounds = estimates(frame_of(case.scene), rules_of(settings))
     got = np.concatenate([result.picture_mean[:, None], result.block_mean.reshape(3, -1)], axis=1)
     variance = np.concatenate([result.picture_variance[:, None], result.block_variance.reshape(3, -1)], axis=1)
     error = np.sqrt(variance + rounds.var(axis=0, ddof=1) / ROUNDS)

@@ -19,7 +19,7 @@ def crossings(corners, starts, directions):
     for k, (a, b, c) in enumerate(corners):
         e1, e2, s = b - a, c - a, starts - a
         p, q = np.cross(directions, e2), np.cross(s, e1)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):  # rays along a plane miss it
             inverse = 1 / (p @ e1)
             u, v, t = (s * p).sum(1) * inverse, (q * directions).sum(1) * inverse, (q @ e2) * inverse
         far[:, k] = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, math.inf)

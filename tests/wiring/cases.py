@@ -17,6 +17,7 @@ from refgi.frame import Frame
 from refgi.scene import Camera, DirectionalLight, Material, Mesh, PointLight, Scene, SpotLight, merge
 from refgi.settings import of
 from refgi.settings.fields import choices_of, hints, is_choice, may_be_none, members
+from tests.sssil.cameras.hidden_side import hidden_side
 from tests.truth.scenes import rectangle
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -97,18 +98,22 @@ def ball(center, radius, material):
 
 
 def tilted(scene):
-    """Return a smooth scene with its vertex normals turned: far from those of the triangles, as on coarse meshes."""
-    axis, angle = np.array([0.36, 0.48, 0.8]), 0.6
-    normals = scene.geometry.vertex_normals
-    turned = (math.cos(angle) * normals + math.sin(angle) * np.cross(axis, normals)
-              + (1 - math.cos(angle)) * (normals @ axis)[:, None] * axis)
-    return dataclasses.replace(scene, geometry=dataclasses.replace(scene.geometry, vertex_normals=turned))
+    """Return a scene with vertex normals up to 35 degrees off those of its triangles, as on coarse meshes."""
+    corners = scene.geometry.vertices[scene.geometry.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.repeat(normals / np.linalg.norm(normals, axis=1, keepdims=True), 3, axis=0)
+    normals += 0.7 * np.sin(np.multiply.outer(np.arange(len(normals)), (1.0, 2.0, 3.0)))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    geometry = dataclasses.replace(scene.geometry, vertices=corners.reshape(-1, 3), vertex_normals=normals,
+                                   faces=np.arange(len(normals), dtype=np.int32).reshape(-1, 3))
+    return dataclasses.replace(scene, geometry=geometry)
 
 
 SCENES = {
     "lamps": lambda: room(*LAMPS),
     "smooth": lambda: room(*LAMPS, smooth=True),
-    "tilted": lambda: tilted(room(*LAMPS, smooth=True)),
+    "hidden": hidden_side,
+    "tilted": lambda: tilted(room(*LAMPS)),
     "glass": lambda: room(*LAMPS, glass=True),
     "spot": lambda: room(LAMPS[0]),
 }

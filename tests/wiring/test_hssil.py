@@ -10,6 +10,7 @@ from refgi.sssil.cameras import place_cameras
 from refgi.sssil.hssil import hssil
 from refgi.sssil.settings import HssilSettings
 from tests.naive import screen_space
+from tests.sssil.cameras.hidden_side import SIDE_VIEW
 from tests.wiring.cases import Case, uncovered
 
 ROUNDING = 1e-9  # of the brightest pixel: float64 in another order
@@ -17,7 +18,7 @@ COUNTS = 1e-3  # of the brightest pixel: a key that is not heeded
 
 BASE = {"levels": 3, "radius": 2.0, "samples": 9}
 SIDES = (Camera((-0.6, 1.2, 0.9), (0.3, 0.4, -0.6), (0.0, 1.0, 0.1), math.radians(80)),
-         Camera((0.9, 0.5, 0.8), (-0.3, 0.3, -0.4), (0.1, 1.0, 0.0), math.radians(75)))
+         Camera((0.9, 0.8, 0.7), (-0.5, 0.2, -0.6), (0.1, 1.0, 0.0), math.radians(75)))
 VIEWS = {"cameras.views": SIDES}
 MASK = {"visibility": "bitmask", "visibility.thickness": 0.05}
 
@@ -25,7 +26,7 @@ CASES = {
     "more samples": Case({"samples": 14}),
     "wider crowns": Case({"radius": 3.0}),
     "the smallest radius": Case({"radius": None}, {"levels": 2}),
-    "two levels": Case({"levels": 2}),
+    "two levels": Case({"levels": 2}, {"radius": 1.0}),
     "from full resolution": Case({"start": "full"}),
     "from quarter resolution": Case({"start": "quarter"}, {"levels": 2}),
     "a pixel's samples": Case({"pattern": "pixel"}),
@@ -41,7 +42,8 @@ CASES = {
     "points": Case({"form_factor": "point"}),
     "the second level alone": Case({"only_level": 1}),
     "wide in depth": Case({"depth_sigma": 0.3}),
-    "wide in normals": Case({"normal_power": 0.5}, {"depth_sigma": 0.3}),
+    "wide in normals": Case({"normal_power": 2.0}, {"depth_sigma": 0.3}, scene="smooth"),
+    "any normal": Case({"normal_power": 0.0}),
     "bilinear": Case({"upsampling": "bilinear"}),
     "nearest": Case({"upsampling": "nearest"}),
     "a bitmask": Case({"visibility": "bitmask"}),
@@ -60,8 +62,10 @@ CASES = {
     "rays, the smallest radius": Case({"radius": None}, {"visibility": "rays", "levels": 2}),
     "rays, on a smooth ball": Case({"visibility": "rays"}, scene="smooth"),
     "further views": Case(VIEWS),
-    "a placed view": Case({"cameras.count": 1}),
-    "a placed view beside others": Case({"cameras.count": 1}, {"cameras.views": SIDES[:1]}),
+    "a placed view": Case({"cameras.count": 1}, scene="hidden"),
+    # texels of one plane may be equally near where bilateral weights vanish: rounding decides between them
+    "placed views beside another": Case({"cameras.count": 2}, {"cameras.views": (SIDE_VIEW,), "upsampling": "bilinear"},
+                                        scene="hidden"),
     "views, a larger tolerance": Case({"cameras.depth_tolerance": 0.2}, VIEWS | {"cameras.normal_cosine": -1.0}),
     "views, any normal": Case({"cameras.normal_cosine": -1.0}, VIEWS | {"cameras.depth_tolerance": 0.2}),
     "the tangents of whole angles": Case({"as_published": {"hss_tan_f"}}),

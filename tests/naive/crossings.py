@@ -22,7 +22,7 @@ def crossings(corners, starts, directions):
         with np.errstate(all="ignore"):  # rays along a plane miss it
             inverse = 1 / (p @ e1)
             u, v, t = (s * p).sum(1) * inverse, (q * directions).sum(1) * inverse, (q @ e2) * inverse
-        far[:, k] = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, math.inf)
+            far[:, k] = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, math.inf)
     return far
 
 

@@ -23,7 +23,7 @@ from tests.wiring.cases import Case, uncovered
 
 SIGMAS = 4.5  # standard errors: one of some 20 means of a few dozen passes lies beyond once in 3,000 runs
 RUNS = 8  # truths with seeds of their own
-WEIGHING, ROUNDS, SIDE = 4, 12, 10  # estimates by NumPy: for weights and for values; and strata of rays, each way
+WEIGHING, ROUNDS, SIDE = 4, 12, 14  # estimates by NumPy: for weights and for values; and strata of rays, each way
 PILOT_CELLS, PILOT_RECEIVERS, PILOT_PICKS = 64, 2048, 1 << 15  # docs/truth: cells each way, most receivers; their picks
 BASE = {"samples": 24 * 3, "light_grid": 12, "interleave": 3}
 

@@ -65,7 +65,7 @@ def test_what_lies_far_off_along_one_axis_does_not_count(axis, sign, rows, evide
     mixed = np.abs(blur(light, to, 8, BoxBlur(), DIAGONAL) - expected).max()
     evidence(f"axis {axis}, {sign:+d}: {error:.0e} off the loops, where a mean of all is {mixed:.2f} off")
     assert error < ROUNDING
-    assert mixed > 0.1
+    assert mixed > 0.05
 
 
 @pytest.mark.feature("VAL-24")

@@ -117,6 +117,7 @@ SCENES = {
     "lamps": lambda: room(*LAMPS),
     "smooth": lambda: room(*LAMPS, smooth=True),
     "hidden": hidden_side,
+    "close": lambda: tilted(room(*LAMPS)).with_camera(vfov=math.radians(25)),
     "tilted": lambda: tilted(room(*LAMPS)),
     "glass": lambda: room(*LAMPS, glass=True),
     "spot": lambda: room(LAMPS[0]),

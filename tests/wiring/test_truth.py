@@ -88,12 +88,12 @@ def weights_of(pictures):
 
 
 def means(pictures, weights):
-    """Return weighted means over the picture and over blocks of 8 x 8 pixels that see anything, (n, 3, values)."""
+    """Return weighted means over the picture and over blocks of 8 x 8 pixels of which half see anything."""
     rows, columns = (range(0, size, 8) for size in weights.shape)
     parts = [np.s_[:, :], *(np.s_[i : i + 8, j : j + 8] for i in rows for j in columns)]
     values = np.nan_to_num(pictures) * weights
     return np.stack([values[..., *part].sum(axis=(2, 3)) / weights[part].sum()
-                     for part in parts if weights[part].any()], axis=2)
+                     for part in parts if (weights[part] > 0).sum() >= 32], axis=2)
 
 
 def rules_of(settings):

@@ -48,6 +48,27 @@ def test_equals_the_twin(height, width, side, evidence):
 
 
 @pytest.mark.feature("VAL-24")
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("across", [False, True])
+def test_a_step_along_one_axis_parts_two_surfaces(axis, sign, across, evidence):
+    """Pixels of one normal and two places, one axis and one way apart; none of the tile's first row lies beyond."""
+    rng = np.random.default_rng(8)
+    y, x = np.mgrid[:16, :24]
+    position = np.zeros((3, 16, 24))
+    position[axis] = 3.0 * sign * (x >= 14 if across else y >= 11)
+    normal = np.zeros_like(position)
+    normal[axis - 1] = 1
+    to, light = Receivers(position, normal, np.ones((16, 24), bool)), rng.random((3, 16, 24))
+    expected = blurred(light, *to, 8, 1.0, 0.8)
+    error = np.abs(blur(light, to, 8, GeometryBlur(), DIAGONAL) - expected).max()
+    mixed = np.abs(blur(light, to, 8, BoxBlur(), DIAGONAL) - expected).max()
+    evidence(f"axis {axis}, {sign:+d}: {error:.0e} off the loops, where a mean of all is {mixed:.2f} off")
+    assert error < ROUNDING
+    assert mixed > 0.05
+
+
+@pytest.mark.feature("VAL-24")
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 def test_a_constant_stays_to_the_bit(real, evidence):
     rng = np.random.default_rng(3)

@@ -20,12 +20,11 @@ from refgi.cluster.settings import (
     RaysRectangle,
     RaysVpls,
 )
-from refgi.lights.selection import choose_lights
-from refgi.pairs.settings import DistanceClamp
+from refgi.lights.selection import choose_lights, footprints
 from tests.naive import area_visibility as soft
 from tests.naive import interleaving, kmeans
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
-from tests.naive.light_sum import contributions
+from tests.naive.pair_term import contributions
 from tests.naive.val import is_between, view_frame
 
 ABOVE = 4e-6  # of map centres off their lights, as a share of the largest coordinate
@@ -90,9 +89,7 @@ def view_of(frame, settings):
     pixels = np.argwhere(buffer.covered)
     at = tuple(pixels.T)
     position, normal = (plane[:, *at].T.astype(float) for plane in (buffer.position, buffer.normal))
-    clamp = settings.pairs.clamp
-    light = contributions(position, normal, lights, offset=settings.pairs.offset,
-                          least=clamp.value if isinstance(clamp, DistanceClamp) else 0.0)
+    light = contributions(position, normal, lights, settings.pairs, footprints(frame, settings.lights, settings.pairs))
     facing = face_normals(frame.scene.geometry, buffer.triangle_id[at], normal)
     return View(frame, settings, pixels, position, normal, facing, lights, light, corners_of(frame.scene.geometry))
 

@@ -10,10 +10,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import betainc
 
 from refgi.scene import DirectionalLight, SpotLight
 from tests.naive.crossings import LIFT, corners_of, crossings, face_normals, free
-from tests.naive.light_sum import share_above
 
 LEAST_ABOVE = 1e-12  # of a lobe: with less of it above the shading horizon it sends nothing
 
@@ -176,3 +176,9 @@ def seen_by(view, scene, vertices):
     starts = vertices.position + LIFT * vertices.face
     inside[inside] = free(corners_of(scene.geometry), starts[inside], view.origin[0])
     return inside
+
+
+def share_above(cosine, exponent):
+    """Return K(theta, P) = 1 - I_{sin^2 theta}((P + 1) / 2, 1 / 2) / 2, for theta > pi / 2 one less K(pi - theta)."""
+    half = betainc((exponent + 1) / 2, 0.5, 1 - cosine * cosine) / 2
+    return np.where(cosine >= 0, 1 - half, half)

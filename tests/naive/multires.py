@@ -11,8 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from tests.naive import eq2, per_light, refinement, upsample
-from tests.naive.sphere import spherical_pair
+from tests.naive import pair_term, per_light, refinement, upsample
 from tests.naive.truth import nearest_hit
 
 LIFT = 1e-6  # m: of a shadow ray's ends
@@ -211,51 +210,24 @@ def halved(light, covered_large, covered):
 # how one light lights one place (Eq. 2)
 
 
-def lights_of(lights, areas, pairs, clamp, blocked=None):
+def lights_of(lights, areas, pairs, blocked=None):
     """Return each pixel light as a function of a place.
 
     `lights` are arrays as `PixelLights`, `areas` (N,) what they stand for or None. `blocked(x, n, p, n_p)` says whether
     anything lies between two places.
     """
-    return [partial(one_light, lights, k, 0.0 if areas is None else areas[k], pairs, clamp, blocked)
-            for k in range(lights.flux.shape[1])]
+    of_light = [[] for _ in range(lights.flux.shape[1])]
+    for part in pair_term.parts(lights, pairs, areas):
+        of_light[part.light].append(part)
+    return [partial(one_light, parts, pairs, blocked) for parts in of_light if parts]
 
 
-def one_light(lights, k, area, pairs, clamp, blocked, place):
+def one_light(parts, pairs, blocked, place):
     """Return the irradiance (3,) of a pixel light at a place, its diffuse part and its lobe."""
-    (x, normal_x), p, normal_p = place, lights.position[:, k], lights.normal[:, k]
-    if blocked is not None and blocked(x, normal_x, p, normal_p):
+    x, normal = place
+    if blocked is not None and blocked(x, normal, parts[0].position, parts[0].normal):
         return np.zeros(3)
-    p, flux = p - pairs.offset * normal_p, lights.flux[:, k]
-    if "sii_no_pi" in pairs.as_published:
-        flux = math.pi * flux
-    if clamp is not None and clamp.name() == "sphere":
-        # pi r^2 = value A
-        return spherical_pair(x, normal_x, p, normal_p, flux, radius=math.sqrt(clamp.value * area / math.pi))
-    near = near_terms(clamp, area)
-    light = eq2.clamped_pair(x, normal_x, p, normal_p, flux, **near)
-    if lights.lobe_flux is None or not lights.lobe_flux[:, k].any():
-        return light
-    lobe = lights.lobe_axis[:, k], float(lights.lobe_exponent[k]), lights.lobe_flux[:, k]
-    return light + clamped_lobe(x, normal_x, p, normal_p, *lobe, pairs.lobe, **near)
-
-
-def near_terms(clamp, area):
-    """Return what keeps near pairs finite, in the words of `eq2.clamped_pair`."""
-    if clamp is None:
-        return {}
-    if clamp.name() == "disc":
-        return {"area": area}
-    return {{"distance": "least", "geometry": "bound"}[clamp.name()]: clamp.value}
-
-
-def clamped_lobe(x, normal_x, p, normal_p, axis, exponent, flux, lobe, least=0.0, bound=math.inf, area=0.0):
-    """Eq. 3 of SII with a bounded <n_x . -w> / r^2, for a lobe has no emitter's cosine."""
-    r = float(np.linalg.norm(x - p))
-    here = exponent * min(1.0, r / lobe.widening) if lobe.widening else exponent
-    intensity = eq2.lobe_intensity((x - p) / r, normal_p, axis, here, flux, lobe.norm)
-    cosine = max(0.0, float(normal_x @ (p - x)) / r)
-    return intensity * min(bound, cosine / (max(r, least) ** 2 + area / math.pi))
+    return sum(part.flux * pair_term.received(part, x[:, None], normal[:, None], pairs)[0] for part in parts)
 
 
 def demo_areas(position, source, drawn):

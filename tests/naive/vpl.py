@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from refgi.pairs.settings import PairSettings
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
-from tests.naive.light_sum import contributions
+from tests.naive.pair_term import contributions
 
 
 def picture(frame, lights, visibility=True):
@@ -16,7 +17,7 @@ def picture(frame, lights, visibility=True):
     at = tuple(pixels.T)
     position, normal = (plane[:, *at].T.astype(float) for plane in (buffer.position, buffer.normal))
     facing = face_normals(geometry, buffer.triangle_id[at], normal)
-    light = contributions(position, normal, lights)
+    light = contributions(position, normal, lights, PairSettings())
     up = sender_faces(frame, lights)
     result = np.zeros((3, frame.height, frame.width))
     for i, sent in enumerate(light):

@@ -1,23 +1,11 @@
 """Cases of all settings of pixel lights, which every method that has some takes over."""
 
-import dataclasses
-from collections.abc import Mapping
-
 from tests.wiring.cases import Case
 
 # 14, 13 and 13 of three lamps, which the grid rounds to 16, 6 (one on each face) and 16
 BASE = {"count": 40}
 LONG_RAYS = {"openness.radius": 1.0}  # the default's leave most lights open
 WARP_A, WARP_B = ({"source.warp": name, "source.warp.levels": 4} for name in "AB")
-
-
-def under(key: str, cases: Mapping[str, Case]) -> dict[str, Case]:
-    """Return cases whose keys lie below another key: those of the part of a tree as those of the tree."""
-    def below(values: Mapping[str, object]) -> dict[str, object]:
-        return {f"{key}.{name}": value for name, value in values.items()}
-
-    return {name: dataclasses.replace(case, values=below(case.values), over=below(case.over))
-            for name, case in cases.items()}
 
 
 LIGHT_CASES = {

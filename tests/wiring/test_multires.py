@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from refgi.lights.selection import choose_lights, footprints
-from refgi.pairs.settings import AutoClamp, DiscClamp, DistanceClamp, GeometryClamp
+from refgi.lights.settings import LightSettings
+from refgi.pairs.settings import AutoClamp, DiscClamp, DistanceClamp
 from refgi.splat import MultiresSettings, multires
 from refgi.splat.multires import ByGeometry
 from refgi.stages import observe
 from tests.naive import multires as naive
-from tests.wiring.cases import Case, uncovered
+from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.pair_cases import PAIR_CASES
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
 
@@ -89,16 +91,11 @@ CASES = {
     "sii_openness": Case({"lights.openness.as_published": {"sii_openness"}}, {"lights.openness.flux": "scale"}),
     "count": Case({"lights.count": 50}),
     "seed": Case({"lights.seed": 7, "lights.source.pattern": "random"}),
-    "auto": Case({"pairs.clamp": "auto"}, {"pairs.clamp": None}),
     "auto of paths": Case({"lights.source": "walk"}),
     "auto of roulette": Case({"lights.openness.flux": "roulette", "lights.openness.radius": 2.0}),
-    "distance": Case({"pairs.clamp": DistanceClamp(0.5)}),
-    "term": Case({"pairs.clamp": GeometryClamp(3.0)}),
-    "sphere": Case({"pairs.clamp": "sphere", "pairs.clamp.value": 2.0},
-                   BARE | {"lights.count": 3}, scene="matte"),
-    "offset": Case({"pairs.offset": 0.1}),
-    "norm": Case({"pairs.lobe.norm": "full_lobe"}),
-    "widening": Case({"pairs.lobe.widening": 1.5}),
+    **under("pairs", PAIR_CASES),
+    "discs": Case({"pairs.clamp": "disc"}, same="what the method takes where it is left to it"),
+    "a clamp left to the method": Case({"pairs.clamp": "auto"}, {"pairs.clamp": None}),
 }
 # pictures of so many pixels that not all are samples of the error
 WIDE = {"width": 112, "height": 84}
@@ -111,10 +108,7 @@ PROMISES = {
     "error detail": Case({"detail": 0.5}, BY_ERROR, frame=WIDE),
 }
 ALL = CASES | PROMISES
-TOLERANCE = {"rays": RAYS, "sphere": SPHERES}
-# what every method has in common is met by the cases of lights and pairs
-SHARED = ("LightSettings", "MapLights", "PathLights", "WarpA", "WarpB", "BackFace", "TwoInterface", "OpennessSettings",
-          "PairSettings", "LobeSettings", "DistanceClamp", "GeometryClamp", "SphereClamp")
+TOLERANCE = {"rays": RAYS, "spheres": SPHERES}
 
 
 def frame_of(name, scale=1):
@@ -129,20 +123,19 @@ def seen(scene, **options):
     return Case({}, scene=scene, frame=options).seen()
 
 
-def clamp_of(settings):
-    """Return the clamp in use: "auto" is the disc, but for lights without footprints and for shadow rays."""
+def pairs_of(settings):
+    """Return the pairs with the clamp in use: "auto" is the disc, none without footprints and with shadow rays."""
     if not isinstance(settings.pairs.clamp, AutoClamp):
-        return settings.pairs.clamp
+        return settings.pairs
     pathless = settings.lights.source.name() == "walk" or settings.lights.openness.flux == "roulette"
     traced = settings.subsplats.name() == "geometry" and settings.subsplats.visibility is not None
-    return None if pathless or traced else DiscClamp()
+    return dataclasses.replace(settings.pairs, clamp=None if pathless or traced else DiscClamp())
 
 
 def lights_of(frame, settings):
     """Return the pixel lights of a frame, and the surface that each stands for, or None."""
-    clamp = clamp_of(settings)
     lights = choose_lights(frame, settings.lights)
-    areas = footprints(frame, settings.lights, dataclasses.replace(settings.pairs, clamp=clamp))
+    areas = footprints(frame, settings.lights, pairs_of(settings))
     if "ams_disc" in settings.as_published:
         areas = demo_areas(frame, settings, lights)
     return lights, areas
@@ -173,14 +166,14 @@ def twin(name, settings):
     geometry = frame.scene.geometry
     traced = settings.subsplats.name() == "geometry" and settings.subsplats.visibility is not None
     blocked = naive.blocked_by(geometry.vertices, geometry.faces) if traced else None
-    lights = naive.lights_of(*lights_of(frame, settings), settings.pairs, clamp_of(settings), blocked)
+    lights = naive.lights_of(*lights_of(frame, settings), pairs_of(settings), blocked)
     light = naive.picture(naive.view_of(large.gbuffer), frame.scene.camera.eye, lights, settings)
     return naive.halved(light, large.gbuffer.covered, frame.gbuffer.covered) if settings.supersampled else light
 
 
 def test_every_field_has_a_case():
     """Property: no setting of the method's own is without a case."""
-    assert {word for word in uncovered(MultiresSettings, ALL, BASE) if not word.startswith(SHARED)} == set()
+    assert not uncovered(MultiresSettings, ALL, BASE) - set(needed(LightSettings))  # those: test_lights, test_shared
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -220,7 +213,7 @@ def full_sum(frame, settings):
 def sums(frame, settings):
     """Return the sum of all lights at every pixel that shows a surface."""
     view = naive.view_of(frame.gbuffer)
-    lights = naive.lights_of(*lights_of(frame, settings), settings.pairs, clamp_of(settings))
+    lights = naive.lights_of(*lights_of(frame, settings), pairs_of(settings))
     full = np.zeros((3, *view.covered.shape))
     for i, j in zip(*np.nonzero(view.covered), strict=True):
         full[:, i, j] = sum(light((view.position[:, i, j], view.normal[:, i, j])) for light in lights)

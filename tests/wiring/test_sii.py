@@ -8,7 +8,7 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
 from refgi.settings import replaced
 from refgi.splat import Receivers, SiiSettings, cut_irradiance, sii
-from refgi.splat.sii.ledger import energy_ledger
+from refgi.splat.sii.ledger import sii_ledger
 from refgi.splat.sii.reach.fragments import fragments
 from tests.naive import ledger
 from tests.naive import sii as naive
@@ -169,7 +169,7 @@ def test_the_ledger_is_that_of_the_twin(name):
     sharp = {"half_resolution": False}
     arrived, at_each_pixel, uncut, full = map(flux, (
         {}, sharp, sharp | {"reach.cut": "none"}, sharp | {"reach.cut": "none", "pairs.clamp": "none"}))
-    account = energy_ledger(frame, settings)
+    account = sii_ledger(frame, settings)
     for line, expected in (("arrived", arrived), ("interpolated", at_each_pixel - arrived),
                            ("cut", uncut - at_each_pixel), ("clamped", full - uncut)):
         np.testing.assert_allclose(getattr(account, line), expected, rtol=0, atol=ROUNDING * full.max(), err_msg=line)

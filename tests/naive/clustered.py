@@ -1,0 +1,400 @@
+"""The picture of clustered visibility (Dong et al. 2009) for every setting, by loops over area lights and receivers.
+
+Assembled from the twins of its parts: k-means, maps by rays, visibility, the light of each pixel light, interleaved
+sampling and the blur. Of the frame it takes the G-buffer, the shadow maps of lamps and the pixel lights chosen.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from refgi.cluster.settings import (
+    AdaptiveClusters,
+    BackProjection,
+    Csm,
+    GeometryBlur,
+    Hard,
+    Pcf,
+    Pcss,
+    RaysRectangle,
+    RaysVpls,
+)
+from refgi.lights.selection import choose_lights
+from refgi.pairs.settings import DistanceClamp
+from tests.naive import area_visibility as soft
+from tests.naive import interleaving, kmeans
+from tests.naive.crossings import LIFT, corners_of, face_normals, free
+from tests.naive.light_sum import contributions
+from tests.naive.val import is_between, view_frame
+
+ABOVE = 4e-6  # of map centres off their lights, as a share of the largest coordinate
+HULL = 1e-6  # of the diagonal: what lies beyond a plane by less is not beyond it
+FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line
+BACK = 0.75  # of the area lights that were enough: the one step back
+FROM_BEHIND = (np.arange(4) + 0.5) / 4  # points along a side of the rectangle that rays from behind end at
+POINTS = 256  # on a rectangle that rays go to
+
+
+class Area(NamedTuple):
+    """The rectangle of a cluster."""
+
+    center: np.ndarray
+    frame: np.ndarray  # (3, 3) right, down, forward of its map
+    axes: np.ndarray  # (2, 3) along its sides
+    side: np.ndarray  # (2,) m
+    offset: np.ndarray  # (2,) m, of its middle, along the axes
+    delta: float
+    radius: float
+    members: list
+
+
+class View(NamedTuple):
+    """What a picture is made of."""
+
+    frame: object
+    settings: object
+    pixels: np.ndarray  # (n, 2) row and column of those that see a surface
+    position: np.ndarray  # (n, 3)
+    normal: np.ndarray
+    facing: np.ndarray
+    lights: object
+    light: np.ndarray  # (N, n, 3) W/m^2 of each pixel light, not shadowed
+    corners: np.ndarray  # (T, 3, 3) of all triangles
+
+
+def picture(frame, settings):
+    """Return the irradiance, (3, h, w)."""
+    view = view_of(frame, settings)
+    block = settings.interleaving.block or 1
+    areas, shares = grouped(view)
+    light = np.zeros((3, frame.height, frame.width))
+    for p, (row, column) in enumerate(view.pixels):
+        of = area_of(areas, len(view.light)) if settings.interleaving.assignment == "cluster" else None
+        mine = interleaving.lights_of(column, row, block, len(view.light), of)
+        light[:, row, column] = block**2 * sum(
+            share[p] * view.light[sorted({*area.members} & {*mine}), p].sum(axis=0)
+            for area, share in zip(areas, shares, strict=True))
+    if block == 1 or settings.blur is None:
+        return light
+    by_geometry = isinstance(settings.blur, GeometryBlur)
+    extent = settings.blur.extent * diagonal(view.position) if by_geometry else math.inf
+    buffer = frame.gbuffer
+    return interleaving.blurred(light, buffer.position, buffer.normal, buffer.covered, block, extent,
+                                settings.blur.cosine if by_geometry else -math.inf)
+
+
+def view_of(frame, settings):
+    """Return what the picture is made of."""
+    buffer, lights = frame.gbuffer, choose_lights(frame, settings.lights)
+    pixels = np.argwhere(buffer.covered)
+    at = tuple(pixels.T)
+    position, normal = (plane[:, *at].T.astype(float) for plane in (buffer.position, buffer.normal))
+    clamp = settings.pairs.clamp
+    light = contributions(position, normal, lights, offset=settings.pairs.offset,
+                          least=clamp.value if isinstance(clamp, DistanceClamp) else 0.0)
+    facing = face_normals(frame.scene.geometry, buffer.triangle_id[at], normal)
+    return View(frame, settings, pixels, position, normal, facing, lights, light, corners_of(frame.scene.geometry))
+
+
+def area_of(areas, count):
+    """Return C(i) of each light."""
+    return [next(k for k, area in enumerate(areas) if i in area.members) for i in range(count)]
+
+
+# how many area lights
+
+
+def grouped(view):
+    """Return area lights and V of each at every pixel, as many as are set or as an error asks for."""
+    clusters = view.settings.clusters
+    if not isinstance(clusters, AdaptiveClusters):
+        return trial(view, clusters.count)
+    exact = np.einsum("ipc,ip->pc", view.light, member_shares(view))
+    samples = sampled(view)
+
+    def error(attempt):
+        off = clustered(view, *attempt)[samples] - exact[samples]
+        return math.sqrt((off**2).mean()) / exact[samples].mean()
+
+    most, count = len(view.light), 1
+    best = latest = trial(view, 1)
+    while error(latest) > clusters.target_error and count < most:
+        count = min(2 * count, most)
+        latest = trial(view, count)
+        best = latest if error(latest) <= clusters.target_error or error(latest) < error(best) else best
+    back = math.ceil(BACK * count)
+    if error(latest) <= clusters.target_error and (count + 1) // 2 < back < count:
+        latest = trial(view, back)
+        best = latest if error(latest) <= clusters.target_error else best
+    return best
+
+
+def sampled(view):
+    """Return the pixels at which the error is estimated: all of a picture of up to 2048."""
+    assert len(view.pixels) <= 2048
+    return slice(None)
+
+
+def member_shares(view):
+    """Return V of each pixel light by a ray, (N, n)."""
+    return np.array([visible_members(view, [i]) for i in range(len(view.light))])
+
+
+def clustered(view, areas, shares):
+    """Return the light of all pixel lights under the visibility of their area lights, (n, 3)."""
+    return sum(view.light[area.members].sum(axis=0) * share[:, None]
+               for area, share in zip(areas, shares, strict=True))
+
+
+def trial(view, count):
+    """Return area lights and V of each at every pixel."""
+    areas = area_lights(view, count)
+    return areas, [shares_of(view, area) for area in areas]
+
+
+# Sec. 5 and 6, area lights
+
+
+def area_lights(view, count):
+    """Group the pixel lights."""
+    kind, positions, normals = view.settings.clusters, view.lights.position.T, view.lights.normal.T
+    centers, axes, of, *_ = kmeans.cluster(positions.astype(float).tolist(), normals.astype(float).tolist(), count,
+                                           kind.distance, (kind.position_weight, kind.normal_weight),
+                                           diagonal(lit_points(view.frame)), kind.rounds)
+    return [rectangle(view, np.array(center), np.array(axis), [i for i in range(len(of)) if of[i] == k])
+            for k, (center, axis) in enumerate(zip(centers, axes, strict=True))]
+
+
+def rectangle(view, center, normal, members):
+    """Return the bounding rectangle of a cluster."""
+    settings = view.settings.area
+    right, down = (np.array(v) for v in view_frame(normal.tolist()))
+    away = view.lights.position[:, members].T.astype(float) - center
+    c, s = turn(away @ right, away @ down, settings.axes)
+    axes = np.array([c * right + s * down, c * down - s * right])
+    flat = away @ axes.T
+    radius = float(np.linalg.norm(away, axis=1).max(initial=0))
+    low, high = (flat.min(axis=0), flat.max(axis=0)) if members else np.zeros((2, 2))
+    side = np.where(high - low < FLAT * radius, 0.0, high - low)
+    if settings.unbiased_area and len(members) > 1:  # ((n - 1) / (n + 1))^2 of the area, in the mean
+        side = side * (len(members) + 1) / (len(members) - 1)
+    if settings.single_light == "footprint" and len(members) == 1:
+        side = np.full(2, math.sqrt(footprint(view, members[0])))
+    delta = {"root": math.sqrt(side[0] * side[1]), "longer": side.max(), "shorter": side.min()}[settings.extent]
+    return Area(center, np.array([right, down, normal]), axes, side, (low + high) / 2, float(delta), radius, members)
+
+
+def turn(s, t, axes):
+    """Return cosine and sine of how far the axes are turned within the plane."""
+    if axes == "fixed" or len(s) < 2:
+        return 1.0, 0.0
+    if axes == "pca":
+        _, vectors = np.linalg.eigh(np.cov(s, t))
+        return vectors[0, 1], vectors[1, 1]
+    best = (math.inf, (1.0, 0.0))  # along an edge of the hull, so along a line through two points
+    for i in range(len(s)):
+        for j in range(i):
+            length = math.hypot(s[i] - s[j], t[i] - t[j])
+            if length > 0:
+                c, d = (s[i] - s[j]) / length, (t[i] - t[j]) / length
+                best = min(best, (np.ptp(c * s + d * t) * np.ptp(c * t - d * s), (c, d)))
+    return best[1]
+
+
+def footprint(view, i):
+    """Return the surface that a pixel light stands for, m^2: Omega d^2 / cos of its texel, times T / N."""
+    maps = view.frame.rsms
+    m, count = int(view.lights.map_index[i]), view.settings.lights.count
+    drawn = count // len(maps) + (m < count % len(maps))
+    lamp, at = maps[m].light, int(view.lights.texel[i])
+    d = view.lights.position[:, i].astype(float) - getattr(lamp, "position", 0.0)
+    if hasattr(lamp, "position"):
+        square, toward = d @ d, d / math.sqrt(d @ d)
+    else:
+        square, toward = 1.0, np.asarray(lamp.direction) / np.linalg.norm(lamp.direction)
+    cosine = abs(toward @ view.lights.normal[:, i].astype(float))
+    return maps[m].solid_angle.reshape(-1)[at] * square / cosine * maps[m].texels / drawn
+
+
+def lit_points(frame):
+    """Return the places that reflect direct light, at all texels."""
+    points = []
+    for rsm in frame.rsms:
+        lit = rsm.flux.any(axis=0) | (False if rsm.lobe_flux is None else rsm.lobe_flux.any(axis=0))
+        points.append(rsm.position[:, lit].T.astype(float))
+    return np.concatenate(points)
+
+
+def diagonal(points):
+    """Return the diagonal of the box of points."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+# visibility
+
+
+def shares_of(view, area):
+    """Return V of an area light at every pixel."""
+    kind = view.settings.visibility
+    if kind is None or not area.members:
+        return np.ones(len(view.pixels))
+    if isinstance(kind, RaysVpls):
+        return visible_members(view, area.members)
+    if isinstance(kind, RaysRectangle):
+        return visible_rectangle(view, area)
+    ahead = ahead_of(view, area)
+    shares = np.where(ahead, by_map(view, area, 1.0), 1.0)
+    behind = view.settings.maps.behind
+    if behind == "dual_paraboloid":
+        return np.minimum(shares, by_map(view, area, -1.0))
+    if behind == "raytrace":
+        if isinstance(kind, BackProjection):
+            return np.where(ahead, shares, visible_rectangle(view, area))
+        return np.where(ahead, shares, from_behind(view, area))
+    return shares
+
+
+def ahead_of(view, area):
+    """Tell which receivers lie before an area light's plane."""
+    return (view.position - area.center) @ area.frame[2] > 0
+
+
+def visible_members(view, members):
+    """Return the share of a cluster's flux that rays reach, of lights that face the receiver and lie above it."""
+    starts = view.position + LIFT * view.facing
+    reached, whole = np.zeros((2, len(starts)))
+    for i in members:
+        place, up = view.lights.position[:, i].astype(float), view.lights.normal[:, i].astype(float)
+        toward = place - view.position
+        flux = sum(float(part[:, i].sum()) for part in (view.lights.flux, view.lights.lobe_flux) if part is not None)
+        counts = flux * (((toward * view.facing).sum(axis=1) > 0) & (toward @ up < 0))
+        whole += counts
+        reached += counts * free(view.corners, starts, place + LIFT * up)
+    return np.divide(reached, whole, out=np.ones_like(whole), where=whole > 0)
+
+
+def visible_rectangle(view, area):
+    """Return the share of Hammersley's points on the rectangle that rays reach; behind it 1, or from behind as well."""
+    i = np.arange(POINTS)
+    second = np.array([van_der_corput(k) for k in i]) + 0.5 / POINTS
+    points = on_rectangle(area, np.stack([(i + 0.5) / POINTS, second]))
+    ahead, settings = ahead_of(view, area), view.settings.maps
+    ball = settings.near_distance * area.radius if settings.near_geometry == "ball" else 0.0
+    corners = view.corners
+    if settings.near_geometry == "planes":
+        corners = without_near_planes(corners, area.center, settings.near_distance * area.radius)
+    shares = np.where(ahead, free_points(view, area, points, area.frame[2], ball, corners, ahead), 1.0)
+    if settings.behind != "visible":
+        shares = np.where(ahead, shares, free_points(view, area, points, -area.frame[2], ball, corners, ~ahead))
+    return shares
+
+
+def van_der_corput(k):
+    """Mirror the binary digits of a number at the point."""
+    value, digit = 0.0, 0.5
+    while k:
+        value, digit, k = value + k % 2 * digit, digit / 2, k // 2
+    return value
+
+
+def from_behind(view, area):
+    """Return the share of 4 x 4 points of the rectangle that rays from behind reach; nothing near its centre blocks."""
+    points = on_rectangle(area, np.array(np.meshgrid(FROM_BEHIND, FROM_BEHIND)).reshape(2, -1))
+    ball = view.settings.maps.near_distance * area.radius
+    return free_points(view, area, points, -area.frame[2], ball, view.corners, ~ahead_of(view, area))
+
+
+def on_rectangle(area, on_square):
+    """Return points of the rectangle, (k, 3)."""
+    return area.center + (area.offset[:, None] + (on_square - 0.5) * area.side[:, None]).T @ area.axes
+
+
+def free_points(view, area, points, up, ball, corners, asked):
+    """Return the share of points above a receiver's surface that its rays reach, with nothing in a ball to block."""
+    shares = np.ones(len(view.pixels))
+    for p in np.flatnonzero(asked & view.light[area.members].any(axis=(0, 2))):
+        x, facing = view.position[p], view.facing[p]
+        above = points[(points - x) @ facing > 0]
+        if len(above):
+            most = way_to_ball(x, above - x, area.center, ball)
+            shares[p] = free(corners, x + LIFT * facing, above + LIFT * up, most).mean()
+    return shares
+
+
+def way_to_ball(start, toward, center, radius):
+    """Return the share of each way that lies before a ball."""
+    a, b = (toward**2).sum(axis=1), toward @ (start - center)
+    root = b * b - a * ((start - center) @ (start - center) - radius**2)
+    share = (-b - np.sqrt(np.maximum(root, 0))) / a
+    return np.where((radius > 0) & (root > 0), np.clip(share, 0, 1), 1.0)
+
+
+def without_near_planes(corners, center, distance):
+    """Leave out triangles whose plane passes within a distance of a point."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    height = np.abs((normal * (corners[:, 0] - center)).sum(axis=1)) / np.linalg.norm(normal, axis=1)
+    return corners[height >= distance]
+
+
+# visibility by maps
+
+
+def by_map(view, area, sign):
+    """Return V by the map ahead (1), or by that of the hemisphere behind (-1): right and forward turned round."""
+    settings, seen = view.settings, map_of(view, area, sign)
+    shares, kind = np.ones(len(view.pixels)), settings.visibility
+    if not np.isfinite(seen.near):
+        return shares
+    projected = isinstance(kind, BackProjection)
+    boxes = "val_alpha_over_pi" in settings.as_published
+    channels = soft.filtered(seen, kind, boxes) if isinstance(kind, Csm) else None
+    for p in np.flatnonzero(view.light[area.members].any(axis=(0, 2))):
+        local = seen.frame @ (view.position[p] - seen.center)
+        if local[2] <= 0:
+            continue
+        if projected:
+            axes = np.array([*area.axes, seen.frame[2]])
+            shares[p] = soft.back_projected(seen, area, axes, view.position[p], view.facing[p])
+        else:
+            shares[p] = share_by_map(settings, area, seen, channels, local, seen.frame @ view.facing[p])
+    return shares
+
+
+def share_by_map(settings, area, seen, channels, local, facing):
+    """Return V of a receiver in the map's own axes."""
+    kind, printed = settings.visibility, settings.as_published
+    if isinstance(kind, Hard) or area.delta == 0:
+        return soft.pcf_share(seen, local, facing, 1)
+    if isinstance(kind, Pcf):
+        return soft.pcf_share(seen, local, facing, kind.texels)
+    d = math.hypot(*local)
+    if d <= seen.near:
+        return 1.0
+    delta = area.delta * math.sqrt(local[2] / d) if settings.area.foreshortened else area.delta
+    if isinstance(kind, Pcss):
+        bias = 0.0 if kind.constant_bias is None else kind.constant_bias.value
+        return soft.pcss_share(seen, kind, soft.series(Csm(bias=bias)).end, delta, local, facing, printed)
+    return soft.csm_share(seen, channels, kind, delta, local, printed)
+
+
+def map_of(view, area, sign):
+    """Draw the map of an area light past what cannot block or lies too near."""
+    settings = view.settings.maps
+    takes_part = np.concatenate([view.position, lit_points(view.frame)])
+    low, high = takes_part.min(axis=0), takes_part.max(axis=0)
+    center = area.center + ABOVE * max(np.abs(low).max(), np.abs(high).max()) * area.frame[2]
+    near = settings.near_distance * area.radius
+    corners = blockers(view, HULL * float(np.linalg.norm(high - low)))
+    corners = without_near_planes(corners, center, near) if settings.near_geometry == "planes" else corners
+    farthest = float(np.linalg.norm(np.maximum(np.abs(low - center), np.abs(high - center))))
+    return soft.draw(corners, center, area.frame * np.array([sign, 1.0, sign])[:, None], settings.resolution,
+                     near if settings.near_geometry == "ball" else 0.0, farthest)
+
+
+def blockers(view, tolerance):
+    """Leave out triangles with all lights and all triangles in view on one side; or those alone that lie outside."""
+    seen = np.unique(view.frame.gbuffer.triangle_id[view.frame.gbuffer.covered])
+    ends = np.concatenate([view.corners[seen].reshape(-1, 3), view.lights.position.T.astype(float)]).tolist()
+    tolerance = tolerance if view.settings.maps.occluders_alone else -tolerance
+    return np.array([t for t in view.corners if is_between(t.tolist(), ends, tolerance)]).reshape(-1, 3, 3)

@@ -78,7 +78,8 @@ def choose_pixel_lights(
 
     Notes
     -----
-    A filtered light whose own texel has no flux moves to the nearest texel of its cell that has. Filtered lights of a
+    A filtered light whose own texel has no flux moves to the nearest texel of its cell that has. Where its texel has no
+    lobe, what the cell's lobes reflect leaves it diffusely, as in the paper, which filters no axes. Filtered lights of a
     warped pattern stand at warped places and carry the flux of the texels nearest to them, without weight: the cells
     already are small where the lights are dense. Of several on one texel the first has it all.
     """
@@ -200,9 +201,13 @@ def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array) -> PixelLigh
 def _filtered_lights(rsm: Rsm, texel: Array, on_grid: bool) -> PixelLights:
     cell = cells_of_grid(rsm.projection, len(texel)) if on_grid else cells_of_nearest(rsm.projection, texel)
     flux = cell_sums(rsm.flux, cell, len(texel))
-    lobe = None if rsm.lobe_flux is None else cell_sums(rsm.lobe_flux, cell, len(texel))
     power = rsm.flux.sum(axis=0) if rsm.lobe_flux is None else (rsm.flux + rsm.lobe_flux).sum(axis=0)
-    return _lights(rsm, texels_with_flux(texel, cell, power > 0), flux, lobe)
+    texel = texels_with_flux(texel, cell, power > 0)
+    if rsm.lobe_flux is None:
+        return _lights(rsm, texel, flux, None)
+    lobe = cell_sums(rsm.lobe_flux, cell, len(texel))
+    glossy = values_at(rsm.lobe_flux, texel).any(axis=0)  # others have no axis for their cell's lobes to leave along
+    return _lights(rsm, texel, flux + np.where(glossy, 0, lobe), np.where(glossy, lobe, 0))
 
 
 def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None) -> PixelLights:

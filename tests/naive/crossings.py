@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 LIFT = 1e-6  # m: ends of segments are lifted off their surfaces by that
-ENDS = 1e-6  # share of a segment at either end within which nothing blocks
 
 
 def corners_of(geometry):
@@ -20,17 +19,17 @@ def crossings(corners, starts, directions):
     for k, (a, b, c) in enumerate(corners):
         e1, e2, s = b - a, c - a, starts - a
         p, q = np.cross(directions, e2), np.cross(s, e1)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):  # rays along a plane miss it
             inverse = 1 / (p @ e1)
             u, v, t = (s * p).sum(1) * inverse, (q * directions).sum(1) * inverse, (q @ e2) * inverse
-        far[:, k] = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, math.inf)
+            far[:, k] = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, math.inf)
     return far
 
 
 def free(corners, starts, ends, most=1.0):
     """Tell between which places, off their surfaces, nothing lies within the share `most` of the way."""
     t = crossings(corners, starts, ends - starts)
-    return ~((t > ENDS) & (t < np.minimum(1 - ENDS, np.reshape(most, (-1, 1))))).any(axis=1)
+    return ~(t < np.minimum(1, np.reshape(most, (-1, 1)))).any(axis=1)
 
 
 def face_normals(geometry, triangle, toward):

@@ -119,8 +119,11 @@ def received(x, y, w, form, disc_pi=False):
     return (1 if disc_pi else math.pi) * y["radiance"] * cos_x * disc / (r2 + disc)
 
 
-def gathered(texels, offsets_at, form, disc_pi=False):
-    """Return the irradiance of each texel of a level, (3, h, w); what is off the picture or empty gives nothing."""
+def gathered(texels, offsets_at, form, disc_pi=False, see=None):
+    """Return the irradiance of each texel of a level, (3, h, w); what is off the picture or empty gives nothing.
+
+    `see(receiver, sender)` is the visibility of two texels, where there is one.
+    """
     height, width = len(texels), len(texels[0])
     light = np.zeros((3, height, width))
     for row in range(height):
@@ -128,7 +131,9 @@ def gathered(texels, offsets_at, form, disc_pi=False):
             for ox, oy, w in offsets_at(row, column) if texels[row][column] is not None else ():
                 i, j = row + oy, column + ox
                 if (ox, oy) != (0, 0) and 0 <= i < height and 0 <= j < width and texels[i][j] is not None:
-                    light[:, row, column] += received(texels[row][column], texels[i][j], w, form, disc_pi)
+                    arriving = received(texels[row][column], texels[i][j], w, form, disc_pi)
+                    if arriving.any():
+                        light[:, row, column] += arriving * (see(texels[row][column], texels[i][j]) if see else 1.0)
     return light
 
 

@@ -42,4 +42,4 @@ def lobe(w, up, lights, i):
 def share_above(cosine, exponent):
     """Return K(theta, P) = 1 - I_{sin^2 theta}((P + 1) / 2, 1 / 2) / 2, for theta > pi / 2 one less K(pi - theta)."""
     half = betainc((exponent + 1) / 2, 0.5, 1 - cosine * cosine) / 2
-    return 1 - half if cosine >= 0 else half
+    return np.where(cosine >= 0, 1 - half, half)

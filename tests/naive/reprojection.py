@@ -25,8 +25,8 @@ def same_surface(depth, ray, z, d, normal, tolerance):
     return slant < 0 and abs(depth - float(normal @ d) / slant) <= tolerance * z
 
 
-def reproject(values, depth, normal_there, point, normal, view, depth_tolerance, normal_cosine):
-    """Mean value and weight of the four texels around a point that show its surface."""
+def reproject(values, depth, normal_there, point, normal, view, depth_tolerance, normal_cosine, fetch="bilinear"):
+    """Mean value and weight of the four texels around a point that show its surface, or of the nearest alone."""
     height, width = depth.shape
     seen = place(point, *view, height, width)
     if seen is None:
@@ -36,7 +36,7 @@ def reproject(values, depth, normal_there, point, normal, view, depth_tolerance,
         return np.zeros(3), 0.0
     eye, right, down, forward, tan_half_v = view
     pixel = 2 * tan_half_v / height
-    x, y = (round(c) if abs(c - round(c)) <= SNAP else c for c in (x, y))
+    x, y = (round(c) if abs(c - round(c)) <= SNAP or fetch == "nearest" else c for c in (x, y))
     total, weight = np.zeros(3), 0.0
     for i in range(math.floor(y), math.floor(y) + 2):
         for j in range(math.floor(x), math.floor(x) + 2):

@@ -17,6 +17,7 @@ from refgi.frame import Frame
 from refgi.scene import Camera, DirectionalLight, Material, Mesh, PointLight, Scene, SpotLight, merge
 from refgi.settings import of
 from refgi.settings.fields import choices_of, hints, is_choice, may_be_none, members
+from tests.sssil.cameras.hidden_side import hidden_side
 from tests.truth.scenes import rectangle
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -96,9 +97,27 @@ def ball(center, radius, material):
                 vertices, material)
 
 
+def tilted(scene):
+    """Return a scene with vertex normals up to 35 degrees off those of its triangles, and wide lobes.
+
+    Sharp ones would be met by few of an estimator's samples where they point below the horizon that normals make.
+    """
+    corners = scene.geometry.vertices[scene.geometry.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.repeat(normals / np.linalg.norm(normals, axis=1, keepdims=True), 3, axis=0)
+    normals += 0.5 * np.sin(np.multiply.outer(np.arange(len(normals)), (1.0, 2.0, 3.0)))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    geometry = dataclasses.replace(scene.geometry, vertices=corners.reshape(-1, 3), vertex_normals=normals,
+                                   faces=np.arange(len(normals), dtype=np.int32).reshape(-1, 3))
+    materials = tuple(dataclasses.replace(m, exponent=min(m.exponent, 4.0)) for m in scene.materials)
+    return dataclasses.replace(scene, geometry=geometry, materials=materials)
+
+
 SCENES = {
     "lamps": lambda: room(*LAMPS),
     "smooth": lambda: room(*LAMPS, smooth=True),
+    "hidden": hidden_side,
+    "tilted": lambda: tilted(room(*LAMPS)),
     "glass": lambda: room(*LAMPS, glass=True),
     "spot": lambda: room(LAMPS[0]),
 }

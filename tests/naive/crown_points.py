@@ -1,0 +1,128 @@
+"""Slow literal twin of where `hssil` samples: docs/conventions, "Random numbers", in whole numbers and floats."""
+
+import math
+
+from tests.naive.draws import mix32
+
+G = 1.324717957244746  # g^3 = g + 1
+GOLDEN = 0.6180339887498949
+
+
+def level_key(seed, number):
+    """Return the key of a level; 0 is the full picture."""
+    return mix32(seed ^ mix32((number + 0x9E3779B9) % 2**32))
+
+
+def row_key(level, row):
+    """Return the key of a row of a level."""
+    return mix32(level ^ mix32((row + 0x85EBCA6B) % 2**32))
+
+
+def pixel_key(row, column):
+    """Return the key of a pixel of a row."""
+    return mix32(row ^ mix32((column + 0xC2B2AE35) % 2**32))
+
+
+def shifts(key):
+    """Return (s, t) of a key."""
+    return mix32(key) / 2**32, mix32(key ^ 0x27D4EB2F) / 2**32
+
+
+def place(sampling, number, row, column):
+    """Return what is added to (u_j, v_j) at a receiver of a level."""
+    level = level_key(sampling.seed, number)
+    if sampling.pattern == "pixel":
+        return shifts(pixel_key(row_key(level, row), column))
+    s, t = shifts(level)
+    n = 2 * row + column % 2
+    return s + n * sampling.samples / G, t + n * sampling.samples / G**2
+
+
+def nearest(x, y):
+    """Return the texel whose centre is nearest; halves round up."""
+    return math.floor(x + 0.5), math.floor(y + 0.5)
+
+
+def samples(sampling, radius, index, number, row, column):
+    """Return (ox, oy, texels it stands for) of the samples around a receiver: the disc's, then the crown's."""
+    inner = sampling.inner if index == 0 else 0
+    found = []
+    for count, low, square in ((inner, 0.0, 1.0), (sampling.samples, 1.0, 3.0)):
+        weight = square * math.pi * radius**2 / max(count, 1)
+        found += [(*offset, weight) for offset in ring(sampling, radius, low, square, count, number, row, column)]
+    return found
+
+
+def ring(sampling, radius, low, square, count, number, row, column):
+    """Return the texels of `count` points at the radius r (low + square u)^(1/2)."""
+    if sampling.pattern == "fixed":
+        return mirrored(radius, low, square, count, shifts(level_key(sampling.seed, number)))
+    s, t = place(sampling, number, row, column)
+    return [nearest(*polar(radius * math.sqrt(low + square * ((0.5 + j / G + s) % 1)),
+                           2 * math.pi * ((0.5 + j / G**2 + t) % 1))) for j in range(count)]
+
+
+def mirrored(radius, low, square, count, shift):
+    """Return half of the points on the right, and their mirror images; an odd last one above or below."""
+    found = []
+    for j in range((count + 1) // 2):
+        u, v = (0.5 + j / G + shift[0]) % 1, (0.5 + j / G**2 + shift[1]) % 1
+        far = radius * math.sqrt(low + square * u)
+        x, y = polar(far, math.pi * (v - 0.5))
+        if 2 * j + 1 < count:
+            ox, oy = nearest(x, y)
+            found += [(ox, oy), (-ox, oy)]
+        else:
+            found.append(nearest(0.0, math.copysign(far, y)))
+    return found
+
+
+def polar(far, angle):
+    """Return columns and rows."""
+    return far * math.cos(angle), far * math.sin(angle)
+
+
+def every_texel(radius, index, shape):
+    """Return each texel once: the disc below 2 r at the first level, the crown from r on at others."""
+    rows, columns = shape
+    return [(ox, oy, 1.0) for oy in range(1 - rows, rows) for ox in range(1 - columns, columns)
+            if (ox, oy) != (0, 0) and math.hypot(ox, oy) < 2 * radius and (index == 0 or math.hypot(ox, oy) >= radius)]
+
+
+def slices(sampling, bitmask, radius, index, number, row, column):
+    """Return slices of (ox, oy, texels it stands for), nearest first; occluders stand for none.
+
+    Samples and disc are shared out among the slices; half as many occluders as crown samples lie in the inner disc.
+    """
+    count = max(1, round(math.sqrt(sampling.samples))) if bitmask.slices is None else bitmask.slices
+    crown = max(1, round(sampling.samples / count))
+    disc = max(1, round(sampling.inner / count)) if index == 0 and sampling.inner else 0
+    level, fixed = level_key(sampling.seed, number), sampling.pattern == "fixed"
+    key = level if fixed else row_key(level, row)
+    turn, shift = shifts(pixel_key(key, column) if sampling.pattern == "pixel" else key)
+    found = []
+    for k in range(count):
+        part = (shift + (k // 2 if fixed else k) * GOLDEN) % 1
+        angle = symmetric(k, count) if fixed else 2 * math.pi * (k + turn) / count
+        side = -1 if fixed and k % 2 else 1
+        right, down = math.sin(angle), math.cos(angle)
+        texels = [(far, *nearest(far * right, far * down), weight) for far, weight in
+                  along(radius, count, disc, crown, (crown + 1) // 2, part)]
+        found.append([(side * ox, oy, weight) for _, ox, oy, weight in texels])
+    return found
+
+
+def symmetric(k, count):
+    """Return the angle of slice k off the vertical: pairs of mirror images, an odd last one upright."""
+    if k == count - count % 2:
+        return 0.0
+    return 2 * math.pi * (k // 2 + (1.0 if count % 2 else 0.5)) / count
+
+
+def along(radius, count, disc, crown, occluders, part):
+    """Return (distance, texels it stands for) along a slice, nearest first."""
+    share = math.pi * radius**2 / count
+    placed = [(radius * (j + part) / occluders, 0.0) for j in range(occluders)]
+    placed += [(radius * math.sqrt((j + part) / disc), share / disc) for j in range(disc)]
+    placed += [(radius * math.sqrt(1 + 3 * (j + part) / crown), 3 * share / crown) for j in range(crown)]
+    return sorted(placed, key=lambda sample: sample[0])

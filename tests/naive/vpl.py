@@ -1,0 +1,35 @@
+"""Slow literal twin of pixel lights with true visibility: every pair of light and receiver, and a ray for each."""
+
+import numpy as np
+
+from tests.naive.crossings import LIFT, corners_of, face_normals, free
+from tests.naive.light_sum import contributions
+
+
+def picture(frame, lights, visibility=True):
+    """Return the irradiance, (3, h, w), by lights that were chosen from the frame's shadow maps.
+
+    Nothing leaves through the back of a face or arrives from below one, whatever normals are interpolated.
+    """
+    buffer, geometry = frame.gbuffer, frame.scene.geometry
+    pixels = np.argwhere(buffer.covered)
+    at = tuple(pixels.T)
+    position, normal = (plane[:, *at].T.astype(float) for plane in (buffer.position, buffer.normal))
+    facing = face_normals(geometry, buffer.triangle_id[at], normal)
+    light = contributions(position, normal, lights)
+    up = sender_faces(frame, lights)
+    result = np.zeros((3, frame.height, frame.width))
+    for i, sent in enumerate(light):
+        place = lights.position[:, i].astype(float)
+        toward = place - position
+        counts = ((toward * facing).sum(axis=1) > 0) & (toward @ up[i] < 0) & sent.any(axis=1)
+        if visibility:
+            counts[counts] = free(corners_of(geometry), position[counts] + LIFT * facing[counts], place + LIFT * up[i])
+        result[:, *at] += (sent * counts[:, None]).T
+    return result
+
+
+def sender_faces(frame, lights):
+    """Return the normals (N, 3) of the triangles that lights lie on, on the side that they shine to."""
+    triangle = [frame.rsms[m].triangle_id.reshape(-1)[t] for m, t in zip(lights.map_index, lights.texel, strict=True)]
+    return face_normals(frame.scene.geometry, np.array(triangle), lights.normal.T.astype(float))

@@ -1,0 +1,111 @@
+"""Every setting of `hssil`: the picture is that of the loops, and heeding the setting shows."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.scene import Camera
+from refgi.sssil.cameras import place_cameras
+from refgi.sssil.hssil import hssil
+from refgi.sssil.settings import HssilSettings
+from tests.naive import screen_space
+from tests.sssil.cameras.hidden_side import SIDE_VIEW
+from tests.wiring.cases import Case, uncovered
+
+ROUNDING = 1e-9  # of the brightest pixel: float64 in another order
+COUNTS = 1e-3  # of the brightest pixel: a key that is not heeded
+
+BASE = {"levels": 3, "radius": 2.0, "samples": 9}
+SIDES = (Camera((-0.6, 1.2, 0.9), (0.3, 0.4, -0.6), (0.0, 1.0, 0.1), math.radians(80)),
+         Camera((0.9, 0.8, 0.7), (-0.5, 0.2, -0.6), (0.1, 1.0, 0.0), math.radians(75)))
+VIEWS = {"cameras.views": SIDES}
+MASK = {"visibility": "bitmask", "visibility.thickness": 0.05}
+
+CASES = {
+    "more samples": Case({"samples": 14}),
+    "wider crowns": Case({"radius": 3.0}),
+    "the smallest radius": Case({"radius": None}, {"levels": 2}),
+    "two levels": Case({"levels": 2}, {"radius": 1.0}),
+    "from full resolution": Case({"start": "full"}),
+    "from quarter resolution": Case({"start": "quarter"}, {"levels": 2}),
+    "a pixel's samples": Case({"pattern": "pixel"}),
+    "fixed samples": Case({"pattern": "fixed"}, {"samples": 11}),
+    "every texel": Case({"pattern": "all"}),
+    "a seed": Case({"seed": 5}),
+    "a seed, a pixel's samples": Case({"seed": 5}, {"pattern": "pixel"}),
+    "a seed, fixed samples": Case({"seed": 5}, {"pattern": "fixed"}),
+    "five inner samples": Case({"inner_samples": 5}, {"pattern": "fixed"}),
+    "no inner samples": Case({"inner_samples": 0}),
+    "averages": Case({"downsample": "average"}),
+    "closest places, average light": Case({"downsample": "closest_average"}),
+    "points": Case({"form_factor": "point"}),
+    "the second level alone": Case({"only_level": 1}),
+    "wide in depth": Case({"depth_sigma": 0.3}),
+    "wide in normals": Case({"normal_power": 2.0}, {"depth_sigma": 0.3}, scene="smooth"),
+    "any normal": Case({"normal_power": 0.0}),
+    "bilinear": Case({"upsampling": "bilinear"}),
+    "nearest": Case({"upsampling": "nearest"}),
+    "a bitmask": Case({"visibility": "bitmask"}),
+    "thick surfaces": Case({"visibility.thickness": 0.2}, MASK),
+    "two slices": Case({"visibility.slices": 2}, MASK),
+    "a bitmask, fixed samples": Case({"pattern": "fixed"}, MASK),
+    "a bitmask, a pixel's samples": Case({"pattern": "pixel"}, MASK),
+    "a bitmask, points": Case({"form_factor": "point"}, MASK),
+    "a bitmask, a seed": Case({"seed": 3}, MASK),
+    "a bitmask, no inner samples": Case({"inner_samples": 0}, MASK),
+    "a bitmask, the smallest radius": Case({"radius": None}, MASK | {"levels": 2}),
+    "rays": Case({"visibility": "rays"}),
+    "rays, fixed samples": Case({"pattern": "fixed"}, {"visibility": "rays"}),
+    "rays, a pixel's samples": Case({"pattern": "pixel"}, {"visibility": "rays"}),
+    "rays, points": Case({"form_factor": "point"}, {"visibility": "rays"}),
+    "rays, the smallest radius": Case({"radius": None}, {"visibility": "rays", "levels": 2}),
+    "rays, on a smooth ball": Case({"visibility": "rays"}, scene="smooth"),
+    "further views": Case(VIEWS),
+    "a placed view": Case({"cameras.count": 1}, scene="hidden"),
+    # texels of one plane may be equally near where bilateral weights vanish: rounding decides between them
+    "placed views beside another": Case({"cameras.count": 2}, {"cameras.views": (SIDE_VIEW,), "upsampling": "bilinear"},
+                                        scene="hidden"),
+    "views, a larger tolerance": Case({"cameras.depth_tolerance": 0.2}, VIEWS | {"cameras.normal_cosine": -1.0}),
+    "views, any normal": Case({"cameras.normal_cosine": -1.0}, VIEWS | {"cameras.depth_tolerance": 0.2}),
+    "the tangents of whole angles": Case({"as_published": {"hss_tan_f"}}),
+    "no pi": Case({"as_published": {"hss_disc_pi"}}),
+    "levels count twice": Case({"as_published": {"hss_level_factor"}}),
+    "no pi past a bitmask": Case({"as_published": {"hss_disc_pi"}}, MASK),
+    "no pi past rays": Case({"as_published": {"hss_disc_pi"}}, {"visibility": "rays"}),
+    "levels count twice past a bitmask": Case({"as_published": {"hss_level_factor"}}, MASK),
+    "levels count twice past rays": Case({"as_published": {"hss_level_factor"}}, {"visibility": "rays"}),
+}
+
+pytestmark = pytest.mark.filterwarnings("ignore:radius")  # crowns that end before the picture does
+
+
+def test_every_field_has_a_case():
+    assert uncovered(HssilSettings, CASES, BASE) == set()
+
+
+@pytest.fixture(scope="module", params=CASES)
+def made(request):
+    """Return the case with its frame, settings and picture."""
+    case = CASES[request.param]
+    frame, settings = case.seen(), case.settings(HssilSettings, BASE)
+    return case, frame, settings, hssil(frame, settings)
+
+
+def test_the_twin(made, evidence):
+    """Where cameras are placed is tested elsewhere: placed views are views."""
+    case, frame, settings, picture = made
+    placed = place_cameras(frame, settings.cameras.count) if settings.cameras.count else ()
+    assert len(placed) == settings.cameras.count
+    expected = screen_space.picture(frame, settings, placed)
+    off = np.abs(picture - expected).max() / expected.max()
+    evidence(f"{case.values}: off by {off:.0e} of the brightest pixel")
+    assert off < ROUNDING
+
+
+def test_each_key_counts(made, evidence):
+    case, frame, _, picture = made
+    for key, settings in case.without(HssilSettings, BASE):
+        change = np.abs(picture - hssil(frame, settings)).max() / picture.max()
+        evidence(f"{key}: {change:.1e} of the brightest pixel")
+        assert change > COUNTS

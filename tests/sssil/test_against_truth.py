@@ -187,9 +187,9 @@ def test_the_line_of_figure_5(evidence):
 
     evidence(f"mean of the line over that of seen emitters without visibility: every texel of four levels "
              f"{average.mean():.4f} by averages, {closest.mean():.4f} by the closest of four; 64 samples, {SEEDS} "
-             f"seeds, {drawn.mean():.4f} +- {spread:.4f} with Eq. 3, {darker:.3f} of that with Eq. 4. Rms {off(average):.3f}, "
-             f"{off(closest):.3f}, {off(drawn):.3f}; a seed's noise {noise:.3f}, the truth's {error.mean():.3f}; the "
-             f"truth with visibility {off(shadowed):.3f}")
+             f"seeds, {drawn.mean():.4f} +- {spread:.4f} with Eq. 3, {darker:.3f} of that with Eq. 4. Rms "
+             f"{off(average):.3f}, {off(closest):.3f}, {off(drawn):.3f}; a seed's noise {noise:.3f}, the truth's "
+             f"{error.mean():.3f}; the truth with visibility {off(shadowed):.3f}")
     assert average.mean() == pytest.approx(1, abs=LEVELS)
     assert 0 < grown < 0.04
     assert drawn.mean() == pytest.approx(1 + grown, abs=LEVELS + SPREADS * spread)

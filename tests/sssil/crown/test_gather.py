@@ -240,6 +240,7 @@ def test_the_first_level_has_most_of_the_samples(evidence):
              f"{fifth:.2%}; a pixel of the picture has {crowns[0] / texels[0]:.1f} samples in the crown, "
              f"{(whole[0] - crowns[0]) / texels[0]:.1f} in the disc")
     assert crowns[:3] == pytest.approx([64 * n for n in texels[:3]], rel=COUNTED)
+    assert whole[1:] == pytest.approx(crowns[1:], rel=2 * COUNTED)  # the first level alone has a disc
     assert whole[0] - crowns[0] == pytest.approx(64 / 3 * texels[0], rel=8 * COUNTED)
     assert share == pytest.approx(0.753, abs=0.01)
     # rows and columns rounded up

@@ -33,9 +33,9 @@ LITERAL = {
 MANY = {"lights.source.pattern": "all", "visibility": "rays_vpls", "clusters.count": 1 << 20, "pairs.clamp": None}
 ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
 GRAZING = 5e-4  # of a step: a ray of float32 that meets an edge of the ball or not, one of 256 to a rectangle
-# How the steps of visibility add up: the root of their squares over the error of all six, 1 where they are independent.
-# On the sphere, steps take back what others did. Limits of the slow scenes: 6^1/2 / 6 where all are alike; on
-# cornell_horse 3.1, whose rectangle darkens what one view from its centre brightens.
+# How the steps of visibility add up: the root of their squares over the error of all six, 1 where they are independent,
+# 6^-1/2 where they are alike, more where some take back what others did: 3 on cornell_horse, whose rectangle darkens
+# what one view from its centre brightens.
 ROOTS, AROUND = {"cornell_box": 1.01, "cornell_sphere:faces=600": 1.32}, 0.1
 LEAST_ROOT, MOST_ROOT = 1.0, 3.5
 

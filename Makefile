@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # a file's tests run in one process, so that few kernels are compiled twice
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: demo test quick test-all check evidence bench docs clean
+.PHONY: demo test quick test-all check evidence bench mutate docs clean
 
 demo: $(VENV)/run.stamp
 	$(BIN)/refgi compare cornell_box --methods sii,multires,val,hssil --out out/
@@ -34,6 +34,9 @@ evidence: $(VENV)/dev.stamp
 
 bench: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks --out out/bench
+
+mutate: $(VENV)/dev.stamp
+	$(BIN)/python -m benchmarks mutate --out out/mutate
 
 docs: $(VENV)/dev.stamp
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html

@@ -1,7 +1,8 @@
 """Run the benchmarks: `python -m benchmarks [--quick] [--out DIR] [topic ...]`.
 
 Every figure is a ratio within one run, or reported without an aim. Results: a table here, results.json in --out.
-`python -m benchmarks paper NAME --out DIR` makes a paper's figures and tables again.
+`python -m benchmarks paper NAME --out DIR` makes a paper's figures and tables again; `python -m benchmarks mutate` puts
+faults into a copy of the sources and counts those that no test catches.
 """
 
 import argparse
@@ -19,6 +20,7 @@ from rich.table import Table
 from benchmarks.harness import Row
 
 FOLDER = Path(__file__).parent
+COMMANDS = {"paper": "benchmarks.papers.runner", "mutate": "benchmarks.mutate.runner"}
 NOT_TOPICS = {"__init__", "__main__", "harness", "signatures"}
 
 
@@ -31,8 +33,8 @@ def topics() -> list[str]:
 
 
 def main() -> int:
-    if sys.argv[1:2] == ["paper"]:
-        return importlib.import_module("benchmarks.papers.runner").main(sys.argv[2:])
+    if sys.argv[1:2] and sys.argv[1] in COMMANDS:
+        return importlib.import_module(COMMANDS[sys.argv[1]]).main(sys.argv[2:])
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("topics", nargs="*", metavar="topic", help=f"of {', '.join(topics())}; all if none")
     parser.add_argument("--quick", action="store_true", help="smaller sizes, fewer repeats")

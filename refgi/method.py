@@ -22,7 +22,7 @@ class Method(NamedTuple):
     summary: str  # one line
     function: Callable[[Any, Any], Array]  # frame and settings to (3, h, w) indirect irradiance, W/m^2
     settings: type[Settings]
-    visibility: bool  # whether it knows what blocks indirect light
+    visibility: bool | Callable[[Any], bool]  # whether it knows what blocks indirect light; may depend on settings
     ledger: Callable[[Any, Any], Any] | None = None  # accounts for the power of the lights
     estimate: Callable[[Any, Any], Any] | None = None  # gives the picture with its own error
     memory: Callable[[Any, tuple[int, int], int], int] | None = None  # bytes that settings add to a picture
@@ -36,6 +36,10 @@ class Method(NamedTuple):
             raise InputError(f"preset: expected one of {', '.join([DEFAULT, *self.presets])} for {self.name}, "
                              f"got {name!r}", key="preset")
         return self.presets[name]
+
+    def knows_visibility(self, settings: Any) -> bool:
+        """Return whether the method, with some settings, knows what blocks indirect light."""
+        return self.visibility(settings) if callable(self.visibility) else self.visibility
 
     def compute(self, frame: Any, settings: Any) -> tuple[Array, Any]:
         """Return the indirect irradiance in the frame's dtype, and the estimate it is the mean of, if it is one."""

@@ -1,15 +1,32 @@
-"""Every feature that the documentation lists is measured by a test that carries its id, and the other way round."""
+"""Every feature of the papers is listed, and is measured by a test that carries its id or says why it is not built."""
 
 import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+WHOLE = {"SII": 29, "VAL": 27, "AMS": 22, "HSS": 20, "REF": 21}  # features of each paper and beyond
+NOT_BUILT = "not built: "
+
+
+def listed():
+    """Return the evidence of each id, in the order of the page."""
+    page = (ROOT / "docs" / "features.md").read_text()
+    return re.findall(r"^\| ([A-Z]{3}-\d\d) \|[^|]+\| (.*) \|$", page, re.MULTILINE)
+
+
+def marked():
+    """Return the ids that tests carry."""
+    found = set()
+    for path in (ROOT / "tests").rglob("test_*.py"):
+        for call in re.findall(r"mark\.feature\(([^)]*)\)", path.read_text()):
+            found |= set(re.findall(r"[A-Z]{3}-\d\d", call))
+    return found
+
+
+def test_every_feature_is_listed_once_and_in_order():
+    assert [feature for feature, _ in listed()] == [
+        f"{paper}-{number:02}" for paper, count in WHOLE.items() for number in range(1, count + 1)]
 
 
 def test_listed_features_are_the_marked_ones():
-    listed = set(re.findall(r"^\| ([A-Z]{3}-\d\d) ", (ROOT / "docs" / "features.md").read_text(), re.MULTILINE))
-    marked = set()
-    for path in (ROOT / "tests").rglob("test_*.py"):
-        for call in re.findall(r"mark\.feature\(([^)]*)\)", path.read_text()):
-            marked |= set(re.findall(r"[A-Z]{3}-\d\d", call))
-    assert listed == marked
+    assert {feature for feature, evidence in listed() if not evidence.startswith(NOT_BUILT)} == marked()

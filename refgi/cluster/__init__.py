@@ -10,6 +10,7 @@ shadows, PCF, PCSS and convolution shadow maps, `lighting` the picture. `adaptiv
 
 from refgi.cluster.clustering.kmeans import Clustering, cluster
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
+from refgi.cluster.ledger import val_ledger
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
@@ -33,4 +34,5 @@ __all__ = [
 
 METHOD = Method(
     "val", "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights", val, ValSettings,
-    visibility=True, memory=extra_bytes, presets=PRESETS)
+    visibility=lambda settings: settings.visibility is not None, ledger=val_ledger, memory=extra_bytes,
+    presets=PRESETS)

@@ -84,7 +84,7 @@ def compare(
     if out is not None:
         require_folder(Path(out))
     references = {TRUTH: runner.reference(TRUTH, settings[TRUTH])}
-    if any(not METHODS[name].visibility for name in names):
+    if not all(METHODS[name].knows_visibility(settings[name]) for name in names):
         references[UNOCCLUDED] = runner.reference(UNOCCLUDED, _without_visibility(settings[TRUTH]))
     results, failures = {}, {}
     for name in names:
@@ -129,7 +129,7 @@ class _Runner:
         self._warm_up(function, settings)
         irradiance, seconds, runs = self._timed(name, lambda frame: function(frame, settings))
         radiance, covered = self.frame.radiance(irradiance), self.frame.gbuffer.covered
-        judges = [TRUTH] if method.visibility else [TRUTH, UNOCCLUDED]
+        judges = [TRUTH] if method.knows_visibility(settings) else [TRUTH, UNOCCLUDED]
         against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered,
                               references[j].mean_variance) for j in judges}
         seen = flip(radiance, references[TRUTH].radiance, covered)

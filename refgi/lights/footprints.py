@@ -122,7 +122,7 @@ def _fill_areas(
 def with_equal_solid_angles(rsm: "Rsm") -> "Rsm":
     """Return a map with the flux its texels would have if all that the light reaches subtended the same solid angle.
 
-    The solid angle of the whole map is unchanged.
+    Diffuse flux, lobes and the areas behind texels follow that angle; that of the whole map is unchanged.
     """
     from refgi.rsm.buffers.light_projection import incident_flux
 

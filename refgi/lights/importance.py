@@ -27,7 +27,8 @@ Kind = Literal["flux", "peak", "openness"]
 
 @stage("lights.importance")
 def importance(
-    rsm: Rsm, kind: Kind = "flux", openness: Array | None = None, floor: float = 0.05, defensive: float = 0.0
+    rsm: Rsm, kind: Kind = "flux", openness: Array | None = None, floor: float = 0.05, defensive: float = 0.0,
+    as_printed: bool = False,
 ) -> Array:
     """Return the importance of each texel for `warp_samples`.
 
@@ -43,6 +44,8 @@ def importance(
         Least factor that openness leaves, 0 to 1. With 0 texels in the open are never chosen and their flux is lost.
     defensive : float
         Share beta, 0 to 1, of the samples that are uniform over the map.
+    as_printed : bool
+        Take g(P) = P, so that sharp lobes count up to twice as much; with it a lobe of P = 0 is never chosen.
 
     Returns
     -------
@@ -72,7 +75,8 @@ def importance(
         result: Array = rsm.flux.max(axis=0)
     else:
         result = np.empty_like(rsm.flux[0])
-        _add_lobes(rsm.flux, rsm.lobe_flux, rsm.lobe_exponent, kind != "flux", result)
+        growth, least = (0.0, 1.0) if kind == "flux" else (1.0, 0.0) if as_printed else (0.5, 0.5)
+        _add_lobes(rsm.flux, rsm.lobe_flux, rsm.lobe_exponent, real(growth), real(least), result)
     if kind == "openness":
         result = result * _hidden(rsm, openness, real(floor))
     if defensive:
@@ -81,13 +85,12 @@ def importance(
 
 
 @kernel
-def _add_lobes(flux: Array, lobe_flux: Array, exponent: Array, by_peak: bool, result: Array) -> None:
-    """Fill the largest channel of Phi_diffuse + g(P) Phi_lobe; g = 1 unless `by_peak`."""
+def _add_lobes(flux: Array, lobe_flux: Array, exponent: Array, growth: Any, least: Any, result: Array) -> None:
+    """Fill the largest channel of Phi_diffuse + g(P) Phi_lobe, g = growth P + least."""
     real = result.dtype.type
-    one, half = real(1), real(0.5)
     for row in range(result.shape[0]):
         for column in range(result.shape[1]):
-            peak = half * (exponent[row, column] + one) if by_peak else one
+            peak = growth * exponent[row, column] + least
             most = real(0)
             for c in range(3):
                 most = max(most, flux[c, row, column] + peak * lobe_flux[c, row, column])

@@ -2,7 +2,8 @@
 
 The paper scales the flux "by the ambient occlusion term" on an unwarped pattern. With O the share of free directions
 the intended factor is 1 - O: `scale_flux` darkens lights in the open and so loses energy, the sum of Phi O. `roulette`
-instead removes them at random and lets the survivors make up for it, so the mean stays the same.
+instead removes them at random and lets the survivors make up for it, so the mean stays the same. By the paper's own O
+(Sec. 3.5) the printed factor is O, which darkens the lights near other surfaces, against its aim: `as_printed`.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,9 @@ Array = npt.NDArray[Any]
 
 
 @stage("lights.scale_flux")
-def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Array]":
+def scale_flux(
+    lights: "PixelLights", openness: Array, as_printed: bool = False
+) -> "tuple[PixelLights, Array]":
     """Scale each light's flux by 1 - O.
 
     Parameters
@@ -30,11 +33,13 @@ def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Ar
         N' lights.
     openness : (N',) ndarray
         Share O of unoccluded directions of each light, 0 to 1.
+    as_printed : bool
+        Scale by O, the ambient occlusion term as the paper defines it.
 
     Returns
     -------
     lights : PixelLights
-        All of them, in the same order; those with O = 1 are dark.
+        All of them, in the same order; those with O = 1, as printed O = 0, are dark.
     lost : (3,) ndarray of float64
         Flux removed, W, diffuse and lobe together.
 
@@ -44,7 +49,7 @@ def scale_flux(lights: "PixelLights", openness: Array) -> "tuple[PixelLights, Ar
         If openness does not fit.
     """
     _check(lights, openness)
-    factor = (1 - openness).astype(lights.flux.dtype)
+    factor = (openness if as_printed else 1 - openness).astype(lights.flux.dtype)
     scaled = lights._replace(flux=lights.flux * factor)
     if lights.lobe_flux is not None:
         scaled = scaled._replace(lobe_flux=lights.lobe_flux * factor)

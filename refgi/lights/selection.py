@@ -62,15 +62,15 @@ def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
     """
     from refgi.lights.refraction import refracted
 
-    equal = "equal_solid_angle" in settings.as_published
-    rsms = tuple(map(with_equal_solid_angles, frame.rsms)) if equal else frame.rsms
-    if settings.refraction is None:
-        return rsms
-    mode: Any = settings.refraction.name()
-    traced = mode == "two_interface" and frame.materials.ior.any()
-    tracer = frame.tracer if traced else None
-    return tuple(refracted(rsm, frame.scene.geometry, frame.materials, mode, settings.refraction.exponent,
-                           tracer=tracer) for rsm in rsms)
+    rsms = frame.rsms
+    if settings.refraction is not None:
+        mode: Any = settings.refraction.name()
+        traced = mode == "two_interface" and frame.materials.ior.any()
+        tracer = frame.tracer if traced else None
+        rsms = tuple(refracted(rsm, frame.scene.geometry, frame.materials, mode, settings.refraction.exponent,
+                               tracer=tracer) for rsm in rsms)
+    # after refraction: what leaves glass has the solid angle of its texel too
+    return tuple(map(with_equal_solid_angles, rsms)) if "equal_solid_angle" in settings.as_published else rsms
 
 
 def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettings) -> list[Array] | None:
@@ -101,7 +101,8 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettin
         free = None
         if warp.importance == "openness":
             free = _openness(frame, rsm.position, rsm.normal, settings, _has_flux(rsm))
-        maps.append(importance(rsm, warp.importance, free, settings.openness.floor, warp.defensive))
+        maps.append(importance(rsm, warp.importance, free, settings.openness.floor, warp.defensive,
+                               as_printed="sii_peak" in _map_lights(settings).as_published))
     return maps
 
 
@@ -114,7 +115,7 @@ def with_openness(frame: "Frame", lights: "PixelLights", settings: LightSettings
         return lights
     free = _openness(frame, lights.position, lights.normal, settings)
     if settings.openness.flux == "scale":
-        scaled = scale_flux(lights, free)[0]
+        scaled = scale_flux(lights, free, "sii_openness" in settings.openness.as_published)[0]
         warn_of_loss(lost_share(power(lights).sum(), power(scaled).sum()), "openness_flux 'scale'")
         return scaled
     return roulette(lights, free, settings.openness.floor, settings.seed)

@@ -63,7 +63,7 @@ class MapLights(Settings):
     """Pixel lights are texels of reflective shadow maps."""
 
     NAME = "rsm"
-    SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_no_tn", "equal_solid_angle"})
+    SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_no_tn", "equal_solid_angle", "sii_peak"})
 
     pattern: Pattern = setting("halton", "where they lie in a map; all: every texel, whatever the count")
     filtered: bool = setting(False, "flux is averaged over each light's cell (SII Sec. 4)")
@@ -72,9 +72,12 @@ class MapLights(Settings):
     as_published: frozenset[str] = setting(frozenset(), "forms of the maps to use as printed", study=True)
 
     def check(self) -> None:
-        """Check that a warped pattern leaves some texels out."""
+        """Check that a warped pattern leaves some texels out, and that a printed importance is in use."""
         expect(self.warp is None or self.pattern != "all", "warp", "none with the pattern 'all'",
                self.warp and self.warp.name())
+        expect("sii_peak" not in self.as_published or (self.warp is not None and self.warp.importance != "flux"),
+               "as_published", "no sii_peak without the warp's importance 'peak' or 'openness'",
+               sorted(self.as_published))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,16 +93,21 @@ class PathLights(Settings):
 class OpennessSettings(Settings):
     """How open the surroundings of a light are, and what that does to its flux (SII Sec. 3.6)."""
 
+    SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_openness"})
+
     radius: float = setting(0.0, "length of the rays; 0: a tenth of the scene's diagonal", least=0.0, most=LARGEST,
                             unit="m", study=True)
     rays: int = setting(16, "rays of one light", least=1, most=1 << 16, study=True)
     floor: float = setting(0.05, "least importance of a light in the open", least=0.0, most=1.0, study=True)
     flux: Literal["none", "scale", "roulette"] = setting(
         "none", "flux times 1 - openness, or roulette with it, which costs no energy in the mean")
+    as_published: frozenset[str] = setting(frozenset(), "forms of the scaling to use as printed", study=True)
 
     def check(self) -> None:
-        """Check that roulette can let a light live."""
+        """Check that roulette can let a light live, and that a printed scaling is in use."""
         expect(self.floor > 0 or self.flux != "roulette", "floor", "more than 0 for roulette", self.floor)
+        expect(not self.as_published or self.flux == "scale", "as_published",
+               f"no sii_openness with the flux {self.flux!r}", sorted(self.as_published))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -178,11 +178,12 @@ def _turn(share: Array) -> Array:
 
 
 def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: PathRays) -> tuple[Array, Array, Array]:
-    """Return position, unit normal on the side the ray came from, and material of each hit."""
+    """Return position, unit normal on the side of the face that the ray met, and material of each hit."""
     position = rays.origin + distance[:, None] * rays.direction
     faces = geometry.faces[triangle]
     corner = geometry.vertices[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    facing = normal * np.where((normal * rays.direction).sum(axis=1, keepdims=True) > 0, -1.0, 1.0)
     if geometry.vertex_normals is not None:
         # twice the areas opposite to the corners, times the face's normal
         rest = position[:, None] - corner
@@ -190,7 +191,7 @@ def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: PathR
         smooth = np.einsum("cn,nca->na", share, geometry.vertex_normals[faces])
         normal = np.where((smooth != 0).any(axis=1, keepdims=True), smooth, normal)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    normal *= np.where((normal * rays.direction).sum(axis=1, keepdims=True) > 0, -1.0, 1.0)
+    normal *= np.where((normal * facing).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     return position, normal, geometry.material_of_face[triangle]
 
 

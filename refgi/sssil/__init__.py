@@ -48,4 +48,4 @@ __all__ = [
 
 METHOD = Method(
     "hssil", "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees", hssil,
-    HssilSettings, visibility=False, memory=extra_bytes, presets=PRESETS)
+    HssilSettings, visibility=lambda settings: settings.visibility is not None, memory=extra_bytes, presets=PRESETS)

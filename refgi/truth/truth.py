@@ -204,4 +204,4 @@ def _fingerprint(task: Task, shape: tuple[int, ...]) -> bytes:
 
 
 METHOD = Method("truth", "one-bounce path tracing with a standard error for every pixel", truth, TruthSettings,
-                visibility=True, estimate=trace_truth)
+                visibility=lambda settings: settings.visibility, estimate=trace_truth)

@@ -81,4 +81,5 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     return irradiance
 
 
-METHOD = Method("vpl", "the same pixel lights with ray-traced visibility", vpl, VplSettings, visibility=True)
+METHOD = Method("vpl", "the same pixel lights with ray-traced visibility", vpl, VplSettings,
+                visibility=lambda settings: settings.visibility)

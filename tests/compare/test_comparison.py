@@ -19,7 +19,7 @@ from refgi.frame import Frame
 from refgi.method import Method
 from refgi.methods import METHODS
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight, load_scene
-from refgi.settings import Settings, setting
+from refgi.settings import Settings, of, setting
 from refgi.stages import stage
 from refgi.truth import TruthSettings
 
@@ -77,6 +77,24 @@ def test_a_method_without_visibility_is_judged_twice(box, truth_settings):
     assert set(got.results["seeing"].against) == {"truth"}
     assert not got.references["unoccluded"].settings.visibility
     assert got.truth.settings == truth_settings
+
+
+@pytest.mark.filterwarnings("ignore:a fake method")
+def test_settings_say_whether_a_method_is_judged_twice(box, truth_settings, fakes):
+    fakes["blind"] = fakes["blind"]._replace(visibility=lambda settings: settings.level > 0)
+    got = compare(box, ["blind"], truth_settings=truth_settings, method_settings={"blind": FakeSettings(0.5)}, **SIZE)
+    assert set(got.references) == set(got.results["blind"].against) == {"truth"}
+    got = compare(box, ["blind"], truth_settings=truth_settings, method_settings={"blind": FakeSettings(0.0)}, **SIZE)
+    assert set(got.references) == set(got.results["blind"].against) == {"truth", "unoccluded"}
+
+
+@pytest.mark.parametrize(("name", "blind", "seeing"), [
+    ("multires", {}, {"visibility": "rays"}), ("hssil", {}, {"visibility": "rays"}),
+    ("hssil", {}, {"visibility": "bitmask"}), ("val", {"visibility": None}, {}), ("vpl", {"visibility": False}, {})])
+def test_methods_know_visibility_by_their_settings(name, blind, seeing):
+    method = METHODS[name]
+    assert not method.knows_visibility(of(method.settings, **blind))
+    assert method.knows_visibility(of(method.settings, **seeing))
 
 
 @pytest.mark.usefixtures("fakes")

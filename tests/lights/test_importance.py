@@ -56,6 +56,18 @@ def test_it_is_the_largest_channel_of_flux_times_lobe_peak_times_hidden_share(ev
     evidence("lobe of P = 20 beside a diffuse part: Phi_d + 10.5 Phi_l, its largest channel, times max(eps, 1 - O)")
 
 
+@pytest.mark.parametrize("kind", ["flux", "peak", "openness"])
+def test_as_printed_a_lobe_counts_by_its_exponent(kind):
+    """Oracle: p = Phi (1 - O) P; the flux alone knows no lobes."""
+    rsm = glossy_map()
+    openness = np.random.default_rng(0).random(rsm.depth.shape)
+    got = importance(rsm, kind, openness if kind == "openness" else None, as_printed=True)
+    weight = 1.0 if kind == "flux" else rsm.lobe_exponent
+    expected = (rsm.flux + weight * rsm.lobe_flux).max(axis=0)
+    hidden = np.maximum(0.05, 1 - openness) if kind == "openness" else 1.0
+    np.testing.assert_allclose(got, expected * hidden, rtol=ROUNDING)
+
+
 def test_it_is_zero_only_where_the_flux_is():
     for rsm in (box_map(), glossy_map()):
         lit = rsm.flux.any(axis=0) if rsm.lobe_flux is None else rsm.flux.any(axis=0) | rsm.lobe_flux.any(axis=0)

@@ -8,12 +8,15 @@ import pytest
 from refgi.errors import InputError
 from refgi.lights import Warp, choose_pixel_lights, importance
 from refgi.lights.openness_flux import roulette, scale_flux
+from refgi.lights.selection import choose_lights
+from refgi.lights.settings import LightSettings
 from refgi.rays import Tracer, openness
 from refgi.rsm import reflective_shadow_map
 from refgi.scene import Material, SpotLight, load_scene, material_table
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.splat import PairSettings, Receivers, irradiance
 from tests.rsm.shapes import geometry
+from tests.wiring.cases import Case
 
 ROUNDING = 1e-12
 STANDARD_ERRORS = 4.0  # of a mean: one in 16,000 means of unbiased estimates is farther off
@@ -122,6 +125,54 @@ def test_scaling_by_openness_saves_pairs_and_says_what_it_loses(chosen, evidence
     total = (lights.flux + lights.lobe_flux).sum(axis=1)
     evidence(f"corner, 256 lights: {lost[1] / total[1]:.0%} of the flux lost; pairs within 5 % x {before / after:.1f} "
              "fewer")
+
+
+def test_as_printed_flux_is_scaled_by_openness(chosen):
+    """Oracle: Phi O, with O the share of free directions."""
+    lights, share = chosen
+    scaled, lost = scale_flux(lights, share, as_printed=True)
+    np.testing.assert_allclose(scaled.flux, lights.flux * share, rtol=ROUNDING)
+    np.testing.assert_allclose(scaled.lobe_flux, lights.lobe_flux * share, rtol=ROUNDING)
+    np.testing.assert_allclose(lost, ((lights.flux + lights.lobe_flux) * (1 - share)).sum(axis=1), rtol=ROUNDING)
+
+
+@pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
+def test_printed_forms_of_openness_and_importance_are_settings():
+    """Oracle: lights by hand, from the maps, the openness of their texels and the printed Phi P and Phi O."""
+    frame = Case({}).seen()
+    options = {"count": 40, "pattern": "halton", "openness.radius": 1.0}
+    warped = of(LightSettings, **options, **{"source.warp": "A", "source.warp.importance": "peak"})
+    printed = replaced(warped, {"source.as_published": {"sii_peak"}})
+    by_hand = [(rsm.flux + rsm.lobe_exponent * rsm.lobe_flux).max(axis=0) for rsm in frame.rsms]
+    expected = choose_pixel_lights(frame.rsms, count=40, pattern="halton", warp=Warp("A", 3), importance=by_hand)
+    assert same_lights(choose_lights(frame, printed), expected)
+    assert not same_lights(choose_lights(frame, warped), expected)
+
+    plain, scaled = of(LightSettings, **options), of(LightSettings, **options, **{"openness.flux": "scale"})
+    lights = choose_lights(frame, plain)
+    free = 1 - powers(choose_lights(frame, scaled)) / powers(lights)
+    got = choose_lights(frame, replaced(scaled, {"openness.as_published": {"sii_openness"}}))
+    assert 0.1 < free.mean() < 0.9
+    np.testing.assert_allclose(powers(got), powers(lights) * free, rtol=ROUNDING, atol=ROUNDING * powers(lights).max())
+
+
+def same_lights(one, other):
+    return np.array_equal(one.position, other.position) and np.array_equal(one.flux, other.flux)
+
+
+def powers(lights):
+    """Return the flux of each light, diffuse and lobe together, of all channels."""
+    return (lights.flux + lights.lobe_flux).sum(axis=0)
+
+
+@pytest.mark.parametrize(("key", "change"), [
+    ("source.as_published", {"source.as_published": {"sii_peak"}}),
+    ("source.as_published", {"source.as_published": {"sii_peak"}, "source.warp": "A"}),
+    ("openness.as_published", {"openness.as_published": {"sii_openness"}}),
+    ("openness.as_published", {"openness.as_published": {"sii_openness"}, "openness.flux": "roulette"})])
+def test_printed_forms_without_what_they_change_are_refused(key, change):
+    with pytest.raises(InputError, match=key):
+        of(LightSettings, **change)
 
 
 @pytest.mark.feature("SII-16")

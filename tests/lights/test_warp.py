@@ -1,5 +1,7 @@
 """Warping: the literal twin, densities on maps of any size, unbiased sums, zero cells, several maps."""
 
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 
 from refgi.errors import InputError
 from refgi.lights import Warp, importance_pyramid, warp_samples, warp_stacked
+from refgi.lights.importance import cell_sum, packed
 from refgi.lights.warp import texel_of
 from refgi.sampling import halton
 from tests.naive import warp as naive
@@ -302,6 +305,28 @@ def test_stacked_maps_are_chosen_by_importance_and_sums_stay_unbiased(maps, evid
     got, weights = warp_stacked(halton(300), importance, maps, Warp("A", 20))
     np.testing.assert_allclose(weights * values_at(got, importance), importance.mean(), rtol=ROUNDING)
     evidence(f"{maps} maps: within {worst:.1f} standard errors; at full depth w Phi is the mean of all maps")
+
+
+@pytest.mark.feature("SII-29")
+@pytest.mark.parametrize("method", ["A", "B"])
+def test_a_sample_reads_four_sums_on_every_level(method, monkeypatch, evidence):
+    """Table 2 counted, not timed: the kernel as plain Python, with its reads of the pyramid written down."""
+    module, reads, counts = sys.modules["refgi.lights.warp"], [], []
+    for name in ("_halve", "_share", "_place"):
+        monkeypatch.setattr(module, name, getattr(module, name).py_func)
+    monkeypatch.setattr(module, "cell_sum", lambda *cell: reads.append(cell[1:]) or cell_sum.py_func(*cell))
+    pyramid, points = importance_pyramid(spot_map(32)), halton(20)
+    for levels in range(6):
+        reads.clear()
+        for u, v in points:
+            module._warp_one.py_func(u, v, packed(pyramid, levels), levels, method == "A")
+        counts.append(len(reads) / len(points))
+        cells = np.array(reads).reshape(-1, 4, 3)  # level, row, column of four children
+        assert (cells[:, :, 0] == cells[:, :1, 0]).all()
+        assert (cells[:, :, 1:] // 2 == cells[:, :1, 1:] // 2).all()
+        assert len(np.unique(cells[:, :, 1:] % 2 @ [2, 1], axis=0)) <= 1
+    assert counts == [4 * levels for levels in range(6)]
+    evidence(f"method {method}: {', '.join(f'{count:g}' for count in counts)} reads a sample with 0 to 5 levels")
 
 
 def test_black_stacked_maps_leave_samples_as_they_are():

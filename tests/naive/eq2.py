@@ -65,9 +65,10 @@ def irradiance(position, normal, lights, term=pair):
     return total
 
 
-def gather(x, normal_x, center, rsm, samples, radius, offset=0.0):
+def gather(x, normal_x, center, rsm, samples, radius, offset=0.0, power=1):
     """Sum the texels at center + r_max xi_1 (cos, sin)(2 pi xi_2) with the weight xi_1, Halton points from 1 on.
 
+    With another power of xi_1 the weight is (power + 1) / 2 xi_1^power, whose mean is the same.
     `center` is (row, column), `rsm` has position, normal and flux (3, H, W) of one square map; E = (2 pi r_max^2 T / S)
     sum xi_1 E_t with r_max in map widths and T the texels of the map.
     """
@@ -79,7 +80,7 @@ def gather(x, normal_x, center, rsm, samples, radius, offset=0.0):
         column = math.floor(center[1] + radius * width * xi1 * math.sin(2 * math.pi * xi2))
         if 0 <= row < height and 0 <= column < width:
             p, n, flux = (part[:, row, column].astype(float) for part in (rsm.position, rsm.normal, rsm.flux))
-            total += xi1 * pair(x, normal_x, p - offset * n, n, flux)
+            total += (power + 1) / 2 * xi1**power * pair(x, normal_x, p - offset * n, n, flux)
     return 2 * math.pi * radius**2 * height * width / samples * total
 
 

@@ -23,16 +23,17 @@ def samples_differ(samples, threshold):
     return bool((np.max(samples, axis=0) - np.min(samples, axis=0) > threshold).any())
 
 
-def subsplats(covered, irradiance_at, top, finest, threshold, shared=None):
+def subsplats(covered, irradiance_at, top, finest, threshold, shared=None, place_of=representative):
     """Return {cell: irradiance} of one light.
 
-    `irradiance_at(pixel)` is the light's irradiance (3,) at (row, column). `threshold(largest)` is T, given the largest
-    channel of all samples up to this pass. `shared` is a set of cells that a shared list refines, which are refined
-    whatever the samples say.
+    `irradiance_at(place)` is the light's irradiance (3,) at the place of a cell, its pixel (row, column) unless
+    `place_of` says otherwise; None for a cell without surface. `threshold(largest)` is T, given the largest channel of
+    all samples up to this pass. `shared` is a set of cells that a shared list refines, which are refined whatever the
+    samples say.
     """
     def sample(cell):
-        pixel = representative(covered, *cell)
-        return None if pixel is None else irradiance_at(pixel)
+        place = place_of(covered, *cell)
+        return None if place is None else irradiance_at(place)
 
     height, width = covered.shape
     cells = [(top, i, j) for i in range(-(-height // 2**top)) for j in range(-(-width // 2**top))]

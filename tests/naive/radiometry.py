@@ -5,6 +5,8 @@ from functools import cache
 
 import numpy as np
 
+gauss_legendre = cache(np.polynomial.legendre.leggauss)
+
 
 def spot_intensity(axis_intensity, cos_angle, cos_inner, cos_outer):
     """I(a) = I0 t t (3 - 2 t), t = clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)."""
@@ -18,7 +20,7 @@ def spot_intensity(axis_intensity, cos_angle, cos_inner, cos_outer):
 
 def solid_angle_of_rectangle(density, x0, x1, y0, y1, nodes=64):
     """Integrate a solid-angle density over a rectangle of the image plane by Gauss-Legendre quadrature."""
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = gauss_legendre(nodes)
     u = 0.5 * (x0 + x1) + 0.5 * (x1 - x0) * x
     v = 0.5 * (y0 + y1) + 0.5 * (y1 - y0) * x
     return float(density(u[:, None], v[None, :]) @ w @ w) * 0.25 * (x1 - x0) * (y1 - y0)
@@ -26,17 +28,22 @@ def solid_angle_of_rectangle(density, x0, x1, y0, y1, nodes=64):
 
 @cache
 def lobe_fraction(theta, exponent, nodes=400):
-    """Share of the integral of cos^P over the half space of the lobe that lies above a surface tilted by theta.
+    """Share of the integral of cos^P over the half space of the lobe that lies above a surface tilted by theta."""
+    return float(lobe_fractions(theta, np.array([exponent]), nodes)[0])
+
+
+def lobe_fractions(theta, exponents, nodes=400):
+    """`lobe_fraction` of several exponents P.
 
     Polar coordinates around the lobe's axis: at angle a off it, the circle lies above the surface for the azimuths
     with cos(theta) cos(a) + sin(theta) sin(a) cos(phi) > 0. The integrand bends at a = pi/2 - theta, where the
     circle first dips below; sin substitutions on both pieces take the square root out of it.
     """
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = gauss_legendre(nodes)
     turn = 0.5 * math.pi * (x + 1)
     weights = 0.5 * math.pi * w
     edge = math.pi / 2 - theta
-    total = 0.0
+    total = np.zeros(len(exponents))
     for low, high in ((0.0, edge), (edge, math.pi / 2)):
         a = low + (high - low) * 0.5 * (1 - np.cos(turn))
         da = (high - low) * 0.5 * np.sin(turn) * weights
@@ -44,5 +51,5 @@ def lobe_fraction(theta, exponent, nodes=400):
             continue
         cosine = -math.cos(theta) * np.cos(a) / np.maximum(math.sin(theta) * np.sin(a), 1e-300)
         azimuth = 2 * np.arccos(np.clip(cosine, -1, 1))
-        total += float((azimuth * np.cos(a) ** exponent * np.sin(a) * da).sum())
-    return total * (exponent + 1) / (2 * math.pi)
+        total += (azimuth * np.cos(a) ** np.reshape(exponents, (-1, 1)) * np.sin(a) * da).sum(axis=1)
+    return total * (np.asarray(exponents) + 1) / (2 * math.pi)

@@ -53,7 +53,7 @@ def nearest(origin, direction, vertices, faces):
         q = np.cross(s, e1)
         v = q @ direction / det
         t = np.einsum("ij,ij->i", e2, q) / det
-    smallest = np.minimum(np.minimum(u, v), 1 - u - v)
+        smallest = np.minimum(np.minimum(u, v), 1 - u - v)
     hit = (det != 0) & (smallest >= 0) & (t > 0)
     ts = np.where(hit, t, np.inf)
     winner = int(np.argmin(ts)) if hit.any() else -1

@@ -30,8 +30,8 @@ def neighbours(shape, i, j):
     return [(i + di, j + dj) for di, dj in SIDES if 0 <= i + di < shape[0] and 0 <= j + dj < shape[1]]
 
 
-def slope(depth, covered, i, j):
-    """sqrt((dz/dx)^2 + (dz/dy)^2) / z with the larger of both one-sided differences."""
+def slope(depth, covered, i, j, relative=True):
+    """sqrt((dz/dx)^2 + (dz/dy)^2), or that over z, with the larger of both one-sided differences."""
     if not covered[i, j]:
         return 0.0
     z, steps = depth[i, j], [0.0, 0.0]
@@ -39,7 +39,7 @@ def slope(depth, covered, i, j):
         if covered[y, x]:
             axis = 0 if y == i else 1
             steps[axis] = max(steps[axis], abs(depth[y, x] - z))
-    return math.hypot(*steps) / z
+    return math.hypot(*steps) / (z if relative else 1)
 
 
 def bend(one, other):

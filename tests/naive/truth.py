@@ -18,7 +18,7 @@ def nearest_hit(vertices, faces, origin, direction):
         t = np.einsum("ij,ij->i", np.cross(e1, e2), s) / volume
         u = np.einsum("ij,ij->i", np.cross(s, e2), np.broadcast_to(direction, e1.shape)) / -volume
         v = np.einsum("ij,ij->i", np.cross(e1, s), np.broadcast_to(direction, e1.shape)) / -volume
-    hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 1e-9) & np.isfinite(t)
+        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 1e-9) & np.isfinite(t)
     if not hit.any():
         return -1, math.inf
     best = int(np.argmin(np.where(hit, t, math.inf)))

@@ -9,7 +9,7 @@ from tests.naive.light_sum import contributions
 def picture(frame, lights, visibility=True):
     """Return the irradiance, (3, h, w), by lights that were chosen from the frame's shadow maps.
 
-    Nothing leaves through the back of a face or arrives from below one, whatever normals are interpolated.
+    Nothing arrives from below a face, whatever normals are interpolated; what leaves below one is blocked by it.
     """
     buffer, geometry = frame.gbuffer, frame.scene.geometry
     pixels = np.argwhere(buffer.covered)
@@ -22,8 +22,9 @@ def picture(frame, lights, visibility=True):
     for i, sent in enumerate(light):
         place = lights.position[:, i].astype(float)
         toward = place - position
-        counts = ((toward * facing).sum(axis=1) > 0) & (toward @ up[i] < 0) & sent.any(axis=1)
+        counts = ((toward * facing).sum(axis=1) > 0) & sent.any(axis=1)
         if visibility:
+            counts &= toward @ up[i] < 0
             counts[counts] = free(corners_of(geometry), position[counts] + LIFT * facing[counts], place + LIFT * up[i])
         result[:, *at] += (sent * counts[:, None]).T
     return result

@@ -14,6 +14,7 @@ from tests.pairs import sets
 UP = np.array([[0.0], [0.0], [1.0]])
 FLOOR = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 RADIANCE = 1.0  # of every sender; a sender of area A has the flux pi A
+NEAREST = 1e-3  # of the bound: the nearest of 400 places, a factor of 1.02 apart
 
 
 def floor_lights(points):
@@ -157,3 +158,23 @@ def test_offset_keeps_the_largest_irradiance_finite_and_costs_bias(evidence):
     np.testing.assert_allclose(moved, exact_move, rtol=1e-9)  # the wall sees the floor 5 cm lower
     evidence("offset 0, 1, 5, 20 cm: largest E " + ", ".join(f"{p:.3g}" for p in peaks) + " W/m^2; mean bias "
              + ", ".join(f"{b:+.1%}" for b in biases))
+
+
+@pytest.mark.feature("SII-27")
+@pytest.mark.parametrize(("how", "most"), [
+    ({"offset": 0.05}, 3 * math.sqrt(3) / 16 / 0.05**2), ({"offset": 0.2}, 3 * math.sqrt(3) / 16 / 0.2**2),
+    ({"clamp": "distance", "clamp_value": 0.05}, 1 / 2 / 0.05**2), ({"clamp": "geometry", "clamp_value": 70.0}, 70.0),
+], ids=str)
+def test_one_light_gives_a_wall_beside_it_no_more_than_its_bound(how, most, evidence):
+    """Closed form: x h / (x^2 + h^2)^2 with h >= d is at most 3 sqrt 3 / 16 d^2; r >= m leaves at most 1/2 m^2.
+
+    Both are attained, at the foot of the wall where x = d / sqrt 3, and on the diagonal up to r = m.
+    """
+    apart, above = (part.reshape(-1) for part in np.meshgrid(np.geomspace(1e-3, 1, 400), np.geomspace(1e-5, 1, 600)))
+    at = np.stack([-apart, 0 * apart, above])
+    light = sets.lights(np.zeros((3, 1)), UP, math.pi)
+    largest = light_on(at, np.array([[1.0], [0.0], [0.0]]), light, **how).max()
+    assert largest == pytest.approx(most, rel=NEAREST)
+    assert largest <= most * (1 + 1e-12)
+    plain = light_on(at, np.array([[1.0], [0.0], [0.0]]), light).max()
+    evidence(f"{how}: largest E pi / Phi {largest:.4g}, bound {most:.4g} 1/m^2; without {plain:.3g}")

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from refgi.frame import Frame
+from refgi.ledger import pixel_areas
 from refgi.lights import choose_pixel_lights
 from refgi.lights.importance import importance
 from refgi.lights.warp import Warp
@@ -12,7 +13,6 @@ from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.scene import load_scene
 from refgi.settings import of
-from refgi.splat.sii.ledger_terms import pixel_areas
 from refgi.truth import TruthSettings, trace_truth
 
 PUBLISHED = Warp("B", 3)  # SII Table 1: 4096 lights, 3 levels, method B

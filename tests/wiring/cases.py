@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
+from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.scene import Camera, DirectionalLight, Material, Mesh, PointLight, Scene, SpotLight, merge
 from refgi.settings import of
@@ -51,11 +52,19 @@ class Case:
         return of(kind, **{**base, **self.over, **self.values})
 
     def without(self, kind: type, base: Mapping[str, Any] = NOTHING) -> Iterator[tuple[str, Any]]:
-        """Yield each key under test, and the settings with that key as its default has it."""
-        for key in self.values:
-            rest = {other: value for other, value in self.values.items()
+        """Yield each key under test, and the settings with that key as its default has it.
+
+        A key without a default, a number that its choice must be given, has twice its value there.
+        """
+        for key, value in self.values.items():
+            rest = {other: kept for other, kept in self.values.items()
                     if other != key and not other.startswith(f"{key}.")}
-            yield key, of(kind, **{**base, **self.over, **rest})
+            try:
+                yield key, of(kind, **{**base, **self.over, **rest})
+            except InputError as error:
+                if error.key is None or not key.endswith(error.key):
+                    raise
+                yield key, of(kind, **{**base, **self.over, **rest, key: 2 * value})
 
     def seen(self) -> Frame:
         """Return the frame of the case, in float64."""
@@ -63,10 +72,10 @@ class Case:
         return Frame(SCENES[self.scene](), **options)
 
 
-def room(*lights, smooth=False, glass=False):
+def room(*lights, smooth=False, glass=False, matte=False):
     """A corner with a diffuse floor, a diffuse and glossy wall, and a purely glossy block before the other wall."""
-    glossy = Material("glossy", (0.3, 0.2, 0.4), (0.4, 0.5, 0.2), 12.0)
-    mirror = Material("purely glossy", (0.0, 0.0, 0.0), (0.7, 0.5, 0.6), 40.0)
+    glossy = Material("glossy", (0.3, 0.2, 0.4), (0, 0, 0) if matte else (0.4, 0.5, 0.2), 12.0)
+    mirror = Material("purely glossy", (0.0, 0.0, 0.0), (0, 0, 0) if matte else (0.7, 0.5, 0.6), 40.0)
     floor, green = Material("floor", (0.6, 0.55, 0.4)), Material("green", (0.1, 0.6, 0.2))
     meshes = [
         rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), floor),
@@ -79,6 +88,13 @@ def room(*lights, smooth=False, glass=False):
                            Material("ball", (0.5, 0.3, 0.2), (0.2, 0.3, 0.4), 20.0)))
     geometry, materials = merge(meshes, smooth=smooth)
     return Scene("wiring", geometry, materials, VIEW, lights)
+
+
+def painted(scene):
+    """The scene with reflectances on its glass, which reflects nothing all the same."""
+    return dataclasses.replace(scene, materials=tuple(
+        dataclasses.replace(one, diffuse=(0.3, 0.4, 0.5), specular=(0.2, 0.2, 0.1), exponent=9.0) if one.ior else one
+        for one in scene.materials))
 
 
 def ball(center, radius, material):
@@ -117,10 +133,26 @@ SCENES = {
     "lamps": lambda: room(*LAMPS),
     "smooth": lambda: room(*LAMPS, smooth=True),
     "hidden": hidden_side,
+    "close": lambda: tilted(room(*LAMPS)).with_camera(vfov=math.radians(25)),
     "tilted": lambda: tilted(room(*LAMPS)),
     "glass": lambda: room(*LAMPS, glass=True),
+    "smooth glass": lambda: room(*LAMPS, smooth=True, glass=True),
+    "painted glass": lambda: painted(room(*LAMPS, glass=True)),
     "spot": lambda: room(LAMPS[0]),
+    "bulbs": lambda: room(*LAMPS[:2]),
+    # the ball fills half of the height, so that neighbouring normals differ by little
+    "ball": lambda: room(*LAMPS, smooth=True).with_camera(eye=(0.9, 0.6, 0.4), target=(0.3, 0.35, -0.2)),
+    "matte": lambda: room(*LAMPS, matte=True),
 }
+
+
+def under(part: str, cases: Mapping[str, Case], base: Mapping[str, Any] = NOTHING) -> dict[str, Case]:
+    """Return the cases of a part of a settings class as cases of the whole, over what else it takes."""
+    def whole(keys: Mapping[str, Any]) -> dict[str, Any]:
+        return {f"{part}.{key}": value for key, value in keys.items()}
+
+    return {name: dataclasses.replace(case, values=whole(case.values), over={**base, **whole(case.over)})
+            for name, case in cases.items()}
 
 
 def uncovered(kind: type, cases: Mapping[str, Case], base: Mapping[str, Any] = NOTHING) -> set[str]:

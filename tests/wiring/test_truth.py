@@ -32,8 +32,11 @@ CASES = {
     "tilted normals": Case({"samples": 24 * 5}, scene="tilted"),
     "two bounces": Case({"bounces": 2}),
     "not blocked": Case({"visibility": False}, scene="tilted"),
-    "visible emitters": Case({"emitters": "visible"}, scene="tilted"),
-    "visible emitters, not blocked": Case({"emitters": "visible"}, {"visibility": False}),
+    "not blocked, on a smooth ball": Case({"visibility": False}, {"estimator": "light"}, scene="smooth"),
+    "visible emitters": Case({"emitters": "visible"}, scene="close"),
+    "visible emitters, by light": Case({"emitters": "visible"}, {"estimator": "light"}, scene="close"),
+    "visible emitters, by directions": Case({"emitters": "visible"}, {"estimator": "hemisphere"}, scene="close"),
+    "visible emitters, not blocked": Case({"emitters": "visible"}, {"visibility": False}, scene="close"),
     "a seed": Case({"seed": 5}),
     "hemisphere": Case({"estimator": "hemisphere"}, scene="tilted"),
     "light": Case({"estimator": "light"}, scene="tilted"),
@@ -85,12 +88,12 @@ def weights_of(pictures):
 
 
 def means(pictures, weights):
-    """Return weighted means over the picture and over blocks of 8 x 8 pixels that see anything, (n, 3, values)."""
+    """Return weighted means over the picture and over blocks of 8 x 8 pixels of which half see anything."""
     rows, columns = (range(0, size, 8) for size in weights.shape)
     parts = [np.s_[:, :], *(np.s_[i : i + 8, j : j + 8] for i in rows for j in columns)]
     values = np.nan_to_num(pictures) * weights
     return np.stack([values[..., *part].sum(axis=(2, 3)) / weights[part].sum()
-                     for part in parts if weights[part].any()], axis=2)
+                     for part in parts if (weights[part] > 0).sum() >= 32], axis=2)
 
 
 def rules_of(settings):
@@ -208,7 +211,7 @@ def test_without_visibility_no_shadow_ray_leaves_a_receiver():
 def test_rays_that_light_nothing_are_uniform_alone(share):
     """Upwards a point light meets nothing: there the density is the uniform share, to the jitter of cells."""
     case = dataclasses.replace(CASES["light"], scene="lamps")
-    tracer, settings, _ = counted(case, uniform_share=share)
+    tracer, settings, _ = counted(case, uniform_share=share, light_grid=40)
     _, directions, _ = next(rays for rays in tracer.closest[3:] if np.allclose(rays[0], LAMP, atol=1e-3))
     upward, expected_share = (directions[:, 1] > UPWARD).mean(), share * (1 - UPWARD) / 2
     assert abs(upward / expected_share - 1) < 0.05

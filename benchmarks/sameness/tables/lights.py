@@ -60,5 +60,7 @@ LIGHTS: list[Row] = [
     vary("refraction_exponent", 60.0, on=GLASS),
     vary("refraction_exponent", 60.0, on=GLASS, refraction="two_interface"),
     vary("as_published", "sii_no_tn", "equal_solid_angle", on=LAMPS),
+    vary("as_published", "sii_peak", on=GLOSSY, warp="A", importance="peak"),
+    vary("as_published", "sii_openness", openness_flux="scale"),
     vary("as_published", "sii_no_tn+equal_solid_angle", pattern="grid", warp="A"),
 ]

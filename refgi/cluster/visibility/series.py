@@ -116,7 +116,8 @@ def first_lit(weight: Array) -> float:
     Returns
     -------
     float
-        b*, about 0.305 / M; below 0.41. For a series that stays below 1: where it has come 95 % of the way to its top.
+        b*, about 0.305 / M; below 0.41. For a series that stays below 1: where it has come 95 % of the way to its top,
+        the highest of 64 values for each term.
     """
     u = np.linspace(0.0, 0.5, SCAN * len(weight) + 1)
     values = above_half(u, weight)

@@ -153,8 +153,9 @@ def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSet
     Notes
     -----
     E = (2 pi r_max^2 T / S) sum xi_1 E_t with T the texels of one map and E_t the light of one texel (Eq. 2), which
-    has the mean of the full sum over the disc. The papers scale by hand. A receiver outside the map gathers at the
-    nearest place on its border. Maps of several faces are one sheet: a disc runs on into the next face's rows.
+    has the mean of the full sum over the disc. The papers scale by hand. A receiver outside the map gathers
+    where the straight way to the map's middle meets its border. Maps of several faces are one sheet: a disc runs on
+    into the next face's rows.
     """
     position, normal, covered = receivers
     result = np.zeros_like(position)

@@ -105,7 +105,7 @@ def gather_discs(
 def centers(rsm: "Rsm", points: Array) -> Array:
     """Return where in the map each point (3, n) gathers: continuous row and column (2, n) on the stacked maps, float64.
 
-    A point outside the map gathers at the nearest place on its border.
+    A point outside the map gathers where the straight way to the map's middle meets its border.
     """
     row, column, _ = rsm.project(points)
     center = np.stack([row, column]).astype(np.float64)

@@ -43,7 +43,7 @@ def multires(frame: "Frame", settings: MultiresSettings) -> Array:
         Indirect irradiance, W/m^2, linear RGB, without visibility unless by rays.
     """
     lights = choose_lights(frame, settings.lights)  # Sec. 3.1
-    footprint = _footprints(frame, lights, settings)
+    footprint = light_areas(frame, lights, settings)
     if not settings.supersampled:
         return _irradiance(frame, frame.gbuffer, lights, footprint, settings)
     double = _doubled(frame)  # Sec. 4: rendered at 2048^2 for 1024^2
@@ -55,18 +55,19 @@ def _irradiance(
 ) -> Array:
     """Return the irradiance at the pixels of one G-buffer: steps 3 to 6 of the paper's overview, and Eq. 3."""
     subsplats, pairs = settings.subsplats, settings.effective_pairs
-    filter_all = "ams_filter_all" in settings.as_published
+    printed: dict[str, bool] = {"filter_all": "ams_filter_all" in settings.as_published,
+                                "corner_rule": "ams_all_corners" not in settings.as_published}
     _resolve_channels(buffer, subsplats)
     warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), lights, pairs, footprint, "multires")
     if isinstance(subsplats, ByError):
         irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed).irradiance
     elif isinstance(subsplats, ByIrradiance):
         start = None if subsplats.start is None else shared_subsplats(buffer, subsplats.start)  # Sec. 6
-        irradiance = per_light(buffer, lights, subsplats, pairs, footprint, start, filter_all=filter_all)  # Sec. 3.3.1
+        irradiance = per_light(buffer, lights, subsplats, pairs, footprint, start, **printed)  # Sec. 3.3.1
     else:
         shared = shared_subsplats(buffer, subsplats)  # Sec. 3.2, 3.3
         values = _evaluated(frame, buffer, shared, lights, footprint, settings)  # Sec. 3.4
-        irradiance = upsample(values, shared, buffer.covered, subsplats.upsampling, filter_all=filter_all)  # Sec. 3.5
+        irradiance = upsample(values, shared, buffer.covered, subsplats.upsampling, **printed)  # Sec. 3.5
         if "ams_rho_in_splat" in settings.as_published:  # the picture's albedo is multiplied in again later
             albedo = buffer.albedo
             irradiance = np.divide(irradiance, albedo, out=np.zeros_like(irradiance), where=albedo > 0)
@@ -120,8 +121,23 @@ def _evaluated(
     return values
 
 
-def _footprints(frame: "Frame", lights: "PixelLights", settings: MultiresSettings) -> Array | None:
-    """Return the footprint of each light, m^2: exact, or as the authors' demo has it."""
+def light_areas(frame: "Frame", lights: "PixelLights", settings: MultiresSettings) -> Array | None:
+    """Return the surface that each light stands for, where the clamp needs it: exact, or as the authors' demo has it.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene and its buffers.
+    lights : PixelLights
+        The lights.
+    settings : MultiresSettings
+        What they were chosen by, and the clamp.
+
+    Returns
+    -------
+    (N,) ndarray or None
+        Area, m^2.
+    """
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings.lights, settings.effective_pairs)
     return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings.lights))

@@ -17,6 +17,7 @@ Diagonal = Literal["off", "corner", "literal", "full8"]
 Traversal = Literal["single_pass", "list"]
 Representative = Literal["pixel", "mean"]
 Upsampling = Literal["tent", "demo", "nearest", "naive_bilinear"]
+Measure = Literal["relative", "absolute", "demo"]
 
 LEAST_TARGET = 1e-6  # about what rounding to float32 leaves of the full sum
 MOST_CELLS = 65536  # along the longer side
@@ -44,21 +45,34 @@ class Criterion(Settings):
 
 
 @dataclasses.dataclass(frozen=True)
-class DepthRange(Criterion):
+class DepthCriterion(Criterion):
+    """A mipmap of depths.
+
+    Its threshold t is a share of the depth ("relative"), a length in metres ("absolute", as published), or a share that
+    is 3 t / l for cells of level l ("demo", the authors').
+    """
+
+    measure: Measure = setting("relative", "t times the depth; t metres, as published; or 3 t / level times the depth",
+                               study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class DepthRange(DepthCriterion):
     """Min-max mipmap of depth (Sec. 3.2.1)."""
 
     NAME = "range"
 
-    threshold: float = _threshold(0.1, "max - min of the depth over min")
+    threshold: float = _threshold(0.1, "t: max - min of the depth over min, see measure")
 
 
 @dataclasses.dataclass(frozen=True)
-class DepthSlope(Criterion):
+class DepthSlope(DepthCriterion):
     """Max mipmap of the depth derivative (Sec. 3.2.1)."""
 
     NAME = "slope"
 
-    threshold: float = _threshold(0.05, "change of the depth a pixel over the depth", unit="1/pixel", study=True)
+    threshold: float = _threshold(0.05, "t: change of the depth a pixel over the depth, see measure", unit="1/pixel",
+                                  study=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -172,7 +186,8 @@ class MultiresSettings(Settings):
     rays. `lights.seed` also draws the samples that estimate the error of subsplats "error".
     """
 
-    SWITCHES: ClassVar[frozenset[str]] = frozenset({"ams_disc", "ams_rho_in_splat", "ams_filter_all"})
+    SWITCHES: ClassVar[frozenset[str]] = frozenset({"ams_disc", "ams_rho_in_splat", "ams_filter_all",
+                                                   "ams_all_corners"})
 
     lights: LightSettings = setting(LightSettings(count=256, source=MapLights(pattern="grid")), "pixel lights")
     pairs: PairSettings = setting(PairSettings(clamp=AutoClamp()), "how one light lights one subsplat")
@@ -186,7 +201,7 @@ class MultiresSettings(Settings):
         clamp = self.effective_pairs.clamp
         chosen = clamp and clamp.name()
         expect_footprints(self.lights, self.effective_pairs)
-        if self._has_shadow_rays:
+        if self.shadow_rays is not None:
             bare = PairSettings(clamp=self.pairs.clamp)
             expect(self.pairs == bare, "pairs", "defaults with visibility 'rays'", self.pairs)
             expect(clamp is None, "pairs.clamp", "none with visibility 'rays'", chosen)
@@ -194,27 +209,29 @@ class MultiresSettings(Settings):
         expect(not (by_error and isinstance(clamp, SphereClamp)), "pairs.clamp",
                "another one with subsplats 'error', which splits the peaks of points off", chosen)
         allowed = {"ams_disc": isinstance(clamp, DiscClamp), "ams_filter_all": not by_error,
-                   "ams_rho_in_splat": isinstance(self.subsplats, ByGeometry)}
+                   "ams_rho_in_splat": isinstance(self.subsplats, ByGeometry),
+                   "ams_all_corners": not isinstance(self.subsplats, ByError) and self.subsplats.upsampling == "tent"}
         wrong = sorted(name for name in self.as_published if not allowed[name])
         expect(not wrong, "as_published",
-               f"no {' or '.join(wrong)} with the clamp {chosen!r} and subsplats {self.subsplats.name()!r}",
-               sorted(self.as_published))
+               f"no {' or '.join(wrong)} with the clamp {chosen!r}, subsplats {self.subsplats.name()!r} and the "
+               f"upsampling {getattr(self.subsplats, 'upsampling', None)!r}", sorted(self.as_published))
 
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return self.lights.traces_rays or self._has_shadow_rays
+        return self.lights.traces_rays or self.shadow_rays is not None
 
     @property
-    def _has_shadow_rays(self) -> bool:
-        return isinstance(self.subsplats, ByGeometry) and self.subsplats.visibility is not None
+    def shadow_rays(self) -> Rays | None:
+        """How subsplats find by rays which lights they see, if they do."""
+        return self.subsplats.visibility if isinstance(self.subsplats, ByGeometry) else None
 
     @property
     def effective_pairs(self) -> PairSettings:
         """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints or rays are traced."""
         if not isinstance(self.pairs.clamp, AutoClamp):
             return self.pairs
-        bare = not self.lights.has_footprints or self._has_shadow_rays
+        bare = not self.lights.has_footprints or self.shadow_rays is not None
         return dataclasses.replace(self.pairs, clamp=None if bare else DiscClamp())
 
 

@@ -20,7 +20,7 @@ from refgi.pairs.loss import warn_of_clamp
 from refgi.pairs.ranged_sum import sum_pairs_in_range, sum_weighted_pairs
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.splat.sii.half_resolution import half_resolution
-from refgi.splat.sii.reach.lists import LightLists
+from refgi.splat.sii.reach.lists import LightLists, Some
 from refgi.splat.sii.reach.reference_length import with_reference_length
 from refgi.splat.sii.reach.threshold import warn_of_cut
 from refgi.splat.sii.settings import SiiSettings
@@ -170,9 +170,20 @@ def _sum_in_range(
             sum_spheres(here, facing, packed.diffuse, packed.spheres, lists.diffuse, sums)
         elif lists.diffuse is not None:
             run = sum_weighted_pairs if weighted else sum_pairs_in_range
-            listed = lists.of_diffuse(here, facing, places)
-            run(here, facing, packed.diffuse, packed.clamp, lists.diffuse, listed, sums)
+            for some, listed in lists.of_diffuse(here, facing, places):
+                points, normals, found = _chosen(some, here, facing)
+                run(points, normals, packed.diffuse, packed.clamp, lists.diffuse, listed, found)
+                sums[:, some] += found
         if packed.lobes is not None:
-            add_lobes(here, facing, *packed.lobes, lists.lobes, lists.of_lobes(here, facing, places), sums)
+            for some, listed in lists.of_lobes(here, facing, places):
+                points, normals, found = _chosen(some, here, facing)
+                add_lobes(points, normals, *packed.lobes, lists.lobes, listed, found)
+                sums[:, some] += found
 
     return over_receivers(receivers, packed, add)
+
+
+def _chosen(some: Some, here: Array, facing: Array) -> tuple[Array, Array, Array]:
+    """Return positions, normals and zeros (3, m) for some of the receivers."""
+    points, normals = (np.ascontiguousarray(part[:, some]) for part in (here, facing))
+    return points, normals, np.zeros_like(points)

@@ -50,13 +50,13 @@ def test_equals_the_twin(height, width, side, evidence):
 @pytest.mark.feature("VAL-24")
 @pytest.mark.parametrize("sign", [-1, 1])
 @pytest.mark.parametrize("axis", [0, 1, 2])
-@pytest.mark.parametrize("rows", [False, True])
-def test_what_lies_far_off_along_one_axis_does_not_count(axis, sign, rows, evidence):
-    """Pixels of one normal whose places differ along one axis alone, one way, from row to row or column to column."""
+@pytest.mark.parametrize("across", [False, True])
+def test_a_step_along_one_axis_parts_two_surfaces(axis, sign, across, evidence):
+    """Pixels of one normal and two places, one axis and one way apart; none of the tile's first row lies beyond."""
     rng = np.random.default_rng(8)
     y, x = np.mgrid[:16, :24]
     position = np.zeros((3, 16, 24))
-    position[axis] = sign * 0.4 * (y if rows else x)
+    position[axis] = 3.0 * sign * (x >= 14 if across else y >= 11)
     normal = np.zeros_like(position)
     normal[axis - 1] = 1
     to, light = Receivers(position, normal, np.ones((16, 24), bool)), rng.random((3, 16, 24))

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from refgi.errors import InputError
 from refgi.jit import threads
@@ -16,6 +17,10 @@ from tests.naive import pixel_lights as naive
 from tests.rsm.shapes import geometry, sphere
 
 ROUNDING = 1e-12  # sums of up to 1e5 float64 fluxes
+SIZES = tuple(range(200, 264, 4))  # of maps
+# 600 of 31,000 texels lie on the outline and are in or out by chance, those along each of its 32 straight edges mostly
+# alike: sqrt(32) * 600 / 32 * 0.29 / 31,000 is 1e-3
+TEXELS_ASTRAY = 1e-3
 RHO = (0.2, 0.5, 0.8)
 DIFFUSE = Material(diffuse=RHO)
 GLOSSY = Material(name="gloss", diffuse=(0.1, 0.1, 0.1), specular=(0.3, 0.4, 0.5), exponent=20.0)
@@ -55,17 +60,61 @@ def test_point_flux_sums_to_albedo_times_4_pi_i(shape, resolution, evidence):
     evidence(f"{shape} {resolution}^2: {error:.0e}")
 
 
+SUN = DirectionalLight((0.3, -1.0, 0.2), (3.0, 2.0, 1.0))
+BLACK = Material(name="black", diffuse=(0.0, 0.0, 0.0))
+
+
+def along_texels(rows, columns, resolution, tilt):
+    """Return a rectangle whose outline, as the sun sees it, runs along the edges of some rows and columns of texels.
+
+    Two black triangles without area span a map that is wider than the rectangle. `tilt`: its slopes along the map's
+    axes. Also return its two sides.
+    """
+    ends = np.repeat([[-1.0, -1, -1], [1.0, 1, 1]], 3, axis=0)
+    empty = geometry(ends, np.arange(6))
+    view = reflective_shadow_map(empty, material_table([BLACK], np.float64), SUN, resolution, np.float64).projection
+    frame, origin = view.frame[0], view.origin[0]
+    (left, right), (top, bottom) = ((2 * np.array(edges) / resolution - 1) * half
+                                    for edges, half in zip((columns, rows), view.half, strict=True))
+    depth = -origin @ frame[2]  # of the middle of the scene
+    corners = np.array([origin + (u, v, depth + tilt[0] * u + tilt[1] * v) @ frame
+                        for u, v in ((left, top), (right, top), (right, bottom), (left, bottom))])
+    shape = geometry(np.concatenate([ends, corners]), [[0, 1, 2], [3, 4, 5], [6, 7, 8], [6, 8, 9]],
+                     materials=[1, 1, 0, 0])
+    return shape, corners[1] - corners[0], corners[3] - corners[0]
+
+
 @pytest.mark.feature("SII-01")
-def test_directional_flux_sums_to_albedo_times_irradiance_times_shadow_area(evidence):
-    light = DirectionalLight((0.3, -1.0, 0.2), (3.0, 2.0, 1.0))
-    rsm = in_a_ball(light, 512)
-    disc = math.pi * 4 * (16 / math.pi * math.sin(math.pi / 16)) ** 2  # about: the sphere is made of flat faces
-    expected = np.array(RHO) * light.irradiance * disc
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.8, -1.1)])
+@pytest.mark.parametrize("resolution", [24, 97])
+def test_directional_flux_of_a_rectangle_along_texels_is_exact(resolution, tilt, evidence):
+    """Closed form: albedo * E_perp * |a x b . d|, the rectangle's area as the sun sees it, however it is tilted."""
+    rows, columns = (resolution // 3, resolution // 2), (resolution // 4, 2 * resolution // 3)
+    shape, along, across = along_texels(rows, columns, resolution, tilt)
+    rsm = reflective_shadow_map(shape, material_table([DIFFUSE, BLACK], np.float64), SUN, resolution, np.float64)
+    toward = np.array(SUN.direction) / np.linalg.norm(SUN.direction)
+    expected = np.array(RHO) * SUN.irradiance * abs(np.cross(along, across) @ toward)
     error = np.abs(rsm.flux.sum(axis=(1, 2)) / expected - 1).max()
-    assert error < 0.02
-    texel = rsm.solid_angle[0, 0]
-    np.testing.assert_allclose(rsm.flux.sum(axis=(1, 2)), np.array(RHO) * light.irradiance * texel * rsm.covered.sum())
-    evidence(f"orthographic: {error:.1e} of the ball's disc, whose outline is known to 2e-2")
+    assert error < ROUNDING
+    lit = np.zeros(rsm.covered.shape, bool)
+    lit[slice(*rows), slice(*columns)] = True
+    np.testing.assert_array_equal(rsm.flux.any(axis=0), lit)
+    evidence(f"orthographic, {resolution}^2, slopes {tilt}: {error:.0e} of albedo * E_perp * area")
+
+
+@pytest.mark.feature("SII-01")
+def test_directional_flux_of_a_ball_is_that_of_its_outline(evidence):
+    """Closed form: the area of the convex hull of the ball's vertices as the sun sees them."""
+    ball = sphere(16, 2.0)
+    toward = np.array(SUN.direction) / np.linalg.norm(SUN.direction)
+    across = np.linalg.svd(toward[None])[2][1:]  # any two axes perpendicular to the sun
+    outline = ConvexHull(ball.vertices @ across.T).volume  # of a plane figure: its area
+    errors = [(in_a_ball(SUN, resolution).flux.sum(axis=(1, 2)) / (np.array(RHO) * SUN.irradiance * outline) - 1)[0]
+              for resolution in SIZES]
+    assert abs(np.mean(errors)) < 2 * TEXELS_ASTRAY / math.sqrt(len(SIZES))
+    assert np.abs(errors).max() < 3 * TEXELS_ASTRAY
+    evidence(f"ball, {SIZES[0]} to {SIZES[-1]} texels: flux {np.mean(errors):+.0e} in the mean, "
+             f"{np.abs(errors).max():.0e} at most, off that of its outline")
 
 
 def eq2(lights, position, normal):

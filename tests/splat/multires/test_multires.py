@@ -15,7 +15,7 @@ from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.settings import changed, leaves, of, replaced
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
 from refgi.splat.multires import ByError
-from refgi.splat.multires.multires import _footprints, _halved
+from refgi.splat.multires.multires import _halved, light_areas
 from refgi.splat.multires.refinement.grid import representatives
 from refgi.splat.multires.settings import PRESETS
 from refgi.stages import observe
@@ -198,7 +198,7 @@ def test_the_demos_disc_counts_the_lights_of_each_map(box):
     for index, (source, count) in enumerate(zip(at.scene.lights, (121, 150), strict=True)):
         here = lights.map_index == index
         square = ((lights.position[:, here].T - np.asarray(source.position)) ** 2).sum(axis=1)
-        np.testing.assert_allclose(_footprints(at, lights, settings)[here], math.pi * square / (1.5 * count), rtol=1e-6)
+        np.testing.assert_allclose(light_areas(at, lights, settings)[here], math.pi * square / (1.5 * count), rtol=1e-6)
 
 
 def test_cells_of_background_are_no_subsplats(box):
@@ -215,7 +215,9 @@ def test_cells_of_background_are_no_subsplats(box):
 def test_the_table_of_methods_knows_it():
     picture = render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
     assert np.isfinite(picture.radiance).all()
-    assert not find_method("multires").visibility
+    method = find_method("multires")
+    assert not method.knows_visibility(MultiresSettings())
+    assert method.knows_visibility(of(MultiresSettings, visibility="rays"))
     with observe() as log:
         render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
     assert log.status("multires.refine") == ["ran"]
@@ -236,7 +238,7 @@ def test_depth_is_computed_only_where_a_criterion_looks_at_it(change, asked):
 BAD = {
     "subsplats.coarsest": [{"coarsest": 0}, {"coarsest": 1.5}],
     "subsplats.finest": [{"finest": -1}, {"finest": 17}, {"subsplats": "error", "subsplats.finest": 1}],
-    "subsplats.criteria.depth": [{"depth": "slope"}, {"depth.threshold": -1}],
+    "subsplats.criteria.depth": [{"depth": "slope"}, {"depth.threshold": -1}, {"depth.measure": "feet"}],
     "subsplats.criteria: not": [{"subsplats": "error", "normal_threshold": 1}, {"subsplats": "error", "rim": 1}],
     "subsplats.criteria.normal.threshold": [{"normal_threshold": math.nan}],
     "subsplats.criteria.normal.components": [{"normal_components": "z"}],
@@ -260,7 +262,9 @@ BAD = {
     "pairs": [{"visibility": "rays", "offset": 0.1}, {"visibility": "rays", "as_published": {"sii_no_pi"}}],
     "as_published": [{"as_published": {"ams_luck"}}, {"as_published": {"ams_disc"}, "clamp": "none"},
                      {"as_published": {"ams_rho_in_splat"}, "subsplats": "irradiance"},
-                     {"as_published": {"ams_filter_all"}, "subsplats": "error"}],
+                     {"as_published": {"ams_filter_all"}, "subsplats": "error"},
+                     {"as_published": {"ams_all_corners"}, "subsplats": "error"},
+                     {"as_published": {"ams_all_corners"}, "upsampling": "demo"}],
 }
 
 

@@ -10,8 +10,9 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
+from refgi.lights.selection import choose_lights
 from refgi.pairs.ranged_sum import LANES, range_factor
-from refgi.scene import load_scene
+from refgi.scene import Material, load_scene
 from refgi.settings import of, replaced
 from refgi.splat import PairSettings, Receivers, irradiance
 from refgi.splat.sii.reach.bounds import light_solids
@@ -20,7 +21,9 @@ from refgi.splat.sii.reach.screen_bounds import covered_pixels, screen_quads
 from refgi.splat.sii.reach.threshold import low_irradiance
 from refgi.splat.sii.settings import SiiSettings
 from refgi.splat.sii.sii import cut_irradiance, splat
+from tests import lamps
 from tests.naive import bounds as naive
+from tests.naive.radiometry import lobe_fraction
 from tests.pairs import sets
 
 CUT = of(SiiSettings, cut_irradiance=0.05)
@@ -289,6 +292,51 @@ def test_counts_and_traffic(corner, evidence):
     assert off.total == off.evaluated == np.count_nonzero(receivers.covered) * lights.flux.shape[1]
     evidence(f"map sums to {counted.total} fragments = sum over lights; {counted.bits} bits at 72 each; evaluated "
              f"{counted.evaluated / counted.total:.2f} a fragment; Fig. 8: 281 MB a frame, 308 samples: 1078 MiB")
+
+
+def alone(lights, k, part):
+    """Return one light's diffuse part or its lobe."""
+    one = type(lights)(*(None if array is None else array[..., k : k + 1] for array in lights[:6]), 1)
+    return one._replace(lobe_flux=None, lobe_axis=None, lobe_exponent=None) if part == "diffuse" else one._replace(
+        flux=np.zeros_like(one.flux))
+
+
+def lobe_peak(cosine, exponent):
+    """Return the peak of a lobe of unit flux, (P + 1) / (2 pi K)."""
+    return (exponent + 1) / (2 * math.pi * lobe_fraction(math.acos(min(1.0, cosine)), exponent))
+
+
+def turned_to(receivers, place):
+    """Return receivers that all face a place, so that no light there is below their horizon."""
+    toward = place[:, :, None] - receivers.position
+    return receivers._replace(normal=toward / np.linalg.norm(toward, axis=0))
+
+
+@pytest.mark.feature("SII-23")
+def test_the_map_sums_to_the_fragments_that_are_drawn(evidence):
+    """Each part of each light is drawn alone on receivers turned towards it: where it leaves light is a fragment."""
+    frame = lamps.corner(material=Material("glossy", (0.5, 0.4, 0.3), (0.3, 0.4, 0.5), 12.0), width=40, height=30)
+    settings = of(SiiSettings, lights=60, cut_share=0.05, reference_length=2.0)
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    lights = choose_lights(frame, settings.lights)
+    counted = fragments(receivers, lights, settings)
+    drawn, of_light = np.zeros_like(counted.overdraw), np.zeros_like(counted.of_light)
+    parts = (lights.flux.T, lights.lobe_flux.T, lights.normal.T, lights.lobe_axis.T)
+    peaks = [max(naive.peak(flux), naive.peak(lobe, lobe_peak(normal @ axis, 12.0)))
+             for flux, lobe, normal, axis in zip(*parts, strict=True)]
+    absolute = of(SiiSettings, cut_irradiance=0.05 * max(peaks) / 2.0**2)
+    for k in range(lights.flux.shape[1]):
+        for part in ("diffuse", "lobe"):
+            one = alone(lights, k, part)
+            lit = splat(turned_to(receivers, one.position), one, absolute).any(axis=0)
+            drawn += lit
+            of_light[k] += np.count_nonzero(lit)
+    np.testing.assert_array_equal(counted.overdraw, drawn)
+    np.testing.assert_array_equal(counted.of_light, of_light)
+    pairs = 2 * lights.flux.shape[1] * np.count_nonzero(receivers.covered)
+    assert 0.05 < drawn.sum() / pairs < 0.6
+    evidence(f"three lamps, {of_light.size} lights with lobes: the map's {counted.overdraw.sum()} are the "
+             f"{drawn.sum()} fragments drawn, pixel by pixel and light by light, of {pairs} pairs")
 
 
 @pytest.mark.parametrize("widening", [0.0, 0.7])

@@ -44,6 +44,7 @@ SMALL_PICTURE = 1 << 18  # pixels up to which threads would wait for each other 
 def per_light(
     buffer: "GBuffer", lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings",
     footprint: Array | None = None, start: Subsplats | None = None, *, filter_all: bool = False,
+    corner_rule: bool = True,
 ) -> Array:
     """Sum the irradiance of every light at every pixel, each from subsplats of its own.
 
@@ -62,7 +63,7 @@ def per_light(
     start : Subsplats, optional
         A list for all lights, of the same picture and levels, that each one goes on to refine; the coarsest cells if
         absent.
-    filter_all : bool
+    filter_all, corner_rule : bool
         As for `upsample`.
 
     Returns
@@ -100,7 +101,8 @@ def per_light(
     def add(values: Array, cells: Array) -> None:
         with threads(thread_count):
             subsplats = subsplats_of_leaves(tree, cells)
-            picture.add(upsample(values, subsplats, buffer.covered, settings.upsampling, filter_all=filter_all))
+            picture.add(upsample(values, subsplats, buffer.covered, settings.upsampling, filter_all=filter_all,
+                                 corner_rule=corner_rule))
 
     least = tree.roots if start is None else len(start.level)
     for cells, values in lists:

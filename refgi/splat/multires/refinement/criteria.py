@@ -7,6 +7,7 @@ neighbours.
 """
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.rsm import GBuffer
-    from refgi.splat.multires.settings import Chord, Criteria, DepthRange, DepthSlope, NormalRange, Rate
+    from refgi.splat.multires.settings import Chord, Criteria, DepthCriterion, DepthRange, DepthSlope, NormalRange, Rate
 
 Array = npt.NDArray[Any]
 CHANNELS = {"depth": ("depth",), "derivative": ("depth",), "normal": ("normal",), "curvature": ("normal", "position")}
@@ -175,36 +176,52 @@ def discontinuities(buffer: "GBuffer", criteria: "Criteria", top: int, finest: i
         chosen = [name for name in sorted(_MARK_BY) if getattr(criteria, name) is not None]
         buffer.resolve(*(channel for name in chosen for channel in CHANNELS[name]))
         for name in chosen:
-            _MARK_BY[name](buffer, getattr(criteria, name), criteria.rim, top, discontinuous, begin)
+            _MARK_BY[name](buffer, getattr(criteria, name), criteria.rim, sizes, discontinuous, begin)
     return (np.zeros((height, width), np.bool_), *level_views(discontinuous, sizes, first=1))
 
 
 def _mark_by_depth(
-    buffer: "GBuffer", settings: "DepthRange", rim: int, top: int, discontinuous: Array, begin: int
+    buffer: "GBuffer", settings: "DepthRange", rim: int, sizes: Array, discontinuous: Array, begin: int
 ) -> None:
-    mip = depth_ranges(buffer.depth, buffer.covered, top, rim)
-    _mark_depths(mip.lows[0], mip.highs[0], buffer.depth.dtype.type(settings.threshold), begin, discontinuous)
+    real = buffer.depth.dtype.type
+    mip = depth_ranges(buffer.depth, buffer.covered, len(sizes) - 1, rim)
+    if settings.measure == "absolute":
+        _mark_spreads(mip.lows, mip.highs, real(settings.threshold), begin, discontinuous)
+        return
+    for cells, threshold in _by_level(settings, sizes, begin):
+        _mark_depths(mip.lows[0, cells], mip.highs[0, cells], real(threshold), 0, discontinuous[cells])
 
 
 def _mark_by_derivative(
-    buffer: "GBuffer", settings: "DepthSlope", _: int, top: int, discontinuous: Array, begin: int
+    buffer: "GBuffer", settings: "DepthSlope", _: int, sizes: Array, discontinuous: Array, begin: int
 ) -> None:
-    mip = depth_slopes(buffer.depth, buffer.covered, top)
-    _mark_maxima(mip.highs[0], buffer.depth.dtype.type(settings.threshold), begin, discontinuous)
+    mip = depth_slopes(buffer.depth, buffer.covered, len(sizes) - 1, settings.measure != "absolute")
+    for cells, threshold in _by_level(settings, sizes, begin):
+        _mark_maxima(mip.highs[0, cells], buffer.depth.dtype.type(threshold), 0, discontinuous[cells])
+
+
+def _by_level(settings: "DepthCriterion", sizes: Array, begin: int) -> Iterator[tuple[slice, float]]:
+    """Yield cells of one threshold from `begin` on, and it: all of them, or with that of the demo a level's."""
+    if settings.measure != "demo":
+        yield slice(begin, None), settings.threshold
+        return
+    for level, (start, rows, columns) in enumerate(sizes):
+        if level > 0 and start >= begin:
+            yield slice(start, start + rows * columns), settings.threshold * 3 / level
 
 
 def _mark_by_normal(
-    buffer: "GBuffer", settings: "NormalRange", rim: int, top: int, discontinuous: Array, begin: int
+    buffer: "GBuffer", settings: "NormalRange", rim: int, sizes: Array, discontinuous: Array, begin: int
 ) -> None:
     components = buffer.normal if settings.components == "xyz" else buffer.normal[:2]
-    mip = normal_ranges(components, buffer.covered, top, rim)
-    _mark_normals(mip.lows, mip.highs, buffer.normal.dtype.type(settings.threshold), begin, discontinuous)
+    mip = normal_ranges(components, buffer.covered, len(sizes) - 1, rim)
+    _mark_spreads(mip.lows, mip.highs, buffer.normal.dtype.type(settings.threshold), begin, discontinuous)
 
 
 def _mark_by_curvature(
-    buffer: "GBuffer", settings: "Chord | Rate", _: int, top: int, discontinuous: Array, begin: int
+    buffer: "GBuffer", settings: "Chord | Rate", _: int, sizes: Array, discontinuous: Array, begin: int
 ) -> None:
-    mip = curvatures(buffer.normal, buffer.position, buffer.covered, top, settings.name() == "rate")
+    mip = curvatures(buffer.normal, buffer.position, buffer.covered, len(sizes) - 1, settings.name() == "rate")
     _mark_maxima(mip.highs[0], buffer.normal.dtype.type(settings.threshold), begin, discontinuous)
 
 
@@ -228,8 +245,8 @@ def _mark_depths_of_chunk(low: Array, high: Array, threshold: Any, discontinuous
 
 
 @kernel(parallel=True)
-def _mark_normals(low: Array, high: Array, threshold: Any, begin: int, discontinuous: Array) -> None:
-    """Mark cells in which any component of the normals spreads by more than the threshold (Sec. 3.2.2)."""
+def _mark_spreads(low: Array, high: Array, threshold: Any, begin: int, discontinuous: Array) -> None:
+    """Mark cells in which any channel spreads by more than the threshold (Sec. 3.2)."""
     for chunk in prange((len(discontinuous) - begin + CHUNK - 1) // CHUNK):
         a, b = begin + chunk * CHUNK, min(begin + (chunk + 1) * CHUNK, len(discontinuous))
         for c in range(len(low)):
@@ -239,7 +256,7 @@ def _mark_normals(low: Array, high: Array, threshold: Any, begin: int, discontin
 @kernel
 def _mark_spreads_of_chunk(low: Array, high: Array, threshold: Any, discontinuous: Array) -> None:
     for k in range(len(discontinuous)):
-        # Sec. 3.2.2, normal threshold: max - min of a component
+        # Sec. 3.2.1, 3.2.2, depth or normal threshold: max - min of a channel
         discontinuous[k] |= high[k] - low[k] > threshold
 
 

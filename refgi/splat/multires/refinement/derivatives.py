@@ -33,8 +33,8 @@ BESIDE, DISTANCE, BELOW = range(3)
 
 
 @stage("multires.depth_slopes")
-def depth_slopes(depth: Array, covered: Array, top: int) -> Mipmap:
-    """Return the steepest relative change of depth within each cell, sqrt((dz/dx)^2 + (dz/dy)^2) / z (Sec. 3.2.1).
+def depth_slopes(depth: Array, covered: Array, top: int, relative: bool = True) -> Mipmap:
+    """Return the steepest change of depth within each cell, sqrt((dz/dx)^2 + (dz/dy)^2), over z (Sec. 3.2.1).
 
     Parameters
     ----------
@@ -44,19 +44,21 @@ def depth_slopes(depth: Array, covered: Array, top: int) -> Mipmap:
         Whether there is a surface.
     top : int
         Coarsest level.
+    relative : bool
+        Divide by z; the paper does not.
 
     Returns
     -------
     Mip
-        Levels of (h_l, w_l), 1/pixel; a max mip.
+        Levels of (h_l, w_l), 1/pixel, or m/pixel if not relative; a max mip.
 
     Notes
     -----
-    The paper leaves the difference open: here dz/dx is the larger of those to both neighbours. It divides nothing by
-    z; a slope relative to the depth has one threshold for scenes of any size.
+    The paper leaves the difference open: here dz/dx is the larger of those to both neighbours. A slope relative to the
+    depth has one threshold for scenes of any size.
     """
     sizes, rows, values = _allocate(depth, top)
-    _build_slopes(np.ascontiguousarray(depth), np.ascontiguousarray(covered), sizes, rows, values)
+    _build_slopes(np.ascontiguousarray(depth), np.ascontiguousarray(covered), relative, sizes, rows, values)
     return _max_mip(values, sizes)
 
 
@@ -107,13 +109,15 @@ def _max_mip(values: Array, sizes: Array) -> Mipmap:
 
 
 @kernel(parallel=True)
-def _build_slopes(depth: Array, covered: Array, sizes: Array, rows: Array, values: Array) -> None:
+def _build_slopes(depth: Array, covered: Array, relative: bool, sizes: Array, rows: Array, values: Array) -> None:
     for strip in prange(len(rows)):
-        _slopes_of_strip(np.int64(strip), depth, covered, sizes, rows, values)
+        _slopes_of_strip(np.int64(strip), depth, covered, relative, sizes, rows, values)
 
 
 @kernel
-def _slopes_of_strip(strip: Any, depth: Array, covered: Array, sizes: Array, rows: Array, values: Array) -> None:
+def _slopes_of_strip(
+    strip: Any, depth: Array, covered: Array, relative: bool, sizes: Array, rows: Array, values: Array
+) -> None:
     """Fill all levels in a row of cells of the coarsest one."""
     height, width = depth.shape
     across = rows[strip, BESIDE]
@@ -123,7 +127,7 @@ def _slopes_of_strip(strip: Any, depth: Array, covered: Array, sizes: Array, row
         above, below = rows[strip, BELOW + y % 2], rows[strip, BELOW + (y + 1) % 2]
         _depth_differences(depth, covered, y, y, 1, across[1:])
         _depth_differences(depth, covered, y, min(y + 1, height - 1), 0, below)
-        _slopes_of_row(depth[y], covered[y], across, above, below, values[y * width : (y + 1) * width])
+        _slopes_of_row(depth[y], covered[y], relative, across, above, below, values[y * width : (y + 1) * width])
     coarsen(strip, 0, sizes, values[:0], values)
 
 
@@ -138,13 +142,16 @@ def _depth_differences(depth: Array, covered: Array, y: int, v: int, beside: int
 
 
 @kernel
-def _slopes_of_row(depth: Array, covered: Array, across: Array, above: Array, below: Array, out: Array) -> None:
+def _slopes_of_row(
+    depth: Array, covered: Array, relative: bool, across: Array, above: Array, below: Array, out: Array
+) -> None:
+    one = depth.dtype.type(1.0)
     for x in range(len(out)):
         left, right = across[x], across[x + 1]
         horizontal = left if left > right else right
         vertical = above[x] if above[x] > below[x] else below[x]
         # Sec. 3.2.1: depth derivative
-        slope = math.sqrt(horizontal * horizontal + vertical * vertical) / depth[x]
+        slope = math.sqrt(horizontal * horizontal + vertical * vertical) / (depth[x] if relative else one)
         out[x] = slope if covered[x] else depth.dtype.type(0.0)
 
 

@@ -112,10 +112,11 @@ def upsample(
     InputError
         If the mode is unknown or shapes do not belong together.
 
-    Notes ----- The paper gives no weights; those of "tent" interpolate bilinearly where all texels hold irradiance. It
-    filters every texel, even those of the finest level, which blurs pixels that were evaluated one by one; `filter_all`
-    and no `corner_rule` are the paper to the letter. A constant stays that constant to the bit, but for
-    "naive_bilinear".
+    Notes
+    -----
+    The paper gives no weights; those of "tent" interpolate bilinearly where all texels hold irradiance. It filters
+    every texel, even those of the finest level, which blurs pixels that were evaluated one by one; `filter_all` and no
+    `corner_rule` are the paper to the letter. A constant stays that constant to the bit, but for "naive_bilinear".
     """
     expect(mode in get_args(Upsampling), "mode", " or ".join(map(repr, get_args(Upsampling))), mode)
     expect(values.shape == (3, len(subsplats.level)), "values", f"shape (3, {len(subsplats.level)})", values.shape)

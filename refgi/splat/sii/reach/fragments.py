@@ -5,6 +5,7 @@ On graphics hardware each fragment reads 72 bits of receiver (48 position, 24 no
 of light (16 + 48 + 24 + 24), Sec. 6.
 """
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES, reached
-from refgi.splat.sii.reach.lists import LightLists
+from refgi.splat.sii.reach.lists import LightLists, Some
 from refgi.splat.sii.reach.reference_length import lobe_strength, with_reference_length
 from refgi.splat.sii.settings import SiiSettings
 
@@ -108,29 +109,34 @@ def fragments(
         nonlocal evaluated
         anywhere = np.zeros_like(facing)  # a fragment may face away: no light lies behind receivers without normals
         if lists.diffuse is not None:
-            listed = lists.of_diffuse(here, anywhere, places)
-            counts, total = np.zeros(listed.shape, np.uint8), np.zeros(len(places), np.int32)
-            _count_diffuse(here, packed.diffuse, lists.diffuse, listed, counts, total)
-            overdraw.reshape(-1)[places] += total
-            of_light[packed.shines] += counts.sum(axis=0, dtype=int)
-            evaluated += _pairs(lists.of_diffuse(here, facing, places), LANES, len(places))
+            for some, listed in lists.of_diffuse(here, anywhere, places):
+                counts, total = np.zeros(listed.shape, np.uint8), np.zeros(len(places[some]), np.int32)
+                points = np.ascontiguousarray(here[:, some])
+                _count_diffuse(points, packed.diffuse, lists.diffuse, listed, counts, total)
+                overdraw.reshape(-1)[places[some]] += total
+                of_light[packed.shines] += counts.sum(axis=0, dtype=int)
+            evaluated += _pairs(lists.of_diffuse(here, facing, places), LANES, places)
         if packed.lobes is not None and lists.lobes is not None:
-            listed = lists.of_lobes(here, anywhere, places)
-            finer = np.repeat(listed, TILE // LANES, axis=0)[: -(-len(places) // LANES)]
-            counts, total = np.zeros(finer.shape, np.uint8), np.zeros(len(places), np.int32)
-            _count_lobes(here, packed.lobes.lights, packed.lobes.widening, lists.lobes, finer, counts, total)
-            overdraw.reshape(-1)[places] += total
-            of_light[packed.glossy] += counts.sum(axis=0, dtype=int)
-            evaluated += _pairs(lists.of_lobes(here, facing, places), TILE, len(places))
+            for some, listed in lists.of_lobes(here, anywhere, places):
+                finer = np.repeat(listed, TILE // LANES, axis=0)[: -(-len(places[some]) // LANES)]
+                counts, total = np.zeros(finer.shape, np.uint8), np.zeros(len(places[some]), np.int32)
+                points = np.ascontiguousarray(here[:, some])
+                _count_lobes(points, packed.lobes.lights, packed.lobes.widening, lists.lobes, finer, counts, total)
+                overdraw.reshape(-1)[places[some]] += total
+                of_light[packed.glossy] += counts.sum(axis=0, dtype=int)
+            evaluated += _pairs(lists.of_lobes(here, facing, places), TILE, places)
 
     over_receivers(receivers, packed, add)
     return Fragments(overdraw, of_light, evaluated)
 
 
-def _pairs(listed: Array, lanes: int, count: int) -> int:
-    """Return how many pairs of listed light and receiver there are."""
-    sizes = np.minimum(lanes, count - lanes * np.arange(len(listed)))
-    return int((np.count_nonzero(listed, axis=1) * sizes).sum())
+def _pairs(lists: Iterable[tuple[Some, Array]], lanes: int, places: Array) -> int:
+    """Return how many pairs of listed light and receiver there are, in tiles of `lanes`."""
+    total = 0
+    for some, listed in lists:
+        sizes = np.minimum(lanes, len(places[some]) - lanes * np.arange(len(listed)))
+        total += int((np.count_nonzero(listed, axis=1) * sizes).sum())
+    return total
 
 
 @kernel(parallel=True)

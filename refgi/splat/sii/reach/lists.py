@@ -1,5 +1,6 @@
 """Ranges of the lights of one picture, and light lists of its tiles by the chosen bound (SII Sec. 3.2, 3.4)."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from refgi.rsm import Projection
 
 Array = npt.NDArray[Any]
+Some = slice | Array
+
+EVERY = slice(None)
 
 
 class LightLists:
@@ -61,15 +65,18 @@ class LightLists:
         self.diffuse = light_range(diffuse, low, reach, DIFFUSE, dtype, outside) if len(diffuse) > 1 else None
         self.lobes = light_range(glossy, low, reach, GLOSSY, dtype, outside) if len(glossy) else None
 
-    def of_diffuse(self, position: Array, normal: Array, places: Array) -> Array:
-        """Return which diffuse lights may count for which tile of LANES receivers, (ceil(n / LANES), M) bool."""
-        return self._list(position, normal, places, self._packed.diffuse[:, :-1], self.diffuse_solids(), nearest=True)
+    def of_diffuse(self, position: Array, normal: Array, places: Array) -> Iterator[tuple[Some, Array]]:
+        """Yield receivers, and which diffuse lights may count for which tile of LANES of them, (ceil(n / LANES), M).
 
-    def of_lobes(self, position: Array, normal: Array, places: Array) -> Array:
-        """Return which lobes may count for which tile of TILE receivers, (ceil(n / TILE), K) bool."""
+        All receivers come at once. For a mesh that loses pixels they come light by light, those where it is drawn.
+        """
+        return self._lists(position, normal, places, self._packed.diffuse[:, :-1], self.diffuse_solids(), nearest=True)
+
+    def of_lobes(self, position: Array, normal: Array, places: Array) -> Iterator[tuple[Some, Array]]:
+        """Yield receivers, and which lobes may count for which tile of TILE of them, (ceil(n / TILE), K)."""
         assert self._packed.lobes is not None
-        return of_whole_tiles(
-            self._list(position, normal, places, self._packed.lobes.lights, self.lobe_solids(), nearest=False))
+        lists = self._lists(position, normal, places, self._packed.lobes.lights, self.lobe_solids(), nearest=False)
+        return ((some, of_whole_tiles(listed)) for some, listed in lists)
 
     def diffuse_solids(self) -> Solids:
         """Return the bounds of the diffuse lights, without the black one."""
@@ -86,23 +93,39 @@ class LightLists:
                             self._settings.pairs.lobe.widening,
                             "sii_widening" in self._settings.pairs.as_published)
 
-    def _list(
+    def _lists(
         self, position: Array, normal: Array, places: Array, lights: Array, solids: Solids, nearest: bool
-    ) -> Array:
-        if isinstance(self._bound, FullBound):
-            return np.ones((-(-len(places) // LANES), lights.shape[1]), np.bool_)
-        packed = pack_solids(solids, lights[3:6], hollow=self._on_screen, nearest=nearest and self._tangent)
-        listed = list_lights(position, normal, packed)
-        return listed & self._tiles_on_screen(places, solids) if self._on_screen else listed
+    ) -> Iterator[tuple[Some, Array]]:
+        bound, count = self._bound, lights.shape[1]
+        if isinstance(bound, FullBound):
+            yield EVERY, np.ones((_tiles(places), count), np.bool_)
+        elif isinstance(bound, MeshBound) and not bound.inflate:
+            for k in range(count):
+                some = np.flatnonzero(self._drawn(solids, k).reshape(-1)[places])
+                listed = np.zeros((_tiles(some), count), np.bool_)
+                listed[:, k] = True
+                yield some, listed
+        else:
+            packed = pack_solids(solids, lights[3:6], hollow=self._on_screen, nearest=nearest and self._tangent)
+            listed = list_lights(position, normal, packed)
+            yield EVERY, listed & self._tiles_on_screen(places, solids) if self._on_screen else listed
 
     def _tiles_on_screen(self, places: Array, solids: Solids) -> Array:
         assert self._projection is not None
         if not isinstance(self._bound, MeshBound):
             return tiles_of_quads(screen_quads(self._projection, solids.position, np.sqrt(solids.square)), places,
                                   self._width)
-        faces, inflate = self._bound.faces, self._bound.inflate
-        return np.stack([tiles_of_pixels(covered_pixels(self._projection, solids, k, faces, inflate), places)
-                         for k in range(solids.position.shape[1])], axis=1)
+        return np.stack([tiles_of_pixels(self._drawn(solids, k), places) for k in range(solids.position.shape[1])],
+                        axis=1)
+
+    def _drawn(self, solids: Solids, k: int) -> Array:
+        assert self._projection is not None
+        assert isinstance(self._bound, MeshBound)
+        return covered_pixels(self._projection, solids, k, self._bound.faces, self._bound.inflate)
+
+
+def _tiles(places: Array) -> int:
+    return -(-len(places) // LANES)
 
 
 def _square(reach: Range) -> Array:

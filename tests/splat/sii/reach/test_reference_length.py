@@ -16,7 +16,7 @@ from refgi.radiometry import lobe_fraction
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, cut_irradiance, irradiance, sii, splat
-from refgi.splat.sii.ledger import energy_ledger
+from refgi.splat.sii.ledger import sii_ledger
 from refgi.splat.sii.reach.fragments import fragments
 from refgi.splat.sii.reach.reference_length import reference_length, with_reference_length
 from refgi.splat.sii.reach.threshold import low_irradiance
@@ -180,7 +180,7 @@ def test_the_ledger_uses_the_same_length():
     at = frame()
     settings = of(SiiSettings, lights=96, cut_share=0.05)
     by_hand = with_reference_length(receivers(at), choose_lights(at, settings.lights), settings)
-    ledgers = [quietly(energy_ledger, at, one) for one in (settings, by_hand)]
+    ledgers = [quietly(sii_ledger, at, one) for one in (settings, by_hand)]
     for row, other in zip(*(ledger.rows for ledger in ledgers), strict=True):
         np.testing.assert_array_equal(row.watts, other.watts)
     assert (ledgers[0].cut > 0).all()

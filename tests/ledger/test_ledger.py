@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.ledger import pixel_areas
 from refgi.lights.selection import choose_lights
 from refgi.rsm.raster.projection import CUBE_FORWARD, CUBE_UP
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
-from refgi.splat.sii.ledger import energy_ledger
-from refgi.splat.sii.ledger_terms import pixel_areas
+from refgi.splat.sii.ledger import sii_ledger
 from refgi.stages import observe
 from tests.form_factors import polygon_form_factor
 from tests.naive import ledger as naive
@@ -63,7 +63,7 @@ def frames():
 def test_lines_sum_to_what_is_emitted(frames, evidence):
     worst = 0.0
     for name, settings in CASES:
-        ledger = energy_ledger(frames(name), of(SiiSettings, **{"lights": 200} | settings))
+        ledger = sii_ledger(frames(name), of(SiiSettings, **{"lights": 200} | settings))
         assert balance(ledger) < WHOLE, (name, settings)
         assert all(row.watts.shape == (3,) and row.watts.dtype == np.float64 for row in ledger.rows)
         worst = max(worst, balance(ledger))
@@ -76,7 +76,7 @@ def test_what_a_setting_does_is_on_its_line(frames):
     signed = ("sampling", "bounced", "scaled", "printed", "interpolated", "cut", "clamped")
 
     def lines(name, **settings):
-        ledger = energy_ledger(frames(name), of(SiiSettings, **{"lights": 200} | settings))
+        ledger = sii_ledger(frames(name), of(SiiSettings, **{"lights": 200} | settings))
         return {line: float(getattr(ledger, line)[1] / ledger.emitted[1]) for line in signed if line != "sampling"}
 
     still = dict.fromkeys(signed[1:], 0.0)
@@ -107,7 +107,7 @@ def test_each_line_is_that_of_the_twin(name, threshold, evidence):
     """Oracle: kept, cut, clamped and behind from loops over pixels and lights, and together the full sum."""
     frame = Frame(load_scene(name), width=11, height=8, rsm_resolution=64, dtype=np.float64)
     settings = of(SiiSettings, lights=24, cut_irradiance=threshold, clamp="distance", clamp_value=0.05)
-    ledger = energy_ledger(frame, settings)
+    ledger = sii_ledger(frame, settings)
     expected = naive.screen(list(pixels_of(frame)), choose_lights(frame, settings.lights), threshold, 0.05)
     error = {line: float(np.abs(getattr(ledger, line) - value).max() / ledger.emitted.max())
              for line, value in expected.items()}
@@ -130,7 +130,7 @@ def around(scene, eye, size, **options):
 @pytest.mark.feature("REF-04")
 def test_off_screen_is_what_the_other_five_views_receive(evidence):
     """Analytic: in a closed convex room without blockers each light arrives exactly once."""
-    views = [energy_ledger(frame, UNCUT)
+    views = [sii_ledger(frame, UNCUT)
              for frame in around(load_scene("integrating_sphere"), (0.1, -0.1, 0.2), 48, rsm_resolution=64)]
     arrived = np.sum([view.arrived for view in views], axis=0)
     whole = float(np.abs(arrived / views[0].lights - 1).max())
@@ -151,7 +151,7 @@ def test_lobes_below_the_horizon_are_behind(evidence):
     for norm in ("clamped", "full_lobe", "none"):
         settings = replaced(UNCUT, {"lobe_norm": norm})
         frames = list(around(glossy, (0.1, -0.1, 0.2), 64, rsm_resolution=64))
-        views = [energy_ledger(frame, settings) for frame in frames]
+        views = [sii_ledger(frame, settings) for frame in frames]
         lights = choose_lights(frames[0], settings.lights)
         tilt = np.arccos(np.clip((lights.normal * lights.lobe_axis).sum(axis=0), -1, 1).astype(float))
         above = np.array([lobe_fraction(t, 3.0) for t in tilt])
@@ -188,7 +188,7 @@ def test_flux_that_meets_a_plate_has_its_form_factor(below, evidence):
     """Analytic: a light under a plate sends it Phi F; seen from above the plate is met from behind."""
     scene, plate = plates(below)
     frame = Frame(scene, width=256, height=256, rsm_resolution=64)
-    ledger, lights = energy_ledger(frame, UNCUT), choose_lights(frame, UNCUT.lights)
+    ledger, lights = sii_ledger(frame, UNCUT), choose_lights(frame, UNCUT.lights)
     factors = np.array([polygon_form_factor(p, n, plate) for p, n in zip(lights.position.T, lights.normal.T,
                                                                         strict=True)])
     met, missed = lights.flux @ factors, lights.flux @ (1 - factors)
@@ -211,7 +211,7 @@ def test_cut_follows_the_law_of_the_range(evidence):
     found = []
     for reach in (1.05, 1.1):  # R0 in plate distances: the lit disc lies inside the plate
         threshold = float(light.flux[0, 0]) / math.pi / reach**2
-        ledger = energy_ledger(frame, replaced(one, {"cut_irradiance": threshold}))
+        ledger = sii_ledger(frame, replaced(one, {"cut_irradiance": threshold}))
         kept = 1 - reach ** (-4 / 3)
         cut = ledger.cut[0] / ledger.lights[0]
         assert cut == pytest.approx(factor - kept, abs=RIM)
@@ -224,11 +224,11 @@ def test_cut_follows_the_law_of_the_range(evidence):
 def test_the_random_range_cuts_nothing_in_the_mean(frames, evidence):
     """Statistical: the signed cut over 64 seeds is 0 within four of its standard errors, the plain cut is not."""
     settings = of(SiiSettings, lights=64, cut_irradiance=0.05)
-    plain = energy_ledger(frames("cornell_box"), settings)
+    plain = sii_ledger(frames("cornell_box"), settings)
     lights = []
     for seed in range(64):
         some = replaced(settings, {"stochastic": True, "seed": seed, "pattern": "grid"})
-        lights.append(energy_ledger(frames("cornell_box"), some).cut[1])
+        lights.append(sii_ledger(frames("cornell_box"), some).cut[1])
     mean, error = np.mean(lights), np.std(lights) / 8
     assert abs(mean) < 4 * error
     assert plain.cut[1] > 20 * error
@@ -243,7 +243,7 @@ def test_emitted_and_missed_in_closed_form(evidence):
     floor = Geometry(scene.geometry.vertices, scene.geometry.faces[:2], np.zeros(2, np.int32))
     scene = dataclasses.replace(scene, geometry=floor)
     lights = (PointLight((0.0, 1.5, 0.0), (1.0, 2.0, 3.0)), DirectionalLight((0.3, -1.0, 0.2), (1.0, 0.5, 0.0)))
-    at = [energy_ledger(Frame(scene.with_lights(light), width=8, height=8, rsm_resolution=256), UNCUT)
+    at = [sii_ledger(Frame(scene.with_lights(light), width=8, height=8, rsm_resolution=256), UNCUT)
           for light in lights]
     share = 4 * math.asin(1 / (1 + (1.5 / 3.0) ** 2)) / (4 * math.pi)  # of a square from above its middle
     assert at[0].emitted == pytest.approx(4 * math.pi * np.array([1, 2, 3]), rel=1e-14)
@@ -251,7 +251,7 @@ def test_emitted_and_missed_in_closed_form(evidence):
     slant = 1.0 / math.sqrt(0.3**2 + 1 + 0.2**2)
     for line in (at[1].absorbed, at[1].reflected):
         assert line == pytest.approx(0.5 * 36.0 * slant * np.array([1, 0.5, 0]), rel=5e-3)
-    both = energy_ledger(Frame(scene.with_lights(*lights), width=8, height=8, rsm_resolution=256), UNCUT)
+    both = sii_ledger(Frame(scene.with_lights(*lights), width=8, height=8, rsm_resolution=256), UNCUT)
     for line in ("emitted", "missed", "absorbed", "reflected"):
         assert getattr(both, line) == pytest.approx(getattr(at[0], line) + getattr(at[1], line), rel=1e-12)
     evidence(f"missed / emitted = {at[0].missed[0] / at[0].emitted[0]:.5f} (closed form {1 - share:.5f}); "
@@ -262,7 +262,7 @@ def test_emitted_and_missed_in_closed_form(evidence):
 def test_bounces_of_a_walk_are_a_geometric_series(evidence):
     """Analytic: in a closed sphere of albedo 1/2 three bounces send 1/2 + 1/4 + 1/8 of the light's power."""
     frame = Frame(load_scene("integrating_sphere"), width=8, height=8, rsm_resolution=32)
-    ledger = energy_ledger(frame, of(SiiSettings, source="walk", bounces=3, lights=100))
+    ledger = sii_ledger(frame, of(SiiSettings, source="walk", bounces=3, lights=100))
     shares = [float(line[0] / ledger.emitted[0]) for line in (ledger.reflected, ledger.bounced, ledger.lights)]
     assert shares[0] == pytest.approx(0.5, rel=1e-6)
     assert -shares[1] / (shares[2] + shares[1]) == pytest.approx(0.75, rel=1e-9)
@@ -286,7 +286,7 @@ def test_a_dark_scene_and_a_view_of_nothing_balance():
     black = dataclasses.replace(scene, materials=tuple(Material("black", (0.0,) * 3) for _ in scene.materials))
     away = scene.with_camera(eye=(0.0, 0.0, 50.0), target=(0.0, 0.0, 60.0))
     for one in (black, away):
-        ledger = energy_ledger(Frame(one, width=16, height=16, rsm_resolution=32), of(SiiSettings, lights=32))
+        ledger = sii_ledger(Frame(one, width=16, height=16, rsm_resolution=32), of(SiiSettings, lights=32))
         assert balance(ledger) < WHOLE
         assert not np.any([ledger.arrived, ledger.cut, ledger.behind])
     assert np.array_equal(ledger.off_screen, ledger.lights)

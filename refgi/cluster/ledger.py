@@ -1,0 +1,45 @@
+"""Energy ledger of `val` (REF-04): beside what all pixel lights lose, light that is blocked or lost to interleaving."""
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+from refgi.cluster.settings import InterleavingSettings, ValSettings
+from refgi.cluster.val import val
+from refgi.ledger import Ledger, account
+from refgi.lights.selection import choose_lights, footprints
+from refgi.pairs.irradiance import Receivers, irradiance
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+
+
+@stage("cluster.ledger")
+def val_ledger(frame: "Frame", settings: ValSettings) -> Ledger:
+    """Account for the power of the lights under `val`.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene and its buffers.
+    settings : ValSettings
+        Those of `val`.
+
+    Returns
+    -------
+    Ledger
+        Its lines sum to `emitted` but for the rounding of the frame's dtype.
+
+    Notes
+    -----
+    `shadowed` is what the method's own soft shadows take. Takes as long as the picture of all lights at every pixel and
+    the picture itself.
+    """
+    footprint = footprints(frame, settings.lights, settings.pairs)
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    unblocked = irradiance(receivers, choose_lights(frame, settings.lights), settings.pairs, footprint)
+    whole = dataclasses.replace(settings, interleaving=InterleavingSettings(block=1))
+    picture = val(frame, settings)
+    every = val(frame, whole) if whole != settings else picture
+    return account(frame, settings.lights, settings.pairs, footprint, picture,
+                   {"shadowed": unblocked - every, "interpolated": every - picture})

@@ -1,0 +1,57 @@
+"""Energy ledger of `multires` (REF-04): beside what all pixel lights lose, light between subsplats and in Eq. 3."""
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy.typing as npt
+
+from refgi.ledger import Ledger, account
+from refgi.lights.selection import choose_lights
+from refgi.pairs.irradiance import Receivers, irradiance
+from refgi.splat.multires.multires import light_areas, multires
+from refgi.splat.multires.settings import MOST_CELLS, ByGeometry, MultiresSettings
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+
+Array = npt.NDArray[Any]
+
+
+@stage("multires.ledger")
+def multires_ledger(frame: "Frame", settings: MultiresSettings) -> Ledger:
+    """Account for the power of the lights under `multires`.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene and its buffers.
+    settings : MultiresSettings
+        Those of `multires`.
+
+    Returns
+    -------
+    Ledger
+        Its lines sum to `emitted` but for the rounding of the frame's dtype.
+
+    Notes
+    -----
+    `interpolated` is every pixel's sum less the picture before Eq. 3, and so holds twice the size and the printed
+    forms of subsplats as well. Takes as long as every pixel's sum several times over.
+    """
+    lights, pairs = choose_lights(frame, settings.lights), settings.effective_pairs
+    footprint = light_areas(frame, lights, settings)
+    every = irradiance(Receivers(*frame.gbuffer.resolve("position", "normal", "covered")), lights, pairs, footprint)
+    picture = multires(frame, settings)
+    shadowed = darkened = None
+    unblocked = every
+    if settings.shadow_rays is not None:
+        finest = ByGeometry(coarsest=MOST_CELLS, visibility=settings.shadow_rays)
+        every = multires(frame, MultiresSettings(settings.lights, settings.pairs, finest))
+        shadowed = unblocked - every
+    plain = picture
+    if settings.detail > 0:
+        plain = multires(frame, dataclasses.replace(settings, detail=0.0))
+        darkened = plain - picture
+    return account(frame, settings.lights, pairs, footprint, picture,
+                   {"shadowed": shadowed, "interpolated": every - plain, "darkened": darkened})

@@ -1,0 +1,238 @@
+"""Every setting of `multires` reaches the picture: against the twin of the whole method, and against its default."""
+
+import dataclasses
+from functools import cache, partial
+
+import numpy as np
+import pytest
+
+from refgi.lights.selection import choose_lights, footprints
+from refgi.pairs.settings import AutoClamp, DiscClamp, DistanceClamp, GeometryClamp
+from refgi.splat import MultiresSettings, multires
+from refgi.splat.multires import ByGeometry
+from refgi.stages import observe
+from tests.naive import multires as naive
+from tests.wiring.cases import Case, uncovered
+
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
+
+ROUNDING = 1e-9  # of the brightest pixel
+RAYS = 1e-5  # receivers of shadow rays are float32
+SPHERES = 1e-4  # of a light on its axis: slices of a cone by a Gauss rule (docs/methods/sii_sum)
+LEAST = 1e-3  # of the brightest pixel, that a key must change
+
+BASE = {"lights.count": 30, "subsplats.coarsest": 3}
+BARE = {"subsplats.criteria.depth": None, "subsplats.criteria.normal": None}
+DEPTH = {"subsplats.criteria.normal": None, "subsplats.criteria.depth.threshold": 0.4}  # cells of 1 to 4 pixels
+NORMAL = {"subsplats.criteria.depth": None, "subsplats.criteria.normal.threshold": 1.2}
+SLOPE = BARE | {"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.3}
+SINGLE = {"subsplats": "irradiance"}
+SAME_LIST = "both ways find the same subsplats"
+
+CASES = {
+    "geometry": Case({"subsplats.coarsest": 6}, {"subsplats.criteria.depth": None}),
+    "finest": Case({"subsplats.finest": 2}),
+    "depth": Case(DEPTH, scene="smooth"),
+    "normal": Case(NORMAL, scene="ball"),
+    "components": Case({"subsplats.criteria.normal.components": "xy"}, NORMAL, scene="ball"),
+    "derivative": Case({"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.3},
+                       BARE),
+    "chord": Case({"subsplats.criteria.curvature": "chord", "subsplats.criteria.curvature.threshold": 1.45}, BARE,
+                  scene="ball"),
+    "rate": Case({"subsplats.criteria.curvature": "rate", "subsplats.criteria.curvature.threshold": 8.0}, BARE,
+                 scene="ball"),
+    "all criteria": Case({"subsplats.criteria.derivative": "slope", "subsplats.criteria.derivative.threshold": 0.4,
+                          "subsplats.criteria.curvature": "rate", "subsplats.criteria.curvature.threshold": 10.0},
+                         {"subsplats.criteria.depth.threshold": 0.8, "subsplats.criteria.normal.threshold": 1.4},
+                         scene="ball"),
+    "depth in metres": Case({"subsplats.criteria.depth.measure": "absolute"}, DEPTH),
+    "depth of the demo": Case({"subsplats.criteria.depth.measure": "demo"}, DEPTH),
+    "derivative in metres": Case({"subsplats.criteria.derivative.measure": "absolute"}, SLOPE),
+    "derivative of the demo": Case({"subsplats.criteria.derivative.measure": "demo"}, SLOPE),
+    "rim": Case({"subsplats.criteria.rim": 1}, DEPTH),
+    "rim of normals": Case({"subsplats.criteria.rim": 1}, NORMAL, scene="ball"),
+    "diagonal off": Case({"subsplats.criteria.diagonal": "off"}, DEPTH, scene="smooth"),
+    "diagonal literal": Case({"subsplats.criteria.diagonal": "literal"}, DEPTH, scene="smooth"),
+    "diagonal full8": Case({"subsplats.criteria.diagonal": "full8"}, DEPTH, scene="smooth"),
+    "list": Case({"subsplats.criteria.traversal": "list"}, DEPTH, scene="smooth", same=SAME_LIST),
+    "mean": Case({"subsplats.representative": "mean"}, DEPTH),
+    "rays": Case({"subsplats.visibility": "rays"}),
+    "demo": Case({"subsplats.upsampling": "demo"}, DEPTH),
+    "nearest": Case({"subsplats.upsampling": "nearest"}, DEPTH),
+    "naive bilinear": Case({"subsplats.upsampling": "naive_bilinear"}, DEPTH),
+    "irradiance": Case({"subsplats": "irradiance", "subsplats.threshold": 0.4}),
+    "irradiance coarsest": Case({"subsplats.coarsest": 6}, SINGLE | {"subsplats.threshold": 0.4}),
+    "irradiance finest": Case({"subsplats.finest": 1}, SINGLE),
+    "absolute": Case({"subsplats.form": "absolute"}, SINGLE),
+    "brightest": Case({"subsplats.form": "brightest"}, SINGLE | {"subsplats.threshold": 0.5}),
+    "shared list first": Case({"subsplats.criteria": "geometry"}, SINGLE | {"subsplats.threshold": 0.5}),
+    "shared list of depth": Case({"subsplats.criteria.normal": None, "subsplats.criteria.depth.threshold": 0.3,
+                                  "subsplats.criteria.diagonal": "full8"},
+                                 SINGLE | {"subsplats.criteria": "geometry", "subsplats.threshold": 0.5}),
+    "shared list finest": Case({"subsplats.finest": 1}, SINGLE | {"subsplats.criteria": "geometry"}),
+    "irradiance mean": Case({"subsplats.representative": "mean"}, SINGLE),
+    "irradiance demo": Case({"subsplats.upsampling": "demo"}, SINGLE),
+    "irradiance nearest": Case({"subsplats.upsampling": "nearest"}, SINGLE),
+    "irradiance naive bilinear": Case({"subsplats.upsampling": "naive_bilinear"}, SINGLE),
+    "detail": Case({"detail": 0.5}),
+    "supersampled": Case({"supersampled": True}, {"detail": 0.5}),
+    "ams_disc": Case({"as_published": {"ams_disc"}}, {"lights.source.pattern": "halton", "lights.count": 31},
+                     scene="bulbs"),
+    "ams_disc on a grid": Case({"as_published": {"ams_disc"}}, scene="bulbs"),
+    "ams_rho_in_splat": Case({"as_published": {"ams_rho_in_splat"}}, DEPTH),
+    "ams_filter_all": Case({"as_published": {"ams_filter_all"}}, DEPTH),
+    "irradiance ams_filter_all": Case({"as_published": {"ams_filter_all"}}, SINGLE),
+    "demo ams_filter_all": Case({"as_published": {"ams_filter_all"}}, DEPTH | {"subsplats.upsampling": "demo"}),
+    "ams_all_corners": Case({"as_published": {"ams_all_corners"}}, SLOPE),
+    "as printed": Case({"as_published": {"ams_filter_all", "ams_all_corners"}}, SLOPE),
+    "irradiance ams_all_corners": Case({"as_published": {"ams_all_corners"}}, SINGLE),
+    "sii_openness": Case({"lights.openness.as_published": {"sii_openness"}}, {"lights.openness.flux": "scale"}),
+    "count": Case({"lights.count": 50}),
+    "seed": Case({"lights.seed": 7, "lights.source.pattern": "random"}),
+    "auto": Case({"pairs.clamp": "auto"}, {"pairs.clamp": None}),
+    "auto of paths": Case({"lights.source": "walk"}),
+    "auto of roulette": Case({"lights.openness.flux": "roulette", "lights.openness.radius": 2.0}),
+    "distance": Case({"pairs.clamp": DistanceClamp(0.5)}),
+    "term": Case({"pairs.clamp": GeometryClamp(3.0)}),
+    "sphere": Case({"pairs.clamp": "sphere", "pairs.clamp.value": 2.0},
+                   BARE | {"lights.count": 3}, scene="matte"),
+    "offset": Case({"pairs.offset": 0.1}),
+    "norm": Case({"pairs.lobe.norm": "full_lobe"}),
+    "widening": Case({"pairs.lobe.widening": 1.5}),
+}
+# pictures of so many pixels that not all are samples of the error
+WIDE = {"width": 112, "height": 84}
+BY_ERROR = {"subsplats": "error", "subsplats.target": 0.02, "lights.count": 12}
+PROMISES = {
+    "error": Case({"subsplats": "error", "subsplats.target": 0.02}, {"lights.count": 12}, frame=WIDE),
+    "error coarsest": Case({"subsplats.coarsest": 25}, BY_ERROR, frame=WIDE),
+    "error seed": Case({"lights.seed": 2}, BY_ERROR, frame=WIDE),
+    "error distance": Case({"pairs.clamp": DistanceClamp(0.5)}, BY_ERROR, frame=WIDE),
+    "error detail": Case({"detail": 0.5}, BY_ERROR, frame=WIDE),
+}
+ALL = CASES | PROMISES
+TOLERANCE = {"rays": RAYS, "sphere": SPHERES}
+# what every method has in common is met by the cases of lights and pairs
+SHARED = ("LightSettings", "MapLights", "PathLights", "WarpA", "WarpB", "BackFace", "TwoInterface", "OpennessSettings",
+          "PairSettings", "LobeSettings", "DistanceClamp", "GeometryClamp", "SphereClamp")
+
+
+def frame_of(name, scale=1):
+    """Return the frame of a case, also at a multiple of its size."""
+    case = ALL[name]
+    return seen(case.scene, **{"width": 17 * scale, "height": 13 * scale} | case.frame)
+
+
+@cache
+def seen(scene, **options):
+    """Return a frame that cases share."""
+    return Case({}, scene=scene, frame=options).seen()
+
+
+def clamp_of(settings):
+    """Return the clamp in use: "auto" is the disc, but for lights without footprints and for shadow rays."""
+    if not isinstance(settings.pairs.clamp, AutoClamp):
+        return settings.pairs.clamp
+    pathless = settings.lights.source.name() == "walk" or settings.lights.openness.flux == "roulette"
+    traced = settings.subsplats.name() == "geometry" and settings.subsplats.visibility is not None
+    return None if pathless or traced else DiscClamp()
+
+
+def lights_of(frame, settings):
+    """Return the pixel lights of a frame, and the surface that each stands for, or None."""
+    clamp = clamp_of(settings)
+    lights = choose_lights(frame, settings.lights)
+    areas = footprints(frame, settings.lights, dataclasses.replace(settings.pairs, clamp=clamp))
+    if "ams_disc" in settings.as_published:
+        areas = demo_areas(frame, settings, lights)
+    return lights, areas
+
+
+def demo_areas(frame, settings, lights):
+    """Return the demo's area of each light; N counts what was drawn from the light's own map, dark texels too."""
+    areas, lamps = np.zeros(lights.flux.shape[1]), frame.scene.lights
+    for index, lamp in enumerate(lamps):
+        share = settings.lights.count // len(lamps) + (index < settings.lights.count % len(lamps))
+        maps = frame.rsms[index].projection.maps
+        drawn = share if settings.lights.source.pattern == "halton" else nearest_grid(share, maps)
+        mine = lights.map_index == index
+        areas[mine] = naive.demo_areas(lights.position[:, mine], lamp.position, drawn)
+        assert mine.sum() < drawn  # some draws are dark, else the case would not tell
+    return areas
+
+
+def nearest_grid(share, maps):
+    """Return the k n^2 that is nearest to a share."""
+    return min((maps * n * n for n in range(1, share + 1)), key=lambda cells: (abs(cells - share), cells))
+
+
+def twin(name, settings):
+    """Return the irradiance that the method's definition gives."""
+    frame, scale = frame_of(name), 2 if settings.supersampled else 1
+    large = frame_of(name, scale)
+    geometry = frame.scene.geometry
+    traced = settings.subsplats.name() == "geometry" and settings.subsplats.visibility is not None
+    blocked = naive.blocked_by(geometry.vertices, geometry.faces) if traced else None
+    lights = naive.lights_of(*lights_of(frame, settings), settings.pairs, clamp_of(settings), blocked)
+    light = naive.picture(naive.view_of(large.gbuffer), frame.scene.camera.eye, lights, settings)
+    return naive.halved(light, large.gbuffer.covered, frame.gbuffer.covered) if settings.supersampled else light
+
+
+def test_every_field_has_a_case():
+    """Property: no setting of the method's own is without a case."""
+    assert {word for word in uncovered(MultiresSettings, ALL, BASE) if not word.startswith(SHARED)} == set()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_twin(name):
+    """Oracle: the picture is that of the method written out by hand."""
+    settings = CASES[name].settings(MultiresSettings, BASE)
+    expected = twin(name, settings)
+    np.testing.assert_allclose(multires(frame_of(name), settings), expected, rtol=0,
+                               atol=TOLERANCE.get(name, ROUNDING) * expected.max())
+
+
+@pytest.mark.parametrize("name", PROMISES)
+def test_the_promise(name):
+    """Oracle: the RMSE to the sum of all lights is within the target, and pixels evaluated one by one are that sum."""
+    frame, settings = frame_of(name), PROMISES[name].settings(MultiresSettings, BASE)
+    full, covered = full_sum(frame, settings), frame.gbuffer.covered
+    with observe(record=True) as log:
+        light = multires(frame, settings)
+    split = next(run.output for run in log.runs if run.name == "multires.error_driven").split
+    off = light - full
+    assert np.sqrt((off[:, covered] ** 2).mean()) <= settings.subsplats.target * full[:, covered].mean()
+    assert len(split) - 1 == naive.coarsest_level(covered.shape, settings.subsplats.coarsest)
+    finest = np.kron(split[1], np.ones((2, 2), bool))[:covered.shape[0], :covered.shape[1]] & covered
+    assert 0 < finest.sum() < covered.sum()
+    assert np.abs(off[:, finest]).max() <= ROUNDING * full.max()
+
+
+def full_sum(frame, settings):
+    """Return the sum of all lights at every pixel that shows a surface, times the surface detail."""
+    view = naive.view_of(frame.gbuffer)
+    unseeded = dataclasses.replace(settings.lights, seed=0)  # a grid needs none
+    plain = dataclasses.replace(settings, lights=unseeded, subsplats=ByGeometry(), detail=0.0)
+    return sums(frame, plain) * naive.surface_detail(view, frame.scene.camera.eye, settings.detail)
+
+
+@cache
+def sums(frame, settings):
+    """Return the sum of all lights at every pixel that shows a surface."""
+    view = naive.view_of(frame.gbuffer)
+    lights = naive.lights_of(*lights_of(frame, settings), settings.pairs, clamp_of(settings))
+    full = np.zeros((3, *view.covered.shape))
+    for i, j in zip(*np.nonzero(view.covered), strict=True):
+        full[:, i, j] = sum(light((view.position[:, i, j], view.normal[:, i, j])) for light in lights)
+    return full
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_each_key_counts(name):
+    """Property: a key put back to its default makes another picture, unless the case says why not."""
+    case = ALL[name]
+    render = partial(multires, frame_of(name))
+    light = render(case.settings(MultiresSettings, BASE))
+    for key, other in case.without(MultiresSettings, BASE):
+        change = np.abs(render(other) - light).max() / light.max()
+        assert change == 0 if case.same else change > LEAST, (key, change)

@@ -1,0 +1,184 @@
+"""Wiring of `sii`: every setting reaches the picture, the counts and the ledger as the whole-method twin has it."""
+
+import numpy as np
+import pytest
+
+from benchmarks.papers.sii.subjects import counted
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import LightSettings
+from refgi.settings import replaced
+from refgi.splat import Receivers, SiiSettings, cut_irradiance, sii
+from refgi.splat.sii.ledger import energy_ledger
+from refgi.splat.sii.reach.fragments import fragments
+from tests.naive import ledger
+from tests.naive import sii as naive
+from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.pair_cases import PAIR_CASES
+
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
+ROUNDING = 1e-9  # of the brightest pixel
+SLICES = 1e-5  # of the brightest pixel: the Gauss rule of cut cones is off by up to 1e-4 of a light on its axis
+SEEN = 1e-3  # of the brightest pixel, what a setting changes at least
+
+BASE = {"lights.count": 40}
+CUT = {"reach.cut": "relative", "reach.cut.reference_length": 0.5}
+MESH = CUT | {"reach.bound": "mesh"}
+OCTAHEDRA = MESH | {"reach.bound.faces": 8, "lights.count": 12}
+# ranges that end beyond the distance within which exponents fall
+FAR = OCTAHEDRA | {"reach.cut.reference_length": 1.5}
+RIM = MESH | {"reach.bound.inflate": False, "lights.count": 6}
+FINE = {"width": 40, "height": 30}
+CANDIDATES = "a bound finds the pixels that the threshold is tested at"
+
+REACH_CASES = {
+    "a share of the brightest": Case({"reach.cut": "relative", "reach.cut.share": 0.1,
+                                      "reach.cut.reference_length": 0.6}),
+    "the paper's share of pairs": Case({"reach.cut": "relative", "reach.cut.share": 0.1}),
+    "a share of each light's own": Case({"reach.cut.as_published": {"per_light_ilow"}}, over=CUT),
+    "an irradiance": Case({"reach.cut": "absolute", "reach.cut.irradiance": 0.02}),
+    "a random share": Case({"reach.stochastic": True, "reach.seed": 5}, over=CUT),
+    "a random share of widened lobes": Case({"reach.stochastic": True}, over=CUT | {"pairs.lobe.widening": 0.9}),
+    "a random share of each light's own": Case(
+        {"reach.stochastic": True, "reach.cut.as_published": {"per_light_ilow"}}, over=CUT),
+    "a share of what is printed": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.9},
+                                       over={"pairs.as_published": {"sii_no_pi"}, "pairs.lobe.norm": "none"}),
+    "a share, clamped": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.6},
+                             over={"pairs.clamp": "distance", "pairs.clamp.value": 0.7, "pairs.offset": 0.1}),
+    "a share of discs": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.6},
+                             over={"pairs.clamp": "disc"}),
+    "a share of spheres": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.6},
+                               over={"pairs.clamp": "sphere", "lights.count": 12}, scene="matte",
+                               frame={"width": 6, "height": 5}),
+    "half the resolution": Case({"half_resolution": True}),
+    "half the resolution, cut": Case({"half_resolution": True}, over=CUT),
+}
+BOUND_CASES = {
+    f"{bound}{how}": Case({"reach.bound": bound}, over=CUT | over, frame=FINE, same=CANDIDATES)
+    for bound in ("full", "quad", "ellipsoid", "mesh")
+    for how, over in (("", {}), (", widened", {"pairs.lobe.widening": 0.9}),
+                      (", widened as printed", {"reach.cut.reference_length": 1.5, "pairs.lobe.widening": 1.5,
+                                                "pairs.as_published": {"sii_widening"}}))}
+MESH_CASES = {
+    "a mesh within its ellipsoid": Case({"reach.bound.inflate": False}, over=OCTAHEDRA),
+    "a mesh within the union of two": Case({"reach.bound.inflate": False},
+                                           over=FAR | {"pairs.lobe.widening": 0.4}),
+    "a mesh within the union of two as printed": Case(
+        {"reach.bound.inflate": False},
+        over=FAR | {"pairs.lobe.widening": 1.5, "pairs.as_published": {"sii_widening"}}),
+    "a mesh of a random range": Case({"reach.bound.inflate": False},
+                                     over=OCTAHEDRA | {"reach.stochastic": True}),
+    **{f"a mesh of {faces}": Case({"reach.bound.faces": faces}, over=RIM, frame=FINE)
+       for faces in (8, 20, 320, 1280)},
+}
+CASES = under("pairs", PAIR_CASES) | REACH_CASES | BOUND_CASES | MESH_CASES
+COUNTED = {name: case for name, case in CASES.items() if "reach.cut" in {**case.over, **case.values}}
+ACCOUNTS = ("a share, clamped", "a random share", "half the resolution, cut", "a mesh within its ellipsoid")
+
+
+def pixel_lights(frame, settings):
+    """Return the pixel lights of a frame, and the area that each stands for where a clamp needs it."""
+    return choose_lights(frame, settings.lights), footprints(frame, settings.lights, settings.pairs)
+
+
+def tolerance(settings):
+    return SLICES if settings.pairs.clamp is not None and settings.pairs.clamp.name() == "sphere" else ROUNDING
+
+
+def receivers_of(frame):
+    return Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+
+
+def test_every_field_has_a_case():
+    assert not uncovered(SiiSettings, CASES, BASE) - set(needed(LightSettings))
+
+
+def test_the_lights_are_of_every_kind():
+    """Diffuse, glossy and both, from all three lamps, fewer than texels and of unequal strength."""
+    settings = Case({}).settings(SiiSettings, BASE)
+    frame = Case({}).seen()
+    lights, _ = pixel_lights(frame, settings)
+    diffuse, glossy = lights.flux.any(axis=0), lights.lobe_flux.any(axis=0)
+    assert (diffuse & glossy).any()
+    assert (diffuse & ~glossy).any()
+    assert (glossy & ~diffuse).any()
+    assert set(lights.map_index) == {0, 1, 2}
+    assert lights.flux.shape[1] < lights.drawn
+    assert lights.flux.max() > 4 * lights.flux[:, diffuse].max(axis=0).min()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_twin(name):
+    case = CASES[name]
+    settings, frame = case.settings(SiiSettings, BASE), case.seen()
+    expected = naive.sii(frame, settings, *pixel_lights(frame, settings))
+    np.testing.assert_allclose(sii(frame, settings), expected, rtol=0, atol=tolerance(settings) * expected.max())
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_key_counts(name):
+    case = CASES[name]
+    frame = case.seen()
+    picture = sii(frame, case.settings(SiiSettings, BASE))
+    for key, settings in case.without(SiiSettings, BASE):
+        change = np.abs(sii(frame, settings) - picture).max() / picture.max()
+        assert change == 0 if case.same else change > SEEN, key
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_fragments_are_those_of_the_twin(name):
+    case = CASES[name]
+    settings, frame = case.settings(SiiSettings, BASE), case.seen()
+    lights, footprint = pixel_lights(frame, settings)
+    found = fragments(receivers_of(frame), lights, settings, footprint, frame.gbuffer.projection)
+    overdraw, of_light = naive.fragments(frame, settings, lights)
+    np.testing.assert_array_equal(found.overdraw, overdraw)
+    np.testing.assert_array_equal(found.of_light, of_light)
+    assert found.total == overdraw.sum()
+
+
+def test_the_paper_counts_the_same_fragments():
+    """The overdraw of Figure 8 and the counts of Section 6, of a random range."""
+    case = CASES["a random share"]
+    settings, frame = case.settings(SiiSettings, BASE), case.seen()
+    overdraw, of_light = naive.fragments(frame, settings, pixel_lights(frame, settings)[0])
+    np.testing.assert_array_equal(counted(frame, settings).overdraw, overdraw)
+    np.testing.assert_array_equal(counted(frame, settings).of_light, of_light)
+
+
+@pytest.mark.parametrize("name", [name for name in COUNTED if name in REACH_CASES])
+def test_what_is_cut_is_that_of_the_twin(name):
+    case = CASES[name]
+    settings, frame = case.settings(SiiSettings, BASE), case.seen()
+    lights, footprint = pixel_lights(frame, settings)
+    expected = naive.cut_irradiance(frame, settings, lights, footprint)
+    np.testing.assert_allclose(cut_irradiance(receivers_of(frame), lights, settings, footprint), expected, rtol=0,
+                               atol=tolerance(settings) * expected.max())
+
+
+@pytest.mark.parametrize("name", ACCOUNTS)
+def test_the_ledger_is_that_of_the_twin(name):
+    """What settings keep from the visible surface, as sums over pixels of the area that they see."""
+    case = CASES[name]
+    settings, frame = case.settings(SiiSettings, BASE), case.seen()
+    lights, areas = pixel_lights(frame, settings), areas_of(frame)
+
+    def flux(changes):
+        return (naive.sii(frame, replaced(settings, changes), *lights) * areas).sum(axis=(1, 2))
+
+    sharp = {"half_resolution": False}
+    arrived, at_each_pixel, uncut, full = map(flux, (
+        {}, sharp, sharp | {"reach.cut": "none"}, sharp | {"reach.cut": "none", "pairs.clamp": "none"}))
+    account = energy_ledger(frame, settings)
+    for line, expected in (("arrived", arrived), ("interpolated", at_each_pixel - arrived),
+                           ("cut", uncut - at_each_pixel), ("clamped", full - uncut)):
+        np.testing.assert_allclose(getattr(account, line), expected, rtol=0, atol=ROUNDING * full.max(), err_msg=line)
+
+
+def areas_of(frame):
+    """Return the area (h, w) of surface that each pixel sees, m^2."""
+    scene, buffer, areas = frame.scene, frame.gbuffer, np.zeros((frame.height, frame.width))
+    for i, j in np.argwhere(buffer.covered):
+        triangle = scene.geometry.vertices[scene.geometry.faces[buffer.triangle_id[i, j]]]
+        areas[i, j] = ledger.area(scene.camera, frame.width, frame.height, i, j, buffer.position[:, i, j], triangle)
+    return areas

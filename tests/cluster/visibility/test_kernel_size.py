@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from refgi.cluster.settings import ValSettings
+from refgi.cluster.visibility.evaluate import visibility
 from refgi.cluster.visibility.kernel_size import (
     STEEPEST,
     cone_tangent,
@@ -13,10 +15,17 @@ from refgi.cluster.visibility.kernel_size import (
     published_tangent,
     solid_angle_tangent,
 )
+from refgi.settings import of
+from tests.cluster.visibility.plates import directions, lit_by
 from tests.naive import soft_shadow as naive
 
 EXACT = 2e-15
 CENTS = 0.005  # half of the last digit of the known ratios
+NEAR, FAR, DELTA = 1.0, 3.0, 0.6  # of the blocker, of receivers and all else, and of the light, m
+TEXELS = 1024
+STEP = 0.002  # of V: texels at the rim of a disc of 100; the edge itself lies between texels
+NARROW = 0.015  # tan, sin and a itself for a = 11 degrees
+WIDTH = 0.002
 
 
 @pytest.mark.parametrize("theta", [0.0, 0.3, 1.0, 1.5, math.pi / 2])
@@ -43,6 +52,60 @@ def test_published_filter_is_too_wide_in_the_middle_and_too_narrow_at_the_rim(ev
         assert ratios[degrees] == pytest.approx(known, abs=CENTS)
         assert ratios[degrees] == pytest.approx(2 / math.pi * (1 + math.cos(theta)), rel=1e-6)
     evidence("alpha / pi over the exact width: " + ", ".join(f"{r:.3f} at {k} deg" for k, r in ratios.items()))
+
+
+def across(theta, turn):
+    """Directions at `turn` from the plane of the edge, in which the one at `theta` from the axis lies, (3, n)."""
+    return np.stack([np.cos(turn) * math.sin(theta), np.sin(turn), np.cos(turn) * math.cos(theta)])
+
+
+def penumbra(theta, *published):
+    """Return V across an edge, and the angles to the receivers.
+
+    A half sphere at NEAR hides the other half, FAR: turned about the edge's normal, the scene is the same, so a
+    penumbra must be as wide at any angle from the light's axis.
+    """
+    w, within = directions(TEXELS)
+    depth = np.where(within, np.where(w[1] < 0, NEAR, FAR), np.inf)
+    turn = np.linspace(-0.4, 0.4, 201)
+    points = FAR * across(theta, turn)
+    settings = of(ValSettings, prefilter="brute", as_published=frozenset(published))
+    return visibility(*reversed(lit_by(depth, DELTA, FAR)), 0, points, -points / FAR, settings), turn
+
+
+def of_the_series(share):
+    """Return V of four terms where a share of the filter is free, all at FAR, and NEAR hides the rest."""
+    bias = naive.first_one(4)
+    to, _ = naive.scales([[NEAR, FAR]], "log_map", FAR, bias, bias)
+    left = naive.step_series(to(FAR) - bias, to(NEAR), 4)
+    return np.where((1 - share) * (1 - left) < naive.NOTHING, 1, np.clip(left + (1 - left) * share, 0, 1))
+
+
+def width_of(v, turn):
+    """Return the angle between where V is 0.1 and 0.9."""
+    return np.subtract(*np.interp([0.9, 0.1], np.maximum.accumulate(v), turn))
+
+
+@pytest.mark.feature("VAL-15")
+@pytest.mark.parametrize("degrees", [0, 30, 60, 75])  # the disc ends at 90
+def test_penumbrae_through_the_chain_are_as_wide_as_their_filters(degrees, evidence):
+    """Analytic: a cone of half-angle a is cut by the edge's plane; of a square of side alpha / pi the map is cut."""
+    theta, a = math.radians(degrees), math.atan(DELTA * (FAR - NEAR) / (2 * FAR * NEAR))
+    v, turn = penumbra(theta)
+    u = np.clip(np.sin(turn) / math.sin(a), -1, 1)
+    disc_ramp = of_the_series(0.5 + (np.arcsin(u) + u * np.sqrt(1 - u * u)) / math.pi)
+    printed, _ = penumbra(theta, "val_alpha_over_pi")
+    t = np.sin(turn) / (1 + np.cos(turn) * math.cos(theta))
+    square_ramp = of_the_series(np.clip(0.5 + t / (4 * a / math.pi), 0, 1))
+    widths = [width_of(one, turn) for one in (v, disc_ramp, printed, square_ramp)]
+    square = width_of(of_the_series(np.clip(0.5 + np.tan(turn) / (2 * math.tan(a)), 0, 1)), turn)
+    evidence(f"{degrees} deg off the axis: the penumbra is {widths[0]:.4f} rad wide ({widths[1]:.4f} in closed form), "
+             f"as published {widths[2]:.4f} ({widths[3]:.4f}), {widths[2] / square:.3f} of a square light's")
+    for one, ramp, got, right in ((v, disc_ramp, *widths[:2]), (printed, square_ramp, *widths[2:])):
+        assert np.abs(one - ramp).max() < STEP
+        assert got == pytest.approx(right, rel=WIDTH)
+    # the table's ratio, for narrow cones; this one is 11 degrees
+    assert widths[2] / square == pytest.approx(2 / math.pi * (1 + math.cos(theta)), rel=NARROW)
 
 
 @pytest.mark.feature("VAL-15")

@@ -6,7 +6,9 @@ import numba
 import numpy as np
 import pytest
 
+from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.crown.pattern import offsets_at, row_offsets
@@ -14,6 +16,7 @@ from refgi.sssil.crown.points import sample_weight
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from tests.naive import crown as naive
+from tests.sssil.crown.counting import COUNTED, reads_of_levels
 
 SETTINGS = of(HssilSettings, radius=3.3, samples=9, levels=2)
 # of the largest value: terms of a sum of up to 200, each with a dozen roundings
@@ -226,15 +229,20 @@ def _of_shares(level, radius):
 
 @pytest.mark.feature("HSS-19")
 def test_the_first_level_has_most_of_the_samples(evidence):
-    """Analytic: pairs of each level at 1280 x 720, half resolution; the paper's share of time is the crowns'."""
-    sizes = [math.ceil(1280 / 2**k) * math.ceil(720 / 2**k) for k in range(1, 6)]
-    crowns = [64 * size for size in sizes]
-    share = crowns[0] / sum(crowns[:4])
-    assert share == pytest.approx(0.753, abs=5e-4)
+    """Pairs that the method adds up at the paper's shape of picture; the share of time it prints is the crowns'."""
+    frame = Frame(load_scene("cornell_box"), width=640, height=360, rsm_resolution=64)
+    five = of(HssilSettings, radius=20.0, start="half", levels=5, samples=64)
+    crowns, whole = (reads_of_levels(frame, replaced(five, {"inner_samples": inner})) for inner in (0, None))
+    share, with_disc = (reads[0] / sum(reads[:4]) for reads in (crowns, whole))
     fifth = crowns[4] / sum(crowns[:4])
-    assert fifth < 0.01
-    settings = HssilSettings()
-    disc = settings.sampling.inner * sizes[0]
-    whole = (crowns[0] + disc) / (sum(crowns[:4]) + disc)
-    evidence(f"first of 4 levels: {share:.1%} of the crowns' samples, {whole:.1%} with its disc of "
-             f"{settings.sampling.inner}; a fifth adds {fifth:.2%}")
+    texels = [320 * 180 // 4**k for k in range(4)]
+    evidence(f"first of 4 levels: {share:.1%} of the crowns' samples, {with_disc:.1%} with its disc; a fifth adds "
+             f"{fifth:.2%}; a pixel of the picture has {crowns[0] / texels[0]:.1f} samples in the crown, "
+             f"{(whole[0] - crowns[0]) / texels[0]:.1f} in the disc")
+    assert crowns[:3] == pytest.approx([64 * n for n in texels[:3]], rel=COUNTED)
+    assert whole[1:] == pytest.approx(crowns[1:], rel=2 * COUNTED)  # the first level alone has a disc
+    assert whole[0] - crowns[0] == pytest.approx(64 / 3 * texels[0], rel=8 * COUNTED)
+    assert share == pytest.approx(0.753, abs=0.01)
+    # rows and columns rounded up
+    assert fifth == pytest.approx(20 * 12 / (sum(texels[:3]) + 40 * 23), rel=2 * COUNTED)
+    assert fifth < 0.01  # as the paper says

@@ -15,8 +15,11 @@ from refgi.sssil.pyramid.levels import pyramid, useful_levels
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import Memory, observe
 from tests.naive import view_pyramid as naive
+from tests.naive.crossings import LIFT, corners_of, free
 from tests.sssil.pyramid.pictures import FLOAT32, FLOAT64, camera, made, random_picture, same
+from tests.wiring.cases import LAMPS, room
 
+DIRECT = 1e-9  # of the brightest: float64 in another order
 MODES = ("closest", "average", "closest_average")
 
 
@@ -98,6 +101,43 @@ def test_level_0_is_the_buffers_and_the_light_that_leaves_them(dtype, evidence):
     size = np.abs(buffer.position).max() + np.abs(eye).max()
     assert away <= (FLOAT32 if dtype == np.float32 else FLOAT64) * size
     evidence(f"{np.dtype(dtype).name}: L is albedo/pi E, positions within {away:.1e} m of the G-buffer's")
+
+
+@pytest.mark.feature("HSS-01")
+def test_radiance_of_glossy_surfaces_is_the_diffuse_part_alone(evidence):
+    """Closed form of a point light, albedo / pi I cos / d^2, on a wall with a lobe and on a block with nothing else.
+
+    Towards the camera the lobes send more than that: with them the level would be another picture.
+    """
+    lamp = LAMPS[1]
+    frame = Frame(room(lamp), width=82, height=62, dtype=np.float64, shadows="exact")
+    buffer, scene, covered = frame.gbuffer, frame.scene, frame.gbuffer.covered
+    x, n = buffer.position[:, covered].T, buffer.normal[:, covered].T
+    materials = [scene.materials[k] for k in scene.geometry.material_of_face[buffer.triangle_id[covered]]]
+    toward = np.array(lamp.position) - x
+    d = np.linalg.norm(toward, axis=1)
+    cosine = np.maximum((toward * n).sum(axis=1) / d, 0)
+    seen = free(corners_of(scene.geometry), x + LIFT * n, np.broadcast_to(lamp.position, x.shape))
+    arrives = (cosine / d**2 * seen)[:, None] * lamp.intensity  # W/m^2
+    diffuse, specular = (np.array([getattr(one, key) for one in materials]) for key in ("diffuse", "specular"))
+    exponent = np.array([one.exponent for one in materials])
+    eye = np.array(scene.camera.eye) - x
+    mirror = 2 * cosine[:, None] * n - toward / d[:, None]
+    along = np.maximum((mirror * eye).sum(axis=1) / np.linalg.norm(eye, axis=1), 0)
+    lobe = specular * arrives * ((exponent + 1) / (2 * math.pi) * along**exponent)[:, None]
+
+    level = pyramid(frame, of(HssilSettings, start="full", levels=1))[0]
+    found, expected = level.radiance[:, covered].T, diffuse / math.pi * arrives
+    glossy = specular.any(axis=1) & (arrives.any(axis=1))
+    black = glossy & ~diffuse.any(axis=1)
+    evidence(f"{glossy.sum()} pixels of glossy surfaces in light, {black.sum()} of them without a diffuse part: "
+             f"radiance within {np.abs(found - expected).max() / expected.max():.1e} of albedo / pi E; the lobes would "
+             f"add up to {(lobe / expected.max()).max():.2f} of the largest")
+    np.testing.assert_allclose(found, expected, rtol=0, atol=DIRECT * expected.max())
+    assert black.sum() > 20
+    assert not found[black].any()
+    assert lobe[glossy].max() > expected.max()
+    assert (lobe[glossy] > 0.1 * expected.max()).any(axis=1).sum() > 20
 
 
 @pytest.mark.parametrize("mode", MODES)

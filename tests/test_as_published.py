@@ -20,15 +20,18 @@ from refgi.cluster.visibility.kernel_size import (
     published_tangent,
     solid_angle_tangent,
 )
+from refgi.lights.importance import importance
 from refgi.lights.selection import choose_lights
 from refgi.methods import METHODS
 from refgi.scene import Material
 from refgi.settings import of, replaced
 from refgi.splat import GatherSettings, MultiresSettings, SiiSettings, gather, multires, sii
+from refgi.splat.multires import shared_subsplats
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
+from refgi.stages import observe
 from tests import lamps
-from tests.naive import eq2
+from tests.naive import eq2, upsample
 from tests.naive.radiometry import lobe_fraction, solid_angle_of_rectangle
 from tests.wiring.cases import needed
 
@@ -180,6 +183,44 @@ def filtered_again():
     return (printed[:, 1:-1, 1:-1][:, inside] / plain.max()).ravel(), (blurred[:, inside] / plain.max()).ravel()
 
 
+def corners_always():
+    """Upsampling by the twin of the method's own subsplats, texels across a corner counted as all others."""
+    frame, settings = lamps.corner(), of(MultiresSettings, lights=48, coarsest=4)
+    with observe(record=True) as log:
+        printed, plain = pair_of(multires, frame, settings, "ams_all_corners")
+    assert np.abs(printed - plain).max() > LEAST * plain.max()
+    values = next(run.output for run in log.runs if run.name == "multires.evaluate")
+    listed, covered = shared_subsplats(frame.gbuffer, settings.subsplats), frame.gbuffer.covered
+    cells = list(zip(*(part.tolist() for part in (listed.level, listed.row, listed.column)), strict=True))
+    expected = np.zeros_like(printed)
+    for c in range(3):
+        leaves = dict(zip(cells, values[c].tolist(), strict=True))
+        for (i, j), value in upsample.tent(leaves, covered.tolist(), listed.top, corner_rule=False).items():
+            expected[c, i, j] = value
+    return printed[:, covered].ravel() / plain.max(), expected[:, covered].ravel() / plain.max()
+
+
+def peak_of_a_lobe():
+    """Importance of purely glossy texels: P over (P + 1) / 2."""
+    found = []
+    for rsm in lamps.corner(material=GLOSSY).rsms:
+        printed, plain = (importance(rsm, "peak", as_printed=form) for form in (True, False))
+        found.append(printed[plain > 0] / plain[plain > 0])
+    found = np.concatenate(found)
+    return found, np.full(found.shape, 2 * P / (P + 1))
+
+
+def scaled_by_openness():
+    """O and 1 - O of each lamp's one light share its flux: the two pictures add up to the one that is not scaled."""
+    frame, plain = lamps.corner(), of(SiiSettings, **ONE_EACH)
+    scale = replaced(plain, {"openness_flux": "scale", "openness_radius": 2.0})
+    printed, scaled = pair_of(sii, frame, scale, "sii_openness")
+    whole = sii(frame, plain)
+    assert all(0.1 < part.sum() / whole.sum() < 0.9 for part in (printed, scaled))
+    found, lit = ratio(printed, scaled)
+    return found[lit], ((whole - scaled)[lit] / scaled[lit])
+
+
 def square_of_xi():
     """Gather with the weight 3/2 xi_1^2 of one literal loop a pixel and lamp."""
     frame = lamps.corner(lamps.RED, lamps.BLUE)
@@ -244,7 +285,8 @@ FACTORS = {
     "sii_no_pi": no_pi, "sii_no_tn": no_tn, "equal_solid_angle": equal_solid_angle,
     "sii_widening": widened("sii_widening"), "sii_widening_unnorm": widened("sii_widening_unnorm"),
     "per_light_ilow": per_light_ilow, "ams_disc": demo_disc, "ams_rho_in_splat": albedo_within_the_splat,
-    "ams_filter_all": filtered_again, "rsm_weight_squared": square_of_xi, "hss_tan_f": tangents_of_the_whole_view,
+    "ams_filter_all": filtered_again, "ams_all_corners": corners_always, "sii_peak": peak_of_a_lobe,
+    "sii_openness": scaled_by_openness, "rsm_weight_squared": square_of_xi, "hss_tan_f": tangents_of_the_whole_view,
     "hss_disc_pi": disc_without_pi, "hss_level_factor": level_factor, "val_alpha": angle_from_the_axis,
     "val_alpha_over_pi": angle_over_pi, "val_search_solid_angle": half_way_search,
 }

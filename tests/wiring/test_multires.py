@@ -108,6 +108,8 @@ PROMISES = {
     "error detail": Case({"detail": 0.5}, BY_ERROR, frame=WIDE),
 }
 ALL = CASES | PROMISES
+FEATURES = {"chord": "AMS-05", "rate": "AMS-05", "detail": "AMS-14", "demo": "AMS-11", "nearest": "AMS-11",
+            "naive bilinear": "AMS-11", "ams_filter_all": "AMS-11", "ams_all_corners": "AMS-11"}
 TOLERANCE = {"rays": RAYS, "spheres": SPHERES}
 
 
@@ -176,13 +178,15 @@ def test_every_field_has_a_case():
     assert not uncovered(MultiresSettings, ALL, BASE) - set(needed(LightSettings))  # those: test_lights, test_shared
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_twin(name):
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.feature(FEATURES[name]))
+                                  if name in FEATURES else name for name in CASES])
+def test_the_twin(name, evidence):
     """Oracle: the picture is that of the method written out by hand."""
     settings = CASES[name].settings(MultiresSettings, BASE)
     expected = twin(name, settings)
-    np.testing.assert_allclose(multires(frame_of(name), settings), expected, rtol=0,
-                               atol=TOLERANCE.get(name, ROUNDING) * expected.max())
+    off = np.abs(multires(frame_of(name), settings) - expected).max() / expected.max()
+    evidence(f"{name}: the picture is {off:.0e} of the brightest pixel off the twin's")
+    assert off <= TOLERANCE.get(name, ROUNDING)
 
 
 @pytest.mark.parametrize("name", PROMISES)

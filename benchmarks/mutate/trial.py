@@ -55,7 +55,12 @@ class Run(NamedTuple):
 
 def run_tests(scratch: Scratch, programs: Programs, tests: Sequence[str], limit: float | None = None,
               first: bool = True) -> Run:
-    """Run test files of a copy in their order, up to the first failure or all, for `limit` seconds at most."""
+    """Run test files of a copy in their order, up to the first failure or all, for `limit` seconds at most.
+
+    Doctests come last, as in the suite: pytest's own import of a source file puts a subpackage in place of the function
+    of its name that the package exports.
+    """
+    tests = sorted(tests, key=lambda test: test.startswith(f"{scratch.project.package}/"))
     report, said = scratch.folder / "report.jsonl", scratch.folder / "pytest.txt"
     report.unlink(missing_ok=True)
     command = scratch.python(CHILD, scratch.project.package, report, "-q", "-p", "no:cacheprovider",

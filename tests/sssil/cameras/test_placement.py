@@ -21,7 +21,7 @@ from refgi.sssil.camera_transport import (
     unoccluded,
     visible_points,
 )
-from refgi.sssil.cameras import place_cameras
+from refgi.sssil.cameras import _wide_views, place_cameras
 from refgi.stages import observe
 from tests.sssil.cameras.hidden_side import BACK, HALF_ANGLE, LIGHT, hidden_side
 
@@ -112,6 +112,18 @@ def test_a_view_straight_down_has_an_upward_direction():
     scene = hidden_side().with_camera(eye=(0, 5, -0.3), target=(0, 0, -0.3), up=(0, 0, -1))
     for camera in place_cameras(small(scene), 4):
         assert math.isfinite(sum(camera.up))
+
+
+@pytest.mark.parametrize("up", [(0.0, 1.0, 0.0), (0.6, 0.0, -0.8)])
+@pytest.mark.parametrize("ahead", [(0.0, 1.0, 0.0), (0.6, 0.0, -0.8), (0.8, 0.0, 0.6), (1e-4, -1.0, 0.0)])
+def test_every_direction_has_a_view(up, ahead):
+    """Property: right, down and forward are a right-handed frame, also for a view along the upward direction."""
+    frame = Frame(hidden_side().with_camera(eye=(0.0, 0.3, 5.0), target=(0.1, 0.0, 0.0), up=up), width=8, height=6)
+    ahead = np.array([ahead]) / np.linalg.norm(ahead)
+    axes = _wide_views(frame, np.zeros((1, 3)), ahead).axes[0]
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(axes[2], ahead[0], atol=1e-12)
+    assert np.linalg.det(axes) > 0
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 50), (50, 1)])

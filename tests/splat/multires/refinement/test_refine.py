@@ -1,6 +1,7 @@
 """The list of subsplats: it tiles the screen, is refined where it must be, and is the published one."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -262,3 +263,13 @@ def test_real_scenes_are_tiled(data_dir, evidence):
         subsplats = refined(buffer)
         assert (naive.times_covered(listed(subsplats), buffer.covered.shape)[buffer.covered] == 1).all()
         evidence(f"{name} at 150 x 101: {len(subsplats.level) / buffer.covered.sum():.1%} of the pixels")
+
+
+def test_cells_of_a_level_picture_have_an_upper_and_a_left_edge():
+    """By hand: one cell of 4 x 4 pixels and four of 2 x 2 beside it, in a list of three levels."""
+    leaf = [np.zeros((4, 8), bool), np.array([[0, 0, 1, 1], [0, 0, 1, 1]], bool), np.array([[1, 0]], bool)]
+    found = level_picture(SimpleNamespace(shape=(4, 8), leaf=leaf))
+    cell = np.full((4, 4), 1 / 3)
+    cell[0] *= 0.6
+    cell[1:, 0] *= 0.6
+    np.testing.assert_allclose(found, np.hstack([cell, np.full((4, 4), 2 / 3)]), rtol=1e-6)

@@ -80,9 +80,10 @@ def run_tests(scratch: Scratch, programs: Programs, tests: Sequence[str], limit:
 
 def run_pictures(scratch: Scratch, programs: Programs, file: Path, *arguments: str | Path,
                  limit: float | None = None) -> Ended:
-    """Write the hashes of all pictures of a copy."""
+    """Write the hashes of all pictures of a copy, by one thread: several of two jobs would wait for each other."""
     command = scratch.python("-m", scratch.project.pictures, file, *arguments)
-    return programs.run(command, scratch.tree, scratch.environment(), scratch.folder / "pictures.txt", limit)
+    one_thread = {**scratch.environment(), "NUMBA_NUM_THREADS": "1"}
+    return programs.run(command, scratch.tree, one_thread, scratch.folder / "pictures.txt", limit)
 
 
 def whole_lines(file: Path) -> list[str]:

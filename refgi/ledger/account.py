@@ -23,11 +23,11 @@ terms. What is left of `sent` meets no visible pixel:
 
     full = arrived + clamped + what the method loses: cut, shadowed, interpolated, darkened
 
-`arrived` is of the picture itself. A method finds each of its losses by a sum of its own where it has one (`sii` sums
-the pairs that its range leaves out by another kernel), so that the last equation is no definition but a check, as is
-the first; `Ledger.difference` is what both are off by. `off_screen` is negative where light is counted on several
-surfaces one behind the other, and where a pixel light lies nearer to a surface than a pixel is wide: a sum over pixel
-centres is no integral there.
+`arrived` is of the picture itself. The first equation is a check, and so is the last for `sii`, which sums the pairs
+that its range leaves out by a kernel of their own; `Ledger.difference` is what both are off by. The losses of
+`multires` and `val` are differences of pictures on the way and add up by construction. `off_screen` is negative where
+light is counted on several surfaces one behind the other, and where a pixel light lies nearer to a surface than a pixel
+is wide: a sum over pixel centres is no integral there.
 
 All lines say where power went; `sampling`, `bounced`, `scaled`, `printed`, `interpolated`, `clamped` and, with the
 stochastic range, `cut` are signed, below 0 where power was added. The cut of the stochastic range has the mean 0.

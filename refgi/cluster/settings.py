@@ -21,6 +21,7 @@ LARGEST_MAP = 4096  # texels
 WIDEST_KERNEL = 255  # texels
 LARGEST_WEIGHT = 1e6
 LARGEST_BIAS = 0.25
+PRINTED = frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -200,7 +201,7 @@ class ValSettings(Settings):
     blur: BoxBlur | GeometryBlur | None = setting(GeometryBlur(), "what joins interleaved pixels")
     as_published: frozenset[str] = setting(frozenset(), "forms to use as printed", study=True)
 
-    SWITCHES: ClassVar[frozenset[str]] = frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"})
+    SWITCHES: ClassVar[frozenset[str]] = PRINTED
 
     def check(self) -> None:
         """Check what parts ask of each other."""
@@ -217,10 +218,30 @@ class ValSettings(Settings):
                 or isinstance(self.visibility, RaysRectangle | RaysVpls))
 
 
+@dataclasses.dataclass(frozen=True)
+class ClusteredShadows(Settings):
+    """Shadows of clusters of pixel lights, for methods that sum the lights in their own way."""
+
+    NAME = "val"
+
+    clusters: Clusters | AdaptiveClusters = setting(Clusters(), "how many area lights")
+    area: AreaLightSettings = setting(AreaLightSettings(), "the rectangle of an area light", study=True)
+    maps: ShadowMapSettings = setting(ShadowMapSettings(), "shadow maps")
+    shadow: Visibility = setting(Csm(), "soft shadow of an area light, the `visibility` of val")
+    as_published: frozenset[str] = setting(frozenset(), "forms to use as printed", study=True)
+
+    SWITCHES: ClassVar[frozenset[str]] = PRINTED
+
+    def of_lights(self, lights: LightSettings, pairs: PairSettings) -> ValSettings:
+        """Return the settings of `val` that sum some lights under these shadows, every light at every receiver."""
+        return ValSettings(lights, pairs, self.clusters, self.area, self.maps, self.shadow, InterleavingSettings(1),
+                           None, self.as_published)
+
+
 # Sec. 5.1, 6 and 7: d in metres and radians, basis of 8 and 16 bits, blocks of 8 x 8 pixels, angles as printed
 PRESETS: Mapping[str, ValSettings] = {
     "paper": ValSettings(
         clusters=Clusters(distance="raw"), visibility=Csm(terms=4, quantisation="published"),
         interleaving=InterleavingSettings(8),
-        as_published=frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"})),
+        as_published=PRINTED),
 }

@@ -168,12 +168,13 @@ def meant(settings: Settings, leaf: Leaf, value: Any) -> Leaf:
     Returns
     -------
     Leaf
-        The same, or the principal setting of what is chosen now.
+        The same, or the principal setting of what is chosen now or by default.
     """
     kinds = choices_of(leaf.hint)
     if not kinds or value is None or isinstance(value, Settings) or value in (*kinds, "none"):
         return leaf
-    kind = kinds.get(flat(settings).get(leaf.key) or "")
+    chosen = flat(settings).get(leaf.key, leaf.field.default)  # the default where another choice holds the part
+    kind = kinds.get(chosen.name() if isinstance(chosen, Settings) else chosen or "")
     if kind is None or not kind.PRINCIPAL:
         return leaf
     return next(one for one in leaves(type(settings)) if one.key == f"{leaf.key}.{kind.PRINCIPAL}")
@@ -183,9 +184,9 @@ def _principals(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
     """Return, for every part that a bare value may stand for, the key of that value."""
     for field in dataclasses.fields(kind):
         hint = hints(kind)[field.name]
-        for part in () if is_choice(hint) else choices_of(hint).values():
+        for part in choices_of(hint).values():
             inner = f"{prefix}{field.name}."
-            if part.PRINCIPAL:
+            if part.PRINCIPAL and not is_choice(hint):  # what a bare value of a choice means depends on what is chosen
                 principal = next(one for one in dataclasses.fields(part) if one.name == part.PRINCIPAL)
                 yield Leaf(inner + part.PRINCIPAL, principal, hints(part)[part.PRINCIPAL], part)
             yield from _principals(part, inner)

@@ -25,7 +25,8 @@ METHODS = {"multires": (multires_ledger, multires, MultiresSettings), "val": (va
 CASES = [
     ("multires", {}), ("multires", {"supersampled": True}),
     ("multires", {"clamp": "geometry", "clamp_value": 30.0, "detail": 0.5}),
-    ("multires", {"visibility": "rays"}), ("multires", {"subsplats": "irradiance"}),
+    ("multires", {"visibility": "rays"}), ("multires", {"visibility": "val"}),
+    ("multires", {"subsplats": "irradiance"}),
     ("multires", {"as_published": {"ams_disc", "ams_filter_all", "ams_rho_in_splat"}}),
     ("multires", {"source": "walk", "bounces": 2}),
     ("val", {}), ("val", {"interleaving": 4, "blur": "box"}), ("val", {"visibility": "none"}),

@@ -83,15 +83,21 @@ def picture(frame, settings):
                                 settings.blur.cosine if by_geometry else -math.inf)
 
 
-def view_of(frame, settings):
-    """Return what the picture is made of."""
+def view_of(frame, settings, areas=None):
+    """Return what the picture is made of; by the areas (N,) of lights, m^2, where they are not their footprints."""
     buffer, lights = frame.gbuffer, choose_lights(frame, settings.lights)
+    areas = footprints(frame, settings.lights, settings.pairs) if areas is None else areas
     pixels = np.argwhere(buffer.covered)
     at = tuple(pixels.T)
     position, normal = (plane[:, *at].T.astype(float) for plane in (buffer.position, buffer.normal))
-    light = contributions(position, normal, lights, settings.pairs, footprints(frame, settings.lights, settings.pairs))
+    light = contributions(position, normal, lights, settings.pairs, areas)
     facing = face_normals(frame.scene.geometry, buffer.triangle_id[at], normal)
     return View(frame, settings, pixels, position, normal, facing, lights, light, corners_of(frame.scene.geometry))
+
+
+def every_light(view):
+    """Return the light of all pixel lights at every pixel that sees a surface, (n, 3)."""
+    return clustered(view, *grouped(view))
 
 
 def area_of(areas, count):

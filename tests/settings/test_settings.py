@@ -5,8 +5,10 @@ from typing import ClassVar, Literal
 
 import pytest
 
+from refgi.cluster.settings import Clusters
 from refgi.errors import InputError
 from refgi.settings import Settings, changed, flat, from_text, leaves, of, replaced, schema, setting
+from refgi.splat import MultiresSettings
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,6 +81,13 @@ def test_a_choice_stands_for_its_principal_setting():
     assert from_text(pcf, ["shadow=none"]).shadow is None
     with pytest.raises(InputError, match="shadow: expected none or csm"):  # has none
         from_text(MethodSettings(), ["shadow=9"])
+
+
+def test_a_part_of_a_choice_stands_for_its_principal_setting():
+    """Property: as it does outside of a choice, also where that choice is only now made."""
+    for settings in (MultiresSettings(), of(MultiresSettings, visibility="val")):
+        shadows = replaced(settings, {"visibility": "val", "clusters": 7, "visibility.maps": 64}).subsplats.visibility
+        assert (shadows.clusters, shadows.maps.resolution) == (Clusters(count=7), 64)
 
 
 def test_settings_of_a_choice_go_with_it():

@@ -7,7 +7,7 @@
 
 from refgi.method import Method
 from refgi.splat.multires.ledger import multires_ledger
-from refgi.splat.multires.multires import multires, shared_subsplats
+from refgi.splat.multires.multires import extra_bytes, multires, shared_subsplats
 from refgi.splat.multires.settings import (
     PRESETS,
     ByError,
@@ -30,5 +30,5 @@ __all__ = [
 
 METHOD = Method(
     "multires", "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes",
-    multires, MultiresSettings, visibility=lambda settings: settings.shadow_rays is not None, ledger=multires_ledger,
-    presets=PRESETS)
+    multires, MultiresSettings, visibility=lambda settings: settings.visibility is not None, ledger=multires_ledger,
+    memory=extra_bytes, presets=PRESETS)

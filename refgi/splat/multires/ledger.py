@@ -44,8 +44,8 @@ def multires_ledger(frame: "Frame", settings: MultiresSettings) -> Ledger:
     footprint = light_areas(frame, lights, settings)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     unblocked = every = irradiance(receivers, lights, pairs, footprint)
-    if settings.shadow_rays is not None:
-        finest = ByGeometry(coarsest=MOST_CELLS, visibility=settings.shadow_rays)
+    if settings.visibility is not None:
+        finest = ByGeometry(coarsest=MOST_CELLS, visibility=settings.visibility)
         every = multires(frame, MultiresSettings(settings.lights, settings.pairs, finest))
     picture = plain = multires(frame, settings)
     if settings.detail > 0:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.val import extra_bytes as bytes_of_shadows
 from refgi.lights.footprints import demo_footprints
 from refgi.lights.selection import choose_lights, drawn_from_maps, footprints
 from refgi.pairs.irradiance import Receivers
@@ -16,7 +17,12 @@ from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import ByError, ByGeometry, ByIrradiance, MultiresSettings
 from refgi.splat.multires.subsplats.detail import surface_detail
-from refgi.splat.multires.subsplats.evaluate import evaluate, evaluate_visible, representative_points
+from refgi.splat.multires.subsplats.evaluate import (
+    evaluate,
+    evaluate_shadowed,
+    evaluate_visible,
+    representative_points,
+)
 from refgi.splat.multires.subsplats.upsample import upsample
 
 if TYPE_CHECKING:
@@ -40,7 +46,7 @@ def multires(frame: "Frame", settings: MultiresSettings) -> Array:
     Returns
     -------
     (3, h, w) ndarray
-        Indirect irradiance, W/m^2, linear RGB, without visibility unless by rays.
+        Indirect irradiance, W/m^2, linear RGB, without visibility unless the settings ask for it.
     """
     lights = choose_lights(frame, settings.lights)  # Sec. 3.1
     footprint = light_areas(frame, lights, settings)
@@ -111,8 +117,10 @@ def _evaluated(
     """Return the irradiance at the subsplats, (3, n), W/m^2; times their albedo if that is asked for as published."""
     subsplats = settings.subsplats
     assert isinstance(subsplats, ByGeometry)
-    if subsplats.visibility is not None:
+    if settings.shadow_rays is not None:
         values = evaluate_visible(frame.tracer, frame.scene.geometry, buffer, shared, lights)
+    elif settings.shadows is not None:
+        values = evaluate_shadowed(frame, buffer, shared, lights, settings.shadows, footprint)
     else:
         points = representative_points(buffer, shared, subsplats.representative)
         values = evaluate(*points, lights, settings.effective_pairs, footprint)
@@ -164,3 +172,23 @@ def _halved(irradiance: Array, fine: Array, covered: Array) -> Array:
         if has_surface.any():
             halved[:, i, j] = mean[:, *window][:, has_surface].mean(axis=1)
     return halved
+
+
+def extra_bytes(settings: MultiresSettings, size: tuple[int, int], float_bytes: int) -> int:
+    """Estimate the memory that shadows add to a picture.
+
+    Parameters
+    ----------
+    settings : MultiresSettings
+        Whether there are shadows, and of what.
+    size : tuple of 2 ints
+        Width and height of the picture, pixels.
+    float_bytes : int
+        4 or 8.
+
+    Returns
+    -------
+    int
+        Bytes, rather too many than too few: as if every pixel were a subsplat.
+    """
+    return 0 if settings.shadows is None else bytes_of_shadows(settings.shadows, size, float_bytes)

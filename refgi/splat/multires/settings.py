@@ -7,6 +7,7 @@ import dataclasses
 import math
 from typing import ClassVar, Literal
 
+from refgi.cluster.settings import ClusteredShadows, ValSettings
 from refgi.errors import expect
 from refgi.lights.settings import LightSettings, MapLights, expect_footprints
 from refgi.pairs.settings import AutoClamp, DiscClamp, PairSettings, SphereClamp
@@ -130,13 +131,14 @@ class ByGeometry(Settings):
     criteria: Criteria = setting(Criteria(), "discontinuities")
     representative: Representative = setting("pixel", "where a subsplat is evaluated: one pixel, or the mean surface",
                                              study=True)
-    visibility: Rays | None = setting(None, "shadow rays from subsplats to lights, the pairs of vpl")
+    visibility: Rays | ClusteredShadows | None = setting(
+        None, "which lights subsplats see: all, by shadow rays (the pairs of vpl), or by soft shadows of clusters")
     upsampling: Upsampling = setting("tent", "filter from subsplats to pixels (Sec. 3.5, Fig. 7)", study=True)
 
     def check(self) -> None:
-        """Check that shadow rays start on a triangle."""
+        """Check that what has shadows lies on a triangle."""
         expect(self.visibility is None or self.representative == "pixel", "representative",
-               "'pixel' with visibility 'rays'", self.representative)
+               "'pixel' with visibility", self.representative)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -205,6 +207,7 @@ class MultiresSettings(Settings):
             bare = PairSettings(clamp=self.pairs.clamp)
             expect(self.pairs == bare, "pairs", "defaults with visibility 'rays'", self.pairs)
             expect(clamp is None, "pairs.clamp", "none with visibility 'rays'", chosen)
+        _ = self.shadows  # refuses what shadows cannot be made of
         by_error = isinstance(self.subsplats, ByError)
         expect(not (by_error and isinstance(clamp, SphereClamp)), "pairs.clamp",
                "another one with subsplats 'error', which splits the peaks of points off", chosen)
@@ -219,12 +222,25 @@ class MultiresSettings(Settings):
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return self.lights.traces_rays or self.shadow_rays is not None
+        return (self.lights.traces_rays or self.shadow_rays is not None
+                or (self.shadows is not None and self.shadows.traces_rays))
+
+    @property
+    def visibility(self) -> Rays | ClusteredShadows | None:
+        """How subsplats find which lights they see, if they do."""
+        return self.subsplats.visibility if isinstance(self.subsplats, ByGeometry) else None
 
     @property
     def shadow_rays(self) -> Rays | None:
         """How subsplats find by rays which lights they see, if they do."""
-        return self.subsplats.visibility if isinstance(self.subsplats, ByGeometry) else None
+        return self.visibility if isinstance(self.visibility, Rays) else None
+
+    @property
+    def shadows(self) -> ValSettings | None:
+        """The settings of `val` that sum the lights at subsplats, if these take its shadows."""
+        if not isinstance(self.visibility, ClusteredShadows):
+            return None
+        return self.visibility.of_lights(self.lights, self.effective_pairs)
 
     @property
     def effective_pairs(self) -> PairSettings:

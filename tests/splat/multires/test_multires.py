@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from refgi.cluster import ValSettings, extra_bytes
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
@@ -218,6 +219,7 @@ def test_the_table_of_methods_knows_it():
     method = find_method("multires")
     assert not method.knows_visibility(MultiresSettings())
     assert method.knows_visibility(of(MultiresSettings, visibility="rays"))
+    assert method.knows_visibility(of(MultiresSettings, visibility="val"))
     with observe() as log:
         render("cornell_box", "multires", of(MultiresSettings, lights=16), width=16, height=16, rsm_resolution=16)
     assert log.status("multires.refine") == ["ran"]
@@ -249,9 +251,13 @@ BAD = {
     "subsplats": [{"subsplats": "both"}],
     "subsplats.threshold": [{"subsplats": "irradiance", "subsplats.threshold": -0.1}, {"subsplats.threshold": 0.1}],
     "subsplats.form": [{"subsplats": "irradiance", "form": "half"}],
-    "subsplats.representative": [{"representative": "corner"}, {"visibility": "rays", "representative": "mean"}],
+    "subsplats.representative": [{"representative": "corner"}, {"visibility": "rays", "representative": "mean"},
+                                 {"visibility": "val", "representative": "mean"}],
     "subsplats.visibility": [{"visibility": "map"}, {"subsplats": "error", "subsplats.visibility": "rays"},
-                             {"subsplats": "irradiance", "subsplats.visibility": "rays"}],
+                             {"subsplats": "irradiance", "subsplats.visibility": "val"}],
+    "area.single_light": [{"visibility": "val", "single_light": "footprint", "lights.source": "walk"}],
+    "subsplats.visibility.shadow": [{"visibility": "val", "shadow": "none"}],
+    "subsplats.visibility.as_published": [{"visibility": "val", "subsplats.visibility.as_published": {"ams_disc"}}],
     "subsplats.upsampling": [{"upsampling": "cubic"}],
     "subsplats.target": [{"subsplats": "error", "target": 0}, {"subsplats": "error", "target": math.inf},
                          {"target": 0.1}],
@@ -274,6 +280,18 @@ def test_settings_are_checked(key, change):
         of(MultiresSettings, **change)
 
 
+def test_shadows_say_what_they_take():
+    """Property: memory as of `val` with the same maps, and rays where their kind traces any."""
+    method, size = find_method("multires"), (640, 480)
+    shadowed = of(MultiresSettings, visibility="val", maps=512, shadow="pcss", clusters=7)
+    same = of(ValSettings, lights=256, pattern="grid", maps=512, visibility="pcss", clusters=7)
+    assert method.extra_bytes(shadowed, size, 4) == extra_bytes(same, size, 4) > 0
+    assert method.extra_bytes(MultiresSettings(), size, 4) == 0
+    assert not shadowed.traces_rays
+    for change in ({"shadow": "rays_vpls"}, {"maps.renderer": "rays"}, {"behind": "raytrace"}):
+        assert of(MultiresSettings, visibility="val", **change).traces_rays
+
+
 def test_printed_values_are_a_preset():
     paper = PRESETS["paper"]
     assert changed(paper) == {"subsplats.criteria.diagonal": "literal", "subsplats.criteria.traversal": "list",
@@ -283,5 +301,5 @@ def test_printed_values_are_a_preset():
 
 def test_the_page_shows_few_keys():
     shown = {leaf.key for leaf in leaves(MultiresSettings) if not leaf.is_for_study}
-    own = [key for key in shown if not key.startswith(("lights.", "pairs."))]
+    own = [key for key in shown if not key.startswith(("lights.", "pairs.", "subsplats.visibility."))]  # or of val
     assert len(own) == 9

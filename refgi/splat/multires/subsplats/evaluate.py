@@ -1,8 +1,8 @@
-"""Irradiance at subsplats: the sum of Eq. 2 over all pixel lights (VPLs), with visibility by shadow rays or without.
+"""Irradiance at subsplats: the sum of Eq. 2 over all pixel lights (VPLs), with visibility or without.
 
-Without visibility the pairs are those of `irradiance` at every pixel (Nichols and Wyman 2009, Sec. 3.4). With it they
-are those of `vpl`, a shadow ray each: the picture converges to `vpl` as subsplats become fine, and to path tracing as
-lights become many, at the subsplats' share of the rays.
+Without visibility the pairs are those of `irradiance` at every pixel (Nichols and Wyman 2009, Sec. 3.4). With a shadow
+ray each they are those of `vpl`: the picture converges to `vpl` as subsplats become fine, and to path tracing as lights
+become many, at the subsplats' share of the rays. With the soft shadows of clusters it converges to `val`.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -10,18 +10,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.lighting.clustered import clustered_irradiance
+from refgi.cluster.reference import reference_visibility
+from refgi.cluster.val import cluster_lights
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.settings import PairSettings
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.pairs.tiles import taken
+from refgi.rsm import facing_normals
 from refgi.scene import Geometry
 from refgi.splat.multires.refinement.grid import Subsplats
 from refgi.splat.multires.settings import Representative
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
+    from refgi.cluster.settings import ValSettings
+    from refgi.frame import Frame
     from refgi.lights import PixelLights
     from refgi.rays import Tracer
     from refgi.rsm import GBuffer
@@ -166,3 +172,45 @@ def evaluate_visible(
     points = receivers(geometry, taken(position, subsplats.pixel), taken(normal, subsplats.pixel), triangle,
                        tracer.grain)
     return shadowed_sum(tracer, points, lights).astype(np.asarray(position).dtype)
+
+
+@stage("multires.evaluate_shadowed")
+def evaluate_shadowed(
+    frame: "Frame", buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights", settings: "ValSettings",
+    footprint: Array | None = None,
+) -> Array:
+    """Sum the irradiance of every pixel light under the soft shadow of its cluster, at representative pixels.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene, in which clusters cast shadows.
+    buffer : GBuffer
+        The camera's G-buffer.
+    subsplats : Subsplats
+        The n subsplats.
+    lights : PixelLights
+        The N lights to sum.
+    settings : ValSettings
+        Clusters, maps and visibility; how one light lights one receiver.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+
+    Returns
+    -------
+    (3, n) ndarray
+        Irradiance, W/m^2, linear RGB: that of `val` at the same pixels, to the bit. Excludes the receiver's albedo/pi.
+
+    Notes
+    -----
+    Adaptive clusters are as many as the pixels of `frame` ask for, and shadow maps hold what can block between its
+    lights and the surfaces in its view (Dong et al. 2009, Sec. 4 to 6).
+    """
+    areas, maps = cluster_lights(frame, lights, settings)
+    position, normal, triangle_id = buffer.resolve("position", "normal", "triangle_id")
+    points, normals = taken(position, subsplats.pixel)[:, None], taken(normal, subsplats.pixel)[:, None]
+    facing = facing_normals(frame.scene.geometry, triangle_id.reshape(-1)[None, subsplats.pixel], normals)
+    return clustered_irradiance(
+        Receivers(points, normals, np.ones(points.shape[1:], np.bool_)), facing, lights, areas, maps, settings,
+        footprint, reference_visibility(frame, lights, areas, maps, settings),
+        rays=frame.tracer if settings.maps.behind == "raytrace" else None)[:, 0]

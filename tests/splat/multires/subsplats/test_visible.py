@@ -1,15 +1,16 @@
-"""Subsplats with shadow rays: the bits of `vpl` at the same pixels."""
+"""Subsplats that see some lights: the bits of `vpl` and `val` at the same pixels."""
 
 import numpy as np
 import pytest
 
+from refgi.cluster import ValSettings, val
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat.multires.refinement.grid import Subsplats, level_shape, representatives
 from refgi.splat.multires.settings import MultiresSettings
-from refgi.splat.multires.subsplats.evaluate import evaluate_visible
+from refgi.splat.multires.subsplats.evaluate import evaluate_shadowed, evaluate_visible
 from refgi.truth import VplSettings, vpl
 
 
@@ -45,3 +46,22 @@ def test_no_subsplats_trace_no_rays(box):
     lights = choose_lights(box, of(MultiresSettings, lights=16).lights)
     nothing = cells(np.zeros((27, 33), bool), 1)
     assert evaluate_visible(box.tracer, box.scene.geometry, box.gbuffer, nothing, lights).shape == (3, 0)
+
+
+@pytest.mark.parametrize("scene", ["cornell_box", "cornell_sphere"])
+@pytest.mark.parametrize("shadow", ["csm", "pcss", "rays_vpls"])
+def test_subsplats_get_the_bits_of_val(scene, shadow):
+    """Oracle: `val` with the same lights, which lights every pixel."""
+    frame = Frame(load_scene(scene), width=33, height=27, rsm_resolution=32)
+    settings = of(ValSettings, lights=64, clusters=5, maps=32, visibility=shadow, interleaving=1)
+    some = cells(frame.gbuffer.covered, 1)
+    light = evaluate_shadowed(frame, frame.gbuffer, some, choose_lights(frame, settings.lights), settings)
+    assert light.dtype == frame.dtype
+    np.testing.assert_array_equal(light, val(frame, settings).reshape(3, -1)[:, some.pixel])
+
+
+def test_no_subsplats_have_no_shadows(box):
+    settings = of(ValSettings, lights=16, maps=16)
+    nothing = cells(np.zeros((27, 33), bool), 1)
+    lights = choose_lights(box, settings.lights)
+    assert evaluate_shadowed(box, box.gbuffer, nothing, lights, settings).shape == (3, 0)

@@ -22,6 +22,7 @@ def _gaps_of(method: str, table: Table) -> list[str]:
                 if chosen := choice_of(method, key):
                     tried.setdefault(chosen[0], set()).add(chosen[1])
     excluded = {key_of(method, name) for name in table.excluded}
+    excluded |= {name for name in wanted if name.startswith(table.borrowed)}
     found = [f"{method}: no case has {name}" for name in wanted if name not in tried and name not in excluded]
     found += [f"{method}: {name} is no setting" for name in (*tried, *excluded) if name not in wanted]
     return found + [f"{method}: no case has {name} {value!r}" for name, values in wanted.items()

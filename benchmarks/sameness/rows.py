@@ -21,6 +21,7 @@ class Table(NamedTuple):
     base: dict[str, Any]  # what the rows start from, for speed
     rows: list[Row]
     excluded: dict[str, str] = {}  # setting: why no case has it  # noqa: RUF012
+    borrowed: tuple[str, ...] = ()  # starts of keys of parts that are another method's, whose table has their cases
 
 
 def vary(field: str, *values: Any, on: tuple[str, ...] = USUAL, same: str = "", **companions: Any) -> Row:

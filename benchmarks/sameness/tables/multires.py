@@ -45,6 +45,7 @@ TABLE = Table({"lights": 96, "coarsest": 6}, [
     vary("visibility", "val", supersampled=True),
     vary("shadow", "pcss", "rays_vpls", visibility="val"),
     vary("clusters", 7, visibility="val"),
+    vary("as_published", "val_alpha", "val_alpha_over_pi", "val_search_solid_angle", visibility="val"),
     vary("upsampling", "demo", "nearest", "naive_bilinear"),
     vary("upsampling", "demo", "nearest", "naive_bilinear", per_light="light"),
     vary("detail", 0.5),
@@ -52,4 +53,4 @@ TABLE = Table({"lights": 96, "coarsest": 6}, [
     vary("seed", 7, target_error=0.02),
     vary("supersampled", True),
     vary("supersampled", True, per_light="light"),
-])
+], borrowed=("subsplats.visibility.",))

@@ -22,8 +22,9 @@ from refgi.stages import Memory, observe
 
 ROOM = "cornell_sphere:faces=17000"
 # a sixth of the pairs count, as in Fig. 8: 125 of 768
-FIVE_PERCENT = of(SiiSettings, cut_share=0.05, reference_length=0.171)
-CAUSTIC = of(SiiSettings, lights=4096, warp="B", importance="peak", cut_share=0.05, reference_length=1.0)
+FIVE_PERCENT = of(SiiSettings, cut_share=0.05, reference_length=0.171, clamp="none")
+CAUSTIC = of(SiiSettings, lights=4096, warp="B", importance="peak", cut_share=0.05, reference_length=1.0,
+             clamp="none")
 
 
 def rows(quick: bool) -> Iterator[Row]:
@@ -72,7 +73,7 @@ def _culling(size: int) -> Iterator[Row]:
     for name, length in scenes.items():
         frame = Frame(load_scene(name), width=size, height=size)
         for bound in ("tangent", "ellipsoid", "quad", "full"):
-            how = of(SiiSettings, cut_share=0.05, reference_length=length, bound=bound)
+            how = of(SiiSettings, cut_share=0.05, reference_length=length, bound=bound, clamp="none")
             drawn = fragments(_receivers(frame), choose_lights(frame, how.lights), how, None, frame.gbuffer.projection)
             yield Row(f"{name}, {bound}: pairs evaluated over fragments", drawn.evaluated / drawn.total, "ratio",
                       "<= 1.3" if bound == "tangent" else "",

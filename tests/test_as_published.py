@@ -92,7 +92,7 @@ def no_tn():
 
 def equal_solid_angle():
     """The mean solid angle of the texels that a lamp shines into over that of its light's texel."""
-    frame, settings = lamps.corner(), of(SiiSettings, **ONE_EACH)
+    frame, settings = lamps.corner(), of(SiiSettings, clamp="none", **ONE_EACH)
     lights, _, _ = one_each(frame, settings)
     half = math.tan(lamps.RED.outer_half_angle)
     spot, face = solid_angles(16, half), solid_angles(16, 1.0)

@@ -12,7 +12,7 @@ from refgi.cluster import ValSettings
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS, find_method, render, usual_shadows
-from refgi.pairs.settings import DiscClamp
+from refgi.pairs.settings import DiscClamp, SphereClamp
 from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.settings import of, replaced
 from refgi.splat import GatherSettings, MultiresSettings, SiiSettings
@@ -64,6 +64,7 @@ def test_shadows_are_exact_where_the_method_traces_rays_anyway(settings, rays):
     assert usual_shadows(settings) == ("exact" if rays else "map")
 
 
+@pytest.mark.filterwarnings("ignore:.* of the indirect light")
 @pytest.mark.parametrize("method", ["truth", "vpl", "sii"])
 def test_a_picture_has_the_shadows_of_its_method(method):
     settings = FEW[method] if method in FEW else of(find_method(method).settings, lights=16)
@@ -89,13 +90,19 @@ def test_methods_without_rays_load_none(method):
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_settings_of_multires_change_one_by_one_without_its_clamp_in_the_way():
-    for change in ({"source": "walk"}, {"openness_flux": "roulette"}, {"visibility": "rays"}):
-        settings = of(MultiresSettings, **change)
-        assert settings.effective_pairs.clamp is None
-        assert replaced(settings, {"clamp": "none"}).effective_pairs.clamp is None
-    for settings in (MultiresSettings(), of(MultiresSettings, openness_flux="scale"),
-                     of(MultiresSettings, subsplats="error")):
+@pytest.mark.parametrize("kind", [SiiSettings, MultiresSettings, ValSettings])
+def test_pixel_lights_are_clamped_alike(kind):
+    """Property: a disc where lights have footprints, so that settings change one by one with no clamp in the way."""
+    for change in ({"source": "walk"}, {"openness_flux": "roulette"}):
+        assert of(kind, **change).effective_pairs.clamp is None
+    for change in ({}, {"openness_flux": "scale"}):
+        settings = of(kind, **change)
         assert settings.effective_pairs.clamp == DiscClamp()
-    assert not of(SiiSettings, clamp="auto").pairs.clamps
-    assert not ValSettings().pairs.clamps
+        assert replaced(settings, {"clamp": "none"}).effective_pairs.clamp is None
+        assert replaced(settings, {"clamp": "sphere"}).effective_pairs.clamp == SphereClamp()
+
+
+def test_subsplats_are_clamped_without_shadow_rays():
+    assert of(MultiresSettings, visibility="rays").effective_pairs.clamp is None
+    for change in ({"visibility": "val"}, {"subsplats": "error"}, {"subsplats": "irradiance"}):
+        assert of(MultiresSettings, **change).effective_pairs.clamp == DiscClamp()

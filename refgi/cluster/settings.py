@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from refgi.errors import expect
-from refgi.lights.settings import MOST_LIGHTS, LightSettings, MapLights, expect_footprints
+from refgi.lights.settings import MOST_LIGHTS, LightSettings, MapLights, clamped_pairs, expect_footprints
 from refgi.pairs.settings import PairSettings
 from refgi.settings import Settings, setting
 
@@ -189,7 +189,10 @@ class GeometryBlur(Settings):
 
 @dataclasses.dataclass(frozen=True)
 class ValSettings(Settings):
-    """What `val` can be set to; the defaults are the paper's, those of docs/methods/val where it is silent."""
+    """What `val` can be set to; the defaults are the paper's, those of docs/methods/val where it is silent.
+
+    `pairs.clamp` "auto" is the form factor of the disc that a light stands for, where lights have footprints.
+    """
 
     lights: LightSettings = setting(LightSettings(count=1024), "pixel lights")
     pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
@@ -217,6 +220,11 @@ class ValSettings(Settings):
         return (self.lights.traces_rays or self.maps.renderer == "rays" or self.maps.behind == "raytrace"
                 or isinstance(self.visibility, RaysRectangle | RaysVpls))
 
+    @property
+    def effective_pairs(self) -> PairSettings:
+        """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints."""
+        return clamped_pairs(self.lights, self.pairs)
+
 
 @dataclasses.dataclass(frozen=True)
 class ClusteredShadows(Settings):
@@ -241,7 +249,6 @@ class ClusteredShadows(Settings):
 # Sec. 5.1, 6 and 7: d in metres and radians, basis of 8 and 16 bits, blocks of 8 x 8 pixels, angles as printed
 PRESETS: Mapping[str, ValSettings] = {
     "paper": ValSettings(
-        clusters=Clusters(distance="raw"), visibility=Csm(terms=4, quantisation="published"),
-        interleaving=InterleavingSettings(8),
-        as_published=PRINTED),
+        pairs=PairSettings(clamp=None), clusters=Clusters(distance="raw"),
+        visibility=Csm(terms=4, quantisation="published"), interleaving=InterleavingSettings(8), as_published=PRINTED),
 }

@@ -14,7 +14,7 @@ from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
 from refgi.lights.selection import choose_lights, footprints, light_footprints, light_maps
-from refgi.lights.settings import MapLights
+from refgi.lights.settings import MapLights, with_clamp
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
 from refgi.rsm import facing_normals
@@ -46,6 +46,7 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, linear RGB.
     """
+    settings = with_clamp(settings)
     lights = choose_lights(frame, settings.lights)  # Sec. 6, VPL generation
     areas, maps = cluster_lights(frame, lights, settings)
     block = block_side(frame, lights, settings)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from refgi.lights.footprints import texel_areas, with_equal_solid_angles
 from refgi.lights.settings import LightSettings, MapLights, PathLights
-from refgi.stages import skip
+from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -203,6 +203,7 @@ def footprints(frame: "Frame", settings: LightSettings, pairs: "PairSettings") -
     return light_footprints(rsms, settings, importance_maps(frame, rsms, settings))
 
 
+@stage("lights.footprints")
 def light_footprints(
     rsms: "Sequence[Rsm]", settings: LightSettings, importance: "Sequence[Array] | None" = None
 ) -> Array:

@@ -1,14 +1,16 @@
 """Settings of pixel lights: how many, from shadow maps or light paths, with which importance and openness."""
 
 import dataclasses
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeVar
 
 from refgi.errors import expect
 from refgi.lights.walk import MOST_BOUNCES
-from refgi.pairs.settings import LAST_SEED, PairSettings
+from refgi.pairs.settings import LAST_SEED, AutoClamp, DiscClamp, PairSettings
 from refgi.scene.material import SHARPEST
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
+
+S = TypeVar("S", bound=Any)
 
 Pattern = Literal["grid", "halton", "all", "random"]
 
@@ -135,6 +137,31 @@ class LightSettings(Settings):
     def has_footprints(self) -> bool:
         """Whether each light stands for a known surface area."""
         return isinstance(self.source, MapLights) and self.openness.flux != "roulette"
+
+
+def clamped_pairs(lights: LightSettings, pairs: PairSettings) -> PairSettings:
+    """Return pairs with the clamp that "auto" stands for.
+
+    Parameters
+    ----------
+    lights : LightSettings
+        Where lights come from.
+    pairs : PairSettings
+        The clamp.
+
+    Returns
+    -------
+    PairSettings
+        The clamp "auto" is "disc", and none where lights have no footprints.
+    """
+    if not isinstance(pairs.clamp, AutoClamp):
+        return pairs
+    return dataclasses.replace(pairs, clamp=DiscClamp() if lights.has_footprints else None)
+
+
+def with_clamp(settings: S) -> S:
+    """Return settings of a method with pixel lights whose clamp is the one in use, never "auto"."""
+    return dataclasses.replace(settings, pairs=settings.effective_pairs)
 
 
 def expect_footprints(lights: LightSettings, pairs: PairSettings) -> None:

@@ -13,7 +13,7 @@ LAST_SEED = 2**32 - 1
 
 @dataclasses.dataclass(frozen=True)
 class AutoClamp(Settings):
-    """The clamp is left to the method: none, unless it has one of its own."""
+    """A disc where lights have footprints and a method sums them without rays; else none."""
 
     NAME = "auto"
 
@@ -70,7 +70,7 @@ class PairSettings(Settings):
 
     SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_no_pi", "sii_widening", "sii_widening_unnorm"})
 
-    clamp: Clamp | None = setting(None, "what keeps near pairs finite")
+    clamp: Clamp | None = setting(AutoClamp(), "what keeps near pairs finite")
     offset: float = setting(0.0, "how far lights lie behind their surface", least=-LARGEST, most=LARGEST, unit="m",
                             study=True)
     lobe: LobeSettings = setting(LobeSettings(), "lobes of glossy lights")

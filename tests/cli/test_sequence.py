@@ -26,6 +26,7 @@ objects = [{material = "red", keys = [{at = 0.0}, {at = 1.0, move = [0.02, 0.0, 
 camera = [{at = 0.0, eye = [0.278, 0.273, -0.8]}, {at = 1.0, eye = [0.3, 0.28, -0.8]}]
 """
 TINY = ["--size", "12x10", "--rsm-resolution", "16"]
+pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # of clamps: tests/pairs/test_loss
 # a method that compiles fast and draws random numbers
 SII = ["--method", "sii", "--set", "lights=16", "--temporal", "weight=0.5"]
 

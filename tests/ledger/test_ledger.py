@@ -26,7 +26,7 @@ FACETS = 4e-4  # of the lights' flux: 20,000 facets have 3.6e-4 less area than t
 RIM = 2e-4  # of a plate some 150 pixels wide: those on its rim count wholly or not
 GRAZING = 3e-3  # of what slanting lobes send: part of it runs along the light's own facet, 1.8e-3 of 80,000 facets
 TWIN = 1e-12  # of emitted: float64 sums in another order
-UNCUT = of(SiiSettings, lights=64)
+UNCUT = of(SiiSettings, lights=64, clamp="none")
 
 CASES = [
     ("cornell_box", {}),
@@ -76,7 +76,7 @@ def test_what_a_setting_does_is_on_its_line(frames):
     signed = ("sampling", "bounced", "scaled", "printed", "interpolated", "cut", "clamped")
 
     def lines(name, **settings):
-        ledger = sii_ledger(frames(name), of(SiiSettings, **{"lights": 200} | settings))
+        ledger = sii_ledger(frames(name), of(SiiSettings, **{"lights": 200, "clamp": "none"} | settings))
         return {line: float(getattr(ledger, line)[1] / ledger.emitted[1]) for line in signed if line != "sampling"}
 
     still = dict.fromkeys(signed[1:], 0.0)

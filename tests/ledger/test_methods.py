@@ -54,7 +54,8 @@ def test_lines_sum_to_what_is_emitted(method, settings, evidence):
 
 @pytest.mark.feature("REF-04")
 @pytest.mark.parametrize(("method", "settings", "limit"), [
-    ("multires", {"visibility": "rays", "coarsest": 64}, RAYS), ("val", {"visibility": "rays_vpls"}, TWIN)])
+    ("multires", {"visibility": "rays", "coarsest": 64}, RAYS),
+    ("val", {"visibility": "rays_vpls", "clamp": "none"}, TWIN)])
 def test_what_is_blocked_is_that_of_the_twin(method, settings, limit, evidence):
     """Oracle: a ray for each pair of pixel and light against every triangle; nothing else is lost at every pixel."""
     lamp = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.4, 0.8, (2.0, 1.5, 1.0))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from refgi.settings import replaced
 from tests.naive.radiometry import lobe_fractions
 from tests.naive.sphere import spherical_pair
 
@@ -23,6 +24,14 @@ class Part(NamedTuple):
     exponent: float | None  # of a lobe
     flux: np.ndarray  # (3,) W
     area: float  # footprint, m^2
+
+
+def with_clamp(settings, *, bare=False):
+    """Return settings whose clamp "auto" is the disc, and none where lights have no footprints or that is `bare`."""
+    if settings.pairs.clamp is None or settings.pairs.clamp.name() != "auto":
+        return settings
+    pathless = settings.lights.source.name() == "walk" or settings.lights.openness.flux == "roulette"
+    return replaced(settings, {"pairs.clamp": "none" if pathless or bare else "disc"})
 
 
 def contributions(position, normal, lights, pairs, footprint=None):

@@ -39,8 +39,12 @@ def receivers(at):
     return Receivers(*at.gbuffer.resolve("position", "normal", "covered"))
 
 
+def plain(**change):
+    return of(SiiSettings, **{"lights": LIGHTS, "clamp": "none"} | change)
+
+
 def full(at, settings, pair=None):
-    lights, own = choose_lights(at, settings.lights), getattr(settings, "effective_pairs", settings.pairs)
+    lights, own = choose_lights(at, settings.lights), settings.effective_pairs
     footprint = footprints(at, settings.lights, own)
     return float(irradiance(receivers(at), lights, pair or own, footprint).sum(dtype=float))
 
@@ -91,7 +95,7 @@ def test_each_method_tells_of_its_clamp():
     {"cut_share": 0.05, "reference_length": 0.1, "as_published": {"per_light_ilow"}},
     {"cut_irradiance": 0.5, "bound": "mesh", "bound_faces": 8, "bound_inflate": False}])
 def test_what_the_threshold_takes_is_told(cut):
-    at, settings = frame("cornell_box"), of(SiiSettings, lights=LIGHTS, **cut)
+    at, settings = frame("cornell_box"), plain(**cut)
     light, said = told(sii, at, settings)
     share = 100 * (1 - light.sum(dtype=float) / full(at, settings))
     assert share > 2 + NEAR
@@ -110,9 +114,8 @@ def test_clamp_and_threshold_are_told_apart():
 
 
 @pytest.mark.parametrize("settings", [
-    of(SiiSettings, lights=LIGHTS), of(SiiSettings, lights=LIGHTS, clamp="distance", clamp_value=1e-4),
-    of(SiiSettings, lights=LIGHTS, cut_irradiance=1e-6), of(SiiSettings, cut_irradiance=0.5, stochastic=True),
-    of(SiiSettings, lights=LIGHTS, stochastic=True, bound="quad")])
+    plain(), plain(clamp="distance", clamp_value=1e-4), plain(cut_irradiance=1e-6),
+    plain(cut_irradiance=0.5, stochastic=True), plain(stochastic=True, bound="quad")])
 def test_settings_that_take_little_or_nothing_in_the_mean_are_passed_over(settings):
     _, said = told(sii, frame("cornell_box"), settings)
     assert said == []
@@ -120,7 +123,7 @@ def test_settings_that_take_little_or_nothing_in_the_mean_are_passed_over(settin
 
 def test_nothing_is_summed_where_nothing_is_limited():
     with observe() as log:
-        sii(frame("cornell_box"), of(SiiSettings, lights=16))
+        sii(frame("cornell_box"), plain(lights=16))
         multires(frame("cornell_box"), of(MultiresSettings, lights=16, clamp="none"))
     assert not [run.name for run in log.runs if run.name.endswith(("_loss", "reference_length"))]
 
@@ -138,14 +141,14 @@ def test_a_black_or_empty_picture_has_nothing_to_lose():
 
 
 def test_scaled_fluxes_are_told():
-    at, settings = frame("cornell_box"), of(SiiSettings, lights=LIGHTS, openness_flux="scale")
+    at, settings = frame("cornell_box"), plain(openness_flux="scale")
     _, said = told(sii, at, settings)
     kept, _ = told(choose_lights, at, settings.lights)
     whole = choose_lights(at, LightSettings(LIGHTS)).flux.sum(dtype=float)
     share = 100 * (1 - kept.flux.sum(dtype=float) / whole)
     assert said == [(pytest.approx(share, abs=0.5), said[0][1])]
     assert said[0][1].startswith("openness_flux 'scale' takes")
-    assert told(sii, at, of(SiiSettings, lights=LIGHTS, openness_flux="roulette"))[1] == []
+    assert told(sii, at, plain(openness_flux="roulette"))[1] == []
 
 
 def outside_share(at, radius):

@@ -197,7 +197,8 @@ def changed(scene, shift=(0, 0, 0), scale=1.0, brightness=1.0):
 
 
 # without the pilot, whose counts of free picks jump with the last bit of a coordinate and move all rays a little
-METHODS = {"sii": {"lights": 48}, "vpl": {"lights": 48}, "truth": {"samples": 32, "uniform_share": 1.0}}
+METHODS = {"sii": {"lights": 48, "clamp": "none"}, "vpl": {"lights": 48},
+           "truth": {"samples": 32, "uniform_share": 1.0}}
 
 
 @cache

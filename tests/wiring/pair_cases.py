@@ -3,10 +3,10 @@
 from tests.wiring.cases import Case
 
 PAIR_CASES = {
-    "a clamp left to the method": Case({"clamp": "auto"}, same="a method without a clamp of its own has none"),
+    "no clamp": Case({"clamp": None}),
     "least distance": Case({"clamp": "distance", "clamp.value": 0.7}),
     "bounded geometry term": Case({"clamp": "geometry", "clamp.value": 0.4}),
-    "discs": Case({"clamp": "disc"}),
+    "discs": Case({"clamp": "disc"}, same="what is taken where nothing is said"),
     "spheres": Case({"clamp": "sphere", "clamp.value": 4.0}, scene="matte", frame={"width": 6, "height": 5}),
     "lights behind their surface": Case({"offset": 0.15}),
     "lobes as printed": Case({"lobe.norm": "none"}),

@@ -9,12 +9,13 @@ import pytest
 from refgi.cluster.settings import ValSettings
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
-from refgi.pairs.settings import AutoClamp, DiscClamp, DistanceClamp
+from refgi.pairs.settings import DistanceClamp
 from refgi.splat import MultiresSettings, multires
 from refgi.splat.multires import ByGeometry
 from refgi.stages import observe
 from tests.naive import clustered
 from tests.naive import multires as naive
+from tests.naive.pair_term import with_clamp
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.pair_cases import PAIR_CASES
 from tests.wiring.shadow_cases import shadow_cases
@@ -109,8 +110,6 @@ CASES = {
     "auto of paths": Case({"lights.source": "walk"}),
     "auto of roulette": Case({"lights.openness.flux": "roulette", "lights.openness.radius": 2.0}),
     **under("pairs", PAIR_CASES),
-    "discs": Case({"pairs.clamp": "disc"}, same="what the method takes where it is left to it"),
-    "a clamp left to the method": Case({"pairs.clamp": "auto"}, {"pairs.clamp": None}),
 }
 # pictures of so many pixels that not all are samples of the error
 WIDE = {"width": 112, "height": 84}
@@ -141,12 +140,8 @@ def seen(scene, **options):
 
 
 def pairs_of(settings):
-    """Return the pairs with the clamp in use: "auto" is the disc, none without footprints and with shadow rays."""
-    if not isinstance(settings.pairs.clamp, AutoClamp):
-        return settings.pairs
-    pathless = settings.lights.source.name() == "walk" or settings.lights.openness.flux == "roulette"
-    traced = visibility_of(settings) == "rays"
-    return dataclasses.replace(settings.pairs, clamp=None if pathless or traced else DiscClamp())
+    """Return the pairs with the clamp in use: none with shadow rays where nothing is said."""
+    return with_clamp(settings, bare=visibility_of(settings) == "rays").pairs
 
 
 def visibility_of(settings):

@@ -15,8 +15,7 @@ from tests.wiring.light_cases import BASE, LIGHT_CASES
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
-# no clamp, which some lights cannot have
-METHODS = {"sii": (sii, SiiSettings, {}), "multires": (multires, MultiresSettings, {"pairs.clamp": None}),
+METHODS = {"sii": (sii, SiiSettings, {}), "multires": (multires, MultiresSettings, {}),
            "val": (val, ValSettings, {"clusters.count": 3, "maps.resolution": 8, "interleaving.block": 1})}
 SUMS = ("pairs.sum", "multires.evaluate", "cluster.irradiance")
 CASES = under("lights", LIGHT_CASES)

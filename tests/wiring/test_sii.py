@@ -12,6 +12,7 @@ from refgi.splat.sii.ledger import sii_ledger
 from refgi.splat.sii.reach.fragments import fragments
 from tests.naive import ledger
 from tests.naive import sii as naive
+from tests.naive.pair_term import with_clamp
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.pair_cases import PAIR_CASES
 
@@ -45,8 +46,8 @@ REACH_CASES = {
                                        over={"pairs.as_published": {"sii_no_pi"}, "pairs.lobe.norm": "none"}),
     "a share, clamped": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.6},
                              over={"pairs.clamp": "distance", "pairs.clamp.value": 0.7, "pairs.offset": 0.1}),
-    "a share of discs": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.6},
-                             over={"pairs.clamp": "disc"}),
+    "a share, not clamped": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.6},
+                                 over={"pairs.clamp": None}),
     "a share of spheres": Case({"reach.cut": "relative", "reach.cut.reference_length": 0.6},
                                over={"pairs.clamp": "sphere", "lights.count": 12}, scene="matte",
                                frame={"width": 6, "height": 5}),
@@ -78,7 +79,7 @@ ACCOUNTS = ("a share, clamped", "a random share", "half the resolution, cut", "a
 
 def pixel_lights(frame, settings):
     """Return the pixel lights of a frame, and the area that each stands for where a clamp needs it."""
-    return choose_lights(frame, settings.lights), footprints(frame, settings.lights, settings.pairs)
+    return choose_lights(frame, settings.lights), footprints(frame, settings.lights, with_clamp(settings).pairs)
 
 
 def tolerance(settings):
@@ -111,7 +112,7 @@ def test_the_lights_are_of_every_kind():
 def test_the_twin(name):
     case = CASES[name]
     settings, frame = case.settings(SiiSettings, BASE), case.seen()
-    expected = naive.sii(frame, settings, *pixel_lights(frame, settings))
+    expected = naive.sii(frame, with_clamp(settings), *pixel_lights(frame, settings))
     np.testing.assert_allclose(sii(frame, settings), expected, rtol=0, atol=tolerance(settings) * expected.max())
 
 
@@ -128,7 +129,7 @@ def test_each_key_counts(name):
 @pytest.mark.parametrize("name", COUNTED)
 def test_fragments_are_those_of_the_twin(name):
     case = CASES[name]
-    settings, frame = case.settings(SiiSettings, BASE), case.seen()
+    settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
     lights, footprint = pixel_lights(frame, settings)
     found = fragments(receivers_of(frame), lights, settings, footprint, frame.gbuffer.projection)
     overdraw, of_light = naive.fragments(frame, settings, lights)
@@ -140,7 +141,7 @@ def test_fragments_are_those_of_the_twin(name):
 def test_the_paper_counts_the_same_fragments():
     """The overdraw of Figure 8 and the counts of Section 6, of a random range."""
     case = CASES["a random share"]
-    settings, frame = case.settings(SiiSettings, BASE), case.seen()
+    settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
     overdraw, of_light = naive.fragments(frame, settings, pixel_lights(frame, settings)[0])
     np.testing.assert_array_equal(counted(frame, settings).overdraw, overdraw)
     np.testing.assert_array_equal(counted(frame, settings).of_light, of_light)
@@ -149,7 +150,7 @@ def test_the_paper_counts_the_same_fragments():
 @pytest.mark.parametrize("name", [name for name in COUNTED if name in REACH_CASES])
 def test_what_is_cut_is_that_of_the_twin(name):
     case = CASES[name]
-    settings, frame = case.settings(SiiSettings, BASE), case.seen()
+    settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
     lights, footprint = pixel_lights(frame, settings)
     expected = naive.cut_irradiance(frame, settings, lights, footprint)
     np.testing.assert_allclose(cut_irradiance(receivers_of(frame), lights, settings, footprint), expected, rtol=0,
@@ -160,7 +161,7 @@ def test_what_is_cut_is_that_of_the_twin(name):
 def test_the_ledger_is_that_of_the_twin(name):
     """What settings keep from the visible surface, as sums over pixels of the area that they see."""
     case = CASES[name]
-    settings, frame = case.settings(SiiSettings, BASE), case.seen()
+    settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
     lights, areas = pixel_lights(frame, settings), areas_of(frame)
 
     def flux(changes):

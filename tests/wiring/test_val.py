@@ -7,6 +7,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.lights.settings import LightSettings
 from tests.naive import clustered
+from tests.naive.pair_term import with_clamp
 from tests.wiring.cases import needed, uncovered, under
 from tests.wiring.pair_cases import PAIR_CASES
 from tests.wiring.shadow_cases import FEW, few, shadow_cases
@@ -49,7 +50,7 @@ def made(request):
 
 def test_the_twin(made, evidence):
     case, frame, settings, picture = made
-    expected = clustered.picture(frame, settings)
+    expected = clustered.picture(frame, with_clamp(settings))
     off = np.abs(picture - expected).max() / expected.max()
     evidence(f"{case.values}: off by {off:.0e} of the brightest pixel")
     assert off < tolerance(settings)

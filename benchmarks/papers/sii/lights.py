@@ -84,7 +84,7 @@ def instant_radiosity(bench: Workbench, scene: str, lights: int, sources: dict[A
     covered, truth = gallery.covered, bench.traced(frame).mean
     rows, blocked, noise = [], {}, {}
     for source, title in sources.items():
-        settings = of(SiiSettings, lights=lights, source=source)
+        settings = of(SiiSettings, lights=lights, source=source, clamp="none")
         splatted, shadowed = sii(frame, settings), _shadow_rays(frame, settings)
         blocked[source] = errors_of(splatted, shadowed, covered)
         noise[source] = errors_of(shadowed, truth, covered)
@@ -118,7 +118,7 @@ def _shadow_rays(frame: Frame, settings: SiiSettings) -> Array:
 def warped(bench: Workbench, scene: str, lights: int, seeds: tuple[int, ...]) -> Figure:
     """Figure 7: where the hierarchical warp puts lights, by level and method, and what that does to the picture."""
     frame, full = bench.frame(scene), full_sum(bench, scene)
-    base = of(SiiSettings, lights=lights)
+    base = of(SiiSettings, lights=lights, clamp="none")
     maps = importance_maps(frame, frame.rsms, of(LightSettings, warp="A", importance="openness"))
     assert maps is not None  # the pattern is warped
     importance = maps[0]

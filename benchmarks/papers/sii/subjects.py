@@ -10,7 +10,8 @@ from typing import Any
 from benchmarks.papers.records import Array
 from benchmarks.papers.workbench import Workbench
 from refgi.frame import Frame
-from refgi.lights.selection import choose_lights
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import with_clamp
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.reach.fragments import Fragments, fragments
@@ -20,8 +21,8 @@ from refgi.splat.sii.settings import RelativeCut
 
 BOX = "cornell_sphere:faces=17000"  # as many faces as the scenes of a game in 2006
 CAUSTIC = of(SiiSettings, lights=4096, warp="B", warp_levels=3, importance="peak", cut_share=PAPER_CUT,
-             reference_length=1.0)  # Figure 4, Table 1
-UNCUT = SiiSettings()
+             reference_length=1.0, clamp="none")  # Figure 4, Table 1
+UNCUT = of(SiiSettings, clamp="none")  # as in all of the figures: the paper clamps nothing
 COARSE = 64  # pixels along a side of the picture that the reference length is chosen by
 
 
@@ -37,13 +38,14 @@ def splats(bench: Workbench, scene: str, share: float = PAPER_CUT, **changes: An
     A share of 0 cuts nothing.
     """
     cut = RelativeCut(share, reference_length(bench, scene)) if share > 0 else None
-    return of(SiiSettings, cut=cut, **changes)
+    return of(SiiSettings, **{"cut": cut, "clamp": "none"} | changes)
 
 
 def reference_length(bench: Workbench, scene: str) -> float:
     """Return the reference length (m) under which 768 splats of 5 % have the overdraw of Figure 8."""
     def length() -> float:
-        frame, settings = bench.frame(scene, width=COARSE, height=COARSE), of(SiiSettings, lights=PAPER_LIGHTS)
+        frame = bench.frame(scene, width=COARSE, height=COARSE)
+        settings = of(SiiSettings, lights=PAPER_LIGHTS, clamp="none")
         receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
         return reference_length_of(receivers, choose_lights(frame, settings.lights), settings.pairs)
 
@@ -54,4 +56,6 @@ def counted(frame: Frame, settings: SiiSettings) -> Fragments:
     """Count the fragments of a frame's splats: the overdraw map and what it adds up to."""
     buffer = frame.gbuffer
     receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
-    return fragments(receivers, choose_lights(frame, settings.lights), settings, None, buffer.projection)
+    settings = with_clamp(settings)
+    footprint = footprints(frame, settings.lights, settings.pairs)
+    return fragments(receivers, choose_lights(frame, settings.lights), settings, footprint, buffer.projection)

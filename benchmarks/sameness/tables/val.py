@@ -65,11 +65,10 @@ LIGHTING = [
     vary("blur", "none", "box", **BLOCKS),
     vary("blur_extent", 0.02, **BLOCKS),
     vary("blur_cosine", 0.99, -1.0, on=("cornell_sphere", "stage"), **BLOCKS),
-    vary("clamp", "auto", same="no clamp is the default"),
-    vary("clamp", "disc"),
+    vary("clamp", "auto", "disc"),
 ]
 
-TABLE = Table({"lights": 96, "area_lights": 8, "map_resolution": 64},
+TABLE = Table({"lights": 96, "area_lights": 8, "map_resolution": 64, "clamp": "none"},
               [*PAIRS, *LIGHTS, *CLUSTERS, *MAPS, *VISIBILITY, *LIGHTING],
               {"clusters": "target_error chooses it", "visibility.constant_bias": "receiver_plane=False chooses it",
                "visibility.constant_bias.value": "bias is it with visibility=step",

@@ -39,6 +39,7 @@ from refgi.cluster.settings import (
 from refgi.cluster.val import PUBLISHED_BLOCK, cluster_lights, face_normals, light_pixels, receivers_of
 from refgi.errors import expect
 from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import with_clamp
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -122,6 +123,7 @@ def split_error(
     InputError
         If the first picture has no light to be a share of.
     """
+    settings = with_clamp(settings)
     lights = choose_lights(frame, settings.lights)
     csm = dataclasses.replace(settings.visibility, prefilter="mip") if isinstance(settings.visibility, Csm) else Csm()
     base = dataclasses.replace(settings, visibility=csm)

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 from refgi.cluster.settings import ClusteredShadows, ValSettings
 from refgi.errors import expect
-from refgi.lights.settings import LightSettings, MapLights, expect_footprints
+from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints
 from refgi.pairs.settings import AutoClamp, DiscClamp, PairSettings, SphereClamp
 from refgi.scene.values import BRIGHTEST
 from refgi.settings import Settings, of, setting
@@ -192,7 +192,7 @@ class MultiresSettings(Settings):
                                                    "ams_all_corners"})
 
     lights: LightSettings = setting(LightSettings(count=256, source=MapLights(pattern="grid")), "pixel lights")
-    pairs: PairSettings = setting(PairSettings(clamp=AutoClamp()), "how one light lights one subsplat")
+    pairs: PairSettings = setting(PairSettings(), "how one light lights one subsplat")
     subsplats: ByGeometry | ByIrradiance | ByError = setting(ByGeometry(), "what subsplats are refined by")
     detail: float = setting(0.0, "a of Eq. 3: darkens what turns away from the camera", least=0.0, most=1.0, study=True)
     supersampled: bool = setting(False, "rendered at twice the width and height (Sec. 4)")
@@ -245,10 +245,9 @@ class MultiresSettings(Settings):
     @property
     def effective_pairs(self) -> PairSettings:
         """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints or rays are traced."""
-        if not isinstance(self.pairs.clamp, AutoClamp):
-            return self.pairs
-        bare = not self.lights.has_footprints or self.shadow_rays is not None
-        return dataclasses.replace(self.pairs, clamp=None if bare else DiscClamp())
+        if self.shadow_rays is not None and isinstance(self.pairs.clamp, AutoClamp):
+            return dataclasses.replace(self.pairs, clamp=None)
+        return clamped_pairs(self.lights, self.pairs)
 
 
 # Sec. 3.3, 4, 5.2 and Fig. 11 a: pictures of 2048^2 shown at 1024^2, all diagonal neighbours, lists pass by pass

@@ -6,6 +6,7 @@ import numpy.typing as npt
 
 from refgi.ledger import Ledger, account
 from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import with_clamp
 from refgi.pairs.irradiance import Receivers
 from refgi.settings import replaced
 from refgi.splat.sii.settings import MeshBound, SiiSettings
@@ -38,6 +39,7 @@ def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
     -----
     On the Cornell box at 512 x 512 it takes six times as long as the picture.
     """
+    settings = with_clamp(settings)
     footprint = footprints(frame, settings.lights, settings.pairs)
     picture = sii(frame, settings)
     between = sii(frame, replaced(settings, {"half_resolution": False})) - picture if settings.half_resolution else None

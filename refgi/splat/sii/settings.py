@@ -7,7 +7,7 @@ import dataclasses
 from typing import ClassVar, Literal
 
 from refgi.errors import expect
-from refgi.lights.settings import LightSettings, MapLights, expect_footprints
+from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints
 from refgi.pairs.settings import LAST_SEED, PairSettings
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
@@ -102,7 +102,8 @@ class SiiSettings(Settings):
     """Settings of `sii`; by default nothing is cut, and every light reaches every pixel.
 
     The sum of all lights takes at most 1.7 times as long as the paper's cut of 5 % (Fig. 12), which removes up to a
-    third of the light.
+    third of the light. `pairs.clamp` "auto" is the form factor of the disc that a light stands for, where lights have
+    footprints.
     """
 
     lights: LightSettings = setting(LightSettings(), "pixel lights")
@@ -121,7 +122,12 @@ class SiiSettings(Settings):
         """Whether the method traces rays."""
         return self.lights.traces_rays
 
+    @property
+    def effective_pairs(self) -> PairSettings:
+        """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints."""
+        return clamped_pairs(self.lights, self.pairs)
+
 
 # 768 lights by a filtered look-up of the flux (Sec. 4), a cut of 5 % (Fig. 12), the ellipsoids of the appendix
-PRESETS = {"paper": SiiSettings(lights=LightSettings(source=MapLights(filtered=True)),
+PRESETS = {"paper": SiiSettings(lights=LightSettings(source=MapLights(filtered=True)), pairs=PairSettings(clamp=None),
                                 reach=ReachSettings(cut=RelativeCut(), bound=EllipsoidBound()))}

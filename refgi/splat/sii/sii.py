@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import with_clamp
 from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.loss import warn_of_clamp
@@ -49,6 +50,7 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     (3, h, w) ndarray
         Indirect irradiance, W/m^2, linear RGB, without visibility.
     """
+    settings = with_clamp(settings)
     lights = choose_lights(frame, settings.lights)  # Sec. 3.1, 3.5 to 3.7
     footprint = footprints(frame, settings.lights, settings.pairs)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading

@@ -26,7 +26,8 @@ WALL = [(0, 0, 1), (0, 0, -1), (0, 1.5, -1), (0, 1.5, 1)]
 SUN = DirectionalLight((0.0, -1.0, 0.0), (3.0, 2.0, 1.0))
 VIEW = Camera((3.0, 1.1, 0.4), (0.0, 0.7, 0.0), (0.0, 1.0, 0.0), math.radians(60))
 LOW = 0.002  # W/m^2, I_low
-SETTINGS = of(SiiSettings, lights=256, pattern="grid", openness_radius=100.0, openness_rays=4096, cut_irradiance=LOW)
+SETTINGS = of(SiiSettings, lights=256, pattern="grid", openness_radius=100.0, openness_rays=4096, cut_irradiance=LOW,
+              clamp="none")
 SCALED = replaced(SETTINGS, {"openness_flux": "scale"})
 RAYS = 1e-3  # 4096 rays of a low-discrepancy set for each of 256 lights
 ONE_LIGHT = 4e-3  # the rays of the light that is nearest to a pixel
@@ -96,7 +97,7 @@ def test_fragments_saved_are_those_of_an_independent_count(wedge, hidden, eviden
 @pytest.mark.feature("SII-16")
 def test_the_picture_is_that_of_the_scaled_fluxes(wedge, hidden, evidence):
     """Twin: Eq. 2 summed literally with Phi F."""
-    uncut, buffer = replaced(SCALED, {"cut": "none"}), wedge.gbuffer
+    uncut, buffer = replaced(SCALED, {"cut": "none", "clamp": "none"}), wedge.gbuffer
     lights = choose_lights(wedge, SETTINGS.lights)
     scaled = lights._replace(flux=lights.flux * hidden)
     expected = eq2.irradiance(buffer.position[:, buffer.covered], buffer.normal[:, buffer.covered], scaled)

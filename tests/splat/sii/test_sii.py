@@ -18,7 +18,7 @@ from tests import lamps
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
-ALL = of(SiiSettings, pattern="all")  # the sum without a cut
+ALL = of(SiiSettings, pattern="all", clamp="none")  # the sum without a cut
 DRAWS = 120
 STANDARD_ERRORS = 4.0  # of a mean: one in 16,000 means of unbiased estimates is farther off
 TELLING = 0.1  # largest standard error: another map's share is 6 times or a sixth of the own
@@ -62,7 +62,7 @@ def test_irradiance_does_not_depend_on_the_number_of_lights(plates, evidence):
     """T/N: over 200 draws the mean is that of all texels, at every N; without it E would fall by 16 and 256."""
     reference, found = sii(plates, ALL).mean(), []
     for count in (16, 64, 256):
-        runs = np.array([sii(plates, of(SiiSettings, lights=count, pattern="random", seed=s)).mean()
+        runs = np.array([sii(plates, of(SiiSettings, lights=count, pattern="random", seed=s, clamp="none")).mean()
                          for s in range(200)])
         error = runs.std() / math.sqrt(200)
         assert abs(runs.mean() - reference) < 4 * error
@@ -96,7 +96,7 @@ def test_error_slopes_of_random_and_low_discrepancy_patterns(plates, evidence):
     slopes = {}
     for pattern in ("random", "halton", "grid"):
         seeds = range(100) if pattern != "grid" else range(1)
-        errors = [math.sqrt(np.mean([rms(sii(plates, of(SiiSettings, lights=n, pattern=pattern, seed=s)),
+        errors = [math.sqrt(np.mean([rms(sii(plates, of(SiiSettings, lights=n, pattern=pattern, seed=s, clamp="none")),
                                          reference) ** 2 for s in seeds])) for n in counts]
         slopes[pattern] = float(np.polyfit(np.log(counts), np.log(errors), 1)[0])
     assert slopes["random"] == pytest.approx(-0.5, abs=0.1)
@@ -201,7 +201,7 @@ def test_without_the_weight_a_picture_has_its_lights_share_of_the_texels(box, la
 def test_scene_without_glass_is_not_searched_for_refraction(box):
     with observe() as log:
         with_it = sii(box, of(SiiSettings, lights=64))
-    assert log.status("lights.refraction") == ["skipped"]
+    assert set(log.status("lights.refraction")) == {"skipped"}
     np.testing.assert_array_equal(with_it, sii(box, of(SiiSettings, lights=64, refraction="none")))
 
 
@@ -226,7 +226,7 @@ def test_settings_are_checked():
 def test_preset_of_the_paper_is_its_printed_values(box):
     """Sec. 4 and Fig. 12: 768 lights with filtered flux, cut at 5 %; the default cuts nothing."""
     paper = METHOD.preset("paper")
-    assert paper == of(SiiSettings, lights=768, filtered=True, cut_share=0.05, bound="ellipsoid")
-    by_hand = sii(box, of(SiiSettings, filtered=True, cut_share=0.05, bound="full"))
+    assert paper == of(SiiSettings, lights=768, filtered=True, cut_share=0.05, bound="ellipsoid", clamp="none")
+    by_hand = sii(box, of(SiiSettings, filtered=True, cut_share=0.05, bound="full", clamp="none"))
     np.testing.assert_array_equal(sii(box, paper), by_hand)
     assert METHOD.preset("default").reach.cut is None

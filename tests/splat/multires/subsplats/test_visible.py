@@ -53,7 +53,7 @@ def test_no_subsplats_trace_no_rays(box):
 def test_subsplats_get_the_bits_of_val(scene, shadow):
     """Oracle: `val` with the same lights, which lights every pixel."""
     frame = Frame(load_scene(scene), width=33, height=27, rsm_resolution=32)
-    settings = of(ValSettings, lights=64, clusters=5, maps=32, visibility=shadow, interleaving=1)
+    settings = of(ValSettings, lights=64, clusters=5, maps=32, visibility=shadow, interleaving=1, clamp="none")
     some = cells(frame.gbuffer.covered, 1)
     light = evaluate_shadowed(frame, frame.gbuffer, some, choose_lights(frame, settings.lights), settings)
     assert light.dtype == frame.dtype

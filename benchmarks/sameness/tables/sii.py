@@ -8,7 +8,9 @@ CUT = {"i_low": 0.05}
 
 TABLE = Table({"lights": 96, "clamp": "none"}, [
     *PAIRS, *LIGHTS,
-    vary("clamp", "auto", "disc"),
+    vary("clamp", "none", same="what the cases start from"),
+    vary("clamp", "disc"),
+    vary("clamp", "auto"),
     vary("i_low", 0.05, 0.3),
     vary("reference_length", 0.3, **CUT),
     vary("irradiance_low", 0.02),

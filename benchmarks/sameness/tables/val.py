@@ -65,7 +65,9 @@ LIGHTING = [
     vary("blur", "none", "box", **BLOCKS),
     vary("blur_extent", 0.02, **BLOCKS),
     vary("blur_cosine", 0.99, -1.0, on=("cornell_sphere", "stage"), **BLOCKS),
-    vary("clamp", "auto", "disc"),
+    vary("clamp", "none", same="what the cases start from"),
+    vary("clamp", "disc"),
+    vary("clamp", "auto"),
 ]
 
 TABLE = Table({"lights": 96, "area_lights": 8, "map_resolution": 64, "clamp": "none"},

@@ -185,6 +185,8 @@ class GeometryBlur(Settings):
 
     extent: float = setting(0.1, "how far apart, as a share of the scene's diagonal", least=0.0, most=10.0)
     cosine: float = setting(0.8, "least cosine between normals", least=-1.0, most=1.0)
+    every_subset: bool = setting(True, "lights that the window misses count by the nearest pixels of the surface that "
+                                       "sum them, up to 2 n away")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -242,6 +244,6 @@ class ClusteredShadows(Settings):
 PRESETS: Mapping[str, ValSettings] = {
     "paper": ValSettings(
         clusters=Clusters(distance="raw"), visibility=Csm(terms=4, quantisation="published"),
-        interleaving=InterleavingSettings(8),
+        interleaving=InterleavingSettings(8), blur=GeometryBlur(every_subset=False),
         as_published=PRINTED),
 }

@@ -174,6 +174,6 @@ def test_settings_that_do_not_go_together_are_refused(key, how):
 def test_the_preset_of_the_paper_has_the_printed_values(ball):
     paper = PRESETS["paper"]
     assert (paper.lights.count, paper.clusters.count, paper.visibility.terms) == (1024, 30, 4)
-    assert (paper.maps.resolution, paper.interleaving.block, paper.blur) == (256, 8, GeometryBlur(0.1, 0.8))
+    assert (paper.maps.resolution, paper.interleaving.block, paper.blur) == (256, 8, GeometryBlur(0.1, 0.8, False))
     assert paper.as_published == ValSettings.SWITCHES
     assert np.isfinite(val(ball, replaced(paper, SMALL))).all()

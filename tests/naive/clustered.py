@@ -80,7 +80,8 @@ def picture(frame, settings):
     extent = settings.blur.extent * diagonal(view.position) if by_geometry else math.inf
     buffer = frame.gbuffer
     return interleaving.blurred(light, buffer.position, buffer.normal, buffer.covered, block, extent,
-                                settings.blur.cosine if by_geometry else -math.inf)
+                                settings.blur.cosine if by_geometry else -math.inf,
+                                by_geometry and settings.blur.every_subset)
 
 
 def view_of(frame, settings, areas=None):

@@ -13,6 +13,7 @@ Distance = Literal["raw", "normalised", "squared"]
 Axes = Literal["fixed", "pca", "min_area"]
 Extent = Literal["root", "longer", "shorter"]
 DepthScaleName = Literal["log_map", "map", "scene"]
+Search = Literal["nearest", "conservative"]
 Assignment = Literal["index", "cluster"]
 
 MOST_TERMS = 64
@@ -21,6 +22,9 @@ LARGEST_MAP = 4096  # texels
 WIDEST_KERNEL = 255  # texels
 LARGEST_WEIGHT = 1e6
 LARGEST_BIAS = 0.25
+# best near_distance of each kind of shadow over four scenes (docs/methods/val_visibility.md)
+NEAR_DISTANCE: Mapping[str, float] = {
+    "csm": 0.4, "pcss": 0.7, "pcf": 0.6, "hard": 0.7, "back_projection": 0.6, "rays_rectangle": 0.4}
 PRINTED = frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"})
 
 
@@ -83,11 +87,17 @@ class ShadowMapSettings(Settings):
     renderer: Literal["raster", "rays"] = setting("raster", "what finds the depths", study=True)
     near_geometry: Literal["keep", "planes", "ball"] = setting(
         "ball", "left out near the centre: nothing, planes that pass there, or hits within a ball", study=True)
-    near_distance: float = setting(0.6, "how near, as a share of the cluster's radius", least=0.0, most=100.0,
-                                   study=True)
+    near_distance: float | None = setting(
+        None, "how near, as a share of the cluster's radius; none: what is best for the kind of shadow", least=0.0,
+        most=100.0, study=True)
     occluders_alone: bool = setting(True, "leave out triangles that nothing lies behind", study=True)
     behind: Literal["visible", "dual_paraboloid", "raytrace"] = setting(
         "visible", "what receivers behind an area light see of it: all, or by a second map, or by rays")
+
+    @property
+    def near_share(self) -> float:
+        """How near, as a share of the cluster's radius; that of convolution shadow maps where it is not given."""
+        return NEAR_DISTANCE["csm"] if self.near_distance is None else self.near_distance
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,6 +109,9 @@ class Csm(Settings):
         "log_map", "depths between what a map holds, by logarithm or in metres, or up to the scene's end",
         study=True)
     prefilter: Literal["mip", "brute"] = setting("mip", "mean over a disc: mip map, or every texel", study=True)
+    search: Search = setting(
+        "nearest", "blocker search: by the nearest depth as if on the axis, or by all that the light's cone may hold",
+        study=True)
     bias: float | None = setting(None, "share of the depth range; none: where the series is 1 for the first time",
                                  least=0.0, most=LARGEST_BIAS, study=True)
     attenuation: float = setting(0.0, "A of the terms' attenuation", least=0.0, most=100.0, study=True)
@@ -119,6 +132,9 @@ class Pcss(Settings):
     """Percentage closer soft shadows: blocker search, then percentage closer filtering, texel by texel."""
 
     cone: bool = setting(True, "blockers lie within the cone from the receiver to the light", study=True)
+    search: Search = setting(
+        "nearest", "blocker search: by the nearest depth as if on the axis, or by all that the light's cone may hold",
+        study=True)
     constant_bias: ConstantBias | None = setting(
         None, "compare with the receiver's biased distance; none: with its tangent plane", study=True)
 
@@ -212,6 +228,14 @@ class ValSettings(Settings):
                "'point' with the source 'walk'", self.area.single_light)
         expect(self.visibility is not None or isinstance(self.clusters, Clusters), "visibility",
                "another one with clusters 'adaptive'", "none")
+
+    @property
+    def drawn_maps(self) -> ShadowMapSettings:
+        """The settings of maps with the `near_distance` of the kind of shadow where none is given."""
+        if self.maps.near_distance is not None or self.visibility is None:
+            return self.maps
+        near = NEAR_DISTANCE.get(self.visibility.name(), self.maps.near_share)
+        return dataclasses.replace(self.maps, near_distance=near)
 
     @property
     def traces_rays(self) -> bool:

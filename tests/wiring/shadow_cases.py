@@ -14,7 +14,7 @@ def few(values, over=None, **options):
 def shadow_cases(kind):
     """Return cases of clusters, area lights, maps and soft shadows, by the key that says the kind of the latter."""
     pcss, back = {kind: "pcss"}, {kind: "back_projection"}
-    adaptive = {"clusters": "adaptive", "clusters.target_error": 0.09, **pcss}
+    adaptive = {"clusters": "adaptive", "clusters.target_error": 0.09, "maps.near_distance": 0.6, **pcss}
     bias = f"{kind}.constant_bias"
     return {
         "more clusters": Case({"clusters.count": 7}),
@@ -75,6 +75,8 @@ def shadow_cases(kind):
                                                                           f"{bias}.value": 0.03}),
         "a constant bias of the scene": few({f"{bias}.scale": "scene"}, pcss | {bias: "constant_bias",
                                                                                f"{bias}.value": 0.1}),
+        "a search of all the cone": few({f"{kind}.search": "conservative"}, {f"{kind}.terms": 16}),
+        "a search of all the cone, PCSS": few({f"{kind}.search": "conservative"}, pcss | {f"{kind}.cone": False}),
         "a small kernel": few({f"{kind}.texels": 3}, {kind: "pcf"}),
         "the printed angle": few({"as_published": {"val_alpha"}}),
         "the printed square": few({"as_published": {"val_alpha_over_pi"}}),

@@ -14,7 +14,8 @@ from refgi.settings import of, replaced
 from tests.naive import val as naive
 
 SIDE, MAP = 8, 16
-SETTINGS = of(ValSettings, lights=40, clusters_count=5, maps_resolution=MAP, interleaving=1, prefilter="brute")
+SETTINGS = of(ValSettings, lights=40, clusters_count=5, maps_resolution=MAP, interleaving=1, prefilter="brute",
+              near_distance=naive.NEAR)
 HULL = 1e-6  # of the diagonal: what lies beyond a plane by less is not beyond it
 # Sums of some dozen positive terms round by a few 1e-16. Whether a texel belongs to a disc could turn on the last bit
 # and change V by a texel's share: no such tie occurs here.

@@ -24,7 +24,7 @@ LARGEST_WEIGHT = 1e6
 LARGEST_BIAS = 0.25
 # best near_distance of each kind of shadow over four scenes (docs/methods/val_visibility.md)
 NEAR_DISTANCE: Mapping[str, float] = {
-    "csm": 0.4, "pcss": 0.7, "pcf": 0.6, "hard": 0.7, "back_projection": 0.6, "rays_rectangle": 0.4}
+    "csm": 0.4, "pcss": 0.7, "pcf": 0.6, "hard": 0.6, "back_projection": 0.25, "rays_rectangle": 0.7}
 PRINTED = frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"})
 
 
@@ -202,7 +202,7 @@ class GeometryBlur(Settings):
     extent: float = setting(0.1, "how far apart, as a share of the scene's diagonal", least=0.0, most=10.0)
     cosine: float = setting(0.8, "least cosine between normals", least=-1.0, most=1.0)
     every_subset: bool = setting(True, "lights that the window misses count by the nearest pixels of the surface that "
-                                       "sum them, up to 2 n away")
+                                       "sum them, up to n away")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -32,7 +32,7 @@ HULL = 1e-6  # of the diagonal: what lies beyond a plane by less is not beyond i
 FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line
 BACK = 0.75  # of the area lights that were enough: the one step back
 FROM_BEHIND = (np.arange(4) + 0.5) / 4  # points along a side of the rectangle that rays from behind end at
-NEAR = {"csm": 0.4, "pcss": 0.7, "pcf": 0.6, "hard": 0.7, "back_projection": 0.6, "rays_rectangle": 0.4}
+NEAR = {"csm": 0.4, "pcss": 0.7, "pcf": 0.6, "hard": 0.6, "back_projection": 0.25, "rays_rectangle": 0.7}
 POINTS = 256  # on a rectangle that rays go to
 
 

@@ -47,7 +47,7 @@ def window(place, count, side):
 
 
 @functools.cache
-def elsewhere(dy, dx, side, reach=2):
+def elsewhere(dy, dx, side, reach=1):
     """Return where else the place of a window finds its subset: pixels n apart, from near to far."""
     steps = [step * side for step in range(-reach, reach + 1)]
     places = [(dy + v, dx + u) for v in steps for u in steps if (v, u) != (0, 0)]

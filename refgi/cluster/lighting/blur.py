@@ -65,7 +65,7 @@ def blur(
     [Dong09] Sec. 6 takes a tenth of the scene's extent and a cosine of 0.8, and blurs what leaves the surface; here it
     is the irradiance, so that textures stay sharp. The window of pixel x starts at x - n // 2. The mean is taken of
     differences to the pixel itself. The paper does not say what becomes of subsets that an edge cuts off; here they
-    are looked for up to two windows away (`every_subset`).
+    are looked for up to a window away (`every_subset`).
     """
     position, covered = np.ascontiguousarray(receivers.position), np.ascontiguousarray(receivers.covered, np.bool_)
     normal = np.ascontiguousarray(receivers.normal, position.dtype)
@@ -94,7 +94,7 @@ def _blur(
     tiles = across * ((height + TALL - 1) // TALL)
     for task in prange(TASKS):
         scratch = np.empty((TALL + size - 1, END), position.dtype)  # once: pages of memory cost more than their use
-        sums = np.empty((4, WIDE), position.dtype)
+        sums, counts = np.empty((4, WIDE), position.dtype), np.empty(MOST_BLOCK, np.bool_)
         for t in range(np.int64(task), tiles, TASKS):
             top, left = t // across * TALL, t % across * WIDE
             tall, wide = min(TALL, height - top), min(WIDE, width - left)
@@ -107,7 +107,8 @@ def _blur(
                 else:
                     _add_accepted(tile, row, size, square_extent, cosine, sums)
                     if places.size > 0:
-                        add_missing(tile, row, size, square_extent, cosine, places, planes, top + row, left, wide, sums)
+                        add_missing(tile, row, size, square_extent, cosine, places, planes, top + row, left, wide, counts,
+                                    sums)
                 _store(tile, row + size // 2, size // 2, sums, covered, top + row, left, wide, result)
 
 

@@ -8,7 +8,7 @@ inwards as it does at the rim of the picture.
 """
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
 
-REACH = 2  # windows on each side that are searched
+REACH = 1  # windows on each side that are searched
 
 
 @lru_cache(maxsize=8)
@@ -47,56 +47,79 @@ def places_of_subsets(size: int) -> Array:
 @kernel
 def add_missing(
     tile: Array, row: int, size: int, square_extent: Any, cosine: Any, places: Array, planes: Any, top: int, left: int,
-    wide: int, sums: Array,
+    wide: int, counts: Array, sums: Array,
 ) -> None:
     """Add differences to pixels farther off for each place of a window that does not count.
 
     `sums` (4, WIDE) has the sums over the window of the pixels from (`top`, `left`) on, and how many pixels counted;
     `planes` are irradiance, position, normal and covered of the whole picture, `places` of `places_of_subsets`.
+    `counts` (>= n,) of bool is overwritten.
     """
     middle, one, whole = row + size // 2, tile.dtype.type(1.0), tile.dtype.type(size * size)
-    covered = planes[3]
+    irradiance, position, normal, covered = planes
     for i in range(wide):
         if sums[3, i] == whole or not covered[top, left + i]:
             continue
-        p = size // 2 + i
+        p = np.uint64(size // 2 + i)
+        here = Here(tile[middle, np.uint64(X) + p], tile[middle, np.uint64(X + COLUMNS) + p],
+                    tile[middle, np.uint64(X + 2 * COLUMNS) + p], tile[middle, np.uint64(N) + p],
+                    tile[middle, np.uint64(N + COLUMNS) + p], tile[middle, np.uint64(N + 2 * COLUMNS) + p],
+                    square_extent, cosine)
         for y in range(size):
+            _flag_row(tile, row + y, i, size, here, counts)
             for x in range(size):
-                if _counts(tile, middle, p, row + y, x + i, square_extent, cosine):
+                if counts[x]:
                     continue
-                found, v, u = _nearest(planes, tile, middle, p, top, left + i, places[y, x], square_extent, cosine)
+                found, v, u = _nearest(position, normal, covered, top, left + i, places, y, x, here)
                 if found:
                     for c in range(3):
-                        sums[c, i] += planes[0][c, v, u] - tile[middle, E + c * COLUMNS + p]
+                        sums[c, i] += irradiance[c, v, u] - tile[middle, np.uint64(E + c * COLUMNS) + p]
                     sums[3, i] += one
 
 
+class Here(NamedTuple):
+    """The pixel that a window is of, and what may count for it."""
+
+    x: Any  # position, m
+    y: Any
+    z: Any
+    a: Any  # normal
+    b: Any
+    c: Any
+    square_extent: Any  # m^2
+    cosine: Any
+
+
 @kernel
-def _counts(tile: Array, middle: int, p: int, y: int, q: int, square_extent: Any, cosine: Any) -> bool:
-    square, dot = tile.dtype.type(0.0), tile.dtype.type(0.0)
-    for c in range(3):
-        away = tile[y, X + c * COLUMNS + q] - tile[middle, X + c * COLUMNS + p]
-        square += away * away
-        dot += tile[y, N + c * COLUMNS + q] * tile[middle, N + c * COLUMNS + p]
-    return bool((square <= square_extent) & (dot >= cosine))
+def _flag_row(tile: Array, y: int, left: int, size: int, here: Here, counts: Array) -> None:
+    """Flag which of `size` pixels of a row of the tile, from `left` on, count."""
+    start = np.uint64(left)
+    for x in range(np.uint64(size)):
+        q = start + x
+        dx, dy, dz = (tile[y, np.uint64(X) + q] - here.x, tile[y, np.uint64(X + COLUMNS) + q] - here.y,
+                      tile[y, np.uint64(X + 2 * COLUMNS) + q] - here.z)
+        dot = (tile[y, np.uint64(N) + q] * here.a + tile[y, np.uint64(N + COLUMNS) + q] * here.b
+               + tile[y, np.uint64(N + 2 * COLUMNS) + q] * here.c)
+        counts[x] = (dx * dx + dy * dy + dz * dz <= here.square_extent) & (dot >= here.cosine)
 
 
 @kernel
 def _nearest(
-    planes: Any, tile: Array, middle: int, p: int, row: int, column: int, places: Array, square_extent: Any, cosine: Any
-) -> tuple[bool, int, int]:
-    """Return whether any place lies on the surface of a pixel, p of the tile, and the first that does."""
-    _, position, normal, covered = planes
+    position: Array, normal: Array, covered: Array, row: int, column: int, places: Array, y: int, x: int, here: Here,
+) -> tuple[bool, Any, Any]:
+    """Return whether any of the places for (y, x) of a window lies on its surface; row and column of the first."""
     height, width = covered.shape
-    for k in range(len(places)):
-        v, u = row + places[k, 0], column + places[k, 1]
-        if v < 0 or v >= height or u < 0 or u >= width or not covered[v, u]:
+    for k in range(np.uint64(places.shape[2])):
+        v, u = row + places[np.uint64(y), np.uint64(x), k, 0], column + places[np.uint64(y), np.uint64(x), k, 1]
+        if v < 0 or v >= height or u < 0 or u >= width:
             continue
-        square, dot = tile.dtype.type(0.0), tile.dtype.type(0.0)
-        for c in range(3):
-            away = position[c, v, u] - tile[middle, X + c * COLUMNS + p]
-            square += away * away
-            dot += normal[c, v, u] * tile[middle, N + c * COLUMNS + p]
-        if square <= square_extent and dot >= cosine:
-            return True, v, u
-    return False, 0, 0
+        j, i = np.uint64(v), np.uint64(u)
+        if not covered[j, i]:
+            continue
+        dot = normal[0, j, i] * here.a + normal[1, j, i] * here.b + normal[2, j, i] * here.c
+        if dot < here.cosine:
+            continue
+        dx, dy, dz = position[0, j, i] - here.x, position[1, j, i] - here.y, position[2, j, i] - here.z
+        if dx * dx + dy * dy + dz * dz <= here.square_extent:
+            return True, j, i
+    return False, np.uint64(0), np.uint64(0)

@@ -13,7 +13,6 @@ Distance = Literal["raw", "normalised", "squared"]
 Axes = Literal["fixed", "pca", "min_area"]
 Extent = Literal["root", "longer", "shorter"]
 DepthScaleName = Literal["log_map", "map", "scene"]
-Search = Literal["nearest", "conservative"]
 Assignment = Literal["index", "cluster"]
 
 MOST_TERMS = 64
@@ -109,9 +108,6 @@ class Csm(Settings):
         "log_map", "depths between what a map holds, by logarithm or in metres, or up to the scene's end",
         study=True)
     prefilter: Literal["mip", "brute"] = setting("mip", "mean over a disc: mip map, or every texel", study=True)
-    search: Search = setting(
-        "nearest", "blocker search: by the nearest depth as if on the axis, or by all that the light's cone may hold",
-        study=True)
     bias: float | None = setting(None, "share of the depth range; none: where the series is 1 for the first time",
                                  least=0.0, most=LARGEST_BIAS, study=True)
     attenuation: float = setting(0.0, "A of the terms' attenuation", least=0.0, most=100.0, study=True)
@@ -132,9 +128,6 @@ class Pcss(Settings):
     """Percentage closer soft shadows: blocker search, then percentage closer filtering, texel by texel."""
 
     cone: bool = setting(True, "blockers lie within the cone from the receiver to the light", study=True)
-    search: Search = setting(
-        "nearest", "blocker search: by the nearest depth as if on the axis, or by all that the light's cone may hold",
-        study=True)
     constant_bias: ConstantBias | None = setting(
         None, "compare with the receiver's biased distance; none: with its tangent plane", study=True)
 

@@ -69,20 +69,9 @@ def printed_angle(delta, d, z):
     return math.tan(math.atan(2 * cone(delta, d, z)) / 2)
 
 
-def widest(delta, d, near):
-    """Return the tangent of the widest angle, up to 80 degrees, at which a depth may lie in the cone to the light."""
-    if near < delta / 2:  # beside the centre, the light itself
-        return STEEPEST
-    # r sin(theta) = (Delta / 2)(1 - r cos(theta) / d) is a line through the receiver and the end of the light
-    foot = delta / 2 * d / math.hypot(delta / 2, d)  # its distance from the centre, at this angle from the axis
-    return min(math.tan(math.atan2(d, delta / 2) - math.acos(foot / near)), STEEPEST)
-
-
-def search(delta, d, near, printed, how="nearest"):
+def search(delta, d, near, printed):
     """Return the tangent of the blocker search."""
-    if "val_search_solid_angle" in printed:
-        return min(delta / (2 * d), STEEPEST)
-    return widest(delta, d, near) if how == "conservative" else cone(delta, d, near)
+    return min(delta / (2 * d), STEEPEST) if "val_search_solid_angle" in printed else cone(delta, d, near)
 
 
 def penumbra(delta, d, z, printed):
@@ -251,7 +240,7 @@ def csm_share(seen, channels, csm, delta, local, printed):
     d, chain = math.hypot(*local), series(csm)
     scale = scale_of(seen, csm.depth_scale, chain.end)
     here = float(scale.depth(d))
-    means = channels.mean(*region(local, search(delta, d, seen.near, printed, csm.search), printed))
+    means = channels.mean(*region(local, search(delta, d, seen.near, printed), printed))
     blocked = 1 - lit_share(means, chain.weight, here - chain.search_bias)
     if blocked < NO_BLOCKER:
         return 1.0
@@ -281,7 +270,7 @@ def pcss_share(seen, pcss, chain_end, delta, local, normal, printed):
         along = pcss.constant_bias.value / scale.slope
         limit = d * 2**-along if scale.logarithmic else d - along
     hides = seen.depth < limit * (1 - SLACK)
-    blockers = hides & in_disc(n, *region(local, search(delta, d, seen.near, printed, pcss.search), printed))
+    blockers = hides & in_disc(n, *region(local, search(delta, d, seen.near, printed), printed))
     blockers &= in_cone(seen, local, delta) if pcss.cone else True
     if not blockers.any():
         return 1.0

@@ -75,8 +75,6 @@ def shadow_cases(kind):
                                                                           f"{bias}.value": 0.03}),
         "a constant bias of the scene": few({f"{bias}.scale": "scene"}, pcss | {bias: "constant_bias",
                                                                                f"{bias}.value": 0.1}),
-        "a search of all the cone": Case({f"{kind}.search": "conservative"}, ONE | {f"{kind}.terms": 16}),
-        "a search of all the cone, PCSS": few({f"{kind}.search": "conservative"}, pcss | {f"{kind}.cone": False}),
         "a small kernel": few({f"{kind}.texels": 3}, {kind: "pcf"}),
         "the printed angle": few({"as_published": {"val_alpha"}}),
         "the printed square": few({"as_published": {"val_alpha_over_pi"}}),

@@ -47,8 +47,6 @@ VISIBILITY = [
     vary("depth_scale", "map", "scene"),
     vary("depth_scale", "map", "scene", **BIASED_STEP),
     vary("prefilter", "brute"),
-    vary("search", "conservative"),
-    vary("search", "conservative", visibility="step"),
     vary("bias", 0.0, 0.05),
     vary("bias", 0.05, 0.2, visibility="step", receiver_plane=False),
     vary("attenuation", 0.5),

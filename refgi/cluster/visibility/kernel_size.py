@@ -51,27 +51,6 @@ def solid_angle_tangent(delta: Any, d: Any) -> Any:
 
 
 @kernel
-def conservative_tangent(delta: Any, d: Any, z: Any) -> Any:
-    """Return tan(a) of the cone from the centre that holds all of the light's cone beyond the distance z, up to 80 deg.
-
-    A point at the distance r and the angle theta from the axis lies within the cone from the receiver to the light
-    where r sin(theta) <= (Delta / 2)(1 - r cos(theta) / d), or r sin(theta + phi) <= (Delta / 2) cos(phi) with
-    tan(phi) = Delta / (2 d). Nearer than Delta / 2 that may be in any direction. `cone_tangent` takes the distance for
-    the depth along the axis, and misses blockers in slanted directions.
-    """
-    one, cap, half = type(d)(1.0), type(d)(STEEPEST), delta * type(d)(0.5)
-    if d <= z:
-        return type(d)(0.0)
-    if z <= half:
-        return cap
-    slope = half / d
-    sine = half / (z * math.sqrt(one + slope * slope))
-    along = sine / math.sqrt(one - sine * sine)
-    tangent = (along - slope) / (one + along * slope)
-    return tangent if tangent < cap else cap
-
-
-@kernel
 def disc(x: Any, y: Any, z: Any, d: Any, tangent: Any) -> tuple[Any, Any, Any]:
     """Return centre s, t and radius, in [-1, 1] units, of the disc that a cone around the receiver is on the map.
 

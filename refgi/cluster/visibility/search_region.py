@@ -11,10 +11,9 @@ import numpy.typing as npt
 
 from refgi.cluster.filters.depth_scale import DepthScale, depth_scale
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
-from refgi.cluster.settings import Csm, DepthScaleName, Pcss, ValSettings
+from refgi.cluster.settings import DepthScaleName, ValSettings
 from refgi.cluster.visibility.kernel_size import (
     cone_tangent,
-    conservative_tangent,
     disc,
     published_square,
     solid_angle_tangent,
@@ -51,7 +50,6 @@ class FilterSizing(NamedTuple):
     alpha_over_pi: bool  # squares of side alpha / pi
     solid_angle: bool  # the search of blockers half-way
     foreshortened: bool  # the light's size as the receiver sees it
-    conservative: bool  # the search holds all of the light's cone
 
 
 def filter_sizing(settings: ValSettings) -> FilterSizing:
@@ -60,17 +58,16 @@ def filter_sizing(settings: ValSettings) -> FilterSizing:
     Parameters
     ----------
     settings : ValSettings
-        `as_published`, `area.foreshortened` and the `search` of `visibility` count.
+        `as_published` and `area.foreshortened` count.
 
     Returns
     -------
     FilterSizing
         One flag each.
     """
-    published, kind = settings.as_published, settings.visibility
+    published = settings.as_published
     return FilterSizing("val_alpha" in published, "val_alpha_over_pi" in published,
-                        "val_search_solid_angle" in published, settings.area.foreshortened,
-                        isinstance(kind, Csm | Pcss) and kind.search == "conservative")
+                   "val_search_solid_angle" in published, settings.area.foreshortened)
 
 
 def light_constants(
@@ -161,9 +158,6 @@ def find_search_regions(
         extent = delta * math.sqrt(z / d) if sizing.foreshortened else delta
         rows[X, i], rows[Y, i], rows[Z, i], rows[D, i], rows[EXTENT, i] = x, y, z, d, extent
         rows[RADIUS, i] = solid_angle_tangent(extent, d) if sizing.solid_angle else cone_tangent(extent, d, near)
-    if sizing.conservative and not sizing.solid_angle:
-        for i in range(size):
-            rows[RADIUS, i] = conservative_tangent(rows[EXTENT, i], rows[D, i], near)
     place_filters(sizing.alpha_over_pi, size, rows)
     return count_true(pending, size)
 

@@ -107,8 +107,8 @@ def _blur(
                 else:
                     _add_accepted(tile, row, size, square_extent, cosine, sums)
                     if places.size > 0:
-                        add_missing(tile, row, size, square_extent, cosine, places, planes, top + row, left, wide, counts,
-                                    sums)
+                        add_missing(tile, row, size, square_extent, cosine, places, planes, top + row, left, wide,
+                                    counts, sums)
                 _store(tile, row + size // 2, size // 2, sums, covered, top + row, left, wide, result)
 
 

@@ -117,9 +117,7 @@ def _nearest(
         if not covered[j, i]:
             continue
         dot = normal[0, j, i] * here.a + normal[1, j, i] * here.b + normal[2, j, i] * here.c
-        if dot < here.cosine:
-            continue
         dx, dy, dz = position[0, j, i] - here.x, position[1, j, i] - here.y, position[2, j, i] - here.z
-        if dx * dx + dy * dy + dz * dz <= here.square_extent:
+        if dot >= here.cosine and dx * dx + dy * dy + dz * dz <= here.square_extent:
             return True, j, i
     return False, np.uint64(0), np.uint64(0)

@@ -45,6 +45,9 @@ def test_equals_the_twin(height, width, side, evidence):
     evidence(f"{width} x {height}, n = {side}: {error:.1e} off the loops, {farther:.1e} with every subset")
     assert max(error, farther) < ROUNDING
     assert (np.abs(full - plain).max() > 0.05) == (side > 1 and height > side)
+    # any normal: what has no surface has none, and is to be left out for that
+    around = blurred(light, *to, side, BETWEEN * DIAGONAL, -np.inf, every_subset=True)
+    assert np.abs(blur(light, to, side, GeometryBlur(BETWEEN, -1.0), DIAGONAL) - around).max() < ROUNDING
     box = blur(light, to, side, BoxBlur(), DIAGONAL)
     assert np.abs(box - blurred(light, *to, side, np.inf, -2.0)).max() < ROUNDING
 

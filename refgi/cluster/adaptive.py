@@ -78,7 +78,8 @@ def group_lights(
         skip("cluster.shadow_maps", f"visibility {chosen!r} reads none")
         return areas, None
     tracer = frame.tracer if settings.maps.renderer == "rays" else None
-    return areas, shadow_maps(frame.scene.geometry, areas, settings.maps, frame.dtype, tracer, ends_of(frame, lights))
+    ends = ends_of(frame, lights)
+    return areas, shadow_maps(frame.scene.geometry, areas, settings.drawn_maps, frame.dtype, tracer, ends)
 
 
 class Trial(NamedTuple):

@@ -21,6 +21,9 @@ LARGEST_MAP = 4096  # texels
 WIDEST_KERNEL = 255  # texels
 LARGEST_WEIGHT = 1e6
 LARGEST_BIAS = 0.25
+# best near_distance of each kind of shadow over four scenes (docs/methods/val_visibility.md)
+NEAR_DISTANCE: Mapping[str, float] = {
+    "csm": 0.4, "pcss": 0.7, "pcf": 0.6, "hard": 0.6, "back_projection": 0.25, "rays_rectangle": 0.7}
 PRINTED = frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"})
 
 
@@ -83,11 +86,17 @@ class ShadowMapSettings(Settings):
     renderer: Literal["raster", "rays"] = setting("raster", "what finds the depths", study=True)
     near_geometry: Literal["keep", "planes", "ball"] = setting(
         "ball", "left out near the centre: nothing, planes that pass there, or hits within a ball", study=True)
-    near_distance: float = setting(0.6, "how near, as a share of the cluster's radius", least=0.0, most=100.0,
-                                   study=True)
+    near_distance: float | None = setting(
+        None, "how near, as a share of the cluster's radius; none: what is best for the kind of shadow", least=0.0,
+        most=100.0, study=True)
     occluders_alone: bool = setting(True, "leave out triangles that nothing lies behind", study=True)
     behind: Literal["visible", "dual_paraboloid", "raytrace"] = setting(
         "visible", "what receivers behind an area light see of it: all, or by a second map, or by rays")
+
+    @property
+    def near_share(self) -> float:
+        """How near, as a share of the cluster's radius; that of convolution shadow maps where it is not given."""
+        return NEAR_DISTANCE["csm"] if self.near_distance is None else self.near_distance
 
 
 @dataclasses.dataclass(frozen=True)
@@ -185,6 +194,8 @@ class GeometryBlur(Settings):
 
     extent: float = setting(0.1, "how far apart, as a share of the scene's diagonal", least=0.0, most=10.0)
     cosine: float = setting(0.8, "least cosine between normals", least=-1.0, most=1.0)
+    every_subset: bool = setting(True, "lights that the window misses count by the nearest pixels of the surface that "
+                                       "sum them, up to n away")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -213,6 +224,14 @@ class ValSettings(Settings):
                "'point' with the source 'walk'", self.area.single_light)
         expect(self.visibility is not None or isinstance(self.clusters, Clusters), "visibility",
                "another one with clusters 'adaptive'", "none")
+
+    @property
+    def drawn_maps(self) -> ShadowMapSettings:
+        """The settings of maps with the `near_distance` of the kind of shadow where none is given."""
+        if self.maps.near_distance is not None or self.visibility is None:
+            return self.maps
+        near = NEAR_DISTANCE.get(self.visibility.name(), self.maps.near_share)
+        return dataclasses.replace(self.maps, near_distance=near)
 
     @property
     def traces_rays(self) -> bool:
@@ -250,5 +269,6 @@ class ClusteredShadows(Settings):
 PRESETS: Mapping[str, ValSettings] = {
     "paper": ValSettings(
         pairs=PairSettings(clamp=None), clusters=Clusters(distance="raw"),
-        visibility=Csm(terms=4, quantisation="published"), interleaving=InterleavingSettings(8), as_published=PRINTED),
+        visibility=Csm(terms=4, quantisation="published"), interleaving=InterleavingSettings(8),
+        blur=GeometryBlur(every_subset=False), as_published=PRINTED),
 }

@@ -7,9 +7,11 @@ import pytest
 
 from refgi.cluster import PRESETS, ValSettings, val
 from refgi.cluster.settings import GeometryBlur
+from refgi.cluster.val import cluster_lights
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights.selection import choose_lights
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
@@ -171,9 +173,26 @@ def test_settings_that_do_not_go_together_are_refused(key, how):
         of(ValSettings, **how)
 
 
+@pytest.mark.feature("VAL-22")
+def test_what_is_ignored_near_a_cluster_follows_the_kind_of_shadow(ball):
+    shares = {"csm": 0.4, "pcss": 0.7, "pcf": 0.6, "hard": 0.6, "back_projection": 0.25, "rays_rectangle": 0.7}
+    drawn = {}
+    for kind, share in shares.items():
+        settings = small({"visibility": kind})
+        assert settings.drawn_maps.near_distance == share
+        assert replaced(settings, {"near_distance": 0.3}).drawn_maps.near_distance == 0.3
+        if kind != "rays_rectangle":
+            lights = choose_lights(ball, settings.lights)
+            drawn[kind], given = (cluster_lights(ball, lights, some)[1].depth
+                                  for some in (settings, replaced(settings, {"near_distance": share})))
+            np.testing.assert_array_equal(drawn[kind], given)
+    assert not np.array_equal(drawn["csm"], drawn["pcss"])
+    assert small({"visibility": "none"}).drawn_maps.near_share == shares["csm"]
+
+
 def test_the_preset_of_the_paper_has_the_printed_values(ball):
     paper = PRESETS["paper"]
     assert (paper.lights.count, paper.clusters.count, paper.visibility.terms) == (1024, 30, 4)
-    assert (paper.maps.resolution, paper.interleaving.block, paper.blur) == (256, 8, GeometryBlur(0.1, 0.8))
+    assert (paper.maps.resolution, paper.interleaving.block, paper.blur) == (256, 8, GeometryBlur(0.1, 0.8, False))
     assert paper.as_published == ValSettings.SWITCHES
     assert np.isfinite(val(ball, replaced(paper, SMALL))).all()

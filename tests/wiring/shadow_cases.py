@@ -14,7 +14,7 @@ def few(values, over=None, **options):
 def shadow_cases(kind):
     """Return cases of clusters, area lights, maps and soft shadows, by the key that says the kind of the latter."""
     pcss, back = {kind: "pcss"}, {kind: "back_projection"}
-    adaptive = {"clusters": "adaptive", "clusters.target_error": 0.09, **pcss}
+    adaptive = {"clusters": "adaptive", "clusters.target_error": 0.09, "maps.near_distance": 0.6, **pcss}
     bias = f"{kind}.constant_bias"
     return {
         "more clusters": Case({"clusters.count": 7}),
@@ -39,7 +39,7 @@ def shadow_cases(kind):
         "single lights with their footprint": Case({"area.single_light": "footprint"}, {"clusters.count": 40, **pcss}),
         "finer maps": few({"maps.resolution": 24}),
         "maps by rays": few({"maps.renderer": "rays"}, same="both renderers find the same distances"),
-        "near geometry kept": few({"maps.near_geometry": "keep"}),
+        "near geometry kept": few({"maps.near_geometry": "keep"}, {"maps.near_distance": 0.6}),
         "near planes left out": few({"maps.near_geometry": "planes"}),
         "a larger ball": few({"maps.near_distance": 0.9}),
         "walls in the maps": few({"maps.occluders_alone": False}),
@@ -66,7 +66,7 @@ def shadow_cases(kind):
         "attenuated": few({f"{kind}.attenuation": 1.0}),
         "twice the series": few({f"{kind}.rescale": "scale2"}),
         "a plateau of one": few({f"{kind}.rescale": "plateau"}, {f"{kind}.attenuation": 1.0}),
-        "8 and 16 bits": Case({f"{kind}.quantisation": "published"}, {"clusters.count": 5}),
+        "8 and 16 bits": Case({f"{kind}.quantisation": "published"}, {"clusters.count": 5, "maps.near_distance": 0.6}),
         "8 and 16 bits, exact means": few({f"{kind}.quantisation": "published"}, {f"{kind}.prefilter": "brute"}),
         "blockers beside the cone": few({f"{kind}.cone": False}, pcss),
         "a constant bias": few({bias: "constant_bias"}, pcss),

@@ -30,6 +30,7 @@ CASES = {
     "a box": few({"blur": "box"}, BLOCKS),
     "not blurred": few({"blur": "none"}, BLOCKS),
     "a wide blur": few({"blur.extent": 0.4}, BLOCKS),
+    "subsets left out": few({"blur.every_subset": False}, BLOCKS | {"blur.extent": 0.4}),
     "a blur around corners": few({"blur.cosine": -1.0}, BLOCKS | {"blur.extent": 0.4}),
 }
 

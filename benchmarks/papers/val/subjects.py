@@ -213,7 +213,7 @@ def maps_of(frame: Frame, found: Clustered, settings: ValSettings) -> ShadowMaps
     """Draw what each area light sees: one map for each that may be occluded."""
     tracer = frame.tracer if settings.maps.renderer == "rays" else None
     ends = ends_of(frame, found.lights)
-    return shadow_maps(frame.scene.geometry, found.areas, settings.maps, frame.dtype, tracer, ends)
+    return shadow_maps(frame.scene.geometry, found.areas, settings.drawn_maps, frame.dtype, tracer, ends)
 
 
 def lit_by(frame: Frame, found: Clustered, settings: ValSettings, maps: ShadowMaps | None = None) -> Array:

@@ -64,6 +64,7 @@ LIGHTING = [
     vary("dealing", "cluster", **BLOCKS),
     vary("blur", "none", "box", **BLOCKS),
     vary("blur_extent", 0.02, **BLOCKS),
+    vary("every_subset", False, **BLOCKS),
     vary("blur_cosine", 0.99, -1.0, on=("cornell_sphere", "stage"), **BLOCKS),
     vary("clamp", "none", same="what the cases start from"),
     vary("clamp", "disc"),

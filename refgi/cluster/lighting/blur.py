@@ -2,7 +2,8 @@
 
 [Laine et al. 2007] A pixel q counts for p where ``|x_q - x_p| <= extent`` and ``<n_p . n_q> >= cosine``. All weights
 are 1: a window of n x n pixels sees each subset of lights once wherever it lies, and any other kernel would leave the
-pattern of the subsets in the picture. At the rim of the picture the window is moved inwards, for the same reason.
+pattern of the subsets in the picture. At the rim of the picture the window is moved inwards, for the same reason, and
+beside the edge of a surface subsets that it misses come from farther along the surface (`blur_subsets`).
 
 Threads take tiles of TALL x WIDE pixels with their surroundings; the pixels of a row are the SIMD lanes. Where bounds
 say that all pixels around a tile count for each other, nothing is compared.
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.cluster.lighting.blur_subsets import add_missing, places_of_subsets
 from refgi.cluster.lighting.blur_tile import COLUMNS, END, FAR, TALL, WIDE, E, N, X, is_one_surface, load_pixels
 from refgi.cluster.settings import MOST_BLOCK, GeometryBlur
 from refgi.errors import expect
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 TASKS = 64  # parts that tiles are split into, whatever the number of threads
+NOWHERE = np.zeros((0, 0, 0, 2), np.int64)  # places of missing subsets where these are left out
 
 
 @stage("cluster.blur")
@@ -61,7 +64,8 @@ def blur(
     -----
     [Dong09] Sec. 6 takes a tenth of the scene's extent and a cosine of 0.8, and blurs what leaves the surface; here it
     is the irradiance, so that textures stay sharp. The window of pixel x starts at x - n // 2. The mean is taken of
-    differences to the pixel itself.
+    differences to the pixel itself. The paper does not say what becomes of subsets that an edge cuts off; here they
+    are looked for up to a window away (`every_subset`).
     """
     position, covered = np.ascontiguousarray(receivers.position), np.ascontiguousarray(receivers.covered, np.bool_)
     normal = np.ascontiguousarray(receivers.normal, position.dtype)
@@ -69,26 +73,28 @@ def blur(
     expect(values.shape == position.shape, "irradiance", f"shape {position.shape}", values.shape)
     expect(1 <= size <= MOST_BLOCK, "size", f"1 to {MOST_BLOCK} pixels", size)
     real = position.dtype.type
-    extent, cosine = FAR / 4, -np.inf
+    extent, cosine, places = FAR / 4, -np.inf, NOWHERE
     if isinstance(settings, GeometryBlur):
         extent = min(settings.extent * diagonal, FAR / 4)
         cosine = settings.cosine if settings.cosine > -1 else -np.inf
+        places = places_of_subsets(size) if settings.every_subset else NOWHERE
     result = np.empty_like(values)
-    _blur(values, position, normal, covered, size, real(extent) ** 2, real(cosine), result)
+    _blur(values, position, normal, covered, size, real(extent) ** 2, real(cosine), places, result)
     return result
 
 
 @kernel(parallel=True)
 def _blur(
     irradiance: Array, position: Array, normal: Array, covered: Array, size: int, square_extent: Any, cosine: Any,
-    result: Array,
+    places: Array, result: Array,
 ) -> None:
     height, width = covered.shape
+    planes = (irradiance, position, normal, covered)
     across = (width + WIDE - 1) // WIDE
     tiles = across * ((height + TALL - 1) // TALL)
     for task in prange(TASKS):
         scratch = np.empty((TALL + size - 1, END), position.dtype)  # once: pages of memory cost more than their use
-        sums = np.empty((4, WIDE), position.dtype)
+        sums, counts = np.empty((4, WIDE), position.dtype), np.empty(MOST_BLOCK, np.bool_)
         for t in range(np.int64(task), tiles, TASKS):
             top, left = t // across * TALL, t % across * WIDE
             tall, wide = min(TALL, height - top), min(WIDE, width - left)
@@ -100,6 +106,9 @@ def _blur(
                     _add_all(tile, row, size, sums)
                 else:
                     _add_accepted(tile, row, size, square_extent, cosine, sums)
+                    if places.size > 0:
+                        add_missing(tile, row, size, square_extent, cosine, places, planes, top + row, left, wide,
+                                    counts, sums)
                 _store(tile, row + size // 2, size // 2, sums, covered, top + row, left, wide, result)
 
 

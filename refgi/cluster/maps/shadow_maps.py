@@ -154,7 +154,7 @@ def shadow_maps(
     drawn, both = blockers(geometry, settings.occluders_alone, ends), settings.behind == "dual_paraboloid"
     used = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
     center = np.ascontiguousarray((areas.center + LIFT * extent.largest * areas.normal)[:, used].T)
-    frame, radius = areas.frame[used], settings.near_distance * areas.radius[used]
+    frame, radius = areas.frame[used], settings.near_share * areas.radius[used]
     rays = tracer if len(drawn.faces) == len(geometry.faces) else None
     depth, near, left_out = _draw(drawn, center, frame, radius, settings, dtype, rays)
     behind = near_behind = None

@@ -145,7 +145,7 @@ def rectangle_visibility(
 
     def visibility_of(m: int, points: Array, facing: Array) -> Array:
         tracer, visible = tracer_of(m), np.ones(points.shape[1], points.dtype)
-        radius = settings.near_distance * float(areas.radius[m])
+        radius = settings.near_share * float(areas.radius[m])
         ball = Ball(areas.center[:, m], radius) if settings.near_geometry == "ball" else None
         height = areas.normal[:, m] @ (points - areas.center[:, m, None])
         within = np.where(height > 0, True, settings.behind != "visible")
@@ -203,7 +203,7 @@ def tracer_without_near(
     Tracer
         That of the frame where nothing is left out.
     """
-    distance = settings.near_distance * areas.radius[m]
+    distance = settings.near_share * areas.radius[m]
     if settings.near_geometry != "planes" or distance == 0:
         return frame.tracer
     corner = drawn.vertices[drawn.faces] - areas.center[:, m]

@@ -127,6 +127,7 @@ def split_error(
     lights = choose_lights(frame, settings.lights)
     csm = dataclasses.replace(settings.visibility, prefilter="mip") if isinstance(settings.visibility, Csm) else Csm()
     base = dataclasses.replace(settings, visibility=csm)
+    base = dataclasses.replace(base, maps=base.drawn_maps)  # one for all kinds: a step changes nothing else
     areas, maps = cluster_lights(frame, lights, base)
     pictures = {} if truth is None else {"truth": truth}
     kinds: dict[str, Visibility] = {

@@ -109,5 +109,5 @@ def reference_visibility(
     projected = maps if isinstance(settings.visibility, BackProjection) else None
     rectangle = None
     if isinstance(settings.visibility, RaysRectangle) or (projected is not None and settings.maps.behind == "raytrace"):
-        rectangle = rectangle_visibility(frame, areas, settings.maps, ends=ends_of(frame, lights))
+        rectangle = rectangle_visibility(frame, areas, settings.drawn_maps, ends=ends_of(frame, lights))
     return rectangle if projected is None else back_projection_visibility(areas, projected, rectangle)

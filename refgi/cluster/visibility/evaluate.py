@@ -79,7 +79,7 @@ def visibility(
                 _shadow_tiles(shadow, filter_channels(shadow), points, facing, visible)
     if traced and tracer is not None:
         back = areas.normal[:, m] @ (points - areas.center[:, m, None]) <= 0
-        radius = settings.maps.near_distance * float(areas.radius[m])
+        radius = settings.drawn_maps.near_share * float(areas.radius[m])
         visible[back] = _by_rays(tracer, areas, m, radius, points[:, back], facing[:, back])
     return visible
 

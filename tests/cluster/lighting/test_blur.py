@@ -12,6 +12,7 @@ from tests.naive.interleaving import blurred, window
 ROUNDING = 1e-12  # of means of some dozen float64 values, relative to the largest
 ROUNDING_SINGLE = 2e-6  # the same of float32: 64 differences, half a unit of rounding each
 DIAGONAL = 10.0  # m: an extent of 1 m as published
+BETWEEN = 0.103  # of the diagonal: no two pixels of `rough` are this far apart, so that rounding does not decide
 
 
 def plane(height, width, real=np.float64):
@@ -38,11 +39,15 @@ def rough(rng, height, width, real=np.float64):
 def test_equals_the_twin(height, width, side, evidence):
     rng = np.random.default_rng(height)
     to, light = rough(rng, height, width), rng.random((3, height, width))
-    expected = blurred(light, *to, side, 1.0, 0.8)
-    result = blur(light, to, side, GeometryBlur(), DIAGONAL)
-    error = np.abs(result - expected).max()
-    evidence(f"{width} x {height}, n = {side}: {error:.1e} off the loops")
-    assert error < ROUNDING
+    plain, full = (blurred(light, *to, side, BETWEEN * DIAGONAL, 0.8, every) for every in (False, True))
+    error, farther = (np.abs(blur(light, to, side, GeometryBlur(BETWEEN, 0.8, every), DIAGONAL) - expected).max()
+                      for every, expected in ((False, plain), (True, full)))
+    evidence(f"{width} x {height}, n = {side}: {error:.1e} off the loops, {farther:.1e} with every subset")
+    assert max(error, farther) < ROUNDING
+    assert (np.abs(full - plain).max() > 0.05) == (side > 1 and height > side)
+    # any normal: what has no surface has none, and is to be left out for that
+    around = blurred(light, *to, side, BETWEEN * DIAGONAL, -np.inf, every_subset=True)
+    assert np.abs(blur(light, to, side, GeometryBlur(BETWEEN, -1.0), DIAGONAL) - around).max() < ROUNDING
     box = blur(light, to, side, BoxBlur(), DIAGONAL)
     assert np.abs(box - blurred(light, *to, side, np.inf, -2.0)).max() < ROUNDING
 
@@ -60,8 +65,9 @@ def test_a_step_along_one_axis_parts_two_surfaces(axis, sign, across, evidence):
     normal = np.zeros_like(position)
     normal[axis - 1] = 1
     to, light = Receivers(position, normal, np.ones((16, 24), bool)), rng.random((3, 16, 24))
-    expected = blurred(light, *to, 8, 1.0, 0.8)
-    error = np.abs(blur(light, to, 8, GeometryBlur(), DIAGONAL) - expected).max()
+    expected, every = blurred(light, *to, 8, 1.0, 0.8), blurred(light, *to, 8, 1.0, 0.8, every_subset=True)
+    error = max(np.abs(blur(light, to, 8, GeometryBlur(every_subset=some), DIAGONAL) - picture).max()
+                for some, picture in ((False, expected), (True, every)))
     mixed = np.abs(blur(light, to, 8, BoxBlur(), DIAGONAL) - expected).max()
     evidence(f"axis {axis}, {sign:+d}: {error:.0e} off the loops, where a mean of all is {mixed:.2f} off")
     assert error < ROUNDING
@@ -110,12 +116,32 @@ def test_single_precision_and_threads():
     to, light = rough(rng, 50, 150), rng.random((3, 50, 150)).astype(np.float32)
     near = Receivers(to.position.astype(np.float32), to.normal.astype(np.float32), to.covered)
     with threads(1):
-        one = blur(light, near, 8, GeometryBlur(), DIAGONAL)
-    assert np.array_equal(one, blur(light, near, 8, GeometryBlur(), DIAGONAL))
-    exact = blurred(light, near.position.astype(np.float64), near.normal, near.covered, 8, 1.0, 0.8)
+        one = blur(light, near, 8, GeometryBlur(BETWEEN), DIAGONAL)
+    assert np.array_equal(one, blur(light, near, 8, GeometryBlur(BETWEEN), DIAGONAL))
+    position, extent = near.position.astype(np.float64), BETWEEN * DIAGONAL
+    exact = blurred(light, position, near.normal, near.covered, 8, extent, 0.8, every_subset=True)
     off = np.abs(one - exact).max(axis=0)
     # where a comparison is decided by rounding, another set of pixels counts
     assert (off > ROUNDING_SINGLE).mean() < 1e-3
+
+
+@pytest.mark.feature("VAL-24")
+@pytest.mark.parametrize("edge", ["left", "top", "corner", "slanted"])
+def test_beside_an_edge_every_subset_counts_once(edge, evidence):
+    """A surface whose light is one number for each subset: its mean everywhere, however the edge cuts the windows."""
+    y, x = np.mgrid[:48, :64]
+    ahead = {"left": x >= 21, "top": y < 19, "corner": (x >= 21) & (y < 35), "slanted": 2 * x > y + 30}[edge]
+    to = plane(48, 64)
+    to = to._replace(position=to.position + np.array([0, 0, 3.0]).reshape(3, 1, 1) * ahead)
+    subset = y % 8 * 8 + x % 8
+    light = np.where(ahead, subset, 100.0 + subset) * np.ones((3, 1, 1))
+    mean = np.where(ahead, 31.5, 131.5)
+    settings = GeometryBlur(extent=0.25)  # 2.5 m: farther along the surface, not across the step
+    left_out = np.abs(blur(light, to, 8, GeometryBlur(0.25, every_subset=False), DIAGONAL) - mean).max()
+    error = np.abs(blur(light, to, 8, settings, DIAGONAL) - mean).max()
+    evidence(f"{edge} edge: off by {error:.0e} of subsets 0 to 63, by {left_out:.1f} without those that windows miss")
+    assert error < ROUNDING * 200
+    assert left_out > 1
 
 
 def test_a_window_sees_every_subset_once():

@@ -162,7 +162,7 @@ def test_any_size_and_any_number_of_threads_give_the_same_bits(size, dtype):
     for count in (1, before):
         numba.set_num_threads(count)
         try:
-            maps = maps_of(shape, areas, dtype, maps_resolution=size, near_geometry="ball")
+            maps = maps_of(shape, areas, dtype, maps_resolution=size, near_geometry="ball", near_distance=0.5)
         finally:
             numba.set_num_threads(before)
         assert maps.depth.shape[1:] == (size, size)

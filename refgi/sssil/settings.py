@@ -11,8 +11,8 @@ from refgi.settings import Settings, setting
 
 Start = Literal["full", "half", "quarter"]
 Pattern = Literal["row", "pixel", "fixed", "all"]
-Downsample = Literal["closest", "average", "closest_average"]
-FormFactor = Literal["disc", "point"]
+Downsample = Literal["closest", "average", "closest_average", "resampled"]
+FormFactor = Literal["disc", "texel", "point"]
 Form = Literal["recursive", "printed"]
 Fetch = Literal["bilinear", "nearest"]
 
@@ -61,8 +61,9 @@ class SenderSettings(Settings):
     """Texels as senders: downsampling (Sec. 4) and form factor (Sec. 3.1).
 
     A coarse texel takes position, normal and radiance of the "closest" of four, the "average" of all, or position and
-    normal of the closest and the average radiance. A sample's form factor is that of a "disc" (Eq. 4) or of a "point"
-    (Eq. 3).
+    normal of the closest and the average radiance; "resampled", it sends the flux of all from one, drawn in
+    proportion to flux, and receives as the closest. A sample's form factor is that of a "disc" as large as all
+    texels that it stands for (Eq. 4), of the disc of its own "texel", times their number, or of a "point" (Eq. 3).
     """
 
     PRINCIPAL = "downsample"

@@ -40,7 +40,7 @@ def test_drawn_senders_are_levels_of_their_own():
     """All but the depth, which is the receivers'; pixels are senders as they are."""
     frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=8)
     for start in ("full", "half"):
-        settings = of(HssilSettings, start=start, levels=3)
+        settings = of(HssilSettings, start=start, levels=3, radius=2.0)
         receivers = pyramid(frame, settings)
         senders = sender_pyramid(frame, receivers, settings)
         own = [plane for one, other in zip(senders, receivers, strict=True)

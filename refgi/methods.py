@@ -79,7 +79,7 @@ class Picture(NamedTuple):
     irradiance: Array  # (3, h, w) indirect, W/m^2
     radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
     estimate: Any = None  # a `TruthResult`, of a method that states its own error
-    count: Any = None  # (h, w) frames that each pixel is blended of, of a temporal filter that counts them
+    frames: Any = None  # (h, w) frames that each pixel is blended of, of a temporal filter that counts them
 
 
 class KeepingEstimate:

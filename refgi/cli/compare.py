@@ -56,7 +56,8 @@ def _compare(session: Session, /, methods: str | None, preset: str, pairs: tuple
     require_memory(scene, dtype, rsm_resolution, traced=True, compared=len(names) + 2, settings=settings)
     with on_threads(threads), progress() as tell:
         warm_up([*names, "truth"], dtype, tell)
-        comparison = compare(scene, names, truth_settings=settings.pop("truth"), method_settings=settings, out=out, still=blended,
+        comparison = compare(scene, names, truth_settings=settings.pop("truth"), method_settings=settings, out=out,
+                             still=blended,
                              progress=tell, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)
     _report(session, comparison, out)
     return 0 if comparison.is_sound else FAILED

@@ -146,8 +146,8 @@ def _write(picture: "Picture", files: "Pictures", record: "Record") -> dict[str,
     from refgi.image import write_exr
 
     estimate = picture.estimate
-    spread = (None, None) if estimate is None else (estimate.variance_of_mean, estimate.samples)
-    planes = linear_planes(picture.radiance, picture.irradiance, *spread, count=picture.count)
+    variance, samples = (None, None) if estimate is None else (estimate.variance_of_mean, estimate.samples)
+    planes = linear_planes(picture.radiance, picture.irradiance, variance, samples, picture.frames)
     files.make_folder()
     if files.exr is not None:
         write_exr(files.exr, planes, record)

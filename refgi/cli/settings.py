@@ -93,7 +93,7 @@ def still_frames(
     InputError
         If none of the methods has a temporal filter, or a setting is wrong or of no use.
     """
-    from refgi.methods import find_method, require_filter
+    from refgi.methods import require_filter
     from refgi.settings import from_text
 
     pairs = list(pairs)
@@ -101,9 +101,10 @@ def still_frames(
         expect(not pairs, "--temporal", "--frames beside it", " ".join(pairs))
         return None
     from refgi.provenance.frames import StillFrames
+    from refgi.sssil.temporal import TemporalSettings
 
-    (first, *_) = require_filter(methods)
-    return StillFrames(frames, from_text(find_method(first).temporal, pairs))
+    require_filter(methods)
+    return StillFrames(frames, from_text(TemporalSettings(), pairs))
 
 
 def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[str]]:

@@ -137,12 +137,12 @@ class _Runner:
         method = METHODS[name]
         function = method.function
         self._warm_up(function, settings)
-        count = None
+        frames = None
         if still is None:
             irradiance, seconds, runs = self._timed(name, lambda frame: function(frame, settings))
         else:
             made, seconds, runs = self._timed(name, lambda _: self._blended(name, settings, still))
-            irradiance, count, seconds = made.irradiance, made.count, seconds / still.count
+            irradiance, frames, seconds = made.irradiance, made.frames, seconds / still.frames
         radiance, covered = self.frame.radiance(irradiance), self.frame.gbuffer.covered
         judges = [TRUTH] if method.knows_visibility(settings) else [TRUTH, UNOCCLUDED]
         against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered,
@@ -151,7 +151,7 @@ class _Runner:
         account = method.ledger if accounts else None
         ledger = account(self.frame, settings) if account else None
         return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen, ledger,
-                            still, count)
+                            still, frames)
 
     def _blended(self, name: str, settings: Any, still: "StillFrames") -> "Picture":
         from refgi.provenance.frames import render_still

@@ -177,7 +177,7 @@ class MethodResult:
     flip: Flip
     ledger: Any = None  # where the light's power went, of a method that accounts for it; only where files are written
     still: Any = None  # `StillFrames` that it is blended of, of a method with a temporal filter
-    count: Any = None  # (h, w) frames that each pixel is blended of, where they are counted
+    frames: Any = None  # (h, w) frames that each pixel is blended of, where they are counted
 
 
 @dataclasses.dataclass(frozen=True)

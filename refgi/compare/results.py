@@ -186,7 +186,7 @@ def error_scale(comparison: Comparison) -> maps.Scale:
 def _write_picture(comparison: Comparison, folder: Path, made: Reference | MethodResult) -> Record:
     """Write EXR and PNG, and return the record that they hold."""
     record = record_of(comparison, made)
-    spread = (made.variance, made.samples) if isinstance(made, Reference) else (None, None, made.count)
+    spread = (made.variance, made.samples) if isinstance(made, Reference) else (None, None, made.frames)
     write_exr(folder / f"{made.name}.exr", linear_planes(made.radiance, made.irradiance, *spread), record)
     write_preview(folder / f"{made.name}.png", made.radiance, record)
     return record

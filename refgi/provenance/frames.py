@@ -30,13 +30,13 @@ class SequenceFrame(NamedTuple):
 class StillFrames(NamedTuple):
     """How many frames of a resting scene a picture is blended of."""
 
-    count: int
+    frames: int
     temporal: TemporalSettings
 
     @property
     def record(self) -> Record:
         """What it adds to the record of scene and method: JSON values."""
-        return {"frames": self.count, "temporal": plain(self.temporal)}
+        return {"frames": self.frames, "temporal": plain(self.temporal)}
 
 
 def path_record(path: str, of: int, temporal: TemporalSettings | None) -> Record:
@@ -173,7 +173,7 @@ def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame,
     sequence = Sequence(scenes, settings, frame.temporal, method=light, **options)
     for step in sequence.over(scenes, first):
         made = step
-    return Picture(made.frame, made.irradiance, made.radiance, None if frame.temporal else light.estimate, made.count)
+    return Picture(made.frame, made.irradiance, made.radiance, None if frame.temporal else light.estimate, made.frames)
 
 
 def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, options: Mapping[str, Any]) -> Picture:
@@ -204,8 +204,8 @@ def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, o
     """
     require_filter([method])
     options = {**options, "shadows": options.get("shadows") or usual_shadows(settings)}
-    last = still_frame(scene, settings, still.temporal, still.count, method=find_method(method).function, **options)
-    return Picture(last.frame, last.irradiance, last.radiance, count=last.count)
+    last = still_frame(scene, settings, still.temporal, still.frames, method=find_method(method).function, **options)
+    return Picture(last.frame, last.irradiance, last.radiance, frames=last.frames)
 
 
 def require_same_path(record: Mapping[str, Any], found: str) -> None:

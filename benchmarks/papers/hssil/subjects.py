@@ -109,7 +109,8 @@ def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
     share = math.hypot(frame.width, frame.height) / math.hypot(WIDE * PAPER_HEIGHT, PAPER_HEIGHT)
     levels = max(1, round(4 + math.log2(share)))
     radius = max(1.0, RADIUS * share * 2.0 ** (4 - levels))
-    return of(HssilSettings, **({"radius": radius, "levels": max(1, levels + further), "downsample": "closest"} | changes))
+    published = {"radius": radius, "levels": max(1, levels + further), "downsample": "closest"}
+    return of(HssilSettings, **(published | changes))
 
 
 def scaled_radius(frame: Frame, radius: float) -> float:

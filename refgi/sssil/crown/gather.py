@@ -59,7 +59,8 @@ def gather(level: Level, index: int, settings: HssilSettings, senders: Level | N
         points, weight = sample_points(inner, sampling.samples), sample_weight(radius, inner, sampling.samples)
         key = level_key(sampling.seed, level.number)
         emitters = pack(senders, 1, farthest, WIDE)
-        _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, key, weight.astype(real), form, factor, result)
+        _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, key,
+                          weight.astype(real), form, factor, result)
         return result
     offsets, weight = _reaching(*shared_offsets(sampling, index, level.number, rows, radius, columns), rows, columns)
     emitters = pack(senders, offsets.shape[1], farthest, WIDE)
@@ -101,8 +102,8 @@ def level_factor(index: int, settings: HssilSettings) -> float:
 
 @kernel(parallel=True)
 def _gather_shared(
-    emitters: Emitters, position: Array, normal: Array, offsets: Array, weight: Array, paired: bool, form: int, factor: Any,
-    result: Array,
+    emitters: Emitters, position: Array, normal: Array, offsets: Array, weight: Array, paired: bool, form: int,
+    factor: Any, result: Array,
 ) -> None:
     rows = normal.shape[1]
     packed, emit_from, emit_to = emitters.packed, emitters.emit_from, emitters.emit_to
@@ -200,8 +201,8 @@ def _store(tile: Array, lanes: int, factor: Any, row: int, column: int, phases: 
 
 @kernel(parallel=True)
 def _gather_per_pixel(
-    emitters: Emitters, position: Array, normal: Array, points: Array, inner: int, radius: float, key: Any, weight: Array, form: int,
-    factor: Any, result: Array,
+    emitters: Emitters, position: Array, normal: Array, points: Array, inner: int, radius: float, key: Any,
+    weight: Array, form: int, factor: Any, result: Array,
 ) -> None:
     rows = normal.shape[1]
     packed, line, pad, strip = emitters.packed, emitters.line, emitters.pad, emitters.strip

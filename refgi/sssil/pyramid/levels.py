@@ -208,7 +208,7 @@ def drawn_senders(
     Returns
     -------
     tuple of Level
-        Area is the sum over pixels, and radiance times area the flux over pi, to rounding. `depth` is that of `closest`.
+        Area is the sum over pixels, radiance times area the flux over pi, to rounding. `depth` is that of `closest`.
 
     Notes
     -----

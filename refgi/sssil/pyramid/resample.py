@@ -1,8 +1,8 @@
 """Senders that keep the light: a coarse texel stands where one of four does, drawn in proportion to its flux.
 
 A drawn texel sends the flux of all, sum of radiance times area. The chance of each is its share of that flux, the mean
-of red, green and blue, so that every sum that is linear in flux (Eq. 3) has the expectation of the sum over pixels: this
-is resampled importance sampling of one out of four. Receivers are the closest texels still (Sec. 4).
+of red, green and blue, so that every sum that is linear in flux (Eq. 3) has the expectation of the sum over pixels:
+resampled importance sampling of one out of four. Receivers are the closest texels still (Sec. 4).
 
 Candidates are in the order of rows. The last one that sends, of those before which less than the share u of the flux is
 sent, is drawn.
@@ -27,7 +27,7 @@ TASKS = 16  # blocks of rows that threads take, whatever their number
 
 @kernel(parallel=True)
 def draw_pixels(picture: Picture, view: View, seed: int, closest: Level, drawn: Level) -> None:
-    """Fill the first level of senders, whose texels cover 2^k x 2^k pixels; where nothing is sent it is as `closest`."""
+    """Fill the first level of senders, whose texels cover 2^k x 2^k pixels; as `closest` where none sends."""
     rows = drawn.area.shape[0]
     for task in prange(TASKS):
         _draw_from_pixels(picture, view, seed, closest, drawn, task * rows // TASKS, (task + 1) * rows // TASKS)
@@ -35,7 +35,7 @@ def draw_pixels(picture: Picture, view: View, seed: int, closest: Level, drawn: 
 
 @kernel(parallel=True)
 def draw_texels(fine: Level, seed: int, closest: Level, drawn: Level) -> None:
-    """Fill a coarser level of senders from a finer one; where nothing is sent it is as `closest`."""
+    """Fill a coarser level of senders from a finer one; as `closest` where none sends."""
     rows = drawn.area.shape[0]
     for task in prange(TASKS):
         _draw_from_texels(fine, seed, closest, drawn, task * rows // TASKS, (task + 1) * rows // TASKS)

@@ -34,7 +34,7 @@ class History(NamedTuple):
     irradiance: Array  # (3, h, w) F, or I for the printed form, W/m^2
     view: SourceView  # its camera, depths and normals
     geometry: Geometry  # the scene's triangles, where the scene has them
-    count: Array | None = None  # (h, w) frames in which each pixel's surface was found; None: as many as a asks for
+    frames: Array | None = None  # (h, w) frames in which each pixel's surface was found; None: as many as a asks for
 
 
 class Filtered(NamedTuple):
@@ -42,10 +42,10 @@ class Filtered(NamedTuple):
 
     irradiance: Array  # (3, h, w) W/m^2
     reused: float  # share of the pixels with a surface that the frame before shows as well
-    count: Array | None  # (h, w) frames in which each pixel's surface was found, this one included
+    frames: Array | None  # (h, w) frames in which each pixel's surface was found, this one included
 
 
-def history_of(frame: "Frame", geometry: Geometry, irradiance: Array, count: Array | None = None) -> History:
+def history_of(frame: "Frame", geometry: Geometry, irradiance: Array, frames: Array | None = None) -> History:
     """Return the state that the next frame needs of this one.
 
     Parameters
@@ -56,20 +56,20 @@ def history_of(frame: "Frame", geometry: Geometry, irradiance: Array, count: Arr
         Its scene's triangles as the scene holds them: the very object of the next scene if nothing moves.
     irradiance : (3, h, w) ndarray
         Light for the next frame, F or I by the form of the filter, W/m^2.
-    count : (h, w) ndarray, optional
+    frames : (h, w) ndarray, optional
         Frames in which each pixel's surface was found; as many as a asks for where absent.
 
     Returns
     -------
     History
-        Depths, normals, light and count: eight numbers a pixel.
+        Depths, normals, light and number of frames: eight numbers a pixel.
     """
     buffer = frame.gbuffer
     depth, normal = buffer.resolve("depth", "normal")
-    return History(irradiance, SourceView(buffer.projection, depth, normal, frame.origin), geometry, count)
+    return History(irradiance, SourceView(buffer.projection, depth, normal, frame.origin), geometry, frames)
 
 
-def first_count(irradiance: Array, settings: TemporalSettings) -> Array | None:
+def first_frames(irradiance: Array, settings: TemporalSettings) -> Array | None:
     """Return the number of frames in which surfaces were found after the first one.
 
     Parameters
@@ -132,8 +132,8 @@ def temporal_filter(
         expect_same_triangles(geometry, history.geometry)
         before = _relative_to(history.geometry, frame.origin)
         position, normal, speed = previous_points(buffer, frame.scene.geometry, before)
-    counted = settings.counts_frames and history.count is not None
-    earlier = np.concatenate([history.irradiance, history.count[None]]) if counted else history.irradiance
+    frames = history.frames if settings.counts_frames else None
+    earlier = history.irradiance if frames is None else np.concatenate([history.irradiance, frames[None]])
     reprojected, weight = reproject(earlier, history.view, position, normal, buffer.covered,
                                     origin=frame.origin, depth_tolerance=settings.depth_tolerance,
                                     normal_cosine=settings.normal_cosine, fetch=settings.fetch)
@@ -148,7 +148,7 @@ def temporal_filter(
     falloff = real(-math.log2(math.e) / settings.speed)
     _blend(irradiance, speed, entering, real(settings.weight), falloff, weight, reprojected, reused)
     return Filtered(reprojected[:3], int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))),
-                    reprojected[3] if counted else None)
+                    None if frames is None else reprojected[3])
 
 
 def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:

@@ -37,12 +37,11 @@ def clamp_to_neighbourhood(new: Array, covered: Array, deviations: float, radius
 @kernel(parallel=True)
 def _clamp(new: Array, covered: Array, deviations: Any, radius: int, earlier: Array) -> None:
     height, width = covered.shape
-    for prow in prange(height):
-        row = np.int64(prow)
+    for row in prange(height):
+        first, end = max(0, int(row) - radius), min(height, int(row) + radius + 1)
         count, total, square = np.zeros(width), np.zeros(width), np.zeros(width)
         for channel in range(3):
-            _sum_columns(new[channel], covered, max(0, row - radius), min(height, row + radius + 1), count, total,
-                         square)
+            _sum_columns(new[channel], covered, first, end, count, total, square)
             _clamp_row(count, total, square, deviations, radius, covered[row], earlier[channel, row])
 
 

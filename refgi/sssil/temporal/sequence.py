@@ -10,7 +10,7 @@ from refgi.frame import Frame
 from refgi.scene.model import Scene
 from refgi.settings import flat, replaced
 from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
-from refgi.sssil.temporal.filter import History, first_count, history_of, temporal_filter
+from refgi.sssil.temporal.filter import History, first_frames, history_of, temporal_filter
 
 Array = npt.NDArray[Any]
 Method = Callable[[Frame, Any], Array]
@@ -25,7 +25,7 @@ class SequenceFrame(NamedTuple):
     irradiance: Array  # (3, h, w) indirect, filtered, W/m^2
     radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
     reused: float  # share of the pixels with a surface that the frame before shows as well
-    count: Array | None = None  # (h, w) frames in which each pixel's surface was found, where the filter counts them
+    frames: Array | None = None  # (h, w) frames in which each pixel's surface was found, where the filter counts them
 
 
 class Sequence:
@@ -98,11 +98,11 @@ class Sequence:
         irradiance = self.method(frame, seeded(self.settings, number))
         if self.temporal is None:
             return SequenceFrame(frame, irradiance, frame.radiance(irradiance), 0.0), None
-        filtered, reused, count = irradiance, 0.0, first_count(irradiance, self.temporal)
+        filtered, reused, frames = irradiance, 0.0, first_frames(irradiance, self.temporal)
         if history is not None:
-            filtered, reused, count = temporal_filter(irradiance, frame, scene.geometry, history, self.temporal)
-        left = history_of(frame, scene.geometry, irradiance if self.temporal.form == "printed" else filtered, count)
-        return SequenceFrame(frame, filtered, frame.radiance(filtered), reused, count), left
+            filtered, reused, frames = temporal_filter(irradiance, frame, scene.geometry, history, self.temporal)
+        left = history_of(frame, scene.geometry, irradiance if self.temporal.form == "printed" else filtered, frames)
+        return SequenceFrame(frame, filtered, frame.radiance(filtered), reused, frames), left
 
 
 def _hssil() -> Method:

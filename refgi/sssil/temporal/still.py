@@ -1,5 +1,6 @@
 """A still picture after some frames of its temporal filter (Sec. 3.3), as the stills of a game are."""
 
+import collections
 import itertools
 from collections.abc import Callable
 from typing import Any
@@ -37,8 +38,4 @@ def still_frame(
         The last frame, filtered.
     """
     sequence = Sequence(itertools.repeat(scene, frames), settings, temporal, method=method, **frame_options)
-    last = None
-    for last in sequence:
-        pass
-    assert last is not None
-    return last
+    return collections.deque(sequence, maxlen=1).pop()

@@ -114,8 +114,8 @@ def _march_rows(packed: Array, sending: Array, offsets: Array, weight: Array, th
 
 
 @kernel
-def _march_row(packed: Array, sending: Array, row: Any, offsets: Array, weight: Array, thickness: Any, form: int, lines: Array,
-               mask: Array, half: int) -> None:
+def _march_row(packed: Array, sending: Array, row: Any, offsets: Array, weight: Array, thickness: Any, form: int,
+               lines: Array, mask: Array, half: int) -> None:
     """March one slice for a row of receivers, which are the SIMD lanes."""
     rows, columns = packed.shape[0], packed.shape[2]
     receiver, part = packed[row], np.uint64(PART + 3 * half)
@@ -209,8 +209,8 @@ def _march_pixels(packed: Array, sending: Array, steps: SliceCounts, key: Any, t
 
 
 @kernel
-def _march_pixel(packed: Array, sending: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any, form: int,
-                 lines: Array, mask: Array) -> None:
+def _march_pixel(packed: Array, sending: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any,
+                 form: int, lines: Array, mask: Array) -> None:
     rows, columns = packed.shape[0], packed.shape[2]
     receiver, part, one, p = packed[row], np.uint64(PART), np.uint64(1), np.uint64(column)
     mask[p], lines[HIGHEST, p] = np.uint32(0), packed.dtype.type(0.0)

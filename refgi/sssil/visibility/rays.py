@@ -93,7 +93,8 @@ def ray_gather(
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])
         size = (last - first) * count
-        _write_rays(surfels, sending, samples, level.shape, first, last, form, rays[0], rays[1], reach, transfer, sender)
+        _write_rays(surfels, sending, samples, level.shape, first, last, form, rays[0], rays[1], reach, transfer,
+                    sender)
         frame.tracer.fill_occluded(rays[0][:size], rays[1][:size], reach[:size], blocked[:size])
         add_unoccluded(radiance, first, last, count, blocked, transfer, sender, total)
         report_progress(last / total.shape[1])
@@ -125,19 +126,23 @@ def _samples(level: Level, index: int, sampling: SamplingSettings) -> SampleOffs
 
 
 @kernel(parallel=True)
-def _write_rays(surfels: Surfels, senders: Surfels, samples: SampleOffsets, shape: tuple[int, int], first: int, last: int, form: int,
-         origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array) -> None:
+def _write_rays(
+    surfels: Surfels, senders: Surfels, samples: SampleOffsets, shape: tuple[int, int], first: int, last: int,
+    form: int, origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array,
+) -> None:
     """Write ray and transfer of each pair of receivers first to last and their samples."""
     count = samples.weight.size
     for i in prange(last - first):
         ray = np.int64(i) * count
-        _write_ray(surfels, senders, samples, shape, first + np.int64(i), ray, form, origins, directions, reach, transfer,
-                   sender)
+        _write_ray(surfels, senders, samples, shape, first + np.int64(i), ray, form, origins, directions, reach,
+                   transfer, sender)
 
 
 @kernel
-def _write_ray(surfels: Surfels, senders: Surfels, samples: SampleOffsets, shape: tuple[int, int], receiver: Any, ray: Any, form: int,
-             origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array) -> None:
+def _write_ray(
+    surfels: Surfels, senders: Surfels, samples: SampleOffsets, shape: tuple[int, int], receiver: Any, ray: Any,
+    form: int, origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array,
+) -> None:
     row, column = receiver // shape[1], receiver % shape[1]
     key = pixel_key(row_key(samples.key, row), column)
     own = samples.offsets.shape[2] == 0

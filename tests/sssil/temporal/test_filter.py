@@ -12,9 +12,9 @@ from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.scene.motion import faces_of, moved, rotation_about
 from refgi.sssil.temporal import Sequence, TemporalSettings
-from refgi.sssil.temporal.filter import first_count, history_of, temporal_filter
-from refgi.sssil.temporal.neighbourhood import clamp_to_neighbourhood
+from refgi.sssil.temporal.filter import first_frames, history_of, temporal_filter
 from refgi.sssil.temporal.motion import previous_points
+from refgi.sssil.temporal.neighbourhood import clamp_to_neighbourhood
 from tests.naive.reprojection import recursion
 
 SIZE = {"width": 40, "height": 30}
@@ -58,7 +58,7 @@ def at_rest(frame, lights, settings):
     """Light of a frame that is rendered again and again."""
     results, history = [], None
     for new in lights:
-        light, count = new, first_count(new, settings)
+        light, count = new, first_frames(new, settings)
         if history is not None:
             light, reused, count = temporal_filter(new, frame, frame.scene.geometry, history, settings)
             assert reused == 1
@@ -117,13 +117,13 @@ def test_a_surface_that_is_new_starts_at_one(room):
                      (room.camera.target, (9.0, 9.0, 9.0)))
     settings = TemporalSettings()
     light = np.ones((3, 30, 40))
-    history = history_of(away, room.geometry, light, first_count(light, settings))
+    history = history_of(away, room.geometry, light, first_frames(light, settings))
     first = temporal_filter(light, looking, room.geometry, history, settings)
-    assert (first.count[looking.gbuffer.covered] == 1).any()
+    assert (first.frames[looking.gbuffer.covered] == 1).any()
     second = temporal_filter(3 * light, looking, room.geometry,
-                             history_of(looking, room.geometry, first.irradiance, first.count), settings)
-    new = looking.gbuffer.covered & (first.count == 1)
-    np.testing.assert_array_equal(second.count[new], 2)
+                             history_of(looking, room.geometry, first.irradiance, first.frames), settings)
+    new = looking.gbuffer.covered & (first.frames == 1)
+    np.testing.assert_array_equal(second.frames[new], 2)
     np.testing.assert_allclose(second.irradiance[:, new], 2.0, rtol=1e-15)
 
 

@@ -11,7 +11,7 @@ from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 
 SIDE, HEIGHT, SPACING, RADIUS = 49, 1.0, 0.25, 12.0
-SEEDS, SAMPLES = 400, 16
+SEEDS, SAMPLES = 100, 16
 
 
 def plane_below():
@@ -43,7 +43,7 @@ def texel_sum(form):
 
 @pytest.mark.feature("HSS-04")
 def test_few_samples_are_unbiased(evidence):
-    """Analytic and statistical: a constant plane, 16 samples in a crown and 5 within; the disc of all texels is dark."""
+    """Analytic and statistical: a constant plane, 16 samples in a crown and 5 within, and Eq. 4 dark."""
     level, middle = plane_below()
     expected = texel_sum("texel")
     means, noise = {}, {}
@@ -54,8 +54,8 @@ def test_few_samples_are_unbiased(evidence):
     assert abs(means["texel"] - expected) < 4 * noise["texel"] / math.sqrt(SEEDS)
     assert means["disc"] < expected - 4 * noise["disc"] / math.sqrt(SEEDS)
     assert noise["disc"] < noise["texel"]
-    evidence(f"{SAMPLES} samples over every texel: disc {means['disc'] / expected:.3f} +- {noise['disc'] / expected:.2f}"
-             f", texel {means['texel'] / expected:.3f} +- {noise['texel'] / expected:.2f}")
+    found = (f"{form} {means[form] / expected:.3f} +- {noise[form] / expected:.2f}" for form in means)
+    evidence(f"{SAMPLES} samples over every texel: {', '.join(found)}")
 
 
 def test_every_texel_is_the_sum_of_eq_4():

@@ -27,6 +27,7 @@ class Method(NamedTuple):
     estimate: Callable[[Any, Any], Any] | None = None  # gives the picture with its own error
     memory: Callable[[Any, tuple[int, int], int], int] | None = None  # bytes that settings add to a picture
     presets: Mapping[str, Settings] = NONE  # named settings beside the default; "paper": the values printed
+    temporal: Settings | None = None  # of its temporal filter over frames, where it has one
 
     def preset(self, name: str) -> Settings:
         """Return named settings; "default" are those of the class."""

@@ -3,7 +3,7 @@
 A method declares itself by a `Method` in its package; here stands only where it is. It is imported when it is used.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -79,6 +79,7 @@ class Picture(NamedTuple):
     irradiance: Array  # (3, h, w) indirect, W/m^2
     radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
     estimate: Any = None  # a `TruthResult`, of a method that states its own error
+    frames: Any = None  # (h, w) frames that each pixel is blended of, of a temporal filter that counts them
 
 
 class KeepingEstimate:
@@ -121,6 +122,33 @@ def find_method(name: str) -> Method:
     if not isinstance(name, str) or name not in METHODS:
         raise InputError(f"method: expected one of {', '.join(METHODS)}, got {name!r}")
     return METHODS[name]
+
+
+def require_filter(names: Iterable[str]) -> list[str]:
+    """Return those of some methods that blend frames over time.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Short names.
+
+    Returns
+    -------
+    list of str
+        One or more.
+
+    Raises
+    ------
+    InputError
+        If none of them has a temporal filter.
+    """
+    asked = list(names)
+    having = [name for name in asked if find_method(name).temporal is not None]
+    if not having:
+        known = ", ".join(name for name in METHODS if METHODS[name].temporal is not None)
+        raise InputError(f"frames: expected a method with a temporal filter ({known}), got {', '.join(asked)}",
+                         key="frames")
+    return having
 
 
 def usual_shadows(settings: Any) -> "Shadows":

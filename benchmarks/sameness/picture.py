@@ -14,7 +14,7 @@ from refgi.sssil.temporal import Sequence
 SIZE = {"width": 45, "height": 33}
 WIDER = {"width": 161, "height": 121}
 RSM = 64
-STILL = {"radius": 3.0, "levels": 3, "samples": 16}  # settings of each frame of a sequence
+STILL = {"radius": 3.0, "levels": 3, "samples": 16, "downsample": "closest"}  # settings of each frame of a sequence
 DIGITS = 16
 
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.options import machine, shadows, speech, view, writing
+from refgi.cli.options import machine, shadows, speech, still, view, writing
 from refgi.cli.session import FAILED, Session, say, table
 from refgi.cli.settings import preset
 
@@ -20,6 +20,7 @@ SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ss
 @preset
 @click.option("--set", "pairs", multiple=True, metavar="METHOD.KEY=VALUE",
               help="A setting of a method or of truth, such as truth.samples=64; repeatable.")
+@still
 @machine
 @shadows("exact")
 @click.option("--out", help="Folder for EXR, PNG, error maps, results.json and index.html.")
@@ -28,10 +29,12 @@ SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ss
 @click.pass_obj
 def _compare(session: Session, /, methods: str | None, preset: str, pairs: tuple[str, ...], dtype: str,
             rsm_resolution: int, shadows: str, threads: int | None, seed: int | None, out: str | None, parents: bool,
-            force: bool, **options: Any) -> int:
+            force: bool, frames: int | None, filtering: tuple[str, ...], **options: Any) -> int:
     """Judge methods on SCENE by path tracing: errors, times, a page.
 
     Writes pictures, error maps, results.json and index.html to --out.
+
+    With --frames, a method with a temporal filter shows its picture after so many frames; its time is that of one.
 
     A method that knows no visibility is also compared with the truth without visibility, to which it converges.
     """
@@ -39,12 +42,14 @@ def _compare(session: Session, /, methods: str | None, preset: str, pairs: tuple
     from refgi.cli.memory import require_memory
     from refgi.cli.options import on_threads
     from refgi.cli.session import progress
+    from refgi.cli.settings import still_frames
     from refgi.cli.view import View
     from refgi.cli.warm import warm_up
     from refgi.compare import compare
     from refgi.compare.results import file_names
 
     names, settings = _asked(methods, preset, pairs, seed)
+    blended = still_frames(names, frames, filtering)
     scene = View(**options).load()
     if out is not None:
         folder(out, Permission(parents, force), file_names(names))
@@ -52,6 +57,7 @@ def _compare(session: Session, /, methods: str | None, preset: str, pairs: tuple
     with on_threads(threads), progress() as tell:
         warm_up([*names, "truth"], dtype, tell)
         comparison = compare(scene, names, truth_settings=settings.pop("truth"), method_settings=settings, out=out,
+                             still=blended,
                              progress=tell, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)
     _report(session, comparison, out)
     return 0 if comparison.is_sound else FAILED

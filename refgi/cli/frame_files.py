@@ -48,7 +48,7 @@ class FrameFiles(NamedTuple):
     def write(self, step: SequenceFrame, number: int, estimate: Any = None) -> None:
         """Write a frame, each file whole or not at all, the EXR last: where it is, so are the others."""
         record = self.record_of(number)
-        spread: tuple[Any, ...] = ()
+        spread: tuple[Any, Any] = (None, None)
         if estimate is not None:
             record |= estimate_record(estimate)
             spread = estimate.variance_of_mean, estimate.samples
@@ -57,7 +57,7 @@ class FrameFiles(NamedTuple):
             if file.suffix == PNG:
                 write_preview(file, step.radiance, record)
             else:
-                write_exr(file, linear_planes(step.radiance, step.irradiance, *spread), record)
+                write_exr(file, linear_planes(step.radiance, step.irradiance, *spread, step.frames), record)
 
     def done(self, frames: int) -> int:
         """Return how many frames, from the first on, are there.
@@ -91,10 +91,10 @@ class FrameFiles(NamedTuple):
                 return number
         return frames
 
-    def light(self, number: int) -> Array:
-        """Return the indirect irradiance of a frame that is there, (3, h, w), W/m^2."""
+    def light(self, number: int) -> tuple[Array, Array | None]:
+        """Return the indirect irradiance of a frame that is there, (3, h, w), W/m^2, and of how many frames."""
         channels = read_exr(self._exr(number))[0]
-        return np.stack([channels[f"irradiance.{c}"] for c in "RGB"])
+        return np.stack([channels[f"irradiance.{c}"] for c in "RGB"]), channels.get("frames")
 
     def _exr(self, number: int) -> Path:
         return self.folder / f"{self.stem}_{number:05d}{EXR}"
@@ -149,4 +149,4 @@ def _history_after(sequence: Sequence, scene: Scene, files: FrameFiles, number: 
     if sequence.temporal.form == "printed":  # needs the light before it was filtered
         return history_of(frame, scene.geometry, sequence.method(frame, seeded(sequence.settings, number)))
     expect(frame.dtype == np.float32, "dtype", "float32 to go on from, which an EXR holds whole", frame.dtype.name)
-    return history_of(frame, scene.geometry, files.light(number))
+    return history_of(frame, scene.geometry, *files.light(number))

@@ -35,15 +35,16 @@ def asked(options: dict[str, Any]) -> "Job":
     """
     import dataclasses
 
-    from refgi.cli.settings import settings_for
+    from refgi.cli.settings import settings_for, still_frames
     from refgi.cli.view import View
     from refgi.provenance import Job
 
     method = options["method"]
     settings = settings_for(method, options["pairs"], options["seed"], options["preset"])
+    still = still_frames([method], options["frames"], options["filtering"])
     scene = View(**{field.name: options[field.name] for field in dataclasses.fields(View)}).load()
     frame = {key: options[key] for key in ("dtype", "rsm_resolution", "shadows")}
-    return Job(scene, method, settings, frame, scene.exposure)
+    return Job(scene, method, settings, frame, scene.exposure, still=still)
 
 
 def recorded(file: str, scene: str | None) -> "Job":

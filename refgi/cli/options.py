@@ -160,6 +160,26 @@ def machine(function: F) -> F:
     return function
 
 
+def still(function: F) -> F:
+    """Add the frames that a still picture is blended of.
+
+    Parameters
+    ----------
+    function : callable
+        A verb.
+
+    Returns
+    -------
+    callable
+        The same, with the options.
+    """
+    function = click.option("--temporal", "filtering", multiple=True, metavar="KEY=VALUE",
+                            help="A setting of the temporal filter of --frames, such as weight=0.8; repeatable."
+                            )(function)
+    return click.option("--frames", type=click.IntRange(1, 100_000),
+                        help="Frames of other random numbers that a method with a temporal filter blends.")(function)
+
+
 def shadows(default: str) -> Callable[[F], F]:
     """Add where the direct light's shadows come from.
 

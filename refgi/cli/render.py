@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.options import machine, seen, shadows, speech, writing
+from refgi.cli.options import machine, seen, shadows, speech, still, writing
 from refgi.cli.session import DONE, FAILED, Session, say
 from refgi.cli.settings import preset
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 @click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
 @preset
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
+@still
 @machine
 @shadows("auto")
 @click.option("--again", metavar="FILE.exr", help="Make this picture again, and say whether it is the same to the bit.")
@@ -38,6 +39,8 @@ def _render(ctx: click.Context, /, **options: Any) -> int:
     An EXR holds the radiance that the camera receives (R, G, B; W/m^2/sr) and the indirect irradiance
     (irradiance.R, .G, .B; W/m^2), of `truth` its variance too, and all that is needed to make it again; a PNG the
     radiance, tone-mapped.
+
+    --frames 20 shows a method with its temporal filter after so many frames of a resting scene.
     """
     from refgi.cli.destination import Permission, Pictures, picture_files
     from refgi.cli.job import asked, recorded, require_either, stem
@@ -71,8 +74,13 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     with progress() as tell:
         warm_up([job.method], str(job.options["dtype"]), tell)
     started = time.perf_counter()
-    with on_threads(options["threads"]), progress() as tell, stages.observe(progress=tell) as log:
-        if job.frame is None:
+    kept = stages.Memory() if job.still is not None else None  # frames of a resting scene share their buffers
+    with on_threads(options["threads"]), progress() as tell, stages.observe(memory=kept, progress=tell) as log:
+        if job.still is not None:
+            from refgi.provenance.frames import render_still
+
+            picture = render_still(job.scene, job.method, job.settings, job.still, job.options)
+        elif job.frame is None:
             picture = render(job.scene, job.method, job.repeatable, **job.options)
         else:
             from refgi.provenance.frames import render_frame
@@ -107,6 +115,8 @@ def _record(job: "Job", picture: "Picture") -> "Record":
         from refgi.provenance.frames import whole_record
 
         record |= whole_record(job.scene, job.frame)
+    if job.still is not None:
+        record |= job.still.record
     if estimate is not None:
         record |= estimate_record(estimate)
     return record
@@ -136,8 +146,8 @@ def _write(picture: "Picture", files: "Pictures", record: "Record") -> dict[str,
     from refgi.image import write_exr
 
     estimate = picture.estimate
-    spread = (None, None) if estimate is None else (estimate.variance_of_mean, estimate.samples)
-    planes = linear_planes(picture.radiance, picture.irradiance, *spread)
+    variance, samples = (None, None) if estimate is None else (estimate.variance_of_mean, estimate.samples)
+    planes = linear_planes(picture.radiance, picture.irradiance, variance, samples, picture.frames)
     files.make_folder()
     if files.exr is not None:
         write_exr(files.exr, planes, record)

@@ -1,13 +1,16 @@
 """--preset and --set: a method's settings from text, and `refgi settings`, which lists them."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from refgi.cli.options import speech
 from refgi.cli.session import Session, table
-from refgi.errors import InputError, first_faults
+from refgi.errors import InputError, expect, first_faults
+
+if TYPE_CHECKING:
+    from refgi.provenance.frames import StillFrames
 
 preset = click.option("--preset", default="default", show_default=True, metavar="NAME",
                       help="Named settings to start from: default, or paper for the values printed.")
@@ -64,6 +67,44 @@ def has_seed(method: str) -> bool:
     from refgi.settings import leaves
 
     return any(leaf.key.rpartition(".")[2] == "seed" for leaf in leaves(find_method(method).settings))
+
+
+def still_frames(
+    methods: Iterable[str], frames: int | None, pairs: Iterable[str]
+) -> "StillFrames | None":
+    """Return how many frames of a resting scene methods are to blend, and by which filter.
+
+    Parameters
+    ----------
+    methods : iterable of str
+        Short names.
+    frames : int or None
+        Of --frames.
+    pairs : iterable of str
+        Settings of the filter.
+
+    Returns
+    -------
+    StillFrames or None
+        None where --frames is absent.
+
+    Raises
+    ------
+    InputError
+        If none of the methods has a temporal filter, or a setting is wrong or of no use.
+    """
+    from refgi.methods import require_filter
+    from refgi.settings import from_text
+
+    pairs = list(pairs)
+    if frames is None:
+        expect(not pairs, "--temporal", "--frames beside it", " ".join(pairs))
+        return None
+    from refgi.provenance.frames import StillFrames
+    from refgi.sssil.temporal import TemporalSettings
+
+    require_filter(methods)
+    return StillFrames(frames, from_text(TemporalSettings(), pairs))
 
 
 def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[str]]:

@@ -14,7 +14,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,9 +24,13 @@ from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, R
 from refgi.compare.provenance import environment
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
-from refgi.methods import METHODS, find_method
+from refgi.methods import METHODS, find_method, require_filter
 from refgi.provenance import estimate_record
 from refgi.scene import Scene, load_scene
+
+if TYPE_CHECKING:
+    from refgi.methods import Picture
+    from refgi.provenance.frames import StillFrames
 
 Progress = Callable[[str, float], None]
 
@@ -43,6 +47,7 @@ def compare(
     method_settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     progress: Progress | None = None,
+    still: "StillFrames | None" = None,
     **frame_options: Any,
 ) -> Comparison:
     """Run methods on a scene and judge them against path tracing.
@@ -63,6 +68,8 @@ def compare(
         Folder for pictures, results.json and index.html; nothing is written where absent.
     progress : callable, optional
         Called with (what runs, fraction done).
+    still : StillFrames, optional
+        Frames that methods with a temporal filter blend, and by which settings; their time is that of one frame.
     **frame_options : object
         Passed to `Frame`: dtype, rsm_resolution, shadows ("exact" where absent: rays are traced anyway).
 
@@ -80,6 +87,7 @@ def compare(
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     names = _names(methods)
     settings = _settings(names, truth_settings, method_settings or {})
+    blended = [] if still is None else require_filter(names)
     runner = _Runner(scene, {"width": width, "height": height, "shadows": "exact", **frame_options}, progress)
     if out is not None:
         require_folder(Path(out))
@@ -89,7 +97,8 @@ def compare(
     results, failures = {}, {}
     for name in names:
         try:
-            results[name] = runner.method(name, settings[name], references, accounts=out is not None)
+            results[name] = runner.method(name, settings[name], references, accounts=out is not None,
+                                          still=still if name in blended else None)
         except RefgiError as error:
             failures[name] = str(error)
     frame = runner.frame
@@ -122,12 +131,18 @@ class _Runner:
                          radiance, seconds, runs, estimate_record(result))
 
     def method(
-        self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool
+        self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool,
+        still: "StillFrames | None" = None,
     ) -> MethodResult:
         method = METHODS[name]
         function = method.function
         self._warm_up(function, settings)
-        irradiance, seconds, runs = self._timed(name, lambda frame: function(frame, settings))
+        frames = None
+        if still is None:
+            irradiance, seconds, runs = self._timed(name, lambda frame: function(frame, settings))
+        else:
+            made, seconds, runs = self._timed(name, lambda _: self._blended(name, settings, still))
+            irradiance, frames, seconds = made.irradiance, made.frames, seconds / still.frames
         radiance, covered = self.frame.radiance(irradiance), self.frame.gbuffer.covered
         judges = [TRUTH] if method.knows_visibility(settings) else [TRUTH, UNOCCLUDED]
         against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered,
@@ -135,7 +150,14 @@ class _Runner:
         seen = flip(radiance, references[TRUTH].radiance, covered)
         account = method.ledger if accounts else None
         ledger = account(self.frame, settings) if account else None
-        return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen, ledger)
+        return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen, ledger,
+                            still, frames)
+
+    def _blended(self, name: str, settings: Any, still: "StillFrames") -> "Picture":
+        from refgi.provenance.frames import render_still
+
+        size = {"width": self.frame.width, "height": self.frame.height}
+        return render_still(self.scene, name, settings, still, {**self.options, **size})
 
     def _warm_up(self, function: Callable[[Frame, Any], Any], settings: Any) -> None:
         with warnings.catch_warnings(), contextlib.suppress(RefgiError):  # the real run will say it

@@ -176,6 +176,8 @@ class MethodResult:
     against: Mapping[str, Measurement]  # by reference: "truth", and "unoccluded" for a method without visibility
     flip: Flip
     ledger: Any = None  # where the light's power went, of a method that accounts for it; only where files are written
+    still: Any = None  # `StillFrames` that it is blended of, of a method with a temporal filter
+    frames: Any = None  # (h, w) frames that each pixel is blended of, where they are counted
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,7 +13,7 @@ Array = npt.NDArray[Any]
 
 
 def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = None,
-                  samples: Array | None = None) -> dict[str, Array]:
+                  samples: Array | None = None, frames: Array | None = None) -> dict[str, Array]:
     """Return the float32 planes of a picture's EXR.
 
     Parameters
@@ -26,6 +26,8 @@ def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = N
         Of the irradiance where it is the mean of an estimate, (W/m^2)^2: variance.R, .G, .B.
     samples : (h, w) ndarray, optional
         How many of them each pixel has.
+    frames : (h, w) ndarray, optional
+        Frames that the light of each pixel is blended of.
 
     Returns
     -------
@@ -37,6 +39,8 @@ def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = N
         planes |= rgb_planes("variance.", variance)
     if samples is not None:
         planes["samples"] = np.asarray(samples, np.float32)
+    if frames is not None:
+        planes["frames"] = np.asarray(frames, np.float32)
     return planes
 
 

@@ -125,7 +125,8 @@ def record_of(comparison: Comparison, made: Reference | MethodResult) -> Record:
     """
     if isinstance(made, Reference):
         return {**comparison.record, **method_record(TRUTH, made.settings), **made.estimate}
-    return {**comparison.record, **method_record(made.name, made.settings)}
+    still = {} if made.still is None else made.still.record
+    return {**comparison.record, **method_record(made.name, made.settings), **still}
 
 
 def ledger_json(ledger: Any) -> dict[str, Any]:
@@ -185,7 +186,7 @@ def error_scale(comparison: Comparison) -> maps.Scale:
 def _write_picture(comparison: Comparison, folder: Path, made: Reference | MethodResult) -> Record:
     """Write EXR and PNG, and return the record that they hold."""
     record = record_of(comparison, made)
-    spread = (made.variance, made.samples) if isinstance(made, Reference) else (None, None)
+    spread = (made.variance, made.samples) if isinstance(made, Reference) else (None, None, made.frames)
     write_exr(folder / f"{made.name}.exr", linear_planes(made.radiance, made.irradiance, *spread), record)
     write_preview(folder / f"{made.name}.png", made.radiance, record)
     return record

@@ -16,7 +16,7 @@ from refgi.scene.files import is_there
 from refgi.settings import Settings, flat, of_record
 
 if TYPE_CHECKING:
-    from refgi.provenance.frames import SequenceFrame
+    from refgi.provenance.frames import SequenceFrame, StillFrames
 
 COMPUTES = ("numpy", "numba", "llvmlite", "scipy", "embreex")  # what may change a bit of a picture
 PARTS = {"geometry": geometry_digest, "materials": materials_digest}
@@ -32,6 +32,7 @@ class Job(NamedTuple):
     exposure: float
     passes: int | None = None  # that an estimate bounded by time or error came to
     frame: "SequenceFrame | None" = None  # where it is one of a sequence
+    still: "StillFrames | None" = None  # where it is blended of frames of a resting scene
 
     @property
     def repeatable(self) -> Any:
@@ -103,7 +104,7 @@ def job_of(record: Mapping[str, Any], path: Path, scene: str | None = None) -> J
             wanted = find_method(record["method"]).settings
             return Job(_same_scene(record["scene"], path, scene), record["method"],
                        _settings(wanted, record["settings"], path), dict(record["options"]), record["exposure"],
-                       record.get("estimate", {}).get("passes"), _frame(record, path))
+                       record.get("estimate", {}).get("passes"), _frame(record, path), _still(record, path))
         except (KeyError, TypeError, AttributeError) as error:
             raise InputError(f"{path}: expected a whole record, got one without {error}") from error
 
@@ -180,6 +181,15 @@ def _frame(record: Mapping[str, Any], path: Path) -> "SequenceFrame | None":
     require_same_path(record["path"], found)
     return SequenceFrame(record["frame"], record["of"], found,
                          None if temporal is None else _settings(TemporalSettings, temporal, path))
+
+
+def _still(record: Mapping[str, Any], path: Path) -> "StillFrames | None":
+    if "frames" not in record:
+        return None
+    from refgi.provenance.frames import StillFrames
+    from refgi.sssil.temporal import TemporalSettings
+
+    return StillFrames(record["frames"], _settings(TemporalSettings, record["temporal"], path))
 
 
 def _warn_of_other_versions(record: Mapping[str, Any], path: Path) -> None:

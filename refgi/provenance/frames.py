@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from refgi.errors import InputError, expect
-from refgi.methods import KeepingEstimate, Picture, find_method
+from refgi.methods import KeepingEstimate, Picture, find_method, require_filter, usual_shadows
 from refgi.provenance.content import light_json, plain
 from refgi.provenance.record import Record
 from refgi.scene import Scene
@@ -15,7 +15,7 @@ from refgi.scene.files import read_bytes
 from refgi.scene.path import Path as Way
 from refgi.scene.path import camera_and_lights, scenes_along
 from refgi.scene.pathfile import read_path
-from refgi.sssil.temporal import Sequence, TemporalSettings
+from refgi.sssil.temporal import Sequence, TemporalSettings, still_frame
 
 
 class SequenceFrame(NamedTuple):
@@ -25,6 +25,18 @@ class SequenceFrame(NamedTuple):
     of: int
     path: str  # TOML file of the path
     temporal: TemporalSettings | None
+
+
+class StillFrames(NamedTuple):
+    """How many frames of a resting scene a picture is blended of."""
+
+    frames: int
+    temporal: TemporalSettings
+
+    @property
+    def record(self) -> Record:
+        """What it adds to the record of scene and method: JSON values."""
+        return {"frames": self.frames, "temporal": plain(self.temporal)}
 
 
 def path_record(path: str, of: int, temporal: TemporalSettings | None) -> Record:
@@ -161,7 +173,39 @@ def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame,
     sequence = Sequence(scenes, settings, frame.temporal, method=light, **options)
     for step in sequence.over(scenes, first):
         made = step
-    return Picture(made.frame, made.irradiance, made.radiance, None if frame.temporal else light.estimate)
+    return Picture(made.frame, made.irradiance, made.radiance, None if frame.temporal else light.estimate, made.frames)
+
+
+def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, options: Mapping[str, Any]) -> Picture:
+    """Render a resting scene by a method and its temporal filter.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    method : str
+        Short name of a method with a temporal filter.
+    settings : dataclass
+        Its settings in the first frame.
+    still : StillFrames
+        How many frames, and the filter.
+    options : mapping
+        Of every `Frame`; where `shadows` is absent those of `usual_shadows`.
+
+    Returns
+    -------
+    Picture
+        The last frame.
+
+    Raises
+    ------
+    InputError
+        If the method has no temporal filter.
+    """
+    require_filter([method])
+    options = {**options, "shadows": options.get("shadows") or usual_shadows(settings)}
+    last = still_frame(scene, settings, still.temporal, still.frames, method=find_method(method).function, **options)
+    return Picture(last.frame, last.irradiance, last.radiance, frames=last.frames)
 
 
 def require_same_path(record: Mapping[str, Any], found: str) -> None:

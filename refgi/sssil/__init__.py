@@ -24,6 +24,7 @@ from refgi.sssil.settings import (
     Rays,
     SamplingSettings,
     SenderSettings,
+    TemporalSettings,
 )
 from refgi.sssil.upsampling.upsample import Guide, upsample
 
@@ -48,4 +49,5 @@ __all__ = [
 
 METHOD = Method(
     "hssil", "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees", hssil,
-    HssilSettings, visibility=lambda settings: settings.visibility is not None, memory=extra_bytes, presets=PRESETS)
+    HssilSettings, visibility=lambda settings: settings.visibility is not None, memory=extra_bytes, presets=PRESETS,
+    temporal=TemporalSettings())

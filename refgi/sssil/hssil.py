@@ -9,7 +9,7 @@ from refgi.settings import replaced
 from refgi.sssil.cameras import join_cameras
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.crown.reach import chosen_radius, warn_short_reach
-from refgi.sssil.pyramid.levels import pyramid
+from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import Bitmask, HssilSettings, Rays
 from refgi.sssil.upsampling.upsample import Guide, upsample
@@ -62,11 +62,12 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
         Indirect irradiance, W/m^2.
     """
     levels = pyramid(frame, settings)  # Sec. 4, hierarchical maps
+    senders = sender_pyramid(frame, levels, settings)
     warn_short_reach(levels[0].shape, settings.sampling)
     settings = replaced(settings, {"sampling.radius": chosen_radius(levels[0].shape, settings.sampling)})
-    irradiance = gather_level(frame, levels[-1], len(levels) - 1, settings)
+    irradiance = gather_level(frame, levels[-1], len(levels) - 1, settings, senders[-1])
     for index in reversed(range(len(levels) - 1)):  # Sec. 3.2: starting from the smallest
-        added = gather_level(frame, levels[index], index, settings)
+        added = gather_level(frame, levels[index], index, settings, senders[index])
         irradiance = upsample(irradiance, guide_of(levels[index + 1]), guide_of(levels[index]), settings, added)
     if levels[0].number == 0:
         skip("sssil.upsample", "light was gathered at full resolution")
@@ -75,7 +76,7 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
     return upsample(irradiance, guide_of(levels[0]), Guide(depth, normal), settings)
 
 
-def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettings) -> Array:
+def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettings, senders: Level) -> Array:
     """Return the irradiance of the texels of one level from samples of it.
 
     Parameters
@@ -83,11 +84,13 @@ def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettin
     frame : Frame
         The scene whose view the level is.
     level : Level
-        Receivers and senders.
+        Receivers.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     settings : HssilSettings
         Sampling and visibility.
+    senders : Level
+        The level as senders.
 
     Returns
     -------
@@ -97,10 +100,10 @@ def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettin
     if settings.senders.only_level not in (None, index):
         return np.zeros_like(level.radiance)
     if isinstance(settings.visibility, Bitmask):
-        return bitmask_gather(level, index, settings, frame.visible_extent.diagonal)
+        return bitmask_gather(level, index, settings, frame.visible_extent.diagonal, senders)
     if isinstance(settings.visibility, Rays):
-        return ray_gather(level, index, settings, frame)
-    return gather(level, index, settings)
+        return ray_gather(level, index, settings, frame, senders)
+    return gather(level, index, settings, senders)
 
 
 def guide_of(level: Level) -> Guide:

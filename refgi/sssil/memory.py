@@ -9,6 +9,7 @@ from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.settings import Bitmask, HssilSettings, Rays
 
 FLOATS = 11  # a texel: position, depth, normal, radiance, area
+SENDER_FLOATS = 10  # a texel of drawn senders: the same but the depth
 PIXEL_BYTES = 4  # and the pixel that it shows
 PLANES, LIGHT_FLOATS = 9, 6  # of a texel of the level that is summed: as senders, and its light and that below
 PADDING = 64  # lanes around a row of senders at least, twice 16 for even and for odd columns
@@ -39,7 +40,8 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
     Notes
     -----
     With n levels from full resolution on it is ``(4 - 4^(1 - n)) / 3`` times the first; from half resolution on, a
-    quarter of that. The mean of radiance alone needs the number of its pixels as well.
+    quarter of that. The mean of radiance alone needs the number of its pixels as well; drawn senders are levels of
+    their own.
 
     Examples
     --------
@@ -47,10 +49,13 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
     >>> level_bytes(HssilSettings(SamplingSettings(start="full", levels=1)), 100, 4)
     4800
     """
-    sampling = settings.sampling
-    floats = FLOATS + (settings.senders.downsample == "closest_average")
+    sampling, downsample = settings.sampling, settings.senders.downsample
+    floats = FLOATS + (downsample == "closest_average")
     numbers = range(sampling.first_level, sampling.first_level + sampling.levels)
-    return sum(-(-pixels >> 2 * number) for number in numbers) * (floats * float_bytes + PIXEL_BYTES)
+    texels = [-(-pixels >> 2 * number) for number in numbers]
+    drawn = [count for count, number in zip(texels, numbers, strict=True) if number > 0]  # pixels are their own senders
+    senders = sum(drawn) * (SENDER_FLOATS * float_bytes + PIXEL_BYTES) if downsample == "resampled" else 0
+    return sum(texels) * (floats * float_bytes + PIXEL_BYTES) + senders
 
 
 def extra_bytes(settings: HssilSettings, size: tuple[int, int], float_bytes: int) -> int:

@@ -36,8 +36,8 @@ def reproject(
 
     Parameters
     ----------
-    values : (3, h, w) ndarray
-        One value for each texel of `source`.
+    values : (3 or 4, h, w) ndarray
+        Values for each texel of `source`.
     source : SourceView
         The view that values are fetched from.
     position : (3, h', w') ndarray
@@ -58,7 +58,7 @@ def reproject(
 
     Returns
     -------
-    mean : (3, h', w') ndarray
+    mean : (3 or 4, h', w') ndarray
         Mean of the texels that show the same surface, weighted bilinearly; 0 where none does.
     weight : (h', w') ndarray
         Share of the four weights that those texels have, 0 to 1.
@@ -78,18 +78,45 @@ def reproject(
     """
     projection = source.projection
     expect(projection.kind == PERSPECTIVE and projection.maps == 1, "there", "one perspective map", projection.kind)
-    expect(values.shape[1:] == source.depth.shape == projection.shape, "values", f"(3, h, w) with {projection.shape}",
-           values.shape)
+    expect(len(values) in (3, 4) and values.shape[1:] == source.depth.shape == projection.shape, "values",
+           f"(3 or 4, h, w) with {projection.shape}", values.shape)
     dtype = position.dtype
-    shift = np.zeros(3) if origin is None else np.subtract(source.origin, origin)
-    eye = (projection.origin[0] + shift).astype(dtype)
-    size = np.array([projection.width, projection.height])
-    scale = np.concatenate([size / (2 * projection.half), (size - 1) / 2]).astype(dtype)
-    mean, weight = plane(position.shape, dtype), plane(covered.shape, dtype)
+    eye, frame, scale = pixel_transform(source, dtype, origin)
+    mean, weight = plane((len(values), *covered.shape), dtype), plane(covered.shape, dtype)
     limits = np.array([depth_tolerance, normal_cosine, SNAP], dtype)
-    _reproject(values, source.depth, source.normal, eye, projection.frame[0].astype(dtype), scale, limits,
-             fetch == "nearest", position, normal, covered, mean, weight)
+    _reproject(values, source.depth, source.normal, eye, frame, scale, limits, fetch == "nearest", position, normal,
+               covered, mean, weight)
     return mean, weight
+
+
+def pixel_transform(
+    source: SourceView, dtype: npt.DTypeLike, origin: Vector | None = None
+) -> tuple[Array, Array, Array]:
+    """Return what takes points to the texels of a view.
+
+    Parameters
+    ----------
+    source : SourceView
+        The view.
+    dtype : dtype
+        Of the result.
+    origin : tuple of 3 floats, optional
+        Origin of the points, m; that of `source` where absent.
+
+    Returns
+    -------
+    eye : (3,) ndarray
+        Where the camera is, m.
+    frame : (3, 3) ndarray
+        Unit vectors right, down and ahead.
+    scale : (4,) ndarray
+        Texels for each tangent, and the middle of the picture, across and down.
+    """
+    projection = source.projection
+    shift = np.zeros(3) if origin is None else np.subtract(source.origin, origin)
+    size = np.array([projection.width, projection.height])
+    scale = np.concatenate([size / (2 * projection.half), (size - 1) / 2])
+    return (projection.origin[0] + shift).astype(dtype), projection.frame[0].astype(dtype), scale.astype(dtype)
 
 
 @kernel(parallel=True)
@@ -136,7 +163,7 @@ def _fetch_row(
     view = _rays(frame, scale)
     for column in range(weight.shape[1]):
         x, y, z = mean[0, row, column], mean[1, row, column], mean[2, row, column]
-        red, green, blue, total = zero, zero, zero, zero
+        red, green, blue, fourth, total = zero, zero, zero, zero, zero
         first_red, first_green, first_blue = zero, zero, zero
         if z > 0 and -half <= x <= right_end and -half <= y <= bottom_end:
             nx, ny, nz = normal[0, row, column], normal[1, row, column], normal[2, row, column]
@@ -164,10 +191,14 @@ def _fetch_row(
                         red += share * (values[0, i, j] - first_red)  # differences: a constant stays, to the bit
                         green += share * (values[1, i, j] - first_green)
                         blue += share * (values[2, i, j] - first_blue)
+                        if values.shape[0] > 3:
+                            fourth += share * values[3, i, j]
         inverse = one / total if total > zero else zero
         mean[0, row, column] = first_red + red * inverse
         mean[1, row, column] = first_green + green * inverse
         mean[2, row, column] = first_blue + blue * inverse
+        if values.shape[0] > 3:
+            mean[3, row, column] = fourth * inverse
         weight[row, column] = min(total, one)
 
 

@@ -11,14 +11,15 @@ from refgi.settings import Settings, setting
 
 Start = Literal["full", "half", "quarter"]
 Pattern = Literal["row", "pixel", "fixed", "all"]
-Downsample = Literal["closest", "average", "closest_average"]
-FormFactor = Literal["disc", "point"]
+Downsample = Literal["closest", "average", "closest_average", "resampled"]
+FormFactor = Literal["disc", "texel", "point"]
 Form = Literal["recursive", "printed"]
 Fetch = Literal["bilinear", "nearest"]
 
 FIRST_LEVEL = {"full": 0, "half": 1, "quarter": 2}
 LAST_SEED = 2**32 - 1
 MOST_LEVELS, MOST_SAMPLES, MOST_SLICES, MOST_CAMERAS = 16, 1 << 16, 256, 16
+MOST_CLAMP_RADIUS = 64
 LARGEST_RADIUS = 65536.0  # texels: the widest picture there may be
 
 
@@ -61,13 +62,14 @@ class SenderSettings(Settings):
     """Texels as senders: downsampling (Sec. 4) and form factor (Sec. 3.1).
 
     A coarse texel takes position, normal and radiance of the "closest" of four, the "average" of all, or position and
-    normal of the closest and the average radiance. A sample's form factor is that of a "disc" (Eq. 4) or of a "point"
-    (Eq. 3).
+    normal of the closest and the average radiance; "resampled", it sends the flux of all from one, drawn in
+    proportion to flux, and receives as the closest. A sample's form factor is that of a "disc" as large as all
+    texels that it stands for (Eq. 4), of the disc of its own "texel", times their number, or of a "point" (Eq. 3).
     """
 
     PRINCIPAL = "downsample"
 
-    downsample: Downsample = setting("closest", "downsampling from level to level")
+    downsample: Downsample = setting("resampled", "downsampling from level to level")
     form_factor: FormFactor = setting("disc", "form factor of a sample: Eq. 4 (disc) or Eq. 3 (point)", study=True)
     only_level: int | None = setting(None, "the one level that sends light, 0: the first; none: all", least=0,
                                      most=MOST_LEVELS - 1, study=True)
@@ -171,19 +173,36 @@ class TemporalSettings(Settings):
 
     Of a pixel's light the share `weight`, a, comes from the frame before where that frame shows the same surface, by
     depth and normal. A disoccluded pixel takes its new light alone. The "recursive" form blends with the frame before
-    as filtered, the "printed" one as computed. Where a surface moved of itself by v pixels since, a falls to
-    a exp(-v / `speed`); a moving camera alone leaves a as it is. The earlier light is fetched from the four texels
-    around a point ("bilinear") or from the "nearest".
+    as filtered, the "printed" one as computed. By `warm_up` the recursive form gives a surface found in n frames before
+    the share n / (n + 1) at most: the mean of all frames until a is less. Where a surface moved of itself by v pixels
+    since, a falls to a exp(-v / `speed`); a moving camera alone leaves a as it is. A pixel whose point lay outside the
+    earlier picture has a exp(-v / `entering_speed`) of the light at its edge, v pixels from there.
+    `clamp` bounds earlier light to so many standard deviations about the mean of the new light within `clamp_radius`.
+    The earlier light is fetched from the four texels around a point ("bilinear") or from the "nearest".
     """
 
     PRINCIPAL = "weight"
 
     weight: float = setting(0.9, "share of the frame before, a", least=0.0, most=0.9999)
     form: Form = setting("recursive", "blend with the frame before as filtered or, as printed, as computed", study=True)
+    warm_up: bool = setting(True, "share of n / (n + 1) at most where a surface was found in n frames before")
     depth_tolerance: float = setting(0.02, "largest difference of depths, a share of the depth", least=0.0, most=1.0)
     normal_cosine: float = setting(0.95, "least cosine between normals", least=-1.0, most=1.0)
     speed: float = setting(16.0, "speed at which a falls to a / e", least=1e-3, most=1e6, unit="pixels a frame")
+    entering_speed: float | None = setting(
+        None, "speed at which a of points that enter the picture falls to a / e; none: they take their new light alone",
+        least=1e-3, most=1e6, unit="pixels a frame")
+    clamp: float | None = setting(
+        None, "standard deviations about the mean of new light that earlier light is clamped to; none: it is not",
+        least=0.0, most=1e6)
+    clamp_radius: int = setting(4, "pixels either way that this mean is of", least=1, most=MOST_CLAMP_RADIUS,
+                                study=True)
     fetch: Fetch = setting("bilinear", "texels that earlier light is fetched from", study=True)
+
+    @property
+    def counts_frames(self) -> bool:
+        """Whether the number of frames in which a surface was found is stored."""
+        return self.warm_up and self.form == "recursive"
 
     @property
     def variance(self) -> float:

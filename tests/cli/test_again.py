@@ -10,9 +10,15 @@ import pytest
 from click.testing import CliRunner
 
 from refgi.cli.group import VerbGroup
+from refgi.frame import Frame
 from refgi.image import read_exr, read_png_attributes, write_exr
-from refgi.methods import METHODS
-from refgi.settings import flat
+from refgi.methods import METHODS, render
+from refgi.provenance import plain
+from refgi.scene import load_scene
+from refgi.settings import flat, of, replaced
+from refgi.sssil.hssil import hssil
+from refgi.sssil.settings import HssilSettings, TemporalSettings
+from tests.naive.temporal import filtered
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 TINY = ["--size", "12x10", "--rsm-resolution", "16"]
@@ -29,6 +35,7 @@ SETTINGS = {
     "truth": ["samples=72", "light_grid=8", "bound=0.2", "seed=9"],
 }
 SII = ["--set", "lights=16"]
+SINGLE = 1e-6  # of the brightest pixel: blended in float32
 
 
 def run(*arguments, verb="render"):
@@ -258,6 +265,63 @@ def test_pictures_of_a_comparison_are_made_again(tmp_path):
     assert content["refgi"] == record["refgi"]
 
 
+STILL = ["--frames", "3", "--temporal", "weight=0.6"]
+HSSIL = ["samples=8", "levels=3", "radius=none", "seed=4"]
+
+
+def still(scene, seed, temporal):
+    """Light of three frames of other random numbers, assembled by hand from those of each alone."""
+    frames = [Frame(scene, rsm_resolution=16) for _ in range(3)]
+    settings = of(HssilSettings, samples=8, levels=3, radius=None)
+    lights = [hssil(frame, replaced(settings, {"seed": seed + k})) for k, frame in enumerate(frames)]
+    return filtered(frames, [light.astype(float) for light in lights], temporal)[-1]
+
+
+def test_frames_of_a_resting_scene_are_blended_and_made_again(tmp_path):
+    sets = [text for pair in HSSIL for text in ("--set", pair)]
+    result = run("cornell_box", *TINY, "--method", "hssil", *sets, *STILL, "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    channels, record = read_exr(tmp_path / "cornell_box_hssil.exr")
+    light = np.stack([channels[f"irradiance.{c}"] for c in "RGB"])
+    expected = still(load_scene("cornell_box").with_camera(width=12, height=10), 4, TemporalSettings(weight=0.6))
+    assert np.abs(light - expected).max() < SINGLE * expected.max()
+    assert record["frames"] == 3
+    assert record["temporal"] == plain(TemporalSettings(weight=0.6))
+    assert channels["frames"].max() == 3
+    assert read_png_attributes(tmp_path / "cornell_box_hssil.png") == record
+    assert made_again(tmp_path / "cornell_box_hssil.exr") == (tmp_path / "cornell_box_hssil.exr").read_bytes()
+
+
+def test_a_comparison_blends_frames_of_methods_with_a_filter(tmp_path):
+    sets = [text for pair in HSSIL for text in ("--set", f"hssil.{pair}")]
+    result = run("cornell_box", *TINY, "--methods", "sii,hssil", *sets, "--set", "sii.lights=16", "--set",
+                 "truth.samples=48", *STILL, "--json", "--out", tmp_path / "out", verb="compare")
+    assert result.exit_code == 0, result.output
+    channels, record = read_exr(tmp_path / "out" / "hssil.exr")
+    light = np.stack([channels[f"irradiance.{c}"] for c in "RGB"])
+    scene = load_scene("cornell_box").with_camera(width=12, height=10)
+    alone = [render(scene, "hssil", of(HssilSettings, samples=8, levels=3, radius=None, seed=4 + k), shadows="exact",
+                    rsm_resolution=16).irradiance for k in range(3)]
+    expected = alone[0]
+    for new, a in zip(alone[1:], (0.5, 0.6), strict=True):  # min(a, n / (n + 1))
+        expected = a * expected + (1 - a) * new
+    assert np.abs(light - expected).max() < SINGLE * expected.max()
+    assert record["frames"] == 3
+    assert "frames" not in read_exr(tmp_path / "out" / "sii.exr")[1]
+    assert made_again(tmp_path / "out" / "hssil.exr") == (tmp_path / "out" / "hssil.exr").read_bytes()
+
+
+@pytest.mark.parametrize(("verb", "arguments", "words"), [
+    ("render", ["--method", "sii", "--frames", "3", "--out", "a.exr"], ["frames", "temporal filter (hssil)", "sii"]),
+    ("render", ["--method", "hssil", "--temporal", "weight=0.3", "--out", "a.exr"], ["--temporal", "--frames"]),
+    ("render", ["--method", "hssil", "--frames", "0", "--out", "a.exr"], ["--frames"]),
+    ("render", ["--method", "hssil", "--frames", "2", "--temporal", "wait=1", "--out", "a.exr"], ["wait"]),
+    ("compare", ["--methods", "sii,gather", "--frames", "3"], ["frames", "temporal filter (hssil)", "sii, gather"]),
+])
+def test_frames_that_no_method_blends_are_refused(verb, arguments, words):
+    assert refused(run("cornell_box", *TINY, *arguments, verb=verb), *words)
+
+
 @pytest.mark.parametrize("settings", [{"seconds": 0.5}, {"checkpoint": "passes"}], ids=lambda pair: next(iter(pair)))
 def test_a_frame_that_would_not_repeat_is_not_made_again(settings):
     """Frames of earlier versions may say so."""
@@ -286,7 +350,8 @@ def test_frames_of_truth_hold_how_sure_they_are_unless_blended(temporal, room, m
     planes, record = read_exr(frame)
     expected, its = read_exr(alone)
     if temporal:
-        assert planes.keys() == expected.keys() - {"variance.R", "variance.G", "variance.B", "samples"}
+        alone = expected.keys() - {"variance.R", "variance.G", "variance.B", "samples"}
+        assert planes.keys() == alone | {"frames"}
         assert "estimate" not in record
     else:
         assert planes.keys() == expected.keys()

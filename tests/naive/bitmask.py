@@ -11,18 +11,22 @@ import numpy as np
 SECTORS = 32
 
 
-def transfer(level, receiver, sender, weight, form="disc"):
-    """What the sender's radiance is multiplied by: Eq. 4 with its pi, or Eq. 3."""
-    d = level["position"][:, *sender] - level["position"][:, *receiver]
+def transfer(level, receiver, sender, weight, form="disc", senders=None):
+    """What the sender's radiance is multiplied by: Eq. 4 with its pi, by the disc of all texels or of one, or Eq. 3."""
+    senders = level if senders is None else senders
+    d = senders["position"][:, *sender] - level["position"][:, *receiver]
     distance = math.sqrt(d @ d)
     if distance == 0:
         return 0.0
     cos_i = max(0.0, level["normal"][:, *receiver] @ d / distance)
-    cos_j = max(0.0, -(level["normal"][:, *sender] @ d) / distance)
-    area = level["area"][sender] * weight
+    cos_j = max(0.0, -(senders["normal"][:, *sender] @ d) / distance)
+    area = senders["area"][sender] * weight
     if form == "point":
         return cos_i * cos_j * area / distance**2
     square_radius = cos_j * area / math.pi
+    if form == "texel":
+        of_one = cos_j * senders["area"][sender] / math.pi
+        return math.pi * cos_i * weight * of_one / (distance**2 + of_one)
     return math.pi * cos_i * square_radius / (distance**2 + square_radius)
 
 
@@ -46,29 +50,33 @@ def inside(level, texel):
     return 0 <= texel[0] < h and 0 <= texel[1] < w and level["position"][:, *texel].any()
 
 
-def masked_light(level, around, thickness, form="disc"):
-    """The sum past the bitmask: `around(row, column)` yields slices, lists of (ox, oy, weight), nearest first."""
+def masked_light(level, around, thickness, form="disc", senders=None):
+    """The sum past the bitmask: `around(row, column)` yields slices, lists of (ox, oy, weight), nearest first.
+
+    `senders` is the level as senders and occluders, where those are others.
+    """
+    senders = level if senders is None else senders
     result = np.zeros(level["position"].shape)
     for receiver in np.ndindex(level["area"].shape):
         if inside(level, receiver):
             for samples in around(*receiver):
-                result[:, *receiver] += one_slice(level, receiver, samples, thickness, form)
+                result[:, *receiver] += one_slice(level, senders, receiver, samples, thickness, form)
     return result
 
 
-def one_slice(level, receiver, samples, thickness, form):
+def one_slice(level, senders, receiver, samples, thickness, form):
     """What one slice sends to a receiver."""
     sum_, blocked, highest = np.zeros(3), set(), 0.0
     for ox, oy, weight in samples:
         sender = receiver[0] + oy, receiver[1] + ox
-        if not inside(level, sender) or sender == receiver:
+        if not inside(senders, sender) or sender == receiver:
             continue
-        here, there = level["position"][:, *receiver], level["position"][:, *sender]
+        here, there = level["position"][:, *receiver], senders["position"][:, *sender]
         normal = level["normal"][:, *receiver]
         front = height(here, normal, there)
         back = height(here, normal, there + thickness * there / math.sqrt(there @ there))
         seen = 1.0 if front >= highest else free_share(blocked, front)
-        sum_ += seen * transfer(level, receiver, sender, weight, form) * level["radiance"][:, *sender]
+        sum_ += seen * transfer(level, receiver, sender, weight, form, senders) * senders["radiance"][:, *sender]
         highest = max(highest, front)
         blocked |= {k for k in range(SECTORS) if back < middle(k) <= front}
     return sum_

@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from tests.naive import upsampling
+from tests.naive import crown_points, upsampling
+from tests.naive.draws import mix32
 
 
 def first_texels(depth, normal, radiance, frame, half, tan_f=False):
@@ -69,6 +70,41 @@ def level(texels, k, mode):
     return made
 
 
+def drawn(texels, closest, first, seed):
+    """Return levels as senders that stand where one of their parts does, drawn by flux, and send the flux of all.
+
+    `closest` are the levels of the closest texels, from level `first` on.
+    """
+    below, made = texels, []
+    for k, nearest in enumerate(closest, first):
+        size = 2**first if k == first else 2
+        height, width = len(below), len(below[0])
+        below = [[one_of([below[row][column] for row in range(size * i, min(size * i + size, height))
+                          for column in range(size * j, min(size * j + size, width))], nearest[i][j], (seed, k, i, j))
+                  for j in range(-(-width // size))] for i in range(-(-height // size))]
+        made.append(below)
+    return made
+
+
+def one_of(block, closest, place):
+    """Return a texel where one of a block is, the last that sends before which less than a share u of all is sent.
+
+    Where none sends it is where the closest is: it may stand in the way of light. `place` is seed, level, row, column.
+    """
+    block = [texel for texel in block if texel is not None]
+    if not block:
+        return None
+    area = sum(texel["area"] for texel in block)
+    flux = [texel["area"] * texel["radiance"].sum() for texel in block]
+    if not sum(flux) > 0:
+        return dict(closest, area=area, radiance=np.zeros(3))
+    seed, k, i, j = place
+    key = crown_points.pixel_key(crown_points.row_key(crown_points.level_key(seed, k), i), j)
+    u = mix32(key ^ 0x165667B1) / 2**32
+    one = [n for n in range(len(block)) if flux[n] > 0 and sum(flux[:n]) <= u * sum(flux)][-1]
+    return dict(block[one], area=area, radiance=sum(texel["area"] * texel["radiance"] for texel in block) / area)
+
+
 def averages(below):
     """Return the level above: areas added, all else averaged by area, normals of unit length again."""
     height, width = len(below), len(below[0])
@@ -105,7 +141,10 @@ def weighted(offsets, inner, r):
 
 
 def received(x, y, w, form, disc_pi=False):
-    """Return what a texel x receives of a sample y that stands for w texels: Eq. 4 ("disc") or Eq. 3 ("point")."""
+    """Return what a texel x receives of a sample y that stands for w texels.
+
+    Eq. 4 with the disc of all w ("disc"), w times that of one ("texel"), or Eq. 3 ("point").
+    """
     d = y["place"] - x["place"]
     r2 = d @ d
     if r2 == 0:
@@ -116,24 +155,29 @@ def received(x, y, w, form, disc_pi=False):
     if form == "point":
         return y["radiance"] * cos_x * cos_y * ds / r2
     disc = cos_y * ds / math.pi  # R^2
+    if form == "texel":
+        disc = cos_y * y["area"] / math.pi
+        return w * (1 if disc_pi else math.pi) * y["radiance"] * cos_x * disc / (r2 + disc)
     return (1 if disc_pi else math.pi) * y["radiance"] * cos_x * disc / (r2 + disc)
 
 
-def gathered(texels, offsets_at, form, disc_pi=False, see=None):
+def gathered(texels, offsets_at, form, disc_pi=False, see=None, senders=None):
     """Return the irradiance of each texel of a level, (3, h, w); what is off the picture or empty gives nothing.
 
-    `see(receiver, sender)` is the visibility of two texels, where there is one.
+    `see(receiver, sender)` is the visibility of two texels, where there is one; `senders` are the texels as senders,
+    where those are others.
     """
+    senders = texels if senders is None else senders
     height, width = len(texels), len(texels[0])
     light = np.zeros((3, height, width))
     for row in range(height):
         for column in range(width):
             for ox, oy, w in offsets_at(row, column) if texels[row][column] is not None else ():
                 i, j = row + oy, column + ox
-                if (ox, oy) != (0, 0) and 0 <= i < height and 0 <= j < width and texels[i][j] is not None:
-                    arriving = received(texels[row][column], texels[i][j], w, form, disc_pi)
+                if (ox, oy) != (0, 0) and 0 <= i < height and 0 <= j < width and senders[i][j] is not None:
+                    arriving = received(texels[row][column], senders[i][j], w, form, disc_pi)
                     if arriving.any():
-                        light[:, row, column] += arriving * (see(texels[row][column], texels[i][j]) if see else 1.0)
+                        light[:, row, column] += arriving * (see(texels[row][column], senders[i][j]) if see else 1.0)
     return light
 
 
@@ -157,19 +201,21 @@ def seen(texels):
 
 
 def hssil(texels, *, first, count, offsets, mode="closest", form="disc", kind="bilateral", sigma=0.02, power=8.0,
-          only=None, disc_pi=False, level_factor=False):
+          only=None, disc_pi=False, level_factor=False, seed=0):
     """Return the irradiance of a picture: gather at each level, coarsest first, carry up, add (Sec. 3.2).
 
     `offsets(index, level, row, column)` lists (ox, oy, w); level 0 is full resolution, `first` the level of index 0.
     """
     levels = [level(texels, first + index, mode) for index in range(count)]
+    senders = drawn(texels, levels, first, seed) if mode == "resampled" else levels
     filtering = (kind, mode != "average", sigma, power)
     light = None
     for index in reversed(range(count)):
         here = levels[index]
         added = np.zeros((3, len(here), len(here[0])))
         if only in (None, index):
-            added = gathered(here, lambda *at, i=index: offsets(i, first + i, *at), form, disc_pi)
+            added = gathered(here, lambda *at, i=index: offsets(i, first + i, *at), form, disc_pi,
+                             senders=senders[index])
         added *= 4.0**index if level_factor else 1.0
         if light is not None:
             added += upsampled(light, levels[index + 1], here, 2, *filtering)

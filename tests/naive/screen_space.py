@@ -59,6 +59,9 @@ def one_view(frame, settings):
                                 "hss_tan_f" in printed)
     levels = [hssil.level(texels, sampling.first_level + i, settings.senders.downsample)
               for i in range(sampling.levels)]
+    senders = levels
+    if settings.senders.downsample == "resampled":
+        senders = hssil.drawn(texels, levels, sampling.first_level, sampling.seed)
     shape = len(levels[0]), len(levels[0][0])
     # Sec. 3.2: the smallest r with which the crowns cover the picture, its diagonal over 2^K
     radius = max(1.0, math.hypot(*shape) / 2**sampling.levels) if sampling.radius is None else sampling.radius
@@ -67,7 +70,7 @@ def one_view(frame, settings):
         here = levels[index]
         added = np.zeros((3, len(here), len(here[0])))
         if settings.senders.only_level in (None, index):
-            added = gathered(frame, here, index, settings, radius)
+            added = gathered(frame, here, index, settings, radius, senders[index])
             added *= 4.0**index if "hss_level_factor" in printed else 1.0
         light = added if light is None else added + upsampled(light, levels[index + 1], here, 2, settings)
     first = sampling.first_level
@@ -82,24 +85,24 @@ def upsampled(light, below, here, factor, settings):
                            sigma, power)
 
 
-def gathered(frame, texels, index, settings, radius):
-    """Return the light that the texels of a level receive from samples of it."""
+def gathered(frame, texels, index, settings, radius, senders):
+    """Return the light that the texels of a level receive from samples of it, `senders`."""
     sampling, kind = settings.sampling, settings.visibility
     number, shape = sampling.first_level + index, (len(texels), len(texels[0]))
     form, disc_pi = settings.senders.form_factor, "hss_disc_pi" in settings.as_published
     if isinstance(kind, Bitmask):
         light = bitmask.masked_light(
             as_arrays(texels), lambda *at: crown_points.slices(sampling, kind, radius, index, number, *at),
-            kind.thickness * diagonal(frame), form)
-        return light / math.pi if disc_pi and form == "disc" else light
+            kind.thickness * diagonal(frame), form, as_arrays(senders))
+        return light / math.pi if disc_pi and form != "point" else light
 
     def around(row, column):
         if sampling.pattern == "all":
             return crown_points.every_texel(radius, index, shape)
         return crown_points.samples(sampling, radius, index, number, row, column)
 
-    see = sight(frame, texels) if isinstance(kind, Rays) else None
-    return hssil.gathered(texels, around, form, disc_pi, see)
+    see = sight(frame, texels, senders) if isinstance(kind, Rays) else None
+    return hssil.gathered(texels, around, form, disc_pi, see, senders)
 
 
 def diagonal(frame):
@@ -118,10 +121,10 @@ def as_arrays(texels):
                for name, key in (("position", "place"), ("normal", "normal"), ("radiance", "radiance"))}}
 
 
-def sight(frame, texels):
+def sight(frame, *levels):
     """Return V of two texels of a level: a ray between the pixels whose surfaces they hold, off their triangles."""
     buffer, corners, ends = frame.gbuffer, corners_of(frame.scene.geometry), {}
-    for texel in (texel for row in texels for texel in row if texel is not None):
+    for texel in (texel for level in levels for row in level for texel in row if texel is not None):
         at = texel["pixel"]
         up = face_normals(frame.scene.geometry, buffer.triangle_id[at][None], buffer.normal[:, *at][None])[0]
         ends[at] = up, buffer.position[:, *at] + LIFT * up

@@ -10,20 +10,58 @@ from tests.naive.screen_space import fetched
 
 def filtered(frames, lights, settings):
     """Return F_i of frames with the light I_i as computed: F_i = a W(F_{i-1}) + (1 - a) I_i."""
-    results = [lights[0]]
+    results, count = [lights[0]], np.ones(lights[0].shape[1:])
     for i in range(1, len(frames)):
         before = lights[i - 1] if settings.form == "printed" else results[-1]
-        results.append(blended(frames[i], lights[i], frames[i - 1], before, settings))
+        light, count = blended(frames[i], lights[i], frames[i - 1], before, count, settings)
+        results.append(light)
     return results
 
 
-def blended(frame, light, last, before, settings):
-    """Blend the light of a frame with that of the frame before; a falls with the speed of surfaces that moved."""
+def blended(frame, light, last, before, count, settings):
+    """Blend the light of a frame with that of the frame before; return it and in how many frames points were found."""
+    covered = frame.gbuffer.covered
     position, normal, speed = moved_back(frame, last.scene.geometry)
-    found, weight = fetched(before, last, position, normal, frame.gbuffer.covered, settings.depth_tolerance,
-                            settings.normal_cosine, settings.fetch)
-    a = np.where(weight > 0, settings.weight * np.exp(-speed / settings.speed), 0.0)
-    return a * found + (1 - a) * light
+    where = position, normal, covered, settings.depth_tolerance, settings.normal_cosine, settings.fetch
+    found, weight = fetched(before, last, *where)
+    seen = fetched(np.stack([count] * 3), last, *where)[0][0]
+    result = light.copy()
+    for pixel in np.argwhere(covered):
+        at = tuple(pixel)
+        a, earlier = settings.weight, found[:, *at]
+        if weight[at] == 0:
+            entered = at_edge(last, before, position[:, *at], at)
+            if entered is None or settings.entering_speed is None:
+                continue
+            earlier, moved = entered
+            a *= math.exp(-moved / settings.entering_speed)
+        elif settings.warm_up and settings.form == "recursive":
+            a = min(a, seen[at] / (seen[at] + 1))
+        if settings.clamp is not None:
+            earlier = clamped(earlier, light, covered, at, settings.clamp, settings.clamp_radius)
+        a *= math.exp(-speed[at] / settings.speed)
+        result[:, *at] = a * earlier + (1 - a) * light[:, *at]
+    return result, np.where(weight > 0, seen + 1, 1)
+
+
+def at_edge(last, before, point, pixel):
+    """Return the light at the edge next to a point outside the earlier picture, and how far it moved, in pixels."""
+    view, (height, width) = last.gbuffer.projection, last.gbuffer.covered.shape
+    seen = place(point, view.origin[0], *view.frame[0], view.half[1], height, width)
+    if seen is None or (-0.5 <= seen[0] <= width - 0.5 and -0.5 <= seen[1] <= height - 0.5):
+        return None
+    i, j = (round(min(max(c, 0), most - 1)) for c, most in ((seen[1], height), (seen[0], width)))
+    if not last.gbuffer.covered[i, j]:
+        return None
+    return before[:, i, j], math.hypot(seen[0] - pixel[1], seen[1] - pixel[0])
+
+
+def clamped(earlier, light, covered, pixel, deviations, radius):
+    """Bound light by mean and standard deviation of the new light in a square of pixels with a surface."""
+    square = tuple(slice(max(0, c - radius), c + radius + 1) for c in pixel)
+    around = light[:, *square][:, covered[square]]
+    middle, spread = around.mean(axis=1), deviations * around.std(axis=1)
+    return np.clip(earlier, middle - spread, middle + spread)
 
 
 def moved_back(frame, before):

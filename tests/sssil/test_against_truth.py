@@ -172,7 +172,8 @@ def test_the_line_of_figure_5(evidence):
     right, error, shadowed = (one[:, asked] / mean for one in (truth, error, next(traced_row(frame, row))))
 
     def line(**settings):
-        light = hssil(frame, of(HssilSettings, start="full", radius=FIGURE_5 / 18, **settings))
+        published = {"start": "full", "radius": FIGURE_5 / 18, "downsample": "closest"}
+        light = hssil(frame, of(HssilSettings, **published | settings))
         return light[:, row, asked].astype(float) / mean
 
     closest, average = (line(pattern="all", downsample=mode) for mode in ("closest", "average"))

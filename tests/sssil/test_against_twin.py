@@ -40,7 +40,8 @@ def twin(frame, settings):
     return naive.hssil(texels, first=sampling.first_level, count=sampling.levels, offsets=samples(settings),
                        mode=senders.downsample, form=senders.form_factor, kind=upsampling.name(),
                        only=senders.only_level, **weights,
-                       disc_pi="hss_disc_pi" in printed, level_factor="hss_level_factor" in printed)
+                       disc_pi="hss_disc_pi" in printed, level_factor="hss_level_factor" in printed,
+                       seed=sampling.seed)
 
 
 def samples(settings):
@@ -68,6 +69,7 @@ SETTINGS = {
     "no inner samples": of(HssilSettings, pattern="pixel", levels=3, radius=2.0, samples=8, inner_samples=0),
     "averages": of(HssilSettings, levels=3, radius=2.0, pattern="all", start="full", downsample="average"),
     "closest places, average light": of(HssilSettings, levels=3, radius=2.0, downsample="closest_average"),
+    "the closest": of(HssilSettings, levels=3, radius=2.0, downsample="closest"),
     "points": of(HssilSettings, levels=3, radius=2.0, form_factor="point"),
     "bilinear": of(HssilSettings, levels=3, radius=2.0, upsampling="bilinear"),
     "nearest": of(HssilSettings, levels=3, radius=2.0, upsampling="nearest"),

@@ -47,8 +47,8 @@ def test_a_page_shows_few_keys_and_says_what_each_is(kind):
     assert all(leaf.about for leaf in leaves(kind))
 
 
-def test_the_papers_values_are_the_defaults():
-    assert PRESETS["paper"] == HssilSettings()
+def test_the_papers_values_are_the_defaults_but_for_senders():
+    assert PRESETS["paper"] == of(HssilSettings, downsample="closest")
 
 
 def test_settings_compare_by_value_and_serve_as_keys():

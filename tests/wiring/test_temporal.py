@@ -26,6 +26,12 @@ CASES = {
     "any normal": Case({"normal_cosine": -1.0}),
     "slow": Case({"speed": 2.0}),
     "the nearest texel": Case({"fetch": "nearest"}),
+    "no warm-up": Case({"warm_up": False}),
+    "little of the frame before from the first": Case({"weight": 0.4}, {"warm_up": False}),
+    "the camera's speed": Case({"entering_speed": 2.0}),
+    "clamped": Case({"clamp": 0.5}),
+    "clamped to few pixels": Case({"clamp_radius": 1}, {"clamp": 0.5}),
+    "clamped at the edge": Case({"clamp": 0.3}, {"entering_speed": 5.0}),
 }
 
 
@@ -44,7 +50,9 @@ def scenes():
         eye = np.add(room.camera.eye, step * np.array([0.03, -0.02, 0.04]))
         spot, point, sun = room.lights
         spot = dataclasses.replace(spot, position=tuple(np.add(spot.position, (0.1 * step, 0.0, 0.0))))
-        yield dataclasses.replace(room, geometry=geometry, lights=(spot, point, sun)).with_camera(eye=tuple(eye))
+        target = np.add(room.camera.target, step * np.array([0.0, 0.1, 0.0]))  # the picture's edge moves on
+        yield dataclasses.replace(room, geometry=geometry, lights=(spot, point, sun)).with_camera(
+            eye=tuple(eye), target=tuple(target))
 
 
 def rotation(angle):

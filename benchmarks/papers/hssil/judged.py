@@ -95,7 +95,8 @@ def settings_of_figure_5(frame: Frame) -> HssilSettings:
 
     Every pixel has its own samples, so that noise shows along the line.
     """
-    return of(HssilSettings, radius=scaled_radius(frame, RADIUS_FIGURE_5), start="full", pattern="pixel")
+    return of(HssilSettings, radius=scaled_radius(frame, RADIUS_FIGURE_5), start="full", pattern="pixel",
+              downsample="closest")
 
 
 def _highest(light: Array, right: Array, row: int) -> float:

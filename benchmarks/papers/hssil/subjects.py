@@ -98,7 +98,7 @@ def wide_frame(bench: Workbench, name: str, factor: float = LARGE) -> Frame:
 
 def settings_of(frame: Frame, **changes: Any) -> HssilSettings:
     """Return the paper's settings with a radius that reaches as much of this picture as the paper's of 1280 x 720."""
-    return of(HssilSettings, **({"radius": scaled_radius(frame, RADIUS)} | changes))
+    return of(HssilSettings, **({"radius": scaled_radius(frame, RADIUS), "downsample": "closest"} | changes))
 
 
 def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
@@ -109,7 +109,8 @@ def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
     share = math.hypot(frame.width, frame.height) / math.hypot(WIDE * PAPER_HEIGHT, PAPER_HEIGHT)
     levels = max(1, round(4 + math.log2(share)))
     radius = max(1.0, RADIUS * share * 2.0 ** (4 - levels))
-    return of(HssilSettings, **({"radius": radius, "levels": max(1, levels + further)} | changes))
+    published = {"radius": radius, "levels": max(1, levels + further), "downsample": "closest"}
+    return of(HssilSettings, **(published | changes))
 
 
 def scaled_radius(frame: Frame, radius: float) -> float:

@@ -17,7 +17,7 @@ from refgi.sssil.temporal.sequence import Sequence
 from refgi.stages import observe
 
 RAW, PRINTED, RECURSIVE = "each frame alone", "as printed", "recursive"
-WAYS = {RAW: None, PRINTED: TemporalSettings(form="printed"), RECURSIVE: TemporalSettings()}
+WAYS = {RAW: None, PRINTED: TemporalSettings(form="printed"), RECURSIVE: TemporalSettings(warm_up=False)}
 RESTING, MOVING = "resting camera", "moving camera"
 SIZE = 3 / 8  # of the run's: each frame is judged by the mean of many pictures
 STEP = (0.04, 0.002, 0.012)  # m: how far the camera moves from frame to frame

@@ -6,7 +6,7 @@ VIEWS = (("cornell_box", "cornell_side"), ("stage", "stage_side"))
 SLICED = {"visibility": "bitmask"}
 TRACED = {"visibility": "rays"}
 
-TABLE = Table({"radius": 3.0, "levels": 3, "samples": 16}, [
+TABLE = Table({"radius": 3.0, "levels": 3, "samples": 16, "downsample": "closest"}, [
     vary("radius", 2.0, None),
     vary("levels", 1, 2),
     vary("samples", 40),
@@ -23,8 +23,15 @@ TABLE = Table({"radius": 3.0, "levels": 3, "samples": 16}, [
     vary("seed", 7, **SLICED),
     vary("seed", 7, pattern="pixel", **SLICED),
     vary("seed", 7, **TRACED),
-    vary("downsample", "average", "closest_average"),
-    vary("form_factor", "point"),
+    vary("downsample", "average", "closest_average", "resampled"),
+    vary("downsample", "resampled", **SLICED),
+    vary("downsample", "resampled", **TRACED),
+    vary("downsample", "resampled", start="full"),
+    vary("downsample", "resampled", start="quarter"),
+    vary("seed", 7, downsample="resampled", pattern="all"),
+    vary("form_factor", "texel", "point"),
+    vary("form_factor", "texel", **SLICED),
+    vary("form_factor", "texel", **TRACED),
     vary("form_factor", "point", **SLICED),
     vary("form_factor", "point", **TRACED),
     vary("only_level", 0, 1, 2),
@@ -43,7 +50,11 @@ TABLE = Table({"radius": 3.0, "levels": 3, "samples": 16}, [
     vary("as_published", "hss_tan_f", "hss_disc_pi", "hss_level_factor", **SLICED),
 ])
 
-TEMPORAL = Table({}, [
+TEMPORAL = Table({"warm_up": False}, [
+    vary("warm_up", True),
+    vary("entering_speed", 4.0),
+    vary("clamp", 0.5),
+    vary("clamp_radius", 1, clamp=0.5),
     vary("weight", 0.0, 0.5),
     vary("form", "printed"),
     vary("depth_tolerance", 0.0005),

@@ -19,29 +19,36 @@ Array = npt.NDArray[Any]
 
 WIDE = 320  # lanes of a tile
 ROWS = 12  # position, normal, sum of a group of samples, sum of all
+POINT, TEXEL, DISC = 0, 1, 2  # form factors
 LEAST = 1e-37  # stands in for a denominator of 0, where the numerator is 0 as well
 
 X, Y, Z, NX, NY, NZ, R, G, B = (np.uint64(k * WIDE) for k in range(9))
 
 
 @kernel
-def form_factor(c: Any, s: Any, square: Any, disc: bool) -> Any:
-    """Return c s / (r^4 + s r) (Eq. 4, `disc`) or c s / r^4 (Eq. 3): cos(theta) R^2 / (r^2 + R^2), without pi.
+def form_factor(c: Any, s: Any, texel: Any, square: Any, form: int) -> Any:
+    """Return c s / (r^4 + s r) (Eq. 4, DISC), c s / (r^4 + t r) (TEXEL) or c s / r^4 (Eq. 3, POINT).
 
-    `square` is r^2. 0 where c or s is 0, and where receiver and sample coincide.
+    That is cos(theta) R^2 / (r^2 + R^2), without pi. `s` is of all texels that the sample stands for, `texel` t of one
+    of them, `square` r^2. 0 where c or s is 0, and where receiver and sample coincide.
     """
     least = type(c)(LEAST)
     # Eq. (3): cos(theta) cos(theta') ds / r^2
     below = square * square
-    if disc:
+    if form != POINT:
         # Eq. (4): cos(theta) R^2 / (r^2 + R^2)
-        below = below + s * math.sqrt(square)
+        below = below + (s if form == DISC else texel) * math.sqrt(square)
     return c * s / (below if below > least else least)
+
+
+def form_of(name: str) -> int:
+    """Return the number by which kernels know a form factor: that of a "disc", a "texel" or a "point"."""
+    return {"point": POINT, "texel": TEXEL, "disc": DISC}[name]
 
 
 @kernel
 def term(px: Any, py: Any, pz: Any, nx: Any, ny: Any, nz: Any, qx: Any, qy: Any, qz: Any, mx: Any, my: Any, mz: Any,
-         weight: Any, disc: bool) -> Any:
+         weight: Any, form: int) -> Any:
     """Return the form factor of one receiver and one sample that stands for `weight` texels.
 
     p, n: position and normal of the receiver; q, m: position of the sample, and its reversed normal times area / pi.
@@ -52,14 +59,14 @@ def term(px: Any, py: Any, pz: Any, nx: Any, ny: Any, nz: Any, qx: Any, qy: Any,
     c = nx * dx + ny * dy + nz * dz
     s = mx * dx + my * dy + mz * dz
     c = c if c > zero else zero
-    s = (s if s > zero else zero) * weight
-    return form_factor(c, s, square, disc)
+    texel = s if s > zero else zero
+    return form_factor(c, texel * weight, texel, square, form)
 
 
 @kernel
 def add_two(
     tile: Array, low: int, lanes: int, packed: Array, step: int, first: int, first_weight: Any, second: int,
-    second_weight: Any, disc: bool,
+    second_weight: Any, form: int,
 ) -> None:
     """Add the light of two samples to each receiver of a tile; the two contributions are added to each other first.
 
@@ -76,9 +83,9 @@ def add_two(
     for i in range(np.uint64(lanes)):
         px, py, pz, nx, ny, nz = tile[X + i], tile[Y + i], tile[Z + i], tile[NX + i], tile[NY + i], tile[NZ + i]
         g = term(px, py, pz, nx, ny, nz, packed[a + i], packed[a1 + i], packed[a2 + i], packed[a3 + i], packed[a4 + i],
-                 packed[a5 + i], first_weight, disc)
+                 packed[a5 + i], first_weight, form)
         h = term(px, py, pz, nx, ny, nz, packed[b + i], packed[b1 + i], packed[b2 + i], packed[b3 + i], packed[b4 + i],
-                 packed[b5 + i], second_weight, disc)
+                 packed[b5 + i], second_weight, form)
         # Eq. (1)
         tile[R + i] = tile[R + i] + (g * packed[a6 + i] + h * packed[b6 + i])
         tile[G + i] = tile[G + i] + (g * packed[a7 + i] + h * packed[b7 + i])

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
-from refgi.sssil.crown.add import ROWS, WIDE, add_two, close_group
+from refgi.sssil.crown.add import ROWS, WIDE, add_two, close_group, form_of
 from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, pack
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.points import level_key, pixel_key, row_key, sample_points, sample_weight, shift_of, shifted
@@ -29,17 +29,19 @@ GROUP = 256  # samples that are summed before they are added to the total
 
 
 @stage("sssil.gather")
-def gather(level: Level, index: int, settings: HssilSettings) -> Array:
+def gather(level: Level, index: int, settings: HssilSettings, senders: Level | None = None) -> Array:
     """Sum the light of the samples around each texel of a level (Eq. 1).
 
     Parameters
     ----------
     level : Level
-        Receivers and senders.
+        Receivers, and senders unless those are given.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     settings : HssilSettings
         Sampling and form factor.
+    senders : Level, optional
+        The same level with other surface points, as senders.
 
     Returns
     -------
@@ -47,22 +49,23 @@ def gather(level: Level, index: int, settings: HssilSettings) -> Array:
         Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi and visibility.
     """
     rows, columns = level.shape
-    sampling = settings.sampling
+    sampling, senders = settings.sampling, level if senders is None else senders
     radius = chosen_radius((rows << index, columns << index), sampling)
     real = level.position.dtype.type
-    disc, factor = settings.senders.form_factor == "disc", real(math.pi * level_factor(index, settings))
+    form, factor = form_of(settings.senders.form_factor), real(math.pi * level_factor(index, settings))
     farthest, result = math.ceil(2 * radius), plane(level.radiance.shape, level.radiance.dtype)
     if sampling.pattern == "pixel":
         inner = sampling.inner if index == 0 else 0
         points, weight = sample_points(inner, sampling.samples), sample_weight(radius, inner, sampling.samples)
         key = level_key(sampling.seed, level.number)
-        emitters = pack(level, 1, farthest, WIDE)
-        _gather_per_pixel(emitters, level.normal, points, inner, radius, key, weight.astype(real), disc, factor, result)
+        emitters = pack(senders, 1, farthest, WIDE)
+        _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, key,
+                          weight.astype(real), form, factor, result)
         return result
     offsets, weight = _reaching(*shared_offsets(sampling, index, level.number, rows, radius, columns), rows, columns)
-    emitters = pack(level, offsets.shape[1], farthest, WIDE)
+    emitters = pack(senders, offsets.shape[1], farthest, WIDE)
     paired = sampling.pattern != "row"
-    _gather_shared(emitters, level.normal, offsets, weight.astype(real), paired, disc, factor, result)
+    _gather_shared(emitters, level.position, level.normal, offsets, weight.astype(real), paired, form, factor, result)
     return result
 
 
@@ -90,7 +93,7 @@ def level_factor(index: int, settings: HssilSettings) -> float:
         1 / pi where Eq. 4 lacks its pi, times 4^k where areas are scaled by the level's 4^k a second time.
     """
     factor = 1.0
-    if "hss_disc_pi" in settings.as_published and settings.senders.form_factor == "disc":
+    if "hss_disc_pi" in settings.as_published and settings.senders.form_factor != "point":
         factor /= math.pi
     if "hss_level_factor" in settings.as_published:
         factor *= 4.0**index
@@ -99,11 +102,12 @@ def level_factor(index: int, settings: HssilSettings) -> float:
 
 @kernel(parallel=True)
 def _gather_shared(
-    emitters: Emitters, normal: Array, offsets: Array, weight: Array, paired: bool, disc: bool, factor: Any,
-    result: Array,
+    emitters: Emitters, position: Array, normal: Array, offsets: Array, weight: Array, paired: bool, form: int,
+    factor: Any, result: Array,
 ) -> None:
     rows = normal.shape[1]
     packed, emit_from, emit_to = emitters.packed, emitters.emit_from, emitters.emit_to
+    scale = packed.dtype.type(emitters.scale)
     phases, strip, line, pad = emitters.phases, emitters.strip, emitters.line, emitters.pad
     strips, bands = (line - 2 * pad) // strip, (rows + BAND - 1) // BAND
     for task in prange(strips * bands):
@@ -113,15 +117,14 @@ def _gather_shared(
         for row in range(top, min(rows, top + BAND)):
             shared = min(row, offsets.shape[0] - 1)
             for phase in range(phases):
-                first = row * PLANES * phases * line + phase * line + pad + left
-                _load(tile, strip, packed, phases * line, first, normal, row, phase + phases * left, phases)
+                _load(tile, strip, position, normal, scale, row, phase + phases * left, phases)
                 count = _list_emitting(offsets[shared, phase], weight, paired, emit_from, emit_to, row, phase,
                                        pad + left, strip, line, starts, weights)
                 for j in range(0, count, 2):
                     low = min(starts[1, j], starts[1, j + 1]) // BLOCK * BLOCK
                     lanes = (max(starts[2, j], starts[2, j + 1]) - low + BLOCK - 1) // BLOCK * BLOCK
                     add_two(tile, low, lanes, packed, phases * line, starts[0, j], weights[j], starts[0, j + 1],
-                            weights[j + 1], disc)
+                            weights[j + 1], form)
                     if (j + 2) % GROUP == 0:
                         close_group(tile, strip)
                 close_group(tile, strip)
@@ -130,16 +133,18 @@ def _gather_shared(
 
 @kernel
 def _load(
-    tile: Array, lanes: int, packed: Array, step: int, first: int, normal: Array, row: int, column: int, phases: int
+    tile: Array, lanes: int, position: Array, normal: Array, scale: Any, row: int, column: int, phases: int
 ) -> None:
-    """Copy the receivers of a strip into a tile and clear its sums."""
-    zero = packed.dtype.type(0.0)
+    """Copy the receivers of a strip into a tile, lengths times `scale`, and clear its sums."""
+    zero = tile.dtype.type(0.0)
     y, x, by = np.uint64(row), np.uint64(column), np.uint64(phases)
     inside = np.uint64(max(0, min(lanes, (normal.shape[2] - column + phases - 1) // phases)))
     for c in range(3):
-        here, to = np.uint64(first + c * step), np.uint64(c * WIDE)
+        to = np.uint64(c * WIDE)
         for i in range(np.uint64(lanes)):
-            tile[to + i] = packed[here + i]
+            tile[to + i] = zero
+        for i in range(inside):
+            tile[to + i] = position[c, y, x + by * i] * scale
         to = np.uint64((c + 3) * WIDE)
         for i in range(np.uint64(lanes)):
             tile[to + i] = zero
@@ -196,11 +201,12 @@ def _store(tile: Array, lanes: int, factor: Any, row: int, column: int, phases: 
 
 @kernel(parallel=True)
 def _gather_per_pixel(
-    emitters: Emitters, normal: Array, points: Array, inner: int, radius: float, key: Any, weight: Array, disc: bool,
-    factor: Any, result: Array,
+    emitters: Emitters, position: Array, normal: Array, points: Array, inner: int, radius: float, key: Any,
+    weight: Array, form: int, factor: Any, result: Array,
 ) -> None:
     rows = normal.shape[1]
     packed, line, pad, strip = emitters.packed, emitters.line, emitters.pad, emitters.strip
+    scale = packed.dtype.type(emitters.scale)
     strips, bands = (line - 2 * pad) // strip, (rows + BAND - 1) // BAND
     for task in prange(strips * bands):
         left, top = np.int64(task) // bands * strip, np.int64(task) % bands * BAND
@@ -208,7 +214,7 @@ def _gather_per_pixel(
         lines = np.empty(2 * PLANES * WIDE, packed.dtype)
         for row in range(top, min(rows, top + BAND)):
             first = row * PLANES * line + pad + left
-            _load(tile, strip, packed, line, first, normal, row, left, 1)
+            _load(tile, strip, position, normal, scale, row, left, 1)
             for i in range(strip):
                 shifts[0, i], shifts[1, i], shifts[2, i] = shift_of(pixel_key(row_key(key, row), left + i), 0)
             for j in range(0, weight.size, 2):
@@ -216,7 +222,7 @@ def _gather_per_pixel(
                 _expand(packed, line, first, row, rows, points, j, inner, radius, shifts, strip, lines, 0)
                 _expand(packed, line, first, row, rows, points, k, inner, radius, shifts, strip, lines, PLANES * WIDE)
                 second = weight[k] if k > j else weight.dtype.type(0.0)
-                add_two(tile, 0, strip, lines, WIDE, 0, weight[j], PLANES * WIDE, second, disc)
+                add_two(tile, 0, strip, lines, WIDE, 0, weight[j], PLANES * WIDE, second, form)
                 if (j + 2) % GROUP == 0:
                     close_group(tile, strip)
             close_group(tile, strip)

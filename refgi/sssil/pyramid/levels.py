@@ -13,6 +13,7 @@ from refgi.rsm.raster.projection import Projection
 from refgi.sssil.pyramid.closest import NO_PIXEL
 from refgi.sssil.pyramid.fill import fill_coarser_level, fill_first_level
 from refgi.sssil.pyramid.mean import average_pixels, average_texels
+from refgi.sssil.pyramid.resample import draw_pixels, draw_texels
 from refgi.sssil.pyramid.view import Level, Picture, View, view_of
 from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.stages import skip, stage
@@ -45,8 +46,35 @@ def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
     count = useful_levels((frame.height, frame.width), sampling)
     if count < sampling.levels:
         skip("sssil.level", f"no texel of level {sampling.first_level + count} has another in its crown")
+    downsample = settings.senders.downsample
     return list(levels(depth, normal, albedo, frame.direct, buffer.projection, sampling.first_level, count,
-                       settings.senders.downsample, settings.as_published & {"hss_tan_f"}))
+                       "closest" if downsample == "resampled" else downsample, settings.as_published & {"hss_tan_f"}))
+
+
+def sender_pyramid(frame: "Frame", receivers: list[Level], settings: HssilSettings) -> list[Level]:
+    """Return the levels as senders: those of the receivers unless senders are drawn.
+
+    Parameters
+    ----------
+    frame : Frame
+        Scene, camera and lights.
+    receivers : list of Level
+        What `pyramid` returned.
+    settings : HssilSettings
+        Downsampling and seed.
+
+    Returns
+    -------
+    list of Level
+        As many, of the same resolutions.
+    """
+    if settings.senders.downsample != "resampled":
+        skip("sssil.senders", "receivers are the senders")
+        return receivers
+    buffer = frame.gbuffer
+    depth, normal, albedo = buffer.resolve("depth", "normal", "albedo")
+    return list(drawn_senders(depth, normal, albedo, frame.direct, buffer.projection, tuple(receivers),
+                              settings.sampling.seed, settings.as_published & {"hss_tan_f"}))
 
 
 def useful_levels(shape: tuple[int, int], sampling: SamplingSettings) -> int:
@@ -149,6 +177,56 @@ def levels(
     if downsample != "closest":
         _average(picture, view, downsample == "average", levels_made)
     return tuple(levels_made)
+
+
+@stage("sssil.senders")
+def drawn_senders(
+    depth: Array, normal: Array, albedo: Array, direct: Array, projection: Projection, closest: tuple[Level, ...],
+    seed: int = 0, as_published: frozenset[str] = frozenset(),
+) -> tuple[Level, ...]:
+    """Return levels whose texels stand where one of four does, drawn in proportion to flux, and send the flux of all.
+
+    Parameters
+    ----------
+    depth : (H, W) ndarray
+        Along the view direction, m; inf where there is no surface.
+    normal : (3, H, W) ndarray
+        Unit vectors on the visible side, world space.
+    albedo : (3, H, W) ndarray
+        Diffuse reflectance.
+    direct : (3, H, W) ndarray
+        Direct irradiance, W/m^2.
+    projection : Projection
+        The camera's map.
+    closest : tuple of Level
+        Levels of the closest texels: those that a texel which sends nothing is like.
+    seed : int
+        Seed of the draws.
+    as_published : frozenset of str
+        "hss_tan_f": sample areas with the tangents of Eq. 3 as printed.
+
+    Returns
+    -------
+    tuple of Level
+        Area is the sum over pixels, radiance times area the flux over pi, to rounding. `depth` is that of `closest`.
+
+    Notes
+    -----
+    Not the published method, which keeps the closest of four as a sender too. The expectation of Eq. 3 is that of
+    the sum over all pixels; where they differ in hue, that of the mean of the channels.
+    """
+    picture = Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(array, depth.dtype)
+                                                     for array in (normal, albedo, direct)))
+    view = view_of(projection, as_published)
+    drawn = [_empty_level(level.number, (view.height, view.width), depth.dtype)._replace(depth=level.depth)
+             for level in closest]
+    if closest[0].number == 0:
+        drawn[0] = closest[0]  # pixels stand for themselves
+    else:
+        draw_pixels(picture, view, seed, closest[0], drawn[0])
+    for (fine, coarse), nearest in zip(itertools.pairwise(drawn), closest[1:], strict=True):
+        draw_texels(fine, seed, nearest, coarse)
+    return tuple(drawn)
 
 
 def _average(picture: Picture, view: View, by_surface: bool, levels_made: list[Level]) -> None:

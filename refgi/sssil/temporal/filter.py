@@ -1,6 +1,7 @@
 """Temporal filter F_i = a W(F_{i-1}) + (1 - a) I_i (Sec. 3.3).
 
-Symbols: I_i light of frame i as computed, F_i as filtered, W reprojection, a share of the frame before.
+Symbols: I_i light of frame i as computed, F_i as filtered, W reprojection, a share of the frame before, n frames in
+which a surface was found before.
 """
 
 import dataclasses
@@ -16,7 +17,9 @@ from refgi.jit import kernel, prange
 from refgi.scene.model import Geometry
 from refgi.sssil.reprojection import SourceView, reproject
 from refgi.sssil.settings import TemporalSettings
+from refgi.sssil.temporal.entering import fetch_entering
 from refgi.sssil.temporal.motion import previous_points
+from refgi.sssil.temporal.neighbourhood import clamp_to_neighbourhood
 from refgi.stages import skip, stage
 
 if TYPE_CHECKING:
@@ -31,6 +34,7 @@ class History(NamedTuple):
     irradiance: Array  # (3, h, w) F, or I for the printed form, W/m^2
     view: SourceView  # its camera, depths and normals
     geometry: Geometry  # the scene's triangles, where the scene has them
+    frames: Array | None = None  # (h, w) frames in which each pixel's surface was found; None: as many as a asks for
 
 
 class Filtered(NamedTuple):
@@ -38,9 +42,10 @@ class Filtered(NamedTuple):
 
     irradiance: Array  # (3, h, w) W/m^2
     reused: float  # share of the pixels with a surface that the frame before shows as well
+    frames: Array | None  # (h, w) frames in which each pixel's surface was found, this one included
 
 
-def history_of(frame: "Frame", geometry: Geometry, irradiance: Array) -> History:
+def history_of(frame: "Frame", geometry: Geometry, irradiance: Array, frames: Array | None = None) -> History:
     """Return the state that the next frame needs of this one.
 
     Parameters
@@ -51,15 +56,35 @@ def history_of(frame: "Frame", geometry: Geometry, irradiance: Array) -> History
         Its scene's triangles as the scene holds them: the very object of the next scene if nothing moves.
     irradiance : (3, h, w) ndarray
         Light for the next frame, F or I by the form of the filter, W/m^2.
+    frames : (h, w) ndarray, optional
+        Frames in which each pixel's surface was found; as many as a asks for where absent.
 
     Returns
     -------
     History
-        Depths, normals and light: seven numbers a pixel.
+        Depths, normals, light and number of frames: eight numbers a pixel.
     """
     buffer = frame.gbuffer
     depth, normal = buffer.resolve("depth", "normal")
-    return History(irradiance, SourceView(buffer.projection, depth, normal, frame.origin), geometry)
+    return History(irradiance, SourceView(buffer.projection, depth, normal, frame.origin), geometry, frames)
+
+
+def first_frames(irradiance: Array, settings: TemporalSettings) -> Array | None:
+    """Return the number of frames in which surfaces were found after the first one.
+
+    Parameters
+    ----------
+    irradiance : (3, h, w) ndarray
+        The first frame's light.
+    settings : TemporalSettings
+        Whether frames are counted.
+
+    Returns
+    -------
+    (h, w) ndarray or None
+        1 everywhere.
+    """
+    return np.ones(irradiance.shape[1:], irradiance.dtype) if settings.counts_frames else None
 
 
 @stage("sssil.temporal", kept=False)
@@ -107,14 +132,23 @@ def temporal_filter(
         expect_same_triangles(geometry, history.geometry)
         before = _relative_to(history.geometry, frame.origin)
         position, normal, speed = previous_points(buffer, frame.scene.geometry, before)
-    reprojected, weight = reproject(history.irradiance, history.view, position, normal, buffer.covered,
+    frames = history.frames if settings.counts_frames else None
+    earlier = history.irradiance if frames is None else np.concatenate([history.irradiance, frames[None]])
+    reprojected, weight = reproject(earlier, history.view, position, normal, buffer.covered,
                                     origin=frame.origin, depth_tolerance=settings.depth_tolerance,
                                     normal_cosine=settings.normal_cosine, fetch=settings.fetch)
+    entering = None
+    if settings.entering_speed is not None:
+        entering = fetch_entering(history.irradiance, history.view, position, buffer.covered, weight, frame.origin,
+                                  settings.entering_speed, reprojected)
+    if settings.clamp is not None:
+        clamp_to_neighbourhood(irradiance, buffer.covered, settings.clamp, settings.clamp_radius, reprojected)
     real = irradiance.dtype.type
     reused = np.empty(len(weight), np.int64)  # pixels of each row
     falloff = real(-math.log2(math.e) / settings.speed)
-    _blend(irradiance, speed, real(settings.weight), falloff, weight, reprojected, reused)
-    return Filtered(reprojected, int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))))
+    _blend(irradiance, speed, entering, real(settings.weight), falloff, weight, reprojected, reused)
+    return Filtered(reprojected[:3], int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))),
+                    None if frames is None else reprojected[3])
 
 
 def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
@@ -142,17 +176,28 @@ def _relative_to(geometry: Geometry, origin: tuple[float, float, float]) -> Geom
 
 @kernel(parallel=True)
 def _blend(
-    irradiance: Array, speed: Array | None, a: float, falloff: float, weight: Array, blended: Array, reused: Array
+    irradiance: Array, speed: Array | None, entering: Array | None, a: float, falloff: float, weight: Array,
+    blended: Array, reused: Array,
 ) -> None:
-    """Turn W(F_{i-1}) into F_i and its weight into a; differences, so that equal light stays as it is, to the bit."""
-    none = weight.dtype.type(0)
+    """Turn W(F_{i-1}) into F_i and its weight into a; differences, so that equal light stays as it is, to the bit.
+
+    A fourth plane of `blended` is n, and becomes n + 1.
+    """
+    none, one = weight.dtype.type(0), weight.dtype.type(1)
     for row in prange(weight.shape[0]):
         count = 0
         for column in range(weight.shape[1]):
             count += weight[row, column] > none
         reused[row] = count
         for column in range(weight.shape[1]):
-            share = a if weight[row, column] > none else none
+            found = weight[row, column] > none
+            share = a if found else none
+            if blended.shape[0] > 3:
+                n = blended[3, row, column] if found else none
+                share = min(share, n / (n + one))
+                blended[3, row, column] = n + one
+            if entering is not None and not found:
+                share = a * entering[row, column]
             if speed is not None:
                 share = share * exp2(speed[row, column] * falloff)
             weight[row, column] = share

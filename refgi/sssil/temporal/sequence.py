@@ -10,7 +10,7 @@ from refgi.frame import Frame
 from refgi.scene.model import Scene
 from refgi.settings import flat, replaced
 from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
-from refgi.sssil.temporal.filter import History, history_of, temporal_filter
+from refgi.sssil.temporal.filter import History, first_frames, history_of, temporal_filter
 
 Array = npt.NDArray[Any]
 Method = Callable[[Frame, Any], Array]
@@ -25,6 +25,7 @@ class SequenceFrame(NamedTuple):
     irradiance: Array  # (3, h, w) indirect, filtered, W/m^2
     radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
     reused: float  # share of the pixels with a surface that the frame before shows as well
+    frames: Array | None = None  # (h, w) frames in which each pixel's surface was found, where the filter counts them
 
 
 class Sequence:
@@ -97,11 +98,11 @@ class Sequence:
         irradiance = self.method(frame, seeded(self.settings, number))
         if self.temporal is None:
             return SequenceFrame(frame, irradiance, frame.radiance(irradiance), 0.0), None
-        filtered, reused = irradiance, 0.0
+        filtered, reused, frames = irradiance, 0.0, first_frames(irradiance, self.temporal)
         if history is not None:
-            filtered, reused = temporal_filter(irradiance, frame, scene.geometry, history, self.temporal)
-        left = history_of(frame, scene.geometry, irradiance if self.temporal.form == "printed" else filtered)
-        return SequenceFrame(frame, filtered, frame.radiance(filtered), reused), left
+            filtered, reused, frames = temporal_filter(irradiance, frame, scene.geometry, history, self.temporal)
+        left = history_of(frame, scene.geometry, irradiance if self.temporal.form == "printed" else filtered, frames)
+        return SequenceFrame(frame, filtered, frame.radiance(filtered), reused, frames), left
 
 
 def _hssil() -> Method:

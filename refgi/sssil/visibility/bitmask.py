@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.sssil.crown.add import form_factor
+from refgi.sssil.crown.add import form_factor, form_of
 from refgi.sssil.crown.emitters import length_scale
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.points import level_key, pixel_key, row_key
@@ -43,19 +43,23 @@ PART, TOTAL, HIGHEST, SCRATCH = 0, 6, 9, 10  # lines of scratch: two slices' sum
 
 
 @stage("sssil.bitmask")
-def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: float) -> Array:
+def bitmask_gather(
+    level: Level, index: int, settings: HssilSettings, diagonal: float, senders: Level | None = None
+) -> Array:
     """Sum the light of the samples around each texel of a level, times their visibility by a bitmask of the depth map.
 
     Parameters
     ----------
     level : Level
-        Receivers and senders.
+        Receivers, and senders unless those are given.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     settings : HssilSettings
         Sampling, form factor, number of slices and thickness.
     diagonal : float
         Diagonal of the scene, m.
+    senders : Level, optional
+        The same level with other surface points, as senders and occluders.
 
     Returns
     -------
@@ -74,37 +78,44 @@ def bitmask_gather(level: Level, index: int, settings: HssilSettings, diagonal: 
     steps = slice_counts(sampling, bitmask, index, chosen_radius((rows << index, columns << index), sampling))
     real = level.position.dtype.type
     scale = length_scale(level.depth)
-    packed = np.empty((rows, PLANES, columns), level.position.dtype)
-    pack(level.position, level.normal, level.radiance, level.area, real(scale), packed)
-    thickness, disc = real(bitmask.thickness * diagonal * scale), settings.senders.form_factor == "disc"
+    packed = _packed(level, scale)
+    sending = packed if senders is None or senders is level else _packed(senders, scale)
+    thickness, form = real(bitmask.thickness * diagonal * scale), form_of(settings.senders.form_factor)
     factor = real(level_factor(index, settings))
     result = np.empty_like(level.radiance)
     if sampling.pattern == "pixel":
         key = level_key(sampling.seed, level.number)
-        _march_pixels(packed, steps, key, thickness, disc, factor, result)
+        _march_pixels(packed, sending, steps, key, thickness, form, factor, result)
     else:
         offsets, weight = slice_offsets(sampling, steps, level.number, rows)
-        _march_rows(packed, offsets, weight.astype(real), thickness, disc, factor, result)
+        _march_rows(packed, sending, offsets, weight.astype(real), thickness, form, factor, result)
     return result
 
 
+def _packed(level: Level, scale: float) -> Array:
+    """Return the texels of a level with lengths times a scale, (rows, PLANES, columns)."""
+    packed = np.empty((level.shape[0], PLANES, level.shape[1]), level.position.dtype)
+    pack(level.position, level.normal, level.radiance, level.area, level.position.dtype.type(scale), packed)
+    return packed
+
+
 @kernel(parallel=True)
-def _march_rows(packed: Array, offsets: Array, weight: Array, thickness: Any, disc: bool, factor: Any,
+def _march_rows(packed: Array, sending: Array, offsets: Array, weight: Array, thickness: Any, form: int, factor: Any,
                 result: Array) -> None:
     for prow in prange(packed.shape[0]):
         row = np.int64(prow)
         lines, mask = np.zeros((SCRATCH, packed.shape[2]), packed.dtype), np.zeros(packed.shape[2], np.uint32)
         shared = min(row, offsets.shape[0] - 1)
         for k in range(offsets.shape[1]):
-            _march_row(packed, row, offsets[shared, k], weight[shared, k], thickness, disc, lines, mask, k % 2)
+            _march_row(packed, sending, row, offsets[shared, k], weight[shared, k], thickness, form, lines, mask, k % 2)
             if k % 2 == 1 or k + 1 == offsets.shape[1]:
                 _join(lines)
         _store(packed, row, lines, factor, result)
 
 
 @kernel
-def _march_row(packed: Array, row: Any, offsets: Array, weight: Array, thickness: Any, disc: bool, lines: Array,
-               mask: Array, half: int) -> None:
+def _march_row(packed: Array, sending: Array, row: Any, offsets: Array, weight: Array, thickness: Any, form: int,
+               lines: Array, mask: Array, half: int) -> None:
     """March one slice for a row of receivers, which are the SIMD lanes."""
     rows, columns = packed.shape[0], packed.shape[2]
     receiver, part = packed[row], np.uint64(PART + 3 * half)
@@ -115,15 +126,15 @@ def _march_row(packed: Array, row: Any, offsets: Array, weight: Array, thickness
         size = columns - abs(ox)
         if row + oy < 0 or row + oy >= rows or size <= 0 or (ox == 0 and oy == 0):
             continue
-        sender, first, second = packed[row + oy], np.uint64((abs(ox) - ox) // 2), np.uint64((abs(ox) + ox) // 2)
+        sender, first, second = sending[row + oy], np.uint64((abs(ox) - ox) // 2), np.uint64((abs(ox) + ox) // 2)
         if weight[j] > 0.0:
-            _add_sample(receiver, first, sender, second, np.uint64(size), weight[j], disc, thickness, lines, mask, part)
+            _add_sample(receiver, first, sender, second, np.uint64(size), weight[j], form, thickness, lines, mask, part)
         else:
             _add_occluder(receiver, first, sender, second, np.uint64(size), thickness, lines, mask)
 
 
 @kernel
-def _add_sample(receiver: Array, first: Any, sender: Array, second: Any, size: Any, weight: Any, disc: bool,
+def _add_sample(receiver: Array, first: Any, sender: Array, second: Any, size: Any, weight: Any, form: int,
            thickness: Any, lines: Array, mask: Array, part: Any) -> None:
     """Add the light of one sample to each receiver of a row, and its occlusion to the masks."""
     for i in range(size):
@@ -131,7 +142,7 @@ def _add_sample(receiver: Array, first: Any, sender: Array, second: Any, size: A
         dx, dy, dz, c = direction(receiver, p, sender, q)
         square = dx * dx + dy * dy + dz * dz
         front, back = heights(receiver, p, sender, q, dx, dy, dz, c, thickness)
-        g = visibility(front, lines[HIGHEST, p], mask[p]) * _transfer(sender, q, dx, dy, dz, c, square, weight, disc)
+        g = visibility(front, lines[HIGHEST, p], mask[p]) * _transfer(sender, q, dx, dy, dz, c, square, weight, form)
         lines[part, p] = lines[part, p] + g * sender[L, q]
         lines[part + np.uint64(1), p] = lines[part + np.uint64(1), p] + g * sender[L + 1, q]
         lines[part + np.uint64(2), p] = lines[part + np.uint64(2), p] + g * sender[L + 2, q]
@@ -153,13 +164,14 @@ def _add_occluder(receiver: Array, first: Any, sender: Array, second: Any, size:
 
 @kernel
 def _transfer(sender: Array, q: Any, dx: Any, dy: Any, dz: Any, c: Any, square: Any, weight: Any,
-              disc: bool) -> Any:
-    """Return pi times the form factor of Eq. 4, or without `disc` of Eq. 3."""
+              form: int) -> Any:
+    """Return pi times the form factor of Eq. 4 or, by `form`, of Eq. 3."""
     real = type(dx)
     zero = real(0.0)
     s = -(sender[N, q] * dx + sender[N + 1, q] * dy + sender[N + 2, q] * dz)
-    s = (s if s > zero else zero) * (sender[AREA, q] * weight)
-    return form_factor(real(math.pi) * (c if c > zero else zero), s, square, disc)
+    s = s if s > zero else zero
+    return form_factor(real(math.pi) * (c if c > zero else zero), s * (sender[AREA, q] * weight), s * sender[AREA, q],
+                       square, form)
 
 
 @kernel
@@ -180,7 +192,7 @@ def _store(packed: Array, row: Any, lines: Array, factor: Any, result: Array) ->
 
 
 @kernel(parallel=True)
-def _march_pixels(packed: Array, steps: SliceCounts, key: Any, thickness: Any, disc: bool, factor: Any,
+def _march_pixels(packed: Array, sending: Array, steps: SliceCounts, key: Any, thickness: Any, form: int, factor: Any,
                   result: Array) -> None:
     for prow in prange(packed.shape[0]):
         row = np.int64(prow)
@@ -191,14 +203,14 @@ def _march_pixels(packed: Array, steps: SliceCounts, key: Any, thickness: Any, d
         for column in range(packed.shape[2]):
             fill_slices(steps, pixel_key(row_key(key, row), column), False, length, offsets, weight)
             for k in range(steps.slices):
-                _march_pixel(packed, row, column, offsets[k], weight[k], thickness, disc, lines, mask)
+                _march_pixel(packed, sending, row, column, offsets[k], weight[k], thickness, form, lines, mask)
         _join(lines)
         _store(packed, row, lines, factor, result)
 
 
 @kernel
-def _march_pixel(packed: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any, disc: bool,
-                 lines: Array, mask: Array) -> None:
+def _march_pixel(packed: Array, sending: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any,
+                 form: int, lines: Array, mask: Array) -> None:
     rows, columns = packed.shape[0], packed.shape[2]
     receiver, part, one, p = packed[row], np.uint64(PART), np.uint64(1), np.uint64(column)
     mask[p], lines[HIGHEST, p] = np.uint32(0), packed.dtype.type(0.0)
@@ -208,6 +220,6 @@ def _march_pixel(packed: Array, row: Any, column: Any, offsets: Array, weight: A
             continue
         if weight[j] > 0.0:
             stands_for = packed.dtype.type(weight[j])
-            _add_sample(receiver, p, packed[a], np.uint64(b), one, stands_for, disc, thickness, lines, mask, part)
+            _add_sample(receiver, p, sending[a], np.uint64(b), one, stands_for, form, thickness, lines, mask, part)
         else:
-            _add_occluder(receiver, p, packed[a], np.uint64(b), one, thickness, lines, mask)
+            _add_occluder(receiver, p, sending[a], np.uint64(b), one, thickness, lines, mask)

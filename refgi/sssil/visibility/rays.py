@@ -15,7 +15,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import receivers
 from refgi.rays import far_offset
-from refgi.sssil.crown.add import form_factor
+from refgi.sssil.crown.add import form_factor, form_of
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.points import level_key, pixel_key, pixel_offset, row_key, sample_points, sample_weight
@@ -54,19 +54,24 @@ class SampleOffsets(NamedTuple):
 
 
 @stage("sssil.rays")
-def ray_gather(level: Level, index: int, settings: HssilSettings, frame: "Frame", *, batch: int = BATCH) -> Array:
+def ray_gather(
+    level: Level, index: int, settings: HssilSettings, frame: "Frame", senders: Level | None = None, *,
+    batch: int = BATCH,
+) -> Array:
     """Sum the light of the samples around each texel of a level that no surface occludes.
 
     Parameters
     ----------
     level : Level
-        Receivers and senders.
+        Receivers, and senders unless those are given.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     settings : HssilSettings
         Sampling and form factor.
     frame : Frame
         The scene whose view the level is.
+    senders : Level, optional
+        The same level with other surface points, as senders.
     batch : int
         Pairs in memory at a time; changes no bit of the result.
 
@@ -75,18 +80,21 @@ def ray_gather(level: Level, index: int, settings: HssilSettings, frame: "Frame"
     (3, h, w) ndarray
         Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi.
     """
+    senders = level if senders is None else senders
     surfels, samples = _surfels(level, frame), _samples(level, index, settings.sampling)
-    radiance = level.radiance.reshape(3, -1)
+    sending = surfels if senders is level else _surfels(senders, frame)
+    radiance = senders.radiance.reshape(3, -1)
     total, count = np.zeros(radiance.shape), len(samples.weight)
     step = max(1, batch // max(count, 1))
     rays = [np.empty((step * count, 3), np.float32) for _ in range(2)]
     transfer, reach = np.empty(step * count), np.empty(step * count, np.float32)
     sender, blocked = np.empty(step * count, np.int64), np.empty(step * count, np.bool_)
-    disc = settings.senders.form_factor == "disc"
+    form = form_of(settings.senders.form_factor)
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])
         size = (last - first) * count
-        _write_rays(surfels, samples, level.shape, first, last, disc, rays[0], rays[1], reach, transfer, sender)
+        _write_rays(surfels, sending, samples, level.shape, first, last, form, rays[0], rays[1], reach, transfer,
+                    sender)
         frame.tracer.fill_occluded(rays[0][:size], rays[1][:size], reach[:size], blocked[:size])
         add_unoccluded(radiance, first, last, count, blocked, transfer, sender, total)
         report_progress(last / total.shape[1])
@@ -118,19 +126,23 @@ def _samples(level: Level, index: int, sampling: SamplingSettings) -> SampleOffs
 
 
 @kernel(parallel=True)
-def _write_rays(surfels: Surfels, samples: SampleOffsets, shape: tuple[int, int], first: int, last: int, disc: bool,
-         origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array) -> None:
+def _write_rays(
+    surfels: Surfels, senders: Surfels, samples: SampleOffsets, shape: tuple[int, int], first: int, last: int,
+    form: int, origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array,
+) -> None:
     """Write ray and transfer of each pair of receivers first to last and their samples."""
     count = samples.weight.size
     for i in prange(last - first):
         ray = np.int64(i) * count
-        _write_ray(surfels, samples, shape, first + np.int64(i), ray, disc, origins, directions, reach, transfer,
-                   sender)
+        _write_ray(surfels, senders, samples, shape, first + np.int64(i), ray, form, origins, directions, reach,
+                   transfer, sender)
 
 
 @kernel
-def _write_ray(surfels: Surfels, samples: SampleOffsets, shape: tuple[int, int], receiver: Any, ray: Any, disc: bool,
-             origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array) -> None:
+def _write_ray(
+    surfels: Surfels, senders: Surfels, samples: SampleOffsets, shape: tuple[int, int], receiver: Any, ray: Any,
+    form: int, origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array,
+) -> None:
     row, column = receiver // shape[1], receiver % shape[1]
     key = pixel_key(row_key(samples.key, row), column)
     own = samples.offsets.shape[2] == 0
@@ -142,35 +154,35 @@ def _write_ray(surfels: Surfels, samples: SampleOffsets, shape: tuple[int, int],
             ox, oy = np.int64(samples.offsets[shared, phase, j, 0]), np.int64(samples.offsets[shared, phase, j, 1])
         a, b = row + oy, column + ox
         reach[ray + j] = 0.0
-        if 0 <= a < shape[0] and 0 <= b < shape[1]:
+        if 0 <= a < shape[0] and 0 <= b < shape[1] and not (ox == 0 and oy == 0):
             other = a * shape[1] + b
             sender[ray + j] = other
-            transfer[ray + j] = _transfer(surfels, receiver, other, samples.weight[j], disc)
+            transfer[ray + j] = _transfer(surfels, senders, receiver, other, samples.weight[j], form)
             reach[ray + j] = 1.0 if transfer[ray + j] > 0.0 else 0.0
-            far = far_offset(surfels.origin[0, other] - surfels.origin[0, receiver],
-                             surfels.origin[1, other] - surfels.origin[1, receiver],
-                             surfels.origin[2, other] - surfels.origin[2, receiver])
+            far = far_offset(senders.origin[0, other] - surfels.origin[0, receiver],
+                             senders.origin[1, other] - surfels.origin[1, receiver],
+                             senders.origin[2, other] - surfels.origin[2, receiver])
             for c in range(3):
                 origins[ray + j, c] = surfels.origin[c, receiver]
-                directions[ray + j, c] = (surfels.origin[c, other] - surfels.origin[c, receiver]
-                                          + far * surfels.facing[c, other])
+                directions[ray + j, c] = (senders.origin[c, other] - surfels.origin[c, receiver]
+                                          + far * senders.facing[c, other])
 
 
 @kernel
-def _transfer(surfels: Surfels, i: int, j: int, weight: float, disc: bool) -> Any:
+def _transfer(surfels: Surfels, senders: Surfels, i: int, j: int, weight: float, form: int) -> Any:
     """Return pi times the form factor of a pair; 0 where either end lies behind the plane of the other's triangle."""
     square, c, s, above, before = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(3):
-        d = surfels.position[k, j] - surfels.position[k, i]
+        d = senders.position[k, j] - surfels.position[k, i]
         square += d * d
         c += surfels.normal[k, i] * d
-        s -= surfels.normal[k, j] * d
+        s -= senders.normal[k, j] * d
         above += surfels.facing[k, i] * d
-        before -= surfels.facing[k, j] * d
+        before -= senders.facing[k, j] * d
     if c <= 0.0 or s <= 0.0 or above <= 0.0 or before <= 0.0:
         return 0.0
-    s *= surfels.area[j] * weight / math.pi
-    return form_factor(math.pi * c, s, square, disc)
+    every, texel = s * (senders.area[j] * weight / math.pi), s * (senders.area[j] / math.pi)
+    return form_factor(math.pi * c, every, texel, square, form)
 
 
 @kernel(parallel=True)

@@ -31,7 +31,7 @@ from refgi.frame import Frame
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.sssil import HssilSettings
-from refgi.sssil.settings import TemporalSettings
+from refgi.sssil.settings import PRESETS, TemporalSettings
 from tests.benchmarks.papers.conftest import SMALL
 from tests.sssil.crown.counting import COUNTED, reads_of_levels
 
@@ -78,8 +78,9 @@ def test_a_full_run_has_the_papers_sizes():
     timed, judged = wide_frame(full, BASKET), frame_of(full, BASKET, LARGE)
     assert (timed.width, timed.height) == (1280, 720)
     assert (judged.width, judged.height) == (720, 720)
-    assert settings_of(timed) == of(HssilSettings, radius=20.0)
-    assert settings_of_figure_5(judged) == of(HssilSettings, radius=40.0, start="full", pattern="pixel")
+    assert settings_of(timed) == PRESETS["paper"]
+    assert settings_of_figure_5(judged) == of(HssilSettings, radius=40.0, start="full", pattern="pixel",
+                                                downsample="closest")
 
 
 def test_smaller_pictures_reach_as_much_by_fewer_levels():

@@ -12,8 +12,9 @@ from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.scene.motion import faces_of, moved, rotation_about
 from refgi.sssil.temporal import Sequence, TemporalSettings
-from refgi.sssil.temporal.filter import history_of, temporal_filter
+from refgi.sssil.temporal.filter import first_frames, history_of, temporal_filter
 from refgi.sssil.temporal.motion import previous_points
+from refgi.sssil.temporal.neighbourhood import clamp_to_neighbourhood
 from tests.naive.reprojection import recursion
 
 SIZE = {"width": 40, "height": 30}
@@ -57,11 +58,11 @@ def at_rest(frame, lights, settings):
     """Light of a frame that is rendered again and again."""
     results, history = [], None
     for new in lights:
-        light = new
+        light, count = new, first_frames(new, settings)
         if history is not None:
-            light, reused = temporal_filter(new, frame, frame.scene.geometry, history, settings)
+            light, reused, count = temporal_filter(new, frame, frame.scene.geometry, history, settings)
             assert reused == 1
-        history = history_of(frame, frame.scene.geometry, new if settings.form == "printed" else light)
+        history = history_of(frame, frame.scene.geometry, new if settings.form == "printed" else light, count)
         results.append(light[:, frame.gbuffer.covered])
     return results
 
@@ -84,12 +85,64 @@ def test_a_static_camera_converges(room, evidence):
     frame = Frame(room, dtype=np.float64)
     lights = np.random.default_rng(1).random((8, 3, 30, 40))
     covered = frame.gbuffer.covered
-    error = np.abs(at_rest(frame, lights, TemporalSettings())[-1] - recursion(lights, 0.9)[:, covered]).max()
+    cold = TemporalSettings(warm_up=False)
+    error = np.abs(at_rest(frame, lights, cold)[-1] - recursion(lights, 0.9)[:, covered]).max()
     assert error < 1e-14
     steady = [lights[0]] + [lights[1]] * 12
-    left = [np.abs(light - lights[1][:, covered]).max() for light in at_rest(frame, steady, TemporalSettings())]
+    left = [np.abs(light - lights[1][:, covered]).max() for light in at_rest(frame, steady, cold)]
     assert left[12] / left[0] == pytest.approx(0.9**12, rel=1e-9)
     evidence(f"equals the recursion to {error:.0e}; steady light: the first frame's share after 12 is 0.9^12")
+
+
+@pytest.mark.feature("HSS-13")
+def test_warming_up_is_the_mean_of_all_frames_until_a_is_less(room, evidence):
+    """n / (n + 1) makes F the mean of n + 1 frames; from n = 9 on a = 0.9 is less, and F decays as without."""
+    frame, frames = Frame(room, dtype=np.float64), 16
+    lights, covered = np.random.default_rng(2).random((frames, 3, 30, 40)), frame.gbuffer.covered
+    made = at_rest(frame, lights, TemporalSettings())
+    for n in range(10):
+        np.testing.assert_allclose(made[n], lights[: n + 1].mean(axis=0)[:, covered], rtol=1e-13)
+    later = recursion([lights[:10].mean(axis=0), *lights[10:]], 0.9)
+    np.testing.assert_allclose(made[-1], later[:, covered], rtol=1e-13)
+    left = [12 * at_rest(frame, lights[:10], TemporalSettings(warm_up=warm))[-1].var() for warm in (True, False)]
+    assert left[0] == pytest.approx(0.1, rel=VARIANCE_OFF)
+    cold = 0.9**18 + 0.1**2 * sum(0.9 ** (2 * k) for k in range(9))  # of F_9: the weights' squares
+    assert left[1] == pytest.approx(cold, rel=VARIANCE_OFF)
+    evidence(f"after 10 frames {left[0]:.3f} of the variance is left, {left[1]:.3f} without warm-up (1/10, {cold:.3f})")
+
+
+def test_a_surface_that_is_new_starts_at_one(room):
+    """Frames are counted for each pixel: one that was not found again has its new light alone, and half of it next."""
+    looking, away = (Frame(room.with_camera(target=target), dtype=np.float64) for target in
+                     (room.camera.target, (9.0, 9.0, 9.0)))
+    settings = TemporalSettings()
+    light = np.ones((3, 30, 40))
+    history = history_of(away, room.geometry, light, first_frames(light, settings))
+    first = temporal_filter(light, looking, room.geometry, history, settings)
+    assert (first.frames[looking.gbuffer.covered] == 1).any()
+    second = temporal_filter(3 * light, looking, room.geometry,
+                             history_of(looking, room.geometry, first.irradiance, first.frames), settings)
+    new = looking.gbuffer.covered & (first.frames == 1)
+    np.testing.assert_array_equal(second.frames[new], 2)
+    np.testing.assert_allclose(second.irradiance[:, new], 2.0, rtol=1e-15)
+
+
+def test_clamping_bounds_what_lags(evidence):
+    """Analytic: mean and deviation of 3 x 3 pixels of which one column in three shines."""
+    new = np.zeros((3, 6, 6))
+    new[:, :, 1::2] = 2.0
+    earlier, covered = np.full((3, 6, 6), 9.0), np.ones((6, 6), np.bool_)
+    clamp_to_neighbourhood(new, covered, 0.5, 1, earlier)
+    share = 1 / 3  # of columns 0 to 2
+    mean, deviation = 2 * share, 2 * math.sqrt(share * (1 - share))
+    assert earlier[0, 3, 1] == pytest.approx(mean + 0.5 * deviation, rel=1e-14)
+    low = np.full((3, 6, 6), -9.0)
+    clamp_to_neighbourhood(new, covered, 0.5, 1, low)
+    assert low[2, 3, 1] == pytest.approx(mean - 0.5 * deviation, rel=1e-14)
+    within = np.full((3, 6, 6), mean)
+    clamp_to_neighbourhood(new, covered, 0.5, 1, within)
+    assert within[1, 3, 1] == mean
+    evidence("9 is clamped to the mean and half a standard deviation of 3 x 3 pixels")
 
 
 def test_equal_light_stays_equal_to_the_bit(room):

@@ -23,11 +23,11 @@ from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
-TALL, WIDE = 16, 128  # texels of a tile of work
+TALL, WIDE = 32, 128  # texels of a tile of work
 PAD = LARGEST_WINDOW // 2  # lanes to either side of a tile
 SPAN = WIDE + 2 * PAD  # lanes of a plane in a row
-LINE = 13 * SPAN  # planes of a row: light, position, normal, largest distance from the tangent plane, mean along the row
-LIGHT, POSITION, NORMAL, LIMIT, MEAN = 0, 3 * SPAN, 6 * SPAN, 9 * SPAN, 10 * SPAN
+LINE = 14 * SPAN  # planes of a row: light, position x, normal n, n . x, its largest change on a surface, mean light
+LIGHT, POSITION, NORMAL, PLANE, LIMIT, MEAN = 0, 3 * SPAN, 6 * SPAN, 9 * SPAN, 10 * SPAN, 11 * SPAN
 
 
 @stage("sssil.blur")
@@ -99,14 +99,13 @@ def _load(
     low, high = max(0, PAD - left), min(SPAN, columns - left + PAD)  # lanes that are texels
     if row < 0 or row >= rows:
         low, high = SPAN, SPAN
-    for k in range(10):
-        value = real(np.nan) if 3 <= k < 6 else real(0.0)
-        start = np.uint64(to + k * SPAN)
-        for i in range(np.uint64(SPAN)):
+    for k in range(11):
+        value, start = real(np.nan) if 3 <= k < 6 else real(0.0), np.uint64(to + k * SPAN)
+        for i in range(np.uint64(low)):
+            tile[start + i] = value
+        for i in range(np.uint64(high), np.uint64(SPAN)):
             tile[start + i] = value
     y, first = np.uint64(row), np.uint64(left - PAD)  # may stand for a number below 0: places wrap to the right ones
-    for i in range(np.uint64(low), np.uint64(high)):
-        tile[np.uint64(to + LIMIT) + i] = tolerance * depth[y, first + i]
     for c in range(3):
         e, x, n = np.uint64(to + c * SPAN), np.uint64(to + POSITION + c * SPAN), np.uint64(to + NORMAL + c * SPAN)
         for i in range(np.uint64(low), np.uint64(high)):
@@ -114,6 +113,18 @@ def _load(
             tile[e + i] = irradiance[c, y, first + i] if covered else real(0.0)
             tile[x + i] = position[c, y, first + i] if covered else real(np.nan)
             tile[n + i] = normal[c, y, first + i]
+    x, n, at, limit = (np.uint64(to + POSITION), np.uint64(to + NORMAL), np.uint64(to + PLANE), np.uint64(to + LIMIT))
+    for i in range(np.uint64(low), np.uint64(high)):
+        tile[limit + i] = tolerance * depth[y, first + i]
+    for i in range(np.uint64(SPAN)):
+        tile[at + i] = _dot(tile, n + i, x + i)
+
+
+@kernel
+def _dot(tile: Array, first: Any, second: Any) -> Any:
+    span = np.uint64(SPAN)
+    return (tile[first] * tile[second] + tile[first + span] * tile[second + span]
+            + tile[first + span + span] * tile[second + span + span])
 
 
 @kernel
@@ -124,10 +135,9 @@ def _average(tile: Array, start: int, light: int, size: int, step: int, cosine: 
         value = real(1.0) if k == 3 else real(0.0)
         for i in range(np.uint64(WIDE)):
             sums[np.uint64(k * WIDE) + i] = value
-    for by in range(-half, half + 1):
-        if by != 0:
-            weight = real(0.5) if 2 * abs(by) == size else real(1.0)
-            _add_texels(tile, start + PAD, start + PAD + by * step, light, weight, cosine, sums)
+    for by in range(1, half + 1):
+        weight = real(0.5) if 2 * by == size else real(1.0)
+        _add_two(tile, start + PAD, by * step, light, weight, cosine, sums)
     for c in range(3):
         own = np.uint64(start + PAD + light + c * SPAN)
         for i in range(np.uint64(WIDE)):
@@ -135,19 +145,25 @@ def _average(tile: Array, start: int, light: int, size: int, step: int, cosine: 
 
 
 @kernel
-def _add_texels(tile: Array, here: int, there: int, light: int, weight: Any, cosine: Any, sums: Array) -> None:
-    """Add the differences of the texels from `there` on to those from `here` on, and weights, where they count."""
-    zero = weight - weight
-    p, q, span = np.uint64(here), np.uint64(there), np.uint64(SPAN)
-    x, n, limit, e = np.uint64(POSITION), np.uint64(NORMAL), np.uint64(here + LIMIT), np.uint64(light)
+def _add_two(tile: Array, here: int, by: int, light: int, weight: Any, cosine: Any, sums: Array) -> None:
+    """Add the differences of the texels `by` places before and after those from `here` on, and weights, if they count."""
+    red, green, blue, total = np.uint64(0), np.uint64(WIDE), np.uint64(2 * WIDE), np.uint64(3 * WIDE)
+    e, g, b = np.uint64(light), np.uint64(light + SPAN), np.uint64(light + 2 * SPAN)
+    p, q, r = np.uint64(here), np.uint64(here - by), np.uint64(here + by)
     for i in range(np.uint64(WIDE)):
-        n0, n1, n2 = tile[p + n + i], tile[p + n + span + i], tile[p + n + span + span + i]
-        off = (n0 * (tile[q + x + i] - tile[p + x + i]) + n1 * (tile[q + x + span + i] - tile[p + x + span + i])
-               + n2 * (tile[q + x + span + span + i] - tile[p + x + span + span + i]))
-        facing = n0 * tile[q + n + i] + n1 * tile[q + n + span + i] + n2 * tile[q + n + span + span + i]
-        w = weight if (abs(off) <= tile[limit + i]) & (facing >= cosine) else zero
-        red, green, blue = np.uint64(0), np.uint64(WIDE), np.uint64(2 * WIDE)
-        sums[red + i] = sums[red + i] + w * (tile[q + e + i] - tile[p + e + i])
-        sums[green + i] = sums[green + i] + w * (tile[q + e + span + i] - tile[p + e + span + i])
-        sums[blue + i] = sums[blue + i] + w * (tile[q + e + span + span + i] - tile[p + e + span + span + i])
-        sums[np.uint64(3 * WIDE) + i] = sums[np.uint64(3 * WIDE) + i] + w
+        v = _weight_of(tile, p + i, q + i, weight, cosine)
+        w = _weight_of(tile, p + i, r + i, weight, cosine)
+        e0, e1, e2 = tile[p + e + i], tile[p + g + i], tile[p + b + i]
+        sums[red + i] = sums[red + i] + (v * (tile[q + e + i] - e0) + w * (tile[r + e + i] - e0))
+        sums[green + i] = sums[green + i] + (v * (tile[q + g + i] - e1) + w * (tile[r + g + i] - e1))
+        sums[blue + i] = sums[blue + i] + (v * (tile[q + b + i] - e2) + w * (tile[r + b + i] - e2))
+        sums[total + i] = sums[total + i] + (v + w)
+
+
+@kernel
+def _weight_of(tile: Array, p: Any, q: Any, weight: Any, cosine: Any) -> Any:
+    """Return `weight` where texel q is of p's surface, else 0."""
+    x, n = np.uint64(POSITION), np.uint64(NORMAL)
+    off = _dot(tile, p + n, q + x) - tile[p + np.uint64(PLANE)]
+    on_surface = (abs(off) <= tile[p + np.uint64(LIMIT)]) & (_dot(tile, p + n, q + n) >= cosine)
+    return weight if on_surface else weight - weight

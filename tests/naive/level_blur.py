@@ -1,0 +1,32 @@
+"""Slow literal twin of the blur of a level: the mean over a box of texels of one surface, along rows, then along columns."""
+
+import numpy as np
+
+
+def blurred(light, texels, size, depth_tolerance, normal_cosine):
+    """Return the mean light, (3, h, w); `texels` are those of `tests.naive.hssil`, `size` texels the side of the box."""
+    for down, right in ((0, 1), (1, 0)):
+        light = along(light, texels, size, down, right, depth_tolerance, normal_cosine)
+    return light
+
+
+def along(light, texels, size, down, right, depth_tolerance, normal_cosine):
+    """Return the mean over the texels at most half a box away in one direction, those that its rim halves by half."""
+    height, width = len(texels), len(texels[0])
+    mean = np.zeros(light.shape)
+    for row in range(height):
+        for column in range(width):
+            here, total, weight = texels[row][column], np.zeros(3), 0.0
+            for step in range(-size, size + 1):
+                inside = min(1.0, max(0.0, (size + 1) / 2 - abs(step)))  # of the texel, by the box
+                i, j = row + step * down, column + step * right
+                if here is None or not inside or not (0 <= i < height and 0 <= j < width) or texels[i][j] is None:
+                    continue
+                there = texels[i][j]
+                height_above = here["normal"] @ (there["place"] - here["place"])
+                if abs(height_above) <= depth_tolerance * here["depth"] and \
+                        here["normal"] @ there["normal"] >= normal_cosine or step == 0:
+                    total += inside * light[:, i, j]
+                    weight += inside
+            mean[:, row, column] = total / weight if weight else 0.0
+    return mean

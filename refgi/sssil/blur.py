@@ -2,8 +2,8 @@
 
 Interleaved sampling (Keller and Heidrich 2001) gives each texel of a tile of n x n its own part of one larger set of
 samples; the mean over a window of n x n texels then has the whole set. As in val (Dong et al. 2009, Sec. 6; Laine et
-al. 2007) a texel q counts for p where q lies on p's tangent plane, ``|n_p . (x_q - x_p)| <= depth_tolerance z_p``, and
-``n_p . n_q >= normal_cosine``.
+al. 2007) a texel q counts for p where q lies on p's tangent plane, ``|n_p . (x_q - x_p)| <= plane_tolerance z_p``, and
+``n_p . n_q >= cosine``.
 
 The window is a box of n x n texels about the texel's centre. Of an even n its rim cuts texels in half, which weigh 1/2:
 every column and every row of the tile has a weight of 1 in each window, and light does not move. The box is taken along
@@ -55,8 +55,8 @@ def blur(irradiance: Array, level: Level, settings: GeometryBlur) -> Array:
     real = level.position.dtype.type
     values = np.ascontiguousarray(irradiance, level.position.dtype)
     result = plane(values.shape, values.dtype)
-    _blur(values, level.position, level.normal, level.depth, settings.size, real(settings.depth_tolerance),
-          real(settings.normal_cosine), result)
+    _blur(values, level.position, level.normal, level.depth, settings.size, real(settings.plane_tolerance),
+          real(settings.cosine), result)
     return result
 
 

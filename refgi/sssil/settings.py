@@ -45,8 +45,8 @@ class SamplingSettings(Settings):
     start: Start = setting("half", "resolution of the first level")
     pattern: Pattern = setting("interleaved", "receivers that share samples")
     tile: int = setting(4, "texels along a side of a tile of interleaved samples, a power of two", least=1,
-                        most=LARGEST_TILE)
-    density: Density = setting("inverse_distance", "samples per texel, by the distance from the receiver")
+                        most=LARGEST_TILE, study=True)
+    density: Density = setting("inverse_distance", "samples per texel, by the distance from the receiver", study=True)
     seed: int = setting(0, "seed of the samples' offsets", least=0, most=LAST_SEED)
     inner_samples: int | None = setting(
         None, "samples of the first level's inner disc; none: as dense as those of its crown", least=0,
@@ -108,10 +108,10 @@ class GeometryBlur(Settings):
 
     PRINCIPAL = "size"
 
-    size: int = setting(4, "texels along a side of the window", least=1, most=LARGEST_WINDOW)
-    depth_tolerance: float = setting(0.02, "largest distance from the tangent plane, a share of the depth", least=0.0,
+    size: int = setting(4, "texels along a side of the window", least=1, most=LARGEST_WINDOW, study=True)
+    plane_tolerance: float = setting(0.02, "largest distance from the tangent plane, a share of the depth", least=0.0,
                                      most=1e6, study=True)
-    normal_cosine: float = setting(0.9, "least cosine between normals", least=-1.0, most=1.0, study=True)
+    cosine: float = setting(0.9, "least cosine between normals", least=-1.0, most=1.0, study=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -179,7 +179,7 @@ class HssilSettings(Settings):
 
     sampling: SamplingSettings = setting(SamplingSettings(), "crown sampling over mip levels")
     senders: SenderSettings = setting(SenderSettings(), "texels as senders")
-    blur: GeometryBlur | None = setting(GeometryBlur(), "geometry-aware blur of each level's light")
+    blur: GeometryBlur | None = setting(GeometryBlur(), "geometry-aware blur of each level's light", study=True)
     upsampling: Bilateral | Bilinear | Nearest = setting(Bilateral(), "upsampling from level to level")
     visibility: Bitmask | Rays | None = setting(None, "visibility of samples; none: ignored, as published")
     cameras: CameraSettings = setting(CameraSettings(), "further cameras")

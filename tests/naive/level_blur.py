@@ -3,14 +3,14 @@
 import numpy as np
 
 
-def blurred(light, texels, size, depth_tolerance, normal_cosine):
+def blurred(light, texels, size, plane_tolerance, cosine):
     """Return the mean light, (3, h, w); `texels` are those of `tests.naive.hssil`, `size` texels the side of the box."""
     for down, right in ((0, 1), (1, 0)):
-        light = along(light, texels, size, down, right, depth_tolerance, normal_cosine)
+        light = along(light, texels, size, down, right, plane_tolerance, cosine)
     return light
 
 
-def along(light, texels, size, down, right, depth_tolerance, normal_cosine):
+def along(light, texels, size, down, right, plane_tolerance, cosine):
     """Return the mean over the texels at most half a box away in one direction, those that its rim halves by half."""
     height, width = len(texels), len(texels[0])
     mean = np.zeros(light.shape)
@@ -24,8 +24,8 @@ def along(light, texels, size, down, right, depth_tolerance, normal_cosine):
                     continue
                 there = texels[i][j]
                 height_above = here["normal"] @ (there["place"] - here["place"])
-                if abs(height_above) <= depth_tolerance * here["depth"] and \
-                        here["normal"] @ there["normal"] >= normal_cosine or step == 0:
+                if abs(height_above) <= plane_tolerance * here["depth"] and \
+                        here["normal"] @ there["normal"] >= cosine or step == 0:
                     total += inside * light[:, i, j]
                     weight += inside
             mean[:, row, column] = total / weight if weight else 0.0

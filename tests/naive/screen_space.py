@@ -70,8 +70,8 @@ def one_view(frame, settings):
             added = gathered(frame, here, index, settings, radius)
             # receivers that all have the same samples have nothing to gain from each other's
             if settings.blur is not None and sampling.pattern not in ("fixed", "all"):
-                added = level_blur.blurred(added, here, settings.blur.size, settings.blur.depth_tolerance,
-                                           settings.blur.normal_cosine)
+                added = level_blur.blurred(added, here, settings.blur.size, settings.blur.plane_tolerance,
+                                           settings.blur.cosine)
             added *= 4.0**index if "hss_level_factor" in printed else 1.0
         light = added if light is None else added + upsampled(light, levels[index + 1], here, 2, settings)
     first = sampling.first_level

@@ -138,15 +138,16 @@ def _average(tile: Array, start: int, light: int, size: int, step: int, cosine: 
     for by in range(1, half + 1):
         weight = real(0.5) if 2 * by == size else real(1.0)
         _add_two(tile, start + PAD, by * step, light, weight, cosine, sums)
+    total = np.uint64(3 * WIDE)
     for c in range(3):
-        own = np.uint64(start + PAD + light + c * SPAN)
+        own, mean = np.uint64(start + PAD + light + c * SPAN), np.uint64(c * WIDE)
         for i in range(np.uint64(WIDE)):
-            sums[np.uint64(c * WIDE) + i] = tile[own + i] + sums[np.uint64(c * WIDE) + i] / sums[np.uint64(3 * WIDE) + i]
+            sums[mean + i] = tile[own + i] + sums[mean + i] / sums[total + i]
 
 
 @kernel
 def _add_two(tile: Array, here: int, by: int, light: int, weight: Any, cosine: Any, sums: Array) -> None:
-    """Add the differences of the texels `by` places before and after those from `here` on, and weights, if they count."""
+    """Add the differences of the texels `by` places before and after to those from `here` on, and their weights."""
     red, green, blue, total = np.uint64(0), np.uint64(WIDE), np.uint64(2 * WIDE), np.uint64(3 * WIDE)
     e, g, b = np.uint64(light), np.uint64(light + SPAN), np.uint64(light + 2 * SPAN)
     p, q, r = np.uint64(here), np.uint64(here - by), np.uint64(here + by)

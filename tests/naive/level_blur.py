@@ -1,10 +1,10 @@
-"""Slow literal twin of the blur of a level: the mean over a box of texels of one surface, along rows, then along columns."""
+"""Slow literal twin of the blur of a level: the mean over a box of texels of one surface, by rows, then by columns."""
 
 import numpy as np
 
 
 def blurred(light, texels, size, plane_tolerance, cosine):
-    """Return the mean light, (3, h, w); `texels` are those of `tests.naive.hssil`, `size` texels the side of the box."""
+    """Return the mean light, (3, h, w); `texels` are those of `tests.naive.hssil`, `size` is the side of the box."""
     for down, right in ((0, 1), (1, 0)):
         light = along(light, texels, size, down, right, plane_tolerance, cosine)
     return light
@@ -24,8 +24,8 @@ def along(light, texels, size, down, right, plane_tolerance, cosine):
                     continue
                 there = texels[i][j]
                 height_above = here["normal"] @ (there["place"] - here["place"])
-                if abs(height_above) <= plane_tolerance * here["depth"] and \
-                        here["normal"] @ there["normal"] >= cosine or step == 0:
+                on_plane = abs(height_above) <= plane_tolerance * here["depth"]
+                if step == 0 or (on_plane and here["normal"] @ there["normal"] >= cosine):
                     total += inside * light[:, i, j]
                     weight += inside
             mean[:, row, column] = total / weight if weight else 0.0

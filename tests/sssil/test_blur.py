@@ -40,10 +40,10 @@ def plain(shape, dtype=np.float64):
 
 def texels_of(level):
     """Return the level as the twins have it."""
-    return [[None if np.isinf(level.depth[row, column]) else
-             {"place": level.position[:, row, column].astype(float), "normal": level.normal[:, row, column].astype(float),
-              "depth": float(level.depth[row, column])} for column in range(level.shape[1])]
-            for row in range(level.shape[0])]
+    position, normal, depth = (array.astype(float) for array in (level.position, level.normal, level.depth))
+    return [[None if np.isinf(depth[at]) else
+             {"place": position[:, *at], "normal": normal[:, *at], "depth": depth[at]}
+             for at in ((row, column) for column in range(level.shape[1]))] for row in range(level.shape[0])]
 
 
 @pytest.mark.parametrize("settings", [GeometryBlur(), GeometryBlur(1), GeometryBlur(3, 0.05, 0.5),

@@ -1,9 +1,9 @@
 """Low-discrepancy points of a crown (Sec. 3.2), shifted for each receiver by a hash (Cranley and Patterson 1976).
 
-A point (u, v) of the unit square lies at the angle 2 pi v and, with uniform density, r sqrt(1 + 3 u) from the receiver in
-the crown, r sqrt(u) in the disc within: equal areas get equally many points. With a density of the inverse distance it
-lies r (1 + u) and r u away: rings of equal width get equally many. It stands for the texel it falls into, and for as
-many texels as there are to a point where it lies.
+A point (u, v) of the unit square lies at the angle 2 pi v. With uniform density it lies r sqrt(1 + 3 u) from the
+receiver in the crown, r sqrt(u) in the disc within: equal areas get equally many points. With a density of the inverse
+distance it lies r (1 + u) and r u away: rings of equal width get equally many. It takes the texel it falls into, and
+stands for as many texels as there are to a point where it lies.
 """
 
 import math
@@ -90,7 +90,7 @@ def shift_of(key: Any, block: Any) -> Any:
 
 @kernel
 def distance(share: Any, near: float, radius: float, uniform: bool) -> Any:
-    """Return the distance of the point u = `share` from the receiver, texels; `near` is 0 in the disc, 1 in the crown."""
+    """Return how far the point u = `share` is from the receiver, texels; `near` is 0 in the disc, 1 in the crown."""
     if uniform:
         return radius * math.sqrt(near + (1.0 + 2.0 * near) * share)
     return radius * (near + share)

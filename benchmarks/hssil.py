@@ -87,7 +87,7 @@ def _errors(name: str, size: int) -> Iterator[Row]:
     """Error against every texel of the crowns, and time, by samples."""
     frame = _seen(name, size, size)
     limit = hssil(frame, of(HssilSettings, pattern="all")).astype(np.float64)
-    for pattern in ("row", "pixel"):
+    for pattern in ("interleaved", "row", "pixel"):
         for samples in (16, 64, 256):
             settings = of(HssilSettings, pattern=pattern, samples=samples)
             found = hssil(frame, settings)

@@ -113,7 +113,7 @@ def _crowns(settings: HssilSettings, times: Array, texels: float) -> list[tuple[
     for k in range(settings.sampling.levels):
         near, far = (0.0 if k == 0 else radius * 2**k), radius * 2 ** (k + 1)
         within = (distance >= near) & (distance < far)
-        samples = settings.sampling.samples + (settings.sampling.inner if k == 0 else 0)
+        samples = sum(settings.sampling.counts(k))
         rows.append((f"level {k + 1}", near, far, samples, texels, float(times[within].mean())))
     return rows
 

@@ -20,6 +20,7 @@ from refgi.sssil import HssilSettings
 from refgi.sssil.crown.add import ROWS, WIDE, add_two, term
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.pyramid.view import Level
+from refgi.sssil.settings import PRESETS
 
 SAMPLES = 64
 
@@ -62,10 +63,10 @@ def rows(quick: bool) -> Iterator[Row]:
     height, width, repeats = (180, 320, 9) if quick else (360, 640, 25)
     for dtype in (np.float32, np.float64):
         yield _against_fastmath(dtype, repeats)
-    level, settings = room(height, width, np.float32), of(HssilSettings, samples=SAMPLES)
+    level, settings = room(height, width, np.float32), HssilSettings()
     whole = partial(gather, level, 0, settings)
     taken = seconds(whole, repeats)
-    pairs = height * width * (SAMPLES + settings.sampling.inner)
+    pairs = height * width * sum(settings.sampling.counts(0))
     yield Row(f"first level, {width} x {height}, {SAMPLES} samples", taken * 1e3, "ms",
               note=f"{pairs / taken / 1e9:.2f} G pairs/s")
     scaling = ratio(partial(_on_threads, 1, whole), whole, repeats)
@@ -92,7 +93,7 @@ def _against_fastmath(dtype: type, repeats: int) -> Row:
 
 def _cost_shape(height: int, width: int, repeats: int) -> Iterator[Row]:
     """Time by level, as in Fig. 7: each a quarter of the one before, the first with its disc."""
-    settings = of(HssilSettings, samples=SAMPLES)
+    settings = PRESETS["paper"]
     taken = [seconds(partial(gather, room(height >> k, width >> k, np.float32), k, settings), repeats)
              for k in range(5)]
     four = sum(taken[:4])

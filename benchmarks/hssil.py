@@ -21,6 +21,7 @@ from refgi.scene import Scene
 from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
+from refgi.sssil.settings import PRESETS
 from refgi.stages import observe
 
 DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -36,7 +37,7 @@ def rows(quick: bool) -> Iterator[Row]:
     width, height, repeats = (640, 360, 5) if quick else (1280, 720, 15)
     frame = _seen("sponza", width, height)
     for (start, levels, samples), (_, fast) in PAPER.items():
-        settings = of(HssilSettings, start=start, levels=levels, samples=samples, downsample="closest")
+        settings = replaced(PRESETS["paper"], {"start": start, "levels": levels, "samples": samples})
         yield _time(frame, f"{start}, {levels} levels, {samples} samples", settings, repeats, fast)
     yield from _fifth_level(frame, repeats)
     for name in STAND_INS:
@@ -77,7 +78,7 @@ def _breakdown(draw: Any, repeats: int) -> str:
 
 def _fifth_level(frame: Frame, repeats: int) -> Iterator[Row]:
     """The fifth level's cost; the paper's text says about 1 %, its samples are 0.3 % of all."""
-    four, five = (of(HssilSettings, levels=levels, downsample="closest") for levels in (4, 5))
+    four, five = (replaced(PRESETS["paper"], {"levels": levels}) for levels in (4, 5))
     found = ratio(lambda: hssil(frame, five), lambda: hssil(frame, four), repeats)
     yield Row("a fifth level: time beside four", found.median, "", "<= 1.01", f"{found.low:.3f} to {found.high:.3f}")
 
@@ -86,7 +87,7 @@ def _errors(name: str, size: int) -> Iterator[Row]:
     """Error against every texel of the crowns, and time, by samples."""
     frame = _seen(name, size, size)
     limit = hssil(frame, of(HssilSettings, pattern="all")).astype(np.float64)
-    for pattern in ("row", "pixel"):
+    for pattern in ("interleaved", "row", "pixel"):
         for samples in (16, 64, 256):
             settings = of(HssilSettings, pattern=pattern, samples=samples)
             found = hssil(frame, settings)

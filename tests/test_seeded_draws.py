@@ -194,20 +194,21 @@ def pixel_key(key, column):
     return mix32(key ^ mix32((column + 0xC2B2AE35) % 2**32))
 
 
-def place(radius, near, u, angle):
-    length = radius * math.sqrt(near + (1 + 2 * near) * u)
+def place(radius, near, u, angle, density="inverse_distance"):
+    length = radius * (math.sqrt(near + (1 + 2 * near) * u) if density == "uniform" else near + u)
     return math.floor(length * math.cos(angle) + 0.5), math.floor(length * math.sin(angle) + 0.5)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("index", [0, 1])
-@pytest.mark.parametrize("pattern", ["row", "pixel"])
-def test_samples_of_a_receiver(pattern, index, seed):
-    settings = of(HssilSettings, radius=6.5, samples=13, inner_samples=5, pattern=pattern, seed=seed)
+@pytest.mark.parametrize("density", ["inverse_distance", "uniform"])
+@pytest.mark.parametrize("pattern", ["interleaved", "row", "pixel"])
+def test_samples_of_a_receiver(pattern, density, index, seed):
+    settings = of(HssilSettings, radius=6.5, samples=13, inner_samples=5, pattern=pattern, density=density, seed=seed)
     inner = settings.sampling.inner if index == 0 else 0
     for row, column in ((0, 0), (3, 6), (17, 41)):
         key = level_key(seed, 2)
-        n = 2 * row + column % 2
+        n = 2 * row + column % 2 if pattern == "row" else 4 * (row % 4) + column % 4
         if pattern == "pixel":
             key, n = pixel_key(row_key(key, row), column), 0
         s, t = pair_of(key)
@@ -216,19 +217,20 @@ def test_samples_of_a_receiver(pattern, index, seed):
             for j in range(count):
                 u = ((0.5 + j * A) % 1 + s + n * 13 * A) % 1
                 v = (0.5 + j * B) % 1 + t + n * 13 * B
-                expected.append(place(6.5, near, u, 2 * math.pi * v))
+                expected.append(place(6.5, near, u, 2 * math.pi * v, density))
         assert offsets_at(settings.sampling, index, 2, row, column).tolist() == [list(offset) for offset in expected]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_fixed_samples_are_mirror_images(seed):
-    settings = of(HssilSettings, radius=6.5, samples=13, inner_samples=5, pattern="fixed", seed=seed)
+    settings = of(HssilSettings, radius=6.5, samples=13, inner_samples=5, pattern="fixed", density="uniform",
+                  seed=seed)
     s, t = pair_of(level_key(seed, 1))
     pairs, middles = [], []
     for near, count in ((0, settings.sampling.inner), (1, 13)):
         for j in range((count + 1) // 2):
             u, v = (0.5 + j * A + s) % 1, (0.5 + j * B + t) % 1
-            x, y = place(6.5, near, u, math.pi * (v - 0.5))
+            x, y = place(6.5, near, u, math.pi * (v - 0.5), "uniform")
             if 2 * j + 1 < count:
                 pairs += [(x, y), (-x, y)]
             else:
@@ -239,7 +241,8 @@ def test_fixed_samples_are_mirror_images(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_slices_of_the_bitmask(seed):
-    settings = of(HssilSettings, radius=8.0, samples=16, inner_samples=4, visibility="bitmask", seed=seed)
+    settings = of(HssilSettings, radius=8.0, samples=16, inner_samples=4, visibility="bitmask", density="uniform",
+                  seed=seed)
     steps = slice_counts(settings.sampling, settings.visibility, 0, 8.0)
     offsets, _ = slice_offsets(settings.sampling, steps, 1, 4)
     for row in range(4):

@@ -3,8 +3,9 @@
 `hssil` (Soler, Hoel, Rochet, Jay and Holzschuch 2009) gathers light from samples around every pixel, near by at high
 and far away at low resolution.
 
-`pyramid` builds the mip levels, `crown` places samples and sums their light, `upsampling` joins the levels, `temporal`
-blends frames, `cameras` adds surfaces outside the picture, `visibility` tests what lies between receiver and sample.
+`pyramid` builds the mip levels, `crown` places samples and sums their light, `blur` averages it along surfaces,
+`upsampling` joins the levels, `temporal` blends frames, `cameras` adds surfaces outside the picture, `visibility` tests
+what lies between receiver and sample.
 """
 
 from refgi.method import Method
@@ -19,6 +20,7 @@ from refgi.sssil.settings import (
     Bilinear,
     Bitmask,
     CameraSettings,
+    GeometryBlur,
     HssilSettings,
     Nearest,
     Rays,
@@ -34,6 +36,7 @@ __all__ = [
     "Bilinear",
     "Bitmask",
     "CameraSettings",
+    "GeometryBlur",
     "Guide",
     "HssilSettings",
     "Level",

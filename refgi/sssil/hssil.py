@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.settings import replaced
+from refgi.sssil.blur import blur
 from refgi.sssil.cameras import join_cameras
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.crown.reach import chosen_radius, warn_short_reach
@@ -77,7 +78,7 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
 
 
 def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettings, senders: Level) -> Array:
-    """Return the irradiance of the texels of one level from samples of it.
+    """Return the irradiance of the texels of one level from samples of it, blurred where these differ by receiver.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettin
     index : int
         0 for the first level, whose inner disc is sampled as well.
     settings : HssilSettings
-        Sampling and visibility.
+        Sampling, visibility and blur.
     senders : Level
         The level as senders.
 
@@ -100,10 +101,15 @@ def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettin
     if settings.senders.only_level not in (None, index):
         return np.zeros_like(level.radiance)
     if isinstance(settings.visibility, Bitmask):
-        return bitmask_gather(level, index, settings, frame.visible_extent.diagonal, senders)
-    if isinstance(settings.visibility, Rays):
-        return ray_gather(level, index, settings, frame, senders)
-    return gather(level, index, settings, senders)
+        irradiance = bitmask_gather(level, index, settings, frame.visible_extent.diagonal, senders)
+    elif isinstance(settings.visibility, Rays):
+        irradiance = ray_gather(level, index, settings, frame, senders)
+    else:
+        irradiance = gather(level, index, settings, senders)
+    if settings.blur is None or settings.sampling.pattern in ("fixed", "all"):
+        skip("sssil.blur", "none is asked for" if settings.blur is None else "all receivers share samples")
+        return irradiance
+    return blur(irradiance, level, settings.blur)
 
 
 def guide_of(level: Level) -> Guide:

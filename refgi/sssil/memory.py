@@ -5,17 +5,18 @@ Mip levels of the buffers add a third to them (Sec. 4).
 
 import math
 
+from refgi.sssil.crown.pattern import PHASES
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.settings import Bitmask, HssilSettings, Rays
 
 FLOATS = 11  # a texel: position, depth, normal, radiance, area
 SENDER_FLOATS = 10  # a texel of drawn senders: the same but the depth
 PIXEL_BYTES = 4  # and the pixel that it shows
-PLANES, LIGHT_FLOATS = 9, 6  # of a texel of the level that is summed: as senders, and its light and that below
-PADDING = 64  # lanes around a row of senders at least, twice 16 for even and for odd columns
+PLANES, LIGHT_FLOATS = 9, 9  # of a texel of the level that is summed: as senders, its light blurred or not, that below
+PADDING = 32  # lanes around a row of senders at least, for each of the phases into which columns are split
 VIEW_FLOATS = 32  # of a pixel of a further view: its G-buffer, direct and indirect light, and temporaries
 RAY_BYTES = 1 << 26  # rays that are held at a time
-OFFSET_BYTES, SLICED_BYTES = 16, 32  # of a sample in an even and an odd column of a row, and of one in a slice
+OFFSET_BYTES, SLICED_BYTES = 16, 32  # of a sample with its weight, and of one in a slice
 CANDIDATE_BYTES = 104  # of a texel that may be among all around a receiver
 LISTED_RAY_BYTES = 48  # of a sample of one receiver
 
@@ -78,7 +79,8 @@ def extra_bytes(settings: HssilSettings, size: tuple[int, int], float_bytes: int
     pixels = size[0] * size[1]
     columns, rows = (-(-side >> settings.sampling.first_level) for side in size)
     radius = chosen_radius((rows, columns), settings.sampling)
-    padded = columns + 2 * min(math.ceil(2 * radius), columns) + PADDING
+    phases = settings.sampling.tile if settings.sampling.pattern == "interleaved" else PHASES
+    padded = columns + 2 * min(math.ceil(2 * radius), columns) + PADDING * phases
     view = level_bytes(settings, pixels, float_bytes)
     view += (PLANES * padded * (rows + 1) + LIGHT_FLOATS * columns * rows) * float_bytes
     further = VIEW_FLOATS * pixels * float_bytes if settings.cameras.count or settings.cameras.views else 0
@@ -96,8 +98,10 @@ def _sample_bytes(settings: HssilSettings, rows: int, columns: int, radius: floa
         return CANDIDATE_BYTES * candidates + rays
     if sampling.pattern == "pixel":
         return 0
-    rows = 1 if sampling.pattern == "fixed" else rows
+    if sampling.pattern == "fixed":
+        rows = 1
     if isinstance(settings.visibility, Bitmask):  # half as many occluders as samples of the crown
         slices = settings.visibility.count(sampling.samples)
         return SLICED_BYTES * rows * (3 * sampling.samples // 2 + sampling.inner + 3 * slices)
-    return OFFSET_BYTES * rows * (sampling.samples + sampling.inner)
+    sets = sampling.tile**2 if sampling.pattern == "interleaved" else PHASES * rows
+    return OFFSET_BYTES * sets * (sampling.samples + sampling.inner)

@@ -10,7 +10,8 @@ from refgi.scene.model import Camera
 from refgi.settings import Settings, setting
 
 Start = Literal["full", "half", "quarter"]
-Pattern = Literal["row", "pixel", "fixed", "all"]
+Pattern = Literal["interleaved", "row", "pixel", "fixed", "all"]
+Density = Literal["inverse_distance", "uniform"]
 Downsample = Literal["closest", "average", "closest_average", "resampled"]
 FormFactor = Literal["disc", "texel", "point"]
 Form = Literal["recursive", "printed"]
@@ -20,6 +21,7 @@ FIRST_LEVEL = {"full": 0, "half": 1, "quarter": 2}
 LAST_SEED = 2**32 - 1
 MOST_LEVELS, MOST_SAMPLES, MOST_SLICES, MOST_CAMERAS = 16, 1 << 16, 256, 16
 MOST_CLAMP_RADIUS = 64
+LARGEST_WINDOW, LARGEST_TILE = 16, 16
 LARGEST_RADIUS = 65536.0  # texels: the widest picture there may be
 
 
@@ -28,8 +30,10 @@ class SamplingSettings(Settings):
     """Crown sampling over mip levels (Sec. 3.2).
 
     At each level, samples lie in the crown from `radius` to twice as many texels around a receiver; at the first level
-    also in the disc within. Patterns: a "row" of receivers shares samples, each "pixel" has its own, one "fixed"
-    mirror-symmetric set serves all, or "all" texels are samples, each once, whatever `samples`.
+    also in the disc within. Patterns: "interleaved" samples, where each texel of a tile of `tile` x `tile` has its part
+    of one larger set; a "row" of receivers shares samples, each "pixel" has its own, one "fixed" mirror-symmetric set
+    serves all, or "all" texels are samples, each once, whatever `samples`. The density of samples is "uniform" or the
+    "inverse_distance" from the receiver.
     """
 
     PRINCIPAL = "samples"
@@ -40,11 +44,18 @@ class SamplingSettings(Settings):
         most=LARGEST_RADIUS, unit="texels")
     levels: int = setting(4, "mip levels", least=1, most=MOST_LEVELS)
     start: Start = setting("half", "resolution of the first level")
-    pattern: Pattern = setting("row", "receivers that share samples")
+    pattern: Pattern = setting("interleaved", "receivers that share samples")
+    tile: int = setting(4, "texels along a side of a tile of interleaved samples, a power of two", least=1,
+                        most=LARGEST_TILE, study=True)
+    density: Density = setting("inverse_distance", "samples per texel, by the distance from the receiver", study=True)
     seed: int = setting(0, "seed of the samples' offsets", least=0, most=LAST_SEED)
     inner_samples: int | None = setting(
-        None, "samples of the first level's inner disc; none: a third of the crown's, as dense", least=0,
+        None, "samples of the first level's inner disc; none: as dense as those of its crown", least=0,
         most=MOST_SAMPLES, study=True)
+
+    def check(self) -> None:
+        """Check that tiles are powers of two."""
+        expect(self.tile & (self.tile - 1) == 0, "tile", f"a power of two, 1 to {LARGEST_TILE}", self.tile)
 
     @property
     def first_level(self) -> int:
@@ -54,7 +65,21 @@ class SamplingSettings(Settings):
     @property
     def inner(self) -> int:
         """Samples of the first level's disc: as dense as the crown's by default."""
-        return max(1, round(self.samples / 3)) if self.inner_samples is None else self.inner_samples
+        return self.counts(0)[0]
+
+    def counts(self, index: int) -> tuple[int, int]:
+        """Return the numbers of samples in the disc and in the crown of a level; `index` 0 is the first.
+
+        Uniform samples add a third of the crown's for the disc, a third of its area. Where density falls with distance
+        disc and crown are worth the same, and share the samples of the first level.
+        """
+        if index > 0:
+            return 0, self.samples
+        if self.inner_samples is not None:
+            return self.inner_samples, self.samples
+        if self.density == "uniform":
+            return max(1, round(self.samples / 3)), self.samples
+        return (self.samples + 1) // 2, max(1, self.samples // 2)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,6 +98,22 @@ class SenderSettings(Settings):
     form_factor: FormFactor = setting("disc", "form factor of a sample: Eq. 4 (disc) or Eq. 3 (point)", study=True)
     only_level: int | None = setting(None, "the one level that sends light, 0: the first; none: all", least=0,
                                      most=MOST_LEVELS - 1, study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class GeometryBlur(Settings):
+    """Geometry-aware blur of each level's light before upsampling: the mean over texels of the same surface.
+
+    With interleaved samples a window of the tile's size holds all of the tile's samples. Texels count that lie on the
+    tangent plane of the texel and face as it does.
+    """
+
+    PRINCIPAL = "size"
+
+    size: int = setting(4, "texels along a side of the window", least=1, most=LARGEST_WINDOW, study=True)
+    plane_tolerance: float = setting(0.02, "largest distance from the tangent plane, a share of the depth", least=0.0,
+                                     most=1e6, study=True)
+    cosine: float = setting(0.9, "least cosine between normals", least=-1.0, most=1.0, study=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,7 +173,7 @@ class CameraSettings(Settings):
 
 @dataclasses.dataclass(frozen=True)
 class HssilSettings(Settings):
-    """Settings of `hssil`; the defaults are the paper's, those of docs/methods/hssil where it gives none.
+    """Settings of `hssil`; docs/methods/hssil tells which defaults are the paper's.
 
     Switches use a form as printed: "hss_tan_f" the tangents of Eq. 3, "hss_disc_pi" Eq. 4 without its pi,
     "hss_level_factor" areas scaled by 4^k a second time.
@@ -140,6 +181,7 @@ class HssilSettings(Settings):
 
     sampling: SamplingSettings = setting(SamplingSettings(), "crown sampling over mip levels")
     senders: SenderSettings = setting(SenderSettings(), "texels as senders")
+    blur: GeometryBlur | None = setting(GeometryBlur(), "geometry-aware blur of each level's light", study=True)
     upsampling: Bilateral | Bilinear | Nearest = setting(Bilateral(), "upsampling from level to level")
     visibility: Bitmask | Rays | None = setting(None, "visibility of samples; none: ignored, as published")
     cameras: CameraSettings = setting(CameraSettings(), "further cameras")
@@ -152,7 +194,7 @@ class HssilSettings(Settings):
         only, levels = self.senders.only_level, self.sampling.levels
         expect(only is None or only < levels, "senders.only_level", f"none or a level, 0 to {levels - 1}", only)
         expect(not isinstance(self.visibility, Bitmask) or self.sampling.pattern != "all", "sampling.pattern",
-               "'row', 'pixel' or 'fixed' with the visibility 'bitmask'", self.sampling.pattern)
+               "any but 'all' with the visibility 'bitmask'", self.sampling.pattern)
 
     @property
     def traces_rays(self) -> bool:
@@ -162,8 +204,9 @@ class HssilSettings(Settings):
 
 PRESETS: Mapping[str, HssilSettings] = {
     # Fig. 6: half resolution, 4 levels, 64 samples, r = 20; Sec. 4: the closest of four texels; Eq. 4; v = 1
-    "paper": HssilSettings(SamplingSettings(samples=64, radius=20.0, levels=4, start="half"),
-                           SenderSettings(downsample="closest", form_factor="disc"), Bilateral(), None),
+    "paper": HssilSettings(
+        SamplingSettings(samples=64, radius=20.0, levels=4, start="half", pattern="row", density="uniform"),
+        SenderSettings(downsample="closest", form_factor="disc"), None, Bilateral(), None),
 }
 
 

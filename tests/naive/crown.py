@@ -22,14 +22,14 @@ def pair(p, n, p_j, n_j, ds, form):
     return math.pi * cos_i * square / (r**2 + square) if square > 0 else 0.0
 
 
-def gathered(level, offsets_at, weights, form):
-    """Irradiance (3, h, w) of every texel; offsets_at(row, column) lists (ox, oy)."""
+def gathered(level, samples_at, form):
+    """Irradiance (3, h, w) of every texel; samples_at(row, column) gives (ox, oy) of samples and the texels of each."""
     position, normal, radiance, area = (np.asarray(a, np.float64) for a in level)
     rows, columns = area.shape
     result = np.zeros((3, rows, columns))
     for row in range(rows):
         for column in range(columns):
-            for (ox, oy), weight in zip(offsets_at(row, column), weights, strict=True):
+            for (ox, oy), weight in zip(*samples_at(row, column), strict=True):
                 a, b = row + int(oy), column + int(ox)
                 if 0 <= a < rows and 0 <= b < columns and (a, b) != (row, column):
                     worth = pair(position[:, row, column], normal[:, row, column], position[:, a, b], normal[:, a, b],

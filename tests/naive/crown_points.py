@@ -28,14 +28,39 @@ def shifts(key):
     return mix32(key) / 2**32, mix32(key ^ 0x27D4EB2F) / 2**32
 
 
-def place(sampling, number, row, column):
-    """Return what is added to (u_j, v_j) at a receiver of a level."""
+def counts(sampling, index):
+    """Return how many samples lie in the disc and in the crown of a level."""
+    if index > 0:
+        return 0, sampling.samples
+    if sampling.inner_samples is not None:
+        return sampling.inner_samples, sampling.samples
+    if sampling.density == "uniform":
+        return max(1, round(sampling.samples / 3)), sampling.samples
+    return math.ceil(sampling.samples / 2), max(1, math.floor(sampling.samples / 2))
+
+
+def place(sampling, number, row, column, stretch):
+    """Return what is added to (u_j, v_j) at a receiver of a level: stretches of so many points follow each other."""
     level = level_key(sampling.seed, number)
     if sampling.pattern == "pixel":
         return shifts(pixel_key(row_key(level, row), column))
     s, t = shifts(level)
     n = 2 * row + column % 2
-    return s + n * sampling.samples / G, t + n * sampling.samples / G**2
+    if sampling.pattern == "interleaved":
+        n = sampling.tile * (row % sampling.tile) + column % sampling.tile
+    return s + n * stretch / G, t + n * stretch / G**2
+
+
+def distance(radius, low, square, u, density):
+    """Return how far from the receiver a point lies; low is 0 in the disc and 1 in the crown, square 1 and 3."""
+    return radius * math.sqrt(low + square * u) if density == "uniform" else radius * (low + u)
+
+
+def stands_for(radius, far, square, count, density):
+    """Return the texels of a point: the area of the ring of its share, d(pi far^2) / du, over the number of points."""
+    if density == "uniform":
+        return square * math.pi * radius**2 / max(count, 1)
+    return 2 * math.pi * far * radius / max(count, 1)
 
 
 def nearest(x, y):
@@ -45,35 +70,38 @@ def nearest(x, y):
 
 def samples(sampling, radius, index, number, row, column):
     """Return (ox, oy, texels it stands for) of the samples around a receiver: the disc's, then the crown's."""
-    inner = sampling.inner if index == 0 else 0
+    inner, crown = counts(sampling, index)
     found = []
-    for count, low, square in ((inner, 0.0, 1.0), (sampling.samples, 1.0, 3.0)):
-        weight = square * math.pi * radius**2 / max(count, 1)
-        found += [(*offset, weight) for offset in ring(sampling, radius, low, square, count, number, row, column)]
+    for count, low, square in ((inner, 0.0, 1.0), (crown, 1.0, 3.0)):
+        found += [(*offset, stands_for(radius, far, square, count, sampling.density))
+                  for *offset, far in ring(sampling, radius, low, square, count, number, row, column, crown)]
     return found
 
 
-def ring(sampling, radius, low, square, count, number, row, column):
-    """Return the texels of `count` points at the radius r (low + square u)^(1/2)."""
+def ring(sampling, radius, low, square, count, number, row, column, stretch):
+    """Return the texels of `count` points and how far these lie from the receiver."""
     if sampling.pattern == "fixed":
-        return mirrored(radius, low, square, count, shifts(level_key(sampling.seed, number)))
-    s, t = place(sampling, number, row, column)
-    return [nearest(*polar(radius * math.sqrt(low + square * ((0.5 + j / G + s) % 1)),
-                           2 * math.pi * ((0.5 + j / G**2 + t) % 1))) for j in range(count)]
+        return mirrored(radius, low, square, count, shifts(level_key(sampling.seed, number)), sampling.density)
+    s, t = place(sampling, number, row, column, stretch)
+    found = []
+    for j in range(count):
+        far = distance(radius, low, square, (0.5 + j / G + s) % 1, sampling.density)
+        found.append((*nearest(*polar(far, 2 * math.pi * ((0.5 + j / G**2 + t) % 1))), far))
+    return found
 
 
-def mirrored(radius, low, square, count, shift):
+def mirrored(radius, low, square, count, shift, density):
     """Return half of the points on the right, and their mirror images; an odd last one above or below."""
     found = []
     for j in range((count + 1) // 2):
         u, v = (0.5 + j / G + shift[0]) % 1, (0.5 + j / G**2 + shift[1]) % 1
-        far = radius * math.sqrt(low + square * u)
+        far = distance(radius, low, square, u, density)
         x, y = polar(far, math.pi * (v - 0.5))
         if 2 * j + 1 < count:
             ox, oy = nearest(x, y)
-            found += [(ox, oy), (-ox, oy)]
+            found += [(ox, oy, far), (-ox, oy, far)]
         else:
-            found.append(nearest(0.0, math.copysign(far, y)))
+            found.append((*nearest(0.0, math.copysign(far, y)), far))
     return found
 
 
@@ -95,8 +123,9 @@ def slices(sampling, bitmask, radius, index, number, row, column):
     Samples and disc are shared out among the slices; half as many occluders as crown samples lie in the inner disc.
     """
     count = max(1, round(math.sqrt(sampling.samples))) if bitmask.slices is None else bitmask.slices
-    crown = max(1, round(sampling.samples / count))
-    disc = max(1, round(sampling.inner / count)) if index == 0 and sampling.inner else 0
+    inner, outer = counts(sampling, index)
+    crown = max(1, round(outer / count))
+    disc = max(1, round(inner / count)) if inner else 0
     level, fixed = level_key(sampling.seed, number), sampling.pattern == "fixed"
     key = level if fixed else row_key(level, row)
     turn, shift = shifts(pixel_key(key, column) if sampling.pattern == "pixel" else key)
@@ -107,7 +136,7 @@ def slices(sampling, bitmask, radius, index, number, row, column):
         side = -1 if fixed and k % 2 else 1
         right, down = math.sin(angle), math.cos(angle)
         texels = [(far, *nearest(far * right, far * down), weight) for far, weight in
-                  along(radius, count, disc, crown, (crown + 1) // 2, part)]
+                  along(radius, count, disc, crown, (crown + 1) // 2, part, sampling.density)]
         found.append([(side * ox, oy, weight) for _, ox, oy, weight in texels])
     return found
 
@@ -119,10 +148,11 @@ def symmetric(k, count):
     return 2 * math.pi * (k // 2 + (1.0 if count % 2 else 0.5)) / count
 
 
-def along(radius, count, disc, crown, occluders, part):
+def along(radius, count, disc, crown, occluders, part, density):
     """Return (distance, texels it stands for) along a slice, nearest first."""
-    share = math.pi * radius**2 / count
     placed = [(radius * (j + part) / occluders, 0.0) for j in range(occluders)]
-    placed += [(radius * math.sqrt((j + part) / disc), share / disc) for j in range(disc)]
-    placed += [(radius * math.sqrt(1 + 3 * (j + part) / crown), 3 * share / crown) for j in range(crown)]
+    for points, low, square in ((disc, 0.0, 1.0), (crown, 1.0, 3.0)):
+        for j in range(points):
+            far = distance(radius, low, square, (j + part) / points, density)
+            placed.append((far, stands_for(radius, far, square, points, density) / count))
     return sorted(placed, key=lambda sample: sample[0])

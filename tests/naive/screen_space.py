@@ -10,7 +10,7 @@ import numpy as np
 
 from refgi.frame import Frame
 from refgi.sssil.settings import Bitmask, Rays
-from tests.naive import bitmask, crown_points, hssil, reprojection
+from tests.naive import bitmask, crown_points, hssil, level_blur, reprojection
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
 from tests.naive.val import dot
 
@@ -71,6 +71,10 @@ def one_view(frame, settings):
         added = np.zeros((3, len(here), len(here[0])))
         if settings.senders.only_level in (None, index):
             added = gathered(frame, here, index, settings, radius, senders[index])
+            # receivers that all have the same samples have nothing to gain from each other's
+            if settings.blur is not None and sampling.pattern not in ("fixed", "all"):
+                added = level_blur.blurred(added, here, settings.blur.size, settings.blur.plane_tolerance,
+                                            settings.blur.cosine)
             added *= 4.0**index if "hss_level_factor" in printed else 1.0
         light = added if light is None else added + upsampled(light, levels[index + 1], here, 2, settings)
     first = sampling.first_level

@@ -8,11 +8,11 @@ from scipy.integrate import dblquad
 
 from refgi.frame import Frame
 from refgi.scene import PointLight, load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.hssil import hssil
 from refgi.sssil.pyramid.view import Level
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import PRESETS, HssilSettings
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.truth import accumulate
 from tests.form_factors import polygon_form_factor
@@ -134,9 +134,9 @@ def test_a_disc_has_no_spikes(evidence):
     frame, variance, spike, mean = room(64, False), {}, {}, {}
     covered = frame.gbuffer.covered
     for form in ("point", "disc"):
-        settings = {"radius": 20.0, "levels": 1, "start": "full", "form_factor": form}
-        whole = hssil(frame, of(HssilSettings, **settings, pattern="all"))[1, covered].mean()
-        runs = np.stack([hssil(frame, of(HssilSettings, **settings, pattern="pixel", seed=seed))[1, covered]
+        settings = replaced(PRESETS["paper"], {"levels": 1, "start": "full", "form_factor": form})
+        whole = hssil(frame, replaced(settings, {"pattern": "all"}))[1, covered].mean()
+        runs = np.stack([hssil(frame, replaced(settings, {"pattern": "pixel", "seed": seed}))[1, covered]
                          for seed in range(4)])
         variance[form] = float(runs.var(axis=0, ddof=1).mean() / whole**2)
         spike[form], mean[form] = float(runs.max() / whole), float(runs.mean() / whole - 1)
@@ -172,8 +172,8 @@ def test_the_line_of_figure_5(evidence):
     right, error, shadowed = (one[:, asked] / mean for one in (truth, error, next(traced_row(frame, row))))
 
     def line(**settings):
-        published = {"start": "full", "radius": FIGURE_5 / 18, "downsample": "closest"}
-        light = hssil(frame, of(HssilSettings, **published | settings))
+        published = PRESETS["paper"]
+        light = hssil(frame, replaced(published, {"start": "full", "radius": FIGURE_5 / 18} | settings))
         return light[:, row, asked].astype(float) / mean
 
     closest, average = (line(pattern="all", downsample=mode) for mode in ("closest", "average"))

@@ -4,9 +4,9 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.scene import load_scene
-from refgi.settings import leaves, of
+from refgi.settings import leaves, of, replaced
 from refgi.sssil import HssilSettings
-from refgi.sssil.settings import PRESETS, Bilateral, Bitmask, Rays, TemporalSettings
+from refgi.sssil.settings import PRESETS, Bilateral, Bitmask, GeometryBlur, Rays, TemporalSettings
 
 NAN = float("nan")
 
@@ -47,8 +47,12 @@ def test_a_page_shows_few_keys_and_says_what_each_is(kind):
     assert all(leaf.about for leaf in leaves(kind))
 
 
-def test_the_papers_values_are_the_defaults_but_for_senders():
-    assert PRESETS["paper"] == of(HssilSettings, downsample="closest")
+def test_the_papers_values_are_the_defaults_but_for_senders_and_noise():
+    """The paper says neither where samples lie nor who shares them; it blurs no level and keeps the closest sender."""
+    changed = {"sampling.pattern": "interleaved", "sampling.density": "inverse_distance", "blur": GeometryBlur(),
+               "senders.downsample": "resampled"}
+    assert PRESETS["paper"] != HssilSettings()
+    assert replaced(PRESETS["paper"], changed) == HssilSettings()
 
 
 def test_settings_compare_by_value_and_serve_as_keys():
@@ -66,5 +70,21 @@ def test_the_start_is_a_level(start, first):
 @pytest.mark.parametrize(("samples", "inner"), [(64, 21), (256, 85), (1, 1), (3, 1)])
 def test_the_first_disc_is_as_dense_as_its_crown(samples, inner):
     """A disc of radius r has a third of the area of the crown from r to 2 r."""
-    assert of(HssilSettings, samples=samples).sampling.inner == inner
-    assert of(HssilSettings, samples=samples, inner_samples=7).sampling.inner == 7
+    sampling = of(HssilSettings, samples=samples, density="uniform").sampling
+    assert sampling.counts(0) == (inner, samples)
+    assert sampling.counts(1) == (0, samples)
+    assert of(HssilSettings, samples=samples, inner_samples=7).sampling.counts(0) == (7, samples)
+
+
+@pytest.mark.parametrize(("samples", "disc", "crown"), [(64, 32, 32), (9, 5, 4), (1, 1, 1)])
+def test_disc_and_crown_share_samples_whose_density_falls_with_distance(samples, disc, crown):
+    """Rings of equal width get equally many: r of them lie within r, and r from there to 2 r."""
+    sampling = of(HssilSettings, samples=samples).sampling
+    assert sampling.counts(0) == (disc, crown)
+    assert sampling.counts(2) == (0, samples)
+
+
+def test_tiles_are_powers_of_two():
+    assert of(HssilSettings, tile=8).sampling.tile == 8
+    with pytest.raises(InputError, match="tile"):
+        of(HssilSettings, tile=6)

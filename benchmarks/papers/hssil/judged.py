@@ -24,8 +24,9 @@ from benchmarks.papers.workbench import Gallery, Workbench, errors_of, mean_of, 
 from refgi.compare.maps import luminance
 from refgi.compare.plot import Axes, curves_plot
 from refgi.frame import Frame
-from refgi.settings import of, replaced
+from refgi.settings import replaced
 from refgi.sssil import HssilSettings
+from refgi.sssil.settings import PRESETS
 
 POINT, DISC, POINT_LIMIT, DISC_LIMIT = "point", "disc", "point_limit", "disc_limit"
 NAMES = {POINT: "Eq. 3, 64 samples", DISC: "Eq. 4, 64 samples", POINT_LIMIT: "Eq. 3, every texel",
@@ -95,8 +96,8 @@ def settings_of_figure_5(frame: Frame) -> HssilSettings:
 
     Every pixel has its own samples, so that noise shows along the line.
     """
-    return of(HssilSettings, radius=scaled_radius(frame, RADIUS_FIGURE_5), start="full", pattern="pixel",
-              downsample="closest")
+    return replaced(PRESETS["paper"], {"radius": scaled_radius(frame, RADIUS_FIGURE_5), "start": "full",
+                                       "pattern": "pixel"})
 
 
 def _highest(light: Array, right: Array, row: int) -> float:

@@ -18,10 +18,11 @@ from benchmarks.papers.workbench import Gallery, Workbench, mapped, mean_of, pal
 from refgi.compare.maps import DIVERGING, Scale, luminance
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
-from refgi.settings import of, replaced
+from refgi.settings import replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.pattern import offsets_at
 from refgi.sssil.crown.reach import coverage
+from refgi.sssil.settings import PRESETS
 
 ROWS = 256  # of receivers whose samples are counted, in units of a run's repeats
 GROUND, RINGS = 0.08, 0.3  # grey values
@@ -31,7 +32,7 @@ SHOWN = 4  # levels, the paper's
 
 def crowns(bench: Workbench) -> Figure:
     """Figure 2: where samples lie, and how often the levels cover each pair of pixels."""
-    settings = of(HssilSettings, radius=max(2.0, RADIUS * bench.scale.size / 512))
+    settings = replaced(PRESETS["paper"], {"radius": max(2.0, RADIUS * bench.scale.size / 512)})
     sampling = settings.sampling
     assert sampling.radius is not None
     rows = ROWS * bench.scale.repeats
@@ -112,7 +113,7 @@ def _crowns(settings: HssilSettings, times: Array, texels: float) -> list[tuple[
     for k in range(settings.sampling.levels):
         near, far = (0.0 if k == 0 else radius * 2**k), radius * 2 ** (k + 1)
         within = (distance >= near) & (distance < far)
-        samples = settings.sampling.samples + (settings.sampling.inner if k == 0 else 0)
+        samples = sum(settings.sampling.counts(k))
         rows.append((f"level {k + 1}", near, far, samples, texels, float(times[within].mean())))
     return rows
 

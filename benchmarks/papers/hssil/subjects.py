@@ -27,9 +27,10 @@ from refgi.scene.builtin.cornell import cornell_box
 from refgi.scene.builtin.surfaces import patch, rectangle
 from refgi.scene.model import merge
 from refgi.scene.repair import mean_face_normals
-from refgi.settings import of, replaced
+from refgi.settings import replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
+from refgi.sssil.settings import PRESETS
 from refgi.truth import TruthResult
 
 HALL, SPOT, BASKET, HORSE, BOX = "hall", "spot", "basket", "horse", "box"
@@ -98,7 +99,7 @@ def wide_frame(bench: Workbench, name: str, factor: float = LARGE) -> Frame:
 
 def settings_of(frame: Frame, **changes: Any) -> HssilSettings:
     """Return the paper's settings with a radius that reaches as much of this picture as the paper's of 1280 x 720."""
-    return of(HssilSettings, **({"radius": scaled_radius(frame, RADIUS), "downsample": "closest"} | changes))
+    return replaced(PRESETS["paper"], {"radius": scaled_radius(frame, RADIUS)} | changes)
 
 
 def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
@@ -109,8 +110,7 @@ def smaller(frame: Frame, further: int = 0, **changes: Any) -> HssilSettings:
     share = math.hypot(frame.width, frame.height) / math.hypot(WIDE * PAPER_HEIGHT, PAPER_HEIGHT)
     levels = max(1, round(4 + math.log2(share)))
     radius = max(1.0, RADIUS * share * 2.0 ** (4 - levels))
-    published = {"radius": radius, "levels": max(1, levels + further), "downsample": "closest"}
-    return of(HssilSettings, **(published | changes))
+    return replaced(PRESETS["paper"], {"radius": radius, "levels": max(1, levels + further)} | changes)
 
 
 def scaled_radius(frame: Frame, radius: float) -> float:

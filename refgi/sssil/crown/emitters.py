@@ -44,7 +44,7 @@ def pack(level: Level, phases: int, farthest: int, most_lanes: int) -> Emitters:
     level : Level
         The texels.
     phases : int
-        P, 1 or 2, into which columns are split.
+        P, a power of two, into which columns are split.
     farthest : int
         Largest distance of a sample, columns.
     most_lanes : int
@@ -132,16 +132,16 @@ def _pack_line(
 ) -> None:
     lanes = np.uint64(max(0, (area.shape[1] - phase + phases - 1) // phases))
     y, x, to, by = np.uint64(row), np.uint64(phase), np.uint64(first), np.uint64(step)
-    two = np.uint64(2)
+    every = np.uint64(phases)
     for c in range(3):
         p, m, r = to + np.uint64(c) * by, to + np.uint64(c + 3) * by, to + np.uint64(c + 6) * by
-        if phases == 2:  # written out, so that the compiler knows the step
+        if phases > 1:
             for i in range(lanes):
-                packed[p + i] = position[c, y, x + two * i] * scale
+                packed[p + i] = position[c, y, x + every * i] * scale
             for i in range(lanes):
-                packed[m + i] = -normal[c, y, x + two * i] * (area[y, x + two * i] * share)
+                packed[m + i] = -normal[c, y, x + every * i] * (area[y, x + every * i] * share)
             for i in range(lanes):
-                packed[r + i] = radiance[c, y, x + two * i]
+                packed[r + i] = radiance[c, y, x + every * i]
         else:
             for i in range(lanes):
                 packed[p + i] = position[c, y, i] * scale

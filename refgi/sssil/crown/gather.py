@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
-from refgi.sssil.crown.add import ROWS, WIDE, add_two, close_group, form_of
+from refgi.sssil.crown.add import ROWS, TEXEL, WIDE, add_two, close_group, form_of
 from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, pack
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.points import level_key, pixel_key, row_key, sample_points, sample_weight, shift_of, shifted
@@ -55,16 +55,16 @@ def gather(level: Level, index: int, settings: HssilSettings, senders: Level | N
     form, factor = form_of(settings.senders.form_factor), real(math.pi * level_factor(index, settings))
     farthest, result = math.ceil(2 * radius), plane(level.radiance.shape, level.radiance.dtype)
     if sampling.pattern == "pixel":
-        inner = sampling.inner if index == 0 else 0
-        points, weight = sample_points(inner, sampling.samples), sample_weight(radius, inner, sampling.samples)
+        inner, crown = sampling.counts(index)
+        points, weight = sample_points(inner, crown), sample_weight(radius, inner, crown)
         key = level_key(sampling.seed, level.number)
         emitters = pack(senders, 1, farthest, WIDE)
-        _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, key,
-                          weight.astype(real), form, factor, result)
+        _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, sampling.density == "uniform",
+                          key, weight.astype(real), form, factor, result)
         return result
     offsets, weight = _reaching(*shared_offsets(sampling, index, level.number, rows, radius, columns), rows, columns)
     emitters = pack(senders, offsets.shape[1], farthest, WIDE)
-    paired = sampling.pattern != "row"
+    paired = sampling.pattern in ("fixed", "all")
     _gather_shared(emitters, level.position, level.normal, offsets, weight.astype(real), paired, form, factor, result)
     return result
 
@@ -74,7 +74,7 @@ def _reaching(offsets: Array, weight: Array, rows: int, columns: int) -> tuple[A
     if offsets.shape[:2] != (1, 1):
         return offsets, weight
     within = (np.abs(offsets[0, 0]) < (columns, rows)).all(axis=1)
-    return offsets[:, :, within], weight[within]
+    return offsets[:, :, within], weight[:, :, within]
 
 
 def level_factor(index: int, settings: HssilSettings) -> float:
@@ -113,12 +113,13 @@ def _gather_shared(
     for task in prange(strips * bands):
         left, top = np.int64(task) // bands * strip, np.int64(task) % bands * BAND
         tile = np.empty(ROWS * WIDE, packed.dtype)
-        starts, weights = np.empty((3, weight.size + 1), np.int64), np.empty(weight.size + 1, packed.dtype)
+        starts, weights = np.empty((3, weight.shape[2] + 1), np.int64), np.empty(weight.shape[2] + 1, packed.dtype)
         for row in range(top, min(rows, top + BAND)):
-            shared = min(row, offsets.shape[0] - 1)
+            shared = row % offsets.shape[0]
             for phase in range(phases):
                 _load(tile, strip, position, normal, scale, row, phase + phases * left, phases)
-                count = _list_emitting(offsets[shared, phase], weight, paired, emit_from, emit_to, row, phase,
+                stands_for = weight[shared % weight.shape[0], phase % weight.shape[1]]
+                count = _list_emitting(offsets[shared, phase], stands_for, paired, emit_from, emit_to, row, phase,
                                        pad + left, strip, line, starts, weights)
                 for j in range(0, count, 2):
                     low = min(starts[1, j], starts[1, j + 1]) // BLOCK * BLOCK
@@ -168,10 +169,13 @@ def _list_emitting(
     rows, phases = emit_to.shape[0] - 1, emit_to.shape[1]
     black = rows * PLANES * phases * line
     start, low, high = starts[0], starts[1], starts[2]
+    power = 0
+    while 1 << power < phases:
+        power += 1
     count, emitting_in_pair = 0, 0
     for j in range(weight.size):
         a, column = row + np.int64(offsets[j, 1]), phase + np.int64(offsets[j, 0])
-        of, lane = column & (phases - 1), first + (column >> (phases - 1))  # phases are 1 or 2
+        of, lane = column & (phases - 1), first + (column >> power)
         start[count], low[count], high[count], weights[count] = black, lanes, 0, weight[j]
         inside = 0 <= a < rows and lane >= 0 and lane + lanes <= line
         if inside and not (offsets[j, 0] == 0 and offsets[j, 1] == 0):
@@ -201,8 +205,8 @@ def _store(tile: Array, lanes: int, factor: Any, row: int, column: int, phases: 
 
 @kernel(parallel=True)
 def _gather_per_pixel(
-    emitters: Emitters, position: Array, normal: Array, points: Array, inner: int, radius: float, key: Any,
-    weight: Array, form: int, factor: Any, result: Array,
+    emitters: Emitters, position: Array, normal: Array, points: Array, inner: int, radius: float, uniform: bool,
+    key: Any, weight: Array, form: int, factor: Any, result: Array,
 ) -> None:
     rows = normal.shape[1]
     packed, line, pad, strip = emitters.packed, emitters.line, emitters.pad, emitters.strip
@@ -219,8 +223,10 @@ def _gather_per_pixel(
                 shifts[0, i], shifts[1, i], shifts[2, i] = shift_of(pixel_key(row_key(key, row), left + i), 0)
             for j in range(0, weight.size, 2):
                 k = min(j + 1, weight.size - 1)
-                _expand(packed, line, first, row, rows, points, j, inner, radius, shifts, strip, lines, 0)
-                _expand(packed, line, first, row, rows, points, k, inner, radius, shifts, strip, lines, PLANES * WIDE)
+                _expand(packed, line, first, row, rows, points, j, inner, radius, uniform, form, shifts, strip, lines,
+                        0)
+                _expand(packed, line, first, row, rows, points, k, inner, radius, uniform, form, shifts, strip, lines,
+                        PLANES * WIDE)
                 second = weight[k] if k > j else weight.dtype.type(0.0)
                 add_two(tile, 0, strip, lines, WIDE, 0, weight[j], PLANES * WIDE, second, form)
                 if (j + 2) % GROUP == 0:
@@ -232,14 +238,21 @@ def _gather_per_pixel(
 @kernel
 def _expand(
     packed: Array, line: int, first: int, row: int, rows: int, points: Array, j: int, inner: int, radius: float,
-    shifts: Array, lanes: int, lines: Array, to: int,
+    uniform: bool, form: int, shifts: Array, lanes: int, lines: Array, to: int,
 ) -> None:
-    """Copy the texels of one sample of each receiver of a strip into a line."""
+    """Copy the texels of one sample of each receiver of a strip into a line, with their relative weight.
+
+    Areas are those of all texels that a sample stands for; the disc of a texel alone keeps its area, and sends more.
+    """
+    weighted = 6 if form == TEXEL else 3
     within = 0.0 if j < inner else 1.0
     for i in range(np.uint64(lanes)):
-        ox, oy = shifted(points, j, within, radius, shifts[0, i], shifts[1, i], shifts[2, i])
+        ox, oy, relative = shifted(points, j, within, radius, uniform, shifts[0, i], shifts[1, i], shifts[2, i])
         lane = first % line + np.int64(i) + ox
         inside = 0 <= row + oy < rows and 0 <= lane < line and not (ox == 0 and oy == 0)
         texel = np.uint64((row + oy) * PLANES * line + lane if inside else rows * PLANES * line)
         for c in range(PLANES):
             lines[np.uint64(to + c * WIDE) + i] = packed[texel + np.uint64(c * line)]
+        for c in range(weighted, weighted + 3):
+            plane_of_texel = np.uint64(to + c * WIDE) + i
+            lines[plane_of_texel] = lines[plane_of_texel] * packed.dtype.type(relative)

@@ -2,9 +2,15 @@
 
 Offsets are whole texels (ox, oy), columns to the right and rows down from the receiver.
 
-Receivers of a row share samples with the pattern "row". Each row takes the stretch of one long Kronecker sequence that
-follows that of the row above, so that rows which upsampling mixes complement each other. A shift by a hash of seed and
-level makes the expected share of samples of a texel the share of its area within the crown, for every receiver.
+Interleaved samples (Keller and Heidrich 2001) repeat in tiles of n x n texels. The texels of a tile, row by row, take
+consecutive stretches of one long Kronecker sequence, so that any n x n texels have the n^2 N points of one
+low-discrepancy set. All texels at one place of their tiles share samples: every n-th column of a row.
+
+With the pattern "row" tiles are two columns wide and never repeat: each row takes the stretch that follows that of the
+row above, so that rows which upsampling mixes complement each other. Sums over few sets show as streaks along rows.
+
+A shift by a hash of seed and level makes the expected weight of a texel the share of its area within the crown, for
+every receiver.
 """
 
 import math
@@ -20,9 +26,11 @@ from refgi.sssil.crown.points import (
     FIRST_STEP,
     SECOND_STEP,
     TO_UNIT,
+    distance,
     level_key,
     pixel_key,
     pixel_offset,
+    relative_weight,
     row_key,
     sample_points,
     sample_weight,
@@ -33,18 +41,18 @@ from refgi.sssil.settings import SamplingSettings
 
 Array = npt.NDArray[Any]
 
-PHASES = 2  # even columns of a row share samples, and odd ones: rows that share all would show as streaks
+PHASES = 2  # of the pattern "row": even columns share samples, and odd ones
 
 
 def row_offsets(
-    sampling: SamplingSettings, index: int, number: int, rows: int, radius: float | None = None, phase: int = 0
+    sampling: SamplingSettings, index: int, number: int, rows: int, radius: float | None = None, column: int = 0
 ) -> tuple[Array, Array]:
-    """Return the samples that receivers of a row share: every second one with the pattern "row".
+    """Return the samples of the receivers of a column.
 
     Parameters
     ----------
     sampling : SamplingSettings
-        Numbers of samples, pattern ("row", "fixed" or "all") and seed.
+        Numbers of samples, density, pattern (any but "pixel") and seed.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     number : int
@@ -53,15 +61,16 @@ def row_offsets(
         Rows of the level.
     radius : float, optional
         Inner radius of the crown, texels; that of the settings by default.
-    phase : int
-        Column modulo PHASES; patterns "fixed" and "all" are those of every column.
+    column : int
+        The column.
 
     Returns
     -------
-    offsets : (rows, n, 2) ndarray of int32
-        Texels (ox, oy) from the receiver; one row for all with "fixed" and "all". In these two, a sample is followed by
-        its mirror image (-ox, oy); those with ox = 0 come last.
-    weight : (n,) ndarray of float64
+    offsets : (m, n, 2) ndarray of int32
+        Texels (ox, oy) from the receiver in row y, at [y mod m]: m is `rows` with "row", the tile's side with
+        "interleaved", else 1. With "fixed" and "all" a sample is followed by its mirror image (-ox, oy); those with
+        ox = 0 come last.
+    weight : (m or 1, n) ndarray of float64
         Texels of the level that each sample stands for.
 
     Raises
@@ -71,19 +80,19 @@ def row_offsets(
     """
     expect(sampling.pattern != "pixel", "pattern", "one that receivers share", sampling.pattern)
     offsets, weight = shared_offsets(sampling, index, number, rows, radius)
-    return offsets[:, min(phase, offsets.shape[1] - 1)], weight
+    return offsets[:, column % offsets.shape[1]], weight[:, column % weight.shape[1]]
 
 
 def shared_offsets(
     sampling: SamplingSettings, index: int, number: int, rows: int, radius: float | None = None,
     columns: int | None = None,
 ) -> tuple[Array, Array]:
-    """Return the samples that receivers share, by row and by column modulo 2.
+    """Return the samples that receivers share, by row and column of their tile.
 
     Parameters
     ----------
     sampling : SamplingSettings
-        Numbers of samples, pattern ("row", "fixed" or "all") and seed.
+        Numbers of samples, density, pattern (any but "pixel") and seed.
     index : int
         0 for the first level, whose inner disc is sampled as well.
     number : int
@@ -97,24 +106,27 @@ def shared_offsets(
 
     Returns
     -------
-    offsets : (rows, PHASES, n, 2) ndarray of int32
-        Texels (ox, oy) from the receiver; (1, 1, n, 2) with "fixed" and "all".
-    weight : (n,) ndarray of float64
+    offsets : (m, P, n, 2) ndarray of int32
+        Texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P]: (tile, tile, n, 2) with "interleaved",
+        (rows, PHASES, n, 2) with "row", (1, 1, n, 2) with "fixed" and "all".
+    weight : (m, P, n) or (1, 1, n) ndarray of float64
         Texels of the level that each sample stands for.
     """
     radius = known_radius(sampling, radius)
-    inner = sampling.inner if index == 0 else 0
+    inner, crown = sampling.counts(index)
     if sampling.pattern == "all":
         within = (rows, columns) if columns is not None else None
         every = _every_texel(0.0 if index == 0 else radius, 2.0 * radius, within)
-        return every[None, None], np.ones(len(every))
+        return every[None, None], np.ones((1, 1, len(every)))
     if sampling.pattern == "fixed":
-        mirrored, weight = _mirrored(sampling, radius, inner, number)
-        return mirrored[None, None], weight
-    points = sample_points(inner, sampling.samples)
-    offsets = np.empty((rows, PHASES, len(points), 2), np.int32)
-    _fill_rows(points, inner, radius, level_key(sampling.seed, number), offsets)
-    return offsets, sample_weight(radius, inner, sampling.samples)
+        mirrored, weight = _mirrored(sampling, radius, inner, crown, number)
+        return mirrored[None, None], weight[None, None]
+    points, uniform = sample_points(inner, crown), sampling.density == "uniform"
+    tile = (rows, PHASES) if sampling.pattern == "row" else (sampling.tile, sampling.tile)
+    offsets = np.empty((*tile, len(points), 2), np.int32)
+    relative = np.empty((1, 1, 1) if uniform else offsets.shape[:3])
+    _fill_tile(points, inner, radius, uniform, level_key(sampling.seed, number), offsets, relative)
+    return offsets, relative * sample_weight(radius, inner, crown)
 
 
 def offsets_at(
@@ -140,15 +152,43 @@ def offsets_at(
     (n, 2) ndarray of int32
         Texels (ox, oy) from the receiver, in the order of `row_offsets` and its weights.
     """
+    return samples_at(sampling, index, number, row, column, radius)[0]
+
+
+def samples_at(
+    sampling: SamplingSettings, index: int, number: int, row: int, column: int, radius: float | None = None
+) -> tuple[Array, Array]:
+    """Return the samples of one receiver and their weights, whatever the pattern.
+
+    Parameters
+    ----------
+    sampling : SamplingSettings
+        Numbers of samples, density, pattern and seed.
+    index : int
+        0 for the first level, whose inner disc is sampled as well.
+    number : int
+        Number of the level in the pyramid.
+    row, column : int
+        The receiver.
+    radius : float, optional
+        Inner radius of the crown, texels; that of the settings by default.
+
+    Returns
+    -------
+    offsets : (n, 2) ndarray of int32
+        Texels (ox, oy) from the receiver.
+    weight : (n,) ndarray of float64
+        Texels of the level that each stands for.
+    """
     if sampling.pattern != "pixel":
-        offsets, _ = row_offsets(sampling, index, number, row + 1, radius, column % PHASES)
-        offsets_here: Array = offsets[min(row, len(offsets) - 1)]
-        return offsets_here
-    inner = sampling.inner if index == 0 else 0
-    points = sample_points(inner, sampling.samples)
+        offsets, weight = row_offsets(sampling, index, number, row + 1, radius, column)
+        return offsets[row % len(offsets)], weight[row % len(weight)]
+    inner, crown = sampling.counts(index)
+    points, radius = sample_points(inner, crown), known_radius(sampling, radius)
     key = pixel_key(row_key(level_key(sampling.seed, number), row), column)
-    return np.array([pixel_offset(points, inner, known_radius(sampling, radius), key, j) for j in range(len(points))],
-                    np.int32).reshape(-1, 2)
+    found = np.array([pixel_offset(points, inner, radius, sampling.density == "uniform", key, j)
+                      for j in range(len(points))]).reshape(-1, 3)
+    return found[:, :2].astype(np.int32), found[:, 2] * sample_weight(radius, inner, crown)
 
 
 def known_radius(sampling: SamplingSettings, radius: float | None) -> float:
@@ -177,16 +217,19 @@ def known_radius(sampling: SamplingSettings, radius: float | None) -> float:
 
 
 @kernel
-def _fill_rows(points: Array, inner: int, radius: float, key: Any, offsets: Array) -> None:
+def _fill_tile(
+    points: Array, inner: int, radius: float, uniform: bool, key: Any, offsets: Array, relative: Array
+) -> None:
     rows, phases, count, _ = offsets.shape
     for row in range(rows):
         for phase in range(phases):
             u, cosine, sine = shift_of(key, (row * phases + phase) * (count - inner))
-            offsets_here = offsets[row, phase]
-            for j in range(np.uint64(inner)):
-                offsets_here[j, 0], offsets_here[j, 1] = shifted(points, j, 0.0, radius, u, cosine, sine)
-            for j in range(np.uint64(inner), np.uint64(count)):
-                offsets_here[j, 0], offsets_here[j, 1] = shifted(points, j, 1.0, radius, u, cosine, sine)
+            offsets_here, relative_here = offsets[row, phase], relative[row % len(relative), phase % relative.shape[1]]
+            for j in range(count):
+                near = 0.0 if j < inner else 1.0
+                ox, oy, weight = shifted(points, np.uint64(j), near, radius, uniform, u, cosine, sine)
+                offsets_here[j, 0], offsets_here[j, 1] = ox, oy
+                relative_here[j % relative.shape[2]] = weight
 
 
 def _every_texel(low: float, high: float, within: tuple[int, int] | None) -> Array:
@@ -202,21 +245,22 @@ def _every_texel(low: float, high: float, within: tuple[int, int] | None) -> Arr
     return np.concatenate([both, np.stack([ox[middle], oy[middle]], axis=1)]).astype(np.int32)
 
 
-def _mirrored(sampling: SamplingSettings, radius: float, inner: int, number: int) -> tuple[Array, Array]:
+def _mirrored(sampling: SamplingSettings, radius: float, inner: int, crown: int, number: int) -> tuple[Array, Array]:
     """Return a mirror-symmetric set and its weights: half of the points on the right, an odd one above or below."""
     key = level_key(sampling.seed, number)
     shift = np.array([hash_bits(key), hash_bits(key ^ np.uint32(0x27D4EB2F))]) * TO_UNIT
-    weight = sample_weight(radius, inner, sampling.samples)
+    weight, uniform = sample_weight(radius, inner, crown), sampling.density == "uniform"
     pairs, middles = [], []
-    for first, count, near in ((0, inner, 0.0), (inner, sampling.samples, 1.0)):
+    for first, count, near in ((0, inner, 0.0), (inner, crown, 1.0)):
         half = np.arange((count + 1) // 2)
         u, v = (0.5 + half * FIRST_STEP + shift[0]) % 1.0, (0.5 + half * SECOND_STEP + shift[1]) % 1.0
-        length = radius * np.sqrt(near + (3.0 if near else 1.0) * u)
+        length = np.array([distance(share, near, radius, uniform) for share in u])
+        relative = np.array([relative_weight(far, near, radius, uniform) for far in length])
         x, y = length * np.cos(math.pi * (v - 0.5)), length * np.sin(math.pi * (v - 0.5))
         right, even = np.floor(np.stack([x, y], axis=1) + 0.5), count // 2
         both = np.stack([right, right * (-1, 1)], axis=1)[:even].reshape(-1, 2)
         middle = np.stack([np.zeros(count % 2), np.floor(np.copysign(length, y)[even:] + 0.5)], axis=1)
-        pairs.append((both, weight[first : first + 2 * even]))
-        middles.append((middle, weight[first : first + count % 2]))
+        pairs.append((both, weight[first : first + 2 * even] * np.repeat(relative[:even], 2)))
+        middles.append((middle, weight[first : first + count % 2] * relative[even:]))
     offsets, weights = zip(*pairs, *middles, strict=True)
     return np.concatenate(offsets).astype(np.int32), np.concatenate(weights)

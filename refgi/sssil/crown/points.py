@@ -1,7 +1,9 @@
 """Low-discrepancy points of a crown (Sec. 3.2), shifted for each receiver by a hash (Cranley and Patterson 1976).
 
-A point (u, v) of the unit square lies r sqrt(1 + 3 u) from the receiver in the crown, r sqrt(u) in the disc within, at
-the angle 2 pi v: equal areas get equally many points. It stands for the texel it falls into.
+A point (u, v) of the unit square lies at the angle 2 pi v. With uniform density it lies r sqrt(1 + 3 u) from the
+receiver in the crown, r sqrt(u) in the disc within: equal areas get equally many points. With a density of the inverse
+distance it lies r (1 + u) and r u away: rings of equal width get equally many. It takes the texel it falls into, and
+stands for as many texels as there are to a point where it lies.
 """
 
 import math
@@ -39,7 +41,7 @@ def sample_points(inner: int, crown: int) -> Array:
 
 
 def sample_weight(radius: float, inner: int, crown: int) -> Array:
-    """Return how many texels each sample stands for.
+    """Return how many texels each sample stands for where density is uniform.
 
     Parameters
     ----------
@@ -87,21 +89,42 @@ def shift_of(key: Any, block: Any) -> Any:
 
 
 @kernel
-def shifted(points: Array, j: Any, near: float, radius: float, u: float, cosine: float, sine: float) -> Any:
-    """Return the offset (ox, oy) of shifted point j, texels from the receiver.
+def distance(share: Any, near: float, radius: float, uniform: bool) -> Any:
+    """Return how far the point u = `share` is from the receiver, texels; `near` is 0 in the disc, 1 in the crown."""
+    if uniform:
+        return radius * math.sqrt(near + (1.0 + 2.0 * near) * share)
+    return radius * (near + share)
+
+
+@kernel
+def relative_weight(length: Any, near: float, radius: float, uniform: bool) -> Any:
+    """Return how many texels a point at a distance stands for, over the mean of disc (`near` 0) or crown (1).
+
+    The area 2 pi r dr over the number of points N du there: with r the radius and l the distance, 2 pi l r / N against
+    pi r^2 / N in the disc and 3 pi r^2 / N in the crown.
+    """
+    return 1.0 if uniform else 2.0 * length / (radius * (1.0 + 2.0 * near))
+
+
+@kernel
+def shifted(
+    points: Array, j: Any, near: float, radius: float, uniform: bool, u: float, cosine: float, sine: float
+) -> Any:
+    """Return the offset (ox, oy) of shifted point j, texels from the receiver, and its relative weight.
 
     `points` are of `sample_points`; `near` is 0 in the disc and 1 in the crown; `u, cosine, sine` of `shift_of`.
     """
     share = points[j, 0] + u
     share = share - 1.0 if share >= 1.0 else share
-    length = radius * math.sqrt(near + (1.0 + 2.0 * near) * share)
+    length = distance(share, near, radius, uniform)
     x = length * (points[j, 1] * cosine - points[j, 2] * sine)
     y = length * (points[j, 1] * sine + points[j, 2] * cosine)
-    return np.int64(math.floor(x + 0.5)), np.int64(math.floor(y + 0.5))
+    return (np.int64(math.floor(x + 0.5)), np.int64(math.floor(y + 0.5)),
+            relative_weight(length, near, radius, uniform))
 
 
 @kernel
-def pixel_offset(points: Array, inner: int, radius: float, key: Any, j: int) -> Any:
-    """Return the offset (ox, oy) of sample j of a receiver with its own samples; the first `inner` lie in the disc."""
+def pixel_offset(points: Array, inner: int, radius: float, uniform: bool, key: Any, j: int) -> Any:
+    """Return offset (ox, oy) and relative weight of sample j of a receiver's own; the first `inner` lie in the disc."""
     u, cosine, sine = shift_of(key, 0)
-    return shifted(points, j, 0.0 if j < inner else 1.0, radius, u, cosine, sine)
+    return shifted(points, j, 0.0 if j < inner else 1.0, radius, uniform, u, cosine, sine)

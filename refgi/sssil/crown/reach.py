@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
-from refgi.sssil.crown.pattern import offsets_at, row_offsets
-from refgi.sssil.crown.points import sample_weight
+from refgi.sssil.crown.pattern import samples_at, shared_offsets
 from refgi.sssil.settings import SamplingSettings
 
 Array = npt.NDArray[Any]
@@ -159,14 +158,14 @@ def texel_weights(
         Mean weight of offset (row - n, column - n), texels of the level; samples on the receiver itself count.
     """
     if sampling.pattern == "pixel":
-        offsets = np.stack([offsets_at(sampling, index, number, 0, column, radius) for column in range(receivers)])
-        known = radius if radius is not None else chosen_radius((1, 1), sampling)
-        weight = sample_weight(known, sampling.inner if index == 0 else 0, sampling.samples)
+        found = [samples_at(sampling, index, number, 0, column, radius) for column in range(receivers)]
+        offsets, weight = (np.stack(parts) for parts in zip(*found, strict=True))
     else:
-        offsets, weight = row_offsets(sampling, index, number, receivers, radius)
+        offsets, weight = shared_offsets(sampling, index, number, receivers, radius)
     reach = int(np.abs(offsets).max(initial=0))
     counted = np.zeros((2 * reach + 1, 2 * reach + 1))
-    np.add.at(counted, (offsets[..., 1] + reach, offsets[..., 0] + reach), weight / len(offsets))
+    sets = offsets.size // (2 * max(weight.shape[-1], 1))
+    np.add.at(counted, (offsets[..., 1] + reach, offsets[..., 0] + reach), weight / max(sets, 1))
     return counted
 
 

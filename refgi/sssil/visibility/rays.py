@@ -46,10 +46,11 @@ class SampleOffsets(NamedTuple):
     """Offsets of the samples of a level."""
 
     offsets: Array  # (1 or h, phases, m, 2) int32 texels, by row and column; no m where each receiver has its own
-    weight: Array  # (m,) texels that a sample stands for
-    points: Array  # (m, 2) of the unit square, for receivers with samples of their own
+    weight: Array  # (1 or h, 1 or phases, m) texels that a sample stands for, of receivers with their own in the mean
+    points: Array  # (m, 3) of `sample_points`, for receivers with samples of their own
     inner: int  # how many of them lie in the inner disc
     radius: float  # of the crown, texels
+    uniform: bool  # density
     key: Any  # uint32, draws the samples of the level
 
 
@@ -84,7 +85,7 @@ def ray_gather(
     surfels, samples = _surfels(level, frame), _samples(level, index, settings.sampling)
     sending = surfels if senders is level else _surfels(senders, frame)
     radiance = senders.radiance.reshape(3, -1)
-    total, count = np.zeros(radiance.shape), len(samples.weight)
+    total, count = np.zeros(radiance.shape), samples.weight.shape[2]
     step = max(1, batch // max(count, 1))
     rays = [np.empty((step * count, 3), np.float32) for _ in range(2)]
     transfer, reach = np.empty(step * count), np.empty(step * count, np.float32)
@@ -116,13 +117,13 @@ def _surfels(level: Level, frame: "Frame") -> Surfels:
 def _samples(level: Level, index: int, sampling: SamplingSettings) -> SampleOffsets:
     rows, columns = level.shape
     radius = chosen_radius((rows << index, columns << index), sampling)
-    inner = sampling.inner if index == 0 else 0
+    inner, crown = sampling.counts(index)
     if sampling.pattern == "pixel":
-        offsets, weight = np.zeros((1, 1, 0, 2), np.int32), sample_weight(radius, inner, sampling.samples)
+        offsets, weight = np.zeros((1, 1, 0, 2), np.int32), sample_weight(radius, inner, crown)[None, None]
     else:
         offsets, weight = shared_offsets(sampling, index, level.number, rows, radius, columns)
-    points = sample_points(inner, sampling.samples)
-    return SampleOffsets(offsets, weight, points, inner, radius, level_key(sampling.seed, level.number))
+    return SampleOffsets(offsets, weight, sample_points(inner, crown), inner, radius, sampling.density == "uniform",
+                         level_key(sampling.seed, level.number))
 
 
 @kernel(parallel=True)
@@ -131,7 +132,7 @@ def _write_rays(
     form: int, origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array,
 ) -> None:
     """Write ray and transfer of each pair of receivers first to last and their samples."""
-    count = samples.weight.size
+    count = samples.weight.shape[2]
     for i in prange(last - first):
         ray = np.int64(i) * count
         _write_ray(surfels, senders, samples, shape, first + np.int64(i), ray, form, origins, directions, reach,
@@ -146,10 +147,13 @@ def _write_ray(
     row, column = receiver // shape[1], receiver % shape[1]
     key = pixel_key(row_key(samples.key, row), column)
     own = samples.offsets.shape[2] == 0
-    shared, phase = min(row, samples.offsets.shape[0] - 1), column % samples.offsets.shape[1]
-    for j in range(samples.weight.size):
+    shared, phase = row % samples.offsets.shape[0], column % samples.offsets.shape[1]
+    weight = samples.weight[shared % samples.weight.shape[0], phase % samples.weight.shape[1]]
+    for j in range(weight.size):
+        stands_for = weight[j]
         if own:
-            ox, oy = pixel_offset(samples.points, samples.inner, samples.radius, key, j)
+            ox, oy, relative = pixel_offset(samples.points, samples.inner, samples.radius, samples.uniform, key, j)
+            stands_for *= relative
         else:
             ox, oy = np.int64(samples.offsets[shared, phase, j, 0]), np.int64(samples.offsets[shared, phase, j, 1])
         a, b = row + oy, column + ox
@@ -157,7 +161,7 @@ def _write_ray(
         if 0 <= a < shape[0] and 0 <= b < shape[1] and not (ox == 0 and oy == 0):
             other = a * shape[1] + b
             sender[ray + j] = other
-            transfer[ray + j] = _transfer(surfels, senders, receiver, other, samples.weight[j], form)
+            transfer[ray + j] = _transfer(surfels, senders, receiver, other, stands_for, form)
             reach[ray + j] = 1.0 if transfer[ray + j] > 0.0 else 0.0
             far = far_offset(senders.origin[0, other] - surfels.origin[0, receiver],
                              senders.origin[1, other] - surfels.origin[1, receiver],

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sampling import hash_bits
-from refgi.sssil.crown.points import level_key, row_key
+from refgi.sssil.crown.points import distance, level_key, relative_weight, row_key
 from refgi.sssil.settings import Bitmask, SamplingSettings
 
 Array = npt.NDArray[Any]
@@ -29,6 +29,7 @@ class SliceCounts(NamedTuple):
     crown: int  # and in the crown
     occluders: int  # and in the inner disc to block alone
     radius: float  # of the crown, texels
+    uniform: bool  # density
 
     @property
     def per_slice(self) -> int:
@@ -56,9 +57,10 @@ def slice_counts(sampling: SamplingSettings, bitmask: Bitmask, index: int, radiu
         With half as many occluders as the crown has samples.
     """
     slices = bitmask.count(sampling.samples)
-    crown = max(1, round(sampling.samples / slices))
-    disc = max(1, round(sampling.inner / slices)) if index == 0 and sampling.inner else 0
-    return SliceCounts(slices, disc, crown, (crown + 1) // 2, radius)
+    inner, outer = sampling.counts(index)
+    crown = max(1, round(outer / slices))
+    disc = max(1, round(inner / slices)) if inner else 0
+    return SliceCounts(slices, disc, crown, (crown + 1) // 2, radius, sampling.density == "uniform")
 
 
 def slice_offsets(sampling: SamplingSettings, steps: SliceCounts, number: int, rows: int) -> tuple[Array, Array]:
@@ -67,7 +69,7 @@ def slice_offsets(sampling: SamplingSettings, steps: SliceCounts, number: int, r
     Parameters
     ----------
     sampling : SamplingSettings
-        Pattern ("row" or "fixed") and seed.
+        Pattern and seed; with all but "fixed" each row has samples of its own.
     steps : Steps
         Of `steps_of`.
     number : int
@@ -129,11 +131,13 @@ def _fill_lengths(steps: SliceCounts, shift: float, length: Array, weight: Array
     for j in range(steps.occluders):
         filled = _insert(steps.radius * (j + shift) / steps.occluders, 0.0, filled, length, weight)
     for j in range(steps.disc):
-        u = (j + shift) / steps.disc
-        filled = _insert(steps.radius * math.sqrt(u), share / steps.disc, filled, length, weight)
+        far = distance((j + shift) / steps.disc, 0.0, steps.radius, steps.uniform)
+        stands_for = share / steps.disc * relative_weight(far, 0.0, steps.radius, steps.uniform)
+        filled = _insert(far, stands_for, filled, length, weight)
     for j in range(steps.crown):
-        u = (j + shift) / steps.crown
-        filled = _insert(steps.radius * math.sqrt(1.0 + 3.0 * u), 3.0 * share / steps.crown, filled, length, weight)
+        far = distance((j + shift) / steps.crown, 1.0, steps.radius, steps.uniform)
+        stands_for = 3.0 * share / steps.crown * relative_weight(far, 1.0, steps.radius, steps.uniform)
+        filled = _insert(far, stands_for, filled, length, weight)
 
 
 @kernel

@@ -29,7 +29,7 @@ from benchmarks.papers.hssil.temporal import left
 from benchmarks.papers.workbench import FULL, Workbench, seen_by
 from refgi.frame import Frame
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.settings import PRESETS, TemporalSettings
 from tests.benchmarks.papers.conftest import SMALL
@@ -79,8 +79,8 @@ def test_a_full_run_has_the_papers_sizes():
     assert (timed.width, timed.height) == (1280, 720)
     assert (judged.width, judged.height) == (720, 720)
     assert settings_of(timed) == PRESETS["paper"]
-    assert settings_of_figure_5(judged) == of(HssilSettings, radius=40.0, start="full", pattern="pixel",
-                                                downsample="closest")
+    assert settings_of_figure_5(judged) == replaced(PRESETS["paper"], {"radius": 40.0, "start": "full",
+                                                                       "pattern": "pixel"})
 
 
 def test_smaller_pictures_reach_as_much_by_fewer_levels():
@@ -151,7 +151,7 @@ def test_a_scan_line_is_a_row():
 def test_the_first_level_has_most_samples(figures, evidence):
     """The figure's shares are those of the pairs that the method adds up at half resolution."""
     shape = Frame(load_scene("cornell_box"), width=640, height=360, rsm_resolution=64)
-    reads = np.array(reads_of_levels(shape, of(HssilSettings, radius=20.0, start="half", levels=5, samples=64)))
+    reads = np.array(reads_of_levels(shape, replaced(PRESETS["paper"], {"levels": 5})))
     share = 100 * reads / reads.sum()
     told = [row["% of the samples"] for row in table(figures["fig7"]).values()]
     evidence(f"Fig. 7: of all samples the five levels have {', '.join(f'{one:.2f}' for one in share)} %, the figure "

@@ -11,10 +11,9 @@ from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.sssil.crown.gather import gather
-from refgi.sssil.crown.pattern import offsets_at, row_offsets
-from refgi.sssil.crown.points import sample_weight
+from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.pyramid.view import Level
-from refgi.sssil.settings import HssilSettings
+from refgi.sssil.settings import PRESETS, HssilSettings
 from tests.naive import crown as naive
 from tests.sssil.crown.counting import COUNTED, reads_of_levels
 
@@ -34,23 +33,17 @@ def random_level(shape, dtype=np.float64, seed=0, background=0.2, number=1):
     return Level(number, *(np.ascontiguousarray(plane, dtype) for plane in planes), pixel)
 
 
-def weights(settings, index):
-    if settings.sampling.pattern == "pixel":
-        sampling = settings.sampling
-        return sample_weight(sampling.radius, sampling.inner if index == 0 else 0, sampling.samples)
-    return row_offsets(settings.sampling, index, 1, 1)[1]
-
-
 @pytest.mark.parametrize("form", ["disc", "point"])
-@pytest.mark.parametrize("pattern", ["row", "fixed", "all", "pixel"])
-def test_equals_the_sum_written_as_loops(pattern, form):
+@pytest.mark.parametrize("density", ["inverse_distance", "uniform"])
+@pytest.mark.parametrize("pattern", ["interleaved", "row", "fixed", "all", "pixel"])
+def test_equals_the_sum_written_as_loops(pattern, density, form):
     """Oracle: every pattern and form, float64, first level and a later one, odd sizes."""
     for shape, index in (((7, 11), 0), ((9, 6), 1)):
         level = random_level(shape, seed=index)
-        settings = replaced(SETTINGS, {"pattern": pattern, "form_factor": form})
+        settings = replaced(SETTINGS, {"pattern": pattern, "density": density, "form_factor": form})
         expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
-                                  lambda row, column, s=settings, i=index: offsets_at(s.sampling, i, 1, row, column),
-                                  weights(settings, index), form)
+                                  lambda row, column, s=settings, i=index: samples_at(s.sampling, i, 1, row, column),
+                                  form)
         assert expected.max() > 0
         np.testing.assert_allclose(gather(level, index, settings), expected, rtol=0,
                                    atol=ROUNDING[np.float64] * expected.max())
@@ -62,14 +55,13 @@ def test_single_precision_rounds_and_no_more():
     level.radiance[:, :, 100:500] = 0
     settings = replaced(SETTINGS, {"samples": 4})
     expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
-                              lambda row, column: offsets_at(settings.sampling, 0, 1, row, column),
-                              weights(settings, 0), "disc")
+                              lambda row, column: samples_at(settings.sampling, 0, 1, row, column), "disc")
     found = gather(level, 0, settings)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING[np.float32] * expected.max())
 
 
-@pytest.mark.parametrize("pattern", ["row", "pixel"])
+@pytest.mark.parametrize("pattern", ["interleaved", "row", "pixel"])
 def test_same_bits_for_any_number_of_threads(pattern):
     """Property: one thread and all of them."""
     level, settings = random_level((70, 33), np.float32), replaced(SETTINGS, {"pattern": pattern})
@@ -187,7 +179,7 @@ def test_mean_light_does_not_depend_on_the_split_into_levels(evidence):
 
 
 @pytest.mark.feature("HSS-06")
-@pytest.mark.parametrize("pattern", ["row", "pixel"])
+@pytest.mark.parametrize("pattern", ["interleaved", "row", "pixel"])
 def test_error_falls_with_samples_and_the_mean_stays(pattern, evidence):
     """Statistical: Eq. 3 on a bounded scene, 12 seeds: no bias, and the error falls at least as N^-1/2."""
     level, count = groove(0, 32), 12
@@ -231,7 +223,7 @@ def _of_shares(level, radius):
 def test_the_first_level_has_most_of_the_samples(evidence):
     """Pairs that the method adds up at the paper's shape of picture; the share of time it prints is the crowns'."""
     frame = Frame(load_scene("cornell_box"), width=640, height=360, rsm_resolution=64)
-    five = of(HssilSettings, radius=20.0, start="half", levels=5, samples=64)
+    five = replaced(PRESETS["paper"], {"levels": 5})
     crowns, whole = (reads_of_levels(frame, replaced(five, {"inner_samples": inner})) for inner in (0, None))
     share, with_disc = (reads[0] / sum(reads[:4]) for reads in (crowns, whole))
     fifth = crowns[4] / sum(crowns[:4])

@@ -7,21 +7,23 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.settings import of, replaced
-from refgi.sssil.crown.pattern import offsets_at, row_offsets
+from refgi.sssil.crown.pattern import offsets_at, row_offsets, samples_at
 from refgi.sssil.crown.reach import coverage, texel_weights
 from refgi.sssil.settings import HssilSettings
 from tests.naive import crown as naive
 
 SETTINGS = of(HssilSettings, radius=4.0, samples=12, inner_samples=5, levels=3)
 ROWS = 6000
+EVEN = 1e-3  # of the area: 6000 rows of low-discrepancy points at distances that count as they are far
 DEVIATIONS = 4.5  # of the mean weight of one texel out of 270: 1 in 500 sets of independent ones would pass it
 
 
 @pytest.mark.feature("HSS-05")
 @pytest.mark.parametrize("index", [0, 1])
-def test_texels_get_their_share_of_the_crown(index, evidence):
+@pytest.mark.parametrize("density", ["inverse_distance", "uniform"])
+def test_texels_get_their_share_of_the_crown(density, index, evidence):
     """Statistical: the mean weight of a texel is the share of it that lies in the crown, in the first level's disc."""
-    found = texel_weights(SETTINGS.sampling, index, 1 + index, ROWS)
+    found = texel_weights(replaced(SETTINGS, {"pattern": "row", "density": density}).sampling, index, 1 + index, ROWS)
     reach = found.shape[0] // 2
     low = 0.0 if index == 0 else SETTINGS.sampling.radius
     share = np.array([[naive.share_inside(ox, oy, low, 2 * SETTINGS.sampling.radius) for ox in range(-reach, reach + 1)]
@@ -30,8 +32,8 @@ def test_texels_get_their_share_of_the_crown(index, evidence):
     error = np.abs(found - share) / np.sqrt(most * np.maximum(share, 1e-9) / ROWS + 1e-5)
     assert error.max() < DEVIATIONS
     area = math.pi * 64 - (0 if index == 0 else math.pi * 16)
-    assert found.sum() == pytest.approx(area, rel=1e-12)
-    evidence(f"level {index}: weight of {(share > 0).sum()} texels = their share of the crown within "
+    assert found.sum() == pytest.approx(area, rel=1e-12 if density == "uniform" else EVEN)
+    evidence(f"{density}, level {index}: weight of {(share > 0).sum()} texels = their share of the crown within "
              f"{np.abs(found - share).max():.3f} over {ROWS} rows; sum exact")
 
 
@@ -78,7 +80,7 @@ def test_symmetric_patterns_are_pairs_of_mirror_images(pattern, samples):
         assert offsets[0, -1, 0] == 0
 
 
-@pytest.mark.parametrize("pattern", ["row", "pixel", "fixed"])
+@pytest.mark.parametrize("pattern", ["interleaved", "row", "pixel", "fixed"])
 def test_samples_lie_in_disc_and_crown(pattern):
     """Property: as far from the receiver as their texel may be from their point."""
     settings = replaced(SETTINGS, {"pattern": pattern})
@@ -90,14 +92,50 @@ def test_samples_lie_in_disc_and_crown(pattern):
 
 def test_receivers_of_a_row_share_samples_with_every_second():
     """Property: by row and phase, and by seed and level."""
-    offsets, _ = row_offsets(SETTINGS.sampling, 0, 1, 8)
-    odd, _ = row_offsets(SETTINGS.sampling, 0, 1, 8, phase=1)
-    np.testing.assert_array_equal(offsets[3], offsets_at(SETTINGS.sampling, 0, 1, 3, 10))
-    np.testing.assert_array_equal(odd[3], offsets_at(SETTINGS.sampling, 0, 1, 3, 11))
+    row = replaced(SETTINGS, {"pattern": "row"})
+    offsets, _ = row_offsets(row.sampling, 0, 1, 8)
+    odd, _ = row_offsets(row.sampling, 0, 1, 8, column=1)
+    np.testing.assert_array_equal(offsets[3], offsets_at(row.sampling, 0, 1, 3, 10))
+    np.testing.assert_array_equal(odd[3], offsets_at(row.sampling, 0, 1, 3, 11))
     assert (offsets[3] != odd[3]).any()
     assert (offsets[3] != offsets[4]).any()
-    assert (offsets != row_offsets(replaced(SETTINGS, {"seed": 1}).sampling, 0, 1, 8)[0]).any()
-    assert (offsets != row_offsets(SETTINGS.sampling, 0, 2, 8)[0]).any()
+    assert (offsets != row_offsets(replaced(row, {"seed": 1}).sampling, 0, 1, 8)[0]).any()
+    assert (offsets != row_offsets(row.sampling, 0, 2, 8)[0]).any()
+
+
+@pytest.mark.parametrize("side", [1, 2, 4])
+def test_interleaved_samples_repeat_in_tiles(side):
+    """Property: texels share samples where both their row and their column are equal modulo the tile's side."""
+    sampling = replaced(SETTINGS, {"tile": side, "samples": 40}).sampling
+    sets = {(row, column): tuple(map(tuple, offsets_at(sampling, 1, 2, row, column))) for row in range(8)
+            for column in range(8)}
+    for (row, column), found in sets.items():
+        assert found == sets[row % side, column % side]
+    assert len(set(sets.values())) == side**2
+
+
+def test_a_tile_holds_one_set_of_low_discrepancy(evidence):
+    """Property: of a tile's 16 x 64 points each of 256 cells of equal weight has its four to within two.
+
+    Of as many independent points a cell would have 4 +- 2, and one of the 256 would have 10 or more.
+    """
+    sampling = of(HssilSettings, radius=2000.0, samples=64).sampling
+    offsets = np.concatenate([offsets_at(sampling, 1, 1, row, column) for row in range(4) for column in range(4)])
+    u = np.hypot(*offsets.T) / 2000.0 - 1.0
+    v = np.arctan2(offsets[:, 1], offsets[:, 0]) / (2 * math.pi) % 1.0
+    counts, *_ = np.histogram2d(u, v, bins=16, range=((0, 1), (0, 1)))
+    evidence(f"16 sets of 64 samples: {counts.min():.0f} to {counts.max():.0f} in each of 256 cells, 4 in the mean")
+    assert counts.min() >= 2
+    assert counts.max() <= 6
+
+
+def test_weights_are_those_of_rings():
+    """Analytic: 2 pi d r / N texels at the distance d in the crown of N points, as much in the disc."""
+    offsets, weight = samples_at(of(HssilSettings, radius=3000.0, samples=32).sampling, 0, 1, 2, 3)
+    expected = 2 * math.pi * np.hypot(*offsets.T) * 3000.0 / 16
+    np.testing.assert_allclose(weight, expected, atol=2 * math.pi * 3000.0 / 16)  # to a texel
+    assert (np.hypot(*offsets[:16].T) < 3001).all()
+    assert (np.hypot(*offsets[16:].T) > 2999).all()
 
 
 def test_what_cannot_be_is_refused():

@@ -9,8 +9,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, merge
 from refgi.settings import of, replaced
-from refgi.sssil.crown.pattern import offsets_at
-from refgi.sssil.crown.points import sample_weight
+from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.visibility.bitmask import bitmask_gather
@@ -45,10 +44,8 @@ def frame():
 
 
 def around(level, index, settings):
-    sampling = settings.sampling
-    weight = sample_weight(sampling.radius, sampling.inner if index == 0 else 0, sampling.samples)
     return lambda row, column: [(int(ox), int(oy), w) for (ox, oy), w in zip(
-        offsets_at(settings.sampling, index, level.number, row, column), weight, strict=True)]
+        *samples_at(settings.sampling, index, level.number, row, column), strict=True)]
 
 
 def twin(level, settings, frame=None):
@@ -65,7 +62,7 @@ def twin(level, settings, frame=None):
 
 
 @pytest.mark.feature("REF-02")
-@pytest.mark.parametrize(("pattern", "form"), [("row", "disc"), ("pixel", "point")])
+@pytest.mark.parametrize(("pattern", "form"), [("interleaved", "disc"), ("row", "disc"), ("pixel", "point")])
 def test_twin(frame, pattern, form, evidence):
     settings = replaced(SETTINGS, {"pattern": pattern, "form_factor": form})
     (level,) = pyramid(frame, settings)

@@ -94,7 +94,7 @@ class SenderSettings(Settings):
 
     PRINCIPAL = "downsample"
 
-    downsample: Downsample = setting("resampled", "downsampling from level to level")
+    downsample: Downsample = setting("closest", "downsampling from level to level")
     form_factor: FormFactor = setting("disc", "form factor of a sample: Eq. 4 (disc) or Eq. 3 (point)", study=True)
     only_level: int | None = setting(None, "the one level that sends light, 0: the first; none: all", least=0,
                                      most=MOST_LEVELS - 1, study=True)

@@ -47,10 +47,9 @@ def test_a_page_shows_few_keys_and_says_what_each_is(kind):
     assert all(leaf.about for leaf in leaves(kind))
 
 
-def test_the_papers_values_are_the_defaults_but_for_senders_and_noise():
-    """The paper says neither where samples lie nor who shares them; it blurs no level and keeps the closest sender."""
-    changed = {"sampling.pattern": "interleaved", "sampling.density": "inverse_distance", "blur": GeometryBlur(),
-               "senders.downsample": "resampled"}
+def test_the_papers_values_are_the_defaults_but_for_noise():
+    """The paper says neither where samples lie nor who shares them; it blurs no level."""
+    changed = {"sampling.pattern": "interleaved", "sampling.density": "inverse_distance", "blur": GeometryBlur()}
     assert PRESETS["paper"] != HssilSettings()
     assert replaced(PRESETS["paper"], changed) == HssilSettings()
 

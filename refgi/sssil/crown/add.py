@@ -73,14 +73,13 @@ def add_two(
     `tile` (ROWS * WIDE,) holds receivers and their sums, of which `lanes` from `low` on receive. `packed` holds texels,
     plane by plane, `step` elements apart; `first` and `second` are the places of the first receiver's samples in it.
     """
-    tile = tile[low:]
     # unsigned: no checks for places counted from the end
-    by, a, b = np.uint64(step), np.uint64(first + low), np.uint64(second + low)
+    by, a, b = np.uint64(step), np.uint64(first), np.uint64(second)
     a1, a2, a3, a4 = a + by, a + by * np.uint64(2), a + by * np.uint64(3), a + by * np.uint64(4)
     a5, a6, a7, a8 = a4 + by, a4 + by * np.uint64(2), a4 + by * np.uint64(3), a4 + by * np.uint64(4)
     b1, b2, b3, b4 = b + by, b + by * np.uint64(2), b + by * np.uint64(3), b + by * np.uint64(4)
     b5, b6, b7, b8 = b4 + by, b4 + by * np.uint64(2), b4 + by * np.uint64(3), b4 + by * np.uint64(4)
-    for i in range(np.uint64(lanes)):
+    for i in range(np.uint64(low), np.uint64(low + lanes)):
         px, py, pz, nx, ny, nz = tile[X + i], tile[Y + i], tile[Z + i], tile[NX + i], tile[NY + i], tile[NZ + i]
         g = term(px, py, pz, nx, ny, nz, packed[a + i], packed[a1 + i], packed[a2 + i], packed[a3 + i], packed[a4 + i],
                  packed[a5 + i], first_weight, form)

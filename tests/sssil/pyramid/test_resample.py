@@ -12,7 +12,7 @@ from refgi.settings import of, replaced
 from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
 from refgi.sssil.settings import HssilSettings
 
-SETTINGS = of(HssilSettings, levels=4, radius=2.0, start="half")
+SETTINGS = of(HssilSettings, levels=4, radius=2.0, start="half", downsample="resampled")
 SEEDS = 60
 ROUNDING = 1e-5  # float32 sums over a few hundred texels
 

@@ -55,6 +55,7 @@ def test_the_examples_of_a_text_are_found():
     assert examples(text) == [["a", "b c"], ["d"]]
 
 
+@pytest.mark.filterwarnings("ignore:.* of the indirect light")  # of clamps: tests/pairs/test_loss
 def test_the_readmes_python_runs():
     block, = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE | re.DOTALL)
     names = {}

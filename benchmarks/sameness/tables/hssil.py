@@ -22,11 +22,11 @@ TABLE = Table({"radius": 3.0, "levels": 3, "samples": 16, "downsample": "closest
     *(vary("density", "uniform", pattern=how) for how in ("interleaved", "row", "pixel", "fixed")),
     vary("density", "uniform", **SLICED),
     vary("density", "uniform", **TRACED),
-    vary("blur", None),
-    vary("blur", None, pattern="row", density="uniform"),
-    vary("blur", None, pattern="pixel", density="uniform"),
-    vary("blur", None, density="uniform", **SLICED),
-    vary("blur", None, density="uniform", pattern="row", **TRACED),
+    vary("blur", "none"),
+    vary("blur", "none", pattern="row", density="uniform"),
+    vary("blur", "none", pattern="pixel", density="uniform"),
+    vary("blur", "none", density="uniform", **SLICED),
+    vary("blur", "none", density="uniform", pattern="row", **TRACED),
     vary("blur.size", 3, 8),
     vary("blur.plane_tolerance", 0.001),
     vary("blur.cosine", -1.0),
@@ -63,6 +63,7 @@ TABLE = Table({"radius": 3.0, "levels": 3, "samples": 16, "downsample": "closest
 ])
 
 TEMPORAL = Table({"warm_up": False}, [
+    vary("warm_up", False, same="what the cases start from"),
     vary("warm_up", True),
     vary("entering_speed", 4.0),
     vary("clamp", 0.5),

@@ -48,6 +48,7 @@ def test_a_perspective_map_of_a_half_space_is_refused_with_the_maps_that_suit(ro
     assert light_projection(spot(0.4, ALMOST), room.geometry, 32, "perspective").maps == 1
 
 
+@pytest.mark.filterwarnings("ignore:.* of the indirect light")  # of clamps: tests/pairs/test_loss
 @pytest.mark.parametrize("method", ["sii", "val", "vpl", "hssil", "truth"])
 def test_ninety_degrees_light_as_the_angles_just_below(room, method):
     settings_class = find_method(method).settings

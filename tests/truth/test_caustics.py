@@ -20,7 +20,7 @@ MIRROR = Material("mirror", (0, 0, 0), (0.9, 0.8, 0.5), 1e8)
 def mirror_over_floor(light):
     wall = rectangle((1, 0, 2), (0, 0, -4), (0, 3, 0), MIRROR)
     found = scene([floor(3.0), wall], light)
-    camera = Camera((0.2, 2.5, 0.0), (0.2, 0.0, 0.0), (0, 0, -1), math.radians(20), 24, 24)
+    camera = Camera((0.2, 2.5, 0.0), (0.2, 0.0, 0.0), (0, 0, -1), math.radians(20), 28, 20)
     return dataclasses.replace(found, camera=camera)
 
 

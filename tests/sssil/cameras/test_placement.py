@@ -1,6 +1,7 @@
 """Cameras are put where they see what the picture misses, in free space, always the same ones."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,10 +22,11 @@ from refgi.sssil.camera_transport import (
     unoccluded,
     visible_points,
 )
-from refgi.sssil.cameras import _wide_views, place_cameras
+from refgi.sssil.cameras import _candidate_views, _wide_views, place_cameras
 from refgi.stages import observe
 from tests.sssil.cameras.hidden_side import BACK, HALF_ANGLE, LIGHT, hidden_side
 
+LOW_DISCREPANCY = 0.02  # some hundred points of a Halton sequence; a turn and a half would be off by 0.16
 CENTRES = 2e-3  # 256 points of equal flux against the disc they stand for; texels of a map of 64
 
 
@@ -131,6 +133,23 @@ def test_pictures_of_any_shape(size):
     for camera in place_cameras(small(hidden_side(), width=size[0], height=size[1]), 2):
         assert (camera.width, camera.height) == size
         assert 0 < camera.vfov < math.pi / 2
+
+
+def test_candidates_lie_in_every_direction_alike():
+    """Closed form: about one pair of points in open space, directions of mean 0 and second moments 1/3."""
+    def nothing(origins, _):
+        return SimpleNamespace(distance=np.full(len(origins), np.inf))
+
+    here = Points(np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))
+    there = Points(np.array([[0.0, 2.0, 0.0]]), np.array([[0.0, -1.0, 0.0]]))
+    eyes, ahead = _candidate_views(SimpleNamespace(closest=nothing), here, there, np.ones((1, 1)), 0.5)
+    away = eyes - (0.0, 1.0, 0.0)
+    far = np.linalg.norm(away, axis=1)
+    direction = away / far[:, None]
+    assert far.max() < 0.5
+    np.testing.assert_allclose(direction.mean(axis=0), 0.0, atol=LOW_DISCREPANCY)
+    np.testing.assert_allclose(direction.T @ direction / len(direction), np.eye(3) / 3, atol=LOW_DISCREPANCY)
+    np.testing.assert_allclose(np.linalg.norm(ahead, axis=1), 1.0)
 
 
 def test_lit_points_share_the_flux_that_the_side_reflects():

@@ -28,7 +28,7 @@ PAPER = {"cornell_horse": 19.7, "sponza": 13.4}  # frames a second, Table 1
 PARTS = {  # stages of each line of Table 2, and the paper's ms on cornell_horse
     "deferred rendering": (("rsm.gbuffer", "rsm.resolve", "rsm.shadow_map_visibility", "rsm.direct_irradiance",
                             "frame.compose"), 0.4),
-    "VPL generation": (("rsm.reflective_shadow_map", "lights.choose"), 0.1),
+    "VPL generation": (("rsm.reflective_shadow_map", "lights.draw", "lights.choose"), 0.1),
     "clustering": (("cluster.kmeans", "cluster.area_lights"), 0.5),
     "depth maps": (("cluster.shadow_maps",), 4.2),
     "indirect light": (("cluster.irradiance",), 35.0),

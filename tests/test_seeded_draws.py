@@ -21,7 +21,7 @@ from refgi.splat.multires.error_target.error_driven import draw_samples
 from refgi.splat.sii.reach.threshold import light_range
 from refgi.splat.sii.settings import SiiSettings
 from refgi.sssil import HssilSettings
-from refgi.sssil.crown.pattern import offsets_at
+from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.visibility.slices import slice_counts, slice_offsets
 from tests.naive.draws import draw, draw_bits, mix32
 from tests.rsm.shapes import geometry
@@ -218,7 +218,7 @@ def test_samples_of_a_receiver(pattern, density, index, seed):
                 u = ((0.5 + j * A) % 1 + s + n * 13 * A) % 1
                 v = (0.5 + j * B) % 1 + t + n * 13 * B
                 expected.append(place(6.5, near, u, 2 * math.pi * v, density))
-        assert offsets_at(settings.sampling, index, 2, row, column).tolist() == [list(offset) for offset in expected]
+        assert samples_at(settings.sampling, index, 2, row, column)[0].tolist() == [list(offset) for offset in expected]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -236,7 +236,7 @@ def test_fixed_samples_are_mirror_images(seed):
             else:
                 length = 6.5 * math.sqrt(near + (1 + 2 * near) * u)
                 middles.append((0, math.floor(math.copysign(length, v - 0.5) + 0.5)))
-    assert sorted(map(tuple, offsets_at(settings.sampling, 0, 1, 0, 0).tolist())) == sorted(pairs + middles)
+    assert sorted(map(tuple, samples_at(settings.sampling, 0, 1, 0, 0)[0].tolist())) == sorted(pairs + middles)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -16,7 +16,7 @@ from refgi.image import is_from_refgi, read_exr, write_exr
 from refgi.provenance import Record, estimate_record
 from refgi.provenance.frames import same_sequence
 from refgi.scene.model import Scene
-from refgi.sssil.temporal.filter import History, history_of
+from refgi.sssil.temporal.filter import History, history_of, with_frames
 from refgi.sssil.temporal.sequence import Sequence, SequenceFrame, seeded
 
 Array = npt.NDArray[Any]
@@ -149,4 +149,4 @@ def _history_after(sequence: Sequence, scene: Scene, files: FrameFiles, number: 
     if sequence.temporal.form == "printed":  # needs the light before it was filtered
         return history_of(frame, scene.geometry, sequence.method(frame, seeded(sequence.settings, number)))
     expect(frame.dtype == np.float32, "dtype", "float32 to go on from, which an EXR holds whole", frame.dtype.name)
-    return history_of(frame, scene.geometry, *files.light(number))
+    return history_of(frame, scene.geometry, with_frames(*files.light(number)))

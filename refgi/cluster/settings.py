@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from refgi.errors import expect
-from refgi.lights.settings import MOST_LIGHTS, LightSettings, MapLights, clamped_pairs, expect_footprints
+from refgi.lights.settings import MOST_LIGHTS, LightSettings, clamped_pairs, expect_footprints
 from refgi.pairs.settings import PairSettings
 from refgi.settings import Settings, setting
 
@@ -220,8 +220,8 @@ class ValSettings(Settings):
     def check(self) -> None:
         """Check what parts ask of each other."""
         expect_footprints(self.lights, self.pairs)
-        expect(self.area.single_light == "point" or isinstance(self.lights.source, MapLights), "area.single_light",
-               "'point' with the source 'walk'", self.area.single_light)
+        expect(self.area.single_light == "point" or self.lights.has_footprints, "area.single_light",
+               "'point' with the source 'walk' or the flux 'roulette'", self.area.single_light)
         expect(self.visibility is not None or isinstance(self.clusters, Clusters), "visibility",
                "another one with clusters 'adaptive'", "none")
 

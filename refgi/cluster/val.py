@@ -13,7 +13,7 @@ from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
-from refgi.lights.selection import choose_lights, footprints, light_footprints, light_maps
+from refgi.lights.selection import choose_lights, footprints, light_areas
 from refgi.lights.settings import MapLights, with_clamp
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
@@ -113,30 +113,15 @@ def cluster_lights(
         What each sees; None where nothing asks for it.
     """
     if isinstance(settings.clusters, AdaptiveClusters):
-        chosen = count_for_error(frame, lights, settings, light_areas(frame, settings))
+        chosen = count_for_error(frame, lights, settings, _areas_of_single(frame, settings))
         return chosen.areas, chosen.maps
     skip("cluster.adaptive", "the number of area lights is set")
-    return group_lights(frame, lights, settings, settings.clusters.count, light_areas(frame, settings))  # Sec. 5
+    return group_lights(frame, lights, settings, settings.clusters.count, _areas_of_single(frame, settings))  # Sec. 5
 
 
-def light_areas(frame: "Frame", settings: ValSettings) -> Array | None:
-    """Return the surface that each pixel light stands for, where a cluster of one light has its light's size.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene with its buffers.
-    settings : ValSettings
-        What the lights were chosen by.
-
-    Returns
-    -------
-    (N,) ndarray or None
-        Area, m^2.
-    """
-    if settings.area.single_light == "point" or not isinstance(settings.lights.source, MapLights):
-        return None
-    return light_footprints(light_maps(frame, settings.lights.source), settings.lights)
+def _areas_of_single(frame: "Frame", settings: ValSettings) -> Array | None:
+    """Return the surface (N,), m^2, that each pixel light stands for where a cluster of one light has that size."""
+    return None if settings.area.single_light == "point" else light_areas(frame, settings.lights)
 
 
 def block_side(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> int:

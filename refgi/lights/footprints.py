@@ -1,7 +1,7 @@
 """Cells and footprints of pixel lights: sums of flux over cells of texels, and the surface area behind each texel.
 
 `cells_of_grid` and `cells_of_nearest` partition a map's texels into one cell per chosen texel, for filtered flux
-(SII Sec. 4). `texel_areas` is the surface behind each texel, A = O d^2 / cos (m^2), O its solid angle (sr).
+(SII Sec. 4). `texel_areas` is the surface behind a texel, A = O d^2 / cos (m^2), O its solid angle (sr).
 
 `with_equal_solid_angles` is the map whose texels all subtend the same solid angle, as the papers print it. A texel at
 the centre of a square 90 degree frustum subtends 1.910 times the mean, one in its corner 0.368 times, so with equal
@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
+from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.raster.projection import Projection
 
 if TYPE_CHECKING:
@@ -85,17 +86,20 @@ def texels_with_flux(texel: Array, cell: Array, has_flux: Array) -> Array:
     return moved
 
 
-def texel_areas(rsm: "Rsm") -> Array:
-    """Return the area of surface behind each texel that reflects anything, (H, W) m^2 in the map's dtype; else 0.
+def texel_areas(rsm: "Rsm", texel: Array) -> Array:
+    """Return the surface behind each of some texels (n,) that reflects anything, m^2 in the map's dtype; else 0.
 
     A directional light's texels have an area in place of a solid angle, and d is 1.
     """
     from refgi.scene import DirectionalLight
 
-    light, areas = rsm.light, np.zeros_like(rsm.solid_angle)
+    light = rsm.light
     far = isinstance(light, DirectionalLight)
     source = np.asarray(light.direction if isinstance(light, DirectionalLight) else light.position, np.float64)
-    _fill_areas(rsm.position, rsm.normal, rsm.solid_angle, rsm.flux, rsm.lobe_flux, source, far, areas)
+    position, normal, solid_angle, flux = rsm.at(texel, "position", "normal", "solid_angle", "flux")
+    lobe = None if rsm.lobe_flux is None else values_at(rsm.lobe_flux, texel)
+    areas = np.zeros_like(solid_angle)
+    _fill_areas(position, normal, solid_angle, flux, lobe, source, far, areas)
     return areas
 
 
@@ -104,19 +108,18 @@ def _fill_areas(
     position: Array, normal: Array, solid_angle: Array, flux: Array, lobe: Array | None, source: Array, far: bool,
     areas: Array,
 ) -> None:
-    for i in prange(areas.shape[0]):
-        for j in range(areas.shape[1]):
-            reflected = flux[0, i, j] != 0 or flux[1, i, j] != 0 or flux[2, i, j] != 0
-            if lobe is not None:
-                reflected = reflected or lobe[0, i, j] != 0 or lobe[1, i, j] != 0 or lobe[2, i, j] != 0
-            if reflected:
-                square, along = 0.0, 0.0
-                for axis in range(3):
-                    d = source[axis] - (0.0 if far else float(position[axis, i, j]))
-                    square += d * d
-                    along += d * normal[axis, i, j]
-                cosine = abs(along) / np.sqrt(square) if square > 0.0 else 0.0
-                areas[i, j] = solid_angle[i, j] * (1.0 if far else square) / max(cosine, LEAST_COSINE)
+    for i in prange(len(areas)):
+        reflected = flux[0, i] != 0 or flux[1, i] != 0 or flux[2, i] != 0
+        if lobe is not None:
+            reflected = reflected or lobe[0, i] != 0 or lobe[1, i] != 0 or lobe[2, i] != 0
+        if reflected:
+            square, along = 0.0, 0.0
+            for axis in range(3):
+                d = source[axis] - (0.0 if far else float(position[axis, i]))
+                square += d * d
+                along += d * normal[axis, i]
+            cosine = abs(along) / np.sqrt(square) if square > 0.0 else 0.0
+            areas[i] = solid_angle[i] * (1.0 if far else square) / max(cosine, LEAST_COSINE)
 
 
 def with_equal_solid_angles(rsm: "Rsm") -> "Rsm":

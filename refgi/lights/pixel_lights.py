@@ -12,14 +12,14 @@ its lights carry T over that number, so rounding moves no light from one map to 
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.draws import PIXEL_LIGHTS, draws
 from refgi.errors import expect
-from refgi.lights.footprints import cell_sums, cells_of_grid, cells_of_nearest, texels_with_flux
+from refgi.lights.footprints import cell_sums, cells_of_grid, cells_of_nearest, texel_areas, texels_with_flux
 from refgi.lights.importance import importance as importance_of
 from refgi.lights.warp import Warp, texel_of, warp_stacked
 from refgi.pairs.pixel_lights import PixelLights
@@ -32,8 +32,16 @@ Array = npt.NDArray[Any]
 Pattern = Literal["grid", "halton", "all", "random"]
 
 
-@stage("lights.choose")
-def choose_pixel_lights(
+class Drawn(NamedTuple):
+    """Texels of one map, drawn as pixel lights; those without flux included."""
+
+    texel: Array  # (n,) row * W + column
+    weight: float | Array  # T/N, or (n,) T/N w where they are warped
+    cell: Array | None  # (H * W,) index of the drawn texel whose light carries a texel's flux; None: own flux alone
+
+
+@stage("lights.draw")
+def draw_texels(
     rsms: Sequence[Rsm],
     *,
     count: int | None,
@@ -43,8 +51,8 @@ def choose_pixel_lights(
     warp: Warp | None = None,
     importance: Sequence[Array] | None = None,
     renormalise: bool = False,
-) -> PixelLights:
-    """Choose texels as pixel lights.
+) -> list[Drawn]:
+    """Draw texels of maps as pixel lights.
 
     Parameters
     ----------
@@ -68,8 +76,8 @@ def choose_pixel_lights(
 
     Returns
     -------
-    PixelLights
-        Those with flux.
+    list of Drawn
+        One a map.
 
     Raises
     ------
@@ -78,10 +86,8 @@ def choose_pixel_lights(
 
     Notes
     -----
-    A filtered light whose own texel has no flux moves to the nearest texel of its cell that has. Where its texel has no
-    lobe, what the cell's lobes reflect leaves it diffusely: flux alone is filtered, in the paper as here. Filtered
-    lights of a warped pattern stand at warped places and carry the flux of the texels nearest to them, without weight:
-    the cells already are small where the lights are dense. Of several on one texel the first has it all.
+    Filtered lights of a warped pattern stand at warped places and carry the flux of the texels nearest to them, without
+    weight: the cells already are small where the lights are dense. Of several on one texel the first has it all.
     """
     expect(len(rsms) > 0, "rsms", "at least one map", "none")
     expect(pattern in get_args(Pattern), "pattern", " or ".join(get_args(Pattern)), pattern)
@@ -89,20 +95,81 @@ def choose_pixel_lights(
     expect(warp is not None or importance is None, "importance", "None without a warp", "maps")
     expect(importance is None or len(importance) == len(rsms), "importance", f"one for each of {len(rsms)} maps",
            None if importance is None else len(importance))
-    parts = []
+    drawn = []
     for index, (rsm, share) in enumerate(zip(rsms, map_shares(rsms, count, pattern), strict=True)):
+        weight: float | Array = rsm.texels / share
         if warp is None:
-            texel, weight = _choose(rsm, share, pattern, seed, index), None
+            texel = _choose(rsm, share, pattern, seed, index)
         else:
             texel_importance = importance_of(rsm) if importance is None else importance[index]
-            texel, weight = _warped(rsm, _points(rsm, share, pattern, seed, index), texel_importance, warp)
-            weight = weight * (share / weight.sum()) if renormalise else weight
+            texel, own = _warped(rsm, _points(rsm, share, pattern, seed, index), texel_importance, warp)
+            weight = weight * (own * (share / own.sum()) if renormalise else own)
+        cell = None
         if filtered and pattern != "all":
-            part = _filtered_lights(rsm, texel, on_grid=pattern == "grid" and warp is None)
-        else:
-            part = _weighted_lights(rsm, texel, rsm.texels / share if weight is None else rsm.texels / share * weight)
+            on_grid = pattern == "grid" and warp is None
+            cell = cells_of_grid(rsm.projection, share) if on_grid else cells_of_nearest(rsm.projection, texel)
+        drawn.append(Drawn(texel, weight, cell))
+    return drawn
+
+
+@stage("lights.choose")
+def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
+    """Return drawn texels as pixel lights.
+
+    Parameters
+    ----------
+    rsms : sequence of Rsm
+        One map a light.
+    drawn : sequence of Drawn
+        The texels drawn from each.
+
+    Returns
+    -------
+    PixelLights
+        Those with flux.
+
+    Notes
+    -----
+    A filtered light whose own texel has no flux moves to the nearest texel of its cell that has. Where its texel has no
+    lobe, what the cell's lobes reflect leaves it diffusely: flux alone is filtered, in the paper as here.
+    """
+    parts = []
+    for index, (rsm, (texel, weight, cell)) in enumerate(zip(rsms, drawn, strict=True)):
+        part = _weighted_lights(rsm, texel, weight) if cell is None else _filtered_lights(rsm, texel, cell)
         parts.append(part._replace(map_index=np.full(part.flux.shape[1], index, np.int32)))
     return parts[0] if len(parts) == 1 else _joined(parts)
+
+
+def choose_pixel_lights(rsms: Sequence[Rsm], **options: Any) -> PixelLights:
+    """Return texels of maps as pixel lights: `lights_of` what `draw_texels` draws with the same options."""
+    return lights_of(rsms, draw_texels(rsms, **options))
+
+
+@stage("lights.footprints")
+def footprints_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> Array:
+    """Return the surface area that each pixel light of `lights_of` stands for.
+
+    Parameters
+    ----------
+    rsms : sequence of Rsm
+        One map a light.
+    drawn : sequence of Drawn
+        The texels drawn from each.
+
+    Returns
+    -------
+    (N,) ndarray
+        Area, m^2: O d^2 / cos of the texel with the same T/N w as its flux, or of all texels of its cell that reflect.
+    """
+    parts = []
+    for rsm, (texel, weight, cell) in zip(rsms, drawn, strict=True):
+        if cell is None:
+            own = texel_areas(rsm, texel)
+            area = own * np.asarray(weight).astype(own.dtype)
+        else:
+            (area,) = cell_sums(texel_areas(rsm, np.arange(rsm.texels))[None], cell, len(texel))
+        parts.append(area[area != 0])
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def map_shares(rsms: Sequence[Rsm], count: int | None, pattern: Pattern) -> list[int]:
@@ -198,8 +265,7 @@ def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array) -> PixelLigh
     return _lights(rsm, texel, flux * scale, lobe)
 
 
-def _filtered_lights(rsm: Rsm, texel: Array, on_grid: bool) -> PixelLights:
-    cell = cells_of_grid(rsm.projection, len(texel)) if on_grid else cells_of_nearest(rsm.projection, texel)
+def _filtered_lights(rsm: Rsm, texel: Array, cell: Array) -> PixelLights:
     flux = cell_sums(rsm.flux, cell, len(texel))
     power = rsm.flux.sum(axis=0) if rsm.lobe_flux is None else (rsm.flux + rsm.lobe_flux).sum(axis=0)
     texel = texels_with_flux(texel, cell, power > 0)

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.lights.footprints import texel_areas, with_equal_solid_angles
+from refgi.lights.footprints import with_equal_solid_angles
 from refgi.lights.settings import LightSettings, MapLights, PathLights
-from refgi.stages import skip, stage
+from refgi.stages import skip
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
+    from refgi.lights.pixel_lights import Drawn
     from refgi.pairs.pixel_lights import PixelLights
     from refgi.pairs.settings import PairSettings
     from refgi.rsm import Rsm
@@ -159,16 +160,22 @@ def pixel_lights(
     PixelLights
         Lights with their share of the flux.
     """
-    from refgi.lights.pixel_lights import choose_pixel_lights
+    from refgi.lights.pixel_lights import lights_of
+
+    return lights_of(rsms, _drawn(rsms, settings, importance))
+
+
+def _drawn(rsms: "Sequence[Rsm]", settings: LightSettings, importance: "Sequence[Array] | None") -> "list[Drawn]":
+    from refgi.lights.pixel_lights import draw_texels
     from refgi.lights.warp import Warp
 
     source = _map_lights(settings)
     count = None if source.pattern == "all" else settings.count
     method: Any = source.warp and source.warp.name()
     warp = None if source.warp is None else Warp(method, source.warp.levels)
-    return choose_pixel_lights(rsms, count=count, pattern=source.pattern, seed=settings.seed,
-                               filtered=source.filtered, warp=warp, importance=importance,
-                               renormalise=source.warp is not None and source.warp.renormalise_weights)
+    return draw_texels(rsms, count=count, pattern=source.pattern, seed=settings.seed, filtered=source.filtered,
+                       warp=warp, importance=importance,
+                       renormalise=source.warp is not None and source.warp.renormalise_weights)
 
 
 def _map_lights(settings: LightSettings) -> MapLights:
@@ -197,43 +204,28 @@ def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: Ligh
 
 def footprints(frame: "Frame", settings: LightSettings, pairs: "PairSettings") -> Array | None:
     """Return the surface area (N,), m^2, of each light of `choose_lights` where the clamp needs it, else None."""
-    if not pairs.needs_footprints:
-        return None
-    rsms = light_maps(frame, _map_lights(settings))
-    return light_footprints(rsms, settings, importance_maps(frame, rsms, settings))
+    return light_areas(frame, settings) if pairs.needs_footprints else None
 
 
-@stage("lights.footprints")
-def light_footprints(
-    rsms: "Sequence[Rsm]", settings: LightSettings, importance: "Sequence[Array] | None" = None
-) -> Array:
-    """Return the surface area that each pixel light stands for: O d^2 / cos, with the same T / N as its flux.
+def light_areas(frame: "Frame", settings: LightSettings) -> Array:
+    """Return the surface area that each light of `choose_lights` stands for.
 
     Parameters
     ----------
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
+    frame : Frame
+        The scene and its buffers.
     settings : LightSettings
-        The settings that the lights were chosen by.
-    importance : sequence of (H, W) ndarray, optional
-        The importance they were chosen by.
+        The settings that the lights were chosen by; their source is maps.
 
     Returns
     -------
     (N,) ndarray
         Area, m^2, in the order of the lights.
-
-    Notes
-    -----
-    The area takes the place of the flux in the map, so that pattern, weights and filtering are those of the lights.
     """
-    area: Array = pixel_lights([_with_area_as_flux(rsm) for rsm in rsms], settings, importance).flux[0]
-    return area
+    from refgi.lights.pixel_lights import footprints_of
 
-
-def _with_area_as_flux(rsm: "Rsm") -> "Rsm":
-    area = texel_areas(rsm)
-    return rsm._replace(flux=np.broadcast_to(area, rsm.flux.shape), lobe_flux=None, lobe_axis=None, lobe_exponent=None)
+    rsms = light_maps(frame, _map_lights(settings))
+    return footprints_of(rsms, _drawn(rsms, settings, importance_maps(frame, rsms, settings)))
 
 
 def _has_flux(rsm: "Rsm") -> Array:

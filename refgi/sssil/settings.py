@@ -95,7 +95,8 @@ class SenderSettings(Settings):
     PRINCIPAL = "downsample"
 
     downsample: Downsample = setting("closest", "downsampling from level to level")
-    form_factor: FormFactor = setting("disc", "form factor of a sample: Eq. 4 (disc) or Eq. 3 (point)", study=True)
+    form_factor: FormFactor = setting("disc", "form factor of a sample: Eq. 4 for all that it stands for (disc) "
+                                      "or its texel (texel), or Eq. 3 (point)", study=True)
     only_level: int | None = setting(None, "the one level that sends light, 0: the first; none: all", least=0,
                                      most=MOST_LEVELS - 1, study=True)
 

@@ -208,18 +208,18 @@ def turn(s, t, axes):
 
 
 def footprint(view, i):
-    """Return the surface that a pixel light stands for, m^2: Omega d^2 / cos of its texel, times T / N."""
-    maps = view.frame.rsms
-    m, count = int(view.lights.map_index[i]), view.settings.lights.count
-    drawn = count // len(maps) + (m < count % len(maps))
-    lamp, at = maps[m].light, int(view.lights.texel[i])
+    """Return the surface that a pixel light stands for, m^2: Omega d^2 / cos of its texel, times that of its flux."""
+    here, at = view.frame.rsms[int(view.lights.map_index[i])], int(view.lights.texel[i])
+    lamp, power = here.light, here.flux.reshape(3, -1)[:, at].sum()
+    times = view.lights.flux[:, i].sum() / power if power else (
+        view.lights.lobe_flux[:, i].sum() / here.lobe_flux.reshape(3, -1)[:, at].sum())
     d = view.lights.position[:, i].astype(float) - getattr(lamp, "position", 0.0)
     if hasattr(lamp, "position"):
         square, toward = d @ d, d / math.sqrt(d @ d)
     else:
         square, toward = 1.0, np.asarray(lamp.direction) / np.linalg.norm(lamp.direction)
     cosine = abs(toward @ view.lights.normal[:, i].astype(float))
-    return maps[m].solid_angle.reshape(-1)[at] * square / cosine * maps[m].texels / drawn
+    return here.solid_angle.reshape(-1)[at] * square / cosine * times
 
 
 def lit_points(frame):

@@ -8,7 +8,7 @@ from refgi.cluster.val import val
 from refgi.lights.settings import LightSettings
 from tests.naive import clustered
 from tests.naive.pair_term import with_clamp
-from tests.wiring.cases import needed, uncovered, under
+from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.pair_cases import PAIR_CASES
 from tests.wiring.shadow_cases import FEW, few, shadow_cases
 
@@ -24,6 +24,9 @@ CASES = {
     "fewer lights": few({"lights": 31}),
     **under("pairs", PAIR_CASES, FEW),
     **shadow_cases("visibility"),
+    "warped lights with their footprint": Case(
+        {"area.single_light": "footprint"},
+        {"clusters.count": 40, "warp": "A", "warp.levels": 4, "lights.seed": 3, "visibility": "pcss"}),
     "no shadows": few({"visibility": "none"}),
     "blocks": few(BLOCKS),
     "blocks by cluster": few({"interleaving.assignment": "cluster"}, BLOCKS),

@@ -20,7 +20,7 @@ from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.settings import replaced
 from refgi.sssil import HssilSettings
-from refgi.sssil.crown.pattern import offsets_at
+from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.crown.reach import coverage
 from refgi.sssil.settings import PRESETS
 
@@ -101,7 +101,7 @@ def _placed(settings: HssilSettings) -> npt.NDArray[np.uint8]:
     for k in range(settings.sampling.levels + 1):
         pixels[np.abs(distance - radius * 2**k) < 0.5 + reach / 640] = RINGS
     for k in reversed(range(settings.sampling.levels)):
-        for ox, oy in 2**k * offsets_at(settings.sampling, k, settings.sampling.first_level + k, 0, 0):
+        for ox, oy in 2**k * samples_at(settings.sampling, k, settings.sampling.first_level + k, 0, 0)[0]:
             top, left = (max(0, reach + o - 2**k // 2) for o in (oy, ox))
             pixels[top : top + 2**k, left : left + 2**k] = colours[k]
     return (255 * pixels + 0.5).astype(np.uint8)

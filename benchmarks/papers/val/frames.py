@@ -103,7 +103,8 @@ class Step(NamedTuple):
 
 STEPS = (Step("deferred rendering", ("rsm.gbuffer", "rsm.resolve", "rsm.rasterize", "rsm.direct", "rsm.shadow_map",
                                      "rsm.facing", "frame."), 0.4),
-         Step("VPL generation", ("rsm.reflective", "lights.choose", "lights.refraction", "rsm.solid_angles"), 0.1),
+         Step("VPL generation", ("rsm.reflective", "lights.draw", "lights.choose", "lights.refraction",
+                                 "rsm.solid_angles"), 0.1),
          Step("VAL clustering", ("cluster.kmeans", "cluster.area_lights"), 0.5),
          Step("CSSM", ("cluster.shadow_maps", "cluster.occluders", "cluster.blockers", "rsm.paraboloid"), 4.2),
          Step("indirect illumination", ("cluster.irradiance", "cluster.visibility", "pairs."), 35.0),

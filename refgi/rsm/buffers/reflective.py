@@ -17,7 +17,7 @@ from refgi.jit import kernel, prange
 from refgi.rsm.buffers.gbuffer import GBuffer, values_at
 from refgi.rsm.buffers.light_projection import MapShape, incident_flux, light_projection
 from refgi.rsm.buffers.runs import texel_ray
-from refgi.rsm.buffers.solid_angle import texel_solid_angles
+from refgi.rsm.buffers.solid_angle import texel_solid_angles, texel_solid_angles_at
 from refgi.rsm.raster.projection import Projection, project
 from refgi.rsm.raster.visibility_buffer import rasterize
 from refgi.scene.model import Geometry, Light, MaterialTable
@@ -139,7 +139,7 @@ class Rsm:
         texel : (n,) ndarray of int
             Texels, row * W + column.
         *names : str
-            Among depth, position, normal, flux.
+            Among depth, position, normal, solid_angle, flux.
 
         Returns
         -------
@@ -154,6 +154,8 @@ class Rsm:
         if "flux" in absent:
             incident = incident_flux(self.light, self.projection, None, self._view.dtype, texel)
             surface["flux"] = self._flux(incident, surface)
+        if "solid_angle" in absent:
+            surface["solid_angle"] = texel_solid_angles_at(self.projection, texel).astype(self._view.dtype)
         parts.update(surface)
         return tuple(parts[name] for name in names)
 

@@ -63,6 +63,16 @@ def texel_solid_angles(projection: Projection) -> Array:
     return _stacked(projection, _texel_integrals(_intrinsics(projection), Circles(radius, radius, 0.0)))
 
 
+def texel_solid_angles_at(projection: Projection, texel: Array) -> Array:
+    """Return what `texel_solid_angles` gives at some texels.
+
+    `projection`: the maps. `texel` (n,) int: texels of the flattened maps. Returns (n,): sr or m^2, float64.
+    """
+    if projection.kind in (ORTHOGRAPHIC, PARABOLOID):
+        return texel_solid_angles(projection).reshape(-1)[texel]
+    return _integrals_at(projection, Circles(math.inf, math.inf, 0.0), texel)
+
+
 def spot_power(projection: Projection, inner: float, outer: float) -> Array:
     """Return the integral of a spot's falloff over every texel of one map that looks along the spot's axis.
 
@@ -81,9 +91,13 @@ def spot_power_at(projection: Projection, inner: float, outer: float, texel: Arr
     """
     if projection.kind == PARABOLOID:  # whose rim texels hold what their neighbours give them
         return spot_power(projection, inner, outer).reshape(-1)[texel]
-    power = np.empty(len(texel))
-    _fill_texels(_intrinsics(projection), _circles(projection.kind, inner, outer), texel, power)
-    return power
+    return _integrals_at(projection, _circles(projection.kind, inner, outer), texel)
+
+
+def _integrals_at(projection: Projection, spot: Circles, texel: Array) -> Array:
+    integrals = np.empty(len(texel))
+    _fill_texels(_intrinsics(projection), spot, texel % (projection.height * projection.width), integrals)
+    return integrals
 
 
 def _intrinsics(projection: Projection) -> Projection:
@@ -140,14 +154,14 @@ def _fill_quadrant(projection: Projection, spot: Circles, quadrant: Array) -> No
 
 
 @kernel
-def _fill_texels(projection: Projection, spot: Circles, texel: Array, power: Array) -> None:
+def _fill_texels(projection: Projection, spot: Circles, texel: Array, integrals: Array) -> None:
     height, width = projection.height, projection.width
     for k in range(len(texel)):
         row, column = texel[k] // width, texel[k] % width
         i, j = _from_axis(row, height), _from_axis(column, width)
         # half of a middle row or column lies on either side of the axis
         twice = (2.0 if height % 2 and i == 0 else 1.0) * (2.0 if width % 2 and j == 0 else 1.0)
-        power[k] = _integral(projection, spot, i, j) * twice
+        integrals[k] = _integral(projection, spot, i, j) * twice
 
 
 @kernel

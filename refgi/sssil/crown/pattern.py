@@ -129,32 +129,6 @@ def shared_offsets(
     return offsets, relative * sample_weight(radius, inner, crown)
 
 
-def offsets_at(
-    sampling: SamplingSettings, index: int, number: int, row: int, column: int, radius: float | None = None
-) -> Array:
-    """Return the samples of one receiver, whatever the pattern.
-
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Numbers of samples, pattern and seed.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    number : int
-        Number of the level in the pyramid.
-    row, column : int
-        The receiver.
-    radius : float, optional
-        Inner radius of the crown, texels; that of the settings by default.
-
-    Returns
-    -------
-    (n, 2) ndarray of int32
-        Texels (ox, oy) from the receiver, in the order of `row_offsets` and its weights.
-    """
-    return samples_at(sampling, index, number, row, column, radius)[0]
-
-
 def samples_at(
     sampling: SamplingSettings, index: int, number: int, row: int, column: int, radius: float | None = None
 ) -> tuple[Array, Array]:

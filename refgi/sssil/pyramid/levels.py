@@ -163,13 +163,7 @@ def levels(
     keeps the light; its positions may lie between two surfaces.
     """
     shape = (projection.height, projection.width)
-    expect(depth.shape == shape, "depth", f"shape {shape}", depth.shape)
-    for name, array in (("normal", normal), ("albedo", albedo), ("direct", direct)):
-        expect(array.shape == (3, *shape), name, f"shape {(3, *shape)}", array.shape)
-    expect(depth.size < NO_PIXEL, "picture", f"fewer than {NO_PIXEL:,} pixels", f"{depth.size:,}")
-    picture = Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(array, depth.dtype)
-                                                     for array in (normal, albedo, direct)))
-    view = view_of(projection, as_published)
+    picture, view = _picture(shape, depth, normal, albedo, direct), view_of(projection, as_published)
     levels_made = [_empty_level(number, shape, depth.dtype) for number in range(first, first + count)]
     fill_first_level(picture, view, levels_made[0])
     for fine, coarse in itertools.pairwise(levels_made):
@@ -210,16 +204,19 @@ def drawn_senders(
     tuple of Level
         Area is the sum over pixels, radiance times area the flux over pi, to rounding. `depth` is that of `closest`.
 
+    Raises
+    ------
+    InputError
+        As `levels`.
+
     Notes
     -----
     Not the published method, which keeps the closest of four as a sender too. The expectation of Eq. 3 is that of
     the sum over all pixels; where they differ in hue, that of the mean of the channels.
     """
-    picture = Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(array, depth.dtype)
-                                                     for array in (normal, albedo, direct)))
-    view = view_of(projection, as_published)
-    drawn = [_empty_level(level.number, (view.height, view.width), depth.dtype)._replace(depth=level.depth)
-             for level in closest]
+    shape = (projection.height, projection.width)
+    picture, view = _picture(shape, depth, normal, albedo, direct), view_of(projection, as_published)
+    drawn = [_empty_level(level.number, shape, depth.dtype)._replace(depth=level.depth) for level in closest]
     if closest[0].number == 0:
         drawn[0] = closest[0]  # pixels stand for themselves
     else:
@@ -227,6 +224,16 @@ def drawn_senders(
     for (fine, coarse), nearest in zip(itertools.pairwise(drawn), closest[1:], strict=True):
         draw_texels(fine, seed, nearest, coarse)
     return tuple(drawn)
+
+
+def _picture(shape: tuple[int, int], depth: Array, normal: Array, albedo: Array, direct: Array) -> Picture:
+    """Return the buffers in one type and order, or raise `InputError` if they do not have the camera's shape."""
+    expect(depth.shape == shape, "depth", f"shape {shape}", depth.shape)
+    for name, array in (("normal", normal), ("albedo", albedo), ("direct", direct)):
+        expect(array.shape == (3, *shape), name, f"shape {(3, *shape)}", array.shape)
+    expect(depth.size < NO_PIXEL, "picture", f"fewer than {NO_PIXEL:,} pixels", f"{depth.size:,}")
+    return Picture(np.ascontiguousarray(depth), *(np.ascontiguousarray(array, depth.dtype)
+                                                  for array in (normal, albedo, direct)))
 
 
 def _average(picture: Picture, view: View, by_surface: bool, levels_made: list[Level]) -> None:

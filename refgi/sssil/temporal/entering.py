@@ -28,8 +28,8 @@ def fetch_entering(
 
     Parameters
     ----------
-    values : (3, h, w) ndarray
-        Light of the earlier picture, W/m^2.
+    values : (3 or 4, h, w) ndarray
+        The first three planes are the light of the earlier picture, W/m^2.
     source : SourceView
         The earlier picture.
     position : (3, h', w') ndarray

@@ -31,21 +31,29 @@ Array = npt.NDArray[Any]
 class History(NamedTuple):
     """State that a frame leaves to the next."""
 
-    irradiance: Array  # (3, h, w) F, or I for the printed form, W/m^2
+    light: Array  # (3 or 4, h, w) F, or I for the printed form, W/m^2; then frames in which a pixel's surface was found
     view: SourceView  # its camera, depths and normals
     geometry: Geometry  # the scene's triangles, where the scene has them
-    frames: Array | None = None  # (h, w) frames in which each pixel's surface was found; None: as many as a asks for
 
 
 class Filtered(NamedTuple):
     """Light blended with that of earlier frames."""
 
-    irradiance: Array  # (3, h, w) W/m^2
+    light: Array  # (3 or 4, h, w) irradiance and, where they are counted, frames
     reused: float  # share of the pixels with a surface that the frame before shows as well
-    frames: Array | None  # (h, w) frames in which each pixel's surface was found, this one included
+
+    @property
+    def irradiance(self) -> Array:
+        """F, (3, h, w) W/m^2."""
+        return self.light[:3]
+
+    @property
+    def frames(self) -> Array | None:
+        """Frames in which each pixel's surface was found, this one included, (h, w); None where they do not count."""
+        return self.light[3] if len(self.light) > 3 else None
 
 
-def history_of(frame: "Frame", geometry: Geometry, irradiance: Array, frames: Array | None = None) -> History:
+def history_of(frame: "Frame", geometry: Geometry, light: Array) -> History:
     """Return the state that the next frame needs of this one.
 
     Parameters
@@ -54,10 +62,9 @@ def history_of(frame: "Frame", geometry: Geometry, irradiance: Array, frames: Ar
         The frame.
     geometry : Geometry
         Its scene's triangles as the scene holds them: the very object of the next scene if nothing moves.
-    irradiance : (3, h, w) ndarray
-        Light for the next frame, F or I by the form of the filter, W/m^2.
-    frames : (h, w) ndarray, optional
-        Frames in which each pixel's surface was found; as many as a asks for where absent.
+    light : (3 or 4, h, w) ndarray
+        Light for the next frame, F or I by the form of the filter, W/m^2, and in a fourth plane the number of frames in
+        which each pixel's surface was found; as many as a asks for where absent.
 
     Returns
     -------
@@ -66,25 +73,20 @@ def history_of(frame: "Frame", geometry: Geometry, irradiance: Array, frames: Ar
     """
     buffer = frame.gbuffer
     depth, normal = buffer.resolve("depth", "normal")
-    return History(irradiance, SourceView(buffer.projection, depth, normal, frame.origin), geometry, frames)
+    return History(light, SourceView(buffer.projection, depth, normal, frame.origin), geometry)
 
 
-def first_frames(irradiance: Array, settings: TemporalSettings) -> Array | None:
-    """Return the number of frames in which surfaces were found after the first one.
+def first_light(irradiance: Array, settings: TemporalSettings) -> Array:
+    """Return the light of a frame that none goes before, with a number of frames of 1 where frames are counted.
 
-    Parameters
-    ----------
-    irradiance : (3, h, w) ndarray
-        The first frame's light.
-    settings : TemporalSettings
-        Whether frames are counted.
-
-    Returns
-    -------
-    (h, w) ndarray or None
-        1 everywhere.
+    `irradiance` (3, h, w): its light, W/m^2. `settings`: say whether frames are counted. Returns (3 or 4, h, w).
     """
-    return np.ones(irradiance.shape[1:], irradiance.dtype) if settings.counts_frames else None
+    return with_frames(irradiance, np.ones(irradiance.shape[1:], irradiance.dtype) if settings.counts_frames else None)
+
+
+def with_frames(irradiance: Array, frames: Array | None) -> Array:
+    """Return light (3, h, w), W/m^2, and the number of frames (h, w), if there is one, as one array."""
+    return irradiance if frames is None else np.concatenate([irradiance, frames[None]])
 
 
 @stage("sssil.temporal", kept=False)
@@ -132,14 +134,13 @@ def temporal_filter(
         expect_same_triangles(geometry, history.geometry)
         before = _relative_to(history.geometry, frame.origin)
         position, normal, speed = previous_points(buffer, frame.scene.geometry, before)
-    frames = history.frames if settings.counts_frames else None
-    earlier = history.irradiance if frames is None else np.concatenate([history.irradiance, frames[None]])
+    earlier = history.light if settings.counts_frames else history.light[:3]
     reprojected, weight = reproject(earlier, history.view, position, normal, buffer.covered,
                                     origin=frame.origin, depth_tolerance=settings.depth_tolerance,
                                     normal_cosine=settings.normal_cosine, fetch=settings.fetch)
     entering = None
     if settings.entering_speed is not None:
-        entering = fetch_entering(history.irradiance, history.view, position, buffer.covered, weight, frame.origin,
+        entering = fetch_entering(earlier, history.view, position, buffer.covered, weight, frame.origin,
                                   settings.entering_speed, reprojected)
     if settings.clamp is not None:
         clamp_to_neighbourhood(irradiance, buffer.covered, settings.clamp, settings.clamp_radius, reprojected)
@@ -147,8 +148,7 @@ def temporal_filter(
     reused = np.empty(len(weight), np.int64)  # pixels of each row
     falloff = real(-math.log2(math.e) / settings.speed)
     _blend(irradiance, speed, entering, real(settings.weight), falloff, weight, reprojected, reused)
-    return Filtered(reprojected[:3], int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))),
-                    None if frames is None else reprojected[3])
+    return Filtered(reprojected, int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))))
 
 
 def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:

@@ -10,7 +10,7 @@ from refgi.frame import Frame
 from refgi.scene.model import Scene
 from refgi.settings import flat, replaced
 from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
-from refgi.sssil.temporal.filter import History, first_frames, history_of, temporal_filter
+from refgi.sssil.temporal.filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
 
 Array = npt.NDArray[Any]
 Method = Callable[[Frame, Any], Array]
@@ -98,11 +98,14 @@ class Sequence:
         irradiance = self.method(frame, seeded(self.settings, number))
         if self.temporal is None:
             return SequenceFrame(frame, irradiance, frame.radiance(irradiance), 0.0), None
-        filtered, reused, frames = irradiance, 0.0, first_frames(irradiance, self.temporal)
-        if history is not None:
-            filtered, reused, frames = temporal_filter(irradiance, frame, scene.geometry, history, self.temporal)
-        left = history_of(frame, scene.geometry, irradiance if self.temporal.form == "printed" else filtered, frames)
-        return SequenceFrame(frame, filtered, frame.radiance(filtered), reused, frames), left
+        if history is None:
+            made = Filtered(first_light(irradiance, self.temporal), 0.0)
+        else:
+            made = temporal_filter(irradiance, frame, scene.geometry, history, self.temporal)
+        left = with_frames(irradiance, made.frames) if self.temporal.form == "printed" else made.light
+        filtered = made.irradiance
+        return (SequenceFrame(frame, filtered, frame.radiance(filtered), made.reused, made.frames),
+                history_of(frame, scene.geometry, left))
 
 
 def _hssil() -> Method:

@@ -44,7 +44,7 @@ STAGES_OF_STEPS = {
     "deferred rendering": {"rsm.gbuffer", "rsm.rasterize", "rsm.resolve", "rsm.facing", "rsm.shadow_map_visibility",
                            "rsm.direct_irradiance", "frame.visible_extent", "frame.illuminated_extent",
                            "frame.compose"},
-    "VPL generation": {"rsm.reflective_shadow_map", "lights.choose"},
+    "VPL generation": {"rsm.reflective_shadow_map", "lights.draw", "lights.choose"},
     "VAL clustering": {"cluster.kmeans", "cluster.area_lights"},
     "CSSM": {"cluster.shadow_maps", "cluster.blockers", "cluster.occluders"},
     "indirect illumination": {"cluster.irradiance", "pairs.clamp_loss"},

@@ -257,7 +257,7 @@ def test_errors_name_what_is_wrong(light, options, message):
         in_a_ball(light, **options)
 
 
-VIEWED = ("depth", "position", "normal", "flux")
+VIEWED = ("depth", "position", "normal", "solid_angle", "flux")
 
 
 @pytest.mark.parametrize("materials", [(DIFFUSE,), (DIFFUSE, GLOSSY, GLASS)])

@@ -259,6 +259,15 @@ def test_sizes_that_cannot_be_drawn_are_named(width, height):
         camera_projection(CAMERA, width, height)
 
 
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e4])
+def test_a_plane_past_the_eye_hides_what_its_distance_says(size):
+    """A triangle of the plane y = -h, seen from the origin: h above 1e-9 of its size counts, below does not."""
+    shape = geometry(size * np.array([[-1.0, 0, 0.5], [1, 0, 0.5], [0.1, 0, -3]]), [[0, 1, 2]])
+    for height, seen in ((3e-8, True), (1e-11, False)):
+        camera = Camera((0.0, height * size, 0.0), (0.0, height * size, -size), width=9, height=9)
+        assert (rasterize(shape, camera_projection(camera)).triangle_id == 0).any() == seen
+
+
 def test_a_plane_through_the_eye_hides_nothing():
     wall = [[-9, -9, -3], [9, -9, -3], [9, 9, -3], [-9, 9, -3]]
     edge_on = [[-1, 0.1, 5], [1, 0.1, 5], [0.2, 0.1, -7]]

@@ -7,7 +7,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.frame import Frame
-from refgi.lights.selection import light_footprints, pixel_lights
+from refgi.lights.selection import light_areas, pixel_lights
 from refgi.lights.settings import LightSettings
 from refgi.scene import SpotLight, load_scene
 from refgi.settings import of, replaced
@@ -136,11 +136,11 @@ def test_clamps_and_offset_on_a_scene(box, evidence):
 def test_footprints_are_the_lit_area(plates):
     """A spot of 40 degrees straight down on a floor at height 1 (and just below the upper plate) lights a disc."""
     (light,) = plates.scene.lights
-    area = light_footprints(plates.rsms, ALL.lights)
+    area = light_areas(plates, ALL.lights)
     assert len(area) == pixel_lights(plates.rsms, ALL.lights).position.shape[1]
     disc = math.pi * (light.position[1] * math.tan(light.outer_half_angle)) ** 2
     assert area.sum() == pytest.approx(disc, rel=0.03)  # whole texels on the rim
-    few = light_footprints(plates.rsms, of(LightSettings, count=256, seed=1))
+    few = light_areas(plates, of(LightSettings, count=256, seed=1))
     assert len(few) == pixel_lights(plates.rsms, of(LightSettings, count=256, seed=1)).position.shape[1]
     assert few.sum() == pytest.approx(disc, rel=0.1)
 

@@ -12,7 +12,7 @@ from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.scene.motion import faces_of, moved, rotation_about
 from refgi.sssil.temporal import Sequence, TemporalSettings
-from refgi.sssil.temporal.filter import first_frames, history_of, temporal_filter
+from refgi.sssil.temporal.filter import first_light, history_of, temporal_filter
 from refgi.sssil.temporal.motion import previous_points
 from refgi.sssil.temporal.neighbourhood import clamp_to_neighbourhood
 from tests.naive.reprojection import recursion
@@ -58,12 +58,13 @@ def at_rest(frame, lights, settings):
     """Light of a frame that is rendered again and again."""
     results, history = [], None
     for new in lights:
-        light, count = new, first_frames(new, settings)
+        light = first_light(new, settings)
         if history is not None:
-            light, reused, count = temporal_filter(new, frame, frame.scene.geometry, history, settings)
+            light, reused = temporal_filter(new, frame, frame.scene.geometry, history, settings)
             assert reused == 1
-        history = history_of(frame, frame.scene.geometry, new if settings.form == "printed" else light, count)
-        results.append(light[:, frame.gbuffer.covered])
+        printed = settings.form == "printed"
+        history = history_of(frame, frame.scene.geometry, np.concatenate([new, light[3:]]) if printed else light)
+        results.append(light[:3, frame.gbuffer.covered])
     return results
 
 
@@ -117,11 +118,11 @@ def test_a_surface_that_is_new_starts_at_one(room):
                      (room.camera.target, (9.0, 9.0, 9.0)))
     settings = TemporalSettings()
     light = np.ones((3, 30, 40))
-    history = history_of(away, room.geometry, light, first_frames(light, settings))
+    history = history_of(away, room.geometry, first_light(light, settings))
     first = temporal_filter(light, looking, room.geometry, history, settings)
     assert (first.frames[looking.gbuffer.covered] == 1).any()
     second = temporal_filter(3 * light, looking, room.geometry,
-                             history_of(looking, room.geometry, first.irradiance, first.frames), settings)
+                             history_of(looking, room.geometry, first.light), settings)
     new = looking.gbuffer.covered & (first.frames == 1)
     np.testing.assert_array_equal(second.frames[new], 2)
     np.testing.assert_allclose(second.irradiance[:, new], 2.0, rtol=1e-15)

@@ -67,7 +67,7 @@ def test_only_what_the_next_frame_needs_is_kept(room, evidence):
     assert not any(ref() is not None for ref in (*frames, *lights))
     sequence = Sequence([], method=white, **QUICK)
     _, history = sequence._step(room, 0, None)
-    kept = history.irradiance.nbytes + history.view.depth.nbytes + history.view.normal.nbytes
+    kept = history.light[:3].nbytes + history.view.depth.nbytes + history.view.normal.nbytes
     pixels = 24 * 20
     assert kept == 7 * 4 * pixels
     assert history.geometry is room.geometry

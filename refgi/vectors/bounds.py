@@ -1,0 +1,154 @@
+"""How far a port may be off: bounds for each element, measured by what rounding does to the stage itself.
+
+A port that computes in float32, with fused or reordered operations, returns about what the exact stage returns for
+inputs a few roundings away. So each stage is run again: by refgi's float32 kernels, and in float64 on inputs changed at
+random by up to two roundings of float32. The bound is SAFETY times the largest change seen, plus the rounding of the
+result and of the largest values beside it. Where a change moves a decision (an edge, a tie) the element is masked: it
+may differ at will.
+
+Tier T2 has the same for storage in half floats, as one bound for the array and a share of outliers. Bounds of a chained
+run, in which every stage reads the roundings of those before, are of that form too.
+
+Inputs that a stage takes as `exact` are not changed: points whose differences float32 finds without error, numbers that
+decide which texel is meant. The kit holds them to the bit.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from refgi.vectors.spec import Array, Arrays, Case, Stage, as_read, outputs_of, stored
+
+SAFETY = 4.0
+RUNS = 6  # with changed inputs
+ROUNDING = 2.0**-24  # of float32, relative
+HALF_ROUNDING = 2.0**-11  # of float16
+CHANGE = 2.0  # roundings that inputs are changed by, at most
+LARGE = 0.9  # quantile of an array's magnitudes that stands for "the largest values beside it"
+USUAL = 0.995  # quantile of changes that a budget is made of; what lies beyond are outliers
+DECIDED = 0.02  # a change beyond this share of the array's large values is a decision taken otherwise
+
+
+class Bound(NamedTuple):
+    """How far each element of an array may be off."""
+
+    limit: Array  # as the array: absolute; 0 for integers
+    masked: Array  # as the array, bool: elements that may differ at will
+
+
+class Budget(NamedTuple):
+    """How far an array may be off as a whole: |got - expected| <= relative (|expected| + large) but for outliers."""
+
+    relative: float
+    large: float  # magnitude that stands for the array's large values
+    outliers: float  # share of elements
+
+
+def isolated_bounds(step: Stage, known: Arrays, seed: int) -> dict[str, Bound]:
+    """Return the bound of each array that a stage writes, its inputs being the stored ones."""
+    runs = [outputs_of(step, known, np.float32)]
+    runs += [_run(step, changed) for changed in _changed(step, known, seed, _rounded_at_random)]
+    return {name: _bound(known[name], [run[name] for run in runs]) for name in step.writes}
+
+
+def half_budgets(step: Stage, known: Arrays, seed: int) -> dict[str, Budget]:
+    """Return the budget of each array that a stage writes when it reads and writes half floats (T2)."""
+    runs = [{name: _to_half(array) for name, array in _run(step, changed).items()}
+            for changed in _changed(step, known, seed, _halved_at_random)]
+    return {name: _budget(known[name], [run[name] for run in runs], HALF_ROUNDING) for name in step.writes}
+
+
+def chained_budgets(case: Case, known: Arrays, seed: int) -> dict[str, Budget]:
+    """Return the budget of each array when every stage reads the rounded outputs of those before it."""
+    runs: list[dict[str, Array]] = []
+    for number in range(RUNS):
+        random = np.random.default_rng([seed, number])
+        chain = {name: stored(array) for name, array in case.given.items()}
+        for step in case.stages:
+            changed = {name: _rounded_at_random(array, random) for name, array in
+                       as_read(chain, step.reads, np.float64).items()}
+            chain.update(_run(step, changed))
+        runs.append(chain)
+    written = [name for step in case.stages for name in step.writes]
+    return {name: _budget(known[name], [run[name] for run in runs], ROUNDING) for name in written}
+
+
+def _changed(
+    step: Stage, known: Arrays, seed: int, change: Callable[[Array, np.random.Generator], Array]
+) -> Iterator[dict[str, Array]]:
+    exact = as_read(known, step.reads, np.float64)
+    for number in range(RUNS):
+        random = np.random.default_rng([seed, number])
+        yield {name: array if name in step.exact else change(array, random) for name, array in exact.items()}
+
+
+def _run(step: Stage, inputs: Arrays) -> dict[str, Array]:
+    made = step.run(inputs, np.float64)
+    return {name: stored(made[name]) for name in step.writes}
+
+
+def _rounded_at_random(array: Array, random: np.random.Generator, rounding: float = ROUNDING) -> Array:
+    if array.dtype.kind != "f":
+        return array
+    return np.asarray(array * (1.0 + rounding * CHANGE * random.uniform(-1.0, 1.0, array.shape)))
+
+
+def _halved_at_random(array: Array, random: np.random.Generator) -> Array:
+    return _rounded_at_random(array, random, HALF_ROUNDING / CHANGE)
+
+
+def _to_half(array: Array) -> Array:
+    if array.dtype.kind != "f":
+        return array
+    with np.errstate(over="ignore", under="ignore"):
+        return array.astype(np.float16).astype(np.float32)
+
+
+def _bound(expected: Array, runs: list[Array]) -> Bound:
+    if any(run.shape != expected.shape for run in runs):
+        return Bound(np.zeros(expected.shape, np.float32), np.ones(expected.shape, np.bool_))
+    off = np.max([distance(run, expected) for run in runs], axis=0, initial=0.0)
+    if expected.dtype.kind != "f":
+        return Bound(np.zeros(expected.shape, np.float32), off > 0)
+    large = large_value(expected)
+    magnitude = np.where(np.isfinite(expected), np.abs(expected), 0.0).astype(np.float64)
+    masked = off > np.maximum(DECIDED * large, DECIDED * magnitude)
+    limit = SAFETY * (off + ROUNDING * (magnitude + large))
+    return Bound(np.where(masked, 0.0, limit).astype(np.float32), masked)
+
+
+def _budget(expected: Array, runs: list[Array], rounding: float) -> Budget:
+    same = [run for run in runs if run.shape == expected.shape]
+    large = 0.0 if expected.dtype.kind != "f" else large_value(expected)
+    if not same or expected.size == 0:
+        return Budget(0.0, large, 1.0 if expected.size else 0.0)
+    off = np.array([distance(run, expected) for run in same])
+    if expected.dtype.kind != "f":
+        return Budget(0.0, 0.0, _outliers(off > 0, expected.size))
+    size = np.where(np.isfinite(expected), np.abs(expected), 0.0).astype(np.float64) + large
+    share = np.divide(off, size, out=np.where(off > 0, np.inf, 0.0), where=size > 0)
+    usual = share[share < DECIDED]
+    relative = SAFETY * (rounding + (float(np.quantile(usual, USUAL)) if usual.size else 0.0))
+    return Budget(relative, large, _outliers(share > relative, expected.size))
+
+
+def _outliers(out: Array, size: int) -> float:
+    """Return the share of outliers to allow: SAFETY times that seen, and never none where some were."""
+    worst = int(out.reshape(len(out), -1).sum(axis=1).max())
+    return min(1.0, SAFETY * worst / size)
+
+
+def large_value(expected: Array) -> float:
+    """Return the magnitude that stands for an array's large values; 0 where all is 0."""
+    magnitude = np.abs(expected[np.isfinite(expected) & (expected != 0)], dtype=np.float64)
+    return float(np.quantile(magnitude, LARGE)) if magnitude.size else 0.0
+
+
+def distance(got: Array, expected: Array) -> Array:
+    """Return |got - expected| in float64: 0 where both are the same infinity, inf where one alone is finite."""
+    a, b = np.asarray(got, np.float64), np.asarray(expected, np.float64)
+    finite = np.isfinite(a) & np.isfinite(b)
+    off = np.where((a == b), 0.0, np.inf)
+    np.subtract(a, b, out=off, where=finite)
+    return np.asarray(np.abs(off))

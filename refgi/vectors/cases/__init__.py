@@ -1,0 +1,28 @@
+"""The cases of the kits, by id. Ids are stable: a case that changes its meaning gets another id."""
+
+from collections.abc import Callable, Iterator
+from importlib import import_module
+
+from refgi.errors import InputError
+from refgi.vectors.spec import Case
+
+MODULES = ("pairs", "sii")  # each with QUICK and FULL: functions without arguments that make a case, by its id
+
+
+def kit_cases(kit: str) -> dict[str, Callable[[], Case]]:
+    """Return what makes the cases of the kit "quick" or "full", by id; the full kit holds the quick one.
+
+    Raises
+    ------
+    InputError
+        If there is no kit of that name.
+    """
+    if kit not in ("quick", "full"):
+        raise InputError(f"kit: expected 'quick' or 'full', got {kit!r}", key="kit")
+    return dict(_of(("QUICK",) if kit == "quick" else ("QUICK", "FULL")))
+
+
+def _of(names: tuple[str, ...]) -> Iterator[tuple[str, Callable[[], Case]]]:
+    for module in MODULES:
+        for name in names:
+            yield from getattr(import_module(f"refgi.vectors.cases.{module}"), name).items()

@@ -1,0 +1,105 @@
+"""The scenes of the kits: small, without symmetry, with lamps of unequal strength, so that no bug hides in them."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from refgi.scene import Camera, DirectionalLight, Geometry, Material, Mesh, PointLight, Scene, SpotLight, merge
+from refgi.vectors.spec import Array
+
+# strongest and weakest differ by a factor of 8 and in hue, so that neither order nor channel can be mistaken
+SPOT = SpotLight((0.5, 1.5, 0.625), (-0.6, -0.8, -0.7), 0.4, 0.8, (4.0, 2.6, 1.3))
+BULB = PointLight((0.2, 0.9, 0.3), (0.1, 0.25, 0.5))
+SUN = DirectionalLight((-0.5, -0.9, -0.3), (0.5, 0.3, 0.9))
+DOWN = SpotLight((0.1, 1.7, 0.2), (0.0, -1.0, 0.0), 0.3, 0.7, (3.0, 1.0, 2.0))  # along the frame's usual up
+VIEW = Camera((1.7, 1.4, 1.5), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(70))  # rolled
+POLE = Camera((0.2, 2.5, 0.1), (0.2, 0.0, 0.1), (0.0, 0.0, -1.0), math.radians(50))  # straight down
+
+FLOOR = Material("floor", (0.6, 0.55, 0.4))
+WALL = Material("glossy wall", (0.3, 0.2, 0.4), (0.4, 0.5, 0.2), 12.0)
+SIDE = Material("side wall", (0.1, 0.6, 0.2))
+BLOCK = Material("purely glossy", (0.0, 0.0, 0.0), (0.7, 0.5, 0.6), 40.0)
+BALL = Material("ball", (0.5, 0.3, 0.2), (0.2, 0.3, 0.4), 20.0)
+
+
+def room(*lights: Any, matte: bool = False, smooth: bool = False, camera: Camera = VIEW) -> Scene:
+    """Return a corner with a floor, a glossy wall and a side wall, a purely glossy shelf, a box's lid wound inwards.
+
+    `matte`: without lobes. `smooth`: with a ball and interpolated normals.
+    """
+    def painted(material: Material) -> Material:
+        return dataclasses.replace(material, specular=(0.0, 0.0, 0.0), diffuse=material.diffuse if any(
+            material.diffuse) else material.specular) if matte else material
+
+    meshes = [
+        quad((-1, 0, 1), (2, 0, 0), (0, 0, -2), painted(FLOOR)),
+        quad((-1, 0, -1), (2, 0, 0), (0, 2, 0), painted(WALL)),
+        quad((-1, 0, 1), (0, 0, -2), (0, 2, 0), painted(SIDE)),
+        quad((-0.4, 0.5, -0.1), (0.6, 0, 0), (0, 0, -0.5), painted(BLOCK)),
+        quad((0.3, 0.3, 0.5), (0.25, 0, -0.35), (0.35, 0.05, 0.3), painted(FLOOR)),  # wound towards the floor
+    ]
+    if smooth:
+        meshes.append(ball((-0.5, 0.35, 0.3), 0.3, painted(BALL)))
+    geometry, materials = merge(meshes, smooth=smooth)
+    return stored_scene(Scene("kit room", geometry, materials, camera, lights))
+
+
+def far_away(scene: Scene, offset: float) -> Scene:
+    """Return a scene moved along x, m, with all that it holds in float32."""
+    move = (offset, 0.0, 0.0)
+
+    def moved(point: Any) -> tuple[float, ...]:
+        return tuple(np.add(point, move).tolist())
+
+    camera = dataclasses.replace(scene.camera, eye=moved(scene.camera.eye), target=moved(scene.camera.target))
+    lights = tuple(dataclasses.replace(light, position=moved(light.position)) if hasattr(light, "position") else light
+                   for light in scene.lights)
+    geometry = dataclasses.replace(scene.geometry, vertices=scene.geometry.vertices + move)
+    return stored_scene(dataclasses.replace(scene, geometry=geometry, camera=camera, lights=lights))
+
+
+def stored_scene(scene: Scene) -> Scene:
+    """Return a scene whose numbers are all floats of 32 bits, as the kit holds them."""
+    def rounded(value: Any) -> Any:
+        return tuple(np.asarray(value, np.float32).astype(np.float64).tolist()) if isinstance(value, tuple) else float(
+            np.float32(value))
+
+    def each(part: Any, *names: str) -> Any:
+        return dataclasses.replace(part, **{name: rounded(getattr(part, name)) for name in names if hasattr(part, name)})
+
+    geometry, normals = scene.geometry, scene.geometry.vertex_normals
+    return dataclasses.replace(
+        scene, geometry=Geometry(_single(geometry.vertices), geometry.faces, geometry.material_of_face,
+                                 None if normals is None else _single(normals)),
+        materials=tuple(each(one, "diffuse", "specular", "exponent") for one in scene.materials),
+        camera=each(scene.camera, "eye", "target", "up", "vfov"),
+        lights=tuple(each(light, "position", "direction", "intensity", "irradiance", "inner_half_angle",
+                          "outer_half_angle") for light in scene.lights))
+
+
+def quad(corner: Any, u: Any, v: Any, material: Material) -> Mesh:
+    """Return a parallelogram of two triangles that faces u x v."""
+    c, u, v = (np.asarray(one, np.float64) for one in (corner, u, v))
+    normal = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
+    return Mesh(np.array([c, c + u, c + u + v, c + v]), np.array([[0, 1, 2], [0, 2, 3]]), np.tile(normal, (4, 1)),
+                material)
+
+
+def ball(center: Any, radius: float, material: Material) -> Mesh:
+    """Return an octahedron's eight faces cut in four each, pushed out to a sphere."""
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = [(a, b, c) if np.linalg.det(axes[[a, b, c]]) > 0 else (a, c, b) for a in (0, 3) for b in (1, 4)
+             for c in (2, 5)]
+    corners: list[Array] = []
+    for face in faces:
+        p, q, r = axes[list(face)]
+        corners += [p, p + q, r + p, p + q, q, q + r, r + p, q + r, r, p + q, q + r, r + p]
+    points = np.asarray(corners)
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    return Mesh(np.asarray(center) + radius * points, np.arange(len(points)).reshape(-1, 3), points, material)
+
+
+def _single(array: Array) -> Array:
+    return np.asarray(array, np.float32).astype(np.float64)

@@ -1,0 +1,95 @@
+"""What a kit is made of: arrays with axes and units, stages that map arrays to arrays, cases.
+
+Stages run in float64 on arrays as the kit stores them, so that each expected value is the stage's own, to the rounding
+of its storage, for exactly the inputs that a port reads.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+Arrays = Mapping[str, Array]
+Tier = Literal["T0", "T1", "T3"]
+Run = Callable[[Arrays, Any], Arrays]  # inputs by name in the dtype of the second argument -> outputs by name
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What one array is, wherever it occurs."""
+
+    axes: str  # outermost first: "channel, row, column"
+    unit: str  # "1" for none
+    what: str
+    space: str = ""  # "world", "camera", "linear RGB"
+    paper: str = ""  # equation or section, and erratum
+    tier: Tier = "T1"  # T0: equal; T1: float32 rounding; T3: an estimate, judged by its standard error
+    index_of: tuple[int, int] | None = None  # (rows, columns) of the map that indices row * columns + column count
+
+
+@dataclass(frozen=True)
+class Decoy:
+    """A likely bug of a stage: what its outputs are with it."""
+
+    cause: str  # for people: "the receiver's cosine is missing"
+    run: Run
+    paper: str = ""  # where it is said how it should be
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step: arrays in, arrays out."""
+
+    name: str
+    what: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    run: Run
+    paper: str = ""
+    decoys: tuple[Decoy, ...] = ()
+    exact: tuple[str, ...] = ()  # inputs whose differences are exact in float32, or that decide: they are not changed
+
+
+@dataclass(frozen=True)
+class Case:
+    """A method on a scene, stage by stage."""
+
+    id: str  # stable: method-name
+    method: str
+    what: str
+    given: Arrays  # inputs of the first stages: scene, camera, lights, random numbers
+    specs: Mapping[str, Spec]  # of every array
+    stages: tuple[Stage, ...]
+    facts: Mapping[str, Any] = field(default_factory=dict)  # settings, sizes, counts: JSON values
+    factors: Mapping[str, float] = field(default_factory=dict)  # numbers that a port may forget or repeat: "N", "T/N"
+    scene: str = ""  # name of its folder in the kit; "" where arrays are all there is
+
+
+def stored(array: Array) -> Array:
+    """Return an array as a kit keeps it: float32, int32 or bool, C order, little-endian."""
+    array = np.asarray(array)
+    kind = {"f": "<f4", "i": "<i4", "u": "<i4", "b": "|b1"}[array.dtype.kind]
+    with np.errstate(over="ignore", under="ignore"):
+        return np.ascontiguousarray(array, dtype=kind)
+
+
+def as_read(arrays: Arrays, names: tuple[str, ...], real: Any) -> dict[str, Array]:
+    """Return stored arrays by name, floats in the type that a stage is to compute in."""
+    return {name: arrays[name].astype(real) if arrays[name].dtype.kind == "f" else arrays[name] for name in names}
+
+
+def expected_of(case: Case) -> dict[str, Array]:
+    """Return every array of a case as a kit keeps it, each stage run in float64 on what is stored before it."""
+    known = {name: stored(array) for name, array in case.given.items()}
+    for step in case.stages:
+        known.update(outputs_of(step, known, np.float64))
+    return known
+
+
+def outputs_of(step: Stage, known: Arrays, real: Any, run: Run | None = None) -> dict[str, Array]:
+    """Return what a stage writes, as stored; by another `run` in its place, such as that of a decoy."""
+    made = (run or step.run)(as_read(known, step.reads, real), real)
+    return {name: stored(made[name]) for name in step.writes}

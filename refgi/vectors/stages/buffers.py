@@ -1,0 +1,249 @@
+"""Stages of buffers: ids, G-buffer of the camera, reflective shadow map of each light (SII Sec. 3.1; docs/radiometry).
+
+A map or camera is given as `origin` (k, 3), `frame` (k, 3, 3) with rows right, down and forward, and `half` (2,), the
+half extent of the image plane. Row 0 is the top row; texel centres lie at + 1/2.
+"""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.buffers.light_projection import light_projection
+from refgi.rsm.buffers.reflective import Rsm
+from refgi.rsm.buffers.solid_angle import texel_solid_angles
+from refgi.rsm.raster.projection import Projection, camera_projection
+from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
+from refgi.scene import DirectionalLight, Geometry, PointLight, Scene, SpotLight, material_table
+from refgi.scene.material import MaterialTable
+from refgi.scene.model import Light
+from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+
+VECTOR, POINT = "unit vector", "m"
+SCENE = ("scene.vertices", "scene.faces", "scene.material_of_face")
+REFLECTANCE = ("materials.diffuse", "materials.specular", "materials.exponent")
+NAMES = {SpotLight: "spot", PointLight: "point", DirectionalLight: "directional"}
+
+
+def give_scene(recipe: Recipe, scene: Scene) -> None:
+    """Give the triangles and materials of a scene."""
+    geometry, materials = scene.geometry, material_table(scene.materials)
+    recipe.give("scene.vertices", geometry.vertices, Spec("vertex, xyz", "m", "corners of triangles", "world"))
+    recipe.give("scene.faces", geometry.faces, Spec("triangle, corner", "1", "indices of vertices", tier="T0"))
+    recipe.give("scene.material_of_face", geometry.material_of_face,
+                Spec("triangle", "1", "indices of materials", tier="T0"))
+    if geometry.vertex_normals is not None:
+        recipe.give("scene.vertex_normals", geometry.vertex_normals,
+                    Spec("vertex, xyz", VECTOR, "normals, interpolated over triangles", "world"))
+    recipe.give("materials.diffuse", materials.diffuse, Spec("material, rgb", "1", "reflectance of the diffuse part"))
+    recipe.give("materials.specular", materials.specular, Spec("material, rgb", "1", "reflectance of the Phong lobe"))
+    recipe.give("materials.exponent", materials.exponent, Spec("material", "1", "Phong exponent"))
+
+
+def add_gbuffer(recipe: Recipe, scene: Scene, width: int, height: int) -> None:
+    """Add the camera's ids and G-buffer."""
+    maps = camera_projection(scene.camera, width, height)
+    _give_maps(recipe, "camera", maps)
+    _add_ids(recipe, "gbuffer", "camera", maps, scene)
+    _add_surface(recipe, "gbuffer", "camera", maps, scene, ("depth", "position", "normal", "albedo"))
+
+
+def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
+    """Add ids, surface and flux of one light's reflective shadow map, `rsm0` for the first light."""
+    light, name, lamp = scene.lights[index], f"rsm{index}", f"light{index}"
+    maps = light_projection(light, scene.geometry, resolution)
+    _give_light(recipe, lamp, light)
+    _give_maps(recipe, name, maps)
+    _add_ids(recipe, name, name, maps, scene)
+    _add_surface(recipe, name, name, maps, scene, ("depth", "position", "normal"))
+    glossy = any(any(material.specular) for material in scene.materials)
+    reads = (*SCENE, *_normals(recipe), *REFLECTANCE, *_map_names(name), f"{name}.triangle_id", *_light_names(lamp, light))
+
+    def flux(arrays: Arrays, real: Any) -> Arrays:
+        map_here = rsm_of(arrays, name, lamp, light, maps, real, scene)
+        made = {f"{name}.solid_angle": texel_solid_angles(_maps_of(arrays, name, maps)), f"{name}.flux": map_here.flux}
+        lobes = {f"{name}.{key}": getattr(map_here, key) for key in ("lobe_flux", "lobe_axis", "lobe_exponent")}
+        return made | (lobes if glossy else {})
+
+    sheet = "row, column"
+    writes = {f"{name}.solid_angle": Spec(sheet, "m^2" if isinstance(light, DirectionalLight) else "sr",
+                                          "solid angle of the whole texel; directional: area across the light",
+                                          paper="Phi_t = albedo I(w) Omega_t, calibrated"),
+              f"{name}.flux": Spec(f"rgb, {sheet}", "W", "flux that the diffuse part of the surface reflects",
+                                   "linear RGB", "SII Sec. 3.1, calibrated")}
+    if glossy:
+        writes |= {f"{name}.lobe_flux": Spec(f"rgb, {sheet}", "W", "flux that the lobe reflects", "linear RGB",
+                                             "SII Eq. 3"),
+                   f"{name}.lobe_axis": Spec(f"xyz, {sheet}", VECTOR, "mirror direction; 0 without a lobe", "world",
+                                             "r = d - 2 (n . d) n"),
+                   f"{name}.lobe_exponent": Spec(sheet, "1", "Phong exponent; 0 without a lobe")}
+    even = f"{name}.solid_angle", f"{name}.flux"
+
+    def equal(arrays: Arrays, real: Any) -> Arrays:
+        made = dict(flux(arrays, real))
+        angle = made[even[0]]
+        mean = np.full_like(angle, angle.mean())
+        return made | {even[0]: mean, even[1]: made[even[1]] * (mean / angle).astype(real)}
+
+    recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
+               paper="SII Sec. 3.1; docs/radiometry", decoys=(
+                   Decoy("every texel has the same solid angle", equal, "Nichols and Wyman 2009, Fig. 13"),
+                   Decoy("the albedo is left out", reading(flux, materials__diffuse=np.ones_like,
+                                                           materials__specular=_ones_where_any), "Phi_t = albedo ..."),
+                   Decoy("flux is divided by pi", writing(flux, **{f"{name}__flux": lambda a: a / np.pi}),
+                         "flux is W; 1/pi comes with Eq. 1"),
+               ))
+
+
+def rsm_of(
+    arrays: Arrays, name: str, lamp: str, light: Light, maps: Projection, real: Any, scene: Scene
+) -> Rsm:
+    """Return the reflective shadow map whose inputs are arrays, and as many of its channels as are among them."""
+    projection = _maps_of(arrays, name, maps)
+    geometry, materials = geometry_of(arrays, scene), materials_of(arrays, real)
+    view = GBuffer(geometry, materials, projection, _visible(arrays[f"{name}.triangle_id"]), real)
+    given = ("depth", "position", "normal", "solid_angle", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")
+    known = {key: np.ascontiguousarray(arrays[f"{name}.{key}"], real) for key in given if f"{name}.{key}" in arrays}
+    return Rsm(light_of(arrays, lamp, light), view, materials, known)
+
+
+def geometry_of(arrays: Arrays, scene: Scene) -> Geometry:
+    """Return the triangles among arrays."""
+    normals = arrays.get("scene.vertex_normals")
+    return dataclasses.replace(scene.geometry, vertices=np.asarray(arrays["scene.vertices"], np.float64),
+                               faces=np.asarray(arrays["scene.faces"], np.int32),
+                               material_of_face=np.asarray(arrays["scene.material_of_face"], np.int32),
+                               vertex_normals=None if normals is None else np.asarray(normals, np.float64))
+
+
+def materials_of(arrays: Arrays, real: Any) -> MaterialTable:
+    """Return the materials among arrays: opaque, without emission."""
+    diffuse, specular, exponent = (np.ascontiguousarray(arrays[name], real) for name in REFLECTANCE)
+    return MaterialTable(diffuse, specular, exponent, np.zeros_like(exponent), np.zeros_like(diffuse))
+
+
+def light_of(arrays: Arrays, lamp: str, light: Light) -> Light:
+    """Return the light among arrays."""
+    value = {key: np.asarray(arrays[f"{lamp}.{key}"], np.float64).tolist() for key in _light_keys(light)}
+    if isinstance(light, SpotLight):
+        inner, outer = value.pop("half_angles")
+        value |= {"inner_half_angle": min(inner, outer), "outer_half_angle": outer}
+    return type(light)(**{key: tuple(one) if isinstance(one, list) else one for key, one in value.items()})
+
+
+def _ones_where_any(array: Array) -> Array:
+    return np.where(array > 0, 1.0, array).astype(array.dtype)
+
+
+def _normals(recipe: Recipe) -> tuple[str, ...]:
+    return ("scene.vertex_normals",) if "scene.vertex_normals" in recipe.specs else ()
+
+
+def _map_names(name: str) -> tuple[str, str, str]:
+    return f"{name}.origin", f"{name}.frame", f"{name}.half"
+
+
+def _light_keys(light: Light) -> tuple[str, ...]:
+    if isinstance(light, SpotLight):
+        return "position", "direction", "half_angles", "intensity"
+    return ("position", "intensity") if isinstance(light, PointLight) else ("direction", "irradiance")
+
+
+def _light_names(lamp: str, light: Light) -> tuple[str, ...]:
+    return tuple(f"{lamp}.{key}" for key in _light_keys(light))
+
+
+def _give_light(recipe: Recipe, lamp: str, light: Light) -> None:
+    spec = {"position": Spec("xyz", "m", f"place of the {NAMES[type(light)]} light", "world"),
+            "direction": Spec("xyz", "1", "where it shines to, any length", "world"),
+            "half_angles": Spec("inner, outer", "rad", "half-angles of the cone: full light within, none beyond"),
+            "intensity": Spec("rgb", "W/sr", "radiant intensity, of a spot on its axis", "linear RGB"),
+            "irradiance": Spec("rgb", "W/m^2", "irradiance of a surface across the light", "linear RGB")}
+    for key in _light_keys(light):
+        spot = key == "half_angles" and isinstance(light, SpotLight)
+        value = (light.inner_half_angle, light.outer_half_angle) if spot else getattr(light, key)
+        recipe.give(f"{lamp}.{key}", value, spec[key])
+    recipe.facts[lamp] = NAMES[type(light)]
+
+
+def _give_maps(recipe: Recipe, name: str, maps: Projection) -> None:
+    kind = ("perspective", "orthographic", "paraboloid")[maps.kind]
+    recipe.give(f"{name}.origin", maps.origin, Spec("map, xyz", "m", f"centre of each {kind} map", "world"))
+    recipe.give(f"{name}.frame", maps.frame, Spec("map, (right, down, forward), xyz", VECTOR, "axes of each map",
+                                                  "world"))
+    recipe.give(f"{name}.half", maps.half, Spec("horizontal, vertical", "m" if maps.kind == 1 else "1",
+                                                "half extent of the map on the image plane"))
+    recipe.facts[name] = {"projection": kind, "maps": maps.maps, "rows": maps.height, "columns": maps.width}
+
+
+def _maps_of(arrays: Arrays, name: str, maps: Projection) -> Projection:
+    origin, frame, half = (np.ascontiguousarray(arrays[one], np.float64) for one in _map_names(name))
+    return maps._replace(origin=origin, frame=frame, half=half)
+
+
+def _visible(triangle_id: Array) -> Visibility:
+    ids = np.ascontiguousarray(triangle_id, np.int32)
+    return Visibility(ids, (ids >= 0).astype(np.float32))
+
+
+def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene) -> None:
+    def ids(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 the rasterizer has one precision
+        return {f"{name}.triangle_id": rasterize(geometry_of(arrays | _MATERIAL_0(arrays), scene),
+                                                 _maps_of(arrays, view, maps)).triangle_id}
+
+    mirrored = reading(ids, **{f"{view}__half": lambda half: half * (1, -1)})
+    recipe.add(f"{name}.ids", "nearest triangle at each texel's centre", ids, (*SCENE, *_map_names(view)),
+               {f"{name}.triangle_id": Spec("row, column", "1", "nearest triangle, -1 for none", tier="T0")},
+               paper="docs/rasterizer", decoys=(
+                   Decoy("rows run upwards", mirrored, "row 0 is the top row (docs/conventions)"),
+                   Decoy("texel centres lie at 0 instead of 1/2",
+                         reading(ids, **{f"{view}__frame": _half_texel(maps)}), "centres at + 1/2 (docs/conventions)"),
+               ))
+
+
+def _MATERIAL_0(arrays: Arrays) -> Arrays:  # noqa: N802
+    return {} if "scene.material_of_face" in arrays else {"scene.material_of_face": np.zeros(len(arrays["scene.faces"]))}
+
+
+def _half_texel(maps: Projection) -> Any:
+    """Return what turns frames so that centres lie half a texel up and left, for small texels."""
+    def turned(frame: Array) -> Array:
+        x, y = maps.half[0] / maps.width, maps.half[1] / maps.height
+        return np.stack([frame[:, 0], frame[:, 1], frame[:, 2] - x * frame[:, 0] - y * frame[:, 1]], axis=1)
+
+    return turned
+
+
+def _add_surface(
+    recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene, channels: tuple[str, ...]
+) -> None:
+    materials = ("materials.diffuse", "materials.specular", "materials.exponent")
+
+    def surface(arrays: Arrays, real: Any) -> Arrays:
+        buffer = GBuffer(geometry_of(arrays, scene), materials_of(arrays, real), _maps_of(arrays, view, maps),
+                         _visible(arrays[f"{name}.triangle_id"]), real)
+        return {f"{name}.{key}": one for key, one in zip(channels, buffer.resolve(*channels), strict=True)}
+
+    specs = {"depth": Spec("row, column", "m", "depth along the view's axis; inf without surface"),
+             "position": Spec("xyz, row, column", "m", "surface point; 0 without surface", "world"),
+             "normal": Spec("xyz, row, column", VECTOR, "on the side that is seen; 0 without surface", "world"),
+             "albedo": Spec("rgb, row, column", "1", "diffuse reflectance; 0 without surface", "linear RGB")}
+    flat = (Decoy("normals are not turned to the side that is seen", _unturned(surface, name, arrays_of=scene), ""),)
+    recipe.add(f"{name}.surface", "depth, position and normal of what each texel sees", surface,
+               (*SCENE, *_normals(recipe), *materials, *_map_names(view), f"{name}.triangle_id"),
+               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1", decoys=flat)
+
+
+def _unturned(run: Any, name: str, arrays_of: Scene) -> Any:
+    """Return the stage with each triangle's normal as its winding gives it."""
+    def altered(arrays: Arrays, real: Any) -> Arrays:
+        made = dict(run(arrays, real))
+        geometry, ids = geometry_of(arrays, arrays_of), np.asarray(arrays[f"{name}.triangle_id"])
+        a, b, c = (geometry.vertices[geometry.faces[:, k]] for k in range(3))
+        wound = np.moveaxis(np.cross(b - a, c - a)[ids], -1, 0)
+        normal = made[f"{name}.normal"]
+        return made | {f"{name}.normal": np.where((wound * normal).sum(axis=0) < 0, -normal, normal)}
+
+    return altered

@@ -1,0 +1,217 @@
+"""Stages of pixel lights: importance, sample points, warp, chosen texels, lights (SII Sec. 3.1, 3.5; P2)."""
+
+from typing import Any, Literal
+
+import numpy as np
+
+from refgi.lights.pixel_lights import Drawn, lights_of
+from refgi.lights.warp import Warp, texel_of, warp_stacked
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.rsm.buffers.light_projection import light_projection
+from refgi.sampling import grid, halton
+from refgi.scene import Scene
+from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.stages.buffers import REFLECTANCE, SCENE, VECTOR, _light_names, _map_names, rsm_of
+
+Pattern = Literal["halton", "grid", "given"]
+LIGHT = ("position", "normal", "flux")
+LOBE = ("lobe_flux", "lobe_axis", "lobe_exponent")
+
+
+def add_lights(
+    recipe: Recipe, scene: Scene, resolution: int, counts: tuple[int, ...], *, pattern: Pattern = "halton",
+    warp: Warp | None = None, shifts: tuple[tuple[float, float], ...] = (),
+) -> None:
+    """Add the pixel lights of all maps: `counts` texels of each map, the first ones of `lights` from the first map.
+
+    `shifts`: what is added to the points of each map modulo 1; none where absent.
+    """
+    texels, weights = [], []
+    for index, count in enumerate(counts):
+        add_points(recipe, index, count, pattern, shifts[index] if shifts else None)
+        _add_texels(recipe, scene, resolution, index, count, warp)
+        texels.append(f"rsm{index}.texel")
+        weights.append(f"rsm{index}.weight")
+    _add_chosen(recipe, scene, resolution, counts)
+
+
+def add_points(
+    recipe: Recipe, index: int, count: int, pattern: Pattern, shift: tuple[float, float] | None = None
+) -> None:
+    """Add the points of the unit square that texels of a map are chosen by: computed, or given as random numbers."""
+    name = f"rsm{index}.points"
+    spec = Spec("point, uv", "1", "points of the unit square in [0, 1): u along columns, v along rows downwards")
+    if pattern == "given":
+        recipe.give(name, _below_1(np.random.default_rng([7, index]).random((count, 2))), spec)
+        return
+    if shift is not None:
+        recipe.give(f"rsm{index}.shift", np.array(shift), Spec("uv", "1", "added to every point, modulo 1"))
+
+    def points(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 a set of numbers, the same in any type
+        if pattern == "grid":
+            return {name: grid(int(np.sqrt(count)))}
+        moved = None if shift is None else np.asarray(arrays[f"rsm{index}.shift"], np.float64)
+        return {name: _below_1(halton(count, shift=moved))}
+
+    def start_at_one(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+        moved = None if shift is None else np.asarray(arrays[f"rsm{index}.shift"], np.float64)
+        return {name: _below_1(halton(count, shift=moved, start=1))}
+
+    wrong = (Decoy("the Halton sequence starts at index 1", start_at_one, "index 0 is the origin (docs/conventions)"),
+             Decoy("bases 2 and 3 are exchanged", writing(points, **{f"rsm{index}__points": lambda a: a[:, ::-1]}),
+                   "base 2 along columns, 3 along rows"))
+    recipe.add(f"rsm{index}.points", "Halton points in bases 2 and 3 from index 0" if pattern == "halton" else
+               "centres of n x n cells, row by row", points, (f"rsm{index}.shift",) if shift is not None else (),
+               {name: spec}, paper="SII Sec. 3.1", decoys=wrong if pattern == "halton" else ())
+
+
+def _below_1(points: Array) -> Array:
+    """Return points that stay below 1 in float32."""
+    return np.minimum(points, 1.0 - 2.0**-24)
+
+
+def _add_texels(recipe: Recipe, scene: Scene, resolution: int, index: int, count: int, warp: Warp | None) -> None:
+    name, light = f"rsm{index}", scene.lights[index]
+    maps = light_projection(light, scene.geometry, resolution)
+    points, texel, weight = f"{name}.points", f"{name}.texel", f"{name}.weight"
+    rows, columns = maps.shape
+    if warp is not None:
+        glossy = f"{name}.lobe_flux" in recipe.specs
+        fluxes = (f"{name}.flux", *((f"{name}.lobe_flux", f"{name}.lobe_exponent") if glossy else ()))
+
+        def worth(arrays: Arrays, real: Any) -> Arrays:
+            lobe = arrays[f"{name}.lobe_flux"] if glossy else 0.0
+            return {f"{name}.importance": (arrays[f"{name}.flux"] + lobe).max(axis=0).astype(real)}
+
+        recipe.add(f"{name}.importance", "largest channel of a texel's flux, lobe included", worth, fluxes,
+                   {f"{name}.importance": Spec("row, column", "W", "importance of each texel")},
+                   paper="SII Sec. 3.5", decoys=(
+                       Decoy("luminance in place of the largest channel", _luminance(name, glossy), "SII Sec. 3.5"),
+                       Decoy("the sum of channels in place of the largest", _summed(name, glossy), "SII Sec. 3.5")))
+        points = _add_warped(recipe, name, maps.maps, warp)
+
+    reads = (points, *((f"{name}.density_weight",) if warp is not None else ()))
+
+    def chosen(arrays: Arrays, real: Any) -> Arrays:
+        at = np.asarray(arrays[points], np.float64)
+        own = arrays[f"{name}.density_weight"] if warp is not None else np.ones(len(at), real)
+        return {texel: texel_of(at[:, 1], rows) * columns + texel_of(at[:, 0], columns),
+                weight: (rows * columns / count * own).astype(real)}
+
+    recipe.factors |= {f"T/N of rsm{index}": rows * columns / count}
+    recipe.facts[f"{name}.lights"] = {"T": rows * columns, "N": count}
+    recipe.add(f"{name}.texels", "the texel that each point falls on, and T/N w", chosen, reads, {
+        texel: Spec("light", "1", "row * columns + column over the stacked maps", tier="T0", index_of=(rows, columns)),
+        weight: Spec("light", "1", "T/N times the weight of the warp: how many texels a light stands for"),
+    }, paper="SII Sec. 3.1", exact=(points,), decoys=(
+        Decoy("rows and columns are exchanged", reading(chosen, **{points.replace(".", "__"): lambda a: a[:, ::-1]}),
+              "u along columns, v along rows"),
+        Decoy("v runs upwards", reading(chosen, **{points.replace(".", "__"): _upwards}), "row 0 is the top row"),
+        Decoy("points are rounded to texels instead of cut", reading(chosen, **{points.replace(".", "__"): lambda a: (
+            np.minimum(a + 0.5 / np.array([columns, rows]), 1 - 2.0**-24).astype(a.dtype))}), "floor(u W)"),
+    ))
+
+
+def _upwards(points: Array) -> Array:
+    return np.stack([points[:, 0], 1.0 - 2.0**-24 - points[:, 1]], axis=1)
+
+
+def _luminance(name: str, glossy: bool) -> Any:
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        flux = arrays[f"{name}.flux"] + (arrays[f"{name}.lobe_flux"] if glossy else 0)
+        return {f"{name}.importance": np.tensordot((0.2126, 0.7152, 0.0722), flux, 1).astype(real)}
+
+    return run
+
+
+def _summed(name: str, glossy: bool) -> Any:
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        flux = arrays[f"{name}.flux"] + (arrays[f"{name}.lobe_flux"] if glossy else 0)
+        return {f"{name}.importance": flux.sum(axis=0).astype(real)}
+
+    return run
+
+
+def _add_warped(recipe: Recipe, name: str, maps: int, warp: Warp) -> str:
+    warped, weight = f"{name}.warped", f"{name}.density_weight"
+
+    def run(arrays: Arrays, real: Any, how: Warp = warp) -> Arrays:
+        points, weights = warp_stacked(np.asarray(arrays[f"{name}.points"], np.float64),
+                                       np.asarray(arrays[f"{name}.importance"]), maps, how)
+        return {warped: _below_1(points), weight: weights.astype(real)}
+
+    other = Warp("B" if warp.method == "A" else "A", warp.levels)
+    decoys = [Decoy(f"method {other.method} in place of {warp.method}", lambda a, r: run(a, r, other), "SII Fig. 6"),
+              Decoy("weights are left at 1", writing(run, **{weight.replace(".", "__"): np.ones_like}), "SII Eq. 5, 6"),
+              Decoy("weights are the density, not 1 / density",
+                    writing(run, **{weight.replace(".", "__"): lambda a: 1 / a}), "SII Eq. 5, 6"),
+              Decoy("one level more", lambda a, r: run(a, r, Warp(warp.method, warp.levels + 1)), "SII Sec. 3.5"),
+              Decoy("the importance map is upside down",
+                    reading(run, **{f"{name}__importance": lambda a: a[::-1]}), "row 0 is the top row")]
+    if warp.levels:
+        decoys.append(Decoy("one level less", lambda a, r: run(a, r, Warp(warp.method, warp.levels - 1)),
+                            "SII Sec. 3.5"))
+    recipe.facts[f"{name}.warp"] = {"method": warp.method, "levels": warp.levels}
+    recipe.add(f"{name}.warp", f"points follow the importance over {warp.levels} levels, method {warp.method}", run,
+               (f"{name}.points", f"{name}.importance"), {
+                   warped: Spec("point, uv", "1", "warped points over the stacked maps"),
+                   weight: Spec("point", "1", "w, 1 / density over the unit square")},
+               paper="SII Sec. 3.5, Eq. 5 and 6", decoys=tuple(decoys))
+    return warped
+
+
+def _add_chosen(recipe: Recipe, scene: Scene, resolution: int, counts: tuple[int, ...]) -> None:
+    glossy = "rsm0.lobe_flux" in recipe.specs
+    kinds = [*LIGHT, *(LOBE if glossy else ())]
+    numbers = range(len(counts))
+    lamps = [(f"light{k}", scene.lights[k], light_projection(scene.lights[k], scene.geometry, resolution))
+             for k in numbers]
+    reads = [*SCENE, *REFLECTANCE]
+    reads += ["scene.vertex_normals"] if "scene.vertex_normals" in recipe.specs else []
+    for k, (lamp, light, _) in enumerate(lamps):
+        name = f"rsm{k}"
+        reads += [*_map_names(name), *_light_names(lamp, light), f"{name}.triangle_id"]
+        reads += [f"{name}.{key}" for key in (*kinds, "texel", "weight")]
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        rsms = [rsm_of(arrays, f"rsm{k}", lamp, light, maps, real, scene) for k, (lamp, light, maps) in enumerate(lamps)]
+        drawn = [Drawn(np.asarray(arrays[f"rsm{k}.texel"], np.int64), arrays[f"rsm{k}.weight"], None) for k in numbers]
+        lights = lights_of(rsms, drawn)
+        made = {f"lights.{key}": getattr(lights, key) for key in kinds}
+        return made | {"lights.texel": lights.texel, "lights.map": lights.map_index}
+
+    specs = {
+        "position": Spec("xyz, light", "m", "places of the lights", "world"),
+        "normal": Spec("xyz, light", VECTOR, "their surfaces' normals", "world"),
+        "flux": Spec("rgb, light", "W", "diffuse flux, T/N w included", "linear RGB", "Phi_i = T/N w Phi_t"),
+        "lobe_flux": Spec("rgb, light", "W", "flux of the lobe, T/N w included", "linear RGB", "SII Eq. 3"),
+        "lobe_axis": Spec("xyz, light", VECTOR, "axis of the lobe", "world"),
+        "lobe_exponent": Spec("light", "1", "Phong exponent of the lobe"),
+    }
+    writes = {f"lights.{key}": specs[key] for key in kinds}
+    writes |= {"lights.texel": Spec("light", "1", "each light's texel", tier="T0"),
+               "lights.map": Spec("light", "1", "each light's map", tier="T0")}
+    unweighted = {f"rsm{k}__weight": np.ones_like for k in numbers}
+    every = np.array([len(counts)], np.float64)
+    recipe.add("lights", "texels with flux as pixel lights; those without are dropped", run, tuple(reads), writes,
+               paper="SII Sec. 3.1", decoys=(
+                   Decoy("T/N is left out", reading(run, **unweighted), "SII E-SII: Phi_i = T/N Phi_t"),
+                   Decoy("T/N of all maps together", reading(run, **{f"rsm{k}__weight": lambda a: (a / every).astype(
+                       a.dtype) for k in numbers}), "each map's own T/N"),
+                   Decoy("normals point into the surface",
+                         writing(run, lights__normal=lambda a: -a), "normals face the light"),
+               ))
+
+
+def pixel_lights_of(arrays: Arrays, real: Any) -> PixelLights:
+    """Return the pixel lights among arrays."""
+    glossy = "lights.lobe_flux" in arrays
+    position, normal, flux = (np.ascontiguousarray(arrays[f"lights.{key}"], real) for key in LIGHT)
+    lobe = [np.ascontiguousarray(arrays[f"lights.{key}"], real) if glossy else None for key in LOBE]
+    return PixelLights(position, normal, flux, lobe[0], lobe[1], lobe[2], position.shape[1])
+
+
+def light_names(recipe: Recipe) -> tuple[str, ...]:
+    """Return the names of the pixel lights' arrays."""
+    return tuple(f"lights.{key}" for key in (*LIGHT, *LOBE) if f"lights.{key}" in recipe.specs)

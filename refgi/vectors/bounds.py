@@ -147,7 +147,8 @@ def large_value(expected: Array) -> float:
 
 def distance(got: Array, expected: Array) -> Array:
     """Return |got - expected| in float64: 0 where both are the same infinity, inf where one alone is finite."""
-    a, b = np.asarray(got, np.float64), np.asarray(expected, np.float64)
+    with np.errstate(invalid="ignore"):  # a signalling NaN
+        a, b = np.asarray(got, np.float64), np.asarray(expected, np.float64)
     finite = np.isfinite(a) & np.isfinite(b)
     off = np.where((a == b), 0.0, np.inf)
     np.subtract(a, b, out=off, where=finite)

@@ -21,12 +21,11 @@ class Recipe:
         Short name of the method.
     what : str
         What the case shows, one line.
-    scene : str
-        Name of its scene in the kit, or "".
     """
 
-    def __init__(self, id: str, method: str, what: str, scene: str = "") -> None:  # noqa: A002
-        self.id, self.method, self.what, self.scene = id, method, what, scene
+    def __init__(self, id: str, method: str, what: str, _scene: str = "") -> None:
+        self.id, self.method, self.what = id, method, what
+        self.scene: Any = None
         self.given: dict[str, Array] = {}
         self.specs: dict[str, Spec] = {}
         self.stages: list[Stage] = []

@@ -65,7 +65,7 @@ class Case:
     stages: tuple[Stage, ...]
     facts: Mapping[str, Any] = field(default_factory=dict)  # settings, sizes, counts: JSON values
     factors: Mapping[str, float] = field(default_factory=dict)  # numbers that a port may forget or repeat: "N", "T/N"
-    scene: str = ""  # name of its folder in the kit; "" where arrays are all there is
+    scene: Any = None  # the Scene, where there is one; None: arrays are all there is
 
 
 def stored(array: Array) -> Array:

@@ -25,7 +25,7 @@ QUICK = {"pairs-diffuse": diffuse, "pairs-glossy": glossy}
 FULL: dict[str, object] = {}
 
 
-def _pairs(id: str, what: str, *, glossy: bool) -> Case:  # noqa: A002
+def _pairs(id: str, what: str, *, glossy: bool) -> Case:
     random = np.random.default_rng(11)
     place, toward = random.normal(size=(3, COUNT)), _unit(random.normal(size=(3, COUNT)))
     apart = 10.0 ** random.uniform(-3, 3, COUNT)

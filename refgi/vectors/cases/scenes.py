@@ -20,7 +20,7 @@ POLE = Camera((0.2, 2.5, 0.1), (0.2, 0.0, 0.1), (0.0, 0.0, -1.0), math.radians(5
 FLOOR = Material("floor", (0.6, 0.55, 0.4))
 WALL = Material("glossy wall", (0.3, 0.2, 0.4), (0.4, 0.5, 0.2), 12.0)
 SIDE = Material("side wall", (0.1, 0.6, 0.2))
-BLOCK = Material("purely glossy", (0.0, 0.0, 0.0), (0.7, 0.5, 0.6), 40.0)
+BLOCK = Material("purely glossy", (0.0, 0.0, 0.0), (0.7, 0.5, 0.6), 4.0)
 BALL = Material("ball", (0.5, 0.3, 0.2), (0.2, 0.3, 0.4), 20.0)
 
 

@@ -15,7 +15,7 @@ from refgi.vectors.stages.pairs import add_footprints, add_sum
 
 
 def splatting(
-    id: str, what: str, scene: Scene, size: tuple[int, int], maps: int, counts: tuple[int, ...], *,  # noqa: A002
+    id: str, what: str, scene: Scene, size: tuple[int, int], maps: int, counts: tuple[int, ...], *,
     clamp: str = "none", **options: Any,
 ) -> Case:
     """Return SII on a scene: buffers, lights, sum; `options` of `add_lights`."""

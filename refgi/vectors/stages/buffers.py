@@ -29,6 +29,7 @@ NAMES = {SpotLight: "spot", PointLight: "point", DirectionalLight: "directional"
 
 def give_scene(recipe: Recipe, scene: Scene) -> None:
     """Give the triangles and materials of a scene."""
+    recipe.scene = scene
     geometry, materials = scene.geometry, material_table(scene.materials)
     recipe.give("scene.vertices", geometry.vertices, Spec("vertex, xyz", "m", "corners of triangles", "world"))
     recipe.give("scene.faces", geometry.faces, Spec("triangle, corner", "1", "indices of vertices", tier="T0"))
@@ -190,8 +191,7 @@ def _visible(triangle_id: Array) -> Visibility:
 
 def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene) -> None:
     def ids(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 the rasterizer has one precision
-        return {f"{name}.triangle_id": rasterize(geometry_of(arrays | _MATERIAL_0(arrays), scene),
-                                                 _maps_of(arrays, view, maps)).triangle_id}
+        return {f"{name}.triangle_id": rasterize(geometry_of(arrays, scene), _maps_of(arrays, view, maps)).triangle_id}
 
     mirrored = reading(ids, **{f"{view}__half": lambda half: half * (1, -1)})
     recipe.add(f"{name}.ids", "nearest triangle at each texel's centre", ids, (*SCENE, *_map_names(view)),
@@ -201,10 +201,6 @@ def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scen
                    Decoy("texel centres lie at 0 instead of 1/2",
                          reading(ids, **{f"{view}__frame": _half_texel(maps)}), "centres at + 1/2 (docs/conventions)"),
                ))
-
-
-def _MATERIAL_0(arrays: Arrays) -> Arrays:  # noqa: N802
-    return {} if "scene.material_of_face" in arrays else {"scene.material_of_face": np.zeros(len(arrays["scene.faces"]))}
 
 
 def _half_texel(maps: Projection) -> Any:

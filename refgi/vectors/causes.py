@@ -1,0 +1,233 @@
+"""Likely causes of a difference: hypotheses that turn the expected array into the one that a port has. NumPy alone.
+
+A hypothesis explains a difference where it predicts what the port has, element by element, at nearly all elements. Those
+of this module hold for any array: factors, signs, axes that are flipped, exchanged or shifted, coding of values, order.
+A kit adds those of each stage as arrays (`Suspect`).
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from refgi.vectors.bounds import distance, large_value
+from refgi.vectors.manifest import ArrayEntry, Cause
+from refgi.vectors.spec import Array
+
+EXPLAINED = 0.9  # share of the differing elements from which on a hypothesis counts
+ROOM = 8.0  # how much farther off than its bound an explained element may be: the bug changes the rounding too
+SINGLE = 2.0**-22
+FACTORS = {"2": 2.0, "1/2": 0.5, "pi": np.pi, "1/pi": 1 / np.pi, "2 pi": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi,
+           "4 pi": 4 * np.pi, "1/(4 pi)": 0.25 / np.pi, "pi^2": np.pi**2, "1/pi^2": np.pi**-2, "4": 4.0, "1/4": 0.25,
+           "3": 3.0, "1/3": 1 / 3, "-1": -1.0, "-2": -2.0, "1000": 1000.0, "1/1000": 1e-3, "100": 100.0, "1/100": 0.01,
+           "255": 255.0, "1/255": 1 / 255, "2/pi": 2 / np.pi, "pi/2": np.pi / 2, "180/pi": 180 / np.pi,
+           "pi/180": np.pi / 180}
+
+
+class Difference(NamedTuple):
+    """An array that is out."""
+
+    name: str
+    entry: ArrayEntry
+    expected: Array
+    got: Array  # of the same shape
+    out: Array  # elements beyond their bounds
+    limit: Array  # the bounds
+
+
+def explain(
+    difference: Difference, factors: Mapping[str, float], others: Mapping[str, Array]
+) -> list[Cause]:
+    """Return the causes that explain a difference, the likeliest first.
+
+    Parameters
+    ----------
+    difference : Difference
+        The array that is out.
+    factors : mapping
+        Numbers of the case that a port may forget or repeat.
+    others : mapping
+        Expected arrays of the case, one of which the port may have written in this one's place.
+
+    Returns
+    -------
+    list of Cause
+        None where no hypothesis explains `EXPLAINED` of the elements that differ.
+    """
+    found = [*_plain(difference)]
+    if not found:
+        guesses = [*_factors(difference, factors), *_axes(difference), *_coded(difference), *_indices(difference),
+                   *_taken_for(difference, others)]
+        found = [Cause(cause=cause, share=share) for cause, predicted in guesses
+                 if (share := explained(difference, predicted)) >= EXPLAINED]
+        found = found or [*_order(difference)]
+    unique = {cause.cause: cause for cause in sorted(found, key=lambda one: -round(one.share, 2))}
+    return list(unique.values())
+
+
+def explained(difference: Difference, predicted: Array, places: Array | None = None) -> float:
+    """Return the share of elements that a prediction explains, of those that differ and of all: the lesser.
+
+    `places`: flat indices of the elements that are predicted; all where absent.
+    """
+    expected, got, out, limit = (array.reshape(-1) if places is None else array.reshape(-1)[places] for array in (
+        difference.expected, difference.got, difference.out, difference.limit))
+    predicted = np.asarray(predicted).reshape(-1)
+    told = distance(predicted, expected) > limit
+    if not told.any() or not out.any():
+        return 0.0
+    with np.errstate(invalid="ignore"):
+        room = ROOM * (limit + SINGLE * (np.abs(np.where(np.isfinite(predicted), predicted, 0.0))))
+    right = distance(got, predicted) <= room
+    return float(min(right[out].mean(), right[told].mean(), right.mean()))
+
+
+def _plain(difference: Difference) -> Iterator[Cause]:
+    """Yield what is seen without a hypothesis: nothing written, numbers that are none."""
+    got, out = difference.got, difference.out
+    if got.dtype.kind == "f" and not np.isfinite(got[out]).all() and np.isfinite(difference.expected[out]).all():
+        bad = int(np.count_nonzero(~np.isfinite(got[out])))
+        what = "NaN" if np.isnan(got[out]).any() else "infinite"
+        yield Cause(cause=f"{bad} elements are {what}", share=bad / max(1, int(out.sum())))
+    elif not got.any() and difference.expected.any():
+        yield Cause(cause="all elements are 0: nothing was written", share=1.0)
+    elif got.size > 1 and (got == got.reshape(-1)[0]).all():
+        yield Cause(cause=f"all elements are {got.reshape(-1)[0]:g}", share=1.0)
+
+
+def _factors(difference: Difference, factors: Mapping[str, float]) -> Iterator[tuple[str, Array]]:
+    expected, got = difference.expected, difference.got
+    if expected.dtype.kind != "f":
+        return
+    usable = difference.out & np.isfinite(expected) & (np.abs(expected) > 1e-3 * large_value(expected))
+    if not usable.any():
+        return
+    with np.errstate(over="ignore"):
+        factor = float(np.median(got[usable].astype(np.float64) / expected[usable]))
+    known = {**FACTORS, **factors, **{f"1/({name})": 1 / value for name, value in factors.items() if value}}
+    name = next((name for name, value in known.items() if abs(factor - value) <= 2e-4 * abs(value)), None)
+    if name == "-1":
+        yield "the sign is turned round", -expected
+    elif factor:
+        yield f"every element is {name or f'{factor:.6g}'} times what it should be", expected * factor
+    shift = float(np.median(got[usable].astype(np.float64) - expected[usable]))
+    yield f"{shift:.6g} is added to every element", expected + shift
+
+
+def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
+    expected = difference.expected
+    names = [one.strip() for one in difference.entry.axes.split(",")]
+    if len(names) != expected.ndim:
+        return
+    for axis, name in enumerate(names):
+        if expected.shape[axis] < 2:
+            continue
+        if name in ("xyz", "rgb") and expected.shape[axis] == 3:
+            yield from _components(expected, axis, name)
+            continue
+        words = {"row": "rows run upwards", "column": "columns run leftwards"}
+        yield words.get(name, f"{name}s are in reverse order"), np.flip(expected, axis)
+        for step, which in ((1, "before"), (-1, "after")):
+            yield f"{name}s are shifted by one: each holds the one {which} it", np.roll(expected, step, axis)
+            if name in ("row", "column") and expected.dtype.kind == "f":
+                with np.errstate(invalid="ignore"):
+                    yield f"half a texel off along {name}s", 0.5 * (expected + np.roll(expected, step, axis))
+    if "row" in names and "column" in names:
+        row, column = names.index("row"), names.index("column")
+        yield "both rows and columns are reversed", np.flip(expected, (row, column))
+        if expected.shape[row] == expected.shape[column]:
+            yield "rows and columns are exchanged", np.swapaxes(expected, row, column)
+        yield "written column by column instead of row by row", np.swapaxes(expected, row, column).reshape(expected.shape)
+    if names[0] in ("xyz", "rgb"):
+        yield "components lie beside each other (h, w, 3) instead of in planes (3, h, w)", np.moveaxis(
+            expected, 0, -1).reshape(expected.shape)
+
+
+def _components(expected: Array, axis: int, name: str) -> Iterator[tuple[str, Array]]:
+    letters = tuple(name)
+    for order in ((2, 1, 0), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1)):
+        yield f"components are in the order {''.join(letters[k] for k in order)}", np.take(expected, order, axis)
+    if name == "rgb":
+        yield "all channels hold red", np.repeat(np.take(expected, [0], axis), 3, axis)
+        return
+    for k, letter in enumerate(letters):
+        sign = np.where(np.arange(3) == k, -1.0, 1.0).reshape([-1 if one == axis else 1 for one in range(expected.ndim)])
+        yield f"{letter} is mirrored", expected * sign
+        if k == 2:
+            swapped = np.take(expected, (0, 2, 1), axis)
+            yield "y and z are exchanged and one is turned round (z up)", swapped * np.where(
+                np.arange(3) == 1, -1.0, 1.0).reshape(sign.shape)
+            yield "y and z are exchanged and z is turned round (z up)", swapped * sign
+
+
+def _coded(difference: Difference) -> Iterator[tuple[str, Array]]:
+    expected, got = difference.expected, difference.got
+    if expected.dtype.kind == "b":
+        yield "true and false are exchanged", ~expected
+    if expected.dtype.kind != "f":
+        return
+    with np.errstate(all="ignore"):
+        positive = np.maximum(expected, 0)
+        yield "encoded as sRGB; linear values are expected", np.where(
+            positive <= 0.0031308, 12.92 * positive, 1.055 * positive ** (1 / 2.4) - 0.055)
+        yield "decoded from sRGB once too often", np.where(
+            positive <= 0.04045, positive / 12.92, ((positive + 0.055) / 1.055) ** 2.4)
+        yield "a gamma of 1/2.2; linear values are expected", positive ** (1 / 2.2)
+        yield "squared", expected**2
+        yield "the square root", np.sqrt(positive)
+        yield "the reciprocal", 1 / expected
+        yield "1 minus what it should be", 1 - expected
+        yield "packed as (x + 1) / 2", (expected + 1) / 2
+        yield "unpacked as 2 x - 1", 2 * expected - 1
+        yield "the absolute value", np.abs(expected)
+        yield "negative values are cut to 0", positive
+        yield "cut to at most 1", np.minimum(expected, 1)
+        yield "bytes are swapped (big-endian)", expected.astype("<f4").view("<u4").byteswap().view("<f4")
+        yield "rounded to whole numbers", np.rint(expected)
+        yield "the natural logarithm", np.log(expected)
+        yield "the logarithm to base 2", np.log2(expected)
+        if np.array_equal(got, expected.astype(np.float16).astype(got.dtype)):
+            yield "stored as float16: tier T2 allows that", got
+        if difference.entry.axes.startswith("xyz") and expected.ndim > 1:
+            yield "vectors are not normalised: right direction, other length", _along(expected, got)
+
+
+def _along(expected: Array, got: Array) -> Array:
+    """Return expected vectors with the lengths of others."""
+    length = np.sqrt((expected.astype(np.float64) ** 2).sum(axis=0))
+    own = np.sqrt((got.astype(np.float64) ** 2).sum(axis=0))
+    return np.asarray(expected * np.divide(own, length, out=np.ones_like(own), where=length > 0))
+
+
+def _indices(difference: Difference) -> Iterator[tuple[str, Array]]:
+    expected, entry = difference.expected, difference.entry
+    if expected.dtype.kind != "i":
+        return
+    some = expected >= 0
+    yield "indices begin at 1", np.where(some, expected + 1, expected)
+    yield "every index is one too high, that for none too", expected + 1
+    yield "every index is one too low", np.where(some, expected - 1, expected)
+    yield "none is marked by 0", np.where(some, expected, 0)
+    yield "none is marked by the largest number", np.where(some, expected, -1).view(np.uint32).astype(np.int64)
+    if entry.index_of is not None:
+        rows, columns = entry.index_of
+        row, column = expected // columns, expected % columns
+        yield "indices count column by column", np.where(some, column * rows + row, expected)
+        yield "rows of indices run upwards", np.where(some, (rows - 1 - row) * columns + column, expected)
+        yield "columns of indices run leftwards", np.where(some, row * columns + columns - 1 - column, expected)
+
+
+def _taken_for(difference: Difference, others: Mapping[str, Array]) -> Iterator[tuple[str, Array]]:
+    for name, array in others.items():
+        if name != difference.name and array.shape == difference.expected.shape and array.any():
+            yield f"it holds {name}", array
+
+
+def _order(difference: Difference) -> Iterator[Cause]:
+    """Yield that the right elements are there in another order, along the last axis or all over."""
+    expected, got = difference.expected, difference.got
+    if expected.size < 2:
+        return
+    a, b = np.sort(expected.astype(np.float64), axis=None), np.sort(got.astype(np.float64), axis=None)
+    if np.allclose(a, b, rtol=4 * SINGLE, atol=float(difference.limit.max(initial=0.0))):
+        yield Cause(cause="the right values in another order", share=1.0)

@@ -1,0 +1,269 @@
+"""The checker: judge a port's arrays by a kit and name the first wrong stage. NumPy alone, but for reading manifests.
+
+A port writes what a stage writes to `OUTPUT/<case>/<array>.npy`. Isolated, it has read the stage's inputs from the kit;
+chained, from its own outputs, and the bounds are those of a chain.
+"""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from refgi.errors import InputError
+from refgi.vectors.causes import EXPLAINED, Difference, explain, explained
+from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
+from refgi.vectors.manifest import (
+    KIT,
+    ArrayVerdict,
+    CaseManifest,
+    Cause,
+    KitManifest,
+    Result,
+    StageEntry,
+    StageVerdict,
+    Verdict,
+    read_model,
+)
+from refgi.vectors.spec import Array
+
+ALL_WITHIN, OUT, NOT_COMPARABLE, DAMAGED = 0, 1, 4, 5
+TIERS = ("T0", "T1", "T2")
+CAUSES = 3  # that are told
+ORDER: tuple[Verdict, ...] = ("out", "invalid", "within", "exact", "not-run")
+
+
+class DamagedError(InputError):
+    """A kit or a port's output that cannot be read as what it says it is."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is to be checked, and how."""
+
+    chained: bool = False
+    stages: tuple[str, ...] = ()  # names or their beginnings; all where empty
+    cases: tuple[str, ...] = ()  # the same of ids
+    tiers: Mapping[str, str] = field(default_factory=dict)  # beginning of a stage's name -> tier; "" is for all
+
+    def tier_of(self, stage: str) -> str:
+        """Return the tier of a stage's floats: that of the longest beginning of its name."""
+        fitting = [start for start in self.tiers if stage.startswith(start)]
+        return self.tiers[max(fitting, key=len)] if fitting else "T1"
+
+
+class Kit:
+    """A kit on disk.
+
+    Parameters
+    ----------
+    folder : Path
+        Its folder.
+
+    Raises
+    ------
+    DamagedError
+        If a file is absent, changed or not what its schema says.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            self.manifest = read_model(KitManifest, folder / KIT)
+        except InputError as error:
+            raise DamagedError(str(error), file=str(folder / KIT)) from error
+
+    def cases(self, asked: Asked) -> Iterator[CaseManifest]:
+        """Yield the manifests of the cases asked for."""
+        for entry in self.manifest.cases:
+            if not asked.cases or entry.id.startswith(asked.cases):
+                file = self.folder / entry.manifest
+                self._bytes(file, entry.sha256)
+                try:
+                    yield read_model(CaseManifest, file)
+                except InputError as error:
+                    raise DamagedError(str(error), file=str(file)) from error
+
+    def array(self, case: CaseManifest, name: str) -> Array:
+        """Return an expected array, checked by its hash."""
+        entry = case.arrays[name]
+        file = self.folder / "cases" / case.id / entry.file
+        self._bytes(file, entry.sha256)
+        return read_array(file)
+
+    def extra(self, case: CaseManifest, file: str) -> Array:
+        """Return an array that is no case's own: a bound, a mask, a likely bug."""
+        return read_array(self.folder / "cases" / case.id / file)
+
+    def _bytes(self, file: Path, sha256: str) -> None:
+        try:
+            found = hashlib.sha256(file.read_bytes()).hexdigest()
+        except OSError as error:
+            raise DamagedError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
+        if found != sha256:
+            raise DamagedError(f"{file}: expected the bytes of its manifest's sha256, got others: a damaged kit",
+                               file=str(file))
+
+
+def read_array(file: Path) -> Array:
+    """Return an .npy file's array.
+
+    Raises
+    ------
+    DamagedError
+        If it is none.
+    """
+    try:
+        array: Array = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise DamagedError(f"{file}: expected an .npy array, got {_reason(error)}", file=str(file)) from error
+    if not isinstance(array, np.ndarray):
+        raise DamagedError(f"{file}: expected an .npy array, got an archive", file=str(file))
+    return array
+
+
+def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
+    """Judge a port's output.
+
+    Parameters
+    ----------
+    kit : Kit
+        The kit.
+    output : Path
+        Folder of the port's arrays.
+    asked : Asked
+        Cases, stages, tiers and mode.
+
+    Returns
+    -------
+    Result
+        A verdict for each stage of each case; the first wrong stage is the first that is out or invalid.
+
+    Raises
+    ------
+    DamagedError
+        If the kit or a file of the output is damaged.
+    InputError
+        If there is no such folder, case or stage.
+    """
+    if not output.is_dir():
+        raise InputError(f"{output}: expected a folder of a port's arrays, got none", file=str(output))
+    verdicts: list[StageVerdict] = []
+    names: set[str] = set()
+    for case in kit.cases(asked):
+        wrong: set[str] = set()  # arrays that are out, or made from such
+        names.update(step.name for step in case.stages)
+        for step in case.stages:
+            if asked.stages and not step.name.startswith(asked.stages):
+                continue
+            verdict = check_stage(kit, case, step, output, asked, dirty=bool(wrong & set(step.reads)))
+            if verdict.verdict in ("out", "invalid") or (asked.chained and wrong & set(step.reads)):
+                wrong.update(step.writes)
+            verdicts.append(verdict)
+    if not verdicts:
+        raise InputError(f"--stage, --case: expected one of {', '.join(sorted(names)) or 'the kit'}, got none of them")
+    return _summed(kit, asked, verdicts)
+
+
+def _summed(kit: Kit, asked: Asked, verdicts: list[StageVerdict]) -> Result:
+    first = next(((one.case, one.stage) for one in verdicts if one.verdict in ("out", "invalid")
+                  and one.upstream != "dirty"), None)
+    found = {one.verdict for one in verdicts}
+    missing = asked.stages and "not-run" in found
+    ran = found - {"not-run"}
+    code = OUT if "out" in found else NOT_COMPARABLE if "invalid" in found or missing or not ran else ALL_WITHIN
+    worst = next(verdict for verdict in ORDER if verdict in found)
+    return Result(kit=kit.manifest.kit, vectors=kit.manifest.vectors, mode="chained" if asked.chained else "isolated",
+                  verdict=worst, exit_code=code, first=first, stages=tuple(verdicts))
+
+
+def check_stage(
+    kit: Kit, case: CaseManifest, step: StageEntry, output: Path, asked: Asked, *, dirty: bool
+) -> StageVerdict:
+    """Judge what a port has of one stage; `dirty`: what it read is wrong already."""
+    got = {name: file for name in step.writes if (file := _file(output, case.id, name)) is not None}
+    tier = asked.tier_of(step.name)
+    judged: dict[str, Judged] = {}
+    arrays: dict[str, Array] = {}
+    for name in step.writes:
+        if name not in got:
+            continue
+        arrays[name] = read_array(got[name])
+        judged[name] = _judged(kit, case, step, name, arrays, got, tier, asked)
+    verdicts = [judged[name].verdict if name in judged else _not_run(name, tier, bool(got)) for name in step.writes]
+    kinds = {one.verdict for one in verdicts}
+    verdict: Verdict = next(one for one in ORDER if one in kinds)
+    causes = _causes(kit, case, step, judged, arrays) if verdict in ("out", "invalid") and not dirty else []
+    upstream = ("dirty" if dirty else "clean") if asked.chained else "isolated"
+    return StageVerdict(case=case.id, stage=step.name, verdict=verdict, upstream=upstream,  # type: ignore[arg-type]
+                        arrays=tuple(verdicts), causes=tuple(causes[:CAUSES]))
+
+
+def _not_run(name: str, tier: str, others: bool) -> ArrayVerdict:
+    """Return the verdict on an array that is not there: missing where others of its stage are."""
+    return ArrayVerdict(name=name, verdict="invalid" if others else "not-run", tier=tier,
+                        said="missing, though other arrays of the stage are there" if others else "")
+
+
+def _judged(
+    kit: Kit, case: CaseManifest, step: StageEntry, name: str, arrays: Mapping[str, Array],
+    files: Mapping[str, Path], tier: str, asked: Asked,
+) -> Judged:
+    entry, got = case.arrays[name], arrays[name]
+    fault = unlike(name, tier, entry, got)
+    if fault is not None:
+        return Judged(fault)
+    expected = kit.array(case, name)
+    if entry.dtype == "|b1":
+        got = got.astype(np.bool_)
+    if entry.tier == "T3":
+        variance = name.replace(".mean", ".variance_of_mean")
+        own = read_array(files[variance]) if variance in files and variance != name else None
+        if variance == name or variance not in step.writes:
+            return Judged(ArrayVerdict(name=name, verdict="within", tier="T3", said="judged with its mean"))
+        if own is not None and own.shape != got.shape:
+            own = None
+        return judge_estimate(name, expected, got, kit.array(case, variance), own)
+    tolerance = entry.half if tier == "T2" else entry.chained if asked.chained else None
+    if tier == "T2" and asked.chained and entry.half is not None and entry.chained is not None:
+        tolerance = entry.half.model_copy(update={"outliers": max(entry.half.outliers, entry.chained.outliers)})
+    limit = kit.extra(case, entry.bound) if entry.bound is not None else None
+    masked = kit.extra(case, entry.masked) if entry.masked is not None else None
+    return judge(name, entry, expected, got, "T0" if entry.tier == "T0" else tier, limit, masked, tolerance)
+
+
+def _causes(
+    kit: Kit, case: CaseManifest, step: StageEntry, judged: Mapping[str, Judged], arrays: Mapping[str, Array]
+) -> list[Cause]:
+    """Return the causes that explain a stage's difference: the stage's own likely bugs first, then any array's."""
+    differing = {name: Difference(name, case.arrays[name], kit.array(case, name), arrays[name], one.out, one.limit)
+                 for name, one in judged.items() if one.verdict.verdict == "out" and one.out is not None
+                 and one.limit is not None}
+    shapes = {name: array.shape for name, array in arrays.items()}
+    found = []
+    for suspect in step.suspects:
+        if suspect.blind or any(shapes.get(name, shape) != shape for name, shape in suspect.shapes.items()):
+            continue
+        shares = [explained(one, kit.extra(case, suspect.arrays[name]), kit.extra(case, suspect.places[name]))
+                  for name, one in differing.items() if name in suspect.arrays]
+        unlike_shape = any(case.arrays[name].shape != shape for name, shape in suspect.shapes.items() if name in shapes)
+        share = min(shares) if shares and len(shares) == len(differing) else 1.0 if unlike_shape and not differing else 0.0
+        if share >= EXPLAINED:
+            found.append(Cause(cause=suspect.cause, share=share, paper=suspect.paper))
+    for one in differing.values():
+        found += explain(one, case.factors, {name: kit.array(case, name) for name in case.arrays
+                                              if case.arrays[name].shape == one.expected.shape})
+    unique = {one.cause: one for one in sorted(found, key=lambda one: -round(one.share, 2))}
+    return list(unique.values())
+
+
+def _file(output: Path, case: str, name: str) -> Path | None:
+    for place in (output / case, output / "cases" / case / "out", output / case / "out"):
+        if (place / f"{name}.npy").is_file():
+            return place / f"{name}.npy"
+    return None
+
+
+def _reason(error: Exception) -> str:
+    return error.strerror or "nothing readable" if isinstance(error, OSError) else f"{error}".split("\n")[0] or "nothing"

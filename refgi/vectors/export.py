@@ -1,0 +1,224 @@
+"""Writing a kit: expected arrays, bounds, likely bugs, manifests, schemas, scenes, and how to read them.
+
+A kit is written to a folder beside its own and renamed when it is whole. Its bytes depend on the cases alone: the same
+version of the vectors gives the same files anywhere, but for the last bit of stages that use libm.
+"""
+
+import hashlib
+import io
+import secrets
+import shutil
+from collections.abc import Callable, Mapping
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from refgi.errors import InputError, expect
+from refgi.vectors.bounds import Bound, Budget, chained_budgets, distance, half_budgets, isolated_bounds
+from refgi.vectors.cases import kit_cases
+from refgi.vectors.manifest import (
+    CASE,
+    KIT,
+    SCHEMAS,
+    VERSION,
+    ArrayEntry,
+    CaseManifest,
+    KitEntry,
+    KitManifest,
+    StageEntry,
+    Suspect,
+    Tolerance,
+    schema_text,
+    text_of,
+)
+from refgi.vectors.scenefile import write_scene
+from refgi.vectors.spec import Array, Arrays, Case, Decoy, Stage, expected_of, outputs_of
+
+SEED = 20090101  # of the changes that bounds are measured by
+TOLD_BY, BESIDE = 192, 64  # elements of a likely bug that are kept: those that tell it, and others
+ISOLATED = "float32 run and 6 float64 runs on inputs changed by up to 2 roundings of float32, x 4; plus rounding"
+CHAINED = "6 float64 runs, the inputs of every stage changed by up to 2 roundings of float32, x 4"
+HALF = "6 float64 runs on inputs rounded to float16 at random, results in float16, x 4"
+Tell = Callable[[str, float], None]
+
+
+def export_kit(kit: str, out: Path, tell: Tell = lambda _, __: None, only: str | None = None) -> KitManifest:
+    """Write a kit.
+
+    Parameters
+    ----------
+    kit : {"quick", "full"}
+        Which cases.
+    out : Path
+        Its folder; must not exist, or hold a kit, which is replaced.
+    tell : callable, optional
+        Called with the case's id and the share done.
+    only : str, optional
+        Start of the ids of cases to write; all where absent.
+
+    Returns
+    -------
+    KitManifest
+        What was written.
+
+    Raises
+    ------
+    InputError
+        If the folder holds something else, a likely bug is told by no case of the kit, or the disk is full.
+    """
+    from refgi.provenance import program
+
+    cases = {name: make for name, make in kit_cases(kit).items() if only is None or name.startswith(only)}
+    expect(bool(cases), "case", f"the start of one of {', '.join(kit_cases(kit))}", only)
+    if out.exists() and any(out.iterdir()) and not (out / KIT).is_file():
+        raise InputError(f"{out}: expected a new folder or a kit, got a folder of other files", file=str(out))
+    part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")
+    try:
+        part.mkdir(parents=True)
+        entries, told = [], _Told()
+        for number, (name, make) in enumerate(cases.items()):
+            tell(name, number / len(cases))
+            manifest = write_case(make(), part)
+            told.add(manifest)
+            text = text_of(manifest)
+            (part / "cases" / name / CASE).write_text(text, encoding="utf-8", newline="\n")
+            entries.append(KitEntry(id=name, method=manifest.method, what=manifest.what,
+                                    manifest=f"cases/{name}/{CASE}", sha256=_sha256(text.encode())))
+        if only is None:
+            told.expect_none_blind()
+        made = KitManifest(kit=kit, vectors=VERSION, refgi=str(program()), cases=tuple(entries))
+        _write_frame(part, made)
+        if out.exists():
+            shutil.rmtree(out)
+        part.replace(out)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written: {error.strerror or error}", file=str(out)) from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    tell("done", 1.0)
+    return made
+
+
+class _Told:
+    """Which likely bugs some case tells from the right stage."""
+
+    def __init__(self) -> None:
+        self._seen: dict[tuple[str, str], bool] = {}
+
+    def add(self, manifest: CaseManifest) -> None:
+        for step in manifest.stages:
+            for suspect in step.suspects:
+                key = _kind(step.name), suspect.cause
+                self._seen[key] = self._seen.get(key, False) or not suspect.blind
+
+    def expect_none_blind(self) -> None:
+        blind = [f"{stage}: {cause}" for (stage, cause), seen in self._seen.items() if not seen]
+        if blind:
+            raise InputError(f"kit: expected a case that tells each likely bug, got none for {'; '.join(blind)}")
+
+
+def _kind(stage: str) -> str:
+    """Return a stage's name without the number of its map or level: rsm0.flux and rsm1.flux are one."""
+    return "".join(letter for letter in stage if not letter.isdigit())
+
+
+def write_case(case: Case, folder: Path) -> CaseManifest:
+    """Write the arrays of a case below a kit's folder and return its manifest, which is not written yet."""
+    home = folder / "cases" / case.id
+    for name in ("in", "out", "bound", "mask", "suspect"):
+        (home / name).mkdir(parents=True, exist_ok=True)
+    known = expected_of(case)
+    arrays = {name: _entry(case, name, known[name], _save(home, f"in/{name}.npy", known[name])) for name in case.given}
+    chained = chained_budgets(case, known, SEED)
+    stages = []
+    for step in case.stages:
+        bounds, halves = isolated_bounds(step, known, SEED), half_budgets(step, known, SEED)
+        for name in step.writes:
+            entry = _entry(case, name, known[name], _save(home, f"out/{name}.npy", known[name]))
+            arrays[name] = entry.model_copy(update=_tolerances(home, name, entry, bounds[name], chained[name],
+                                                               halves[name]))
+        suspects = tuple(_suspect(home, step, known, bounds, decoy, number) for number, decoy in
+                         enumerate(step.decoys))
+        stages.append(StageEntry(name=step.name, what=step.what, paper=step.paper, reads=step.reads,
+                                 writes=step.writes, suspects=suspects))
+    scene = None
+    if case.scene is not None:
+        scene = f"scenes/{case.id}"
+        size = case.facts.get("camera", {"columns": 1, "rows": 1})
+        write_scene(case.scene, (size["columns"], size["rows"]), folder / scene)
+    return CaseManifest(id=case.id, method=case.method, what=case.what, vectors=VERSION, facts=dict(case.facts),
+                        factors=dict(case.factors), scene=scene, given=tuple(case.given), stages=tuple(stages),
+                        arrays=arrays)
+
+
+def _entry(case: Case, name: str, array: Array, saved: tuple[str, str]) -> ArrayEntry:
+    spec = case.specs[name]
+    kind = {"f": "<f4", "i": "<i4", "b": "|b1"}[array.dtype.kind]
+    return ArrayEntry(file=saved[0], sha256=saved[1], dtype=kind, shape=array.shape,  # type: ignore[arg-type]
+                      axes=spec.axes, unit=spec.unit, what=spec.what, space=spec.space, paper=spec.paper,
+                      tier="T0" if array.dtype.kind != "f" else spec.tier, index_of=spec.index_of)
+
+
+def _tolerances(
+    home: Path, name: str, entry: ArrayEntry, bound: Bound, chained: Budget, half: Budget
+) -> Mapping[str, object]:
+    """Return the fields of an array that say how far it may be off."""
+    more: dict[str, object] = {"chained": Tolerance(**chained._asdict(), source=CHAINED),
+                               "half": Tolerance(**half._asdict(), source=HALF)}
+    if entry.dtype == "<f4":
+        more |= {"bound": _save(home, f"bound/{name}.npy", bound.limit)[0], "bound_source": ISOLATED}
+    if bound.masked.any():
+        more |= {"masked": _save(home, f"mask/{name}.npy", bound.masked)[0],
+                 "masked_count": int(np.count_nonzero(bound.masked))}
+    return more
+
+
+def _suspect(
+    home: Path, step: Stage, known: Arrays, bounds: Mapping[str, Bound], decoy: Decoy, number: int
+) -> Suspect:
+    made = outputs_of(step, known, np.float64, decoy.run)
+    values, places, blind = {}, {}, True
+    for name in step.writes:
+        array, expected = made[name], known[name]
+        if array.shape != expected.shape:
+            blind = False
+            continue
+        off = (distance(array, expected) > bounds[name].limit) & ~bounds[name].masked
+        blind = blind and not off.any()
+        told = np.concatenate([_spread(np.flatnonzero(off), TOLD_BY), _spread(np.flatnonzero(~off), BESIDE)])
+        if off.any():
+            places[name] = _save(home, f"suspect/{step.name}.{number}.{name}.places.npy", told.astype("<i4"))[0]
+            values[name] = _save(home, f"suspect/{step.name}.{number}.{name}.npy", array.reshape(-1)[told])[0]
+    return Suspect(cause=decoy.cause, paper=decoy.paper, arrays=values, places=places, blind=blind,
+                   shapes={name: made[name].shape for name in step.writes})
+
+
+def _spread(indices: Array, count: int) -> Array:
+    """Return at most so many of some indices, evenly spread."""
+    if len(indices) <= count:
+        return indices
+    return np.asarray(indices[np.linspace(0, len(indices) - 1, count).astype(np.int64)])
+
+
+def _save(home: Path, file: str, array: Array) -> tuple[str, str]:
+    stream = io.BytesIO()
+    np.lib.format.write_array(stream, array, version=(1, 0), allow_pickle=False)
+    content = stream.getvalue()
+    (home / file).write_bytes(content)
+    return file, _sha256(content)
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _write_frame(folder: Path, made: KitManifest) -> None:
+    """Write what surrounds the cases: version, list, schemas, how to read them."""
+    (folder / "schema").mkdir()
+    for name, model in SCHEMAS.items():
+        (folder / "schema" / name).write_text(schema_text(model), encoding="utf-8", newline="\n")
+    (folder / "VERSION").write_text(f"{VERSION}\n", encoding="utf-8")
+    (folder / KIT).write_text(text_of(made), encoding="utf-8", newline="\n")
+    for name in ("README.md", "CHANGES.md"):
+        (folder / name).write_bytes(resources.files("refgi.vectors").joinpath(name).read_bytes())

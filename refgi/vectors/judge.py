@@ -1,0 +1,170 @@
+"""Verdict on one array: within its bounds or not, and where it is worst. NumPy alone."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from refgi.vectors.bounds import distance
+from refgi.vectors.manifest import ArrayEntry, ArrayVerdict, Tolerance, Verdict
+from refgi.vectors.spec import Array
+
+SIGMAS = 4.0  # of an estimate's mean, and of a pixel but for FEW of them
+FEW = 0.005
+STEADY = (0.4, 2.5)  # mean square of z over the pixels of an estimate: right variances, and no structure
+
+
+class Judged(NamedTuple):
+    """A verdict, and the elements that are out."""
+
+    verdict: ArrayVerdict
+    out: Array | None = None  # bool, as the array
+    limit: Array | None = None  # what was allowed, as the array
+
+
+def unlike(name: str, tier: str, entry: ArrayEntry, got: Array) -> ArrayVerdict | None:
+    """Return the verdict on an array that cannot be compared, saying why; None where it can."""
+    said = _dtype_fault(entry, got) or _shape_fault(entry, got)
+    return ArrayVerdict(name=name, verdict="invalid", tier=tier, said=said) if said else None
+
+
+def judge(
+    name: str, entry: ArrayEntry, expected: Array, got: Array, tier: str, limit: Array | None, masked: Array | None,
+    tolerance: Tolerance | None,
+) -> Judged:
+    """Compare an array with what is expected, element by element.
+
+    Parameters
+    ----------
+    name : str
+        Of the array.
+    entry : ArrayEntry
+        What the kit says of it.
+    expected, got : ndarray
+        Of one shape.
+    tier : str
+        "T0": equal; else within bounds.
+    limit : ndarray or None
+        Bound of each element, where there is one.
+    masked : ndarray of bool or None
+        Elements that may differ at will.
+    tolerance : Tolerance or None
+        In place of bounds for each element: one of the whole array, with a share of outliers.
+
+    Returns
+    -------
+    Judged
+        The worst element is the one farthest beyond its bound; a number that is not finite where a finite one is
+        expected is beyond any.
+    """
+    off = distance(got, expected)
+    if tier == "T0" or expected.dtype.kind != "f":
+        allowed = np.zeros(expected.shape)
+    elif tolerance is not None:
+        allowed = tolerance.relative * (np.where(np.isfinite(expected), np.abs(expected), 0.0) + tolerance.large)
+    else:
+        allowed = np.zeros(expected.shape) if limit is None else limit.astype(np.float64)
+    out = off > allowed
+    free = masked if tolerance is None else None
+    spared = out & free if free is not None else np.zeros(expected.shape, np.bool_)
+    out = out & ~spared
+    few = 0.0 if tolerance is None else tolerance.outliers
+    count = int(np.count_nonzero(out))
+    verdict: Verdict = "exact" if not off.any() else "within" if count <= few * out.size else "out"
+    worst, place = _worst(off, allowed, out)
+    verdict_here = ArrayVerdict(
+        name=name, verdict=verdict, tier=tier, worst=worst, element=place, outside=count,
+        masked=int(np.count_nonzero(spared)), **_values(expected, got, allowed, place))
+    return Judged(verdict_here, out, allowed)
+
+
+def judge_estimate(
+    name: str, expected: Array, got: Array, variance: Array, own: Array | None
+) -> Judged:
+    """Compare two estimates by the standard error of their difference (tier T3).
+
+    Parameters
+    ----------
+    name : str
+        Of the array.
+    expected, got : ndarray
+        Means.
+    variance : ndarray
+        Of the expected mean.
+    own : ndarray or None
+        Of the port's mean; as the expected one's where it gives none.
+
+    Returns
+    -------
+    Judged
+        Out where the sum over all pixels is SIGMAS standard errors off, more than FEW pixels are, or the mean square
+        of z lies outside of STEADY.
+    """
+    both = np.asarray(variance, np.float64) + (variance if own is None else own)
+    off = distance(got, expected)
+    sigma = np.sqrt(both)
+    z = np.divide(off, sigma, out=np.where(off > 0, np.inf, 0.0), where=sigma > 0)
+    out = z > SIGMAS
+    steady = float(np.mean(z[sigma > 0] ** 2)) if (sigma > 0).any() else 0.0
+    with np.errstate(invalid="ignore"):
+        total = abs(float(np.sum(np.asarray(got, np.float64) - expected)))
+    bias = total / max(float(np.sqrt(both.sum())), np.finfo(np.float64).tiny)
+    few = np.count_nonzero(out) <= FEW * out.size
+    fine = bool(few) and bias <= SIGMAS and (STEADY[0] <= steady <= STEADY[1] or not sigma.any())
+    verdict: Verdict = "exact" if not off.any() else "within" if fine else "out"
+    worst, place = _worst(off, SIGMAS * sigma, z >= z.max(initial=0.0))
+    said = f"sum {bias:.1f} standard errors off, mean square of z {steady:.2f}"
+    return Judged(ArrayVerdict(name=name, verdict=verdict, tier="T3", worst=worst, element=place, said=said,
+                               outside=int(np.count_nonzero(out)),
+                               **_values(expected, got, SIGMAS * sigma, place)), out, SIGMAS * sigma)
+
+
+def _worst(off: Array, allowed: Array, out: Array) -> tuple[float | None, tuple[int, ...] | None]:
+    """Return the largest error over its bound and where it is, among the elements that are out or else all."""
+    if off.size == 0:
+        return None, None
+    floor = np.finfo(np.float64).tiny
+    with np.errstate(over="ignore"):
+        ratio = np.where(off > 0, off / np.maximum(allowed, floor), 0.0)
+    among = np.where(out, ratio, -1.0) if out.any() else ratio
+    at = np.unravel_index(int(np.argmax(among)), off.shape)
+    worst = float(ratio[at])
+    return (worst if np.isfinite(worst) and worst < 1e30 else None), tuple(int(k) for k in at)
+
+
+def _values(expected: Array, got: Array, allowed: Array, place: tuple[int, ...] | None) -> dict[str, float | None]:
+    if place is None:
+        return {}
+    return {key: _number(array[place]) for key, array in (("expected", expected), ("got", got), ("bound", allowed))}
+
+
+def _number(value: object) -> float | None:
+    number = float(value)  # type: ignore[arg-type]
+    return number if np.isfinite(number) else None
+
+
+def _dtype_fault(entry: ArrayEntry, got: Array) -> str:
+    kinds = {"<f4": ("f", "floats"), "<i4": ("iu", "whole numbers"), "|b1": ("biu", "true or false, or 0 and 1")}
+    kind, words = kinds[entry.dtype]
+    if got.dtype.kind not in kind:
+        return f"expected {words} ({entry.dtype}), got {got.dtype.name}"
+    if entry.dtype == "|b1" and got.dtype.kind != "b" and not np.isin(got, (0, 1)).all():
+        return "expected 0 and 1, got other numbers"
+    return ""
+
+
+def _shape_fault(entry: ArrayEntry, got: Array) -> str:
+    if got.shape == entry.shape:
+        return ""
+    said = f"expected shape {entry.shape} ({entry.axes}), got {got.shape}"
+    if sorted(got.shape) == sorted(entry.shape):
+        return f"{said}: the axes are in another order"
+    if got.size == int(np.prod(entry.shape)):
+        return f"{said}: as many elements, in another shape"
+    if got.ndim == len(entry.shape):
+        differing = [k for k in range(got.ndim) if got.shape[k] != entry.shape[k]]
+        names = [one.strip() for one in entry.axes.split(",")]
+        if len(differing) == 1 and len(names) == got.ndim:
+            k = differing[0]
+            return f"{said}: {abs(got.shape[k] - entry.shape[k])} {'more' if got.shape[k] > entry.shape[k] else 'fewer'}"\
+                   f" along {names[k]}"
+    return said

@@ -1,0 +1,184 @@
+"""The files of a kit and of a verdict as data: read, checked and described by JSON Schema with pydantic."""
+
+import json
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import pydantic
+
+from refgi.errors import InputError
+
+VERSION = "1.0.0"  # of the vectors, apart from the program's: a patch adds cases, a minor adds arrays to a case,
+# a major changes what an array means
+KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
+
+M = TypeVar("M", bound=pydantic.BaseModel)
+Verdict = Literal["exact", "within", "out", "invalid", "not-run"]
+
+
+class _Strict(pydantic.BaseModel):
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+
+
+class Tolerance(_Strict):
+    """|got - expected| <= relative (|expected| + large), but for a share of outliers."""
+
+    relative: float
+    large: float
+    outliers: float
+    source: str
+
+
+class Suspect(_Strict):
+    """A likely bug of a stage: the elements that tell it, and their values with it."""
+
+    cause: str
+    paper: str = ""
+    arrays: dict[str, str]  # file of (n,) values by array
+    places: dict[str, str]  # file of (n,) flat indices by array
+    shapes: dict[str, tuple[int, ...]]  # of the arrays with the bug
+    blind: bool = False  # this case cannot tell it from the right stage
+
+
+class ArrayEntry(_Strict):
+    """One array of a case."""
+
+    file: str
+    sha256: str
+    dtype: Literal["<f4", "<i4", "|b1"]
+    shape: tuple[int, ...]
+    axes: str
+    unit: str
+    what: str
+    space: str = ""
+    paper: str = ""
+    tier: Literal["T0", "T1", "T3"]
+    index_of: tuple[int, int] | None = None
+    bound: str | None = None  # file of (...) absolute bounds, one an element; None: equal
+    bound_source: str = ""
+    masked: str | None = None  # file of bool: elements that may differ at will
+    masked_count: int = 0
+    chained: Tolerance | None = None
+    half: Tolerance | None = None  # tier T2
+
+
+class StageEntry(_Strict):
+    """One stage of a case."""
+
+    name: str
+    what: str
+    paper: str = ""
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    suspects: tuple[Suspect, ...] = ()
+
+
+class CaseManifest(_Strict):
+    """manifest.json: one case."""
+
+    id: str
+    method: str
+    what: str
+    vectors: str
+    facts: dict[str, Any]
+    factors: dict[str, float]
+    scene: str | None = None  # folder of scene.json
+    given: tuple[str, ...]
+    stages: tuple[StageEntry, ...]
+    arrays: dict[str, ArrayEntry]
+
+
+class KitEntry(_Strict):
+    """One case in the list of a kit."""
+
+    id: str
+    method: str
+    what: str
+    manifest: str
+    sha256: str
+
+
+class KitManifest(_Strict):
+    """kit.json: what a kit holds."""
+
+    kit: str
+    vectors: str
+    refgi: str
+    cases: tuple[KitEntry, ...]
+
+
+class ArrayVerdict(_Strict):
+    """What became of one array."""
+
+    name: str
+    verdict: Verdict
+    tier: str
+    worst: float | None = None  # largest error over its bound
+    element: tuple[int, ...] | None = None
+    expected: float | None = None
+    got: float | None = None
+    bound: float | None = None
+    outside: int = 0  # elements beyond their bound
+    masked: int = 0  # masked elements that differ
+    said: str = ""  # why it is invalid
+
+
+class Cause(_Strict):
+    """A likely bug that explains a difference."""
+
+    cause: str
+    share: float  # of the elements that differ
+    paper: str = ""
+
+
+class StageVerdict(_Strict):
+    """What became of one stage."""
+
+    case: str
+    stage: str
+    verdict: Verdict
+    upstream: Literal["clean", "dirty", "isolated"]
+    arrays: tuple[ArrayVerdict, ...]
+    causes: tuple[Cause, ...] = ()
+
+
+class Result(_Strict):
+    """result.json: what a check found."""
+
+    kit: str
+    vectors: str
+    mode: Literal["isolated", "chained"]
+    verdict: Verdict
+    exit_code: int
+    first: tuple[str, str] | None  # case and stage of the first wrong one
+    stages: tuple[StageVerdict, ...]
+
+
+SCHEMAS: dict[str, type[_Strict]] = {"kit.json": KitManifest, "manifest.json": CaseManifest, "result.json": Result}
+
+
+def schema_text(model: type[pydantic.BaseModel]) -> str:
+    """Return the JSON Schema of a file, as the kit holds it."""
+    return json.dumps(model.model_json_schema(), indent=1, sort_keys=True) + "\n"
+
+
+def text_of(model: pydantic.BaseModel) -> str:
+    """Return a file's text: keys in the order of the class, nothing that is absent."""
+    return json.dumps(model.model_dump(mode="json", exclude_defaults=True), indent=1, ensure_ascii=False) + "\n"
+
+
+def read_model(model: type[M], file: Path) -> M:
+    """Read and check a file.
+
+    Raises
+    ------
+    InputError
+        If it is absent, no JSON, or not what its schema says; all faults at once.
+    """
+    try:
+        return model.model_validate_json(file.read_bytes())
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
+    except pydantic.ValidationError as error:
+        faults = [f"{file}: {'.'.join(map(str, one['loc'])) or 'file'}: {one['msg']}" for one in error.errors()[:20]]
+        raise InputError("\n".join(faults), file=str(file)) from error

@@ -221,4 +221,4 @@ def _write_frame(folder: Path, made: KitManifest) -> None:
     (folder / "VERSION").write_text(f"{VERSION}\n", encoding="utf-8")
     (folder / KIT).write_text(text_of(made), encoding="utf-8", newline="\n")
     for name in ("README.md", "CHANGES.md"):
-        (folder / name).write_bytes(resources.files("refgi.vectors").joinpath(name).read_bytes())
+        (folder / name).write_bytes(resources.files("refgi.vectors").joinpath("files", name).read_bytes())

@@ -13,7 +13,7 @@ from refgi.vectors.check import Asked, Kit, find_array, read_array
 from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Result, StageVerdict
 from refgi.vectors.spec import Array
 
-FILES = Path(__file__).with_name("page_files")
+FILES = Path(__file__).with_name("files")
 MOST_BYTES = 24_000_000  # of arrays in a page; beyond that only those that are out are shown
 
 

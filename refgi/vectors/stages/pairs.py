@@ -120,10 +120,14 @@ def pair_decoys(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tup
         return altered
 
     found = [
-        Decoy("the receiver's cosine is missing", literal(receiver=False), EQ2),
-        Decoy("the light's cosine is missing", literal(sender=False), EQ2),
-        Decoy("cosines are not clamped at 0: lights behind a surface count", literal(floor=None), CLAMPED),
-        Decoy("cosines are taken as absolute values", literal(floor="abs"), CLAMPED),
+        Decoy("the receiver's cosine is missing", literal(arrives="none"), EQ2),
+        Decoy("the light's cosine is missing", literal(leaves="none"), EQ2),
+        Decoy("cosines are not clamped at 0", literal(arrives="any", leaves="any"), CLAMPED),
+        Decoy("the receiver's cosine is not clamped at 0: light from behind counts", literal(arrives="any"), CLAMPED),
+        Decoy("the light's cosine is not clamped at 0: lights shine backwards", literal(leaves="any"), CLAMPED),
+        Decoy("cosines are taken as absolute values", literal(arrives="abs", leaves="abs"), CLAMPED),
+        Decoy("the receiver's cosine is taken as absolute value", literal(arrives="abs"), CLAMPED),
+        Decoy("the light's cosine is taken as absolute value", literal(leaves="abs"), CLAMPED),
         Decoy("1/r^4 with unit directions", literal(power=4), "E-SII-02"),
         Decoy("1/r in place of 1/r^2", literal(power=1), "E-SII-02"),
         Decoy("directions are not normalised", literal(power=0), "E-SII-02"),
@@ -164,7 +168,7 @@ def _first_half(array: Array) -> Array:
 
 
 def _literal(
-    arrays: Arrays, own: bool, *, receiver: bool = True, sender: bool = True, floor: Any = 0.0, power: int = 2,
+    arrays: Arrays, own: bool, *, arrives: str = "positive", leaves: str = "positive", power: int = 2,
     least: float = 0.0, norm: str = "exact", horizon: bool = True,
 ) -> Array:
     """Return Eq. 2 and 3 with a bug, in float64: (3, h, w)."""
@@ -181,9 +185,9 @@ def _literal(
         fall = {0: np.ones_like(r), 1: 1 / r}.get(power, 1 / np.maximum(r, least) ** power)
     if power == 0:
         arriving, sent = arriving * r, sent * r
-    received = (_cut(arriving, floor) if receiver else (arriving > 0)) * np.where(r > 0, fall, 0)
+    received = _cosine(arriving, arrives) * np.where(r > 0, fall, 0)
     flux = lights.flux[:, None] if own else lights.flux[:, :, None]
-    total = flux / np.pi * ((_cut(sent, floor) if sender else sent > 0) * received)
+    total = flux / np.pi * (_cosine(sent, leaves) * received)
     if lights.lobe_flux is not None and lights.lobe_axis is not None and lights.lobe_exponent is not None:
         axis = lights.lobe_axis[:, None] if own else lights.lobe_axis[:, :, None]
         exponent = lights.lobe_exponent[None] if own else lights.lobe_exponent[:, None]
@@ -199,8 +203,8 @@ def _directions(d: Array) -> tuple[Array, Array]:
     return np.divide(d, r, out=np.zeros_like(d), where=r > 0), r
 
 
-def _cut(cosine: Array, floor: Any) -> Array:
-    return np.abs(cosine) if floor == "abs" else cosine if floor is None else np.maximum(floor, cosine)
+def _cosine(cosine: Array, how: str) -> Array:
+    return {"positive": np.maximum(0, cosine), "any": cosine, "abs": np.abs(cosine), "none": 1.0 * (cosine > 0)}[how]
 
 
 def _norms(lights: PixelLights, norm: str) -> Array:

@@ -1,10 +1,10 @@
 """How far a port may be off: bounds for each element, measured by what rounding does to the stage itself.
 
 A port that computes in float32, with fused or reordered operations, returns about what the exact stage returns for
-inputs a few roundings away. So each stage is run again: by refgi's float32 kernels, and in float64 on inputs changed at
-random by up to two roundings of float32. The bound is SAFETY times the largest change seen, plus the rounding of the
-result and of the largest values beside it. Where a change moves a decision (an edge, a tie) the element is masked: it
-may differ at will.
+inputs a few roundings away. So each stage is run again: by refgi's float32 kernels, in other ways that ports write it
+in float32, and in float64 on inputs changed at random by up to two roundings of float32. The bound is SAFETY times the
+largest change seen, plus the rounding of the result and of the largest values beside it. Where a change moves a
+decision (an edge, a tie) the element is masked: it may differ at will.
 
 Tier T2 has the same for storage in half floats, as one bound for the array and a share of outliers. Bounds of a chained
 run, in which every stage reads the roundings of those before, are of that form too.
@@ -39,7 +39,7 @@ class Bound(NamedTuple):
 
 
 class Budget(NamedTuple):
-    """How far an array may be off as a whole: |got - expected| <= relative (|expected| + large) but for outliers."""
+    """How far an array may be off: ``|got - expected| <= relative (|expected| + large)`` but for outliers."""
 
     relative: float
     large: float  # magnitude that stands for the array's large values
@@ -48,7 +48,7 @@ class Budget(NamedTuple):
 
 def isolated_bounds(case: Case, step: Stage, known: Arrays, seed: int) -> dict[str, Bound]:
     """Return the bound of each array that a stage of a case writes, its inputs being the stored ones."""
-    runs = [outputs_of(step, known, np.float32)]
+    runs = [outputs_of(step, known, np.float32, run) for run in (step.run, *step.variants)]
     runs += [_run(step, changed) for changed in _changed(step, known, seed, _rounded_at_random)]
     return {name: _bound(known[name], [run[name] for run in runs], _large(case, name, known[name]))
             for name in step.writes}
@@ -152,7 +152,7 @@ def large_value(expected: Array) -> float:
 
 
 def distance(got: Array, expected: Array) -> Array:
-    """Return |got - expected| in float64: 0 where both are the same infinity, inf where one alone is finite."""
+    """Return ``|got - expected|`` in float64: 0 where both are the same infinity, inf where one alone is finite."""
     with np.errstate(invalid="ignore"):  # a signalling NaN
         a, b = np.asarray(got, np.float64), np.asarray(expected, np.float64)
     finite = np.isfinite(a) & np.isfinite(b)

@@ -16,6 +16,7 @@ from refgi.vectors.spec import Array
 
 EXPLAINED = 0.9  # share of the differing elements from which on a hypothesis counts
 ROOM = 8.0  # how much farther off than its bound an explained element may be: the bug changes the rounding too
+FEWEST = 4  # elements that a factor can be told from
 NEARER = 0.25  # of its distance from what is expected: how near an element must be to what explains it
 SORTED = 1e-3  # the same, of elements in order
 SLIGHT = 100.0  # bounds: a difference without an explanation that stays below may be rounding
@@ -104,7 +105,7 @@ def _factors(difference: Difference, factors: Mapping[str, float]) -> Iterator[t
     if expected.dtype.kind != "f":
         return
     usable = difference.out & np.isfinite(expected) & (np.abs(expected) > 1e-3 * large_value(expected))
-    if not usable.any():
+    if np.count_nonzero(usable) < FEWEST:
         return
     with np.errstate(over="ignore"):
         factor = float(np.median(got[usable].astype(np.float64) / expected[usable]))
@@ -189,7 +190,6 @@ def _coded(difference: Difference) -> Iterator[tuple[str, Array]]:
         yield "negative values are cut to 0", positive
         yield "cut to at most 1", np.minimum(expected, 1)
         yield "bytes are swapped (big-endian)", expected.astype("<f4").view("<u4").byteswap().view("<f4")
-        yield "rounded to whole numbers", np.rint(expected)
         yield "the natural logarithm", np.log(expected)
         yield "the logarithm to base 2", np.log2(expected)
         if np.array_equal(got, expected.astype(np.float16).astype(got.dtype)):

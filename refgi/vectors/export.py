@@ -141,7 +141,7 @@ def write_case(case: Case, folder: Path) -> CaseManifest:
         suspects = tuple(_suspect(home, step, known, bounds, decoy, number) for number, decoy in
                          enumerate(step.decoys))
         stages.append(StageEntry(name=step.name, what=step.what, paper=step.paper, reads=step.reads,
-                                 writes=step.writes, suspects=suspects))
+                                 writes=step.writes, exact=step.exact, suspects=suspects))
     scene = None
     if case.scene is not None:
         scene = f"scenes/{case.id}"

@@ -21,7 +21,7 @@ class _Strict(pydantic.BaseModel):
 
 
 class Tolerance(_Strict):
-    """|got - expected| <= relative (|expected| + large), but for a share of outliers."""
+    """``|got - expected| <= relative (|expected| + large)``, but for a share of outliers."""
 
     relative: float
     large: float
@@ -70,6 +70,7 @@ class StageEntry(_Strict):
     paper: str = ""
     reads: tuple[str, ...]
     writes: tuple[str, ...]
+    exact: tuple[str, ...] = ()  # inputs that must stay in float32 in any tier: their differences or choices count
     suspects: tuple[Suspect, ...] = ()
 
 

@@ -23,7 +23,7 @@ class Recipe:
         What the case shows, one line.
     """
 
-    def __init__(self, id: str, method: str, what: str, _scene: str = "") -> None:
+    def __init__(self, id: str, method: str, what: str) -> None:
         self.id, self.method, self.what = id, method, what
         self.scene: Any = None
         self.given: dict[str, Array] = {}
@@ -39,12 +39,13 @@ class Recipe:
     def add(
         self, name: str, what: str, run: Run, reads: tuple[str, ...], writes: Mapping[str, Spec], *, paper: str = "",
         decoys: tuple[Decoy, ...] = (), exact: tuple[str, ...] = (),
+        variants: tuple[Run, ...] = (),
     ) -> None:
-        """Add a stage that writes the arrays named, which are what their specs say; `exact`: as in `Stage`."""
+        """Add a stage that writes the arrays named, which are what their specs say; the rest as in `Stage`."""
         missing = [one for one in reads if one not in self.specs]
         if missing:
             raise ValueError(f"{self.id}: stage {name} reads {', '.join(missing)}, which nothing gives or writes")
-        self.stages.append(Stage(name, what, reads, tuple(writes), run, paper, decoys, exact))
+        self.stages.append(Stage(name, what, reads, tuple(writes), run, paper, decoys, variants, exact))
         self.specs.update(writes)
 
     def case(self) -> Case:

@@ -51,6 +51,7 @@ class Stage:
     run: Run
     paper: str = ""
     decoys: tuple[Decoy, ...] = ()
+    variants: tuple[Run, ...] = ()  # other ways to compute it in float32, as ports do: the bound holds them too
     exact: tuple[str, ...] = ()  # inputs whose differences are exact in float32, or that decide: they are not changed
 
 

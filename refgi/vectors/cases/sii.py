@@ -19,7 +19,7 @@ def splatting(
     clamp: str = "none", **options: Any,
 ) -> Case:
     """Return SII on a scene: buffers, lights, sum; `options` of `add_lights`."""
-    recipe = Recipe(id, "sii", what, id)
+    recipe = Recipe(id, "sii", what)
     add_lit(recipe, scene, size, maps, counts, **options)
     pairs = of(PairSettings, clamp=clamp)
     if pairs.needs_footprints:

@@ -1,0 +1,154 @@
+"""Eq. 2 and 3 as a port writes them from the paper, and as it gets them wrong (SII; docs/radiometry)."""
+
+from typing import Any
+
+import numpy as np
+
+from refgi.lobes import lobe_norm
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.vectors.recipe import reading
+from refgi.vectors.spec import Array, Arrays, Decoy, Run
+from refgi.vectors.stages.lights import pixel_lights_of
+
+RECEIVERS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
+EQ2 = "SII Eq. 2 and 3; unit directions and r^2 (E-SII-02)"
+CLAMPED, DISC = "<a.b> = max(0, a.b)", "r^2 + A/pi"
+
+
+def as_printed(own: bool) -> Run:
+    """Return Eq. 2 and 3 as a port would write them from the paper; with footprints the disc's r^2 + A/pi for r^2."""
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        return {("pairs" if own else "sum") + ".irradiance": _literal(arrays, own).astype(real)}
+
+    return run
+
+
+def pair_decoys(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple[Decoy, ...]:
+    """Return likely bugs of Eq. 2 and 3; `own`: light k meets receiver k alone."""
+    def literal(**bugs: Any) -> Run:
+        def altered(arrays: Arrays, real: Any) -> Arrays:
+            return {("pairs" if own else "sum") + ".irradiance": _literal(arrays, own, **bugs).astype(real)}
+
+        return altered
+
+    found = [
+        Decoy("the receiver's cosine is missing", literal(arrives="none"), EQ2),
+        Decoy("the light's cosine is missing", literal(leaves="none"), EQ2),
+        Decoy("cosines are not clamped at 0", literal(arrives="any", leaves="any"), CLAMPED),
+        Decoy("the receiver's cosine is not clamped at 0: light from behind counts", literal(arrives="any"), CLAMPED),
+        Decoy("the light's cosine is not clamped at 0: lights shine backwards", literal(leaves="any"), CLAMPED),
+        Decoy("cosines are taken as absolute values", literal(arrives="abs", leaves="abs"), CLAMPED),
+        Decoy("the receiver's cosine is taken as absolute value", literal(arrives="abs"), CLAMPED),
+        Decoy("the light's cosine is taken as absolute value", literal(leaves="abs"), CLAMPED),
+        Decoy("1/r^4 with unit directions", literal(power=4), "E-SII-02"),
+        Decoy("1/r in place of 1/r^2", literal(power=1), "E-SII-02"),
+        Decoy("directions are not normalised", literal(power=0), "E-SII-02"),
+        Decoy("distances count as at least 0.1 m", literal(least=0.1), "no clamp unless asked for"),
+        Decoy("distances count as at least 1 cm", literal(least=0.01), "no clamp unless asked for"),
+        Decoy("places of light and receiver are exchanged", literal(exchanged=True), EQ2),
+        Decoy("the light's normal points inwards", reading(run, lights__normal=lambda a: -a), EQ2),
+        Decoy("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), EQ2),
+        Decoy("only the first half of the lights", reading(run, lights__flux=_first_half, **(
+            {"lights__lobe_flux": _first_half} if glossy else {})), "all lights"),
+        *(() if own else (
+            Decoy("the last light is left out", reading(run, lights__flux=_without_last, **(
+                {"lights__lobe_flux": _without_last} if glossy else {})), "all lights"),
+            Decoy("the largest light in place of the sum", literal(joined="max"), "all lights"))),
+    ] if not clamped else [
+        Decoy("the footprint is divided by 2 pi instead of pi", reading(run, lights__area=lambda a: a / 2), DISC),
+        Decoy("the footprint is not divided by pi", reading(run, lights__area=lambda a: a * np.pi), DISC),
+    ]
+    if glossy:
+        found += [
+            Decoy("lobes are missing", reading(run, lights__lobe_flux=np.zeros_like), "SII Eq. 3"),
+            Decoy("the diffuse part is missing", reading(run, lights__flux=np.zeros_like), "SII Eq. 3"),
+            Decoy("lobes are around the normal", _lobes_at_normal(run), "SII Eq. 3"),
+            Decoy("the lobe's exponent is one too high", reading(run, lights__lobe_exponent=lambda a: a + 1),
+                  "SII Eq. 3"),
+        ]
+        found += [] if clamped else [
+            Decoy("lobes are not normalised", literal(norm="none"), "E-SII-03: (P + 1) / 2 pi K"),
+            Decoy("lobes are normalised over the whole lobe, not over what lies above the surface",
+                  literal(norm="full"), "E-SII-03: (P + 1) / 2 pi K"),
+            Decoy("lobes reach below the light's horizon", literal(horizon=False), "SII Eq. 3"),
+            Decoy("lobes are normalised by (P + 2) / 2 pi", literal(norm="cosine"), "E-SII-03: (P + 1) / 2 pi K"),
+            Decoy("the light's cosine counts for lobes too", literal(lobe_cosine=True), "SII Eq. 3"),
+        ]
+    return tuple(found)
+
+
+def _lobes_at_normal(run: Run) -> Run:
+    return lambda arrays, real: run({**arrays, "lights.lobe_axis": arrays["lights.normal"]}, real)
+
+
+def _first_half(array: Array) -> Array:
+    kept = array.copy()
+    kept[..., (array.shape[-1] + 1) // 2 :] = 0
+    return kept
+
+
+def _without_last(array: Array) -> Array:
+    kept = array.copy()
+    kept[..., -1:] = 0
+    return kept
+
+
+def _literal(
+    arrays: Arrays, own: bool, *, arrives: str = "positive", leaves: str = "positive", power: int = 2,
+    least: float = 0.0, norm: str = "exact", horizon: bool = True, lobe_cosine: bool = False,
+    exchanged: bool = False, joined: str = "sum",
+) -> Array:
+    """Return Eq. 2 and 3 as printed, or with a bug: (3, h, w), in the type of the arrays."""
+    x, n = (np.asarray(arrays[name]) for name in RECEIVERS[:2])
+    real = x.dtype.type
+    shape, covered = x.shape[1:], np.asarray(arrays["gbuffer.triangle_id"]).reshape(-1) >= 0
+    lights = pixel_lights_of(arrays, real)
+    d = x.reshape(3, 1, -1) - lights.position[:, :, None]
+    if own:  # (3, 1, n): light k with receiver k
+        d = x.reshape(3, 1, -1) - lights.position[:, None]
+    unit, r = _directions(-d if exchanged else d)
+    facing, leaving = n.reshape(3, 1, -1), (lights.normal[:, None] if own else lights.normal[:, :, None])
+    arriving, sent = -(facing * unit).sum(axis=0), (leaving * unit).sum(axis=0)
+    area = np.asarray(arrays["lights.area"], real)[:, None] if "lights.area" in arrays else real(0)
+    with np.errstate(divide="ignore"):
+        square = np.maximum(r, real(least)) ** power + area / real(np.pi)
+        fall = {0: np.ones_like(r), 1: 1 / r}.get(power, 1 / square)
+    if power == 0:
+        arriving, sent = arriving * r, sent * r
+    received = _cosine(arriving, arrives) * np.where(r > 0, fall, 0)
+    flux = lights.flux[:, None] if own else lights.flux[:, :, None]
+    total = flux / real(np.pi) * (_cosine(sent, leaves) * received)
+    if lights.lobe_flux is not None and lights.lobe_axis is not None and lights.lobe_exponent is not None:
+        axis = lights.lobe_axis[:, None] if own else lights.lobe_axis[:, :, None]
+        exponent = lights.lobe_exponent[None] if own else lights.lobe_exponent[:, None]
+        lobe = lights.lobe_flux[:, None] if own else lights.lobe_flux[:, :, None]
+        peak = _norms(lights, norm).astype(real)
+        shape_of = np.maximum(0, (axis * unit).sum(axis=0)) ** exponent * (peak[None] if own else peak[:, None])
+        shape_of = np.where((sent > 0) | (not horizon), shape_of, 0) * (np.maximum(0, sent) if lobe_cosine else 1)
+        total = total + lobe * (shape_of * received)
+    total = total.max(axis=1, initial=0) if joined == "max" else total.sum(axis=1)
+    return np.asarray(np.where(covered, total, 0).reshape(3, *shape))
+
+
+def _directions(d: Array) -> tuple[Array, Array]:
+    r = np.sqrt((d**2).sum(axis=0))
+    return np.divide(d, r, out=np.zeros_like(d), where=r > 0), r
+
+
+def _cosine(cosine: Array, how: str) -> Array:
+    if how == "none":
+        return (cosine > 0).astype(cosine.dtype)
+    return {"positive": np.maximum(0, cosine), "any": cosine, "abs": np.abs(cosine)}[how]
+
+
+def _norms(lights: PixelLights, norm: str) -> Array:
+    assert lights.lobe_axis is not None
+    assert lights.lobe_exponent is not None
+    if norm == "none":
+        return np.ones(lights.position.shape[1], lights.position.dtype)
+    if norm in ("full", "cosine"):
+        return (lights.lobe_exponent + (1 if norm == "full" else 2)) / (2 * np.pi)
+    cosine = np.clip((lights.normal * lights.lobe_axis).sum(axis=0), -1, 1)
+    return np.array([lobe_norm(c, p) for c, p in zip(cosine, lights.lobe_exponent, strict=True)], np.float64)
+
+

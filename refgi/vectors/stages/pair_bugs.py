@@ -44,13 +44,12 @@ def pair_decoys(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tup
         Decoy("1/r in place of 1/r^2", literal(power=1), "E-SII-02"),
         Decoy("directions are not normalised", literal(power=0), "E-SII-02"),
         Decoy("distances count as at least 0.1 m", literal(least=0.1), "no clamp unless asked for"),
-        Decoy("distances count as at least 1 cm", literal(least=0.01), "no clamp unless asked for"),
         Decoy("places of light and receiver are exchanged", literal(exchanged=True), EQ2),
         Decoy("the light's normal points inwards", reading(run, lights__normal=lambda a: -a), EQ2),
         Decoy("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), EQ2),
         Decoy("only the first half of the lights", reading(run, lights__flux=_first_half, **(
             {"lights__lobe_flux": _first_half} if glossy else {})), "all lights"),
-        *(() if own else (
+        *((Decoy("distances count as at least 1 cm", literal(least=0.01), "no clamp unless asked for"),) if own else (
             Decoy("the last light is left out", reading(run, lights__flux=_without_last, **(
                 {"lights__lobe_flux": _without_last} if glossy else {})), "all lights"),
             Decoy("the largest light in place of the sum", literal(joined="max"), "all lights"))),

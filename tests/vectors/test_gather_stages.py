@@ -1,7 +1,7 @@
 """Stages of `gather` in the kit: the production method at their end, the literal twin as a port, decoys.
 
-The twin chooses its own samples and texels; here it is given the kit's. It has no depth on the map and no place on it for
-points on a lamp's axis behind it: both are written out.
+The twin chooses its own samples and texels; here it is given the kit's. It has no depth on the map and no place on it
+for points on a lamp's axis behind it: both are written out.
 """
 
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from refgi.rsm.buffers.light_projection import light_projection
 from refgi.splat.gather import gather
 from refgi.vectors.cases.gather import FULL, FULL_PLANS, QUICK, QUICK_PLANS, SQUARE
 from refgi.vectors.cases.scenes import room
-from refgi.vectors.stages.gather import Disc, literal_sum
+from refgi.vectors.stages.gather_disc import Disc, literal_sum
 from tests.naive import gather as twin
 from tests.vectors.splat_ports import LARGEST_MASK, expect_within, made, masked_shares, stages_of, unseen
 

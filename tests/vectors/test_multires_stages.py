@@ -8,11 +8,11 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.splat import multires
-from refgi.vectors.cases.multires import FULL, FULL_PLANS, QUICK, QUICK_PLANS
 from refgi.splat.multires.subsplats.upsample import black_level, filled_cells
+from refgi.vectors.cases.multires import FULL, FULL_PLANS, QUICK, QUICK_PLANS
 from refgi.vectors.stages.lights import pixel_lights_of
-from refgi.vectors.stages.multires_light import tent
 from refgi.vectors.stages.multires_list import subsplats_of
+from refgi.vectors.stages.multires_upsample import tent
 from tests.naive import multires as twin
 from tests.naive import per_light, refinement, upsample
 from tests.vectors.splat_ports import LARGEST_MASK, expect_within, made, masked_shares, stages_of, unseen
@@ -49,7 +49,8 @@ def leaves(known, start=0):
 
 def levels(function, shape, top):
     """Return arrays of levels 1 to top of a function of a cell; channels come first."""
-    return [np.moveaxis(np.array([[function(level, i, j) for j in range(columns)] for i in range(rows)]), (0, 1), (-2, -1))
+    return [np.moveaxis(np.array([[function(level, i, j) for j in range(columns)] for i in range(rows)]), (0, 1),
+                        (-2, -1))
             for level in range(1, top + 1) for rows, columns in [refinement.grid(shape, level)]]
 
 
@@ -85,7 +86,8 @@ def ranges(id, what):
 def largest(id, key, of_pixel):
     _, _, view, top = of(id)
     plane = twin.everywhere(view, of_pixel)
-    return named((key,), [levels(lambda *cell: plane[refinement.pixels_of(plane.shape, *cell)].max(), plane.shape, top)])
+    return named((key,), [levels(lambda *cell: plane[refinement.pixels_of(plane.shape, *cell)].max(), plane.shape,
+                                 top)])
 
 
 def slopes(id):

@@ -1,6 +1,6 @@
-"""Stages of the range of pixel lights in the kit: the production method at their end, the literal twin as a port, decoys.
+"""Stages of the range of pixel lights in the kit: the production method, the literal twin as a port, decoys.
 
-The twin has no ellipsoids apart from meshes: these are compared with the printed formula and with their defining tangent.
+The twin has no ellipsoids apart from meshes: these are compared with the printed formula and their defining tangent.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from refgi.pairs.settings import PairSettings
 from refgi.splat import sii
 from refgi.vectors.cases.sii_range import FULL, FULL_PLANS, QUICK, QUICK_PLANS
 from refgi.vectors.stages.lights import pixel_lights_of
-from refgi.vectors.stages.sii_range import BOTH
+from refgi.vectors.stages.sii_range_sum import BOTH
 from tests.naive import sii as twin
 from tests.naive.pair_term import parts, received
 from tests.vectors.splat_ports import LARGEST_MASK, expect_within, made, masked_shares, stages_of, unseen
@@ -41,7 +41,7 @@ class Given:
         self.known, self.plan = made(id)[1], PLANS[id]()
         self.covered = self.known["gbuffer.triangle_id"] >= 0
         self.x, self.n = (self.known[f"gbuffer.{key}"][:, self.covered].astype(float) for key in ("position", "normal"))
-        drawn = self.plan.count * len(self.plan.scene.lights)
+        drawn = self.plan.lights * len(self.plan.scene.lights)
         self.lights = pixel_lights_of(self.known, np.float64)._replace(drawn=drawn)
         self.parts = parts(self.lights, BARE)
 
@@ -50,8 +50,8 @@ class Given:
         shapes = np.shape(values[0]) if values else ()
         made_here = {}
         for name in BOTH if self.lights.lobe_flux is not None else BOTH[:1]:
-            whole = np.zeros((self.lights.flux.shape[1], *(self.covered.shape if shapes or not values and key in (
-                "strength", "kept") else ())), kind)
+            whole = np.zeros((self.lights.flux.shape[1], *(self.covered.shape if shapes or (not values and key in (
+                "strength", "kept")) else ())), kind)
             for part, value in zip(self.parts, values, strict=True):
                 if (part.exponent is not None) == (name == "glossy"):
                     whole[part.light] = self.picture(value, kind) if shapes else value
@@ -80,7 +80,8 @@ def all_strengths(given):
 def length(given):
     found = [twin.strength(part, given.x, BARE) for part in given.parts]
     brightest = max((twin.peak(part, BARE) for part in given.parts), default=0.0)
-    return {"range.length": np.array([twin.reference_length(given.x, given.lights, brightest, found) if found else 1.0])}
+    return {"range.length": np.array([twin.reference_length(given.x, given.lights, brightest, found)
+                                      if found else 1.0])}
 
 
 def low(given):
@@ -100,13 +101,14 @@ def kept(given):
 
 def total(given):
     pairs, light = given.plan.settings.pairs, np.zeros((3, given.x.shape[1]))
-    for part, counts in zip(parts(given.lights, pairs, given.known.get("lights.area")), given.stored("kept"), strict=True):
+    for part, counts in zip(parts(given.lights, pairs, given.known.get("lights.area")), given.stored("kept"),
+                            strict=True):
         light += np.outer(part.flux, counts[given.covered] * received(part, given.x, given.n, pairs))
     return {"range.irradiance": given.picture(light)}
 
 
 def ellipsoids(given):
-    """The tangent ellipse of n >= 2 at x_0 = 0.71 has the region's radius and slope there and goes through the light."""
+    """The tangent ellipse of n >= 2 at x_0 = 0.71 has the region's radius and slope there and meets the light."""
     n = given.known["range.exponent"].astype(float)
     center = (n / (n + 2)) ** ((n + 2) / 4)
     height = (n / (n + 2)) ** (n / 4) * np.sqrt(2 / (n + 2))

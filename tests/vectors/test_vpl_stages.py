@@ -22,7 +22,7 @@ FLAT = PairSettings(clamp=None)
 def test_the_last_array_is_the_picture_of_the_method(id):
     plan = PLANS[id]()
     frame = Frame(plan.scene, width=plan.size[0], height=plan.size[1], dtype=np.float64, rsm_resolution=plan.maps)
-    expected = vpl(frame, of(VplSettings, lights=plan.count * len(plan.scene.lights)))
+    expected = vpl(frame, of(VplSettings, lights=plan.lights * len(plan.scene.lights)))
     case, known = made(id)
     got = known[case.stages[-1].writes[0]]
     np.testing.assert_allclose(got, expected, rtol=0, atol=STORED * expected.max())

@@ -108,7 +108,7 @@ def gather_discs(
 @kernel
 def sample_texel(center: Array, pattern: Array, i: int, s: int) -> tuple[int, int]:
     """Return row and column of the texel of sample s of receiver i, on the stacked maps or outside of them."""
-    return int(math.floor(center[0, i] + pattern[s, 0])), int(math.floor(center[1, i] + pattern[s, 1]))
+    return math.floor(center[0, i] + pattern[s, 0]), math.floor(center[1, i] + pattern[s, 1])
 
 
 def fill_texels(center: Array, pattern: Array, rows: int, columns: int, cut: bool = True) -> Array:

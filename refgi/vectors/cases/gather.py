@@ -37,7 +37,7 @@ class Plan(NamedTuple):
         return of(GatherSettings, **{"interpolation": None, **self.choices})
 
 
-def gathering(id: str, plan: Plan) -> Case:  # noqa: A002
+def gathering(id: str, plan: Plan) -> Case:
     """Return `gather` as planned: buffers, pattern, places, texels, sums, interpolation."""
     recipe, settings = Recipe(id, "gather", plan.what, id), plan.settings
     give_scene(recipe, plan.scene)
@@ -58,10 +58,12 @@ def at_borders() -> Case:
     give_scene(recipe, scene)
     add_rsm(recipe, scene, 0, maps)
     view = light_projection(scene.lights[0], scene.geometry, maps)
-    places = [(a, b, z) for z in (1.0, 0.5) for a in (-1.0, -0.5, 0.0, 1.0) for b in (-1.0, 0.0, 0.75, 1.0)]  # on the map
+    places = [(a, b, z) for z in (1.0, 0.5) for a in (-1.0, -0.5, 0.0, 1.0)
+              for b in (-1.0, 0.0, 0.75, 1.0)]  # on the map
     places += [(1.5, 0.25, 1.0), (-3.0, 1.5, 0.5), (0.0, -2.0, 1.0), (8.0, 8.0, 0.25)]  # beyond it
     local = [(a * z, b * z, z) for a, b, z in places]
-    local += [(0.5, 0.25, -0.25), (-0.25, 0.5, -0.5), (0.0, 0.0, -0.25), (0.5, 0.0, 0.0), (0.0, 0.0, 0.0)]  # behind, at it
+    local += [(0.5, 0.25, -0.25), (-0.25, 0.5, -0.5), (0.0, 0.0, -0.25), (0.5, 0.0, 0.0),
+              (0.0, 0.0, 0.0)]  # behind, at it
     position = view.origin[0] + np.asarray(local) @ view.frame[0]
     texels = recipe.expected()["rsm0.position"][:, 3:9:5, 2:11:4].reshape(3, -1)
     position = np.concatenate([position.T, texels], axis=1)
@@ -86,14 +88,16 @@ QUICK_PLANS: dict[str, Callable[[], Plan]] = {
     "gather-spot": lambda: Plan("one spot, discs of 0.3 map widths, no lobes", room(SPOT, matte=True), (24, 18), 13,
                                 {"samples": 24, "radius": 0.3}),
     "gather-three-lamps": lambda: Plan(
-        "spot, cube and directional maps; of glossy surfaces the diffuse part alone", room(SPOT, BULB, SUN), (17, 13), 11,
+        "spot, cube and directional maps; of glossy surfaces the diffuse part alone", room(SPOT, BULB, SUN), (17, 13),
+        11,
         {"samples": 16, "radius": 0.5}),
     "gather-behind": lambda: Plan(
         "receivers behind the lamp, texels moved back by 2 cm, xi1^2 as weight, discs of more than the map",
         room(DOWN, matte=True), (19, 23), 12, {"samples": 20, "radius": 1.5, "disc.offset": 0.02,
                                                "disc.as_published": frozenset({"rsm_weight_squared"})}),
     "gather-interpolated": lambda: Plan(
-        "interpolated between 9 x 9 coarse pixels where surfaces are similar", room(SPOT, DOWN, smooth=True), (31, 25), 12,
+        "interpolated between 9 x 9 coarse pixels where surfaces are similar", room(SPOT, DOWN, smooth=True), (31, 25),
+        12,
         {"samples": 12, "radius": 0.4, "interpolation": "coarse", "interpolation.grid": 9, "interpolation.reach": 0.2}),
 }
 FULL_PLANS: dict[str, Callable[[], Plan]] = {
@@ -103,10 +107,10 @@ FULL_PLANS: dict[str, Callable[[], Plan]] = {
 
 
 def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
-    def made(id: str) -> Case:  # noqa: A002
+    def made(id: str) -> Case:
         return gathering(id, plans[id]())
 
-    return {id: partial(made, id) for id in plans}  # noqa: A001
+    return {id: partial(made, id) for id in plans}
 
 
 QUICK, FULL = {**_cases(QUICK_PLANS), "gather-border": at_borders}, _cases(FULL_PLANS)

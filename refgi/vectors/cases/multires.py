@@ -26,19 +26,19 @@ class Plan(NamedTuple):
     scene: Scene
     size: tuple[int, int]  # columns and rows of the picture
     maps: int  # texels along the side of a map
-    count: int  # lights of each map, on a grid
+    lights: int  # lights of each map, on a grid
     choices: dict[str, Any]  # settings by their keys
 
     @property
     def settings(self) -> MultiresSettings:
         """Settings of the method; few cells on the coarsest level."""
-        return of(MultiresSettings, **{"lights": self.count * len(self.scene.lights), "coarsest": 5, **self.choices})
+        return of(MultiresSettings, **{"lights": self.lights * len(self.scene.lights), "coarsest": 5, **self.choices})
 
 
-def multiresolution(id: str, plan: Plan) -> Case:  # noqa: A002
+def multiresolution(id: str, plan: Plan) -> Case:
     """Return `multires` as planned: buffers, lights, refinement, light, picture."""
     recipe, settings, lamps = Recipe(id, "multires", plan.what, id), plan.settings, len(plan.scene.lights)
-    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.count,) * lamps, pattern="grid")
+    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, pattern="grid")
     if settings.effective_pairs.needs_footprints:
         add_footprints(recipe, lamps)
     add_multires(recipe, settings, *plan.size)
@@ -95,10 +95,10 @@ FULL_PLANS: dict[str, Callable[[], Plan]] = {
 
 
 def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
-    def made(id: str) -> Case:  # noqa: A002
+    def made(id: str) -> Case:
         return multiresolution(id, plans[id]())
 
-    return {id: partial(made, id) for id in plans}  # noqa: A001
+    return {id: partial(made, id) for id in plans}
 
 
 QUICK, FULL = _cases(QUICK_PLANS), _cases(FULL_PLANS)

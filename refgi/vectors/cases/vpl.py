@@ -21,14 +21,14 @@ class Plan(NamedTuple):
     scene: Scene
     size: tuple[int, int]  # columns and rows of the picture
     maps: int  # texels along the side of a map
-    count: int  # lights of each map, by Halton points
+    lights: int  # lights of each map, by Halton points
 
 
-def shadowed(id: str, plan: Plan) -> Case:  # noqa: A002
+def shadowed(id: str, plan: Plan) -> Case:
     """Return `vpl` as planned: buffers, lights, visibility, sum."""
     recipe = Recipe(id, "vpl", plan.what, id)
     lamps = len(plan.scene.lights)
-    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.count,) * lamps, shifts=default_shifts(lamps))
+    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, shifts=default_shifts(lamps))
     add_vpl(recipe, plan.scene)
     return recipe.case()
 
@@ -40,11 +40,13 @@ def default_shifts(lamps: int) -> tuple[tuple[float, float], ...]:
 
 
 QUICK_PLANS: dict[str, Callable[[], Plan]] = {
-    "vpl-spot": lambda: Plan("one spot, no lobes; shadows of a shelf and a lid", room(SPOT, matte=True), (24, 18), 13, 32),
+    "vpl-spot": lambda: Plan("one spot, no lobes; shadows of a shelf and a lid", room(SPOT, matte=True), (24, 18), 13,
+                             32),
     "vpl-smooth": lambda: Plan("interpolated normals on a ball: pixels that face lights below their triangle; lobes",
                                room(SPOT, smooth=True), (26, 20), 13, 24),
     "vpl-sun": lambda: Plan("spot and directional lamp, purely glossy surfaces", room(DOWN, SUN), (19, 13), 11, 14),
-    "vpl-no-flux": lambda: Plan("a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True), (12, 9),
+    "vpl-no-flux": lambda: Plan("a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True),
+                                (12, 9),
                                 7, 5),
 }
 FULL_PLANS: dict[str, Callable[[], Plan]] = {
@@ -53,10 +55,10 @@ FULL_PLANS: dict[str, Callable[[], Plan]] = {
 
 
 def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
-    def made(id: str) -> Case:  # noqa: A002
+    def made(id: str) -> Case:
         return shadowed(id, plans[id]())
 
-    return {id: partial(made, id) for id in plans}  # noqa: A001
+    return {id: partial(made, id) for id in plans}
 
 
 QUICK, FULL = _cases(QUICK_PLANS), _cases(FULL_PLANS)

@@ -1,6 +1,7 @@
 """Adaptive multiresolution splatting (Nichols and Wyman 2009) as stages, from the G-buffer and pixel lights on.
 
-`multires_ranges` finds discontinuous cells, `multires_list` the subsplats, `multires_light` their light and the picture.
+`multires_ranges` finds discontinuous cells, `multires_list` the subsplats, `multires_light` their light and
+`multires_upsample` the picture.
 """
 
 import dataclasses
@@ -8,9 +9,10 @@ import dataclasses
 from refgi.splat.multires.refinement.grid import top_level
 from refgi.splat.multires.settings import ByGeometry, MultiresSettings
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.stages.multires_light import add_detail, add_irradiance, add_points, add_upsampling
+from refgi.vectors.stages.multires_light import add_detail, add_irradiance, add_points
 from refgi.vectors.stages.multires_list import add_states, add_subsplats
 from refgi.vectors.stages.multires_ranges import add_curvatures, add_discontinuities, add_ranges, add_slopes
+from refgi.vectors.stages.multires_upsample import add_upsampling
 
 
 def add_multires(recipe: Recipe, settings: MultiresSettings, width: int, height: int) -> None:

@@ -1,5 +1,6 @@
 """Stages of the list of subsplats: states of cells, leaves, points they are evaluated at (Nichols and Wyman 2009)."""
 
+from functools import partial
 from typing import Any, get_args
 
 import numpy as np
@@ -18,9 +19,9 @@ SUBSPLATS = ("multires.level", "multires.row", "multires.column", "multires.pixe
 
 def subsplats_of(arrays: Arrays, top: int) -> Subsplats:
     """Return the list of subsplats among arrays."""
-    shape = np.asarray(arrays[IDS]).shape
+    shape: tuple[int, int] = np.asarray(arrays[IDS]).shape
     level, row, column = (np.asarray(arrays[name]) for name in SUBSPLATS[:3])
-    leaf = tuple(np.zeros(level_shape(*shape, one), np.bool_) for one in range(top + 1))
+    leaf = tuple(np.zeros(level_shape(shape[0], shape[1], one), np.bool_) for one in range(top + 1))
     for k in range(len(level)):
         leaf[level[k]][row[k], column[k]] = True
     pixel = np.asarray(arrays.get(SUBSPLATS[3], np.zeros_like(level)), np.int64)
@@ -38,13 +39,15 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
 
     whole = {name.replace(".", "__"): lambda a: np.where(a == EMPTY, ENOUGH, a) for name in states}
     beside = {name.replace(".", "__"): _spread_to_sides for name in marks}
-    names = {"off": "neighbours across a corner do not count", "corner": "of neighbours across a corner only those count "
+    names = {"off": "neighbours across a corner do not count", "corner": "of neighbours across a corner only those "
+             "count "
              "that no cell between shows", "literal": "every neighbour across a corner counts",
              "full8": "all eight neighbours count"}
     recipe.add("multires.states", "which cells are refined, by their own need or across a corner", run, (IDS, *marks), {
-        name: Spec("row, column", "1", "0 no surface, 1 a subsplat may end here, 2 refined", tier="T0") for name in states},
+        name: Spec("row, column", "1", "0 no surface, 1 a subsplat may end here, 2 refined", tier="T0")
+        for name in states},
         paper="AMS Sec. 3.3, 5.2; E-AMS-10", decoys=(
-            *(Decoy(names[rule], lambda a, r, rule=rule: run(a, r, rule), "E-AMS-10")
+            *(Decoy(names[rule], partial(run, rule=rule), "E-AMS-10")
               for rule in get_args(Diagonal) if rule != diagonal),
             Decoy("cells without surface are kept", writing(run, **whole), "they are never evaluated"),
             Decoy("neighbours across an edge count, not those across a corner", reading(
@@ -63,8 +66,9 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
     def cells(arrays: Arrays) -> CellStates:
         covered = covered_of(arrays)
         flat = [np.asarray(arrays[name], np.uint8).reshape(-1) for name in states]
-        return CellStates(covered, np.concatenate([np.zeros(0, np.uint8), *flat]), layout(*covered.shape, top, first=1),
-                          layout(*covered.shape, top))
+        height, width = covered.shape
+        return CellStates(covered, np.concatenate([np.zeros(0, np.uint8), *flat]), layout(height, width, top, first=1),
+                          layout(height, width, top))
 
     def named(level: Array, row: Array, column: Array, pixel: Array) -> Arrays:
         columns = (np.asarray(one, np.int32) for one in (level, row, column, pixel))
@@ -83,7 +87,8 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
             row, column = row[above], column[above]
             found.append(np.stack([np.full(len(row), level), row, column, pixels[level][row, column]]))
         listed = np.concatenate(found, axis=1)
-        return named(*listed[:, np.argsort(_place(*listed[:3], top, grids[top].shape[1]), kind="stable")])
+        place = _place(listed[0], listed[1], listed[2], top, grids[top].shape[1])
+        return named(*(column[np.argsort(place, kind="stable")] for column in listed))
 
     def placed(down: int, cut: bool = True) -> Run:
         """Return the stage with the pixel at or before the centre, whether it shows a surface or not."""
@@ -106,9 +111,11 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
         return {**made, SUBSPLATS[3]: made[SUBSPLATS[3]] % shape[1] * shape[0] + made[SUBSPLATS[3]] // shape[1]}
 
     what = {"level": "cell of 2^level pixels a side", "row": "in the grid of its level", "column": "in the grid of its "
-            "level", "pixel": "row * width + column of the pixel right and below of the cell's centre, or of the nearest "
+            "level", "pixel": "row * width + column of the pixel right and below of the cell's centre, or of the "
+            "nearest "
             "that shows a surface, the first of several"}
-    recipe.add("multires.subsplats", "the list of subsplats: cells of the coarsest level row by row, in each depth first, "
+    recipe.add("multires.subsplats", "the list of subsplats: cells of the coarsest level row by row, in each depth "
+               "first, "
                "top left, top right, bottom left, bottom right", run, (IDS, *states),
                {f"multires.{key}": Spec("subsplat", "1", one, tier="T0") for key, one in what.items()},
                paper="AMS Sec. 3.3; E-AMS-08, E-AMS-11", decoys=(
@@ -118,7 +125,8 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
                    Decoy("the pixel at the centre, whether it shows a surface or not", placed(0), "E-AMS-11"),
                    Decoy("the list is sorted by levels", reordered, "order of the list"),
                    Decoy("pixels are counted column by column", transposed, "row * width + column"),
-                   Decoy("pixels without surface are listed", reading(run, gbuffer__triangle_id=everywhere), "never evaluated")))
+                   Decoy("pixels without surface are listed", reading(run, gbuffer__triangle_id=everywhere),
+                         "never evaluated")))
 
 
 def _place(level: Array, row: Array, column: Array, top: int, columns: int) -> Array:

@@ -6,7 +6,7 @@ Level l has cells of 2^l x 2^l pixels, cut at the right and lower border; a pixe
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from refgi.splat.multires.refinement.criteria import (
 )
 from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
 from refgi.splat.multires.refinement.mipmap import START, Mipmap, element_count, layout, level_views
-from refgi.splat.multires.settings import Criteria
+from refgi.splat.multires.settings import Criteria, Measure
 from refgi.vectors.recipe import Recipe, reading
 from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
 
@@ -61,17 +61,19 @@ def add_ranges(recipe: Recipe, what: str, top: int, rim: int, components: int) -
 
         return altered
 
-    empty = {f"{source.replace('.', '__')}": lambda a: np.where(np.isfinite(a), a, 0.0), "gbuffer__triangle_id": everywhere}
+    empty = {source.replace(".", "__"): lambda a: np.where(np.isfinite(a), a, 0.0), "gbuffer__triangle_id": everywhere}
     axes, unit = ("row, column", "m") if what == "depth" else ("xyz, row, column", "1")
-    text = "{} " + ("depth" if what == "depth" else "of each component of the normals") + " in each cell; {} where empty"
-    recipe.add(f"multires.{what}_ranges", f"least and largest {what} within each cell of each level", run, (source, IDS), {
+    text = "{} " + ("depth" if what == "depth" else "of each component of normals") + " in each cell; {} where empty"
+    recipe.add(f"multires.{what}_ranges", f"least and largest {what} within each cell of each level", run,
+               (source, IDS), {
         **{name: Spec(axes, unit, text.format("least", "inf")) for name in lows},
         **{name: Spec(axes, unit, text.format("largest", "-inf")) for name in highs},
     }, paper="AMS Sec. 3.2.1" if what == "depth" else "AMS Sec. 3.2.2", exact=(source,), decoys=(
         Decoy("pixels without surface count as 0", reading(run, **empty), "only surfaces count"),
         Decoy("the last row and column of odd sizes are left out", reading(run, gbuffer__triangle_id=_even_part),
               "cells are cut by the border"),
-        Decoy("a cell takes one of its four finer cells", joined(lambda four: four[0], lambda four: four[0]), "min-max"),
+        Decoy("a cell takes one of its four finer cells", joined(lambda four: four[0], lambda four: four[0]),
+              "min-max"),
         Decoy("the fourth quadrant is left out", joined(lambda four: np.min(four[:3], axis=0),
                                                         lambda four: np.max(four[:3], axis=0)), "E-AMS-06"),
         Decoy("least and largest are exchanged", lambda a, r: named(*(
@@ -120,7 +122,8 @@ def add_slopes(recipe: Recipe, top: int, relative: bool) -> None:
 
     recipe.add("multires.slopes", "steepest change of depth from pixel to pixel within each cell", run,
                ("gbuffer.depth", IDS), {
-                   name: Spec("row, column", "1/pixel" if relative else "m/pixel", "sqrt(dx^2 + dy^2), the larger of both "
+                   name: Spec("row, column", "1/pixel" if relative else "m/pixel", "sqrt(dx^2 + dy^2), the larger "
+                              "of both "
                               "differences along each axis" + ", over the depth" * relative) for name in names},
                paper="AMS Sec. 3.2.1", exact=("gbuffer.depth",), decoys=(
                    Decoy("slopes are not divided by the depth" if relative else "slopes are divided by the depth",
@@ -151,7 +154,8 @@ def add_curvatures(recipe: Recipe, top: int, rate: bool) -> None:
                    Decoy("angles in place of chords", angles, "E-AMS-01: |N1 - N2|"),
                    Decoy("the distance of the points is left out" if rate else "divided by the distance of the points",
                          lambda a, r: run(a, r, not rate), "E-AMS-01"),
-                   Decoy("pixels without surface count", reading(run, gbuffer__triangle_id=everywhere), "only surfaces count")))
+                   Decoy("pixels without surface count", reading(run, gbuffer__triangle_id=everywhere),
+                         "only surfaces count")))
 
 
 def add_discontinuities(
@@ -190,15 +194,14 @@ def add_discontinuities(
               for kind in ("depth", "derivative", "normal", "curvature") if getattr(criteria, kind) is not None]
     if criteria.depth is not None:
         decoys += [Decoy(cause, another(depth=dataclasses.replace(criteria.depth, measure=measure)), "E-AMS-07")
-                   for measure, cause in (("relative", "depths are compared with a share of the depth"),
-                                          ("absolute", "depths are compared with a length in metres"),
-                                          ("demo", "the threshold of depths falls as 3 / level"))
-                   if measure != criteria.depth.measure]
+                   for measure, cause in zip(get_args(Measure), (
+                       "depths are compared with a share of the depth", "depths are compared with a length in metres",
+                       "the threshold of depths falls as 3 / level"), strict=True) if measure != criteria.depth.measure]
     if criteria.normal is not None and criteria.normal.components == "xyz":
         decoys.append(Decoy("z of the normals is left out", another(normal=dataclasses.replace(
             criteria.normal, components="xy")), "E-AMS-07: three components, x and y in the authors' demo"))
     if criteria.depth is not None and criteria.normal is not None:
-        single = [dataclasses.replace(criteria, **{kind: None}) for kind in ("depth", "normal")]
+        single = dataclasses.replace(criteria, depth=None), dataclasses.replace(criteria, normal=None)
         decoys.append(Decoy("depth and normal must both be discontinuous", lambda a, r: dict(zip(names, level_views(
             marks(a, r, single[0]) & marks(a, r, single[1]), sizes, first=1), strict=True)), "any test counts"))
     if finest:

@@ -1,4 +1,4 @@
-"""Stages of the range of pixel lights: peaks, B, reference length, I_low, R_0, pairs that count, their sum (SII Sec. 3.4).
+"""Stages of the range of pixel lights: peaks, B, reference length, I_low, R_0, pairs that count, sum (SII Sec. 3.4).
 
 B = I(w) / r^2 is the irradiance that a light causes at most; the largest channel of its intensity counts. A pair counts
 where B >= I_low, one irradiance for all lights; the parts of a light, diffuse and glossy, have each their own range.
@@ -8,32 +8,35 @@ from typing import Any
 
 import numpy as np
 
-from refgi.pairs.irradiance import Receivers, irradiance
+from refgi.pairs.irradiance import Receivers
 from refgi.pairs.packing import Packed, pack
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import LobeSettings, PairSettings
-from refgi.splat.sii.reach.bounds import appendix_ellipsoid, tangent_ellipsoid
 from refgi.splat.sii.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW, reference_length, strengths
-from refgi.splat.sii.reach.threshold import DIFFUSE, GLOSSY, all_peaks, light_range, threshold
-from refgi.splat.sii.settings import AbsoluteCut, FullBound, ReachSettings, RelativeCut, SiiSettings
-from refgi.splat.sii.sii import splat
+from refgi.splat.sii.reach.threshold import all_peaks, threshold
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.pairs import RECEIVERS
-
-BOTH = ("diffuse", "glossy")
-LENGTH, LOW, LIGHT = "range.length", "range.low", "range.irradiance"
-BARE = PairSettings(clamp=None)
-EXPONENTS = (0.25, 1.0, 2.0, 3.0, 10.0, 40.0, 100.0, 1000.0)
-PAPER = "SII Sec. 3.4; E-SII-11"
+from refgi.vectors.stages.sii_range_sum import (
+    BARE,
+    BOTH,
+    LENGTH,
+    LOW,
+    PAPER,
+    add_kept,
+    add_squares,
+    add_sum,
+    peaks_of,
+    relative_reach,
+)
 
 
 def add_range(recipe: Recipe, drawn: int, share: float, length: float | None, pairs: PairSettings = BARE) -> None:
     """Add ranges and the sum of the pairs in range.
 
-    `drawn` counts lights without flux as well; I_low is `share` times the largest peak over the square of `length`, or of
-    the reference length where that is absent.
+    `drawn` counts lights without flux as well; I_low is `share` times the largest peak over the square of `length`, or
+    of the reference length where that is absent.
     """
     parts = BOTH if "lights.lobe_flux" in recipe.specs else BOTH[:1]
     recipe.facts["range"] = {"share": share, "reference_length": length, "lights_drawn": drawn,
@@ -42,43 +45,13 @@ def add_range(recipe: Recipe, drawn: int, share: float, length: float | None, pa
     _add_peaks(recipe, parts)
     _add_strengths(recipe, parts)
     if length is None:
-        _add_length(recipe, parts, drawn)
+        _add_length(recipe, drawn)
     else:
         recipe.give(LENGTH, np.array([length]), Spec("one", "m", "reference length of the share"))
     _add_low(recipe, parts, share)
-    _add_squares(recipe, parts, share)
-    _add_kept(recipe, parts)
-    _add_sum(recipe, parts, pairs)
-
-
-def add_ellipsoids(recipe: Recipe) -> None:
-    """Add the bounds of the region where B >= I_low, for some exponents."""
-    recipe.give("range.exponent", np.array(EXPONENTS), Spec("shape", "1", "exponent n of cos^n; 1: diffuse"))
-    names = [f"range.{kind}_{key}" for kind in ("appendix", "tangent") for key in ("center", "half_width", "height")]
-
-    def run(arrays: Arrays, real: Any) -> Arrays:
-        n = np.asarray(arrays["range.exponent"], np.float64)
-        both = (*appendix_ellipsoid(n), *tangent_ellipsoid(n))
-        return {name: np.asarray(one, real) for name, one in zip(names, both, strict=True)}
-
-    def printed(arrays: Arrays, real: Any) -> Arrays:
-        n = np.asarray(arrays["range.exponent"], np.float64)
-        return {**run(arrays, real), names[0]: n / (n + 2) * (n + 2) / 4}
-
-    what = {"center": "place of the centre along the axis", "half_width": "half axis along it",
-            "height": "half axis across it"}
-    recipe.add("range.ellipsoids", "ellipsoids of revolution around the region in units of R_0: centred where it is widest, "
-               "and the least wasteful one through the light", run, ("range.exponent",), {
-                   name: Spec("shape", "1", what[name.split("_", 1)[1]] + ", in R_0") for name in names},
-               paper="SII Eq. 7 and 8; E-SII-12, E-SII-13", decoys=(
-                   Decoy("the exponent of Eq. 8 is printed as a factor", printed, "E-SII-12"),
-                   Decoy("the ellipsoid is as wide as its centre is far", writing(run, **{
-                       names[1].replace(".", "__"): lambda a: a * 0 + 0.438691}), "E-SII-13: max(c, 1 - c)"),
-                   Decoy("the height is that of the diffuse light", writing(run, **{
-                       names[2].replace(".", "__"): lambda a: np.full_like(a, a[1])}), "E-SII-13: F(c)"),
-                   Decoy("the tangent ellipsoid is the appendix's", lambda a, r: dict(zip(names, [
-                       run(a, r)[name] for name in names[:3]] * 2, strict=True)), "E-SII-13"),
-                   Decoy("n is one too high", reading(run, range__exponent=lambda a: a + 1), "SII Eq. 8")))
+    add_squares(recipe, parts, share)
+    add_kept(recipe, parts)
+    add_sum(recipe, parts, pairs)
 
 
 def _packed(arrays: Arrays, pairs: PairSettings = BARE) -> tuple[PixelLights, Packed]:
@@ -159,7 +132,8 @@ def _add_strengths(recipe: Recipe, parts: tuple[str, ...]) -> None:
     def at_peak(arrays: Arrays, real: Any) -> Arrays:
         (d, r), made = to_light(arrays), run(arrays, real)
         cosine = -(d * np.asarray(arrays["lights.normal"])[:, :, None, None]).sum(axis=0) / r
-        return {**made, names[0]: np.divide(made[names[0]], cosine, out=np.zeros_like(made[names[0]]), where=cosine > 0)}
+        return {**made, names[0]: np.divide(made[names[0]], cosine, out=np.zeros_like(made[names[0]]),
+                                            where=cosine > 0)}
 
     def powered(power: int) -> Run:
         def altered(arrays: Arrays, real: Any) -> Arrays:
@@ -170,7 +144,8 @@ def _add_strengths(recipe: Recipe, parts: tuple[str, ...]) -> None:
 
     recipe.add("range.strengths", "B, what each light causes at each pixel at most", run,
                (*RECEIVERS, *light_names(recipe)), {name: Spec(
-                   "light, row, column", "W/m^2", f"I(w) / r^2 of the {part} part, without the pixel's cosine; 0 without "
+                   "light, row, column", "W/m^2", f"I(w) / r^2 of the {part} part, without the pixel's cosine; 0 "
+                   "without "
                    "surface", paper=PAPER) for name, part in zip(names, parts, strict=True)},
                paper=PAPER, exact=(RECEIVERS[0], "lights.position"), decoys=(
                    Decoy("the pixel's cosine counts", with_receiver, "the pixel's cosine is taken as 1"),
@@ -180,19 +155,22 @@ def _add_strengths(recipe: Recipe, parts: tuple[str, ...]) -> None:
                    Decoy("pixels without surface count", reading(run, gbuffer__triangle_id=np.zeros_like), "surfaces")))
 
 
-def _add_length(recipe: Recipe, parts: tuple[str, ...], drawn: int) -> None:
+def _add_length(recipe: Recipe, drawn: int) -> None:
     def run(arrays: Arrays, real: Any, count: int = drawn) -> Arrays:
         ids = np.asarray(arrays[RECEIVERS[2]])
-        at = Receivers(*(np.ascontiguousarray(arrays[name], np.float64) for name in RECEIVERS[:2]), covered=ids >= 0)
+        position, normal = (np.ascontiguousarray(arrays[name], np.float64) for name in RECEIVERS[:2])
+        at = Receivers(position, normal, ids >= 0)
         return {LENGTH: np.array([reference_length(at, pixel_lights_of(arrays, real)._replace(drawn=count), BARE)])}
 
     def fixed(length: float) -> Run:
-        return lambda a, r: {LENGTH: np.array([length], r)}
+        return lambda _, real: {LENGTH: np.array([length], real)}
 
     recipe.add("range.length", "length under which 5 % of the largest peak leave 125 of 768 pairs", run,
                (*RECEIVERS, *light_names(recipe)), {LENGTH: Spec(
-                   "one", "m", "sqrt(0.05 / b), b the k-th largest B over the largest I_0 of all pairs of part and pixel, k "
-                   "= 125/768 of all pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels and lights; 1 "
+                   "one", "m", "sqrt(0.05 / b), b the k-th largest B over the largest I_0 of all pairs of part and "
+                   "pixel, k "
+                   "= 125/768 of all pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels and "
+                   "lights; 1 "
                    "where nothing is lit")},
                paper="SII Fig. 8; E-SII-11", exact=(RECEIVERS[0], "lights.position"), decoys=(
                    Decoy("lights drawn without flux do not count", lambda a, r: run(
@@ -204,20 +182,14 @@ def _add_length(recipe: Recipe, parts: tuple[str, ...], drawn: int) -> None:
                    Decoy("half as many pairs are left", lambda a, r: run(a, r, drawn // 2), "125 of 768")))
 
 
-def _peaks(arrays: Arrays, parts: tuple[str, ...]) -> list[Array]:
-    return [np.asarray(arrays[f"range.{part}_peak"], np.float64) for part in parts]
-
-
-def _relative(share: float, arrays: Arrays, switches: frozenset[str] = frozenset()) -> ReachSettings:
-    return ReachSettings(cut=RelativeCut(share, float(np.asarray(arrays[LENGTH])[0]), switches))
-
-
 def _add_low(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
     def run(arrays: Arrays, real: Any) -> Arrays:
-        return {LOW: np.array([threshold(np.concatenate(_peaks(arrays, parts)), _relative(share, arrays))], real)}
+        return {LOW: np.array([threshold(np.concatenate(peaks_of(arrays, parts)), relative_reach(share, arrays))],
+                              real)}
 
     peaks = {f"range__{part}_peak": _mean for part in parts}
-    recipe.add("range.low", f"I_low = {share:g} max I_0 / L^2", run, (LENGTH, *(f"range.{part}_peak" for part in parts)), {
+    recipe.add("range.low", f"I_low = {share:g} max I_0 / L^2", run, (LENGTH,
+                                                                      *(f"range.{part}_peak" for part in parts)), {
         LOW: Spec("one", "W/m^2", "irradiance under which pairs are left out; 0 without lights", paper=PAPER)},
         paper=PAPER, decoys=(
             Decoy("the length is not squared", reading(run, range__length=np.sqrt), PAPER),
@@ -232,94 +204,3 @@ def _mean(peaks: Array) -> Array:
     return np.full_like(peaks, peaks.mean()) if peaks.size else peaks
 
 
-def _add_squares(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
-    names = [f"range.{part}_square" for part in parts]
-
-    def run(arrays: Arrays, real: Any, own: bool = False) -> Arrays:
-        low = float(np.asarray(arrays[LOW])[0])
-        reach = _relative(share, arrays, frozenset({"per_light_ilow"})) if own else ReachSettings(cut=None)
-        ranges = [light_range(peak, low, reach, part, real) for part, peak in zip((DIFFUSE, GLOSSY), _peaks(arrays, parts),
-                                                                                 strict=False)]
-        return {name: one.square for name, one in zip(names, ranges, strict=True)}
-
-    def all_of(change: Any) -> Run:
-        return writing(run, **{name.replace(".", "__"): change for name in names})
-
-    recipe.add("range.squares", "R_0^2 = I_0 / I_low of each part of each light", run,
-               (LOW, LENGTH, *(f"range.{part}_peak" for part in parts)), {
-                   name: Spec("light", "m^2", f"square of the largest distance at which the {part} part counts")
-                   for name, part in zip(names, parts, strict=True)}, paper=PAPER, decoys=(
-                   Decoy("R_0 in place of its square", all_of(np.sqrt), PAPER),
-                   Decoy("I_low is a share of the light's own peak: all reach equally far", lambda a, r: run(a, r, True),
-                         "E-SII-11"),
-                   Decoy("all have the range of the brightest", all_of(lambda a: np.full_like(a, a.max(initial=0))), PAPER),
-                   Decoy("a diameter in place of a radius", all_of(lambda a: a / 4), PAPER)))
-
-
-def _add_kept(recipe: Recipe, parts: tuple[str, ...]) -> None:
-    names, sources = [f"range.{part}_kept" for part in parts], [f"range.{part}_strength" for part in parts]
-
-    def run(arrays: Arrays, real: Any) -> Arrays:
-        low = np.asarray(arrays[LOW], real)[0]
-        return {name: (np.asarray(arrays[source], real) >= low) & (np.asarray(arrays[source]) > 0)
-                for name, source in zip(names, sources, strict=True)}
-
-    recipe.add("range.kept", "pairs that count: B >= I_low", run, (LOW, *sources), {
-        name: Spec("light, row, column", "1", f"true where the {part} part counts; never where B is 0", tier="T0")
-        for name, part in zip(names, parts, strict=True)}, paper=PAPER, decoys=(
-            Decoy("pairs below I_low count", writing(run, **{name.replace(".", "__"): np.logical_not for name in names}),
-                  PAPER),
-            Decoy("all pairs count", reading(run, range__low=np.zeros_like), PAPER),
-            Decoy("I_low is divided by pi", reading(run, range__low=lambda a: a / np.pi), PAPER)))
-
-
-def _add_sum(recipe: Recipe, parts: tuple[str, ...], pairs: PairSettings) -> None:
-    area = ("lights.area",) if pairs.needs_footprints else ()
-    names, kept = light_names(recipe), [f"range.{part}_kept" for part in parts]
-
-    def receivers_of(arrays: Arrays, real: Any, covered: Array) -> Receivers:
-        position, normal = (np.ascontiguousarray(arrays[name], real) for name in RECEIVERS[:2])
-        return Receivers(position, normal, covered)
-
-    def run(arrays: Arrays, real: Any) -> Arrays:
-        low = float(np.asarray(arrays[LOW])[0])
-        at = receivers_of(arrays, real, np.asarray(arrays[RECEIVERS[2]]) >= 0)
-        cut = AbsoluteCut(low) if low > 0 else None
-        settings = SiiSettings(pairs=pairs, reach=ReachSettings(cut=cut, bound=FullBound()))
-        footprint = np.ascontiguousarray(arrays["lights.area"], np.float64) if area else None
-        return {LIGHT: splat(at, pixel_lights_of(arrays, real), settings, footprint)}
-
-    def every(arrays: Arrays, real: Any) -> Arrays:
-        return run({**arrays, LOW: np.zeros(1, real)}, real)
-
-    def masked(change: Any, own: bool = False) -> Run:
-        """Return the sum of parts, each where a mask made of those that count says; `own`: where its light exceeds I_low."""
-        def altered(arrays: Arrays, real: Any) -> Arrays:
-            total, fluxes = np.zeros_like(np.asarray(arrays[RECEIVERS[0]], real)), ("lights.flux", "lights.lobe_flux")
-            covered = np.asarray(arrays[RECEIVERS[2]]) >= 0
-            for part, mask in enumerate(change([np.asarray(arrays[name]) for name in kept])):
-                alone = {fluxes[1 - part]: np.zeros_like(arrays["lights.flux"])} if len(parts) > 1 else {}
-                for k, here in enumerate(mask):
-                    one = {name: (alone.get(name, arrays[name]))[..., k : k + 1] for name in names}
-                    footprint = np.asarray(arrays["lights.area"], np.float64)[k : k + 1] if area else None
-                    at = receivers_of(arrays, real, covered & (own | here))
-                    light = irradiance(at, pixel_lights_of(one, real), pairs, footprint)
-                    total += np.where(light.max(axis=0) >= np.asarray(arrays[LOW])[0], light, 0) if own else light
-            return {LIGHT: total}
-
-        return altered
-
-    decoys = [Decoy("nothing is cut", every, PAPER),
-              Decoy("what is cut is summed", lambda a, r: {LIGHT: every(a, r)[LIGHT] - run(a, r)[LIGHT]}, PAPER),
-              Decoy("a light counts at all pixels or at none", masked(lambda masks: [
-                  np.broadcast_to(mask.any(axis=(1, 2), keepdims=True), mask.shape) for mask in masks]), "pair by pair"),
-              Decoy("pairs count by their light, the pixel's cosine included", masked(lambda masks: masks, own=True), PAPER),
-              Decoy("1/pi is left out", reading(run, lights__flux=lambda a: a * np.pi), "I_0 = Phi / pi")]
-    if len(parts) > 1:
-        decoys += [Decoy("a light's lobe counts where its diffuse part does", masked(lambda masks: [masks[0]] * 2),
-                         "each part has its range"),
-                   Decoy("a light counts whole where one of its parts does", masked(lambda masks: [masks[0] | masks[1]] * 2),
-                         "each part has its range")]
-    recipe.add("range.sum", "irradiance of the pairs that count", run, (LOW, *kept, *RECEIVERS, *names, *area), {
-        LIGHT: Spec("rgb, row, column", "W/m^2", "indirect irradiance without visibility and albedo/pi", "linear RGB")},
-        paper=PAPER, exact=(RECEIVERS[0], "lights.position"), decoys=tuple(decoys))

@@ -50,7 +50,8 @@ def _add_facing(recipe: Recipe, scene: Scene) -> None:
         return {FACING: np.where(ids >= 0, np.moveaxis(face[ids], -1, 0), 0).astype(real)}
 
     recipe.add("vpl.facing", "normal of the triangle that each pixel sees", run, (*GEOMETRY, *RECEIVERS), {FACING: Spec(
-        "xyz, row, column", VECTOR, "the face's normal, on the side of the pixel's normal; 0 without surface", "world")},
+        "xyz, row, column", VECTOR, "the face's normal, on the side of the pixel's normal; 0 without surface",
+        "world")},
         paper="docs/conventions", exact=(GEOMETRY[0],), decoys=(
             Decoy("faces are not turned to the side that is seen", wound, "docs/conventions"),
             Decoy("interpolated normals in place of faces'", lambda a, r: {FACING: np.asarray(a[RECEIVERS[1]], r)},
@@ -104,7 +105,8 @@ class _Rays:
 
 def _add_visible(recipe: Recipe, scene: Scene) -> None:
     def run(arrays: Arrays, real: Any, lift: float = 0.0) -> Arrays:
-        rays = _Rays(arrays, scene, LIFT if real == np.float32 else lift)  # one run that measures the bound lifts as ports
+        # of the runs that measure the bound the one in float32 lifts as ports do
+        rays = _Rays(arrays, scene, LIFT if real == np.float32 else lift)
         return {VISIBLE: rays.visible(rays.reach)}
 
     def traced(change: Any) -> Run:
@@ -124,7 +126,8 @@ def _add_visible(recipe: Recipe, scene: Scene) -> None:
 
     recipe.add("vpl.visible", "whether light reaches each pixel from each pixel light", run,
                (*GEOMETRY, *RECEIVERS, FACING, *LIGHTS), {VISIBLE: Spec(
-                   "light, row, column", "1", "true where the normals of light and pixel and the pixel's face look at the "
+                   "light, row, column", "1", "true where the normals of light and pixel and the pixel's face look "
+                   "at the "
                    "other, whatever the lobe, and nothing lies between", tier="T0")}, paper="SII Eq. 2 with V", decoys=(
                    Decoy("the ray goes on behind the light", traced(lambda rays: rays.visible(rays.reach * 1e4)), "V"),
                    Decoy("rays start on the surface without any lift", traced(from_points), "ends are lifted"),
@@ -135,7 +138,8 @@ def _add_visible(recipe: Recipe, scene: Scene) -> None:
                    Decoy("visibility is inverted", writing(run, vpl__visible=np.logical_not), "V = 1: nothing between"),
                    Decoy("pairs that face away count as visible", traced(lambda rays: rays.visible(np.ones_like(
                        rays.reach)) | ~_sends(rays)), "facing each other"),
-                   Decoy("lights are in reverse order", writing(run, vpl__visible=lambda a: a[::-1]), "light, row, column"),
+                   Decoy("lights are in reverse order", writing(run, vpl__visible=lambda a: a[::-1]),
+                         "light, row, column"),
                    Decoy("the last two triangles are left out", fewer, "all triangles"),
                    Decoy("rays end halfway", traced(lambda rays: rays.visible(0.5 * rays.reach)), "V")))
 
@@ -190,7 +194,8 @@ def _add_sum(recipe: Recipe) -> None:
                                  "cosines are not clamped at 0: lights behind a surface count",
                                  "cosines are taken as absolute values", "lobes reach below the light's horizon")]
     recipe.add("vpl.sum", "irradiance of the visible pixel lights at every pixel, without albedo/pi", run,
-               (*RECEIVERS, VISIBLE, *names), {LIGHT: Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB",
+               (*RECEIVERS, VISIBLE, *names), {LIGHT: Spec("rgb, row, column", "W/m^2", "indirect irradiance",
+                                                           "linear RGB",
                                                            EQ2)}, paper=EQ2,
                exact=(RECEIVERS[0], "lights.position"), decoys=(
                    *(Decoy(one.cause, shadowed(one.run), EQ2) for one in bugs),

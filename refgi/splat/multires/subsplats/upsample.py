@@ -185,7 +185,7 @@ def _empty_level(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
 
 def black_level(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
     """Return irradiance and mask of the level above one, without texels."""
-    shape = level_shape(*filled.shape, 1)
+    shape = level_shape(filled.shape[0], filled.shape[1], 1)
     return np.zeros((3, *shape), dtype), np.zeros(shape, np.bool_)
 
 

@@ -1,0 +1,206 @@
+"""Stages of the range of pixel lights: peaks, B, reference length, I_low, R_0, pairs that count, sum (SII Sec. 3.4).
+
+B = I(w) / r^2 is the irradiance that a light causes at most; the largest channel of its intensity counts. A pair counts
+where B >= I_low, one irradiance for all lights; the parts of a light, diffuse and glossy, have each their own range.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from refgi.pairs.irradiance import Receivers
+from refgi.pairs.packing import Packed, pack
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.pairs.settings import LobeSettings, PairSettings
+from refgi.splat.sii.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW, reference_length, strengths
+from refgi.splat.sii.reach.threshold import all_peaks, threshold
+from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.stages.lights import light_names, pixel_lights_of
+from refgi.vectors.stages.pairs import RECEIVERS
+from refgi.vectors.stages.sii_range_sum import (
+    BARE,
+    BOTH,
+    LENGTH,
+    LOW,
+    PAPER,
+    add_kept,
+    add_squares,
+    add_sum,
+    peaks_of,
+    relative_reach,
+)
+
+
+def add_range(recipe: Recipe, drawn: int, share: float, length: float | None, pairs: PairSettings = BARE) -> None:
+    """Add ranges and the sum of the pairs in range.
+
+    `drawn` counts lights without flux as well; I_low is `share` times the largest peak over the square of `length`, or
+    of the reference length where that is absent.
+    """
+    parts = BOTH if "lights.lobe_flux" in recipe.specs else BOTH[:1]
+    recipe.facts["range"] = {"share": share, "reference_length": length, "lights_drawn": drawn,
+                             "share_of_pairs": PAPER_OVERDRAW / PAPER_LIGHTS}
+    recipe.factors["N"] = float(drawn)
+    _add_peaks(recipe, parts)
+    _add_strengths(recipe, parts)
+    if length is None:
+        _add_length(recipe, drawn)
+    else:
+        recipe.give(LENGTH, np.array([length]), Spec("one", "m", "reference length of the share"))
+    _add_low(recipe, parts, share)
+    add_squares(recipe, parts, share)
+    add_kept(recipe, parts)
+    add_sum(recipe, parts, pairs)
+
+
+def _packed(arrays: Arrays, pairs: PairSettings = BARE) -> tuple[PixelLights, Packed]:
+    lights = pixel_lights_of(arrays, np.float64)
+    return lights, pack(lights, pairs, np.zeros(lights.flux.shape[1]), np.float64)
+
+
+def _of_parts(lights: PixelLights, packed: Packed, values: tuple[Array, Array], parts: tuple[str, ...]) -> list[Array]:
+    """Return values of the packed parts, (K, ...) each, as (N, ...): 0 for lights without that part."""
+    made = []
+    for part, chosen, value in zip(BOTH, (packed.shines, packed.glossy), values, strict=True):
+        if part in parts:
+            whole = np.zeros((lights.flux.shape[1], *value.shape[1:]))
+            whole[chosen] = value
+            made.append(whole)
+    return made
+
+
+def _add_peaks(recipe: Recipe, parts: tuple[str, ...]) -> None:
+    names = [f"range.{part}_peak" for part in parts]
+
+    def run(arrays: Arrays, real: Any, pairs: PairSettings = BARE) -> Arrays:
+        lights, packed = _packed(arrays, pairs)
+        diffuse, lobes = all_peaks(packed)
+        return dict(zip(names, (one.astype(real) for one in _of_parts(lights, packed, (diffuse[:-1], lobes), parts)),
+                        strict=True))
+
+    def summed(weights: tuple[float, float, float]) -> Run:
+        def altered(arrays: Arrays, real: Any) -> Arrays:
+            scalar = {name: np.stack([np.tensordot(weights, arrays[name], 1)] * 3) for name in arrays
+                      if name.endswith("flux")}
+            return run({**arrays, **scalar}, real)
+
+        return altered
+
+    decoys = [Decoy("luminance in place of the largest channel", summed((0.2126, 0.7152, 0.0722)), "largest channel"),
+              Decoy("the sum of channels in place of the largest", summed((1, 1, 1)), "largest channel"),
+              Decoy("1/pi is left out", writing(run, range__diffuse_peak=lambda a: a * np.pi), "I_0 = Phi / pi")]
+    if "glossy" in parts:
+        decoys += [Decoy("a lobe's peak is its flux", lambda a, r: run(a, r, PairSettings(
+            clamp=None, lobe=LobeSettings(norm="none"))), "E-SII-03: times (P + 1) / 2 pi K"),
+            Decoy("the norm is that of the whole lobe", lambda a, r: run(a, r, PairSettings(
+                clamp=None, lobe=LobeSettings(norm="full_lobe"))), "E-SII-03")]
+    recipe.add("range.peaks", "I_0, the peak intensity of each part of each light", run, light_names(recipe), {
+        name: Spec("light", "W/sr", f"largest channel of I_0 of the {part} part; 0 without it", paper=PAPER)
+        for name, part in zip(names, parts, strict=True)}, paper=PAPER, decoys=tuple(decoys))
+
+
+def _strengths(arrays: Arrays, parts: tuple[str, ...]) -> list[Array]:
+    """Return B of each part, light and pixel, float64; 0 without surface."""
+    ids = np.asarray(arrays[RECEIVERS[2]])
+    here = ids.reshape(-1) >= 0
+    position = np.ascontiguousarray(np.asarray(arrays[RECEIVERS[0]], np.float64).reshape(3, -1)[:, here])
+    lights, packed = _packed(arrays)
+    diffuse, lobes = all_peaks(packed)
+    values = strengths(packed, position, 1) * max(diffuse.max(), lobes.max(initial=0.0))
+    whole = np.zeros((len(values), ids.size))
+    whole[:, here] = values
+    whole = whole.reshape(-1, *ids.shape)
+    return _of_parts(lights, packed, (whole[: len(diffuse) - 1], whole[len(diffuse) - 1 :]), parts)
+
+
+def _add_strengths(recipe: Recipe, parts: tuple[str, ...]) -> None:
+    names = [f"range.{part}_strength" for part in parts]
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        return {name: one.astype(real) for name, one in zip(names, _strengths(arrays, parts), strict=True)}
+
+    def to_light(arrays: Arrays) -> tuple[Array, Array]:
+        d = np.asarray(arrays["lights.position"])[:, :, None, None] - np.asarray(arrays[RECEIVERS[0]])[:, None]
+        return d, np.linalg.norm(d, axis=0)
+
+    def with_receiver(arrays: Arrays, real: Any) -> Arrays:
+        (d, r), n = to_light(arrays), np.asarray(arrays[RECEIVERS[1]])[:, None]
+        cosine = np.maximum(0, (d * n).sum(axis=0) / r)
+        return {name: one * cosine for name, one in run(arrays, real).items()}
+
+    def at_peak(arrays: Arrays, real: Any) -> Arrays:
+        (d, r), made = to_light(arrays), run(arrays, real)
+        cosine = -(d * np.asarray(arrays["lights.normal"])[:, :, None, None]).sum(axis=0) / r
+        return {**made, names[0]: np.divide(made[names[0]], cosine, out=np.zeros_like(made[names[0]]),
+                                            where=cosine > 0)}
+
+    def powered(power: int) -> Run:
+        def altered(arrays: Arrays, real: Any) -> Arrays:
+            r = to_light(arrays)[1]
+            return {name: one * r**power for name, one in run(arrays, real).items()}
+
+        return altered
+
+    recipe.add("range.strengths", "B, what each light causes at each pixel at most", run,
+               (*RECEIVERS, *light_names(recipe)), {name: Spec(
+                   "light, row, column", "W/m^2", f"I(w) / r^2 of the {part} part, without the pixel's cosine; 0 "
+                   "without "
+                   "surface", paper=PAPER) for name, part in zip(names, parts, strict=True)},
+               paper=PAPER, exact=(RECEIVERS[0], "lights.position"), decoys=(
+                   Decoy("the pixel's cosine counts", with_receiver, "the pixel's cosine is taken as 1"),
+                   Decoy("the light's cosine is missing", at_peak, "B = I(w) / r^2"),
+                   Decoy("1/r in place of 1/r^2", powered(1), "B = I(w) / r^2"),
+                   Decoy("the distance is left out", powered(2), "B = I(w) / r^2"),
+                   Decoy("pixels without surface count", reading(run, gbuffer__triangle_id=np.zeros_like), "surfaces")))
+
+
+def _add_length(recipe: Recipe, drawn: int) -> None:
+    def run(arrays: Arrays, real: Any, count: int = drawn) -> Arrays:
+        ids = np.asarray(arrays[RECEIVERS[2]])
+        position, normal = (np.ascontiguousarray(arrays[name], np.float64) for name in RECEIVERS[:2])
+        at = Receivers(position, normal, ids >= 0)
+        return {LENGTH: np.array([reference_length(at, pixel_lights_of(arrays, real)._replace(drawn=count), BARE)])}
+
+    def fixed(length: float) -> Run:
+        return lambda _, real: {LENGTH: np.array([length], real)}
+
+    recipe.add("range.length", "length under which 5 % of the largest peak leave 125 of 768 pairs", run,
+               (*RECEIVERS, *light_names(recipe)), {LENGTH: Spec(
+                   "one", "m", "sqrt(0.05 / b), b the k-th largest B over the largest I_0 of all pairs of part and "
+                   "pixel, k "
+                   "= 125/768 of all pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels and "
+                   "lights; 1 "
+                   "where nothing is lit")},
+               paper="SII Fig. 8; E-SII-11", exact=(RECEIVERS[0], "lights.position"), decoys=(
+                   Decoy("lights drawn without flux do not count", lambda a, r: run(
+                       a, r, a["lights.flux"].shape[1]), "k counts all that were drawn"),
+                   Decoy("one metre", fixed(1.0), "E-SII-11"),
+                   Decoy("the root is missing", writing(run, range__length=lambda a: a * a), "L^2 = 0.05 / b"),
+                   Decoy("all pixels count, those without surface too", reading(
+                       run, gbuffer__triangle_id=np.zeros_like), "surfaces"),
+                   Decoy("half as many pairs are left", lambda a, r: run(a, r, drawn // 2), "125 of 768")))
+
+
+def _add_low(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        return {LOW: np.array([threshold(np.concatenate(peaks_of(arrays, parts)), relative_reach(share, arrays))],
+                              real)}
+
+    peaks = {f"range__{part}_peak": _mean for part in parts}
+    recipe.add("range.low", f"I_low = {share:g} max I_0 / L^2", run, (LENGTH,
+                                                                      *(f"range.{part}_peak" for part in parts)), {
+        LOW: Spec("one", "W/m^2", "irradiance under which pairs are left out; 0 without lights", paper=PAPER)},
+        paper=PAPER, decoys=(
+            Decoy("the length is not squared", reading(run, range__length=np.sqrt), PAPER),
+            Decoy("the length is left out", reading(run, range__length=np.ones_like), PAPER),
+            Decoy("the mean of the peaks in place of the largest", reading(run, **peaks), PAPER),
+            Decoy("the share is in percent", writing(run, range__low=lambda a: 100 * a), "5 % is 0.05"),
+            *((Decoy("lobes do not count", reading(run, range__glossy_peak=np.zeros_like), "all parts"),)
+              if "glossy" in parts else ())))
+
+
+def _mean(peaks: Array) -> Array:
+    return np.full_like(peaks, peaks.mean()) if peaks.size else peaks
+
+

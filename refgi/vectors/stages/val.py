@@ -39,10 +39,11 @@ def add_val(recipe: Recipe, scene: Scene, settings: ValSettings) -> None:
     add_kmeans(recipe, clusters_of(settings), recipe.expected()["lights.flux"].shape[1])
     add_areas(recipe, settings.area)
     add_maps(recipe, settings)
-    if isinstance(settings.visibility, Csm):
+    delta = recipe.expected()["areas.delta"]
+    if isinstance(settings.visibility, Csm) and delta.any():
         add_basis(recipe, settings.visibility)
     _add_facing(recipe, scene)
-    add_visibility(recipe, settings)
+    add_visibility(recipe, settings, delta)
     add_lighting(recipe, settings)
 
 
@@ -65,13 +66,13 @@ def _add_facing(recipe: Recipe, scene: Scene) -> None:
                      if smooth else ())))
 
 
-def add_visibility(recipe: Recipe, settings: ValSettings) -> None:
-    """Add V of each area light at each pixel."""
+def add_visibility(recipe: Recipe, settings: ValSettings, delta: Array) -> None:
+    """Add V of each area light at each pixel; those of size `delta` (M,) 0 have hard shadows."""
     kind = settings.visibility
-    if isinstance(kind, Pcf):
-        add_binary(recipe, "visibility", kind.texels)
+    if isinstance(kind, Pcf) or not delta.any():
+        add_binary(recipe, "visibility", kind.texels if isinstance(kind, Pcf) else 1)
         return
-    if (recipe.expected()["areas.delta"] == 0).any():
+    if (delta == 0).any():
         add_binary(recipe, "hard", 1)
     add_search(recipe, settings)
     if isinstance(kind, Csm):
@@ -100,7 +101,8 @@ def add_lighting(recipe: Recipe, settings: ValSettings) -> None:
                    Decoy("nothing is shadowed", lambda a, r: run(a, r, shadowed=False), "VAL Sec. 4"),
                    Decoy("V of the next area light", reading(run, visibility__share=lambda a: np.roll(a, 1, axis=0)), ""),
                    Decoy("shadows are squared", reading(run, visibility__share=np.square), ""),
-                   Decoy("the mean over area lights", writing(run, sum__irradiance=lambda a: a / 2), "a sum")))
+                   Decoy("the mean over area lights", lambda a, r: run(
+                       {**a, "visibility.share": a["visibility.share"] / len(a["visibility.share"])}, r), "a sum")))
     if block > 1 and settings.blur is not None:
         _add_blur(recipe, settings.blur, block)
 
@@ -200,8 +202,9 @@ def _add_blur(recipe: Recipe, settings: BoxBlur | GeometryBlur, block: int) -> N
         Decoy("pixels of other surfaces count", lambda a, r: run(a, r, BoxBlur()), BLUR),
         Decoy("normals are not compared", other(cosine=-1.0), BLUR),
         Decoy("distances are not compared", other(extent=10.0), BLUR),
-        Decoy("the least cosine is 0.95", other(cosine=0.95), BLUR),
-        Decoy("subsets that an edge cuts off are left out", other(every_subset=False), BLUR),
+        Decoy("the extent counts across, not around", other(extent=settings.extent / 2), BLUR),
+        Decoy("subsets that an edge cuts off are " + ("left out" if settings.every_subset else "taken from farther off"),
+              other(every_subset=not settings.every_subset), BLUR),
     ) if isinstance(settings, GeometryBlur) else ()
     recipe.facts["blur"] = {"n": block, "window": "x - n // 2 on, moved inwards at the rim"} | (
         {"extent, of the visible box's diagonal": settings.extent, "least cosine": settings.cosine,

@@ -52,8 +52,8 @@ def _add_series(recipe: Recipe, csm: Csm) -> None:
         paper="VAL Sec. 4.1, E-VAL-02, 03, 05", decoys=(
             Decoy("c_k = k pi", writing(run, series__weight=lambda a: 2 / (np.pi * np.arange(1, len(a) + 1))), "E-VAL-02"),
             Decoy("w_k = 1 / c_k", writing(run, series__weight=lambda a: a / 2), "E-VAL-02"),
-            Decoy("terms are damped as for CSM with A = 1",
-                  lambda a, r: run(a, r, series(replaced(csm, {"attenuation": 1.0}))), "A = 0"),
+            Decoy("terms are damped more", lambda a, r: run(a, r, series(replaced(csm, {
+                "attenuation": csm.attenuation + 1.0}))), f"A = {csm.attenuation:g}"),
             Decoy("no bias", writing(run, series__bias=np.zeros_like), "E-VAL-03"),
             Decoy("depths fill the whole period", writing(run, series__range=np.ones_like), "E-VAL-05"),
             Decoy("the bias is that of one term less", lambda a, r: run(a, r, series(
@@ -69,6 +69,10 @@ def _add_scale(recipe: Recipe, csm: Csm) -> None:
         return {"scale.origin": np.array([one.origin for one in scales]),
                 "scale.slope": np.array([one.slope for one in scales])}
 
+    def other(kind: str) -> Any:
+        return lambda arrays, real: run(arrays, real, kind)
+
+    forms = {"log_map": "logarithms of what the map holds", "map": "linear in metres", "scene": "shares of the scene"}
     every = {"maps__near": lambda a: np.where(np.isfinite(a), a.min(), a), "maps__far": lambda a: np.full_like(a, a.max())}
     unit = "depths per octave" if csm.depth_scale == "log_map" else "1/m"
     recipe.add("scale", "scale on which the depths of each map are compared", run,
@@ -76,9 +80,10 @@ def _add_scale(recipe: Recipe, csm: Csm) -> None:
                {"scale.origin": Spec("area light", "m", "distance of depth 0; 0 for empty maps"),
                 "scale.slope": Spec("area light", unit, "depths per octave of distance, or per metre; 0 for empty maps")},
                paper="E-VAL-05", decoys=(
-                   Decoy("depths are linear in metres", lambda a, r: run(a, r, "map"), "E-VAL-05: log depth"),
-                   Decoy("depths are shares of the scene's extent", lambda a, r: run(a, r, "scene"), "E-VAL-05"),
-                   Decoy("one scale for all maps", reading(run, **every), "E-VAL-05: what each map holds"),
+                   *(Decoy(f"depths are {what}", other(kind), "E-VAL-05") for kind, what in forms.items()
+                     if kind != csm.depth_scale),
+                   *((Decoy("one scale for all maps", reading(run, **every), "E-VAL-05: what each map holds"),)
+                     if csm.depth_scale != "scene" else ()),
                    Decoy("the farthest depth is the far end of the range",
                          writing(run, scale__slope=lambda a: a * _top(csm)), "b* is left behind the farthest blocker")))
 
@@ -115,8 +120,8 @@ def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
             Decoy("natural logarithms", natural, "log2"),
             Decoy("texels without surface are at depth 1", writing(run, maps__t=_empty_at_1), "E-VAL-05: wrap-around"),
             Decoy("depths are not cut at the range", reading(run, series__range=lambda a: a * 2), "E-VAL-05"),
-            Decoy("the square beyond the disc " + ("holds nothing" if mirrored else "mirrors the disc"),
-                  lambda a, r: run(a, r, not mirrored), "docs/methods/val_visibility")))
+            *((Decoy("the square beyond the disc holds nothing", lambda a, r: run(a, r, mirror=False),
+                     "docs/methods/val_visibility"),) if mirrored else ())))
 
 
 def _empty_at_1(t: Array) -> Array:

@@ -86,7 +86,7 @@ def add_kmeans(recipe: Recipe, settings: Clusters, total: int) -> None:
                exact=(*LIGHTS, *last), decoys=(
                    Decoy("no rounds beyond those shown", stopped, "until assignments repeat"),
                    Decoy("one round alone", lambda a, r: run(a, r, rounds=1), "until assignments repeat"),
-                   *_metric_decoys(run)))
+                   Decoy("normals do not count", lambda a, r: run(a, r, normal_weight=0.0), METRIC)))
 
 
 def _add_each(recipe: Recipe) -> None:
@@ -164,15 +164,18 @@ def _add_assignment(recipe: Recipe, settings: Clusters, number: int) -> None:
                paper=METRIC, exact=(*LIGHTS, center, normal), decoys=(
                    Decoy("the highest index of equally near ones", lambda a, r: run(a, r, last=True), "A.6 P5"),
                    Decoy("1 - cosine in place of the angle over pi", lambda a, r: run(a, r, cosine=True), METRIC),
-                   *_metric_decoys(run)))
+                   *_metric_decoys(run, settings)))
 
 
-def _metric_decoys(run: Any) -> tuple[Decoy, ...]:
+def _metric_decoys(run: Any, settings: Clusters) -> tuple[Decoy, ...]:
+    forms = {"raw": "metres and radians are weighed, not shares of the diagonal and of pi", "squared": "squares",
+             "normalised": "shares of the diagonal and of pi"}
+
     def other(**how: Any) -> Run:
         return lambda arrays, real: run(arrays, real, **how)
 
-    return (Decoy("metres and radians are weighed, not shares of the diagonal and of pi", other(distance="raw"), METRIC),
-            Decoy("squares of distances", other(distance="squared"), METRIC),
+    return (*(Decoy(f"distances are others: {what}", other(distance=kind), METRIC) for kind, what in forms.items()
+              if kind != settings.distance),
             Decoy("normals do not count", other(normal_weight=0.0), METRIC),
             Decoy("the weights are exchanged", other(position_weight=0.3, normal_weight=0.7), METRIC))
 
@@ -214,13 +217,14 @@ def add_areas(recipe: Recipe, settings: AreaLightSettings) -> None:
     recipe.add("areas", "bounding rectangle of each cluster's lights in its plane", run,
                (LIGHTS[0], "clusters.center", "clusters.normal", "clusters.of"), {
                    "areas.frame": Spec("cluster, (right, down, forward), xyz", VECTOR, "axes of the map", "world"),
-                   "areas.axes": Spec("cluster, side, xyz", VECTOR, "axes of the rectangle", "world"),
+                   "areas.axes": Spec("cluster, side, xyz", VECTOR, "axes of the rectangle, the first at most a quarter turn "
+                                      "from right", "world"),
                    "areas.side": Spec("side, cluster", "m", "how long it is along its axes"),
                    "areas.offset": Spec("side, cluster", "m", "its middle from the centre, along its axes"),
                    "areas.delta": Spec("cluster", "m", "Delta, its size; 0: a point", paper="VAL Sec. 6, E-VAL-10"),
                    "areas.radius": Spec("cluster", "m", "from the centre to its farthest light"),
                    "areas.members": Spec("cluster", "1", "how many lights it has", tier="T0")},
-               paper="VAL Sec. 6, E-VAL-10", decoys=(*_area_decoys(run, settings),))
+               paper="VAL Sec. 6, E-VAL-10", exact=(LIGHTS[0], "clusters.center"), decoys=_area_decoys(run, settings))
 
 
 def _area_decoys(run: Any, settings: AreaLightSettings) -> tuple[Decoy, ...]:
@@ -229,7 +233,8 @@ def _area_decoys(run: Any, settings: AreaLightSettings) -> tuple[Decoy, ...]:
     return (
         Decoy(f"Delta is another size of the rectangle: {other}", lambda a, r: run(a, r, extent=other), "E-VAL-10"),
         Decoy(f"the axes are others: {turned}", lambda a, r: run(a, r, axes=turned), "E-VAL-10"),
-        Decoy("the area is corrected for the sample", lambda a, r: run(a, r, unbiased_area=True), "E-VAL-10"),
+        Decoy("the area is " + ("not " if settings.unbiased_area else "") + "corrected for the sample",
+              lambda a, r: run(a, r, unbiased_area=not settings.unbiased_area), "E-VAL-10"),
         Decoy("Delta is half of the size", writing(run, areas__delta=lambda a: a / 2), "sides, not half sides"),
         Decoy("the rectangle lies around the centre", writing(run, areas__offset=np.zeros_like), "VAL Sec. 6"),
         Decoy("the map's second axis is up", writing(run, areas__frame=lambda a: a * ((1,), (-1,), (1,))),

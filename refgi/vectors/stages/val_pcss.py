@@ -79,7 +79,7 @@ def add_binary(recipe: Recipe, name: str, texels: int) -> None:
         made = np.ones((len(delta), *arrays["gbuffer.triangle_id"].shape), real)
         for k in np.flatnonzero(maps.map_of >= 0):
             if delta[k] == 0 or name != "hard":
-                shadow = pcf_shadow(maps, int(k), side if delta[k] > 0 else 1)
+                shadow = pcf_shadow(maps, int(k), side if delta[k] > 0 or texels == 1 else 1)
                 pcf_tile(shadow, points, facing, len(covered), covered.copy(), made[k].reshape(-1), None)
         return {f"{name}.share": made}
 

@@ -29,7 +29,7 @@ def made(name):
 
 @cache
 def bounds(name):
-    case, known, steps = made(name)
+    _, known, steps = made(name)
     return {step.name: isolated_bounds(step, known, 1) for step in steps}
 
 

@@ -5,13 +5,13 @@ import math
 import numpy as np
 
 from refgi.cluster.settings import Csm, Pcf
+from refgi.vectors.stages.lights import pixel_lights_of
 from tests.naive import area_visibility as soft
 from tests.naive import filters, interleaving, kmeans
 from tests.naive.clustered import ABOVE, FLAT, HULL, NEAR, turn
 from tests.naive.crossings import face_normals
 from tests.naive.pair_term import contributions
 from tests.naive.val import is_between, view_frame
-from refgi.vectors.stages.lights import pixel_lights_of
 
 
 class Port:
@@ -80,7 +80,8 @@ class Port:
         center, normal, of, *_ = kmeans.cluster(
             self["lights.position"].T.tolist(), self["lights.normal"].T.tolist(), len(start[0]), *self.metric(),
             self.settings.clusters.rounds - 2, start)
-        return {"clusters.center": np.array(center).T, "clusters.normal": np.array(normal).T, "clusters.of": np.array(of)}
+        return {"clusters.center": np.array(center).T, "clusters.normal": np.array(normal).T,
+                "clusters.of": np.array(of)}
 
     def areas(self):
         how, count = self.settings.area, self["clusters.center"].shape[1]
@@ -132,8 +133,9 @@ class Port:
 
     def maps_depth(self):
         blockers = self.corners()[self["maps.blocks"]]
+        views = zip(self["maps.center"], self["areas.frame"], self["maps.ball"], strict=True)
         made = [soft.draw(blockers, center, frame, self.settings.maps.resolution, ball, 0.0).depth
-                for center, frame, ball in zip(self["maps.center"], self["areas.frame"], self["maps.ball"], strict=True)]
+                for center, frame, ball in views]
         return {"maps.depth": np.where((self["areas.members"] > 0)[:, None, None], made, np.inf)}
 
     def maps_range(self):

@@ -111,7 +111,7 @@ def assigned(
     position: Array, normal: Array, center: Array, axis: Array, distance: Distance, weights: tuple[float, float],
     diagonal: float,
 ) -> tuple[Array, Array]:
-    """Return C(i) of each light, and its distance, for clusters at centres and normals (3, M): one step of `cluster`."""
+    """Return C(i) of each light, and its distance, for centres and normals (3, M): one step of `cluster`."""
     state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64), 1)
     iterate(state, _metric(distance, weights, diagonal, _span(state)), 0, np.zeros(1))
     return state.of, state.own

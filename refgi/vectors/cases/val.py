@@ -21,17 +21,19 @@ class Setup:
     """What a case is made of, for the case and for the same picture by the method itself."""
 
     def __init__(
-        self, id: str, what: str, scene: Scene, size: tuple[int, int], maps: int, lights: int,  # noqa: A002
+        self, id: str, what: str, scene: Scene, size: tuple[int, int], maps: int, lights: int,
         **settings: Any,
     ) -> None:
         self.id, self.what, self.scene, self.size, self.maps = id, what, scene, size, maps
         self.counts = [lights // len(scene.lights)] * len(scene.lights)
-        self.settings = of(ValSettings, **{"lights": lights, "seed": SEED, "clamp": "none", "maps_resolution": 15} | settings)
+        plain = {"lights": lights, "seed": SEED, "clamp": "none", "maps_resolution": 15}
+        self.settings = of(ValSettings, **plain | settings)
 
     def case(self) -> Case:
         """Return the case."""
         recipe = Recipe(self.id, "val", self.what)
-        shifts = tuple((float(u), float(v)) for u, v in (draws(SEED, PIXEL_LIGHTS, 2, k) for k in range(len(self.counts))))
+        pairs = [draws(SEED, PIXEL_LIGHTS, 2, k).tolist() for k in range(len(self.counts))]
+        shifts = tuple((u, v) for u, v in pairs)
         add_lit(recipe, self.scene, self.size, self.maps, tuple(self.counts), shifts=shifts)
         if self.settings.pairs.needs_footprints:
             add_footprints(recipe, len(self.counts))
@@ -63,9 +65,9 @@ FULL_SETUPS = {setup.id: setup for setup in (
           16, 64, clusters=6, interleaving=4, assignment="cluster", every_subset=False, distance="raw",
           prefilter="brute", as_published=("val_alpha", "val_alpha_over_pi", "val_search_solid_angle")),
     Setup("val-options", "rectangles along the spread of lights, Delta the longer side, unbiased and foreshortened; 6 "
-          "damped terms stretched to their plateau, depths up to the scene's end", room(SPOT, smooth=True), (17, 13),
+          "damped terms, V doubled and cut, depths up to the scene's end", room(SPOT, smooth=True), (17, 13),
           13, 40, clusters=4, interleaving=1, axes="pca", area_extent="longer", unbiased_area=True, foreshortened=True,
-          terms=6, attenuation=1.0, rescale="plateau", depth_scale="scene", distance="squared"),
+          terms=6, attenuation=1.0, rescale="scale2", depth_scale="scene", distance="squared"),
 )}
 QUICK = {id: setup.case for id, setup in SETUPS.items()}
 FULL = {id: setup.case for id, setup in FULL_SETUPS.items()}

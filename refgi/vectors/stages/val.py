@@ -1,4 +1,4 @@
-"""Stages of clustered visibility as a whole: area lights, their visibility, interleaved sums, blur (VAL Sec. 4 to 6)."""
+"""Stages of clustered visibility as a whole: area lights, visibility, interleaved sums, blur (VAL Sec. 4 to 6)."""
 
 from typing import Any
 
@@ -19,12 +19,13 @@ from refgi.rsm import facing_normals
 from refgi.scene import Scene
 from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.pairs import EQ2, RECEIVERS
+from refgi.vectors.stages.val_areas import add_areas
 from refgi.vectors.stages.val_basis import add_basis
-from refgi.vectors.stages.val_clusters import add_areas, add_extents, add_kmeans, clusters_of
+from refgi.vectors.stages.val_clusters import add_extents, add_kmeans, clusters_of, extent_of
 from refgi.vectors.stages.val_csm import add_csm
 from refgi.vectors.stages.val_maps import add_maps
 from refgi.vectors.stages.val_pcss import add_binary, add_pcss
@@ -99,7 +100,7 @@ def add_lighting(recipe: Recipe, settings: ValSettings) -> None:
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance" + (
                    ", not blurred" if block > 1 else ""), "linear RGB")}, paper="VAL Sec. 4", decoys=(
                    Decoy("nothing is shadowed", lambda a, r: run(a, r, shadowed=False), "VAL Sec. 4"),
-                   Decoy("V of the next area light", reading(run, visibility__share=lambda a: np.roll(a, 1, axis=0)), ""),
+                   Decoy("V of another area light", reading(run, visibility__share=lambda a: np.roll(a, 1, 0)), ""),
                    Decoy("shadows are squared", reading(run, visibility__share=np.square), ""),
                    Decoy("the mean over area lights", lambda a, r: run(
                        {**a, "visibility.share": a["visibility.share"] / len(a["visibility.share"])}, r), "a sum")))
@@ -133,8 +134,7 @@ def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
     own = ("interleaving.subset",) if block > 1 else ()
 
     def run(arrays: Arrays, real: Any, factor: float = block**2) -> Arrays:
-        receivers = Receivers(*(np.ascontiguousarray(arrays[name], real) for name in RECEIVERS[:2]),
-                              np.asarray(arrays["gbuffer.triangle_id"]) >= 0)
+        receivers = _receivers(arrays, real)
         packed = checked(receivers, pixel_lights_of(arrays, real), pairs,
                          np.ascontiguousarray(arrays["lights.area"], real) if area else None)
         of, count = np.asarray(arrays["clusters.of"]), arrays["clusters.center"].shape[1]
@@ -165,13 +165,18 @@ def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
         paper="VAL Sec. 4, E-VAL-01, E-VAL-13", exact=("gbuffer.position", "lights.position"), decoys=(
             *interleaved,
             Decoy("Phi in place of Phi / pi", writing(run, parts__irradiance=lambda a: a * np.pi), "E-VAL-01"),
-            Decoy("every light has its cluster's normal", reading_normals(run), "VAL Sec. 4: visibility alone is shared"),
+            Decoy("every light has its cluster's normal", _with_one_normal(run), "VAL Sec. 4: V alone is shared"),
             Decoy("clusters are shifted by one", reading(
                 run, clusters__of=lambda a: (a + 1) % (int(a.max()) + 1)), "C(i)"),
             Decoy("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), EQ2)))
 
 
-def reading_normals(run: Any) -> Any:
+def _receivers(arrays: Arrays, real: Any) -> Receivers:
+    position, normal = (np.ascontiguousarray(arrays[name], real) for name in RECEIVERS[:2])
+    return Receivers(position, normal, np.ascontiguousarray(np.asarray(arrays[RECEIVERS[2]]) >= 0))
+
+
+def _with_one_normal(run: Run) -> Run:
     """Return a stage whose lights face where the first light of their cluster does."""
     def altered(arrays: Arrays, real: Any) -> Arrays:
         of = np.asarray(arrays["clusters.of"])
@@ -185,13 +190,10 @@ def _add_blur(recipe: Recipe, settings: BoxBlur | GeometryBlur, block: int) -> N
     reads = ("sum.irradiance", *RECEIVERS, "extents.visible")
 
     def run(arrays: Arrays, real: Any, how: Any = settings, size: int = block) -> Arrays:
-        receivers = Receivers(*(np.ascontiguousarray(arrays[name], real) for name in RECEIVERS[:2]),
-                              np.ascontiguousarray(np.asarray(arrays["gbuffer.triangle_id"]) >= 0))
-        diagonal = float(np.linalg.norm(np.diff(np.asarray(arrays["extents.visible"], np.float64), axis=0)))
-        return {"blur.irradiance": blur(np.ascontiguousarray(arrays["sum.irradiance"], real), receivers, size, how,
-                                        diagonal)}
+        light, diagonal = np.ascontiguousarray(arrays["sum.irradiance"], real), extent_of(arrays, "visible").diagonal
+        return {"blur.irradiance": blur(light, _receivers(arrays, real), size, how, diagonal)}
 
-    def turned(arrays: Arrays, real: Any) -> Arrays:
+    def turned(arrays: Arrays, real: Any) -> dict[str, Array]:
         there = {name: arrays[name][..., ::-1, ::-1] for name in reads[:-1]}
         return {"blur.irradiance": run({**arrays, **there}, real)["blur.irradiance"][..., ::-1, ::-1]}
 
@@ -203,7 +205,7 @@ def _add_blur(recipe: Recipe, settings: BoxBlur | GeometryBlur, block: int) -> N
         Decoy("normals are not compared", other(cosine=-1.0), BLUR),
         Decoy("distances are not compared", other(extent=10.0), BLUR),
         Decoy("the extent counts across, not around", other(extent=settings.extent / 2), BLUR),
-        Decoy("subsets that an edge cuts off are " + ("left out" if settings.every_subset else "taken from farther off"),
+        Decoy("subsets that an edge cuts off are " + ("left out" if settings.every_subset else "replaced"),
               other(every_subset=not settings.every_subset), BLUR),
     ) if isinstance(settings, GeometryBlur) else ()
     recipe.facts["blur"] = {"n": block, "window": "x - n // 2 on, moved inwards at the rim"} | (

@@ -1,4 +1,4 @@
-"""Stages of convolution shadow maps: series, scale of depths, depths, basis, mip map (VAL Sec. 4.1, 6).
+"""Stages of the maps of convolution shadow maps: depths of the series, basis, mip map (VAL Sec. 4.1, 6).
 
 A texel's channels are sin(c_k t) for all k, cos(c_k t), t sin(c_k t), t cos(c_k t), then t, its depth.
 """
@@ -9,94 +9,28 @@ import numpy as np
 
 from refgi.cluster.filters.basis import beyond_disc, fill_basis, fill_beyond, normalise
 from refgi.cluster.filters.brute import Brute, brutes
-from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.eight import EIGHT
 from refgi.cluster.filters.mip_build import halve
 from refgi.cluster.filters.prefilter import LEVEL_SHIFT
 from refgi.cluster.filters.pyramid import Mip, level_offsets, mip_of, mips
 from refgi.cluster.settings import Csm
-from refgi.cluster.visibility.search_region import scale_of
-from refgi.cluster.visibility.series import Series, frequencies, series
-from refgi.settings import replaced
+from refgi.cluster.visibility.series import frequencies
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Spec
-from refgi.vectors.stages.val_maps import SHEET, shadow_maps_of
+from refgi.vectors.stages.val_maps import SHEET
+from refgi.vectors.stages.val_series import SCALE, add_scale, add_series, scale_at
 
-SERIES = ("series.weight", "series.bias", "series.range")
-SCALE = ("scale.origin", "scale.slope", "series.range")
 CHANNELS = "area light, channel, row, column"
 
 
 def add_basis(recipe: Recipe, csm: Csm) -> None:
-    """Add the series, its scale of depths on each map, depths, basis and mip map."""
-    _add_series(recipe, csm)
-    _add_scale(recipe, csm)
+    """Add the series and its scale on each map, then depths, basis and mip map."""
+    add_series(recipe, csm)
+    add_scale(recipe, csm)
     _add_series_depths(recipe, csm)
     _add_level_0(recipe, csm)
     if csm.prefilter == "mip":
         _add_levels(recipe, csm.terms)
-
-
-def _add_series(recipe: Recipe, csm: Csm) -> None:
-    def run(arrays: Arrays, real: Any, chain: Series = series(csm)) -> Arrays:  # noqa: ARG001
-        return {"series.weight": chain.weight, "series.bias": np.array([chain.search_bias, chain.bias]),
-                "series.range": np.array([chain.range])}
-
-    facts = {"terms": csm.terms, "depth_scale": csm.depth_scale, "prefilter": csm.prefilter,
-             "gain": series(csm).gain, "least blocked share": 0.02}
-    recipe.facts["csm"] = facts
-    recipe.add("series", "weights and biases of f_M, and the far end of its depths", run, (), {
-        "series.weight": Spec("term", "1", "w_k = 2 / c_k, c_k = (2k - 1) pi", paper="E-VAL-02"),
-        "series.bias": Spec("search, comparison", "1", "b*, where f_M is 1 for the first time", paper="E-VAL-03"),
-        "series.range": Spec("one", "1", "1 - 2 b*, the depth of what is farthest", paper="E-VAL-05")},
-        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", decoys=(
-            Decoy("c_k = k pi", writing(run, series__weight=lambda a: 2 / (np.pi * np.arange(1, len(a) + 1))), "E-VAL-02"),
-            Decoy("w_k = 1 / c_k", writing(run, series__weight=lambda a: a / 2), "E-VAL-02"),
-            Decoy("terms are damped more", lambda a, r: run(a, r, series(replaced(csm, {
-                "attenuation": csm.attenuation + 1.0}))), f"A = {csm.attenuation:g}"),
-            Decoy("no bias", writing(run, series__bias=np.zeros_like), "E-VAL-03"),
-            Decoy("depths fill the whole period", writing(run, series__range=np.ones_like), "E-VAL-05"),
-            Decoy("the bias is that of one term less", lambda a, r: run(a, r, series(
-                replaced(csm, {"terms": csm.terms - 1}))) | {"series.weight": series(csm).weight}, "E-VAL-03")))
-
-
-def _add_scale(recipe: Recipe, csm: Csm) -> None:
-    def run(arrays: Arrays, real: Any, kind: Any = csm.depth_scale) -> Arrays:
-        maps = shadow_maps_of(arrays, real)
-        chain = series(csm)._replace(range=float(arrays["series.range"][0]))
-        scales = [scale_of(maps, k, kind, chain) if maps.map_of[k] >= 0 else DepthScale(False, 0.0, 0.0, 0.0)
-                  for k in range(len(maps.near))]
-        return {"scale.origin": np.array([one.origin for one in scales]),
-                "scale.slope": np.array([one.slope for one in scales])}
-
-    def other(kind: str) -> Any:
-        return lambda arrays, real: run(arrays, real, kind)
-
-    forms = {"log_map": "logarithms of what the map holds", "map": "linear in metres", "scene": "shares of the scene"}
-    every = {"maps__near": lambda a: np.where(np.isfinite(a), a.min(), a), "maps__far": lambda a: np.full_like(a, a.max())}
-    unit = "depths per octave" if csm.depth_scale == "log_map" else "1/m"
-    recipe.add("scale", "scale on which the depths of each map are compared", run,
-               ("maps.near", "maps.far", "maps.scene_far", "series.range"),
-               {"scale.origin": Spec("area light", "m", "distance of depth 0; 0 for empty maps"),
-                "scale.slope": Spec("area light", unit, "depths per octave of distance, or per metre; 0 for empty maps")},
-               paper="E-VAL-05", decoys=(
-                   *(Decoy(f"depths are {what}", other(kind), "E-VAL-05") for kind, what in forms.items()
-                     if kind != csm.depth_scale),
-                   *((Decoy("one scale for all maps", reading(run, **every), "E-VAL-05: what each map holds"),)
-                     if csm.depth_scale != "scene" else ()),
-                   Decoy("the farthest depth is the far end of the range",
-                         writing(run, scale__slope=lambda a: a * _top(csm)), "b* is left behind the farthest blocker")))
-
-
-def _top(csm: Csm) -> float:
-    end = series(csm).range
-    return end / max(2 * end - 1, end / 2)
-
-
-def scale_at(arrays: Arrays, csm: Csm, k: int) -> DepthScale:
-    """Return the scale of one map among arrays."""
-    return DepthScale(csm.depth_scale == "log_map", float(arrays["scale.origin"][k]), float(arrays["scale.slope"][k]),
-                      float(arrays["series.range"][0]))
 
 
 def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
@@ -144,7 +78,8 @@ def _add_level_0(recipe: Recipe, csm: Csm) -> None:
             sine, cosine = (np.moveaxis(of(np.multiply.outer(t, c)), 3, 1) for of in (np.sin, np.cos))
             by = t[:, None] if weigh else 1
             made = np.concatenate([sine, cosine, by * sine, by * cosine, t[:, None]], axis=1)
-            return {"basis.0": np.where(t.any(axis=(1, 2))[:, None, None, None], made, 0)}
+            made[~np.asarray(t.any(axis=(1, 2)))] = 0
+            return {"basis.0": made}
 
         return altered
 
@@ -200,7 +135,7 @@ def _add_levels(recipe: Recipe, terms: int) -> None:
         return altered
 
     recipe.facts["basis.sides"] = sides
-    recipe.add("mip", "each level halves the one before by the mean of 2 x 2 texels; of an odd side the last counts twice",
+    recipe.add("mip", "each level halves the one before by means of 2 x 2 texels; of an odd side the last counts twice",
                run, ("basis.0",), {name: Spec(CHANNELS, "1", f"means over {2**level} x {2**level} texels")
                                    for level, name in enumerate(names, 1)},
                paper="VAL Sec. 6", decoys=(
@@ -210,7 +145,7 @@ def _add_levels(recipe: Recipe, terms: int) -> None:
                    Decoy("columns are halved alone, then rows shifted", chained(
                        lambda a: _mean_of_four(np.roll(a, -1, axis=2), "edge")), "texels 2 i and 2 i + 1"),
                    Decoy("the depth is that of the nearest texel, not the mean",
-                         chained(lambda a: np.concatenate([_mean_of_four(a, "edge")[:, :-1], _least_of_four(a)], axis=1)),
+                         chained(lambda a: np.concatenate([_mean_of_four(a, "edge")[:, :-1], _least_of_four(a)], 1)),
                          "E-VAL-02: Z = w * z")))
 
 
@@ -226,7 +161,7 @@ def _halved(level: Array, terms: int) -> Array:
         for part, first in zip(parts, (0, 2 * terms), strict=True):
             part[: side * side, : 2 * terms] = texels[:, first : first + 2 * terms]
         depth[: side * side] = texels[:, -1]
-        halve(*parts, depth, 0, side * side, side)
+        halve(parts[0], parts[1], depth, 0, side * side, side)
         new = slice(side * side, side * side + half * half)
         channels = np.concatenate([*(part[new, : 2 * terms] for part in parts), depth[new, None]], axis=1)
         made[k] = channels.T.reshape(-1, half, half)

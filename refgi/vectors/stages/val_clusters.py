@@ -1,23 +1,20 @@
-"""Stages of clustered visibility up to its area lights: extents, k-means round by round, rectangles (VAL Sec. 5, 6)."""
+"""Stages of clusters of pixel lights: extents, k-means round by round (VAL Sec. 5.1)."""
 
 from typing import Any
 
 import numpy as np
 
 from refgi.cluster.clustering.kmeans import Clustering, assigned, cluster, first_lights, moved
-from refgi.cluster.clustering.rectangle import AreaLights, area_lights
-from refgi.cluster.settings import AreaLightSettings, Clusters, ValSettings
-from refgi.pairs.pixel_lights import PixelLights
+from refgi.cluster.settings import Clusters, ValSettings
 from refgi.rsm.buffers.extent import Extent, bounds_of
 from refgi.settings import replaced
-from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.recipe import Recipe, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR
 
 ROUNDS = 2  # of k-means that a case shows one by one
 LIGHTS = ("lights.position", "lights.normal")
 METRIC = "VAL Sec. 5.1, E-VAL-11: d = w_x dx / diagonal + w_a angle / pi"
-AREA = ("frame", "axes", "side", "offset", "delta", "radius", "members")
 
 
 def add_extents(recipe: Recipe, maps: int) -> None:
@@ -30,8 +27,8 @@ def add_extents(recipe: Recipe, maps: int) -> None:
         visible = bounds_of(arrays["gbuffer.position"], np.ones_like(covered) if empty else covered)
         boxes = []
         for name in rsms[:1] if first else rsms:
-            flux = arrays[f"{name}.flux"].any(axis=0)
-            flux |= arrays[f"{name}.lobe_flux"].any(axis=0) if lobes else False
+            flux = np.asarray(arrays[f"{name}.flux"].any(axis=0))
+            flux = flux | arrays[f"{name}.lobe_flux"].any(axis=0) if lobes else flux
             boxes.append(bounds_of(arrays[f"{name}.position"], np.ones_like(flux) if dark else flux))
         low, high = np.min([box.low for box in boxes], axis=0), np.max([box.high for box in boxes], axis=0)
         return {"extents.visible": np.stack(visible), "extents.illuminated": np.stack([low, high])}
@@ -124,7 +121,7 @@ def _add_start(recipe: Recipe, count: int, total: int) -> None:
 
     recipe.add("kmeans.start", "cluster k begins at light floor(k N / M)", run, LIGHTS, _centers(0),
                paper="VAL Sec. 5.1; A.6 P5", exact=LIGHTS, decoys=(
-                   Decoy("clusters begin at the first M lights", lambda a, r: run(a, r, lambda n, m: np.arange(m)),
+                   Decoy("clusters begin at the first M lights", lambda a, r: run(a, r, lambda _, m: np.arange(m)),
                          "floor(k N / M)"),
                    Decoy("k N / M is rounded instead of cut", lambda a, r: run(
                        a, r, lambda n, m: (np.arange(m) * n + m // 2) // m), "floor(k N / M)"),
@@ -204,51 +201,6 @@ def _add_means(recipe: Recipe, number: int) -> None:
                    Decoy("clusters without lights go to the origin", empty_at_origin, "they keep their values"),
                    Decoy("mean normals are not of unit length", not_unit, "E-VAL-11"),
                    Decoy("normals stay as they were", lambda a, r: {**run(a, r), after[1]: a[before[1]]}, "E-VAL-11")))
-
-
-def add_areas(recipe: Recipe, settings: AreaLightSettings) -> None:
-    """Add the rectangle of each cluster."""
-    def run(arrays: Arrays, real: Any, **how: Any) -> Arrays:  # noqa: ARG001
-        made = _areas(arrays, replaced(settings, how))
-        return {f"areas.{key}": getattr(made, key) for key in AREA}
-
-    recipe.facts["areas"] = {"axes": settings.axes, "extent": settings.extent, "up": [0, 1, 0],
-                             "up where |y| of the normal >= 0.999": [0, 0, -1], "flat below, of the radius": 1e-5}
-    recipe.add("areas", "bounding rectangle of each cluster's lights in its plane", run,
-               (LIGHTS[0], "clusters.center", "clusters.normal", "clusters.of"), {
-                   "areas.frame": Spec("cluster, (right, down, forward), xyz", VECTOR, "axes of the map", "world"),
-                   "areas.axes": Spec("cluster, side, xyz", VECTOR, "axes of the rectangle, the first at most a quarter turn "
-                                      "from right", "world"),
-                   "areas.side": Spec("side, cluster", "m", "how long it is along its axes"),
-                   "areas.offset": Spec("side, cluster", "m", "its middle from the centre, along its axes"),
-                   "areas.delta": Spec("cluster", "m", "Delta, its size; 0: a point", paper="VAL Sec. 6, E-VAL-10"),
-                   "areas.radius": Spec("cluster", "m", "from the centre to its farthest light"),
-                   "areas.members": Spec("cluster", "1", "how many lights it has", tier="T0")},
-               paper="VAL Sec. 6, E-VAL-10", exact=(LIGHTS[0], "clusters.center"), decoys=_area_decoys(run, settings))
-
-
-def _area_decoys(run: Any, settings: AreaLightSettings) -> tuple[Decoy, ...]:
-    other = "longer" if settings.extent == "root" else "root"
-    turned = "min_area" if settings.axes == "fixed" else "fixed"
-    return (
-        Decoy(f"Delta is another size of the rectangle: {other}", lambda a, r: run(a, r, extent=other), "E-VAL-10"),
-        Decoy(f"the axes are others: {turned}", lambda a, r: run(a, r, axes=turned), "E-VAL-10"),
-        Decoy("the area is " + ("not " if settings.unbiased_area else "") + "corrected for the sample",
-              lambda a, r: run(a, r, unbiased_area=not settings.unbiased_area), "E-VAL-10"),
-        Decoy("Delta is half of the size", writing(run, areas__delta=lambda a: a / 2), "sides, not half sides"),
-        Decoy("the rectangle lies around the centre", writing(run, areas__offset=np.zeros_like), "VAL Sec. 6"),
-        Decoy("the map's second axis is up", writing(run, areas__frame=lambda a: a * ((1,), (-1,), (1,))),
-              "rows run downwards"),
-        Decoy("frames are transposed", writing(run, areas__frame=lambda a: a.transpose(0, 2, 1)), "rows are the axes"),
-        Decoy("the map looks into the surface", reading(run, clusters__normal=lambda a: -a), "along the normal"))
-
-
-def _areas(arrays: Arrays, settings: AreaLightSettings) -> AreaLights:
-    position, of = np.asarray(arrays[LIGHTS[0]], np.float64), np.asarray(arrays["clusters.of"])
-    center, normal = (np.asarray(arrays[f"clusters.{key}"], np.float64) for key in ("center", "normal"))
-    clusters = Clustering(center, normal, np.bincount(of, minlength=center.shape[1]), of, 0, np.zeros(1))
-    lights = PixelLights(position, position, position, None, None, None, position.shape[1])
-    return area_lights(lights, clusters, settings)
 
 
 def clusters_of(settings: ValSettings) -> Clusters:

@@ -11,7 +11,7 @@ from refgi.cluster.visibility.search_region import BIAS, CONSTANTS, GAIN, ON_SER
 from refgi.cluster.visibility.series import Series, series
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Spec
-from refgi.vectors.stages.val_basis import SCALE, filters_of, level_names, scale_at
+from refgi.vectors.stages.val_basis import filters_of, level_names
 from refgi.vectors.stages.val_decoys import compared_decoys, means_decoys, series_decoys
 from refgi.vectors.stages.val_search import (
     LIGHT,
@@ -24,6 +24,7 @@ from refgi.vectors.stages.val_search import (
     searched,
     share_spec,
 )
+from refgi.vectors.stages.val_series import SCALE, scale_at
 
 
 def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
@@ -66,7 +67,7 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
             made[k].reshape(-1)[flags] = visible[flags]
         return {"visibility.share": made}
 
-    recipe.add("visibility", "V = gain (1/2 + sum w_k (cos(c_k d') S_k - sin(c_k d') C_k)), 0 to 1, where shaded", share,
+    recipe.add("visibility", "V = gain (1/2 + sum w_k (cos(c_k d') S_k - sin(c_k d') C_k)), where shaded", share,
                ("penumbra.shaded", "penumbra.t", "penumbra.means", "series.weight", "series.bias", *hard),
                {"visibility.share": share_spec()}, paper="VAL Sec. 4.1, E-VAL-02", decoys=compared_decoys(share))
 

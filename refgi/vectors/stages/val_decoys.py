@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from refgi.cluster.settings import ConstantBias, Csm, Pcss, ValSettings
+from refgi.cluster.settings import Csm, ValSettings
 from refgi.settings import replaced
 from refgi.vectors.recipe import reading, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Run
@@ -24,7 +24,7 @@ def _without_cosine(local: Array, d: Array) -> Array:
     return np.asarray(local[:2] / (d + local[2]))
 
 
-def _local(arrays: Arrays) -> tuple[Array, Array]:
+def local_of(arrays: Arrays) -> tuple[Array, Array]:
     """Return pixels in each map's frame, (3, area light, h, w), and their distances."""
     position = np.asarray(arrays["gbuffer.position"], np.float64)
     away = position[:, None] - np.asarray(arrays["maps.center"], np.float64).T[:, :, None, None]
@@ -37,7 +37,7 @@ def _placed(run: Any, name: str, flag: str, middle: Callable[[Array, Array], Arr
     def altered(arrays: Arrays, real: Any) -> Arrays:
         made = dict(run(arrays, real))
         with np.errstate(divide="ignore", invalid="ignore"):
-            place = np.nan_to_num(middle(*_local(arrays)))
+            place = np.nan_to_num(middle(*local_of(arrays)))
         region = made[name].copy()
         region[:, :2] = np.where(made[flag][:, None], np.moveaxis(place, 0, 1), 0)
         return made | {name: region}
@@ -45,7 +45,8 @@ def _placed(run: Any, name: str, flag: str, middle: Callable[[Array, Array], Arr
     return altered
 
 
-def _scaled(factor: float) -> Callable[[Array], Array]:
+def scaled(factor: float) -> Callable[[Array], Array]:
+    """Return what scales the radii of regions."""
     return lambda region: region * np.array([1, 1, factor])[:, None, None]
 
 
@@ -81,8 +82,8 @@ def _all_pending(run: Any) -> Run:
 
 def _axial(run: Any) -> Run:
     def altered(arrays: Arrays, real: Any) -> Arrays:
-        made = run(arrays, real)
-        return made | {"search.distance": np.where(made["search.pending"], _local(arrays)[0][2], 0)}
+        made = dict(run(arrays, real))
+        return made | {"search.distance": np.where(made["search.pending"], local_of(arrays)[0][2], 0)}
 
     return altered
 
@@ -97,9 +98,9 @@ def means_decoys(run: Any, name: str, csm: Csm) -> tuple[Decoy, ...]:
     finer, coarser = ("a level too fine", "a level too coarse") if csm.prefilter == "mip" else (
         "half of the disc's radius", "twice the disc's radius")
     return (
-        Decoy(coarser, moved(_scaled(2.0)), "docs/methods/val_visibility"),
-        Decoy(finer, moved(_scaled(0.5)), "docs/methods/val_visibility"),
-        Decoy("the nearest texel of the map alone", moved(_scaled(0.0)), "VAL Sec. 6"),
+        Decoy(coarser, moved(scaled(2.0)), "docs/methods/val_visibility"),
+        Decoy(finer, moved(scaled(0.5)), "docs/methods/val_visibility"),
+        Decoy("the nearest texel of the map alone", moved(scaled(0.0)), "VAL Sec. 6"),
         Decoy("rows run upwards", moved(lambda a: a * np.array([1, -1, 1])[:, None, None]), "right, down, forward"),
         Decoy("s and t are exchanged", moved(lambda a: a[:, [1, 0, 2]]), "s along columns"),
         Decoy("a texel too far right and down", moved(lambda a: a + np.array([0.125, 0.125, 0])[:, None, None]),
@@ -125,7 +126,7 @@ def series_decoys(run: Any, settings: ValSettings, csm: Csm) -> tuple[Decoy, ...
         Decoy("means of all depths, blockers or not", literal(all_depths=True), Z_AVG),
         Decoy("the sine's term is added", reading(run, search__means=_negated(csm.terms)), "E-VAL-02"),
         Decoy("no bias in the search", reading(run, series__bias=np.zeros_like), "E-VAL-04"),
-        *_size_decoys(run, settings))
+        *size_decoys(run, settings))
 
 
 def _negated(m: int) -> Callable[[Array], Array]:
@@ -142,7 +143,7 @@ def _literal_penumbra(
     all_depths: bool = False,
 ) -> Arrays:
     """Return the stage's arrays with z_avg and its disc by a formula with a bug."""
-    local, d = _local(arrays)
+    local, d = local_of(arrays)
     m, shaded, means = csm.terms, made["penumbra.shaded"], np.moveaxis(np.asarray(arrays["search.means"]), 1, 0)
     angle = np.multiply.outer((2 * np.arange(1, m + 1) - 1) * np.pi, made["penumbra.t"] - arrays["series.bias"][0])
     weight = np.asarray(arrays["series.weight"])[:, None, None, None]
@@ -162,39 +163,15 @@ def _literal_penumbra(
     return {**made, "penumbra.z_avg": np.where(shaded, z, 0), "penumbra.region": np.where(shaded[:, None], disc, 0)}
 
 
-def _size_decoys(run: Any, settings: ValSettings) -> tuple[Decoy, ...]:
+def size_decoys(run: Any, settings: ValSettings) -> tuple[Decoy, ...]:
+    """Return likely bugs of the size of the penumbra."""
     return (
         Decoy("alpha starts at the axis", _printed(run, settings, "val_alpha"), "E-VAL-07"),
         Decoy("squares of side alpha / pi", _printed(run, settings, "val_alpha_over_pi"), DISC),
-        Decoy("the penumbra is twice as wide", writing(run, penumbra__region=_scaled(2.0)), FINAL),
+        Decoy("the penumbra is twice as wide", writing(run, penumbra__region=scaled(2.0)), FINAL),
         Decoy("the disc lies around the pixel's own place",
               _placed(run, "penumbra.region", "penumbra.shaded", _without_cosine), DISC),
         Decoy("the light's whole size in place of half", reading(run, areas__delta=lambda a: 2 * a), FINAL))
-
-
-def blocker_decoys(run: Any, settings: ValSettings, pcss: Pcss) -> tuple[Decoy, ...]:
-    """Return likely bugs of the mean depth of blockers and of the penumbra's disc, by depth tests."""
-    return (
-        Decoy("depths are compared with the pixel's distance, not with its plane", _with(run, settings, _plain(pcss)),
-              "E-VAL-14"),
-        Decoy("blockers outside the cone to the light count", _with(run, settings, replaced(pcss, {"cone": False})),
-              "E-VAL-14"),
-        Decoy("normals point inwards within the map", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
-        Decoy("z_avg is the nearest distance", writing(run, penumbra__z_avg=_least), "the mean"),
-        *_size_decoys(run, settings))
-
-
-def _with(run: Any, *how: Any) -> Run:
-    return lambda arrays, real: run(arrays, real, *how)
-
-
-def _plain(pcss: Pcss) -> Pcss:
-    return replaced(pcss, {"constant_bias": ConstantBias(0.0)})
-
-
-def _least(z_avg: Array) -> Array:
-    least = np.where(z_avg > 0, z_avg, np.inf).min(axis=(1, 2), keepdims=True)
-    return np.where(z_avg > 0, least, 0)
 
 
 def compared_decoys(run: Any) -> tuple[Decoy, ...]:
@@ -206,8 +183,13 @@ def compared_decoys(run: Any) -> tuple[Decoy, ...]:
         Decoy("w_k = 1 / c_k", reading(run, series__weight=lambda a: a / 2), "E-VAL-02"),
         Decoy("sines and cosines are exchanged", reading(run, penumbra__means=_halves_swapped), "E-VAL-02"),
         Decoy("the cosine's term is missing", reading(run, penumbra__means=_without_sines), "E-VAL-02"),
-        Decoy("V is doubled and cut", writing(run, visibility__share=lambda a: np.minimum(2 * a, 1)), "E-VAL-03: scale2"),
-        Decoy("pixels without blockers are dark", writing(run, visibility__share=lambda a: np.where(a == 1, 0, a)), "1"))
+        Decoy("V is doubled and cut", writing(run, visibility__share=lambda a: np.minimum(2 * a, 1)), "E-VAL-03"),
+        Decoy("pixels without blockers are dark", writing(run, visibility__share=dark_where_1), "1"))
+
+
+def dark_where_1(share: Array) -> Array:
+    """Return V with 0 in place of 1."""
+    return np.where(share == 1, 0, share)
 
 
 def _halves_swapped(means: Array) -> Array:
@@ -218,37 +200,3 @@ def _halves_swapped(means: Array) -> Array:
 def _without_sines(means: Array) -> Array:
     m = means.shape[1] // 2
     return np.concatenate([0 * means[:, :m], means[:, m:]], axis=1)
-
-
-def counted_decoys(run: Any, pcss: Pcss) -> tuple[Decoy, ...]:
-    """Return likely bugs of V by depth tests of a disc."""
-    return (
-        Decoy("depths are compared with the pixel's distance, not with its plane", _with(run, _plain(pcss)), "E-VAL-14"),
-        Decoy("V is the hidden share", writing(run, visibility__share=lambda a: 1 - a), "V = 1 - blocked / tested"),
-        Decoy("V of one test: hidden or not", writing(run, visibility__share=np.floor), "a share"),
-        Decoy("one texel alone", reading(run, penumbra__region=_scaled(0.0)), "all texels of the disc"),
-        Decoy("half of the disc's radius", reading(run, penumbra__region=_scaled(0.5)), "radius, not diameter"),
-        Decoy("rows run upwards", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
-        Decoy("pixels without blockers are dark", writing(run, visibility__share=lambda a: np.where(a == 1, 0, a)), "1"))
-
-
-def binary_decoys(run: Any, name: str, texels: int) -> tuple[Decoy, ...]:
-    """Return likely bugs of depth tests of a square of texels, or of one."""
-    facing, share = "gbuffer__facing", f"{name}__share"
-    return (
-        Decoy("depths are compared with the pixel's distance, not with its plane",
-              reading(run, **{facing: np.zeros_like}), "E-VAL-14"),
-        Decoy("the kernel is two texels wider" if texels > 1 else "3 x 3 texels in place of one",
-              _with(run, texels + 2), f"{texels} x {texels}"),
-        Decoy("V is the hidden share", writing(run, **{share: lambda a: 1 - a}), "V = 1 - blocked / tested"),
-        Decoy("rows run upwards", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
-        Decoy("a texel too far left", reading(run, maps__depth=lambda a: np.roll(a, 1, axis=2)), "floor(s n)"),
-        Decoy("pixels behind the light's plane are hidden", _hidden_behind(run, name), "E-VAL-12: V = 1"))
-
-
-def _hidden_behind(run: Any, name: str) -> Run:
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        behind = (_local(arrays)[0][2] <= 0) & np.isfinite(arrays["maps.near"])[:, None, None]
-        return {f"{name}.share": np.where(behind, 0, run(arrays, real)[f"{name}.share"])}
-
-    return altered

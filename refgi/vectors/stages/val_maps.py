@@ -37,10 +37,10 @@ def add_maps(recipe: Recipe, settings: ValSettings) -> None:
         "maps.near": Spec("area light", "m", "least distance; inf on an empty map"),
         "maps.far": Spec("area light", "m", "greatest finite distance; 0 on an empty map")},
         paper="E-VAL-05", decoys=(
-            Decoy("texels without surface count as the farthest", writing(run, maps__far=lambda a: np.full_like(a, 1e4)),
-                  "E-VAL-05"),
-            Decoy("the nearest of all maps counts for each", writing(run, maps__near=lambda a: np.full_like(a, a.min())),
-                  "E-VAL-05: depths are scaled to what each map holds")))
+            Decoy("texels without surface count as the farthest",
+                  writing(run, maps__far=lambda a: np.full_like(a, 1e4)), "E-VAL-05"),
+            Decoy("the nearest of all maps counts for each",
+                  writing(run, maps__near=lambda a: np.full_like(a, a.min())), "E-VAL-05: each map")))
 
 
 def _add_views(recipe: Recipe, settings: ValSettings) -> None:
@@ -68,14 +68,16 @@ def _add_views(recipe: Recipe, settings: ValSettings) -> None:
 
 
 def _add_blockers(recipe: Recipe, settings: ValSettings) -> None:
-    def run(arrays: Arrays, real: Any, lights: bool = True, alone: bool = settings.maps.occluders_alone) -> Arrays:  # noqa: ARG001
+    alone = settings.maps.occluders_alone
+
+    def run(arrays: Arrays, real: Any, lights: bool = True, touching: bool = not alone) -> Arrays:  # noqa: ARG001
         geometry = _geometry(arrays)
         frame: Any = SimpleNamespace(
             scene=SimpleNamespace(geometry=geometry, face_count=len(geometry.faces)),
             gbuffer=SimpleNamespace(triangle_id=np.asarray(arrays["gbuffer.triangle_id"])),
             extent=extent_of(arrays, "visible", "illuminated"))
         where: Any = SimpleNamespace(position=arrays["lights.position"] if lights else np.zeros((3, 0)))
-        return {"maps.blocks": occluders(geometry, ends_of(frame, where), touching=not alone)}
+        return {"maps.blocks": occluders(geometry, ends_of(frame, where), touching=touching)}
 
     recipe.facts["maps.blocks"] = {"tolerance, of the diagonal of the extents' common box": 1e-6}
     recipe.add("maps.blockers", "triangles with ends of light, seen vertices and pixel lights, on both sides", run,
@@ -84,7 +86,7 @@ def _add_blockers(recipe: Recipe, settings: ValSettings) -> None:
                paper="docs/methods/val_visibility", decoys=(
                    Decoy("all triangles block", writing(run, maps__blocks=np.ones_like), "walls of a room do not"),
                    Decoy("pixel lights do not count as ends", lambda a, r: run(a, r, lights=False), ""),
-                   Decoy("triangles on the hull block too", lambda a, r: run(a, r, alone=False), "")))
+                   Decoy("triangles on the hull block too", lambda a, r: run(a, r, touching=True), "")))
 
 
 def _add_depth(recipe: Recipe, settings: ValSettings) -> None:
@@ -109,7 +111,7 @@ def _add_depth(recipe: Recipe, settings: ValSettings) -> None:
                                    paper="VAL Sec. 4.2, E-VAL-06")},
                paper="VAL Sec. 4.2, E-VAL-06, E-VAL-12", exact=("scene.vertices", *VIEW), decoys=(
                    Decoy("rows run upwards", writing(run, maps__depth=lambda a: a[:, ::-1]), "right, down, forward"),
-                   Decoy("rows and columns are exchanged", writing(run, maps__depth=lambda a: a.transpose(0, 2, 1)), ""),
+                   Decoy("rows and columns are exchanged", writing(run, maps__depth=lambda a: a.swapaxes(1, 2)), ""),
                    Decoy("texel centres lie at 0 instead of 1/2", moved, "centres at + 1/2"),
                    Decoy("depth along the axis, not distance", writing(run, maps__depth=_axial), "E-VAL-06"),
                    Decoy("directions are linear in the angle", writing(run, maps__depth=_equiangular),

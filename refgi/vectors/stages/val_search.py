@@ -127,8 +127,8 @@ def add_search(recipe: Recipe, settings: ValSettings) -> None:
     recipe.facts["search"] = {"steepest, degrees": 80, "printed forms": sorted(settings.as_published)}
     recipe.add("search", "the disc in which each pixel's blockers may lie: tan a = Delta (d - near) / (2 d near)", run,
                (*PIXELS, *LIGHT), {
-                   "search.pending": Spec(PLACE, "1", "whether the pixel lies before the light's plane and farther than "
-                                          "the nearest distance; no others are shadowed", tier="T0"),
+                   "search.pending": Spec(PLACE, "1", "whether the pixel lies before the light's plane and farther "
+                                          "than the nearest distance; no others are shadowed", tier="T0"),
                    "search.region": REGION,
                    "search.distance": Spec(PLACE, "m", "d, from the map's centre; 0 where not pending")},
                paper="VAL Sec. 4.2, E-VAL-09; disc: E-VAL-08", exact=("maps.center",),

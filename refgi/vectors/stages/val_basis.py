@@ -1,0 +1,204 @@
+"""Stages of the maps of convolution shadow maps: depths of the series, basis, mip map (VAL Sec. 4.1, 6).
+
+A texel's channels are sin(c_k t) for all k, cos(c_k t), t sin(c_k t), t cos(c_k t), then t, its depth.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from refgi.cluster.filters.basis import beyond_disc, fill_basis, fill_beyond, normalise
+from refgi.cluster.filters.brute import Brute, brutes
+from refgi.cluster.filters.eight import EIGHT
+from refgi.cluster.filters.mip_build import halve
+from refgi.cluster.filters.prefilter import LEVEL_SHIFT
+from refgi.cluster.filters.pyramid import Mip, level_offsets, mip_of, mips
+from refgi.cluster.settings import Csm
+from refgi.cluster.visibility.series import frequencies
+from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.stages.val_maps import SHEET
+from refgi.vectors.stages.val_series import SCALE, add_scale, add_series, scale_at
+
+CHANNELS = "area light, channel, row, column"
+
+
+def add_basis(recipe: Recipe, csm: Csm) -> None:
+    """Add the series and its scale on each map, then depths, basis and mip map."""
+    add_series(recipe, csm)
+    add_scale(recipe, csm)
+    _add_series_depths(recipe, csm)
+    _add_level_0(recipe, csm)
+    if csm.prefilter == "mip":
+        _add_levels(recipe, csm.terms)
+
+
+def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
+    mirrored = csm.prefilter == "mip"
+
+    def run(arrays: Arrays, real: Any, mirror: bool = mirrored) -> Arrays:
+        depth = np.ascontiguousarray(arrays["maps.depth"], real)
+        made = np.zeros_like(depth)
+        for k in np.flatnonzero(arrays["scale.slope"] > 0):
+            normalise(depth[k], scale_at(arrays, csm, int(k)), made[k])
+            fill_beyond(beyond_disc(depth.shape[1], mirror), made[k])
+        return {"maps.t": made}
+
+    def natural(arrays: Arrays, real: Any) -> Arrays:
+        return run({**arrays, "scale.slope": arrays["scale.slope"] * np.log(2)}, real)
+
+    recipe.add("maps.t", "depths of the series: log2(z / origin) slope, 0 to the range" + (
+        "; beyond the disc the texel at (s, t) / (s^2 + t^2)" if mirrored else ""), run, ("maps.depth", *SCALE),
+        {"maps.t": Spec(SHEET, "1", "depth; the range where nothing is; 0 on empty maps", paper="E-VAL-05")},
+        paper="E-VAL-05", exact=("maps.depth",), decoys=(
+            Decoy("natural logarithms", natural, "log2"),
+            Decoy("texels without surface are at depth 1", writing(run, maps__t=_empty_at_1), "E-VAL-05: wrap-around"),
+            Decoy("depths are not cut at the range", reading(run, series__range=lambda a: a * 2), "E-VAL-05"),
+            *((Decoy("the square beyond the disc holds nothing", lambda a, r: run(a, r, mirror=False),
+                     "docs/methods/val_visibility"),) if mirrored else ())))
+
+
+def _empty_at_1(t: Array) -> Array:
+    return np.where(t == t.max(), 1, t).astype(t.dtype)
+
+
+def _add_level_0(recipe: Recipe, csm: Csm) -> None:
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        t = np.ascontiguousarray(arrays["maps.t"], real)
+        made = np.zeros((len(t), 4 * csm.terms + 1, *t.shape[1:]), real)
+        for k in np.flatnonzero(t.any(axis=(1, 2))):
+            parts = [np.zeros((*t.shape[1:], 2 * csm.terms + extra), real) for extra in (0, 1)]
+            fill_basis(t[k], csm.terms, False, *parts)
+            made[k] = np.moveaxis(np.concatenate(parts, axis=2), 2, 0)
+        return {"basis.0": made}
+
+    def literal(c: Array, weigh: bool = True) -> Any:
+        def altered(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+            t = np.asarray(arrays["maps.t"], np.float64)
+            sine, cosine = (np.moveaxis(of(np.multiply.outer(t, c)), 3, 1) for of in (np.sin, np.cos))
+            by = t[:, None] if weigh else 1
+            made = np.concatenate([sine, cosine, by * sine, by * cosine, t[:, None]], axis=1)
+            made[~np.asarray(t.any(axis=(1, 2)))] = 0
+            return {"basis.0": made}
+
+        return altered
+
+    k, right = np.arange(1, csm.terms + 1), frequencies(csm.terms)
+    recipe.add("basis", "sines and cosines of each texel's depth, and the same times the depth", run, ("maps.t",), {
+        "basis.0": Spec(CHANNELS, "1", "S_1.., C_1.., t S_1.., t C_1.., t; 0 on empty maps", paper="E-VAL-02")},
+        paper="VAL Sec. 4.1, E-VAL-02", exact=("maps.t",), decoys=(
+            Decoy("c_k = k pi", literal(k * np.pi), "c_k = (2k - 1) pi"),
+            Decoy("c_k = 2 k pi", literal(2 * k * np.pi), "c_k = (2k - 1) pi"),
+            Decoy("c_k = (2k + 1) pi", literal(right + 2 * np.pi), "k from 1 on"),
+            Decoy("sines and cosines are not weighed by the depth", literal(right, weigh=False), "E-VAL-02"),
+            Decoy("sines and cosines are exchanged", writing(run, basis__0=_exchanged), "E-VAL-02"),
+            Decoy("sines and cosines take turns", writing(run, basis__0=_in_turns), "order of channels"),
+            Decoy("the mean depth itself is left out",
+                  writing(run, basis__0=lambda a: np.concatenate([a[:, :-1], 0 * a[:, -1:]], axis=1)), "E-VAL-02: Z")))
+
+
+def _exchanged(basis: Array) -> Array:
+    m = basis.shape[1] // 4
+    return basis[:, [*range(m, 2 * m), *range(m), *range(3 * m, 4 * m), *range(2 * m, 3 * m), 4 * m]]
+
+
+def _in_turns(basis: Array) -> Array:
+    m = basis.shape[1] // 4
+    return basis[:, [j + half for half in (0, 2 * m) for k in range(m) for j in (k, m + k)] + [4 * m]]
+
+
+def level_names(recipe: Recipe) -> tuple[str, ...]:
+    """Return the names of the basis and of its mip levels."""
+    return tuple(name for name in recipe.specs if name.startswith("basis."))
+
+
+def _add_levels(recipe: Recipe, terms: int) -> None:
+    side = recipe.facts["maps"]["texels a side"]
+    sides = [side]
+    while sides[-1] > 1:
+        sides.append((sides[-1] + 1) // 2)
+    names = [f"basis.{level}" for level in range(1, len(sides))]
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        level, made = np.ascontiguousarray(arrays["basis.0"], real), {}
+        for name in names:
+            level = made[name] = _halved(level, terms)
+        return made
+
+    def chained(half: Any) -> Any:
+        def altered(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+            level, made = arrays["basis.0"], {}
+            for name in names:
+                level = made[name] = half(level)
+            return made
+
+        return altered
+
+    recipe.facts["basis.sides"] = sides
+    recipe.add("mip", "each level halves the one before by means of 2 x 2 texels; of an odd side the last counts twice",
+               run, ("basis.0",), {name: Spec(CHANNELS, "1", f"means over {2**level} x {2**level} texels")
+                                   for level, name in enumerate(names, 1)},
+               paper="VAL Sec. 6", decoys=(
+                   Decoy("one texel of four", chained(lambda a: a[:, :, ::2, ::2]), "means"),
+                   Decoy("sums of four texels", chained(lambda a: 4 * _mean_of_four(a, "edge")), "means"),
+                   Decoy("beyond an odd side is 0", chained(lambda a: _mean_of_four(a, "constant")), "docs/methods"),
+                   Decoy("columns are halved alone, then rows shifted", chained(
+                       lambda a: _mean_of_four(np.roll(a, -1, axis=2), "edge")), "texels 2 i and 2 i + 1"),
+                   Decoy("the depth is that of the nearest texel, not the mean",
+                         chained(lambda a: np.concatenate([_mean_of_four(a, "edge")[:, :-1], _least_of_four(a)], 1)),
+                         "E-VAL-02: Z = w * z")))
+
+
+def _halved(level: Array, terms: int) -> Array:
+    """Return the next level by the kernel of the mip maps, whose texels are rows of channels."""
+    count, _, side, _ = level.shape
+    half, width = (side + 1) // 2, -(-2 * terms // EIGHT) * EIGHT
+    made = np.zeros((count, level.shape[1], half, half), level.dtype)
+    for k in range(count):
+        texels = np.moveaxis(level[k].reshape(-1, side * side), 0, 1)
+        parts = [np.zeros((side * side + half * half + EIGHT, width), level.dtype) for _ in range(2)]
+        depth = np.zeros(len(parts[0]), level.dtype)
+        for part, first in zip(parts, (0, 2 * terms), strict=True):
+            part[: side * side, : 2 * terms] = texels[:, first : first + 2 * terms]
+        depth[: side * side] = texels[:, -1]
+        halve(parts[0], parts[1], depth, 0, side * side, side)
+        new = slice(side * side, side * side + half * half)
+        channels = np.concatenate([*(part[new, : 2 * terms] for part in parts), depth[new, None]], axis=1)
+        made[k] = channels.T.reshape(-1, half, half)
+    return made
+
+
+def _padded(level: Array, mode: Any) -> Array:
+    odd = level.shape[2] % 2
+    return np.pad(level, ((0, 0), (0, 0), (0, odd), (0, odd)), mode=mode)
+
+
+def _mean_of_four(level: Array, mode: str) -> Array:
+    a = _padded(level, mode)
+    return np.asarray(a[:, :, ::2, ::2] + a[:, :, ::2, 1::2] + a[:, :, 1::2, ::2] + a[:, :, 1::2, 1::2]) / 4
+
+
+def _least_of_four(level: Array) -> Array:
+    a = _padded(level[:, -1:], "edge")
+    return np.asarray(a.reshape(*a.shape[:2], a.shape[2] // 2, 2, -1, 2).min(axis=(3, 5)))
+
+
+def filters_of(arrays: Arrays, csm: Csm, k: int, real: Any, boxes: bool) -> Any:
+    """Return the filtered map of area light k among arrays."""
+    levels = [np.asarray(arrays[name][k], real) for name in sorted(
+        (name for name in arrays if name.startswith("basis.")), key=lambda name: int(name[6:]))]
+    n, basis = levels[0].shape[1], 2 * csm.terms
+    if csm.prefilter == "brute":
+        brute: Brute = brutes(n, csm.terms, real, box=boxes)
+        brute.depth[:], brute.basis[:] = levels[0][-1], np.moveaxis(levels[0][:basis], 0, 2)
+        brute.basis_z[:] = np.moveaxis(levels[0][basis:], 0, 2)
+        return brute
+    mip: Mip = mip_of(mips(1, n, csm.terms, real, shift=LEVEL_SHIFT), 0)
+    mip.depth[:] = levels[0][-1]
+    first = level_offsets(n)[0]
+    for start, level in zip(first[1:], levels[1:], strict=True):
+        texels = slice(start, start + level[0].size)
+        flat = level.reshape(len(level), -1).T
+        mip.basis[texels, :basis], mip.basis_z[texels, :basis] = flat[:, :basis], flat[:, basis : 2 * basis]
+        mip.mean_depth[texels] = flat[:, -1]
+    return mip

@@ -1,0 +1,83 @@
+"""Stages of the series by which convolution shadow maps compare depths, and of its scale on each map (VAL Sec. 4.1)."""
+
+from typing import Any
+
+import numpy as np
+
+from refgi.cluster.filters.depth_scale import DepthScale
+from refgi.cluster.settings import Csm
+from refgi.cluster.visibility.search_region import scale_of
+from refgi.cluster.visibility.series import series
+from refgi.settings import replaced
+from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.spec import Arrays, Decoy, Spec
+from refgi.vectors.stages.val_maps import shadow_maps_of
+
+SCALE = ("scale.origin", "scale.slope", "series.range")
+
+
+def add_series(recipe: Recipe, csm: Csm) -> None:
+    """Add the numbers of the series."""
+    def run(arrays: Arrays, real: Any, how: Csm = csm) -> Arrays:  # noqa: ARG001
+        chain = series(how)
+        return {"series.weight": chain.weight, "series.bias": np.array([chain.search_bias, chain.bias]),
+                "series.range": np.array([chain.range])}
+
+    facts = {"terms": csm.terms, "depth_scale": csm.depth_scale, "prefilter": csm.prefilter,
+             "gain": series(csm).gain, "least blocked share": 0.02}
+    recipe.facts["csm"] = facts
+    recipe.add("series", "weights and biases of f_M, and the far end of its depths", run, (), {
+        "series.weight": Spec("term", "1", "w_k = 2 / c_k, c_k = (2k - 1) pi", paper="E-VAL-02"),
+        "series.bias": Spec("search, comparison", "1", "b*, where f_M is 1 for the first time", paper="E-VAL-03"),
+        "series.range": Spec("one", "1", "1 - 2 b*, the depth of what is farthest", paper="E-VAL-05")},
+        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", decoys=(
+            Decoy("c_k = k pi", writing(run, series__weight=lambda a: 2 / np.pi / np.arange(1, len(a) + 1)),
+                  "E-VAL-02"),
+            Decoy("w_k = 1 / c_k", writing(run, series__weight=lambda a: a / 2), "E-VAL-02"),
+            Decoy("terms are damped more", lambda a, r: run(a, r, replaced(csm, {
+                "attenuation": csm.attenuation + 1.0})), f"A = {csm.attenuation:g}"),
+            Decoy("no bias", writing(run, series__bias=np.zeros_like), "E-VAL-03"),
+            Decoy("depths fill the whole period", writing(run, series__range=np.ones_like), "E-VAL-05"),
+            Decoy("the bias is that of one term less", lambda a, r: {
+                **run(a, r, replaced(csm, {"terms": csm.terms - 1})), "series.weight": series(csm).weight}, "b*(M)")))
+
+
+def add_scale(recipe: Recipe, csm: Csm) -> None:
+    """Add the scale of depths of each map."""
+    def run(arrays: Arrays, real: Any, kind: Any = csm.depth_scale) -> Arrays:
+        maps = shadow_maps_of(arrays, real)
+        chain = series(csm)._replace(range=float(arrays["series.range"][0]))
+        scales = [scale_of(maps, k, kind, chain) if maps.map_of[k] >= 0 else DepthScale(False, 0.0, 0.0, 0.0)
+                  for k in range(len(maps.near))]
+        return {"scale.origin": np.array([one.origin for one in scales]),
+                "scale.slope": np.array([one.slope for one in scales])}
+
+    def other(kind: str) -> Any:
+        return lambda arrays, real: run(arrays, real, kind)
+
+    forms = {"log_map": "logarithms of what the map holds", "map": "linear in metres", "scene": "shares of the scene"}
+    every = {"maps__near": lambda a: np.where(np.isfinite(a), a.min(), a),
+             "maps__far": lambda a: np.full_like(a, a.max())}
+    unit = "depths per octave" if csm.depth_scale == "log_map" else "1/m"
+    recipe.add("scale", "scale on which the depths of each map are compared", run,
+               ("maps.near", "maps.far", "maps.scene_far", "series.range"),
+               {"scale.origin": Spec("area light", "m", "distance of depth 0; 0 for empty maps"),
+                "scale.slope": Spec("area light", unit, "depths per octave of distance or per metre; 0 on empty maps")},
+               paper="E-VAL-05", decoys=(
+                   *(Decoy(f"depths are {what}", other(kind), "E-VAL-05") for kind, what in forms.items()
+                     if kind != csm.depth_scale),
+                   *((Decoy("one scale for all maps", reading(run, **every), "E-VAL-05: what each map holds"),)
+                     if csm.depth_scale != "scene" else ()),
+                   Decoy("the farthest depth is the far end of the range",
+                         writing(run, scale__slope=lambda a: a * _top(csm)), "b* is left behind the farthest blocker")))
+
+
+def _top(csm: Csm) -> float:
+    end = series(csm).range
+    return end / max(2 * end - 1, end / 2)
+
+
+def scale_at(arrays: Arrays, csm: Csm, k: int) -> DepthScale:
+    """Return the scale of one map among arrays."""
+    return DepthScale(csm.depth_scale == "log_map", float(arrays["scale.origin"][k]), float(arrays["scale.slope"][k]),
+                      float(arrays["series.range"][0]))

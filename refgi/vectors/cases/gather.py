@@ -39,7 +39,7 @@ class Plan(NamedTuple):
 
 def gathering(id: str, plan: Plan) -> Case:
     """Return `gather` as planned: buffers, pattern, places, texels, sums, interpolation."""
-    recipe, settings = Recipe(id, "gather", plan.what, id), plan.settings
+    recipe, settings = Recipe(id, "gather", plan.what), plan.settings
     give_scene(recipe, plan.scene)
     add_gbuffer(recipe, plan.scene, *plan.size)
     for index in range(len(plan.scene.lights)):

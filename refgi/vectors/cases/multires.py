@@ -37,7 +37,7 @@ class Plan(NamedTuple):
 
 def multiresolution(id: str, plan: Plan) -> Case:
     """Return `multires` as planned: buffers, lights, refinement, light, picture."""
-    recipe, settings, lamps = Recipe(id, "multires", plan.what, id), plan.settings, len(plan.scene.lights)
+    recipe, settings, lamps = Recipe(id, "multires", plan.what), plan.settings, len(plan.scene.lights)
     add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, pattern="grid")
     if settings.effective_pairs.needs_footprints:
         add_footprints(recipe, lamps)

@@ -37,7 +37,7 @@ class Plan(NamedTuple):
 
 def ranged(id: str, plan: Plan) -> Case:
     """Return `sii` with a cut as planned: buffers, lights, ranges, sum."""
-    recipe, lamps, settings = Recipe(id, "sii", plan.what, id), len(plan.scene.lights), plan.settings
+    recipe, lamps, settings = Recipe(id, "sii", plan.what), len(plan.scene.lights), plan.settings
     add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, shifts=default_shifts(lamps))
     if settings.pairs.needs_footprints:
         add_footprints(recipe, lamps)

@@ -26,7 +26,7 @@ class Plan(NamedTuple):
 
 def shadowed(id: str, plan: Plan) -> Case:
     """Return `vpl` as planned: buffers, lights, visibility, sum."""
-    recipe = Recipe(id, "vpl", plan.what, id)
+    recipe = Recipe(id, "vpl", plan.what)
     lamps = len(plan.scene.lights)
     add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, shifts=default_shifts(lamps))
     add_vpl(recipe, plan.scene)

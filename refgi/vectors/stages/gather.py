@@ -17,7 +17,7 @@ from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, in
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Spec
 from refgi.vectors.stages.gather_disc import OFFSET, PAPER, WEIGHT, Disc, add_centers, add_disc_sum, add_texels
-from refgi.vectors.stages.pairs import RECEIVERS
+from refgi.vectors.stages.pair_bugs import RECEIVERS
 
 
 def add_gather(

@@ -20,7 +20,7 @@ from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import covered_of, everywhere
 from refgi.vectors.stages.multires_upsample import LIGHT
-from refgi.vectors.stages.pairs import RECEIVERS, pair_decoys
+from refgi.vectors.stages.pair_bugs import RECEIVERS, pair_decoys
 
 POINTS = ("multires.point", "multires.normal")
 EQ2 = "AMS Eq. 2, E only; E-AMS-02"

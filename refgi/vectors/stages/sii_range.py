@@ -17,7 +17,7 @@ from refgi.splat.sii.reach.threshold import all_peaks, threshold
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
-from refgi.vectors.stages.pairs import RECEIVERS
+from refgi.vectors.stages.pair_bugs import RECEIVERS
 from refgi.vectors.stages.sii_range_sum import (
     BARE,
     BOTH,

@@ -13,7 +13,7 @@ from refgi.splat.sii.sii import splat
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
-from refgi.vectors.stages.pairs import RECEIVERS
+from refgi.vectors.stages.pair_bugs import RECEIVERS
 
 BOTH = ("diffuse", "glossy")
 LENGTH, LOW, LIGHT = "range.length", "range.low", "range.irradiance"

@@ -22,7 +22,7 @@ from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
-from refgi.vectors.stages.pairs import EQ2, RECEIVERS
+from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS
 from refgi.vectors.stages.val_areas import add_areas
 from refgi.vectors.stages.val_basis import add_basis
 from refgi.vectors.stages.val_clusters import add_extents, add_kmeans, clusters_of, extent_of

@@ -16,7 +16,7 @@ from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
-from refgi.vectors.stages.pairs import EQ2, RECEIVERS, pair_decoys
+from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, pair_decoys
 
 GEOMETRY = ("scene.vertices", "scene.faces")
 LIGHTS = ("lights.position", "lights.normal")

@@ -54,7 +54,7 @@ def at_borders() -> Case:
     """Return gathering at points that are given: on a map's border, outside, behind the lamp, at it, on a texel."""
     scene, maps, name = room(SQUARE, matte=True), 12, "gather-border"
     recipe = Recipe(name, "gather", "points on the border of a map, beyond it, behind the lamp, at it, on a texel's "
-                    "surface; a sample in the middle of the disc", name)
+                    "surface; a sample in the middle of the disc")
     give_scene(recipe, scene)
     add_rsm(recipe, scene, 0, maps)
     view = light_projection(scene.lights[0], scene.geometry, maps)

@@ -149,8 +149,6 @@ def _add_at_once(recipe: Recipe, mode: Upsampling, top: int) -> None:
                paper="AMS Sec. 3.5, Fig. 7", decoys=(
                    *(Decoy(cause, partial(run, how=how), "AMS Fig. 7") for how, cause in others.items()
                      if how != mode),
-                   Decoy("light spreads to pixels without surface", reading(run, gbuffer__triangle_id=everywhere),
-                         "0 without surface"),
                    Decoy("rows and columns of subsplats are exchanged", _with_list(run, (1, 0), 0), "row, column"),
                    Decoy("subsplats one level finer are taken", _with_list(run, (0, 1), -1), "level of the layer")))
 

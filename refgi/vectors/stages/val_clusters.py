@@ -82,7 +82,6 @@ def add_kmeans(recipe: Recipe, settings: Clusters, total: int) -> None:
                (*LIGHTS, "extents.illuminated", *last), _clusters(), paper="VAL Sec. 5.1; A.6 P5",
                exact=(*LIGHTS, *last), decoys=(
                    Decoy("no rounds beyond those shown", stopped, "until assignments repeat"),
-                   Decoy("one round alone", lambda a, r: run(a, r, rounds=1), "until assignments repeat"),
                    Decoy("normals do not count", lambda a, r: run(a, r, normal_weight=0.0), METRIC)))
 
 

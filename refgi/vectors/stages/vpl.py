@@ -22,6 +22,8 @@ GEOMETRY = ("scene.vertices", "scene.faces")
 LIGHTS = ("lights.position", "lights.normal")
 FACING, VISIBLE, LIGHT = "vpl.facing", "vpl.visible", "vpl.irradiance"
 LIFT = 1e-3  # m: ports lift the ends of their rays off the surfaces by up to that; what it decides is masked
+# what shows only where surfaces block the light, or never in these cases
+SHADOWED = ("clamped", "absolute", "at least", "largest light", "first half", "horizon")
 LEAK = 0.05  # m: a lift through which light leaks
 
 
@@ -190,9 +192,7 @@ def _add_sum(recipe: Recipe) -> None:
         return altered
 
     bugs = [one for one in pair_decoys(unshadowed, False, "lights.lobe_flux" in recipe.specs)
-            if one.cause not in ("only the first half of the lights", "the distance is clamped at 0.1 m",
-                                 "cosines are not clamped at 0: lights behind a surface count",
-                                 "cosines are taken as absolute values", "lobes reach below the light's horizon")]
+            if not any(word in one.cause for word in SHADOWED)]
     recipe.add("vpl.sum", "irradiance of the visible pixel lights at every pixel, without albedo/pi", run,
                (*RECEIVERS, VISIBLE, *names), {LIGHT: Spec("rgb, row, column", "W/m^2", "indirect irradiance",
                                                            "linear RGB",

@@ -38,8 +38,8 @@ VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
 }
 TEMPORAL = {
     "hssil-temporal": of(TemporalSettings),
-    "hssil-entering": of(TemporalSettings, warm_up=False, entering_speed=6.0, clamp=1.0, clamp_radius=2, depth_tolerance=0.25,
-                         fetch="nearest"),
+    "hssil-entering": of(TemporalSettings, warm_up=False, entering_speed=6.0, clamp=1.0, clamp_radius=2,
+                         depth_tolerance=0.25, fetch="nearest"),
     "hssil-moving": of(TemporalSettings, speed=3.0),
 }
 STEPS = {"hssil-temporal": (0.1, 0.15, -0.2), "hssil-entering": (-0.2, 0.1, 0.2), "hssil-moving": (0.01, 0.0, 0.02)}
@@ -81,9 +81,9 @@ def frames_of(id: str) -> list[Scene]:
         vertices = still.geometry.vertices.copy()
         if id == "hssil-moving":
             vertices[BOX] += k * np.array([-0.06, 0.03, 0.04])
-        scenes.append(stored_scene(dataclasses.replace(
-            still, camera=dataclasses.replace(VIEW, eye=eye, target=target, vfov=NARROW),
-            geometry=dataclasses.replace(still.geometry, vertices=vertices) if id == "hssil-moving" else still.geometry)))
+        geometry = dataclasses.replace(still.geometry, vertices=vertices) if id == "hssil-moving" else still.geometry
+        camera = dataclasses.replace(VIEW, eye=eye, target=target, vfov=NARROW)
+        scenes.append(stored_scene(dataclasses.replace(still, camera=camera, geometry=geometry)))
     return scenes
 
 
@@ -103,8 +103,8 @@ QUICK = {
                             "around the room"),
     "hssil-paper": _quick("hssil-paper", "the paper's settings: rows share samples, uniform density, no blur"),
     "hssil-odd": _quick("hssil-odd", "13 x 11 pixels from full resolution down to one texel"),
-    "hssil-pole": _quick("hssil-pole", "a camera that looks straight down: surfaces of one depth; a lamp above a purely "
-                         "glossy shelf"),
+    "hssil-pole": _quick("hssil-pole", "a camera that looks straight down: surfaces of one depth; a lamp above a "
+                         "purely glossy shelf"),
     "hssil-temporal": lambda: coherent("hssil-temporal", "a camera that moves: fourth frame, surfaces found in 1 to 3 "
                                        "frames before, disoccluded ones"),
     "hssil-entering": lambda: coherent("hssil-entering", "a camera that turns: entering pixels, clamped light of the "

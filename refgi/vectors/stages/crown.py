@@ -73,16 +73,16 @@ def add_samples(recipe: Recipe, sampling: SamplingSettings, index: int, rows: in
         a.mean(axis=-1, keepdims=True), a.shape)}), CROWN)] if sampling.density != "uniform" else []
     recipe.add(name, "texels around a receiver that are its samples, and how many texels each stands for", run,
                (points, shifts), {
-                   f"{name}.offsets": Spec("row modulo the tile's, column modulo the tile's, sample, (right, down)", "1",
+                   f"{name}.offsets": Spec("row modulo tile, column modulo tile, sample, (right, down)", "1",
                                            "texels from the receiver to the sample, the disc's first", tier="T0"),
-                   f"{name}.weight": Spec("row modulo, column modulo (1: all alike), sample", "1",
+                   f"{name}.weight": Spec("row modulo tile, column modulo tile, sample; 1: all alike", "1",
                                           "texels of this level that a sample stands for", paper="E-HSS-06"),
                }, paper=CROWN, decoys=tuple(decoys))
 
 
 def add_gather(recipe: Recipe, settings: HssilSettings, index: int) -> None:
     """Add the light that each texel of a level receives of its samples."""
-    name, number, form = f"gather{index}.irradiance", settings.sampling.first_level + index, settings.senders.form_factor
+    name, number = f"gather{index}.irradiance", settings.sampling.first_level + index
     samples = f"samples{index}.offsets", f"samples{index}.weight"
     planes = level_names(index, *SENDER)
     plain = replaced(settings, {"sampling.pattern": "interleaved"})
@@ -117,7 +117,7 @@ def add_gather(recipe: Recipe, settings: HssilSettings, index: int) -> None:
     ]
     if index:
         decoys.append(Decoy("areas are scaled by 4^k a second time", printed["hss_level_factor"], "E-HSS-06"))
-    recipe.facts[name.split(".")[0]] = {"form_factor": form}
+    recipe.facts[name.split(".")[0]] = {"form_factor": settings.senders.form_factor}
     recipe.add(name.split(".")[0], "irradiance of a level's texels by their samples, those outside the picture, on "
                "nothing or on the texel itself left out", run, (*planes, *samples), {
                    name: Spec("rgb, row, column", "W/m^2", "irradiance by this level; 0 without surface", "linear RGB",
@@ -132,7 +132,9 @@ def _add_shifts(recipe: Recipe, name: str, counts: tuple[int, int], tile: tuple[
         return {f"{name}.points": sample_points(inner, crown),
                 f"{name}.shifts": np.minimum(tile_shifts(start, tile, stretch), 1.0 - 2.0**-24)}
 
-    def literal(steps: tuple[float, float] = (FIRST_STEP, SECOND_STEP), first: float = 0.5, column: bool = False) -> Run:
+    def literal(
+        steps: tuple[float, float] = (FIRST_STEP, SECOND_STEP), first: float = 0.5, column: bool = False
+    ) -> Run:
         def wrong(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
             count = np.concatenate([np.arange(inner), np.arange(crown)])
             u, v = ((first + count * step) % 1 for step in steps)
@@ -182,7 +184,7 @@ def _gathered(
     """Return the light of the samples, in float64, with a bug."""
     place, normal, radiance, area = (np.asarray(arrays[name], np.float64) for name in level_names(index, *SENDER))
     offsets, weight = arrays[f"samples{index}.offsets"], np.asarray(arrays[f"samples{index}.weight"], np.float64)
-    row, column = np.indices(area.shape)
+    row, column = np.arange(area.shape[0])[:, None], np.arange(area.shape[1])
     down, across = (column, row) if turned else (row, column - moved)
     here = offsets[down % len(offsets), across % offsets.shape[1]]
     stands_for = weight[down % len(weight), across % weight.shape[1]]

@@ -47,7 +47,8 @@ def surface_points(arrays: Arrays, real: Any, scene: Scene, view: Projection) ->
     """Return the camera's G-buffer with the positions and normals among arrays."""
     known = {key: np.ascontiguousarray(arrays[f"gbuffer.{key}"], real) for key in
              ("depth", "position", "normal", "albedo") if f"gbuffer.{key}" in arrays}
-    return GBuffer(scene.geometry, material_table(scene.materials, real), view, _visible(arrays[POINTS[2]]), real, known)
+    materials, ids = material_table(scene.materials, real), _visible(arrays[POINTS[2]])
+    return GBuffer(scene.geometry, materials, view, ids, real, known)
 
 
 def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
@@ -64,10 +65,10 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
         view = GBuffer(scene.geometry, material_table(scene.materials, real), projection,
                        _visible(np.zeros(maps.shape, np.int32)), real)
         known = {key.split(".")[1]: np.ascontiguousarray(arrays[key], real) for key in depths}
-        points = (np.ascontiguousarray(arrays[key], real) for key in POINTS[:2])
-        return {f"shadow{index}.visible": shadow_map_visibility(
-            *points, np.asarray(arrays[POINTS[2]]) >= 0, Rsm(light, view, material_table(scene.materials, real), known),
-            bias)}
+        position, normal = (np.ascontiguousarray(arrays[key], real) for key in POINTS[:2])
+        rsm = Rsm(light, view, material_table(scene.materials, real), known)
+        return {f"shadow{index}.visible": shadow_map_visibility(position, normal, np.asarray(arrays[POINTS[2]]) >= 0,
+                                                                rsm, bias)}
 
     printed = name.replace(".", "__")
     recipe.add(f"shadow{index}", "the nearest texel's point does not lie above the receiver's own plane", test,
@@ -90,9 +91,9 @@ def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:
 
     def test(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 rays have one precision
         tracer = Tracer(geometry_of(arrays, scene))
-        return {f"shadow{index}.visible": tracer.visible_from_light(
-            *(np.asarray(arrays[key]) for key in POINTS[:2]), np.asarray(arrays[POINTS[2]]) >= 0,
-            light_of(arrays, lamp, light))}
+        position, normal, triangle_id = (np.asarray(arrays[key]) for key in POINTS)
+        return {f"shadow{index}.visible": tracer.visible_from_light(position, normal, triangle_id >= 0,
+                                                                    light_of(arrays, lamp, light))}
 
     place = [name for name in _light_names(lamp, light) if name.endswith("position")]
     wrong = (Decoy("the light is looked for at the origin", reading(test, **{

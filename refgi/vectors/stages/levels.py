@@ -46,8 +46,8 @@ def _add_first(recipe: Recipe, view: Projection, first: int) -> None:
     def run(arrays: Arrays, real: Any, downsample: str = "closest", number: int = first) -> Arrays:
         projection = view._replace(frame=np.asarray(arrays[reads[4]], np.float64),
                                    half=np.asarray(arrays[reads[5]], np.float64))
-        buffers = (np.ascontiguousarray(arrays[name], real) for name in reads[:4])
-        return _named(0, levels(*buffers, projection, number, 1, downsample)[0])
+        depth, normal, albedo, light = (np.ascontiguousarray(arrays[name], real) for name in reads[:4])
+        return _named(0, levels(depth, normal, albedo, light, projection, number, 1, downsample)[0])
 
     def picked(rule: str) -> Run:
         return lambda a, r: _picked(run(a, r, number=0), 0, 1 << first, rule)
@@ -93,7 +93,7 @@ def _add_coarser(recipe: Recipe, view: Projection, first: int, index: int) -> No
         return _named(index, next_level(level_of(arrays, index - 1, number - 1, real), shape))
 
     def picked(rule: str) -> Run:
-        return lambda a, r: _picked(_named(0, level_of(a, index - 1, number - 1, r)), index, 2, rule)  # noqa: ARG005
+        return lambda a, r: _picked(_named(0, level_of(a, index - 1, number - 1, r)), index, 2, rule)
 
     def scaled(made: Arrays, factor: float) -> Array:
         """Return areas as `factor` times those of the texel that was kept."""
@@ -129,7 +129,7 @@ class _Rays:
     def lengths(self, made: Arrays, index: int) -> Array:
         depth, place = (np.asarray(made[f"level{index}.{key}"], np.float64) for key in ("depth", "position"))
         far = np.sqrt((place**2).sum(axis=0))
-        return np.divide(far, depth, out=np.ones_like(far), where=np.isfinite(depth))
+        return np.asarray(np.divide(far, depth, out=np.ones_like(far), where=np.isfinite(depth)))
 
     def facing(self, made: Arrays, index: int) -> Array:
         depth, place, normal = (np.asarray(made[f"level{index}.{key}"], np.float64) for key in

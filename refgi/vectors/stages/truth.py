@@ -33,8 +33,8 @@ def add_truth(recipe: Recipe, scene: Scene, settings: TruthSettings) -> None:
     def run(arrays: Arrays, real: Any, how: TruthSettings = settings) -> Arrays:
         given = dataclasses.replace(scene, geometry=geometry_of(arrays, scene), materials=_materials(arrays, scene),
                                     lights=tuple(light_of(arrays, lamp, light) for lamp, light in lamps))
-        points = (np.ascontiguousarray(arrays[name], real) for name in POINTS[:2])
-        found = accumulate(given, Tracer(given.geometry), *points, np.asarray(arrays[POINTS[2]]), how)
+        position, normal = (np.ascontiguousarray(arrays[name], real) for name in POINTS[:2])
+        found = accumulate(given, Tracer(given.geometry), position, normal, np.asarray(arrays[POINTS[2]]), how)
         return dict(zip(NAMES, (found.mean, found.variance_of_mean, found.samples), strict=True))
 
     def changed(**values: Any) -> Run:
@@ -62,7 +62,8 @@ def add_truth(recipe: Recipe, scene: Scene, settings: TruthSettings) -> None:
     elif settings.visibility and settings.emitters == "all":
         decoys.append(Decoy("one bounce more", changed(bounces=2), "number of bounces: a fact of the case"))
     else:
-        decoys.append(Decoy("all surfaces emit and block", changed(visibility=True, emitters="all"), "facts of the case"))
+        decoys.append(Decoy("all surfaces emit and block", changed(visibility=True, emitters="all"),
+                            "facts of the case"))
     if settings.visibility and settings.bounces == 1:
         decoys.append(Decoy("nothing blocks between emitter and receiver", changed(visibility=False), RADIOMETRY))
     if np.any(recipe.given[REFLECTANCE[1]] > 0):
@@ -85,11 +86,13 @@ def add_truth(recipe: Recipe, scene: Scene, settings: TruthSettings) -> None:
 def deviation(mean: Array, variance: Array, other_mean: Array, other_variance: Array) -> float:
     """Return the mean square of what two estimates differ by over the standard error of both: about 1 if they agree.
 
-    Only values with an error in one of them count.
+    Values that neither has an error of, such as pixels without surface, must be equal: inf if they are not.
     """
     both = np.asarray(variance, np.float64) + other_variance
-    apart = (np.asarray(mean, np.float64) - other_mean)[both > 0]
-    return float((apart**2 / both[both > 0]).mean()) if apart.size else 0.0
+    apart = np.asarray(mean, np.float64) - other_mean
+    if np.any(apart[both == 0] != 0):
+        return np.inf
+    return float((apart[both > 0] ** 2 / both[both > 0]).mean()) if np.any(both > 0) else 0.0
 
 
 def _materials(arrays: Arrays, scene: Scene) -> tuple[Material, ...]:

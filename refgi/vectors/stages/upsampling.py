@@ -160,6 +160,7 @@ def _bilateral(
         places.append((offset[:, None] if axis == 0 else offset) - corner)
         slopes.append(factor * slope)
     total, mass = np.zeros((3, *depth.shape)), np.zeros(depth.shape)
+    nearest, least = np.zeros_like(total), np.full(depth.shape, np.inf)
     row, column = np.indices(depth.shape) // factor
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
@@ -167,12 +168,14 @@ def _bilateral(
             there = (i == row + dy) & (j == column + dx) & np.isfinite(far[i, j]) & seen
             plane = 1 / z + (dy - places[0]) * slopes[0] + (dx - places[1]) * slopes[1]
             delta = z * (1 / np.where(there, far[i, j], 1.0) - plane)
+            closer = there & (np.abs(delta) < least)
+            nearest, least = np.where(closer, light[:, i, j], nearest), np.where(closer, np.abs(delta), least)
             u = np.clip(1 - delta**2 / (32 * weights.depth_sigma**2), 0, None) ** 16
             cosine = np.clip((normal * up[:, i, j]).sum(axis=0), 0, None) ** weights.normal_power
             weight = _tent(dy, places[0]) * _tent(dx, places[1]) * u * cosine * there
             total, mass = total + weight * light[:, i, j], mass + weight
     found = mass > 1e-20
-    mean = np.where(found, total / np.where(found & divided, mass, 1.0), light[:, row, column])
+    mean = np.where(found, total / np.where(found & divided, mass, 1.0), nearest)
     return np.asarray(np.where(seen, mean, 0))
 
 

@@ -17,10 +17,10 @@ from refgi.splat.multires.subsplats.upsample import (
     tent_level,
     upsample,
 )
-from refgi.vectors.recipe import Recipe, reading
+from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
-from refgi.vectors.stages.multires_ranges import IDS, covered_of, everywhere
+from refgi.vectors.stages.multires_ranges import IDS, covered_of
 
 LIGHT = "multires.irradiance"
 

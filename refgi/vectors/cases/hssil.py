@@ -1,0 +1,116 @@
+"""Hierarchical screen-space light, from the buffers to the picture, and its temporal filter."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from refgi.scene import Scene, SpotLight
+from refgi.settings import of, replaced
+from refgi.sssil.settings import PRESETS, HssilSettings, TemporalSettings
+from refgi.sssil.temporal.sequence import Sequence
+from refgi.vectors.cases.scenes import BULB, DOWN, POLE, SPOT, VIEW, room, stored_scene
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.spec import Case
+from refgi.vectors.stages.buffers import add_gbuffer, give_scene
+from refgi.vectors.stages.direct import Shadows, add_direct
+from refgi.vectors.stages.hssil import add_hssil
+from refgi.vectors.stages.temporal import add_temporal
+
+AWAY = SpotLight((0.5, 1.5, 0.625), (0.3, 1.0, 0.2), 0.3, 0.6, (4.0, 2.6, 1.3))  # shines into the void
+NARROW = math.radians(38)  # the room fills the picture: points enter at its edges
+BOX = slice(16, 20)  # vertices of the lid in the room
+SETTINGS = {
+    "hssil-default": of(HssilSettings, samples=12, radius=2.0, seed=3),
+    "hssil-paper": replaced(PRESETS["paper"], {"sampling.samples": 12, "sampling.radius": 2.0}),
+    "hssil-odd": of(HssilSettings, samples=9, radius=None, levels=5, start="full", seed=1, size=3,
+                    plane_tolerance=0.1, cosine=0.5),
+    "hssil-pole": of(HssilSettings, samples=8, radius=2.0, levels=2, seed=5),
+    "hssil-dark": of(HssilSettings, samples=8, radius=2.0, levels=2, start="quarter"),
+}
+VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
+    "hssil-default": (room(SPOT, BULB), (40, 28), "map"),
+    "hssil-paper": (room(SPOT, matte=True), (40, 28), "map"),
+    "hssil-odd": (room(SPOT, matte=True), (13, 11), "exact"),
+    "hssil-pole": (room(DOWN, camera=POLE), (21, 14), "exact"),
+    "hssil-dark": (room(AWAY, matte=True), (18, 13), "exact"),
+}
+TEMPORAL = {
+    "hssil-temporal": of(TemporalSettings),
+    "hssil-entering": of(TemporalSettings, warm_up=False, entering_speed=6.0, clamp=1.0, clamp_radius=2,
+                         depth_tolerance=0.25, fetch="nearest"),
+    "hssil-moving": of(TemporalSettings, speed=3.0),
+}
+STEPS = {"hssil-temporal": (0.1, 0.15, -0.2), "hssil-entering": (-0.2, 0.1, 0.2), "hssil-moving": (0.01, 0.0, 0.02)}
+FRAMES, TEMPORAL_SIZE = 4, (32, 24)
+
+
+def screen_space(id: str, what: str, scene: Scene, size: tuple[int, int], shadows: Shadows) -> Case:
+    """Return hssil on a scene: `size` (columns, rows) of the picture."""
+    recipe = Recipe(id, "hssil", what)
+    give_scene(recipe, scene)
+    add_gbuffer(recipe, scene, *size)
+    add_direct(recipe, scene, size, shadows)
+    add_hssil(recipe, scene, size, SETTINGS[id])
+    return recipe.case()
+
+
+def coherent(id: str, what: str) -> Case:
+    """Return the temporal filter of the last of some frames; light and count of the frames before are given."""
+    scenes = frames_of(id)
+    filtered = list(sequence(id, scenes[:-1]))
+    recipe = Recipe(id, "hssil", what)
+    give_scene(recipe, scenes[-1])
+    add_gbuffer(recipe, scenes[-1], *TEMPORAL_SIZE)
+    before = filtered[-1]
+    new = next(iter(sequence(id, scenes[-1:], None).over(scenes[-1:], FRAMES - 1)))
+    counts = np.ones(before.irradiance.shape[1:]) if before.frames is None else before.frames
+    add_temporal(recipe, scenes[-1], scenes[-2], TEMPORAL_SIZE, TEMPORAL[id],
+                 (before.irradiance, counts, new.irradiance))
+    return recipe.case()
+
+
+def frames_of(id: str) -> list[Scene]:
+    """Return scenes whose camera moves on, or whose lid rises in place."""
+    still, step = room(SPOT, BULB, matte=True), np.array(STEPS[id])
+    scenes = []
+    for k in range(FRAMES):
+        eye, target = (tuple((np.array(point) + k * share * step).tolist()) for point, share in
+                       ((VIEW.eye, 1.0), (VIEW.target, 0.3)))
+        vertices = still.geometry.vertices.copy()
+        if id == "hssil-moving":
+            vertices[BOX] += k * np.array([-0.06, 0.03, 0.04])
+        geometry = dataclasses.replace(still.geometry, vertices=vertices) if id == "hssil-moving" else still.geometry
+        camera = dataclasses.replace(VIEW, eye=eye, target=target, vfov=NARROW)
+        scenes.append(stored_scene(dataclasses.replace(still, camera=camera, geometry=geometry)))
+    return scenes
+
+
+def sequence(id: str, scenes: list[Scene], *temporal: Any) -> Sequence:
+    """Return the frames of the production method in double precision."""
+    settings = of(HssilSettings, samples=8, radius=3.0, levels=3, seed=7)
+    width, height = TEMPORAL_SIZE
+    return Sequence(scenes, settings, *(temporal or (TEMPORAL[id],)), width=width, height=height, dtype=np.float64)
+
+
+def _quick(id: str, what: str) -> Any:
+    return lambda: screen_space(id, what, *VIEWS[id])
+
+
+QUICK = {
+    "hssil-default": _quick("hssil-default", "interleaved samples, two lamps, 4 levels from half resolution, void "
+                            "around the room"),
+    "hssil-paper": _quick("hssil-paper", "the paper's settings: rows share samples, uniform density, no blur"),
+    "hssil-odd": _quick("hssil-odd", "13 x 11 pixels from full resolution down to one texel"),
+    "hssil-pole": _quick("hssil-pole", "a camera that looks straight down: surfaces of one depth; a lamp above a "
+                         "purely glossy shelf"),
+    "hssil-temporal": lambda: coherent("hssil-temporal", "a camera that moves: fourth frame, surfaces found in 1 to 3 "
+                                       "frames before, disoccluded ones"),
+    "hssil-entering": lambda: coherent("hssil-entering", "a camera that turns: entering pixels, clamped light of the "
+                                       "nearest texel"),
+}
+FULL: dict[str, Any] = {
+    "hssil-dark": _quick("hssil-dark", "no direct light: all is 0"),
+    "hssil-moving": lambda: coherent("hssil-moving", "a surface that moves by itself before a camera that moves too"),
+}

@@ -1,0 +1,47 @@
+"""The ground truth of small pictures."""
+
+from typing import Any
+
+from refgi.scene import Scene
+from refgi.settings import of
+from refgi.truth.settings import TruthSettings
+from refgi.vectors.cases.scenes import BULB, SPOT, SUN, room
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.spec import Case
+from refgi.vectors.stages.buffers import add_gbuffer, give_scene
+from refgi.vectors.stages.direct import add_direct
+from refgi.vectors.stages.truth import add_truth
+
+SIZE = (20, 14)  # columns, rows
+PLAIN = {"estimator": "hemisphere", "directions": 64, "samples": 2048, "seed": 1}  # as a port would first write it
+VIEWS: dict[str, tuple[Scene, TruthSettings]] = {
+    "truth-one-bounce": (room(SPOT, BULB, SUN), of(TruthSettings, **PLAIN)),
+    "truth-matte": (room(SPOT, matte=True), of(TruthSettings, **PLAIN)),
+    "truth-visible": (room(SPOT, BULB, matte=True), of(TruthSettings, **PLAIN, emitters="visible", visibility=False)),
+    "truth-two-bounces": (room(SPOT, BULB), of(TruthSettings, **PLAIN, bounces=2)),
+    "truth-smooth": (room(SPOT, BULB, smooth=True), of(TruthSettings, **PLAIN)),
+}
+
+
+def traced(id: str, what: str) -> Case:
+    """Return direct light and path-traced light of a scene."""
+    scene, settings = VIEWS[id]
+    recipe = Recipe(id, "truth", what)
+    give_scene(recipe, scene)
+    add_gbuffer(recipe, scene, *SIZE)
+    add_direct(recipe, scene, SIZE, "exact")
+    add_truth(recipe, scene, settings)
+    return recipe.case()
+
+
+QUICK = {
+    "truth-one-bounce": lambda: traced("truth-one-bounce", "light of three lamps after one bounce, glossy and purely "
+                                       "glossy surfaces"),
+    "truth-matte": lambda: traced("truth-matte", "diffuse surfaces alone, one lamp"),
+    "truth-visible": lambda: traced("truth-visible", "only what the camera sees emits and nothing blocks: what a "
+                                    "screen-space method can find"),
+}
+FULL: dict[str, Any] = {
+    "truth-two-bounces": lambda: traced("truth-two-bounces", "light after one and two bounces"),
+    "truth-smooth": lambda: traced("truth-smooth", "a ball with interpolated normals"),
+}

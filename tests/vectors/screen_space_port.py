@@ -1,0 +1,248 @@
+"""A port of hssil's stages: the literal twins, fed with the arrays of a kit.
+
+`outputs(case, stage, arrays)` returns what the port writes, or None where no twin covers the stage (ids and surfaces,
+which the rasterizer's own stages cover).
+"""
+
+import math
+import re
+from types import SimpleNamespace
+
+import numpy as np
+
+from refgi.scene import Geometry
+from refgi.vectors.cases.hssil import SETTINGS, TEMPORAL
+from tests.naive import crossings, crown, crown_points, direct, level_blur, reprojection, temporal, upsampling
+from tests.naive import view_pyramid as pyramid
+
+PLANES = {"p": "position", "n": "normal", "L": "radiance"}
+
+
+def outputs(case, stage, arrays):
+    kind = re.sub(r"\d", "", stage.name)
+    make = {"shadow": shadows, "direct": irradiance, "level": level, "shifts of samples": shifts, "samples": samples,
+            "gather": gathered, "blur": blurred, "light": upsampled, "picture": upsampled, "motion": motion,
+            "reprojected": reprojected, "entering": entering, "clamp": clamped, "temporal": blended}.get(kind)
+    if make is None:
+        return None
+    index = int((re.findall(r"\d", stage.name) or [-1])[0])
+    return make(case, arrays, index)  # some need no arrays, some no facts of the case
+
+
+def pixels(arrays):
+    return [tuple(pixel) for pixel in np.argwhere(arrays["gbuffer.triangle_id"] >= 0)]
+
+
+def points(arrays):
+    return arrays["gbuffer.position"], arrays["gbuffer.normal"]
+
+
+def shadows(case, arrays, index):
+    position, normal = points(arrays)
+    visible = np.zeros(position.shape[1:], bool)
+    lamp = lamps(arrays).get(f"light{index}")
+    for at in pixels(arrays):
+        if f"rsm{index}.depth" in arrays:
+            facts = case.facts[f"rsm{index}"]
+            visible[at] = direct.reached(
+                facts["projection"], *(arrays[f"rsm{index}.{key}"] for key in ("origin", "frame", "half")),
+                (facts["rows"], facts["columns"]), arrays[f"rsm{index}.depth"], arrays[f"rsm{index}.position"],
+                position[:, *at], normal[:, *at])
+            continue
+        corners = arrays["scene.vertices"][arrays["scene.faces"]]
+        start = position[:, *at] + 1e-5 * normal[:, *at]
+        end = lamp["position"] if "position" in lamp else start - 1e3 * lamp["direction"]
+        faces = (end - start) @ normal[:, *at] > 0
+        visible[at] = faces and crossings.free(corners, start[None], end[None], 1 - 1e-5)[0]
+    return {f"shadow{index}.visible": visible}
+
+
+def lamps(arrays):
+    names = {name.split(".")[0] for name in arrays if re.match(r"light\d+\.(position|direction)", name)}
+    return {lamp: {name.split(".")[1]: array for name, array in arrays.items() if name.startswith(lamp + ".")}
+            for lamp in sorted(names)}
+
+
+def irradiance(case, arrays, _):
+    position, normal = points(arrays)
+    light = np.zeros(position.shape)
+    for lamp, values in lamps(arrays).items():
+        for at in pixels(arrays):
+            if arrays[f"shadow{lamp[5:]}.visible"][at]:
+                light[:, *at] += direct.irradiance(case.facts[lamp], values, position[:, *at], normal[:, *at])
+    return {"direct.irradiance": light}
+
+
+def level(case, arrays, index):
+    first, camera = case.facts["hssil"]["first level"], case.facts["camera"]
+    height, width = camera["rows"], camera["columns"]
+    if index == 0:
+        picture = {"depth": arrays["gbuffer.depth"], "axes": arrays["camera.frame"][0],
+                   "f_h": 2 * math.atan(arrays["camera.half"][0]), "f_v": 2 * math.atan(arrays["camera.half"][1]),
+                   **{key: np.moveaxis(arrays[name], 0, -1) for key, name in (
+                       ("normal", "gbuffer.normal"), ("albedo", "gbuffer.albedo"), ("direct", "direct.irradiance"))}}
+        made = pyramid.levels(picture, first, 1)[0]
+    else:
+        made = pyramid.closest_level(texels(arrays, index - 1, width), height, width, first + index, 2)
+    return arrays_of(made, index, width)
+
+
+def texels(arrays, index, width):
+    """Return a level as rows of texels."""
+    depth = arrays[f"level{index}.depth"]
+    names = {key: f"level{index}.{plane}" for key, plane in PLANES.items()}
+
+    def texel(i, j):
+        if math.isinf(depth[i, j]):
+            return None
+        found = {key: arrays[name][:, i, j] for key, name in names.items() if name in arrays}
+        found |= {"z": depth[i, j], "seen": 1}
+        if f"level{index}.area" in arrays:
+            found["A"] = arrays[f"level{index}.area"][i, j]
+        if f"level{index}.pixel" in arrays:
+            found["pixel"] = divmod(int(arrays[f"level{index}.pixel"][i, j]), width)
+        return found
+
+    return [[texel(i, j) for j in range(depth.shape[1])] for i in range(depth.shape[0])]
+
+
+def arrays_of(rows, index, width):
+    """Return rows of texels as a level's arrays."""
+    def plane(of, none):
+        return np.array([[none if texel is None else of(texel) for texel in row] for row in rows])
+
+    made = {name: np.moveaxis(plane(lambda texel, key=key: texel[key], np.zeros(3)), 2, 0)
+            for key, name in PLANES.items()}
+    made |= {"depth": plane(lambda texel: texel["z"], np.inf), "area": plane(lambda texel: texel["A"], 0.0),
+             "pixel": plane(lambda texel: texel["pixel"][0] * width + texel["pixel"][1], -1)}
+    return {f"level{index}.{key}": array for key, array in made.items()}
+
+
+def shifts(case, arrays, index):
+    facts = case.facts[f"samples{index}"]
+    (rows, columns), n = facts["tile"], facts["crown"]
+    s, t = arrays[f"samples{index}.shift"]
+    count = [*range(facts["disc"]), *range(n)]
+    turns = [2 * math.pi * ((0.5 + j / crown_points.G**2) % 1) for j in count]
+    shift = [[((s + k / crown_points.G) % 1, (t + k / crown_points.G**2) % 1) for k in
+              ((columns * row + column) * n for column in range(columns))] for row in range(rows)]
+    return {f"samples{index}.points": np.array([((0.5 + j / crown_points.G) % 1, math.cos(turn), math.sin(turn))
+                                               for j, turn in zip(count, turns, strict=True)]),
+            f"samples{index}.shifts": np.array(shift)}
+
+
+def samples(case, arrays, index):  # noqa: ARG001
+    """Return the samples of the whole twin, which draws its shifts by its own hash."""
+    sampling, facts = SETTINGS[case.id].sampling, case.facts[f"samples{index}"]
+    rows, columns = facts["tile"]
+    found = np.array([[crown_points.samples(sampling, facts["radius"], index, sampling.first_level + index, row, column)
+                       for column in range(columns)] for row in range(rows)])
+    weight = found[..., 2] if sampling.density != "uniform" else found[:1, :1, :, 2]
+    return {f"samples{index}.offsets": found[..., :2].astype(int), f"samples{index}.weight": weight}
+
+
+def gathered(case, arrays, index):  # noqa: ARG001
+    offsets, weight = arrays[f"samples{index}.offsets"], arrays[f"samples{index}.weight"]
+
+    def around(row, column):
+        return (offsets[row % len(offsets), column % offsets.shape[1]],
+                weight[row % len(weight), column % weight.shape[1]])
+
+    planes = tuple(arrays[f"level{index}.{key}"] for key in ("position", "normal", "radiance", "area"))
+    return {f"gather{index}.irradiance": crown.gathered(planes, around, "disc")}
+
+
+def blurred(case, arrays, index):
+    rows = [[texel and {"place": texel["p"], "normal": texel["n"], "depth": texel["z"]} for texel in row]
+            for row in texels(arrays, index, 1)]
+    facts = case.facts["blur"]
+    return {f"blur{index}.irradiance": level_blur.blurred(arrays[f"gather{index}.irradiance"], rows, facts["size"],
+                                                          facts["plane_tolerance"], facts["cosine"])}
+
+
+def upsampled(case, arrays, index):
+    name, here = ("picture", "gbuffer") if index < 0 else (f"light{index}", f"level{index}")
+    below, facts = f"level{index + 1}", case.facts["upsampling"]
+    coarse = next(one for kind in ("light", "blur", "gather") if (one := f"{kind}{index + 1}.irradiance") in arrays)
+    factor = 2 ** case.facts["hssil"]["first level"] if index < 0 else 2
+    light = upsampling.bilateral(arrays[coarse], arrays[f"{below}.depth"], arrays[f"{below}.normal"],
+                                 arrays[f"{here}.depth"], arrays[f"{here}.normal"], factor, facts["depth_sigma"],
+                                 facts["normal_power"])
+    own = [one for kind in ("blur", "gather") if (one := f"{kind}{index}.irradiance") in arrays]
+    return {f"{name}.irradiance": light + (arrays[own[0]] if own else 0)}
+
+
+def view_of(arrays, name):
+    return (arrays[f"{name}.origin"][0], *arrays[f"{name}.frame"][0], arrays[f"{name}.half"][1])
+
+
+def were(arrays):
+    """Return where points and normals were: as they are unless surfaces moved."""
+    return (arrays.get(f"motion.{key}", arrays.get(f"gbuffer.{key}")) for key in ("position", "normal"))
+
+
+def motion(case, arrays, _):
+    given = {"material_of_face": arrays["scene.material_of_face"], "faces": arrays["scene.faces"],
+             "vertex_normals": None}
+    facts = case.facts["camera"]
+    projection = SimpleNamespace(**{key: arrays[f"camera.{key}"] for key in ("origin", "frame", "half")},
+                                 height=facts["rows"], width=facts["columns"])
+    buffer = SimpleNamespace(resolve=lambda *names: [arrays[f"gbuffer.{name}"] for name in names],
+                             covered=arrays["gbuffer.triangle_id"] >= 0, triangle_id=arrays["gbuffer.triangle_id"],
+                             projection=projection)
+    scene = SimpleNamespace(geometry=Geometry(vertices=arrays["scene.vertices"], **given))
+    made = temporal.moved_back(SimpleNamespace(gbuffer=buffer, scene=scene),
+                               Geometry(vertices=arrays["before.vertices"], **given))
+    return dict(zip(("motion.position", "motion.normal", "motion.speed"), made, strict=True))
+
+
+def reprojected(case, arrays, _):
+    facts, (position, normal) = case.facts["temporal"], were(arrays)
+    light, weight = np.zeros(position.shape), np.zeros(position.shape[1:])
+    count = np.zeros(weight.shape)
+    where = arrays["before.depth"], arrays["before.normal"]
+    limits = facts["depth_tolerance"], facts["normal_cosine"], facts["fetch"]
+    for at in pixels(arrays):
+        one = position[:, *at], normal[:, *at], view_of(arrays, "before"), *limits
+        light[:, *at], weight[at] = reprojection.reproject(arrays["before.irradiance"], *where, *one)
+        if "before.frames" in arrays:
+            count[at] = reprojection.reproject(np.stack([arrays["before.frames"]] * 3), *where, *one)[0][0]
+    return {"reprojected.irradiance": light, "reprojected.weight": weight, "reprojected.frames": count}
+
+
+def entering(case, arrays, _):
+    settings, (position, _) = TEMPORAL[case.id], were(arrays)
+    view = SimpleNamespace(**{key: arrays[f"before.{key}"] for key in ("origin", "frame", "half")})
+    last = SimpleNamespace(gbuffer=SimpleNamespace(projection=view, covered=np.isfinite(arrays["before.depth"])))
+    light, share = arrays["reprojected.irradiance"].copy(), np.zeros(position.shape[1:])
+    for at in pixels(arrays):
+        found = temporal.at_edge(last, arrays["before.irradiance"], position[:, *at], at)
+        if arrays["reprojected.weight"][at] == 0 and found is not None:
+            light[:, *at], share[at] = found[0], math.exp(-found[1] / settings.entering_speed)
+    return {"entering.irradiance": light, "entering.share": share}
+
+
+def clamped(case, arrays, _):
+    settings = TEMPORAL[case.id]
+    earlier, covered = arrays[next(name for name in arrays if name in (
+        "entering.irradiance", "reprojected.irradiance"))].copy(), arrays["gbuffer.triangle_id"] >= 0
+    for at in pixels(arrays):
+        earlier[:, *at] = temporal.clamped(earlier[:, *at], arrays["new.irradiance"], covered, at, settings.clamp,
+                                           settings.clamp_radius)
+    return {"clamped.irradiance": earlier}
+
+
+def blended(case, arrays, _):
+    """Return Sec. 3.3's blend, written out: a W(F) + (1 - a) I."""
+    settings, new = TEMPORAL[case.id], arrays["new.irradiance"]
+    earlier = arrays[next(name for name in ("clamped.irradiance", "entering.irradiance", "reprojected.irradiance")
+                          if name in arrays)]
+    found, share = arrays["reprojected.weight"] > 0, np.zeros(new.shape[1:])
+    share[found] = settings.weight
+    n = np.where(found, arrays.get("reprojected.frames", np.full(new.shape[1:], np.inf)), 0)
+    share = np.minimum(share, np.where(np.isinf(n), 1, n / (np.where(np.isinf(n), 0, n) + 1)))
+    if "entering.share" in arrays:
+        share = np.where(found, share, settings.weight * arrays["entering.share"])
+    share = share * np.exp(-arrays.get("motion.speed", 0.0) / settings.speed)
+    return {"temporal.irradiance": share * earlier + (1 - share) * new, "temporal.share": share,
+            "temporal.frames": n + 1}

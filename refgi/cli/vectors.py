@@ -108,8 +108,8 @@ def report(result: "Result") -> str:
             told.add(one.case)
             lines += ["", *_story(one)]
     idle = len(result.stages) - len(ran)
-    counts = ", ".join(f"{sum(one.verdict == kind for one in ran)} {kind}" for kind in ("exact", "within", "out", "invalid")
-                       if any(one.verdict == kind for one in ran))
+    tally = {kind: sum(one.verdict == kind for one in ran) for kind in ("exact", "within", "out", "invalid")}
+    counts = ", ".join(f"{count} {kind}" for kind, count in tally.items() if count)
     lines += ["", f"{result.mode}: {counts or 'nothing to check'}" + (f"; {idle} stages not run" if idle else "")]
     if result.first is not None:
         lines.append(f"first wrong stage: {result.first[1]} of {result.first[0]}")

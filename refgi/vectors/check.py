@@ -182,7 +182,7 @@ def check_stage(
     kit: Kit, case: CaseManifest, step: StageEntry, output: Path, asked: Asked, *, dirty: bool
 ) -> StageVerdict:
     """Judge what a port has of one stage; `dirty`: what it read is wrong already."""
-    got = {name: file for name in step.writes if (file := _file(output, case.id, name)) is not None}
+    got = {name: file for name in step.writes if (file := find_array(output, case.id, name)) is not None}
     tier = asked.tier_of(step.name)
     judged: dict[str, Judged] = {}
     arrays: dict[str, Array] = {}
@@ -230,7 +230,7 @@ def _judged(
         tolerance = entry.half.model_copy(update={"outliers": max(entry.half.outliers, entry.chained.outliers)})
     limit = kit.extra(case, entry.bound) if entry.bound is not None else None
     masked = kit.extra(case, entry.masked) if entry.masked is not None else None
-    return judge(name, entry, expected, got, "T0" if entry.tier == "T0" else tier, limit, masked, tolerance)
+    return judge(name, expected, got, "T0" if entry.tier == "T0" else tier, limit, masked, tolerance)
 
 
 def _causes(
@@ -247,8 +247,9 @@ def _causes(
             continue
         shares = [explained(one, kit.extra(case, suspect.arrays[name]), kit.extra(case, suspect.places[name]))
                   for name, one in differing.items() if name in suspect.arrays]
-        unlike_shape = any(case.arrays[name].shape != shape for name, shape in suspect.shapes.items() if name in shapes)
-        share = min(shares) if shares and len(shares) == len(differing) else 1.0 if unlike_shape and not differing else 0.0
+        other_shape = any(case.arrays[name].shape != shape for name, shape in suspect.shapes.items() if name in shapes)
+        share = min(shares, default=0.0) if len(shares) == len(differing) else 0.0
+        share = 1.0 if other_shape and not differing else share
         if share >= EXPLAINED:
             found.append(Cause(cause=suspect.cause, share=share, paper=suspect.paper))
     for one in differing.values():
@@ -258,7 +259,8 @@ def _causes(
     return list(unique.values())
 
 
-def _file(output: Path, case: str, name: str) -> Path | None:
+def find_array(output: Path, case: str, name: str) -> Path | None:
+    """Return the file of a port's array, None where there is none."""
     for place in (output / case, output / "cases" / case / "out", output / case / "out"):
         if (place / f"{name}.npy").is_file():
             return place / f"{name}.npy"
@@ -266,4 +268,5 @@ def _file(output: Path, case: str, name: str) -> Path | None:
 
 
 def _reason(error: Exception) -> str:
-    return error.strerror or "nothing readable" if isinstance(error, OSError) else f"{error}".split("\n")[0] or "nothing"
+    said = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]
+    return said or "nothing readable"

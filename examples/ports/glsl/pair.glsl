@@ -3,6 +3,7 @@
 
 #include "elementary.glsl"
 #include "arrays.glsl"
+#include "scalar_product.glsl"
 
 const float PI = 3.14159265358979;
 
@@ -52,21 +53,6 @@ Light light_at(uint k) {
     light.area = AT(lights_area, k);
 #endif
     return light;
-}
-
-#ifdef FUSED
-// a b + c rounded once; fma() is rounded once or twice, as an implementation likes
-float fused(float a, float b, float c) {
-    return float(double(a) * double(b) + double(c));
-}
-#endif
-
-float scalar_product(vec3 a, vec3 b) {
-#ifdef FUSED
-    return fused(a.x, b.x, fused(a.y, b.y, a.z * b.z));
-#else
-    return dot(a, b);
-#endif
 }
 
 // <r.w>^P. With 1 - r.w = |r - w|^2 / 2 digits are kept near the axis, where P is large.

@@ -1,7 +1,7 @@
 """Run compute shaders on the inputs of a conformance kit: `python run.py KIT OUT [CASE ...]`.
 
-Every stage that this port has is run, its inputs read from the kit, or with `--chained` from the port's own output where
-there is such. Results go to `OUT/<case>/<array>.npy`, which `refgi vectors check KIT OUT` judges.
+Every stage that this port has is run, its inputs read from the kit, or with `--chained` from the port's own output
+where there is such. Results go to `OUT/<case>/<array>.npy`, which `refgi vectors check KIT OUT` judges.
 """
 
 import argparse
@@ -39,6 +39,7 @@ class Arrays:
         return name in self.manifest["arrays"]
 
     def write(self, name: str, flat: np.ndarray) -> None:
+        """Write an output in the shape that the manifest says."""
         self.out.mkdir(parents=True, exist_ok=True)
         np.save(self.out / f"{name}.npy", flat.reshape(self.manifest["arrays"][name]["shape"]))
 
@@ -137,10 +138,26 @@ def footprints(gpu: Gpu, arrays: Arrays) -> None:
     arrays.write("lights.area", read(areas))
 
 
-STAGES: dict[str, Callable[[Gpu, Arrays], None]] = {
-    "pairs": lambda gpu, arrays: irradiance(gpu, arrays, "pairs.comp", "pairs.irradiance"),
-    "footprints": footprints,
-    "sum": lambda gpu, arrays: irradiance(gpu, arrays, "sum.comp", "sum.irradiance"),
+def gather(gpu: Gpu, arrays: Arrays, stage: str) -> None:
+    """Run gather.comp on a level."""
+    index = stage.removeprefix("gather")
+    area, offsets = arrays[f"level{index}.area"], arrays[f"samples{index}.offsets"]
+    weight = arrays[f"samples{index}.weight"]
+    result = gpu.context.buffer(reserve=12 * area.size)
+    places = gpu.stored(arrays[f"level{index}.position"], place=True)
+    gpu.run("gather.comp", (), {
+        0: places, 1: gpu.stored(arrays[f"level{index}.normal"]), 2: gpu.stored(arrays[f"level{index}.radiance"]),
+        3: gpu.stored(area), 4: offsets, 5: gpu.stored(weight), 6: result,
+    }, area.size if "TREE" in gpu.variant else -(-area.size // GROUP), size=area.shape[::-1],
+        tile=offsets.shape[1::-1], weight_tile=weight.shape[1::-1], samples=offsets.shape[2])
+    arrays.write(f"{stage}.irradiance", read(result))
+
+
+STAGES: dict[str, Callable[[Gpu, Arrays, str], None]] = {  # by name without numbers of maps and levels
+    "pairs": lambda gpu, arrays, _: irradiance(gpu, arrays, "pairs.comp", "pairs.irradiance"),
+    "footprints": lambda gpu, arrays, _: footprints(gpu, arrays),
+    "sum": lambda gpu, arrays, _: irradiance(gpu, arrays, "sum.comp", "sum.irradiance"),
+    "gather": gather,
 }
 
 
@@ -160,9 +177,10 @@ def main() -> int:
             continue
         arrays = Arrays(asked.kit, asked.out, case["id"], asked.chained)
         for stage in arrays.manifest["stages"]:
-            if stage["name"] in STAGES:
-                STAGES[stage["name"]](gpu, arrays)
-                print(case["id"], stage["name"])
+            name = stage["name"]
+            if (kind := re.sub(r"\d", "", name)) in STAGES:
+                STAGES[kind](gpu, arrays, name)
+                print(case["id"], name)
     return 0
 
 

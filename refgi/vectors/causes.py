@@ -17,6 +17,7 @@ from refgi.vectors.spec import Array
 EXPLAINED = 0.9  # share of the differing elements from which on a hypothesis counts
 ROOM = 8.0  # how much farther off than its bound an explained element may be: the bug changes the rounding too
 NEARER = 0.25  # of its distance from what is expected: how near an element must be to what explains it
+SORTED = 1e-3  # the same, of elements in order
 SLIGHT = 100.0  # bounds: a difference without an explanation that stays below may be rounding
 SINGLE = 2.0**-22
 FACTORS = {"2": 2.0, "1/2": 0.5, "pi": np.pi, "1/pi": 1 / np.pi, "2 pi": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi,
@@ -244,5 +245,6 @@ def _order(difference: Difference) -> Iterator[Cause]:
     if expected.size < 2:
         return
     a, b = np.sort(expected.astype(np.float64), axis=None), np.sort(got.astype(np.float64), axis=None)
-    if np.allclose(a, b, rtol=4 * SINGLE, atol=float(difference.limit.max(initial=0.0))):
+    apart = np.median(distance(got, expected)[difference.out])
+    if bool((distance(a, b) <= 4 * SINGLE * np.abs(a) + SORTED * apart).all()):
         yield Cause(cause="the right values in another order", share=1.0)

@@ -97,7 +97,7 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
 
     recipe.add("pairs", "irradiance of light k at receiver k", run, (*RECEIVERS, *names), {
         "pairs.irradiance": Spec("rgb, row, pair", "W/m^2", "irradiance; 0 where light and receiver coincide",
-                                 "linear RGB", EQ2)},
+                                 "linear RGB", EQ2, alone=True)},
         paper=EQ2, decoys=pair_decoys(run, False, "lights.lobe_flux" in lights, own=True),
         exact=("gbuffer.position", "lights.position"))
 

@@ -6,7 +6,8 @@ from importlib import import_module
 from refgi.errors import InputError
 from refgi.vectors.spec import Case
 
-MODULES = ("pairs", "sii", "hssil")  # each with QUICK and FULL: functions without arguments that make a case, by its id
+# each with QUICK and FULL: functions without arguments that make a case, by its id
+MODULES = ("pairs", "sii", "val", "hssil")
 
 
 def kit_cases(kit: str) -> dict[str, Callable[[], Case]]:

@@ -151,7 +151,10 @@ def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
         raise InputError(f"{output}: expected a folder of a port's arrays, got none", file=str(output))
     verdicts: list[StageVerdict] = []
     names: set[str] = set()
+    begun: set[str] = set()  # cases of which the port has something
     for case in kit.cases(asked):
+        if any(find_array(output, case.id, name) for step in case.stages for name in step.writes):
+            begun.add(case.id)
         wrong: set[str] = set()  # arrays that are out, or made from such
         names.update(step.name for step in case.stages)
         for step in case.stages:
@@ -163,14 +166,14 @@ def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
             verdicts.append(verdict)
     if not verdicts:
         raise InputError(f"--stage, --case: expected one of {', '.join(sorted(names)) or 'the kit'}, got none of them")
-    return _summed(kit, asked, verdicts)
+    return _summed(kit, asked, verdicts, begun)
 
 
-def _summed(kit: Kit, asked: Asked, verdicts: list[StageVerdict]) -> Result:
+def _summed(kit: Kit, asked: Asked, verdicts: list[StageVerdict], begun: set[str]) -> Result:
     first = next(((one.case, one.stage) for one in verdicts if one.verdict in ("out", "invalid")
                   and one.upstream != "dirty"), None)
     found = {one.verdict for one in verdicts}
-    missing = asked.stages and "not-run" in found
+    missing = asked.stages and any(one.verdict == "not-run" and one.case in begun for one in verdicts)
     ran = found - {"not-run"}
     code = OUT if "out" in found else NOT_COMPARABLE if "invalid" in found or missing or not ran else ALL_WITHIN
     worst = next(verdict for verdict in ORDER if verdict in found)

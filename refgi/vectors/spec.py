@@ -21,7 +21,7 @@ Run = Callable[[Arrays, Any], Arrays]  # inputs by name in the dtype of the seco
 class Spec:
     """What one array is, wherever it occurs."""
 
-    axes: str  # outermost first: "channel, row, column"
+    axes: str  # outermost first: "rgb, row, column"; "(inner, outer)" is one axis of two elements
     unit: str  # "1" for none
     what: str
     space: str = ""  # "world", "camera", "linear RGB"

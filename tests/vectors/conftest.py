@@ -5,14 +5,8 @@ from refgi.vectors.check import Kit
 
 
 @pytest.fixture(scope="session")
-def kit(monkeypatch_session_cache):
-    """The quick kit, made once."""
-    return Kit(kit_folder())
-
-
-@pytest.fixture(scope="session")
-def monkeypatch_session_cache():
-    """Nothing of the user's own kit is used."""
+def kit():
+    """The quick kit, made once; none of the user's own is used."""
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("REFGI_KIT", raising=False)
-        yield
+        return Kit(kit_folder())

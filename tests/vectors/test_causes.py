@@ -68,7 +68,7 @@ def test_another_array_in_its_place_is_named(kit, tmp_path):
 
 
 def test_every_likely_bug_of_the_kit_is_told_by_the_checker(kit, tmp_path):
-    """The exporter keeps a sample of elements of each; here it is put over the right arrays, as a port would have it."""
+    """The exporter keeps a sample of elements of each; here it is put over the right arrays, as a port has it."""
     told = seen = 0
     for case in ("sii-three-lamps", "sii-warp-a", "sii-warp-b", "pairs-glossy"):
         port = Port(kit, case, tmp_path / case)

@@ -162,7 +162,7 @@ def _light_names(lamp: str, light: Light) -> tuple[str, ...]:
 def _give_light(recipe: Recipe, lamp: str, light: Light) -> None:
     spec = {"position": Spec("xyz", "m", f"place of the {NAMES[type(light)]} light", "world"),
             "direction": Spec("xyz", "1", "where it shines to, any length", "world"),
-            "half_angles": Spec("inner, outer", "rad", "half-angles of the cone: full light within, none beyond"),
+            "half_angles": Spec("(inner, outer)", "rad", "half-angles of the cone: full light within, none beyond"),
             "intensity": Spec("rgb", "W/sr", "radiant intensity, of a spot on its axis", "linear RGB"),
             "irradiance": Spec("rgb", "W/m^2", "irradiance of a surface across the light", "linear RGB")}
     for key in _light_keys(light):
@@ -178,7 +178,7 @@ def _give_maps(recipe: Recipe, name: str, maps: Projection) -> None:
     recipe.give(f"{name}.origin", maps.origin, Spec("map, xyz", "m", f"centre of each {kind} map", "world"))
     recipe.give(f"{name}.frame", maps.frame, Spec("map, (right, down, forward), xyz", VECTOR, "axes of each map",
                                                   "world"))
-    recipe.give(f"{name}.half", maps.half, Spec("horizontal, vertical", "m" if maps.kind == 1 else "1",
+    recipe.give(f"{name}.half", maps.half, Spec("(horizontal, vertical)", "m" if maps.kind == 1 else "1",
                                                 "half extent of the map on the image plane"))
     recipe.facts[name] = {"projection": kind, "maps": maps.maps, "rows": maps.height, "columns": maps.width}
 

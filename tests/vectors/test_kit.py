@@ -1,0 +1,163 @@
+"""The kit on disk: schemas, hashes, axes, scenes, what makes it again to the byte, and what is refused."""
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from refgi.errors import InputError
+from refgi.frame import Frame
+from refgi.scene import load_scene
+from refgi.settings import of
+from refgi.splat import SiiSettings, sii
+from refgi.vectors import export
+from refgi.vectors.bounds import isolated_bounds
+from refgi.vectors.cases import kit_cases
+from refgi.vectors.cases.scenes import SPOT, room
+from refgi.vectors.check import Asked, Kit
+from refgi.vectors.export import export_kit
+from refgi.vectors.manifest import CASE, SCHEMAS, VERSION, CaseManifest, KitManifest, read_model, schema_text
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.spec import Decoy, Spec, expected_of
+
+LARGEST = 20e6  # bytes of the quick kit
+
+
+def test_every_file_is_what_its_schema_says_and_the_schemas_lie_beside_them(kit):
+    for name, model in SCHEMAS.items():
+        assert (kit.folder / "schema" / name).read_text() == schema_text(model)
+    assert read_model(KitManifest, kit.folder / "kit.json").vectors == VERSION
+    assert (kit.folder / "VERSION").read_text().strip() == VERSION
+    assert {entry.id for entry in kit.manifest.cases} == set(kit_cases("quick"))
+    for entry in kit.manifest.cases:
+        assert read_model(CaseManifest, kit.folder / entry.manifest).id == entry.id
+
+
+def test_every_array_is_there_in_its_type_and_shape_with_axes_and_units(kit):
+    for case in kit.cases(Asked()):
+        for name, entry in case.arrays.items():
+            array = kit.array(case, name)
+            assert (array.shape, array.dtype) == (entry.shape, np.dtype(entry.dtype)), name
+            assert array.flags.c_contiguous
+            axes = re.sub(r"\(.*?\)", "components", entry.axes).split(",")
+            assert len(axes) == array.ndim, (name, entry.axes)
+            assert entry.unit, name
+            assert entry.what, name
+            assert (entry.tier == "T0") == (entry.dtype != "<f4"), name
+        written = [name for step in case.stages for name in step.writes]
+        assert sorted([*case.given, *written]) == sorted(case.arrays)
+        for number, step in enumerate(case.stages):
+            before = {*case.given, *(name for one in case.stages[:number] for name in one.writes)}
+            assert set(step.reads) <= before, step.name
+
+
+def test_the_quick_kit_is_small(kit, evidence):
+    size = sum(file.stat().st_size for file in kit.folder.rglob("*") if file.is_file())
+    assert size < LARGEST
+    evidence(f"{len(kit.manifest.cases)} cases, {size / 1e6:.1f} MB")
+
+
+def test_the_same_bytes_each_time(kit, tmp_path):
+    """But for the list, which names the cases and the program."""
+    made = export_kit("quick", tmp_path / "again", only="sii-warp-b")
+    (entry,) = made.cases
+    assert entry.sha256 == next(one.sha256 for one in kit.manifest.cases if one.id == entry.id)
+    for file in (tmp_path / "again" / "cases" / entry.id).rglob("*.npy"):
+        assert file.read_bytes() == (kit.folder / file.relative_to(tmp_path / "again")).read_bytes(), file.name
+
+
+def test_scenes_are_those_of_the_cases(kit):
+    for case in kit.cases(Asked()):
+        if case.scene is None:
+            continue
+        scene = load_scene(kit.folder / case.scene / "scene.json")
+        vertices, faces = kit.array(case, "scene.vertices"), kit.array(case, "scene.faces")
+        loaded = scene.geometry.vertices[scene.geometry.faces].astype(np.float32).reshape(-1, 9)  # by material
+        assert sorted(loaded.tolist()) == sorted(vertices[faces].reshape(-1, 9).tolist())
+        lines = (kit.folder / case.scene / "scene.obj").read_text().splitlines()
+        written = [[int(corner.partition("/")[0]) - 1 for corner in line.split()[1:]]
+                   for line in lines if line[0] == "f"]
+        np.testing.assert_array_equal(written, faces)  # in the order of the ids
+        size = case.facts["camera"]
+        assert (scene.camera.width, scene.camera.height) == (size["columns"], size["rows"])
+        assert len(scene.lights) == sum(key.startswith("light") for key in case.facts)
+
+
+def test_the_last_stage_is_the_method(kit):
+    case = next(one for one in kit.cases(Asked(cases=("sii-halton",))))
+    frame = Frame(room(SPOT, matte=True), width=24, height=18, rsm_resolution=13, dtype=np.float64)
+    picture = sii(frame, of(SiiSettings, lights=40, pattern="halton", clamp="none"))
+    np.testing.assert_allclose(kit.array(case, "sum.irradiance"), picture, rtol=2e-5, atol=1e-6)  # stored in float32
+
+
+def test_a_bug_that_no_case_tells_is_refused(monkeypatch, tmp_path):
+    def twice():
+        recipe = Recipe("x-blind", "x", "a likely bug that changes nothing")
+        recipe.give("x.in", np.arange(4.0), Spec("number", "1", "numbers"))
+        recipe.add("x", "twice", lambda arrays, _: {"x.out": 2 * arrays["x.in"]}, ("x.in",),
+                   {"x.out": Spec("number", "1", "twice")},
+                   decoys=(Decoy("added to itself", lambda arrays, _: {"x.out": arrays["x.in"] + arrays["x.in"]}),))
+        return recipe.case()
+
+    monkeypatch.setattr(export, "kit_cases", lambda _: {"x-blind": twice})
+    with pytest.raises(InputError, match="got none for x: added to itself"):
+        export_kit("quick", tmp_path / "kit")
+    assert not list(tmp_path.iterdir())
+
+
+def test_folders_of_others_are_kept(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match="folder of other files"):
+        export_kit("quick", tmp_path)
+    with pytest.raises(InputError, match="expected the start of one of"):
+        export_kit("quick", tmp_path / "new", only="none")
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_kit_is_replaced_whole(kit, tmp_path):
+    shutil.copytree(kit.folder, tmp_path / "kit")
+    export_kit("quick", tmp_path / "kit", only="pairs-diffuse")
+    assert [entry.id for entry in Kit(tmp_path / "kit").manifest.cases] == ["pairs-diffuse"]
+    assert [file.name for file in tmp_path.iterdir()] == ["kit"]
+
+
+def test_bounds_are_near_rounding(kit, evidence):
+    """Of values that are not tiny beside others of their array; what conditions them worse is said by the bound."""
+    worst = {}
+    for case in kit.cases(Asked(cases=("sii-",))):
+        for name, entry in case.arrays.items():
+            if entry.bound is None:
+                continue
+            expected, limit = kit.array(case, name), kit.extra(case, entry.bound)
+            large = np.abs(expected[np.isfinite(expected)]).max(initial=0.0)
+            if large and not case.id.startswith("sii-one"):
+                worst[name] = max(worst.get(name, 0.0), float(np.median(limit) / large))
+    assert max(worst.values()) < 1e-5
+    told = ", ".join(f"{name} {value:.0e}" for name, value in worst.items())
+    evidence(f"median bound over the largest value: {told}")
+
+
+def test_what_rounding_flips_is_masked_and_nothing_else():
+    """A stage that cuts at 1: numbers beside it are masked, others bounded by a few roundings."""
+    recipe = Recipe("x-cut", "x", "a decision")
+    recipe.give("x.in", np.array([0.5, 1.0 - 2**-24, 1.0, 2.0]), Spec("number", "1", "numbers"))
+
+    def cut(arrays, real):
+        return {"x.out": np.where(arrays["x.in"] > 1, arrays["x.in"], 0).astype(real)}
+
+    recipe.add("x", "what is above 1", cut, ("x.in",), {"x.out": Spec("number", "1", "cut")})
+    case = recipe.case()
+    bound = isolated_bounds(case, case.stages[0], expected_of(case), 0)["x.out"]
+    assert bound.masked.tolist() == [False, True, True, False]
+    assert 2**-23 < bound.limit[3] < 2**-18  # of 2: 1 to 32 roundings
+
+
+def test_manifests_speak_plainly(kit):
+    """No name of a module, class or function: a port's author has not read the source."""
+    for case in kit.cases(Asked()):
+        text = json.dumps(case.model_dump(mode="json"))
+        assert "refgi." not in text
+        assert "lambda" not in text
+    assert CASE in {file.name for file in kit.folder.rglob("*.json")}

@@ -1,0 +1,134 @@
+"""Legal variants of a port raise no alarm: float64, float32, reordered and fused sums, tiles, half floats in T2."""
+
+import numpy as np
+import pytest
+
+from refgi.vectors.cases import kit_cases
+from refgi.vectors.check import ALL_WITHIN, Asked, check_output
+from refgi.vectors.spec import as_read
+from tests.vectors.naive_port import NaivePort
+
+CASES = ("pairs-diffuse", "sii-halton", "sii-three-lamps", "sii-warp-a", "sii-warp-b", "sii-grid")
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.parametrize("chained", [False, True])
+@pytest.mark.parametrize("name", CASES)
+def test_refgi_itself_in_either_type(kit, tmp_path, name, chained, real):
+    """The production kernels as a port, outputs in their own type."""
+    made = kit_cases("quick")[name]()
+    entry = next(one for one in kit.cases(Asked(cases=(name,))) if one.id == name)
+    known = {one: kit.array(entry, one) for one in entry.arrays}
+    (tmp_path / name).mkdir()
+    for step in made.stages:
+        outputs = step.run(as_read(known, step.reads, real), real)
+        for one in step.writes:
+            np.save(tmp_path / name / f"{one}.npy", np.asarray(outputs[one]))
+            if chained:
+                known[one] = np.asarray(outputs[one])
+    assert check_output(kit, tmp_path, Asked(chained=chained, cases=(name,))).exit_code == ALL_WITHIN
+
+
+def single(x):
+    return np.asarray(x, np.float32)
+
+
+def forwards(terms):
+    total = np.zeros(terms.shape[1:], np.float32)
+    for term in terms:
+        total += term
+    return total
+
+
+def pairwise(terms):
+    while len(terms) > 1:
+        odd = terms[-1:] if len(terms) % 2 else terms[:0]
+        terms = np.concatenate([terms[0 : len(terms) - len(odd) : 2] + terms[1 : len(terms) : 2], odd])
+    return terms[0]
+
+
+def by_fours(terms):
+    parts = [forwards(terms[k::4]) for k in range(4)]
+    return (parts[0] + parts[2]) + (parts[1] + parts[3])
+
+
+def compensated(terms):
+    total, rest = np.zeros(terms.shape[1:], np.float32), np.zeros(terms.shape[1:], np.float32)
+    for term in terms:
+        added = term - rest
+        grown = total + added
+        rest, total = (grown - total) - added, grown
+    return total
+
+
+def terms_of(arrays, kind):
+    """Return Eq. 2 of each light at each pixel in float32, (N, 3, h, w), in one of the ways that ports write it."""
+    x, n = single(arrays["gbuffer.position"]), single(arrays["gbuffer.normal"])
+    p, facing = (single(arrays[f"lights.{key}"])[:, :, None, None] for key in ("position", "normal"))
+    flux = single(arrays["lights.flux"])[:, :, None, None] / single(np.pi)
+    d = x[:, None] - p
+    square = (d * d).sum(axis=0)
+    if kind == "fused":  # products summed in a wider type and rounded once
+        square = single((d.astype(np.float64) ** 2).sum(axis=0))
+    if kind == "unnormalised":  # both dot products over r^4
+        cosines = np.maximum(0, (facing * d).sum(axis=0)) * np.maximum(0, -(n[:, None] * d).sum(axis=0))
+        return np.moveaxis(flux * (cosines / np.maximum(square * square, single(1e-30))), 1, 0)
+    inverse = single(1) / np.sqrt(np.maximum(square, single(1e-30)))
+    w = d * inverse
+    cosines = np.maximum(0, (facing * w).sum(axis=0)) * np.maximum(0, -(n[:, None] * w).sum(axis=0))
+    fall = inverse * inverse if kind == "reciprocal" else 1 / np.maximum(square, single(1e-30))
+    return np.moveaxis(flux * (cosines * fall), 1, 0)
+
+
+@pytest.mark.parametrize("order", [forwards, lambda t: forwards(t[::-1]), pairwise, by_fours, compensated,
+                                   lambda t: forwards(t[np.random.default_rng(3).permutation(len(t))])])
+@pytest.mark.parametrize("kind", ["plain", "fused", "unnormalised", "reciprocal"])
+def test_sums_in_any_order(kit, tmp_path, kind, order):
+    case = next(one for one in kit.cases(Asked(cases=("sii-halton",))))
+    arrays = {name: kit.array(case, name) for name in case.arrays}
+    total = np.where(arrays["gbuffer.triangle_id"] >= 0, order(terms_of(arrays, kind)), 0)
+    (tmp_path / case.id).mkdir()
+    np.save(tmp_path / case.id / "sum.irradiance.npy", total)
+    result = check_output(kit, tmp_path, Asked(stages=("sum",), cases=("sii-halton",)))
+    assert result.exit_code == ALL_WITHIN
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_half_floats_between_stages(kit, tmp_path, name):
+    """Buffers of 16 bits pass T2 and fail T1, each stage reading the kit's inputs rounded."""
+    made = kit_cases("quick")[name]()
+    entry = next(one for one in kit.cases(Asked(cases=(name,))) if one.id == name)
+    (tmp_path / name).mkdir()
+    for step in made.stages:
+        inputs = {one: as_half(kit.array(entry, one), one in step.exact) for one in step.reads}
+        outputs = step.run(inputs, np.float32)
+        for one in step.writes:
+            array = np.asarray(outputs[one])
+            with np.errstate(over="ignore"):
+                array = array.astype(np.float16) if array.dtype.kind == "f" else array
+            np.save(tmp_path / name / f"{one}.npy", array)
+    assert check_output(kit, tmp_path, Asked(tiers={"": "T2"}, cases=(name,))).exit_code == ALL_WITHIN
+    assert check_output(kit, tmp_path, Asked(cases=(name,))).exit_code != ALL_WITHIN
+
+
+def as_half(array, exact):
+    if array.dtype.kind != "f" or exact:
+        return array
+    return np.clip(array, -65504, 65504).astype(np.float16).astype(np.float32)
+
+
+def test_tiles_in_any_order(kit, tmp_path):
+    """The twin's pixels one by one are a picture whatever the order of tiles."""
+    case = next(one for one in kit.cases(Asked(cases=("sii-grid",))))
+    arrays = {name: kit.array(case, name).astype(np.float64) for name in case.arrays}
+    right = NaivePort(case).sum(arrays)["sum.irradiance"]
+    tiles = np.zeros_like(right)
+    for column in range(0, right.shape[2], 4):
+        for row in reversed(range(0, right.shape[1], 4)):
+            here = {**arrays, "gbuffer.triangle_id": np.full_like(arrays["gbuffer.triangle_id"], -1)}
+            block = np.s_[row : row + 4, column : column + 4]
+            here["gbuffer.triangle_id"][block] = arrays["gbuffer.triangle_id"][block]
+            tiles += NaivePort(case).sum(here)["sum.irradiance"]
+    (tmp_path / case.id).mkdir()
+    np.save(tmp_path / case.id / "sum.irradiance.npy", tiles)
+    assert check_output(kit, tmp_path, Asked(stages=("sum",), cases=("sii-grid",))).exit_code == ALL_WITHIN

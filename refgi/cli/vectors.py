@@ -9,7 +9,7 @@ from refgi.cli.options import speech
 from refgi.cli.session import Session, progress, say, table
 
 if TYPE_CHECKING:
-    from refgi.vectors.manifest import ArrayVerdict, Result, StageVerdict
+    from refgi.vectors.manifest import Result, StageVerdict
 
 
 @click.group("vectors")
@@ -98,6 +98,8 @@ def tiers_of(texts: tuple[str, ...]) -> dict[str, str]:
 
 def report(result: "Result") -> str:
     """Return what people read: one line a stage that ran, then the first wrong stage of each case."""
+    from refgi.vectors.words import story
+
     ran = [one for one in result.stages if one.verdict != "not-run"]
     rows = [("case", "stage", "verdict", "worst / bound", "")]
     rows += [(one.case, one.stage, one.verdict, _worst(one), _remark(one)) for one in ran]
@@ -106,10 +108,10 @@ def report(result: "Result") -> str:
     for one in ran:
         if one.verdict in ("out", "invalid") and one.upstream != "dirty" and one.case not in told:
             told.add(one.case)
-            lines += ["", *_story(one)]
+            lines += ["", *story(one)]
     idle = len(result.stages) - len(ran)
-    counts = ", ".join(f"{sum(one.verdict == kind for one in ran)} {kind}" for kind in ("exact", "within", "out", "invalid")
-                       if any(one.verdict == kind for one in ran))
+    tally = {kind: sum(one.verdict == kind for one in ran) for kind in ("exact", "within", "out", "invalid")}
+    counts = ", ".join(f"{count} {kind}" for kind, count in tally.items() if count)
     lines += ["", f"{result.mode}: {counts or 'nothing to check'}" + (f"; {idle} stages not run" if idle else "")]
     if result.first is not None:
         lines.append(f"first wrong stage: {result.first[1]} of {result.first[0]}")
@@ -127,23 +129,3 @@ def _remark(stage: "StageVerdict") -> str:
     remarks += ["made from wrong inputs"] if stage.upstream == "dirty" else []
     remarks += [stage.causes[0].cause] if stage.causes else []
     return "; ".join(remarks)
-
-
-def _story(stage: "StageVerdict") -> list[str]:
-    """Return what is wrong with a stage: arrays, worst elements, causes."""
-    lines = [f"{stage.case}: {stage.stage} is {stage.verdict}"]
-    lines += [f"  {_fault(one)}" for one in stage.arrays if one.verdict in ("out", "invalid")]
-    lines += [f"  likely: {one.cause} ({one.share:.0%} of what differs{f'; {one.paper}' if one.paper else ''})"
-              for one in stage.causes]
-    return lines
-
-
-def _fault(array: "ArrayVerdict") -> str:
-    if array.verdict == "invalid":
-        return f"{array.name}: {array.said}"
-    place = ", ".join(map(str, array.element or ()))
-    values = " and ".join(f"{'none' if value is None else f'{value:.9g}'} {word}" for value, word in (
-        (array.expected, "expected"), (array.got, "here")))
-    said = f" ({array.said})" if array.said else ""
-    bound = "" if array.bound is None else f", bound {array.bound:.2g}"
-    return f"{array.name}[{place}]: {values}{bound}; {array.outside} elements out{said}"

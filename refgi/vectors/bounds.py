@@ -45,18 +45,20 @@ class Budget(NamedTuple):
     outliers: float  # share of elements
 
 
-def isolated_bounds(step: Stage, known: Arrays, seed: int) -> dict[str, Bound]:
-    """Return the bound of each array that a stage writes, its inputs being the stored ones."""
+def isolated_bounds(case: Case, step: Stage, known: Arrays, seed: int) -> dict[str, Bound]:
+    """Return the bound of each array that a stage of a case writes, its inputs being the stored ones."""
     runs = [outputs_of(step, known, np.float32)]
     runs += [_run(step, changed) for changed in _changed(step, known, seed, _rounded_at_random)]
-    return {name: _bound(known[name], [run[name] for run in runs]) for name in step.writes}
+    return {name: _bound(known[name], [run[name] for run in runs], _large(case, name, known[name]))
+            for name in step.writes}
 
 
-def half_budgets(step: Stage, known: Arrays, seed: int) -> dict[str, Budget]:
-    """Return the budget of each array that a stage writes when it reads and writes half floats (T2)."""
+def half_budgets(case: Case, step: Stage, known: Arrays, seed: int) -> dict[str, Budget]:
+    """Return the budget of each array that a stage of a case writes when it reads and writes half floats (T2)."""
     runs = [{name: _to_half(array) for name, array in _run(step, changed).items()}
             for changed in _changed(step, known, seed, _halved_at_random)]
-    return {name: _budget(known[name], [run[name] for run in runs], HALF_ROUNDING) for name in step.writes}
+    return {name: _budget(known[name], [run[name] for run in runs], HALF_ROUNDING, _large(case, name, known[name]))
+            for name in step.writes}
 
 
 def chained_budgets(case: Case, known: Arrays, seed: int) -> dict[str, Budget]:
@@ -71,7 +73,8 @@ def chained_budgets(case: Case, known: Arrays, seed: int) -> dict[str, Budget]:
             chain.update(_run(step, changed))
         runs.append(chain)
     written = [name for step in case.stages for name in step.writes]
-    return {name: _budget(known[name], [run[name] for run in runs], ROUNDING) for name in written}
+    return {name: _budget(known[name], [run[name] for run in runs], ROUNDING, _large(case, name, known[name]))
+            for name in written}
 
 
 def _changed(
@@ -105,22 +108,24 @@ def _to_half(array: Array) -> Array:
         return array.astype(np.float16).astype(np.float32)
 
 
-def _bound(expected: Array, runs: list[Array]) -> Bound:
+def _large(case: Case, name: str, expected: Array) -> float:
+    return 0.0 if case.specs[name].alone or expected.dtype.kind != "f" else large_value(expected)
+
+
+def _bound(expected: Array, runs: list[Array], large: float) -> Bound:
     if any(run.shape != expected.shape for run in runs):
         return Bound(np.zeros(expected.shape, np.float32), np.ones(expected.shape, np.bool_))
     off = np.max([distance(run, expected) for run in runs], axis=0, initial=0.0)
     if expected.dtype.kind != "f":
         return Bound(np.zeros(expected.shape, np.float32), off > 0)
-    large = large_value(expected)
     magnitude = np.where(np.isfinite(expected), np.abs(expected), 0.0).astype(np.float64)
     masked = off > np.maximum(DECIDED * large, DECIDED * magnitude)
     limit = SAFETY * (off + ROUNDING * (magnitude + large))
     return Bound(np.where(masked, 0.0, limit).astype(np.float32), masked)
 
 
-def _budget(expected: Array, runs: list[Array], rounding: float) -> Budget:
+def _budget(expected: Array, runs: list[Array], rounding: float, large: float) -> Budget:
     same = [run for run in runs if run.shape == expected.shape]
-    large = 0.0 if expected.dtype.kind != "f" else large_value(expected)
     if not same or expected.size == 0:
         return Budget(0.0, large, 1.0 if expected.size else 0.0)
     off = np.array([distance(run, expected) for run in same])

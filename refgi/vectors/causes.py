@@ -1,8 +1,8 @@
 """Likely causes of a difference: hypotheses that turn the expected array into the one that a port has. NumPy alone.
 
-A hypothesis explains a difference where it predicts what the port has, element by element, at nearly all elements. Those
-of this module hold for any array: factors, signs, axes that are flipped, exchanged or shifted, coding of values, order.
-A kit adds those of each stage as arrays (`Suspect`).
+A hypothesis explains a difference where it predicts what the port has, element by element, at nearly all elements.
+Those of this module hold for any array: factors, signs, axes that are flipped, exchanged or shifted, coding of values,
+order. A kit adds those of each stage as arrays (`Suspect`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,6 +16,9 @@ from refgi.vectors.spec import Array
 
 EXPLAINED = 0.9  # share of the differing elements from which on a hypothesis counts
 ROOM = 8.0  # how much farther off than its bound an explained element may be: the bug changes the rounding too
+NEARER = 0.25  # of its distance from what is expected: how near an element must be to what explains it
+SORTED = 1e-3  # the same, of elements in order
+SLIGHT = 100.0  # bounds: a difference without an explanation that stays below may be rounding
 SINGLE = 2.0**-22
 FACTORS = {"2": 2.0, "1/2": 0.5, "pi": np.pi, "1/pi": 1 / np.pi, "2 pi": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi,
            "4 pi": 4 * np.pi, "1/(4 pi)": 0.25 / np.pi, "pi^2": np.pi**2, "1/pi^2": np.pi**-2, "4": 4.0, "1/4": 0.25,
@@ -60,7 +63,7 @@ def explain(
                    *_taken_for(difference, others)]
         found = [Cause(cause=cause, share=share) for cause, predicted in guesses
                  if (share := explained(difference, predicted)) >= EXPLAINED]
-        found = found or [*_order(difference)]
+        found = found or [*_order(difference), *_slight(difference)]
     unique = {cause.cause: cause for cause in sorted(found, key=lambda one: -round(one.share, 2))}
     return list(unique.values())
 
@@ -78,6 +81,7 @@ def explained(difference: Difference, predicted: Array, places: Array | None = N
         return 0.0
     with np.errstate(invalid="ignore"):
         room = ROOM * (limit + SINGLE * (np.abs(np.where(np.isfinite(predicted), predicted, 0.0))))
+    room = np.where(out, np.minimum(room, NEARER * distance(got, expected)), room)
     right = distance(got, predicted) <= room
     return float(min(right[out].mean(), right[told].mean(), right.mean()))
 
@@ -108,6 +112,8 @@ def _factors(difference: Difference, factors: Mapping[str, float]) -> Iterator[t
     name = next((name for name, value in known.items() if abs(factor - value) <= 2e-4 * abs(value)), None)
     if name == "-1":
         yield "the sign is turned round", -expected
+    elif factor and abs(factor - 1) < 1e-3:
+        yield f"every element is {factor - 1:+.2g} of itself off: a constant with too few digits", expected * factor
     elif factor:
         yield f"every element is {name or f'{factor:.6g}'} times what it should be", expected * factor
     shift = float(np.median(got[usable].astype(np.float64) - expected[usable]))
@@ -137,7 +143,8 @@ def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
         yield "both rows and columns are reversed", np.flip(expected, (row, column))
         if expected.shape[row] == expected.shape[column]:
             yield "rows and columns are exchanged", np.swapaxes(expected, row, column)
-        yield "written column by column instead of row by row", np.swapaxes(expected, row, column).reshape(expected.shape)
+        turned = np.swapaxes(expected, row, column)
+        yield "written column by column instead of row by row", turned.reshape(expected.shape)
     if names[0] in ("xyz", "rgb"):
         yield "components lie beside each other (h, w, 3) instead of in planes (3, h, w)", np.moveaxis(
             expected, 0, -1).reshape(expected.shape)
@@ -150,14 +157,13 @@ def _components(expected: Array, axis: int, name: str) -> Iterator[tuple[str, Ar
     if name == "rgb":
         yield "all channels hold red", np.repeat(np.take(expected, [0], axis), 3, axis)
         return
-    for k, letter in enumerate(letters):
-        sign = np.where(np.arange(3) == k, -1.0, 1.0).reshape([-1 if one == axis else 1 for one in range(expected.ndim)])
+    along = [-1 if one == axis else 1 for one in range(expected.ndim)]
+    signs = [np.where(np.arange(3) == k, -1.0, 1.0).reshape(along) for k in range(3)]
+    for letter, sign in zip(letters, signs, strict=True):
         yield f"{letter} is mirrored", expected * sign
-        if k == 2:
-            swapped = np.take(expected, (0, 2, 1), axis)
-            yield "y and z are exchanged and one is turned round (z up)", swapped * np.where(
-                np.arange(3) == 1, -1.0, 1.0).reshape(sign.shape)
-            yield "y and z are exchanged and z is turned round (z up)", swapped * sign
+    swapped = np.take(expected, (0, 2, 1), axis)
+    yield "y and z are exchanged and y is turned round (z up)", swapped * signs[1]
+    yield "y and z are exchanged and z is turned round (z up)", swapped * signs[2]
 
 
 def _coded(difference: Difference) -> Iterator[tuple[str, Array]]:
@@ -223,11 +229,22 @@ def _taken_for(difference: Difference, others: Mapping[str, Array]) -> Iterator[
             yield f"it holds {name}", array
 
 
+def _slight(difference: Difference) -> Iterator[Cause]:
+    """Yield that a difference is small."""
+    worst = distance(difference.got, difference.expected)[difference.out]
+    with np.errstate(over="ignore", divide="ignore"):
+        over = float((worst / difference.limit[difference.out]).max(initial=0.0))
+    if over < SLIGHT:
+        yield Cause(cause=f"{over:.2g} times the bound at most: rounding, such as half floats, approximate functions "
+                          "or cancellation", share=1.0)
+
+
 def _order(difference: Difference) -> Iterator[Cause]:
     """Yield that the right elements are there in another order, along the last axis or all over."""
     expected, got = difference.expected, difference.got
     if expected.size < 2:
         return
     a, b = np.sort(expected.astype(np.float64), axis=None), np.sort(got.astype(np.float64), axis=None)
-    if np.allclose(a, b, rtol=4 * SINGLE, atol=float(difference.limit.max(initial=0.0))):
+    apart = np.median(distance(got, expected)[difference.out])
+    if bool((distance(a, b) <= 4 * SINGLE * np.abs(a) + SORTED * apart).all()):
         yield Cause(cause="the right values in another order", share=1.0)

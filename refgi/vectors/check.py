@@ -182,15 +182,12 @@ def check_stage(
     kit: Kit, case: CaseManifest, step: StageEntry, output: Path, asked: Asked, *, dirty: bool
 ) -> StageVerdict:
     """Judge what a port has of one stage; `dirty`: what it read is wrong already."""
-    got = {name: file for name in step.writes if (file := _file(output, case.id, name)) is not None}
+    got = {name: file for name in step.writes if (file := find_array(output, case.id, name)) is not None}
     tier = asked.tier_of(step.name)
     judged: dict[str, Judged] = {}
-    arrays: dict[str, Array] = {}
-    for name in step.writes:
-        if name not in got:
-            continue
-        arrays[name] = read_array(got[name])
-        judged[name] = _judged(kit, case, step, name, arrays, got, tier, asked)
+    arrays = {name: read_array(file) for name, file in got.items()}
+    for name in arrays:
+        judged[name] = _judged(kit, case, name, arrays, tier, asked)
     verdicts = [judged[name].verdict if name in judged else _not_run(name, tier, bool(got)) for name in step.writes]
     kinds = {one.verdict for one in verdicts}
     verdict: Verdict = next(one for one in ORDER if one in kinds)
@@ -206,9 +203,31 @@ def _not_run(name: str, tier: str, others: bool) -> ArrayVerdict:
                         said="missing, though other arrays of the stage are there" if others else "")
 
 
+def stage_of_array(kit: Kit, case: str, name: str, got: Array, tier: str = "T1") -> StageVerdict:
+    """Judge one array by itself, its stage having read the kit's inputs.
+
+    Raises
+    ------
+    InputError
+        If there is no such case, array or tier.
+    """
+    manifest = next((one for one in kit.cases(Asked(cases=(case,))) if one.id == case), None)
+    if manifest is None:
+        raise InputError(f"case: expected one of {', '.join(one.id for one in kit.manifest.cases)}, got {case!r}")
+    step = next((one for one in manifest.stages if name in one.writes), None)
+    if step is None:
+        written = ", ".join(array for one in manifest.stages for array in one.writes)
+        raise InputError(f"array: expected one of {written}, got {name!r}")
+    if tier not in TIERS:
+        raise InputError(f"tier: expected one of {', '.join(TIERS)}, got {tier!r}")
+    judged = _judged(kit, manifest, name, {name: got}, tier, Asked())
+    causes = _causes(kit, manifest, step, {name: judged}, {name: got}) if judged.verdict.verdict == "out" else []
+    return StageVerdict(case=case, stage=step.name, verdict=judged.verdict.verdict, upstream="isolated",
+                        arrays=(judged.verdict,), causes=tuple(causes[:CAUSES]))
+
+
 def _judged(
-    kit: Kit, case: CaseManifest, step: StageEntry, name: str, arrays: Mapping[str, Array],
-    files: Mapping[str, Path], tier: str, asked: Asked,
+    kit: Kit, case: CaseManifest, name: str, arrays: Mapping[str, Array], tier: str, asked: Asked
 ) -> Judged:
     entry, got = case.arrays[name], arrays[name]
     fault = unlike(name, tier, entry, got)
@@ -218,19 +237,23 @@ def _judged(
     if entry.dtype == "|b1":
         got = got.astype(np.bool_)
     if entry.tier == "T3":
-        variance = name.replace(".mean", ".variance_of_mean")
-        own = read_array(files[variance]) if variance in files and variance != name else None
-        if variance == name or variance not in step.writes:
-            return Judged(ArrayVerdict(name=name, verdict="within", tier="T3", said="judged with its mean"))
-        if own is not None and own.shape != got.shape:
-            own = None
-        return judge_estimate(name, expected, got, kit.array(case, variance), own)
+        return _judged_estimate(kit, case, name, arrays, expected)
     tolerance = entry.half if tier == "T2" else entry.chained if asked.chained else None
     if tier == "T2" and asked.chained and entry.half is not None and entry.chained is not None:
         tolerance = entry.half.model_copy(update={"outliers": max(entry.half.outliers, entry.chained.outliers)})
     limit = kit.extra(case, entry.bound) if entry.bound is not None else None
     masked = kit.extra(case, entry.masked) if entry.masked is not None else None
-    return judge(name, entry, expected, got, "T0" if entry.tier == "T0" else tier, limit, masked, tolerance)
+    return judge(name, expected, got, "T0" if entry.tier == "T0" else tier, limit, masked, tolerance)
+
+
+def _judged_estimate(kit: Kit, case: CaseManifest, name: str, arrays: Mapping[str, Array], expected: Array) -> Judged:
+    """Judge a mean by the standard errors of both; what goes with it, its variance, is judged with it."""
+    variance = name.replace(".mean", ".variance_of_mean")
+    if variance == name or variance not in case.arrays:
+        return Judged(ArrayVerdict(name=name, verdict="within", tier="T3", said="judged with its mean"))
+    own = arrays.get(variance)
+    own = None if own is None or own.shape != expected.shape else own
+    return judge_estimate(name, expected, arrays[name], kit.array(case, variance), own)
 
 
 def _causes(
@@ -247,8 +270,9 @@ def _causes(
             continue
         shares = [explained(one, kit.extra(case, suspect.arrays[name]), kit.extra(case, suspect.places[name]))
                   for name, one in differing.items() if name in suspect.arrays]
-        unlike_shape = any(case.arrays[name].shape != shape for name, shape in suspect.shapes.items() if name in shapes)
-        share = min(shares) if shares and len(shares) == len(differing) else 1.0 if unlike_shape and not differing else 0.0
+        other_shape = any(case.arrays[name].shape != shape for name, shape in suspect.shapes.items() if name in shapes)
+        share = min(shares, default=0.0) if len(shares) == len(differing) else 0.0
+        share = 1.0 if other_shape and not differing else share
         if share >= EXPLAINED:
             found.append(Cause(cause=suspect.cause, share=share, paper=suspect.paper))
     for one in differing.values():
@@ -258,7 +282,8 @@ def _causes(
     return list(unique.values())
 
 
-def _file(output: Path, case: str, name: str) -> Path | None:
+def find_array(output: Path, case: str, name: str) -> Path | None:
+    """Return the file of a port's array, None where there is none."""
     for place in (output / case, output / "cases" / case / "out", output / case / "out"):
         if (place / f"{name}.npy").is_file():
             return place / f"{name}.npy"
@@ -266,4 +291,5 @@ def _file(output: Path, case: str, name: str) -> Path | None:
 
 
 def _reason(error: Exception) -> str:
-    return error.strerror or "nothing readable" if isinstance(error, OSError) else f"{error}".split("\n")[0] or "nothing"
+    said = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]
+    return said or "nothing readable"

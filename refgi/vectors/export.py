@@ -133,7 +133,7 @@ def write_case(case: Case, folder: Path) -> CaseManifest:
     chained = chained_budgets(case, known, SEED)
     stages = []
     for step in case.stages:
-        bounds, halves = isolated_bounds(step, known, SEED), half_budgets(step, known, SEED)
+        bounds, halves = isolated_bounds(case, step, known, SEED), half_budgets(case, step, known, SEED)
         for name in step.writes:
             entry = _entry(case, name, known[name], _save(home, f"out/{name}.npy", known[name]))
             arrays[name] = entry.model_copy(update=_tolerances(home, name, entry, bounds[name], chained[name],

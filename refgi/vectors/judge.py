@@ -28,7 +28,7 @@ def unlike(name: str, tier: str, entry: ArrayEntry, got: Array) -> ArrayVerdict 
 
 
 def judge(
-    name: str, entry: ArrayEntry, expected: Array, got: Array, tier: str, limit: Array | None, masked: Array | None,
+    name: str, expected: Array, got: Array, tier: str, limit: Array | None, masked: Array | None,
     tolerance: Tolerance | None,
 ) -> Judged:
     """Compare an array with what is expected, element by element.
@@ -37,8 +37,6 @@ def judge(
     ----------
     name : str
         Of the array.
-    entry : ArrayEntry
-        What the kit says of it.
     expected, got : ndarray
         Of one shape.
     tier : str
@@ -71,10 +69,9 @@ def judge(
     count = int(np.count_nonzero(out))
     verdict: Verdict = "exact" if not off.any() else "within" if count <= few * out.size else "out"
     worst, place = _worst(off, allowed, out)
-    verdict_here = ArrayVerdict(
-        name=name, verdict=verdict, tier=tier, worst=worst, element=place, outside=count,
-        masked=int(np.count_nonzero(spared)), **_values(expected, got, allowed, place))
-    return Judged(verdict_here, out, allowed)
+    said = ArrayVerdict(name=name, verdict=verdict, tier=tier, worst=worst, element=place, outside=count,
+                        masked=int(np.count_nonzero(spared)))
+    return Judged(said.model_copy(update=_values(expected, got, allowed, place)), out, allowed)
 
 
 def judge_estimate(
@@ -112,10 +109,10 @@ def judge_estimate(
     fine = bool(few) and bias <= SIGMAS and (STEADY[0] <= steady <= STEADY[1] or not sigma.any())
     verdict: Verdict = "exact" if not off.any() else "within" if fine else "out"
     worst, place = _worst(off, SIGMAS * sigma, z >= z.max(initial=0.0))
-    said = f"sum {bias:.1f} standard errors off, mean square of z {steady:.2f}"
-    return Judged(ArrayVerdict(name=name, verdict=verdict, tier="T3", worst=worst, element=place, said=said,
-                               outside=int(np.count_nonzero(out)),
-                               **_values(expected, got, SIGMAS * sigma, place)), out, SIGMAS * sigma)
+    text = f"sum {bias:.1f} standard errors off, mean square of z {steady:.2f}"
+    said = ArrayVerdict(name=name, verdict=verdict, tier="T3", worst=worst, element=place, said=text,
+                        outside=int(np.count_nonzero(out)))
+    return Judged(said.model_copy(update=_values(expected, got, SIGMAS * sigma, place)), out, SIGMAS * sigma)
 
 
 def _worst(off: Array, allowed: Array, out: Array) -> tuple[float | None, tuple[int, ...] | None]:
@@ -164,7 +161,6 @@ def _shape_fault(entry: ArrayEntry, got: Array) -> str:
         differing = [k for k in range(got.ndim) if got.shape[k] != entry.shape[k]]
         names = [one.strip() for one in entry.axes.split(",")]
         if len(differing) == 1 and len(names) == got.ndim:
-            k = differing[0]
-            return f"{said}: {abs(got.shape[k] - entry.shape[k])} {'more' if got.shape[k] > entry.shape[k] else 'fewer'}"\
-                   f" along {names[k]}"
+            more = got.shape[differing[0]] - entry.shape[differing[0]]
+            return f"{said}: {abs(more)} {'more' if more > 0 else 'fewer'} along {names[differing[0]]}"
     return said

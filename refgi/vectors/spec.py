@@ -27,6 +27,7 @@ class Spec:
     space: str = ""  # "world", "camera", "linear RGB"
     paper: str = ""  # equation or section, and erratum
     tier: Tier = "T1"  # T0: equal; T1: float32 rounding; T3: an estimate, judged by its standard error
+    alone: bool = False  # elements have nothing to do with each other: none is judged by the size of others
     index_of: tuple[int, int] | None = None  # (rows, columns) of the map that indices row * columns + column count
 
 

@@ -11,7 +11,7 @@ COUNT = 160
 
 def diffuse() -> Case:
     """Return diffuse pairs: random ones, then coincident, grazing, behind, near, far, dim and bright ones."""
-    return _pairs("pairs-diffuse", "one light and one receiver: random, coincident, grazing, behind, 1 mm to 1 km apart",
+    return _pairs("pairs-diffuse", "one light, one receiver: random, coincident, grazing, behind, 1 mm to 1 km apart",
                   glossy=False)
 
 

@@ -30,15 +30,18 @@ def room(*lights: Any, matte: bool = False, smooth: bool = False, camera: Camera
     `matte`: without lobes. `smooth`: with a ball and interpolated normals.
     """
     def painted(material: Material) -> Material:
-        return dataclasses.replace(material, specular=(0.0, 0.0, 0.0), diffuse=material.diffuse if any(
-            material.diffuse) else material.specular) if matte else material
+        if not matte:
+            return material
+        diffuse = material.diffuse if any(material.diffuse) else material.specular
+        return dataclasses.replace(material, diffuse=diffuse, specular=(0.0, 0.0, 0.0))
 
     meshes = [
         quad((-1, 0, 1), (2, 0, 0), (0, 0, -2), painted(FLOOR)),
         quad((-1, 0, -1), (2, 0, 0), (0, 2, 0), painted(WALL)),
         quad((-1, 0, 1), (0, 0, -2), (0, 2, 0), painted(SIDE)),
         quad((-0.4, 0.5, -0.1), (0.6, 0, 0), (0, 0, -0.5), painted(BLOCK)),
-        quad((0.3, 0.3, 0.5), (0.25, 0, -0.35), (0.35, 0.05, 0.3), painted(FLOOR)),  # wound towards the floor
+        # wound inwards:
+        quad((0.3, 0.3, 0.5), (0.25, 0, -0.35), (0.35, 0.05, 0.3), painted(FLOOR)),
     ]
     if smooth:
         meshes.append(ball((-0.5, 0.35, 0.3), 0.3, painted(BALL)))
@@ -50,12 +53,12 @@ def far_away(scene: Scene, offset: float) -> Scene:
     """Return a scene moved along x, m, with all that it holds in float32."""
     move = (offset, 0.0, 0.0)
 
-    def moved(point: Any) -> tuple[float, ...]:
+    def moved(point: Any) -> Any:
         return tuple(np.add(point, move).tolist())
 
     camera = dataclasses.replace(scene.camera, eye=moved(scene.camera.eye), target=moved(scene.camera.target))
-    lights = tuple(dataclasses.replace(light, position=moved(light.position)) if hasattr(light, "position") else light
-                   for light in scene.lights)
+    lights = tuple(light if isinstance(light, DirectionalLight) else
+                   dataclasses.replace(light, position=moved(light.position)) for light in scene.lights)
     geometry = dataclasses.replace(scene.geometry, vertices=scene.geometry.vertices + move)
     return stored_scene(dataclasses.replace(scene, geometry=geometry, camera=camera, lights=lights))
 
@@ -67,7 +70,8 @@ def stored_scene(scene: Scene) -> Scene:
             np.float32(value))
 
     def each(part: Any, *names: str) -> Any:
-        return dataclasses.replace(part, **{name: rounded(getattr(part, name)) for name in names if hasattr(part, name)})
+        return dataclasses.replace(part, **{name: rounded(getattr(part, name)) for name in names
+                                            if hasattr(part, name)})
 
     geometry, normals = scene.geometry, scene.geometry.vertex_normals
     return dataclasses.replace(

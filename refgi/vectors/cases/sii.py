@@ -49,8 +49,8 @@ QUICK = {
     "sii-warp-a": lambda: splatting("sii-warp-a", "points warped by method A over 3 levels; clamped by discs",
                                     room(SPOT, BULB), (24, 18), 16, (40, 20), clamp="disc", warp=A3,
                                     shifts=((0.1, 0.2), (0.3, 0.45))),
-    "sii-warp-b": lambda: splatting("sii-warp-b", "random points, given, warped by method B over 5 levels; 13 x 13 maps",
-                                    room(SPOT), (17, 11), 13, (30,), pattern="given", warp=Warp("B", 5)),
+    "sii-warp-b": lambda: splatting("sii-warp-b", "random points, given, warped by method B over 5 levels", room(SPOT),
+                                    (17, 11), 13, (30,), pattern="given", warp=Warp("B", 5)),
     "sii-grid": lambda: splatting("sii-grid", "6 x 6 cells of a map; a light that shines straight down, a camera "
                                   "that looks straight down", room(DOWN, camera=POLE), (15, 21), 17, (36,),
                                   pattern="grid"),

@@ -60,7 +60,8 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     _add_ids(recipe, name, name, maps, scene)
     _add_surface(recipe, name, name, maps, scene, ("depth", "position", "normal"))
     glossy = any(any(material.specular) for material in scene.materials)
-    reads = (*SCENE, *_normals(recipe), *REFLECTANCE, *_map_names(name), f"{name}.triangle_id", *_light_names(lamp, light))
+    reads = (*SCENE, *_normals(recipe), *REFLECTANCE, *_map_names(name), f"{name}.triangle_id",
+             *_light_names(lamp, light))
 
     def flux(arrays: Arrays, real: Any) -> Arrays:
         map_here = rsm_of(arrays, name, lamp, light, maps, real, scene)
@@ -127,11 +128,13 @@ def materials_of(arrays: Arrays, real: Any) -> MaterialTable:
 
 def light_of(arrays: Arrays, lamp: str, light: Light) -> Light:
     """Return the light among arrays."""
-    value = {key: np.asarray(arrays[f"{lamp}.{key}"], np.float64).tolist() for key in _light_keys(light)}
+    value: dict[str, Any] = {key: tuple(np.asarray(arrays[f"{lamp}.{key}"], np.float64).tolist())
+                             for key in _light_keys(light)}
     if isinstance(light, SpotLight):
         inner, outer = value.pop("half_angles")
         value |= {"inner_half_angle": min(inner, outer), "outer_half_angle": outer}
-    return type(light)(**{key: tuple(one) if isinstance(one, list) else one for key, one in value.items()})
+    made: Light = type(light)(**value)
+    return made
 
 
 def _ones_where_any(array: Array) -> Array:
@@ -163,8 +166,9 @@ def _give_light(recipe: Recipe, lamp: str, light: Light) -> None:
             "intensity": Spec("rgb", "W/sr", "radiant intensity, of a spot on its axis", "linear RGB"),
             "irradiance": Spec("rgb", "W/m^2", "irradiance of a surface across the light", "linear RGB")}
     for key in _light_keys(light):
-        spot = key == "half_angles" and isinstance(light, SpotLight)
-        value = (light.inner_half_angle, light.outer_half_angle) if spot else getattr(light, key)
+        value = getattr(light, key, None)
+        if value is None and isinstance(light, SpotLight):
+            value = light.inner_half_angle, light.outer_half_angle
         recipe.give(f"{lamp}.{key}", value, spec[key])
     recipe.facts[lamp] = NAMES[type(light)]
 

@@ -48,15 +48,14 @@ def add_points(
     if shift is not None:
         recipe.give(f"rsm{index}.shift", np.array(shift), Spec("uv", "1", "added to every point, modulo 1"))
 
-    def points(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 a set of numbers, the same in any type
+    def points(arrays: Arrays, real: Any, start: int = 0) -> Arrays:  # noqa: ARG001 numbers, the same in any type
         if pattern == "grid":
             return {name: grid(int(np.sqrt(count)))}
-        moved = None if shift is None else np.asarray(arrays[f"rsm{index}.shift"], np.float64)
-        return {name: _below_1(halton(count, shift=moved))}
+        moved = None if shift is None else arrays[f"rsm{index}.shift"].tolist()
+        return {name: _below_1(halton(count, shift=moved, start=start))}
 
-    def start_at_one(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
-        moved = None if shift is None else np.asarray(arrays[f"rsm{index}.shift"], np.float64)
-        return {name: _below_1(halton(count, shift=moved, start=1))}
+    def start_at_one(arrays: Arrays, real: Any) -> Arrays:
+        return points(arrays, real, 1)
 
     wrong = (Decoy("the Halton sequence starts at index 1", start_at_one, "index 0 is the origin (docs/conventions)"),
              Decoy("bases 2 and 3 are exchanged", writing(points, **{f"rsm{index}__points": lambda a: a[:, ::-1]}),
@@ -175,7 +174,7 @@ def _add_chosen(recipe: Recipe, scene: Scene, resolution: int, counts: tuple[int
         reads += [f"{name}.{key}" for key in (*kinds, "texel", "weight")]
 
     def run(arrays: Arrays, real: Any) -> Arrays:
-        rsms = [rsm_of(arrays, f"rsm{k}", lamp, light, maps, real, scene) for k, (lamp, light, maps) in enumerate(lamps)]
+        rsms = [rsm_of(arrays, f"rsm{k}", *lamps[k], real, scene) for k in numbers]
         drawn = [Drawn(np.asarray(arrays[f"rsm{k}.texel"], np.int64), arrays[f"rsm{k}.weight"], None) for k in numbers]
         lights = lights_of(rsms, drawn)
         made = {f"lights.{key}": getattr(lights, key) for key in kinds}

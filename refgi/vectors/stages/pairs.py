@@ -16,13 +16,20 @@ from refgi.vectors.stages.lights import LIGHT, LOBE, light_names, pixel_lights_o
 
 RECEIVERS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
 EQ2 = "SII Eq. 2 and 3; unit directions and r^2 (E-SII-02)"
+CLAMPED, DISC = "<a.b> = max(0, a.b)", "r^2 + A/pi"
+
+
+def receivers_of(arrays: Arrays, real: Any) -> Receivers:
+    """Return the camera's pixels among arrays as points to light."""
+    position, normal = (np.ascontiguousarray(arrays[name], real) for name in RECEIVERS[:2])
+    return Receivers(position, normal, np.asarray(arrays["gbuffer.triangle_id"]) >= 0)
 
 
 def add_footprints(recipe: Recipe, maps: int) -> None:
     """Add the surface that each pixel light stands for: Omega d^2 / cos of its texel, times T/N w."""
-    reads = tuple(f"{name}.{key}" for name in (f"rsm{k}" for k in range(maps)) for key in ("solid_angle", "texel", "weight"))
-    places = tuple(name for k in range(maps) for name in (f"light{k}.position", f"light{k}.direction")
-                   if name in recipe.specs and not (name.endswith("direction") and f"light{k}.position" in recipe.specs))
+    reads = tuple(f"rsm{k}.{key}" for k in range(maps) for key in ("solid_angle", "texel", "weight"))
+    places = tuple(f"light{k}.position" if f"light{k}.position" in recipe.specs else f"light{k}.direction"
+                   for k in range(maps))
 
     def run(arrays: Arrays, real: Any, squared: bool = True, slanted: bool = True) -> Arrays:
         lights, chosen = pixel_lights_of(arrays, real), np.asarray(arrays["lights.map"])
@@ -55,8 +62,7 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
     area = ("lights.area",) if settings.needs_footprints else ()
 
     def run(arrays: Arrays, real: Any, how: PairSettings = settings) -> Arrays:
-        receivers = Receivers(*(np.ascontiguousarray(arrays[name], real) for name in RECEIVERS[:2]),
-                              np.asarray(arrays["gbuffer.triangle_id"]) >= 0)
+        receivers = receivers_of(arrays, real)
         footprint = np.ascontiguousarray(arrays["lights.area"], np.float64) if area else None
         return {"sum.irradiance": irradiance(receivers, pixel_lights_of(arrays, real), how, footprint)}
 
@@ -85,14 +91,13 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
         made = np.zeros((3, 1, count), real)
         for k in range(count):
             one = {name: arrays[name][..., k : k + 1] for name in names}
-            here = Receivers(*(np.ascontiguousarray(arrays[name][..., k : k + 1], real) for name in RECEIVERS[:2]),
-                             np.ones((1, 1), np.bool_))
+            here = receivers_of({name: arrays[name][..., k : k + 1] for name in RECEIVERS}, real)
             made[..., k : k + 1] = irradiance(here, pixel_lights_of(one, real), of(PairSettings, clamp="none"))
         return {"pairs.irradiance": made}
 
     recipe.add("pairs", "irradiance of light k at receiver k", run, (*RECEIVERS, *names), {
         "pairs.irradiance": Spec("rgb, row, pair", "W/m^2", "irradiance; 0 where light and receiver coincide",
-                                 "linear RGB", EQ2)},
+                                 "linear RGB", EQ2, alone=True)},
         paper=EQ2, decoys=pair_decoys(run, False, "lights.lobe_flux" in lights, own=True),
         exact=("gbuffer.position", "lights.position"))
 
@@ -109,13 +114,16 @@ def _give_lights(recipe: Recipe, lights: Arrays) -> None:
 def pair_decoys(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple[Decoy, ...]:
     """Return likely bugs of Eq. 2 and 3; `own`: light k meets receiver k alone."""
     def literal(**bugs: Any) -> Run:
-        return lambda arrays, real: {("pairs" if own else "sum") + ".irradiance": _literal(arrays, own, **bugs)}
+        def altered(arrays: Arrays, real: Any) -> Arrays:
+            return {("pairs" if own else "sum") + ".irradiance": _literal(arrays, own, **bugs).astype(real)}
+
+        return altered
 
     found = [
         Decoy("the receiver's cosine is missing", literal(receiver=False), EQ2),
         Decoy("the light's cosine is missing", literal(sender=False), EQ2),
-        Decoy("cosines are not clamped at 0: lights behind a surface count", literal(floor=None), "<a.b> = max(0, a.b)"),
-        Decoy("cosines are taken as absolute values", literal(floor="abs"), "<a.b> = max(0, a.b)"),
+        Decoy("cosines are not clamped at 0: lights behind a surface count", literal(floor=None), CLAMPED),
+        Decoy("cosines are taken as absolute values", literal(floor="abs"), CLAMPED),
         Decoy("1/r^4 with unit directions", literal(power=4), "E-SII-02"),
         Decoy("1/r in place of 1/r^2", literal(power=1), "E-SII-02"),
         Decoy("directions are not normalised", literal(power=0), "E-SII-02"),
@@ -125,16 +133,16 @@ def pair_decoys(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tup
         Decoy("only the first half of the lights", reading(run, lights__flux=_first_half, **(
             {"lights__lobe_flux": _first_half} if glossy else {})), "all lights"),
     ] if not clamped else [
-        Decoy("the footprint is divided by 2 pi instead of pi", reading(run, lights__area=lambda a: a / 2), "r^2 + A/pi"),
-        Decoy("the footprint is not divided by pi", reading(run, lights__area=lambda a: a * np.pi), "r^2 + A/pi"),
+        Decoy("the footprint is divided by 2 pi instead of pi", reading(run, lights__area=lambda a: a / 2), DISC),
+        Decoy("the footprint is not divided by pi", reading(run, lights__area=lambda a: a * np.pi), DISC),
     ]
     if glossy:
         found += [
             Decoy("lobes are missing", reading(run, lights__lobe_flux=np.zeros_like), "SII Eq. 3"),
             Decoy("the diffuse part is missing", reading(run, lights__flux=np.zeros_like), "SII Eq. 3"),
-            Decoy("lobes are around the normal", reading(run, lights__lobe_axis=np.zeros_like) if own else _lobes_at_normal(run),
+            Decoy("lobes are around the normal", _lobes_at_normal(run), "SII Eq. 3"),
+            Decoy("the lobe's exponent is one too high", reading(run, lights__lobe_exponent=lambda a: a + 1),
                   "SII Eq. 3"),
-            Decoy("the lobe's exponent is one too high", reading(run, lights__lobe_exponent=lambda a: a + 1), "SII Eq. 3"),
         ]
         found += [] if clamped else [
             Decoy("lobes are not normalised", literal(norm="none"), "E-SII-03: (P + 1) / 2 pi K"),

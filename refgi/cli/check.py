@@ -1,0 +1,89 @@
+"""`refgi check`: judge a finished picture of a port against a method of refgi, or against the truth."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from refgi.cli.options import machine, seen, shadows, speech
+from refgi.cli.session import DONE, FAILED, Session, progress
+from refgi.cli.settings import preset
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+INDIRECT = ("irradiance.R", "irradiance.G", "irradiance.B")
+RADIANCE = ("R", "G", "B")
+
+
+@click.command("check")
+@click.argument("picture")
+@click.option("--against", "against", required=True, metavar="SCENE", help="The scene that the picture shows.")
+@seen
+@click.option("--method", default="truth", show_default=True, help="What it is judged by; `refgi info` lists methods.")
+@preset
+@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
+@click.option("--tolerance", type=click.FloatRange(0, 10), default=0.01, show_default=True,
+              help="Largest RMSE above the noise, as a share of the mean.")
+@machine
+@shadows("auto")
+@speech
+@click.pass_obj
+def _check(
+    session: Session, /, picture: str, against: str, method: str, preset: str, pairs: tuple[str, ...],
+    tolerance: float, dtype: str, rsm_resolution: int, shadows: str | None, threads: int | None, seed: int | None,
+    **options: Any,
+) -> int:
+    """Judge PICTURE, an EXR of linear values, against a method on SCENE.
+
+    Channels irradiance.R, .G, .B are compared with indirect irradiance (W/m^2), else R, G, B with radiance. The scene
+    is rendered at the picture's size.
+
+    Exit codes: 0 within the tolerance or the noise, 1 not.
+    """
+    from refgi.cli.memory import require_memory
+    from refgi.cli.options import on_threads
+    from refgi.cli.settings import settings_for
+    from refgi.cli.view import View
+    from refgi.cli.warm import warm_up
+    from refgi.errors import expect
+    from refgi.methods import render
+    from refgi.vectors.pictures import judge_picture
+
+    got, kind = _read(Path(picture))
+    settings = settings_for(method, pairs, seed, preset)
+    size = (got.shape[2], got.shape[1])
+    expect(options["size"] in (None, size), "--size", f"{size[0]}x{size[1]} as the picture", options["size"])
+    scene = View(scene=against, **{**options, "size": size}).load()
+    require_memory(scene, dtype, rsm_resolution, traced=method == "truth", settings={method: settings})
+    with on_threads(threads), progress() as tell:
+        warm_up([method], dtype, tell)
+        made = render(scene, method, settings, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)
+    variance = None
+    if made.estimate is not None and kind == "indirect irradiance":
+        variance = made.estimate.variance_of_mean
+    verdict = judge_picture(got, made.irradiance if kind == "indirect irradiance" else made.radiance, variance,
+                            tolerance=tolerance)
+    lines = [f"{picture}: {kind} {'is' if verdict.close else 'is not'} that of {scene.name} by {method}", verdict.said,
+             *(f"likely: {one}" for one in verdict.causes)]
+    session.result("\n".join(lines), {"picture": picture, "scene": scene.name, "method": method, "compared": kind,
+                                      **verdict._asdict()})
+    return DONE if verdict.close else FAILED
+
+
+command = _check
+
+
+def _read(file: Path) -> "tuple[npt.NDArray[Any], str]":
+    """Return a picture's planes and what they are."""
+    import numpy as np
+
+    from refgi.errors import InputError
+    from refgi.image.exr import read_exr
+
+    channels = read_exr(file)[0]
+    for names, kind in ((INDIRECT, "indirect irradiance"), (RADIANCE, "radiance")):
+        if all(name in channels for name in names):
+            return np.stack([channels[name] for name in names]), kind
+    raise InputError(f"{file}: expected channels {', '.join(RADIANCE)} or {', '.join(INDIRECT)}, got "
+                     f"{', '.join(channels)}", file=str(file), key="channels")

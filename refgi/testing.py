@@ -1,0 +1,174 @@
+"""For pytest suites of ports: assertions on stages and pictures, and kits made once.
+
+`assert_stage_close(my_flux, "sii-warp-a", "rsm0.flux")` judges one array by the quick kit, which is made on first use;
+`pytest_plugins = ["refgi.testing"]` in a conftest.py gives the fixture `refgi_kit`.
+"""
+
+import functools
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import InputError
+
+if TYPE_CHECKING:
+    from refgi.vectors.check import Kit
+
+Array = npt.NDArray[Any]
+
+KIT_FOLDER = "REFGI_KIT"  # environment variable: a kit to use in place of one made here
+
+try:
+    import pytest
+except ImportError:  # assertions work without
+    pytest = None  # type: ignore[assignment]
+
+
+def kit_folder(kit: str = "quick") -> Path:
+    """Return the folder of a kit, which is made on first use and kept in the cache, by a hash of what makes it.
+
+    Parameters
+    ----------
+    kit : {"quick", "full"}
+        Which kit; the folder that the environment variable REFGI_KIT names takes its place.
+
+    Returns
+    -------
+    Path
+        A kit.
+    """
+    from refgi.jit.cache import cache_root
+    from refgi.vectors.export import export_kit
+    from refgi.vectors.manifest import KIT, VERSION
+
+    if os.environ.get(KIT_FOLDER):
+        return Path(os.environ[KIT_FOLDER])
+    folder = cache_root() / "kits" / f"{kit}-{VERSION}-{_digest()[:12]}"
+    if not (folder / KIT).is_file():
+        with _made_by_one(folder):
+            if not (folder / KIT).is_file():
+                export_kit(kit, folder)
+    return folder
+
+
+def assert_stage_close(
+    got: npt.ArrayLike, case: str, name: str, *, tier: str = "T1", kit: "Kit | None" = None
+) -> None:
+    """Assert that an array of a port is what a kit expects.
+
+    Parameters
+    ----------
+    got : array_like
+        What the port has.
+    case : str
+        Id of a case, such as "sii-warp-a".
+    name : str
+        Name of an array, such as "rsm0.flux".
+    tier : {"T0", "T1", "T2"}
+        Equal; float32 rounding; storage in half floats.
+    kit : Kit, optional
+        The kit; the quick one where absent.
+
+    Raises
+    ------
+    AssertionError
+        If it is not, with the worst element, both values, the bound and likely causes.
+    InputError
+        If there is no such case or array.
+    """
+    from refgi.vectors.check import stage_of_array
+
+    opened = quick_kit() if kit is None else kit
+    verdict = stage_of_array(opened, case, name, np.asarray(got), tier)
+    if verdict.verdict in ("out", "invalid"):
+        from refgi.vectors.words import story
+
+        raise AssertionError("\n".join(story(verdict)))
+
+
+def assert_image_close(
+    picture: npt.ArrayLike, reference: npt.ArrayLike, *, variance: npt.ArrayLike | None = None,
+    own_variance: npt.ArrayLike | None = None, tolerance: float = 0.0, report: str | Path | None = None,
+) -> None:
+    """Assert that a picture is its reference, to a tolerance or to the noise of both.
+
+    Parameters
+    ----------
+    picture, reference : (3, h, w) array_like
+        Linear values, of one unit.
+    variance, own_variance : (3, h, w) array_like, optional
+        Variance of the reference's mean, and of the picture's: a z-test of pixels and sum.
+    tolerance : float
+        Largest RMSE above the noise, as a share of the reference's mean.
+    report : str or Path, optional
+        Folder for picture.exr, reference.exr and difference.exr on failure.
+
+    Raises
+    ------
+    AssertionError
+        If it is not, with RMSE, noise, the worst pixel and likely causes.
+    """
+    from refgi.vectors.pictures import judge_picture
+
+    got, expected = np.asarray(picture), np.asarray(reference)
+    its, own = (None if one is None else np.asarray(one) for one in (variance, own_variance))
+    verdict = judge_picture(got, expected, its, own, tolerance)
+    if not verdict.close:
+        lines = [f"the picture is not its reference: {verdict.said}", *(f"likely: {one}" for one in verdict.causes)]
+        if report is not None:
+            lines.append(f"pictures: {_written(Path(report), got, expected)}")
+        raise AssertionError("\n".join(lines))
+
+
+@functools.cache
+def quick_kit() -> "Kit":
+    """Return the quick kit, opened."""
+    from refgi.vectors.check import Kit
+
+    return Kit(kit_folder())
+
+
+if pytest is not None:
+    @pytest.fixture(scope="session")
+    def refgi_kit() -> "Kit":
+        """Return the quick kit, made once and kept."""
+        return quick_kit()
+
+
+def _written(folder: Path, got: Array, expected: Array) -> Path:
+    from refgi.image import write_exr
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, planes in (("picture", got), ("reference", expected), ("difference", got - expected)):
+        write_exr(folder / f"{name}.exr", dict(zip("RGB", planes.astype(np.float32), strict=True)))
+    return folder
+
+
+def _digest() -> str:
+    """Return a hash of the sources of the package, which a kit is made by."""
+    import refgi
+
+    total = hashlib.sha256()
+    for file in sorted(Path(refgi.__file__).parent.rglob("*.py")):
+        total.update(file.read_bytes())
+    return total.hexdigest()
+
+
+@contextmanager
+def _made_by_one(folder: Path) -> Iterator[None]:
+    """Let one process at a time make a kit."""
+    import fcntl
+
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with (folder.parent / ".lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot be locked: {error.strerror}") from error
+        yield

@@ -1,0 +1,83 @@
+"""The page of a check: stages left to right, the first wrong one open, arrays side by side. One file, no network."""
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from refgi import __version__
+from refgi.image.whole import write_text
+from refgi.vectors.check import Asked, Kit, find_array, read_array
+from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Result, StageVerdict
+from refgi.vectors.spec import Array
+
+FILES = Path(__file__).with_name("page_files")
+MOST_BYTES = 24_000_000  # of arrays in a page; beyond that only those that are out are shown
+
+
+def write_page(file: str, kit: Kit, output: Path, result: Result) -> None:
+    """Write the page, whole or not at all.
+
+    Parameters
+    ----------
+    file : str
+        Its name.
+    kit : Kit
+        The kit.
+    output : Path
+        The port's arrays.
+    result : Result
+        What was found.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    import jinja2
+
+    manifests = {case.id: case for case in kit.cases(Asked(cases=tuple({one.case for one in result.stages})))}
+    ran = [one for one in result.stages if one.verdict != "not-run"]
+    size = 12 * sum(int(np.prod(manifests[one.case].arrays[array.name].shape)) for one in ran for array in one.arrays)
+    shown = {"out"} if size > MOST_BYTES else {"out", "within", "exact"}
+    stages = {f"{one.case}/{one.stage}": _stage(kit, manifests[one.case], output, one, shown) for one in ran}
+    first = "/".join(result.first) if result.first else next(iter(stages), "")
+    wrong = {one.case for one in ran if one.verdict in ("out", "invalid")}
+    cases = [{"id": case.id, "what": case.what, "open": not wrong or case.id in wrong,
+              "stages": [one for one in result.stages if one.case == case.id]}
+             for case in manifests.values() if any(one.case == case.id for one in ran)]
+    text = json.dumps({"first": first, "stages": stages}, allow_nan=False).replace("<", "\\u003c")
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    template = environment.from_string((FILES / "page.html.j2").read_text(encoding="utf-8"))
+    style, script = ((FILES / name).read_text(encoding="utf-8") for name in ("style.css", "page.js"))
+    safe = environment.filters["safe"]
+    write_text(file, template.render(result=result, cases=cases, data=safe(text), style=safe(style),
+                                     script=safe(script), version=__version__))
+
+
+def _stage(kit: Kit, case: CaseManifest, output: Path, verdict: StageVerdict, shown: set[str]) -> dict[str, Any]:
+    entry = next(step for step in case.stages if step.name == verdict.stage)
+    return {"verdict": verdict.verdict, "what": entry.what, "paper": entry.paper,
+            "causes": [cause.model_dump() for cause in verdict.causes],
+            "arrays": [_array(kit, case, output, one, shown) for one in verdict.arrays]}
+
+
+def _array(kit: Kit, case: CaseManifest, output: Path, verdict: ArrayVerdict, shown: set[str]) -> dict[str, Any]:
+    entry = case.arrays[verdict.name]
+    told = {"name": verdict.name, "verdict": verdict.verdict, "worst": verdict.worst, "element": verdict.element,
+            "expected_value": verdict.expected, "got_value": verdict.got, "bound": verdict.bound,
+            "outside": verdict.outside, "said": verdict.said, "axes": entry.axes, "unit": entry.unit,
+            "what": entry.what, "shape": entry.shape, "got": None}
+    file = find_array(output, case.id, verdict.name)
+    if verdict.verdict not in shown or file is None or not np.prod(entry.shape):
+        return told
+    expected = kit.array(case, verdict.name)
+    limit = kit.extra(case, entry.bound) if entry.bound is not None else np.zeros(entry.shape)
+    return told | {"expected": _text(expected), "got": _text(read_array(file)), "limit": _text(limit)}
+
+
+def _text(array: Array) -> str:
+    with np.errstate(over="ignore"):
+        return base64.b64encode(np.ascontiguousarray(array, "<f4").tobytes()).decode("ascii")

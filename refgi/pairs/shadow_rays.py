@@ -112,7 +112,7 @@ def shadowed_sum(
     (3, r) ndarray of float64
         Irradiance, W/m^2.
     """
-    senders, total = _senders(lights), np.zeros((3, len(to.pixel)))
+    senders, total = senders_of(lights), np.zeros((3, len(to.pixel)))
     step = max(1, batch // LIGHTS_AT_A_TIME)
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])
@@ -197,7 +197,8 @@ def _lobe(to: RayReceivers, r: int, senders: Senders, j: int) -> Any:
     return senders.lobe_norm[j] * lobe_power(gap, senders.lobe_exponent[j])
 
 
-def _senders(lights: "PixelLights") -> Senders:
+def senders_of(lights: "PixelLights") -> Senders:
+    """Return pixel lights as the kernels read them."""
     arrays = (lights.position, lights.normal, lights.flux)
     position, normal, flux = (np.ascontiguousarray(array, np.float64) for array in arrays)
     if lights.lobe_flux is None or lights.lobe_axis is None or lights.lobe_exponent is None:

@@ -178,4 +178,4 @@ def _gather_one(points: Array, normals: Array, rsm: "Rsm", disc: DiscSettings, t
     pattern *= (disc.radius * height, disc.radius * width, 1.0)
     texels = (rsm.position - disc.offset * rsm.normal, rsm.normal, rsm.flux)
     source = GatherMap(*(np.ascontiguousarray(part, dtype) for part in texels))
-    gather_discs(points, normals, centers(rsm, points), source, pattern, dtype.type(scale), total)
+    gather_discs(points, normals, centers(rsm.projection, points), source, pattern, dtype.type(scale), total)

@@ -22,7 +22,7 @@ from refgi.sampling import halton
 from refgi.stages import stage
 
 if TYPE_CHECKING:
-    from refgi.rsm import Rsm
+    from refgi.rsm import Projection, Rsm
 
 Array = npt.NDArray[Any]
 TEXELS = 1024  # of each map
@@ -62,7 +62,12 @@ def disc_pattern(samples: int, seed: int, weight_squared: bool = False) -> Array
     3.14
     """
     shift = draws(seed, GATHERING, 2).tolist() if seed else None
-    xi, turn = halton(samples, shift=shift, start=1).T
+    return disc_offsets(halton(samples, shift=shift, start=1), weight_squared)
+
+
+def disc_offsets(points: Array, weight_squared: bool = False) -> Array:
+    """Return offset down, offset right and weight of points (xi_1, xi_2) of the unit square, (n, 2), as (n, 3)."""
+    xi, turn = points.T
     # density 1 / (2 pi xi): the weight is 2 pi xi; with xi^2 the mean weight stays the same, 2 pi * 3/2 xi^2
     weight = 2 * math.pi * (1.5 * xi * xi if weight_squared else xi)
     return np.stack([xi * np.cos(2 * math.pi * turn), xi * np.sin(2 * math.pi * turn), weight], axis=1)
@@ -85,10 +90,8 @@ def gather_discs(
         x, y, z = position[0, i], position[1, i], position[2, i]
         nx, ny, nz = normal[0, i], normal[1, i], normal[2, i]
         for s in range(pattern.shape[0]):
-            row = math.floor(center[0, i] + pattern[s, 0])
-            column = math.floor(center[1, i] + pattern[s, 1])
-            if 0 <= row < height and 0 <= column < width:
-                t, u = int(row), int(column)
+            t, u = sample_texel(center, pattern, i, s)
+            if 0 <= t < height and 0 <= u < width:
                 fr, fg, fb = source.flux[0, t, u], source.flux[1, t, u], source.flux[2, t, u]
                 if fr > 0 or fg > 0 or fb > 0:
                     p, n = source.position, source.normal
@@ -102,18 +105,23 @@ def gather_discs(
         irradiance[2, i] += blue * scale
 
 
-def centers(rsm: "Rsm", points: Array) -> Array:
+@kernel
+def sample_texel(center: Array, pattern: Array, i: int, s: int) -> tuple[int, int]:
+    """Return row and column of the texel of sample s of receiver i, on the stacked maps or outside of them."""
+    return int(math.floor(center[0, i] + pattern[s, 0])), int(math.floor(center[1, i] + pattern[s, 1]))
+
+
+def centers(maps: "Projection", points: Array) -> Array:
     """Return where in the map each point (3, n) gathers: continuous row and column (2, n) on the stacked maps, float64.
 
     A point outside the map gathers where the straight way to the map's middle meets its border.
     """
-    row, column, _ = rsm.project(points)
+    from refgi.rsm.raster.projection import ORTHOGRAPHIC, project
+
+    row, column, _ = project(maps, points)
     center = np.stack([row, column]).astype(np.float64)
     outside = np.isnan(center[0])
     if outside.any():
-        from refgi.rsm.raster.projection import ORTHOGRAPHIC
-
-        maps = rsm.projection
         right, down, ahead = maps.frame[0] @ (points[:, outside] - maps.origin[0][:, None])
         plane = np.stack([down / maps.half[1], right / maps.half[0]])
         if maps.kind != ORTHOGRAPHIC:
@@ -151,7 +159,7 @@ def disc_loss(receivers: Receivers, rsms: "Sequence[Rsm]", radius: float, offset
     for rsm in rsms:
         side = radius * np.array([[rsm.projection.height], [rsm.projection.width]])
         texel, lights = _texels(rsm, offset)
-        _add_shares(position, normal, centers(rsm, sample.position) / side, lights, texel / side, sums)
+        _add_shares(position, normal, centers(rsm.projection, sample.position) / side, lights, texel / side, sums)
     inside, whole = sums.sum(axis=1)
     return lost_share(float(whole), float(inside))
 

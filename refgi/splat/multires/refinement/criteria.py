@@ -183,21 +183,35 @@ def discontinuities(buffer: "GBuffer", criteria: "Criteria", top: int, finest: i
 def _mark_by_depth(
     buffer: "GBuffer", settings: "DepthRange", rim: int, sizes: Array, discontinuous: Array, begin: int
 ) -> None:
-    real = buffer.depth.dtype.type
     mip = depth_ranges(buffer.depth, buffer.covered, len(sizes) - 1, rim)
+    mark_depth_ranges(mip.lows, mip.highs, settings, sizes, discontinuous, begin)
+
+
+def mark_depth_ranges(
+    lows: Array, highs: Array, settings: "DepthRange", sizes: Array, discontinuous: Array, begin: int = 0
+) -> None:
+    """Mark the cells (n,) of a layout whose depths `lows` to `highs`, (1, n) m, spread beyond the threshold."""
+    real = lows.dtype.type
     if settings.measure == "absolute":
-        _mark_spreads(mip.lows, mip.highs, real(settings.threshold), begin, discontinuous)
+        _mark_spreads(lows, highs, real(settings.threshold), begin, discontinuous)
         return
     for cells, threshold in _by_level(settings, sizes, begin):
-        _mark_depths(mip.lows[0, cells], mip.highs[0, cells], real(threshold), 0, discontinuous[cells])
+        _mark_depths(lows[0, cells], highs[0, cells], real(threshold), 0, discontinuous[cells])
 
 
 def _mark_by_derivative(
     buffer: "GBuffer", settings: "DepthSlope", _: int, sizes: Array, discontinuous: Array, begin: int
 ) -> None:
     mip = depth_slopes(buffer.depth, buffer.covered, len(sizes) - 1, settings.measure != "absolute")
+    mark_depth_slopes(mip.highs, settings, sizes, discontinuous, begin)
+
+
+def mark_depth_slopes(
+    highs: Array, settings: "DepthSlope", sizes: Array, discontinuous: Array, begin: int = 0
+) -> None:
+    """Mark the cells (n,) of a layout whose steepest slope `highs`, (1, n), exceeds the threshold."""
     for cells, threshold in _by_level(settings, sizes, begin):
-        _mark_maxima(mip.highs[0, cells], buffer.depth.dtype.type(threshold), 0, discontinuous[cells])
+        _mark_maxima(highs[0, cells], highs.dtype.type(threshold), 0, discontinuous[cells])
 
 
 def _by_level(settings: "DepthCriterion", sizes: Array, begin: int) -> Iterator[tuple[slice, float]]:
@@ -215,14 +229,26 @@ def _mark_by_normal(
 ) -> None:
     components = buffer.normal if settings.components == "xyz" else buffer.normal[:2]
     mip = normal_ranges(components, buffer.covered, len(sizes) - 1, rim)
-    _mark_spreads(mip.lows, mip.highs, buffer.normal.dtype.type(settings.threshold), begin, discontinuous)
+    mark_normal_ranges(mip.lows, mip.highs, settings, discontinuous, begin)
+
+
+def mark_normal_ranges(
+    lows: Array, highs: Array, settings: "NormalRange", discontinuous: Array, begin: int = 0
+) -> None:
+    """Mark the cells (n,) in which a component of the normals, `lows` to `highs`, (c, n), spreads too far."""
+    _mark_spreads(lows, highs, lows.dtype.type(settings.threshold), begin, discontinuous)
 
 
 def _mark_by_curvature(
     buffer: "GBuffer", settings: "Chord | Rate", _: int, sizes: Array, discontinuous: Array, begin: int
 ) -> None:
     mip = curvatures(buffer.normal, buffer.position, buffer.covered, len(sizes) - 1, settings.name() == "rate")
-    _mark_maxima(mip.highs[0], buffer.normal.dtype.type(settings.threshold), begin, discontinuous)
+    mark_curvatures(mip.highs, settings, discontinuous, begin)
+
+
+def mark_curvatures(highs: Array, settings: "Chord | Rate", discontinuous: Array, begin: int = 0) -> None:
+    """Mark the cells (n,) whose largest curvature `highs`, (1, n), exceeds the threshold."""
+    _mark_maxima(highs[0], highs.dtype.type(settings.threshold), begin, discontinuous)
 
 
 _MARK_BY: dict[str, Any] = {"depth": _mark_by_depth, "derivative": _mark_by_derivative, "normal": _mark_by_normal,

@@ -117,10 +117,10 @@ def refine(
         Cells of the coarsest level row by row, depth first within them.
     """
     cells = classify_cells(discontinuous, np.ascontiguousarray(covered), diagonal)
-    return pass_by_pass(cells) if traversal == "list" else _depth_first(cells)
+    return pass_by_pass(cells) if traversal == "list" else depth_first(cells)
 
 
-def _depth_first(cells: CellStates) -> Subsplats:
+def depth_first(cells: CellStates) -> Subsplats:
     """Return the subsplats in a single pass: count those of each cell of the coarsest level, then write them."""
     counts = np.zeros(cells.leaf_sizes[-1, ROWS] * cells.leaf_sizes[-1, COLUMNS], np.int64)
     _count(cells, counts)

@@ -56,10 +56,17 @@ def representative_points(
         World space, m, and unit vectors.
     """
     position, normal = buffer.resolve("position", "normal")
+    return points_of(position, normal, buffer.covered, subsplats, representative)
+
+
+def points_of(
+    position: Array, normal: Array, covered: Array, subsplats: Subsplats, representative: Representative
+) -> tuple[Array, Array]:
+    """Return points and normals of `representative_points` from the channels (3, h, w), (3, h, w) and (h, w)."""
     points, normals = taken(position, subsplats.pixel), taken(normal, subsplats.pixel)
     if representative == "mean":
         cells = np.stack([subsplats.level, subsplats.row, subsplats.column]).astype(np.int64)
-        _average(position, normal, buffer.covered, cells, points, normals)
+        _average(position, normal, covered, cells, points, normals)
     return points, normals
 
 

@@ -35,7 +35,7 @@ def tent_pass(
 ) -> None:
     """Fill a level by the masked tent filter.
 
-    values: (3, n), irradiance of all subsplats, W/m^2; order, starts: of `_sorted_by_row`; column: (n,) columns of all
+    values: (3, n), irradiance of all subsplats, W/m^2; order, starts: of `sorted_by_row`; column: (n,) columns of all
     subsplats; coarse, coarse_mask: (3, h', w') and (h', w'), the level above and where it has texels; filled: (h_l,
     w_l), cells that show a surface; filter_all: also texels evaluated at this level; corner: 0, or 1 to count diagonal
     texels always. Fills result, (3, h_l, w_l) W/m^2, and its mask.

@@ -30,7 +30,7 @@ def _layer(values: Array, subsplats: Subsplats, level: int) -> Array:
     return plane
 
 
-def _filled_cells(covered: Array, top: int) -> list[Array]:
+def filled_cells(covered: Array, top: int) -> list[Array]:
     """Return which cells of levels 0 to `top` show any surface, (h_l, w_l) bool each."""
     levels = [covered]
     for level in range(1, top + 1):
@@ -39,7 +39,7 @@ def _filled_cells(covered: Array, top: int) -> list[Array]:
     return levels
 
 
-def _sorted_by_row(subsplats: Subsplats) -> tuple[list[Array], Array]:
+def sorted_by_row(subsplats: Subsplats) -> tuple[list[Array], Array]:
     """Return the subsplats sorted by level and row.
 
     starts: for each level (h_l + 1,) int64, where its rows start in `order` and where the last one ends; order: (n,)
@@ -136,28 +136,46 @@ def upsample(
 
 
 def _tent(values: Array, subsplats: Subsplats, covered: Array, filter_all: bool, corner_rule: bool) -> Array:
-    starts, order = _sorted_by_row(subsplats)
-    filled = _filled_cells(covered, subsplats.top)
-    corner = 0.0 if corner_rule else 1.0
-    result, mask = _black_level(-(-np.array(filled[-1].shape) // 2), values.dtype)
+    rows = sorted_by_row(subsplats)
+    filled = filled_cells(covered, subsplats.top)
+    result, mask = black_level(filled[-1], values.dtype)
     for level in range(subsplats.top, -1, -1):
-        coarse, coarse_mask = result, mask
-        result, mask = _empty_level(filled[level], values.dtype)
-        with threads(1 if mask.size <= FEW_TEXELS else None):
-            tent_pass(values, order, starts[level], subsplats.column, coarse, coarse_mask, filled[level], filter_all,
-                      corner, result, mask)
+        result, mask = tent_level(values, subsplats.column, rows, level, (result, mask), filled[level], filter_all,
+                                  corner_rule)
     return result
+
+
+def tent_level(
+    values: Array, column: Array, rows: tuple[list[Array], Array], level: int, coarse: tuple[Array, Array],
+    filled: Array, filter_all: bool, corner_rule: bool,
+) -> tuple[Array, Array]:
+    """Return irradiance and mask of a level from those of the coarser one, and from the subsplats by `rows`."""
+    starts, order = rows
+    result, mask = _empty_level(filled, values.dtype)
+    with threads(1 if mask.size <= FEW_TEXELS else None):
+        tent_pass(values, order, starts[level], column, *coarse, filled, filter_all, 0.0 if corner_rule else 1.0,
+                  result, mask)
+    return result, mask
 
 
 def _demo(values: Array, subsplats: Subsplats, covered: Array, filter_all: bool) -> Array:
-    filled = _filled_cells(covered, subsplats.top)
+    filled = filled_cells(covered, subsplats.top)
     result, mask = _layer(values, subsplats, subsplats.top), subsplats.leaf[-1]
     for level in range(subsplats.top - 1, -1, -1):
-        coarse, coarse_mask = result, mask
-        result, mask = _empty_level(filled[level], values.dtype)
-        demo_pass(_layer(values, subsplats, level), subsplats.leaf[level], coarse, coarse_mask, filled[level],
-                  filter_all, result, mask)
+        result, mask = demo_level(values, subsplats, level, (result, mask), filled[level], filter_all)
     return result
+
+
+def demo_level(
+    values: Array, subsplats: Subsplats, level: int, coarse: tuple[Array, Array], filled: Array, filter_all: bool
+) -> tuple[Array, Array]:
+    """Return irradiance and mask of a level from those of the coarser one; the coarsest is its layer as it is."""
+    layer, leaf = _layer(values, subsplats, level), subsplats.leaf[level]
+    if level == subsplats.top:
+        return layer, leaf
+    result, mask = _empty_level(filled, values.dtype)
+    demo_pass(layer, leaf, *coarse, filled, filter_all, result, mask)
+    return result, mask
 
 
 def _empty_level(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
@@ -165,8 +183,9 @@ def _empty_level(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
     return np.empty((3, *filled.shape), dtype), np.empty(filled.shape, np.bool_)
 
 
-def _black_level(shape: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
-    """Return irradiance and mask of a level without texels."""
+def black_level(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
+    """Return irradiance and mask of the level above one, without texels."""
+    shape = level_shape(*filled.shape, 1)
     return np.zeros((3, *shape), dtype), np.zeros(shape, np.bool_)
 
 

@@ -1,0 +1,104 @@
+"""Adaptive multiresolution splatting, from the buffers to the picture."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+from refgi.scene import Camera, Scene, SpotLight, merge
+from refgi.settings import of
+from refgi.splat.multires.settings import MultiresSettings
+from refgi.vectors.cases.scenes import DOWN, FLOOR, SPOT, SUN, WALL, quad, room, stored_scene
+from refgi.vectors.cases.sii import add_lit
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.spec import Case
+from refgi.vectors.stages.multires import add_multires
+from refgi.vectors.stages.pairs import add_footprints
+
+AT_WALL = Camera((0.2, 1.4, 0.8), (0.1, 1.4, -1.0), (0.0, 1.0, 0.0), math.radians(30))  # the back wall alone
+AWAY = SpotLight((1.5, 1.5, 0.5), (1.0, 0.2, 0.1), 0.2, 0.5, (4.0, 2.0, 1.0))  # into the void
+
+
+class Plan(NamedTuple):
+    """A case in the making."""
+
+    what: str
+    scene: Scene
+    size: tuple[int, int]  # columns and rows of the picture
+    maps: int  # texels along the side of a map
+    count: int  # lights of each map, on a grid
+    choices: dict[str, Any]  # settings by their keys
+
+    @property
+    def settings(self) -> MultiresSettings:
+        """Settings of the method; few cells on the coarsest level."""
+        return of(MultiresSettings, **{"lights": self.count * len(self.scene.lights), "coarsest": 5, **self.choices})
+
+
+def multiresolution(id: str, plan: Plan) -> Case:  # noqa: A002
+    """Return `multires` as planned: buffers, lights, refinement, light, picture."""
+    recipe, settings, lamps = Recipe(id, "multires", plan.what, id), plan.settings, len(plan.scene.lights)
+    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.count,) * lamps, pattern="grid")
+    if settings.effective_pairs.needs_footprints:
+        add_footprints(recipe, lamps)
+    add_multires(recipe, settings, *plan.size)
+    return recipe.case()
+
+
+def pole(*lights: Any) -> Scene:
+    """Return a floor, a thin slanted pole one to two pixels wide and a glossy fold, before the void.
+
+    The two sides of the fold differ in z of their normals alone.
+    """
+    geometry, materials = merge([quad((-1, 0, 0.6), (2, 0, 0), (0, 0, -1.2), FLOOR),
+                                 quad((0.25, 0.0, 0.1), (0.05, 0, 0.02), (-0.2, 1.6, 0.1), FLOOR),
+                                 quad((-0.8, 0.05, 0.4), (0.112, 0, -0.384), (0, 0.8, 0), WALL),
+                                 quad((-0.688, 0.05, 0.016), (-0.112, 0, -0.384), (0, 0.8, 0), WALL)], smooth=False)
+    camera = Camera((0.4, 0.9, 2.4), (-0.1, 0.55, 0.0), (0.0, 1.0, 0.0), math.radians(45))
+    return stored_scene(Scene("kit pole", geometry, materials, camera, lights))
+
+
+QUICK_PLANS: dict[str, Callable[[], Plan]] = {
+    "multires-odd": lambda: Plan(
+        "defaults but for the depth's threshold: ranges, bare corners, tent; 45 x 35 pixels, cut cells",
+        room(SPOT), (45, 35), 12, 16, {"depth.threshold": 0.3}),
+    "multires-edge": lambda: Plan(
+        "a thin edge before the void, directional lamp; rim of one pixel, no corners, no clamp",
+        pole(SUN), (41, 30), 18, 36, {"rim": 1, "diagonal": "off", "clamp": "none"}),
+    "multires-wall": lambda: Plan(
+        "a flat wall, no cell is refined; each pixel has the light of its subsplat",
+        room(SUN, DOWN, camera=AT_WALL), (19, 14), 15, 9, {"upsampling": "nearest"}),
+    "multires-no-flux": lambda: Plan(
+        "a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True), (18, 13), 9, 9, {}),
+    "multires-published": lambda: Plan(
+        "printed forms: every cell across a corner, every cell filtered, depths in metres; Eq. 3",
+        room(SPOT, matte=True, smooth=True), (26, 35), 15, 25, {
+            "diagonal": "literal", "traversal": "list", "clamp": "none", "depth.measure": "absolute",
+            "depth.threshold": 0.4, "normal.components": "xy", "detail": 0.3,
+            "as_published": frozenset({"ams_filter_all", "ams_all_corners"})}),
+    "multires-slopes": lambda: Plan(
+        "slopes of depth and Eq. 1, finest level 1, all neighbours, means of cells, the demo's filter",
+        room(SPOT, DOWN, matte=True, smooth=True), (33, 25), 15, 9, {
+            "depth": None, "normal": None, "derivative": "slope", "curvature": "chord", "finest": 1,
+            "diagonal": "full8", "representative": "mean", "upsampling": "demo", "derivative.threshold": 0.2,
+            "curvature.threshold": 0.3}),
+}
+FULL_PLANS: dict[str, Callable[[], Plan]] = {
+    "multires-large": lambda: Plan("64 x 48 pixels, 2 x 64 lights, 6 levels", room(SPOT, DOWN, smooth=True), (64, 48),
+                                   24, 64, {"coarsest": 2}),
+    "multires-rate": lambda: Plan(
+        "Eq. 1 over the distance, thresholds of depth that fall with the level; levels interpolated one by one",
+        room(SPOT, smooth=True), (45, 31), 12, 16, {
+            "curvature": "rate", "normal": None, "upsampling": "naive_bilinear", "depth.measure": "demo",
+            "depth.threshold": 0.2, "curvature.threshold": 2.0}),
+}
+
+
+def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
+    def made(id: str) -> Case:  # noqa: A002
+        return multiresolution(id, plans[id]())
+
+    return {id: partial(made, id) for id in plans}  # noqa: A001
+
+
+QUICK, FULL = _cases(QUICK_PLANS), _cases(FULL_PLANS)

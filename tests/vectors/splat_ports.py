@@ -1,0 +1,71 @@
+"""What the tests of the kit's stages of splatting share: cases, bounds, and a port's arrays judged by them."""
+
+from functools import cache
+
+import numpy as np
+
+from refgi.vectors.bounds import distance, isolated_bounds
+from refgi.vectors.cases import kit_cases
+from refgi.vectors.spec import expected_of, outputs_of, stored
+
+LARGEST_MASK = 0.05  # share of an array's elements that rounding may decide
+
+
+@cache
+def made(id):
+    """Return a case of the full kit and its arrays."""
+    case = kit_cases("full")[id]()
+    return case, expected_of(case)
+
+
+@cache
+def bounds_of(id, name):
+    """Return the bounds of one stage's arrays."""
+    case, known = made(id)
+    return isolated_bounds(stage_of(id, name), known, seed=1)
+
+
+def stage_of(id, name):
+    return next(stage for stage in made(id)[0].stages if stage.name == name)
+
+
+def stages_of(id, start):
+    """Return the names of the stages that start with a word."""
+    return [stage.name for stage in made(id)[0].stages if stage.name.startswith(start)]
+
+
+def off(id, name, got):
+    """Return the names of a stage's arrays that a port has out of bounds."""
+    known, bounds = made(id)[1], bounds_of(id, name)
+    return [array for array, bound in bounds.items() if out_of_bounds(known[array], stored(got[array]), bound)]
+
+
+def out_of_bounds(expected, got, bound):
+    if got.shape != expected.shape:
+        return True
+    return bool((distance(got, expected) > bound.limit)[~bound.masked].any())
+
+
+def expect_within(id, name, got):
+    wrong = off(id, name, got)
+    assert not wrong, f"{id}, {name}: {wrong}"
+
+
+def unseen(ids, start):
+    """Return (stage, cause) of decoys of stages that start with a word which no case tells from the stage."""
+    seen = {}
+    for id in ids:
+        known = made(id)[1]
+        for name in stages_of(id, start):
+            stage = stage_of(id, name)
+            for decoy in stage.decoys:
+                got = outputs_of(stage, known, np.float64, decoy.run)
+                key = name.rstrip("0123456789."), decoy.cause
+                seen[key] = seen.get(key, False) or bool(off(id, name, got))
+    return [key for key, found in seen.items() if not found]
+
+
+def masked_shares(id, start):
+    """Return the share of masked elements of each array of the stages that start with a word."""
+    return {array: float(bound.masked.mean()) for name in stages_of(id, start)
+            for array, bound in bounds_of(id, name).items() if bound.masked.size}

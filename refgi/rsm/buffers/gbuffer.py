@@ -1,5 +1,6 @@
 """The G-buffer of a camera or a light: depth, position, normal, albedo, ids; each channel resolved on first use."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numba
@@ -35,6 +36,8 @@ class GBuffer:
         Which triangle each texel sees.
     dtype : dtype
         Float32 or float64, of every channel but the ids.
+    known : mapping of str to ndarray, optional
+        Channels that need not be computed.
 
     Notes
     -----
@@ -48,13 +51,14 @@ class GBuffer:
         projection: Projection,
         visibility: Visibility,
         dtype: npt.DTypeLike,
+        known: Mapping[str, Array] | None = None,
     ) -> None:
         self.projection = projection
         self.visibility = visibility
         self.dtype = np.dtype(dtype)
         self._geometry = geometry
         self._materials = materials
-        self._channels: dict[str, Array] = {}
+        self._channels: dict[str, Array] = dict(known or {})
 
     @property
     def height(self) -> int:

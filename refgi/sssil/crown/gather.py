@@ -29,7 +29,10 @@ GROUP = 256  # samples that are summed before they are added to the total
 
 
 @stage("sssil.gather")
-def gather(level: Level, index: int, settings: HssilSettings, senders: Level | None = None) -> Array:
+def gather(
+    level: Level, index: int, settings: HssilSettings, senders: Level | None = None,
+    samples: tuple[Array, Array] | None = None,
+) -> Array:
     """Sum the light of the samples around each texel of a level (Eq. 1).
 
     Parameters
@@ -42,6 +45,8 @@ def gather(level: Level, index: int, settings: HssilSettings, senders: Level | N
         Sampling and form factor.
     senders : Level, optional
         The same level with other surface points, as senders.
+    samples : tuple of ndarray, optional
+        Offsets and weights as `shared_offsets` returns them, in place of those that the settings draw.
 
     Returns
     -------
@@ -54,7 +59,7 @@ def gather(level: Level, index: int, settings: HssilSettings, senders: Level | N
     real = level.position.dtype.type
     form, factor = form_of(settings.senders.form_factor), real(math.pi * level_factor(index, settings))
     farthest, result = math.ceil(2 * radius), plane(level.radiance.shape, level.radiance.dtype)
-    if sampling.pattern == "pixel":
+    if samples is None and sampling.pattern == "pixel":
         inner, crown = sampling.counts(index)
         points, weight = sample_points(inner, crown), sample_weight(radius, inner, crown)
         key = level_key(sampling.seed, level.number)
@@ -62,7 +67,8 @@ def gather(level: Level, index: int, settings: HssilSettings, senders: Level | N
         _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, sampling.density == "uniform",
                           key, weight.astype(real), form, factor, result)
         return result
-    offsets, weight = _reaching(*shared_offsets(sampling, index, level.number, rows, radius, columns), rows, columns)
+    shared = shared_offsets(sampling, index, level.number, rows, radius, columns) if samples is None else samples
+    offsets, weight = _reaching(*shared, rows, columns)
     emitters = pack(senders, offsets.shape[1], farthest, WIDE)
     paired = sampling.pattern in ("fixed", "all")
     _gather_shared(emitters, level.position, level.normal, offsets, weight.astype(real), paired, form, factor, result)

@@ -21,12 +21,12 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
-from refgi.sampling import hash_bits
 from refgi.sssil.crown.points import (
     FIRST_STEP,
     SECOND_STEP,
-    TO_UNIT,
     distance,
+    key_shift,
+    known_radius,
     level_key,
     pixel_key,
     pixel_offset,
@@ -34,10 +34,10 @@ from refgi.sssil.crown.points import (
     row_key,
     sample_points,
     sample_weight,
-    shift_of,
     shifted,
+    tile_shifts,
 )
-from refgi.sssil.settings import SamplingSettings
+from refgi.sssil.settings import Density, SamplingSettings
 
 Array = npt.NDArray[Any]
 
@@ -121,12 +121,38 @@ def shared_offsets(
     if sampling.pattern == "fixed":
         mirrored, weight = _mirrored(sampling, radius, inner, crown, number)
         return mirrored[None, None], weight[None, None]
-    points, uniform = sample_points(inner, crown), sampling.density == "uniform"
     tile = (rows, PHASES) if sampling.pattern == "row" else (sampling.tile, sampling.tile)
-    offsets = np.empty((*tile, len(points), 2), np.int32)
+    shifts = tile_shifts(key_shift(level_key(sampling.seed, number)), tile, crown)
+    return tile_offsets(sample_points(inner, crown), inner, shifts, radius, sampling.density)
+
+
+def tile_offsets(points: Array, inner: int, shifts: Array, radius: float, density: Density) -> tuple[Array, Array]:
+    """Return the samples of the texels of a tile.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+        The common points, of `sample_points`; the first `inner` lie in the disc.
+    inner : int
+        How many lie in the disc.
+    shifts : (m, P, 2) ndarray
+        What each texel of the tile adds to u and v, modulo 1.
+    radius : float
+        Inner radius of the crown, texels.
+    density : {"uniform", "inverse_distance"}
+        Samples per texel, by the distance from the receiver.
+
+    Returns
+    -------
+    offsets : (m, P, n, 2) ndarray of int32
+        Texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P].
+    weight : (m, P, n) or (1, 1, n) ndarray of float64
+        Texels of the level that each sample stands for.
+    """
+    offsets, uniform = np.empty((*shifts.shape[:2], len(points), 2), np.int32), density == "uniform"
     relative = np.empty((1, 1, 1) if uniform else offsets.shape[:3])
-    _fill_tile(points, inner, radius, uniform, level_key(sampling.seed, number), offsets, relative)
-    return offsets, relative * sample_weight(radius, inner, crown)
+    _fill_tile(points, inner, radius, uniform, shifts, offsets, relative)
+    return offsets, relative * sample_weight(radius, inner, len(points) - inner)
 
 
 def samples_at(
@@ -165,39 +191,15 @@ def samples_at(
     return found[:, :2].astype(np.int32), found[:, 2] * sample_weight(radius, inner, crown)
 
 
-def known_radius(sampling: SamplingSettings, radius: float | None) -> float:
-    """Return the inner radius of the crowns.
-
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Their radius.
-    radius : float or None
-        Replaces that of the settings.
-
-    Returns
-    -------
-    float
-        Texels.
-
-    Raises
-    ------
-    InputError
-        If neither is set.
-    """
-    found = sampling.radius if radius is None else radius
-    expect(found is not None, "radius", "texels, or the size of the first level to choose it by", found)
-    return float(found)  # type: ignore[arg-type]
-
-
 @kernel
 def _fill_tile(
-    points: Array, inner: int, radius: float, uniform: bool, key: Any, offsets: Array, relative: Array
+    points: Array, inner: int, radius: float, uniform: bool, shifts: Array, offsets: Array, relative: Array
 ) -> None:
     rows, phases, count, _ = offsets.shape
     for row in range(rows):
         for phase in range(phases):
-            u, cosine, sine = shift_of(key, (row * phases + phase) * (count - inner))
+            u, turn = shifts[row, phase, 0], 2.0 * math.pi * shifts[row, phase, 1]
+            cosine, sine = math.cos(turn), math.sin(turn)
             offsets_here, relative_here = offsets[row, phase], relative[row % len(relative), phase % relative.shape[1]]
             for j in range(count):
                 near = 0.0 if j < inner else 1.0
@@ -222,7 +224,7 @@ def _every_texel(low: float, high: float, within: tuple[int, int] | None) -> Arr
 def _mirrored(sampling: SamplingSettings, radius: float, inner: int, crown: int, number: int) -> tuple[Array, Array]:
     """Return a mirror-symmetric set and its weights: half of the points on the right, an odd one above or below."""
     key = level_key(sampling.seed, number)
-    shift = np.array([hash_bits(key), hash_bits(key ^ np.uint32(0x27D4EB2F))]) * TO_UNIT
+    shift = key_shift(key)
     weight, uniform = sample_weight(radius, inner, crown), sampling.density == "uniform"
     pairs, middles = [], []
     for first, count, near in ((0, inner, 0.0), (inner, crown, 1.0)):

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.sampling import hash_bits
+from refgi.sssil.settings import SamplingSettings
 
 Array = npt.NDArray[Any]
 
@@ -59,6 +61,31 @@ def sample_weight(radius: float, inner: int, crown: int) -> Array:
     return np.repeat([disc / max(inner, 1), 3.0 * disc / crown], [inner, crown])
 
 
+def known_radius(sampling: SamplingSettings, radius: float | None) -> float:
+    """Return the inner radius of the crowns.
+
+    Parameters
+    ----------
+    sampling : SamplingSettings
+        Their radius.
+    radius : float or None
+        Replaces that of the settings.
+
+    Returns
+    -------
+    float
+        Texels.
+
+    Raises
+    ------
+    InputError
+        If neither is set.
+    """
+    found = sampling.radius if radius is None else radius
+    expect(found is not None, "radius", "texels, or the size of the first level to choose it by", found)
+    return float(found)  # type: ignore[arg-type]
+
+
 @kernel
 def level_key(seed: Any, number: Any) -> Any:
     """Return the hash of seed and level number, uint32."""
@@ -86,6 +113,21 @@ def shift_of(key: Any, block: Any) -> Any:
     u = (hash_bits(key) * TO_UNIT + block * FIRST_STEP) % 1.0
     v = (hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT + block * SECOND_STEP) % 1.0
     return u, math.cos(2.0 * math.pi * v), math.sin(2.0 * math.pi * v)
+
+
+def key_shift(key: Any) -> Array:
+    """Return the random shift (u, v) of a key, (2,) float64 in [0, 1)."""
+    return np.array([hash_bits(key), hash_bits(key ^ np.uint32(0x27D4EB2F))]) * TO_UNIT
+
+
+def tile_shifts(start: Array, tile: tuple[int, int], stretch: int) -> Array:
+    """Return the shifts of the texels of a tile, row by row, each `stretch` points of the sequence after the last.
+
+    `start` (2,): shift of the first. Returns (rows, columns, 2): addends of u and v modulo 1.
+    """
+    points = np.arange(tile[0] * tile[1]).reshape(*tile, 1) * stretch
+    shifts: Array = (start + points * np.array([FIRST_STEP, SECOND_STEP])) % 1.0
+    return shifts
 
 
 @kernel

@@ -173,6 +173,16 @@ def levels(
     return tuple(levels_made)
 
 
+def next_level(fine: Level, shape: tuple[int, int]) -> Level:
+    """Return the level of the closest of each four texels of a finer one, as `levels` makes it.
+
+    `shape`: height and width of the picture.
+    """
+    coarse = _empty_level(fine.number + 1, shape, fine.depth.dtype)
+    fill_coarser_level(fine, *shape, coarse)
+    return coarse
+
+
 @stage("sssil.senders")
 def drawn_senders(
     depth: Array, normal: Array, albedo: Array, direct: Array, projection: Projection, closest: tuple[Level, ...],

@@ -144,11 +144,41 @@ def temporal_filter(
                                   settings.entering_speed, reprojected)
     if settings.clamp is not None:
         clamp_to_neighbourhood(irradiance, buffer.covered, settings.clamp, settings.clamp_radius, reprojected)
+    reused = blend(irradiance, reprojected, weight, settings, speed, entering)
+    return Filtered(reprojected, reused / max(1, int(np.count_nonzero(buffer.covered))))
+
+
+def blend(
+    irradiance: Array, reprojected: Array, weight: Array, settings: TemporalSettings, speed: Array | None = None,
+    entering: Array | None = None,
+) -> int:
+    """Turn light of the frame before into F_i = a W(F_{i-1}) + (1 - a) I_i.
+
+    Parameters
+    ----------
+    irradiance : (3, h, w) ndarray
+        I_i, W/m^2.
+    reprojected : (3 or 4, h, w) ndarray
+        W(F_{i-1}), W/m^2, and frames in which the surface was found; becomes F_i and the frames with this one.
+    weight : (h, w) ndarray
+        Share of the texels that show the same surface, 0 where none does; becomes a.
+    settings : TemporalSettings
+        Share of the frame before, and the speed at which it falls.
+    speed : (h, w) ndarray, optional
+        Of the surfaces, pixels a frame.
+    entering : (h, w) ndarray, optional
+        Share of a of the pixels that entered the picture.
+
+    Returns
+    -------
+    int
+        Pixels whose surface the frame before shows.
+    """
     real = irradiance.dtype.type
     reused = np.empty(len(weight), np.int64)  # pixels of each row
     falloff = real(-math.log2(math.e) / settings.speed)
     _blend(irradiance, speed, entering, real(settings.weight), falloff, weight, reprojected, reused)
-    return Filtered(reprojected, int(reused.sum()) / max(1, int(np.count_nonzero(buffer.covered))))
+    return int(reused.sum())
 
 
 def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:

@@ -1,0 +1,163 @@
+"""Stages of direct light at the camera's pixels: shadows from a map's depths or by rays, irradiance of all lights."""
+
+from typing import Any, Literal
+
+import numpy as np
+
+from refgi.rays import Tracer
+from refgi.rsm.buffers.direct import direct_irradiance, shadow_map_visibility
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.buffers.light_projection import light_projection
+from refgi.rsm.buffers.reflective import Rsm
+from refgi.rsm.raster.projection import Projection, camera_projection
+from refgi.scene import Scene, material_table
+from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.stages.buffers import (
+    SCENE,
+    _add_ids,
+    _add_surface,
+    _give_light,
+    _give_maps,
+    _light_names,
+    _map_names,
+    _maps_of,
+    _visible,
+    geometry_of,
+    light_of,
+)
+
+POINTS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
+Shadows = Literal["map", "exact"]
+
+
+def add_direct(recipe: Recipe, scene: Scene, size: tuple[int, int], shadows: Shadows, resolution: int = 32) -> None:
+    """Add shadows and direct irradiance of all lights: `size` (columns, rows), texels of a shadow map's side."""
+    view = camera_projection(scene.camera, *size)
+    for index, light in enumerate(scene.lights):
+        _give_light(recipe, f"light{index}", light)
+        if shadows == "exact":
+            _add_rays(recipe, scene, index)
+        else:
+            _add_map(recipe, scene, index, resolution)
+    _add_sum(recipe, scene, view)
+
+
+def surface_points(arrays: Arrays, real: Any, scene: Scene, view: Projection) -> GBuffer:
+    """Return the camera's G-buffer with the positions and normals among arrays."""
+    known = {key: np.ascontiguousarray(arrays[f"gbuffer.{key}"], real) for key in
+             ("depth", "position", "normal", "albedo") if f"gbuffer.{key}" in arrays}
+    return GBuffer(scene.geometry, material_table(scene.materials, real), view, _visible(arrays[POINTS[2]]), real, known)
+
+
+def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
+    """Add the depths that a light sees, and whether it sees what the camera does."""
+    name, light = f"rsm{index}", scene.lights[index]
+    maps = light_projection(light, scene.geometry, resolution)
+    _give_maps(recipe, name, maps)
+    _add_ids(recipe, name, name, maps, scene)
+    _add_surface(recipe, name, name, maps, scene, ("depth", "position", "normal"))
+    depths = f"{name}.depth", f"{name}.position"
+
+    def test(arrays: Arrays, real: Any, bias: float | None = None) -> Arrays:
+        projection = _maps_of(arrays, name, maps)
+        view = GBuffer(scene.geometry, material_table(scene.materials, real), projection,
+                       _visible(np.zeros(maps.shape, np.int32)), real)
+        known = {key.split(".")[1]: np.ascontiguousarray(arrays[key], real) for key in depths}
+        points = (np.ascontiguousarray(arrays[key], real) for key in POINTS[:2])
+        return {f"shadow{index}.visible": shadow_map_visibility(
+            *points, np.asarray(arrays[POINTS[2]]) >= 0, Rsm(light, view, material_table(scene.materials, real), known),
+            bias)}
+
+    printed = name.replace(".", "__")
+    recipe.add(f"shadow{index}", "the nearest texel's point does not lie above the receiver's own plane", test,
+               (*POINTS, *_map_names(name), *depths), {f"shadow{index}.visible": _visible_spec()},
+               paper="docs/rasterizer: receiver-plane bias", exact=(*POINTS[:2], *depths), decoys=(
+                   Decoy("the bias is a constant 0", lambda a, r: test(a, r, 0.0), "receiver-plane bias"),
+                   Decoy("the bias is a constant tenth of the scene's size", lambda a, r: test(a, r, 0.2),
+                         "receiver-plane bias"),
+                   Decoy("rows of the map run upwards", reading(test, **{f"{printed}__frame": _upside_down}),
+                         "row 0 is the top row"),
+                   Decoy("the map's depths are those at its texels' corners", reading(test, **{
+                       f"{printed}__depth": _moved, f"{printed}__position": _moved}), "texel centres at + 1/2"),
+                   Decoy("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
+               ))
+
+
+def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:
+    """Add whether a ray from each pixel's point reaches a light."""
+    lamp, light = f"light{index}", scene.lights[index]
+
+    def test(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 rays have one precision
+        tracer = Tracer(geometry_of(arrays, scene))
+        return {f"shadow{index}.visible": tracer.visible_from_light(
+            *(np.asarray(arrays[key]) for key in POINTS[:2]), np.asarray(arrays[POINTS[2]]) >= 0,
+            light_of(arrays, lamp, light))}
+
+    place = [name for name in _light_names(lamp, light) if name.endswith("position")]
+    wrong = (Decoy("the light is looked for at the origin", reading(test, **{
+        place[0].replace(".", "__"): np.zeros_like}), "a ray to the light"),) if place else ()
+    recipe.add(f"shadow{index}", "no triangle lies between the pixel's point and the light", test,
+               (*SCENE, *POINTS, *_light_names(lamp, light)), {f"shadow{index}.visible": _visible_spec()},
+               paper="shadow rays", exact=("scene.vertices", *POINTS[:2]), decoys=(
+                   Decoy("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
+                   Decoy("rays start below the surface", reading(test, gbuffer__normal=lambda a: -a),
+                         "off the surface, on the side that is seen"), *wrong))
+
+
+def _add_sum(recipe: Recipe, scene: Scene, view: Projection) -> None:
+    """Add the irradiance of all lights."""
+    lights = [(f"light{k}", light) for k, light in enumerate(scene.lights)]
+    names = [name for lamp, light in lights for name in _light_names(lamp, light)]
+    shadows = [f"shadow{k}.visible" for k in range(len(lights))]
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        buffer = surface_points(arrays, real, scene, view)
+        parts = [direct_irradiance(buffer, light_of(arrays, lamp, light), np.asarray(arrays[shadow]))
+                 for (lamp, light), shadow in zip(lights, shadows, strict=True)]
+        return {"direct.irradiance": np.sum(parts, axis=0, dtype=real)}
+
+    def unshadowed(array: Array) -> Array:
+        return np.ones_like(array)
+
+    def away(arrays: Arrays, power: int) -> Array:
+        """Distance from the first light that has a place, to a power, at pixels with a surface."""
+        place = next((arrays[name] for name in names if name.endswith("position")), np.zeros(3))
+        square = ((arrays[POINTS[0]] - np.reshape(place, (3, 1, 1))) ** 2).sum(axis=0)
+        return np.asarray(np.where(np.asarray(arrays[POINTS[2]]) >= 0, square ** (power / 2), 1.0))
+
+    def times(power: int) -> Any:
+        return lambda a, r: {"direct.irradiance": run(a, r)["direct.irradiance"] * away(a, power)}
+
+    positions = tuple(name for name in names if name.endswith("position"))
+    near = (Decoy("1/d^2 is missing", times(2), "E = I cos / d^2"),
+            Decoy("1/d in place of 1/d^2", times(1), "E = I cos / d^2")) if positions else ()
+    spots = [name.replace(".", "__") for name in names if name.endswith("half_angles")]
+    cones = (Decoy("the cone's edge is hard", reading(run, **{name: lambda a: a[[1, 1]] for name in spots}),
+                   "docs/conventions: smooth edge of a spot"),
+             Decoy("whole angles in place of half-angles", reading(run, **{name: lambda a: a / 2 for name in spots}),
+                   "half-angles")) if spots else ()
+    recipe.add("direct", "direct irradiance of all lights, without albedo/pi", run, (*POINTS, *names, *shadows),
+               {"direct.irradiance": Spec("rgb, row, column", "W/m^2", "direct irradiance; 0 without surface",
+                                          "linear RGB", "E = I(w) cos / d^2")},
+               paper="HSS Sec. 4; docs/radiometry", exact=(POINTS[0], *positions), decoys=(
+                   Decoy("shadows are missing", reading(run, **{name.replace(".", "__"): unshadowed for name in
+                                                                shadows}), "HSS Sec. 4"),
+                   Decoy("the normal points inwards", reading(run, gbuffer__normal=lambda a: -a), "E = I cos / d^2"),
+                   Decoy("irradiance is divided by pi", writing(run, direct__irradiance=lambda a: a / np.pi),
+                         "albedo/pi comes with the radiance"), *near, *cones,
+                   *((Decoy("the first light alone", reading(run, **{name.replace(".", "__"): np.zeros_like for name in
+                                                                    shadows[1:]}), "all lights"),)
+                     if len(lights) > 1 else ())))
+
+
+def _visible_spec() -> Spec:
+    return Spec("row, column", "1", "whether the light reaches the pixel's point; false without surface", tier="T0")
+
+
+def _upside_down(frame: Array) -> Array:
+    return np.asarray(frame * np.array([1.0, -1.0, 1.0]).reshape(3, 1))
+
+
+def _moved(array: Array) -> Array:
+    return np.roll(array, (1, 1), axis=(-2, -1))

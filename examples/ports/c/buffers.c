@@ -46,6 +46,20 @@ vec3 face_normal(Case *c, int triangle, vec3 seen_along) {
     return dot(normal, seen_along) > 0.0f ? scale(normal, -1.0f) : normal;
 }
 
+/* Interpolated between the corners where there are vertex normals, on the visible side of the face. */
+static vec3 shading_normal(Case *c, int triangle, vec3 face, vec3 point) {
+    if (!has(c, "scene.vertex_normals")) return face;
+    const float *normals = get(c, "scene.vertex_normals")->f;
+    const int *corner = get(c, "scene.faces")->i + 3 * triangle;
+    vec3 p[3], sum = v3(0, 0, 0);
+    corners(c, triangle, p);
+    for (int k = 0; k < 3; k++) {
+        float share = dot(face, cross(sub(p[(k + 1) % 3], point), sub(p[(k + 2) % 3], point)));
+        sum = add(sum, scale(row3(normals + 3 * corner[k]), share));
+    }
+    return normalize(dot(sum, face) < 0.0f ? scale(sum, -1.0f) : sum);
+}
+
 /* A centre on an edge belongs to the triangle whose first coefficient that is not 0 is positive (docs/rasterizer). */
 static int inside(vec3 edge, vec3 place, float sign) {
     float e = dot(edge, place) * sign;
@@ -109,7 +123,7 @@ void surface_stage(Case *c, const char *name, const char *view) {
         corners(c, id[k], p);
         depth[k] = dot(n, sub(p[0], ray.origin)) / dot(n, ray.direction);
         put3(position, count, k, add(ray.origin, scale(ray.direction, depth[k])));
-        put3(normal, count, k, n);
+        put3(normal, count, k, shading_normal(c, id[k], n, plane3(position, count, k)));
         if (albedo) put3(albedo, count, k, row3(diffuse + 3 * material[id[k]]));
     }
 }

@@ -13,7 +13,10 @@ static const struct { const char *end; void (*run)(Case *, int); } OF_MAPS[] = {
     {"texels", texels_stage},
 };
 static const struct { const char *name; void (*run)(Case *); } STAGES[] = {
-    {"lights", lights_stage}, {"footprints", footprints_stage}, {"sum", sum_stage}, {"pairs", pairs_stage},
+    {"multires.discontinuities", discontinuities_stage}, {"multires.states", states_stage},
+    {"multires.subsplats", subsplats_stage}, {"multires.points", subsplat_points_stage},
+    {"multires.irradiance", subsplat_irradiance_stage}, {"multires.upsample", upsample_nearest_stage},
+    {"multires.detail", detail_stage}, {"lights", lights_stage}, {"footprints", footprints_stage}, {"sum", sum_stage}, {"pairs", pairs_stage},
 };
 #define COUNT(list) (sizeof(list) / sizeof *(list))
 
@@ -28,6 +31,10 @@ static int run(Case *c, const char *name) {
     }
     for (size_t k = 0; of_map && k < COUNT(OF_MAPS); k++)
         if (!strcmp(end, OF_MAPS[k].end)) return OF_MAPS[k].run(c, map), 1;
+    int level = 0;
+    if (!strcmp(name, "multires.depth_ranges")) return ranges_stage(c, "depth"), 1;
+    if (!strcmp(name, "multires.normal_ranges")) return ranges_stage(c, "normal"), 1;
+    if (sscanf(name, "multires.upsample.%d", &level) == 1) return upsample_level_stage(c, level), 1;
     for (size_t k = 0; k < COUNT(STAGES); k++)
         if (!strcmp(name, STAGES[k].name)) return STAGES[k].run(c), 1;
     return 0;

@@ -29,6 +29,17 @@ void warp_stage(Case *c, int map);                                 /* warp.c */
 void sum_stage(Case *c);                                           /* sums.c */
 void pairs_stage(Case *c);
 
+void ranges_stage(Case *c, const char *what);                      /* multires.c */
+void discontinuities_stage(Case *c);
+void states_stage(Case *c);
+void subsplats_stage(Case *c);
+int multires_top(Case *c);
+void subsplat_points_stage(Case *c);                               /* subsplats.c */
+void upsample_level_stage(Case *c, int level);
+void upsample_nearest_stage(Case *c);
+void detail_stage(Case *c);
+void subsplat_irradiance_stage(Case *c);                           /* sums.c */
+
 float spot_integral(float x0, float x1, float y0, float y1, float inner, float outer); /* spot.c */
 float lobe_norm(vec3 normal, vec3 axis, float exponent);                               /* lobes.c */
 float lobe_shape(vec3 axis, vec3 direction, float exponent);

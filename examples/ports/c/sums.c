@@ -36,19 +36,28 @@ static vec3 pair(const Lights *l, int k, vec3 x, vec3 n) {
     return add(total, scale(plane3(l->lobe_flux, l->count, k), l->norm[k] * shape * fall));
 }
 
-static void irradiance(Case *c, Array *made, int own, int clamped) {
+/* At receivers whose `id`, where there is one, is not -1; `own`: light k meets receiver k alone. */
+static void irradiance(Case *c, Array *made, const float *position, const float *normal, const int *id, int own, int clamped) {
     Lights l = lights_of(c, clamped);
-    const int *id = get(c, "gbuffer.triangle_id")->i;
-    const float *position = get(c, "gbuffer.position")->f, *normal = get(c, "gbuffer.normal")->f;
     int n = made->size / 3;
     for (int k = 0; k < n; k++) {
         vec3 total = v3(0.0f, 0.0f, 0.0f);
-        for (int j = own ? k : 0; id[k] >= 0 && j < (own ? k + 1 : l.count); j++)
+        for (int j = own ? k : 0; (!id || id[k] >= 0) && j < (own ? k + 1 : l.count); j++)
             total = add(total, pair(&l, j, plane3(position, n, k), plane3(normal, n, k)));
         put3(made->f, n, k, total);
     }
     free(l.norm);
 }
 
-void sum_stage(Case *c) { irradiance(c, make(c, "sum.irradiance"), 0, json_is(fact(c, "sum.clamp"), "disc")); }
-void pairs_stage(Case *c) { irradiance(c, make(c, "pairs.irradiance"), 1, 0); }
+static void at_pixels(Case *c, Array *made, int own, int clamped) {
+    irradiance(c, made, get(c, "gbuffer.position")->f, get(c, "gbuffer.normal")->f, get(c, "gbuffer.triangle_id")->i, own, clamped);
+}
+
+void sum_stage(Case *c) { at_pixels(c, make(c, "sum.irradiance"), 0, json_is(fact(c, "sum.clamp"), "disc")); }
+void pairs_stage(Case *c) { at_pixels(c, make(c, "pairs.irradiance"), 1, 0); }
+
+void subsplat_irradiance_stage(Case *c) {
+    const Array *point = get(c, "multires.point");
+    Array *made = make_of(c, 'f', 2, point->shape, "multires.irradiance");
+    irradiance(c, made, point->f, get(c, "multires.normal")->f, 0, 0, json_is(fact(c, "multires.clamp"), "disc"));
+}

@@ -12,11 +12,15 @@ static const struct { const char *end; void (*run)(Case *, int); } OF_MAPS[] = {
     {"flux", flux_stage}, {"points", points_stage}, {"importance", importance_stage}, {"warp", warp_stage},
     {"texels", texels_stage},
 };
+static const struct { const char *format; void (*run)(Case *, int); } OF_LEVELS[] = {
+    {"multires.upsample.%d%n", upsample_level_stage}, {"level%d%n", level_stage}, {"shifts of samples%d%n", shifts_stage},
+    {"samples%d%n", samples_stage}, {"gather%d%n", gather_stage}, {"blur%d%n", blur_stage}, {"light%d%n", light_stage},
+};
 static const struct { const char *name; void (*run)(Case *); } STAGES[] = {
     {"multires.discontinuities", discontinuities_stage}, {"multires.states", states_stage},
     {"multires.subsplats", subsplats_stage}, {"multires.points", subsplat_points_stage},
     {"multires.irradiance", subsplat_irradiance_stage}, {"multires.upsample", upsample_nearest_stage},
-    {"multires.detail", detail_stage}, {"lights", lights_stage}, {"footprints", footprints_stage}, {"sum", sum_stage}, {"pairs", pairs_stage},
+    {"multires.detail", detail_stage}, {"direct", direct_stage}, {"picture", picture_stage}, {"lights", lights_stage}, {"footprints", footprints_stage}, {"sum", sum_stage}, {"pairs", pairs_stage},
 };
 #define COUNT(list) (sizeof(list) / sizeof *(list))
 
@@ -34,7 +38,10 @@ static int run(Case *c, const char *name) {
     int level = 0;
     if (!strcmp(name, "multires.depth_ranges")) return ranges_stage(c, "depth"), 1;
     if (!strcmp(name, "multires.normal_ranges")) return ranges_stage(c, "normal"), 1;
-    if (sscanf(name, "multires.upsample.%d", &level) == 1) return upsample_level_stage(c, level), 1;
+    for (size_t k = 0; k < COUNT(OF_LEVELS); k++) {
+        int length = 0;
+        if (sscanf(name, OF_LEVELS[k].format, &level, &length) == 1 && !name[length]) return OF_LEVELS[k].run(c, level), 1;
+    }
     for (size_t k = 0; k < COUNT(STAGES); k++)
         if (!strcmp(name, STAGES[k].name)) return STAGES[k].run(c), 1;
     return 0;

@@ -40,6 +40,15 @@ void upsample_nearest_stage(Case *c);
 void detail_stage(Case *c);
 void subsplat_irradiance_stage(Case *c);                           /* sums.c */
 
+void direct_stage(Case *c);                                        /* levels.c */
+void level_stage(Case *c, int level);
+void shifts_stage(Case *c, int level);                             /* crown.c */
+void samples_stage(Case *c, int level);
+void gather_stage(Case *c, int level);
+void blur_stage(Case *c, int level);                               /* bilateral.c */
+void light_stage(Case *c, int level);
+void picture_stage(Case *c);
+
 float spot_integral(float x0, float x1, float y0, float y1, float inner, float outer); /* spot.c */
 float lobe_norm(vec3 normal, vec3 axis, float exponent);                               /* lobes.c */
 float lobe_shape(vec3 axis, vec3 direction, float exponent);

@@ -25,6 +25,7 @@ RUNS = 6  # with changed inputs
 ROUNDING = 2.0**-24  # of float32, relative
 HALF_ROUNDING = 2.0**-11  # of float16
 CHANGE = 2.0  # roundings that inputs are changed by, at most
+FLUSHED = 2.0**-126  # smaller numbers are subnormal in float32: many machines flush them to 0
 LARGE = 0.9  # quantile of an array's magnitudes that stands for "the largest values beside it"
 USUAL = 0.995  # quantile of changes that a budget is made of; what lies beyond are outliers
 DECIDED = 0.02  # a change beyond this share of the array's large values is a decision taken otherwise
@@ -120,7 +121,7 @@ def _bound(expected: Array, runs: list[Array], large: float) -> Bound:
         return Bound(np.zeros(expected.shape, np.float32), off > 0)
     magnitude = np.where(np.isfinite(expected), np.abs(expected), 0.0).astype(np.float64)
     masked = off > np.maximum(DECIDED * large, DECIDED * magnitude)
-    limit = SAFETY * (off + ROUNDING * (magnitude + large))
+    limit = SAFETY * (off + ROUNDING * (magnitude + large)) + FLUSHED
     return Bound(np.where(masked, 0.0, limit).astype(np.float32), masked)
 
 

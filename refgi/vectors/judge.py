@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refgi.vectors.bounds import distance
+from refgi.vectors.bounds import FLUSHED, distance
 from refgi.vectors.manifest import ArrayEntry, ArrayVerdict, Tolerance, Verdict
 from refgi.vectors.spec import Array
 
@@ -58,7 +58,8 @@ def judge(
     if tier == "T0" or expected.dtype.kind != "f":
         allowed = np.zeros(expected.shape)
     elif tolerance is not None:
-        allowed = tolerance.relative * (np.where(np.isfinite(expected), np.abs(expected), 0.0) + tolerance.large)
+        size = np.where(np.isfinite(expected), np.abs(expected), 0.0) + tolerance.large
+        allowed = tolerance.relative * size + FLUSHED
     else:
         allowed = np.zeros(expected.shape) if limit is None else limit.astype(np.float64)
     out = off > allowed

@@ -44,7 +44,7 @@ def lobe_fractions(theta, exponents, nodes=400):
     weights = 0.5 * math.pi * w
     edge = math.pi / 2 - theta
     total = np.zeros(len(exponents))
-    for low, high in ((0.0, edge), (edge, math.pi / 2)):
+    for low, high in ((0.0, edge), (abs(edge), math.pi / 2)):  # an axis below the surface: nothing up to -edge
         a = low + (high - low) * 0.5 * (1 - np.cos(turn))
         da = (high - low) * 0.5 * np.sin(turn) * weights
         if high <= low:

@@ -9,7 +9,10 @@ import pytest
 from refgi.frame import Frame
 from refgi.splat import multires
 from refgi.vectors.cases.multires import FULL, FULL_PLANS, QUICK, QUICK_PLANS
+from refgi.splat.multires.subsplats.upsample import black_level, filled_cells
 from refgi.vectors.stages.lights import pixel_lights_of
+from refgi.vectors.stages.multires_light import tent
+from refgi.vectors.stages.multires_list import subsplats_of
 from tests.naive import multires as twin
 from tests.naive import per_light, refinement, upsample
 from tests.vectors.splat_ports import LARGEST_MASK, expect_within, made, masked_shares, stages_of, unseen
@@ -190,3 +193,20 @@ def test_every_likely_bug_is_seen():
 @pytest.mark.parametrize("id", PLANS)
 def test_rounding_decides_few_elements(id):
     assert max(masked_shares(id, "multires").values()) < LARGEST_MASK
+
+
+@pytest.mark.parametrize("id", PLANS)
+def test_the_tent_that_bugs_are_put_into_has_none_of_its_own(id):
+    settings, known, view, top = of(id)
+    if settings.subsplats.upsampling != "tent":
+        return
+    subsplats, light = subsplats_of(known, top), known["multires.irradiance"].astype(np.float64)
+    for level, filled in enumerate(filled_cells(view.covered, top)):
+        layer, here = np.zeros((3, *filled.shape)), subsplats.level == level
+        layer[:, subsplats.row[here], subsplats.column[here]] = light[:, here]
+        coarse = black_level(filled, np.float64) if level == top else (
+            known[f"multires.upsampled.{level + 1}"], known[f"multires.known.{level + 1}"])
+        made_here = tent(layer, subsplats.leaf[level], coarse, filled, every="ams_filter_all" in settings.as_published,
+                         corner="ams_all_corners" not in settings.as_published)
+        expect_within(id, f"multires.upsample.{level}", dict(zip(
+            (f"multires.upsampled.{level}", f"multires.known.{level}"), made_here, strict=True)))

@@ -111,6 +111,26 @@ def sample_texel(center: Array, pattern: Array, i: int, s: int) -> tuple[int, in
     return int(math.floor(center[0, i] + pattern[s, 0])), int(math.floor(center[1, i] + pattern[s, 1]))
 
 
+def fill_texels(center: Array, pattern: Array, rows: int, columns: int, cut: bool = True) -> Array:
+    """Return the texels of discs, (S, n) int32: row * columns + column, -1 outside; not `cut`: the nearest one there.
+
+    `center` (2, n) and `pattern` (S, 2) are those of `gather_discs`, of any type.
+    """
+    texel = np.empty((len(pattern), center.shape[1]), np.int32)
+    _fill_texels(center, pattern, rows, columns, cut, texel)
+    return texel
+
+
+@kernel(parallel=True)
+def _fill_texels(center: Array, pattern: Array, rows: int, columns: int, cut: bool, texel: Array) -> None:
+    for s in prange(texel.shape[0]):
+        for i in range(texel.shape[1]):
+            row, column = sample_texel(center, pattern, i, s)
+            inside = 0 <= row < rows and 0 <= column < columns
+            nearest = min(max(row, 0), rows - 1) * columns + min(max(column, 0), columns - 1)
+            texel[s, i] = nearest if inside or not cut else -1
+
+
 def centers(maps: "Projection", points: Array) -> Array:
     """Return where in the map each point (3, n) gathers: continuous row and column (2, n) on the stacked maps, float64.
 

@@ -44,10 +44,13 @@ def _pairs(id: str, what: str, *, glossy: bool) -> Case:
     lights = {"lights.position": place, "lights.normal": _unit(normal), "lights.flux": flux}
     if glossy:
         lobe = 10.0 ** random.uniform(-4, 2, (3, COUNT))
-        axis = _unit(0.5 * random.normal(size=(3, COUNT)) + toward)
+        axis, above = _unit(0.5 * random.normal(size=(3, COUNT)) + toward), _unit(normal)
+        height = (axis * above).sum(axis=0)
+        axis = np.where((height < 0) & (np.arange(COUNT) < 140), axis - 2 * height * above, axis)  # above the surface
         flux[:, 80:110] = 0.0  # purely glossy
         lobe[:, 110:120] = 0.0  # purely diffuse
         exponent = np.where(np.arange(COUNT) % 8 == 0, 0.0, 10.0 ** random.uniform(0, 3, COUNT))
+        exponent[140:] = np.minimum(exponent[140:], 8.0)  # some axes lie below their surface
         lights |= {"lights.lobe_flux": lobe, "lights.lobe_axis": axis, "lights.lobe_exponent": exponent}
     recipe = Recipe(id, "pairs", what)
     add_pairs(recipe, lights, receiver, _unit(facing))

@@ -108,7 +108,7 @@ def reference_length(receivers: Receivers, lights: "PixelLights", pairs: PairSet
     packed = pack(lights, pairs, np.zeros(lights.flux.shape[1]), np.float64)
     position = sample_for(receivers, lights, least=LEAST_SAMPLED).position.astype(np.float64)
     step = 1 + lights.flux.shape[1] * LEAST_SAMPLED // PAIRS
-    strength = _strengths(packed, position, step)
+    strength = strengths(packed, position, step)
     if strength.size == 0:
         return 1.0
     counted = round(PAPER_OVERDRAW / PAPER_LIGHTS * lights.drawn / step * position.shape[1])
@@ -119,7 +119,7 @@ def reference_length(receivers: Receivers, lights: "PixelLights", pairs: PairSet
     return min(max(length, 1 / LARGEST), LARGEST)
 
 
-def _strengths(packed: Packed, position: Array, step: int) -> Array:
+def strengths(packed: Packed, position: Array, step: int) -> Array:
     """Return B of pairs over the largest I_0, of every so many-th diffuse light and lobe and all places, 1/m^2."""
     diffuse, lobes = all_peaks(packed)
     brightest = max(diffuse.max(), lobes.max(initial=0.0))

@@ -1,0 +1,112 @@
+"""Gathering from reflective shadow maps, from the buffers to the picture."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from refgi.rsm.buffers.light_projection import light_projection
+from refgi.sampling import halton
+from refgi.scene import Scene, SpotLight
+from refgi.settings import of
+from refgi.splat.gather.gather import GatherSettings
+from refgi.vectors.cases.scenes import BULB, DOWN, SPOT, SUN, room
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.spec import Array, Case, Spec
+from refgi.vectors.stages.buffers import VECTOR, add_gbuffer, add_rsm, give_scene
+from refgi.vectors.stages.gather import add_gather, add_interpolation
+
+SQUARE = SpotLight((0.25, 1.5, 0.125), (0.0, -1.0, 0.0), 0.4, math.pi / 4, (3.0, 1.0, 2.0))  # a map of half extent 1
+AWAY = SpotLight((1.5, 1.5, 0.5), (1.0, 0.2, 0.1), 0.2, 0.5, (4.0, 2.0, 1.0))  # into the void
+
+
+class Plan(NamedTuple):
+    """A case in the making."""
+
+    what: str
+    scene: Scene
+    size: tuple[int, int]  # columns and rows of the picture
+    maps: int  # texels along the side of a map
+    choices: dict[str, Any]  # settings by their keys
+
+    @property
+    def settings(self) -> GatherSettings:
+        """Settings of the method; every pixel runs the sum unless they say otherwise."""
+        return of(GatherSettings, **{"interpolation": None, **self.choices})
+
+
+def gathering(id: str, plan: Plan) -> Case:  # noqa: A002
+    """Return `gather` as planned: buffers, pattern, places, texels, sums, interpolation."""
+    recipe, settings = Recipe(id, "gather", plan.what, id), plan.settings
+    give_scene(recipe, plan.scene)
+    add_gbuffer(recipe, plan.scene, *plan.size)
+    for index in range(len(plan.scene.lights)):
+        add_rsm(recipe, plan.scene, index, plan.maps)
+    add_gather(recipe, plan.scene, plan.maps, settings.disc, halton(settings.disc.samples, start=1))
+    if settings.interpolation is not None:
+        add_interpolation(recipe, settings.interpolation)
+    return recipe.case()
+
+
+def at_borders() -> Case:
+    """Return gathering at points that are given: on a map's border, outside, behind the lamp, at it, on a texel."""
+    scene, maps, name = room(SQUARE, matte=True), 12, "gather-border"
+    recipe = Recipe(name, "gather", "points on the border of a map, beyond it, behind the lamp, at it, on a texel's "
+                    "surface; a sample in the middle of the disc", name)
+    give_scene(recipe, scene)
+    add_rsm(recipe, scene, 0, maps)
+    view = light_projection(scene.lights[0], scene.geometry, maps)
+    places = [(a, b, z) for z in (1.0, 0.5) for a in (-1.0, -0.5, 0.0, 1.0) for b in (-1.0, 0.0, 0.75, 1.0)]  # on the map
+    places += [(1.5, 0.25, 1.0), (-3.0, 1.5, 0.5), (0.0, -2.0, 1.0), (8.0, 8.0, 0.25)]  # beyond it
+    local = [(a * z, b * z, z) for a, b, z in places]
+    local += [(0.5, 0.25, -0.25), (-0.25, 0.5, -0.5), (0.0, 0.0, -0.25), (0.5, 0.0, 0.0), (0.0, 0.0, 0.0)]  # behind, at it
+    position = view.origin[0] + np.asarray(local) @ view.frame[0]
+    texels = recipe.expected()["rsm0.position"][:, 3:9:5, 2:11:4].reshape(3, -1)
+    position = np.concatenate([position.T, texels], axis=1)
+    normal = np.tile([[0.0], [1.0], [0.0]], position.shape[1])
+    normal[:, len(places) : len(local)] *= -1
+    normal[:, 1 : len(places) : 3] = [[0.8], [0.0], [0.6]]
+    _give_points(recipe, position, normal)
+    points = np.concatenate([[[0.0, 0.0], [0.0, 0.5]], halton(22, start=1)])
+    add_gather(recipe, scene, maps, of(GatherSettings, radius=0.4).disc, points, decided=True)
+    return recipe.case()
+
+
+def _give_points(recipe: Recipe, position: Array, normal: Array) -> None:
+    axes = "xyz, row, column"
+    recipe.give("gbuffer.position", position[:, None], Spec(axes, "m", "points to light", "world"))
+    recipe.give("gbuffer.normal", normal[:, None], Spec(axes, VECTOR, "their normals", "world"))
+    recipe.give("gbuffer.triangle_id", np.zeros((1, position.shape[1]), np.int32),
+                Spec("row, column", "1", "0: all are surfaces", tier="T0"))
+
+
+QUICK_PLANS: dict[str, Callable[[], Plan]] = {
+    "gather-spot": lambda: Plan("one spot, discs of 0.3 map widths, no lobes", room(SPOT, matte=True), (24, 18), 13,
+                                {"samples": 24, "radius": 0.3}),
+    "gather-three-lamps": lambda: Plan(
+        "spot, cube and directional maps; of glossy surfaces the diffuse part alone", room(SPOT, BULB, SUN), (17, 13), 11,
+        {"samples": 16, "radius": 0.5}),
+    "gather-behind": lambda: Plan(
+        "receivers behind the lamp, texels moved back by 2 cm, xi1^2 as weight, discs of more than the map",
+        room(DOWN, matte=True), (19, 23), 12, {"samples": 20, "radius": 1.5, "disc.offset": 0.02,
+                                               "disc.as_published": frozenset({"rsm_weight_squared"})}),
+    "gather-interpolated": lambda: Plan(
+        "interpolated between 9 x 9 coarse pixels where surfaces are similar", room(SPOT, DOWN, smooth=True), (31, 25), 12,
+        {"samples": 12, "radius": 0.4, "interpolation": "coarse", "interpolation.grid": 9, "interpolation.reach": 0.2}),
+}
+FULL_PLANS: dict[str, Callable[[], Plan]] = {
+    "gather-no-flux": lambda: Plan("a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True),
+                                   (12, 9), 7, {"samples": 8}),
+}
+
+
+def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
+    def made(id: str) -> Case:  # noqa: A002
+        return gathering(id, plans[id]())
+
+    return {id: partial(made, id) for id in plans}  # noqa: A001
+
+
+QUICK, FULL = {**_cases(QUICK_PLANS), "gather-border": at_borders}, _cases(FULL_PLANS)

@@ -1,0 +1,62 @@
+"""Pixel lights with visibility, from the buffers to the sum."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+from refgi.draws import PIXEL_LIGHTS, draws
+from refgi.scene import Scene
+from refgi.vectors.cases.gather import AWAY
+from refgi.vectors.cases.scenes import DOWN, SPOT, SUN, room
+from refgi.vectors.cases.sii import add_lit
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.spec import Case
+from refgi.vectors.stages.vpl import add_vpl
+
+
+class Plan(NamedTuple):
+    """A case in the making."""
+
+    what: str
+    scene: Scene
+    size: tuple[int, int]  # columns and rows of the picture
+    maps: int  # texels along the side of a map
+    count: int  # lights of each map, by Halton points
+
+
+def shadowed(id: str, plan: Plan) -> Case:  # noqa: A002
+    """Return `vpl` as planned: buffers, lights, visibility, sum."""
+    recipe = Recipe(id, "vpl", plan.what, id)
+    lamps = len(plan.scene.lights)
+    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.count,) * lamps, shifts=default_shifts(lamps))
+    add_vpl(recipe, plan.scene)
+    return recipe.case()
+
+
+def default_shifts(lamps: int) -> tuple[tuple[float, float], ...]:
+    """Return the shifts of the Halton points of each map that the methods take by default: none for the first map."""
+    drawn = [draws(0, PIXEL_LIGHTS, 2, index).tolist() for index in range(1, lamps)]
+    return ((0.0, 0.0), *((u, v) for u, v in drawn))
+
+
+QUICK_PLANS: dict[str, Callable[[], Plan]] = {
+    "vpl-spot": lambda: Plan("one spot, no lobes; shadows of a shelf and a lid", room(SPOT, matte=True), (24, 18), 13, 32),
+    "vpl-smooth": lambda: Plan("interpolated normals on a ball: pixels that face lights below their triangle; lobes",
+                               room(SPOT, smooth=True), (26, 20), 13, 24),
+    "vpl-sun": lambda: Plan("spot and directional lamp, purely glossy surfaces", room(DOWN, SUN), (19, 13), 11, 14),
+    "vpl-no-flux": lambda: Plan("a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True), (12, 9),
+                                7, 5),
+}
+FULL_PLANS: dict[str, Callable[[], Plan]] = {
+    "vpl-large": lambda: Plan("48 x 36 pixels, 2 x 64 lights", room(SPOT, DOWN), (48, 36), 23, 64),
+}
+
+
+def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
+    def made(id: str) -> Case:  # noqa: A002
+        return shadowed(id, plans[id]())
+
+    return {id: partial(made, id) for id in plans}  # noqa: A001
+
+
+QUICK, FULL = _cases(QUICK_PLANS), _cases(FULL_PLANS)

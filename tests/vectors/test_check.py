@@ -1,0 +1,164 @@
+"""The checker: verdicts, the first wrong stage, tiers, chains, exit codes, damaged files."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from refgi.errors import InputError
+from refgi.vectors.check import ALL_WITHIN, NOT_COMPARABLE, OUT, DamagedError, Kit, stage_of_array
+from tests.vectors.port import Port
+
+
+@pytest.fixture
+def port(kit, tmp_path):
+    return Port(kit, "sii-warp-a", tmp_path)
+
+
+def test_what_the_kit_expects_is_exact(port):
+    result = port.check()
+    assert (result.verdict, result.exit_code, result.first) == ("exact", ALL_WITHIN, None)
+    assert {one.verdict for one in result.stages} == {"exact"}
+
+
+def test_rounding_is_within(port):
+    rng = np.random.default_rng(0)
+    for name, array in port.arrays.items():
+        if array.dtype.kind == "f":
+            port.write(name, array * (1 + 2.0**-24 * rng.uniform(-1, 1, array.shape)))  # float64
+    result = port.check()
+    assert (result.verdict, result.exit_code) == ("within", ALL_WITHIN)
+
+
+def test_the_first_wrong_stage_is_named_with_its_worst_element(port):
+    flux, total = port.arrays["rsm0.flux"].copy(), port.arrays["sum.irradiance"]
+    flux[1, 7, 4] *= 1.5
+    port.write("rsm0.flux", flux)
+    port.write("sum.irradiance", 2 * total)
+    result = port.check()
+    assert result.exit_code == OUT
+    assert result.first == ("sii-warp-a", "rsm0.flux")
+    (wrong,) = [one for one in port.first().arrays if one.verdict == "out"]
+    assert (wrong.name, wrong.element, wrong.outside) == ("rsm0.flux", (1, 7, 4), 1)
+    assert wrong.expected == port.arrays["rsm0.flux"][1, 7, 4]
+    assert wrong.got == flux[1, 7, 4]
+
+
+def test_an_id_that_differs_is_out_and_one_on_an_edge_is_not(kit, tmp_path):
+    port = Port(kit, "sii-three-lamps", tmp_path)
+    entry = port.case.arrays["rsm1.triangle_id"]
+    masked = kit.extra(port.case, entry.masked)
+    ids = port.arrays["rsm1.triangle_id"]
+    port.write("rsm1.triangle_id", np.where(masked, ids + 1, ids))
+    (verdict,) = [one for one in port.check().stages if one.stage == "rsm1.ids"]
+    assert (verdict.verdict, verdict.arrays[0].masked) == ("within", masked.sum())
+    assert masked.sum() == entry.masked_count > 0
+    port.write("rsm1.triangle_id", np.where(masked, ids, ids + 1))
+    assert port.first().stage == "rsm1.ids"
+
+
+@pytest.mark.parametrize(("array", "change", "said"), [
+    ("rsm0.flux", lambda a: np.moveaxis(a, 0, -1), "the axes are in another order"),
+    ("rsm0.flux", lambda a: a.ravel(), "as many elements, in another shape"),
+    ("rsm0.flux", lambda a: a[:, :-1], "1 fewer along row"),
+    ("rsm0.flux", lambda a: a[0], "expected shape (3, 16, 16)"),
+    ("rsm0.flux", lambda a: a.astype(np.int32), "expected floats (<f4), got int32"),
+    ("rsm0.texel", lambda a: a.astype(np.float32), "expected whole numbers (<i4), got float32"),
+    ("rsm0.flux", lambda a: a.astype(np.complex64), "expected floats (<f4), got complex64"),
+])
+def test_what_cannot_be_compared_is_said_in_plain_words(port, array, change, said):
+    port.write(array, change(port.arrays[array]))
+    result, first = port.check(), port.first()
+    assert result.exit_code == NOT_COMPARABLE
+    (wrong,) = [one for one in first.arrays if one.verdict == "invalid"]
+    assert (wrong.name, first.verdict) == (array, "invalid")
+    assert said in wrong.said
+
+
+def test_numbers_that_are_none_are_out(port):
+    for value in (np.nan, np.inf):
+        flux = port.arrays["rsm0.flux"].copy()
+        flux[0, 5, 5] = value
+        port.write("rsm0.flux", flux)
+        assert port.check().exit_code == OUT
+        assert "1 elements are" in port.first().causes[0].cause
+
+
+def test_stages_that_did_not_run_do_not_count_unless_asked_for(port):
+    for name in port.arrays:
+        if not name.startswith("sum"):
+            port.remove(name)
+    assert port.check().exit_code == ALL_WITHIN
+    assert port.check(stages=("rsm0",)).exit_code == NOT_COMPARABLE
+    port.remove("sum.irradiance")
+    assert port.check().exit_code == NOT_COMPARABLE
+
+
+def test_a_missing_array_of_a_stage_is_not_comparable(port):
+    port.remove("lights.normal")
+    result = port.check()
+    assert (result.exit_code, result.first) == (NOT_COMPARABLE, ("sii-warp-a", "lights"))
+
+
+def test_half_floats_pass_the_second_tier_alone(port):
+    for name, array in port.arrays.items():
+        if array.dtype.kind == "f":
+            port.write(name, array.astype(np.float16))
+    assert port.check().exit_code == OUT
+    assert port.check(tiers={"": "T2"}).exit_code == ALL_WITHIN
+    assert port.check(tiers={"rsm": "T2"}).first[1] == "gbuffer.surface"
+
+
+def test_the_strictest_tier_wants_equal_floats(port):
+    port.write("rsm0.flux", np.nextafter(port.arrays["rsm0.flux"], np.float32(1)))
+    assert port.check().exit_code == ALL_WITHIN
+    assert port.check(tiers={"": "T1", "rsm0": "T0"}).first[1] == "rsm0.flux"
+
+
+def test_a_chain_says_what_was_made_from_wrong_inputs(port):
+    port.write("rsm0.flux", 2 * port.arrays["rsm0.flux"])
+    port.write("rsm0.importance", 2 * port.arrays["rsm0.importance"])
+    port.write("lights.flux", 2 * port.arrays["lights.flux"])
+    verdicts = {one.stage: one for one in port.check(chained=True).stages}
+    assert (verdicts["rsm0.surface"].upstream, verdicts["rsm0.flux"].upstream) == ("clean", "clean")
+    assert verdicts["rsm0.flux"].verdict == verdicts["rsm0.importance"].verdict == "out"
+    for stage in ("rsm0.importance", "rsm0.warp", "rsm0.texels", "lights", "sum"):
+        assert verdicts[stage].upstream == "dirty", stage
+    assert verdicts["rsm1.flux"].upstream == "clean"
+    assert port.check(chained=True).first == ("sii-warp-a", "rsm0.flux")
+
+
+def test_damaged_kits_and_outputs_are_told(kit, port, tmp_path):
+    copy = tmp_path / "kit"
+    shutil.copytree(kit.folder, copy)
+    file = copy / "cases" / "sii-warp-a" / "out" / "rsm0.flux.npy"
+    content = bytearray(file.read_bytes())
+    content[-3] ^= 1
+    file.write_bytes(bytes(content))
+    port.kit = Kit(copy)
+    with pytest.raises(DamagedError, match=r"rsm0\.flux\.npy: expected the bytes"):
+        port.check()
+    manifest = copy / "cases" / "sii-warp-a" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace("W/m^2", "W"))
+    with pytest.raises(DamagedError, match="manifest"):
+        port.check()
+    (copy / "kit.json").write_text(json.dumps({"kit": "quick", "strange": 1}))
+    with pytest.raises(DamagedError, match="strange"):
+        Kit(copy)
+    port.kit = kit
+    (port.folder / "sii-warp-a" / "rsm0.flux.npy").write_bytes(b"no array")
+    with pytest.raises(DamagedError, match=r"rsm0\.flux\.npy: expected an \.npy array"):
+        port.check()
+
+
+def test_unknown_names_are_refused(kit, port, tmp_path):
+    with pytest.raises(InputError, match="--stage"):
+        port.check(stages=("rms",))
+    port.folder = tmp_path / "nowhere"
+    with pytest.raises(InputError, match="expected a folder"):
+        port.check()
+    for case, array, tier in (("sii-warp-c", "rsm0.flux", "T1"), ("sii-warp-a", "rsm0.fluxx", "T1"),
+                              ("sii-warp-a", "rsm0.flux", "T9")):
+        with pytest.raises(InputError, match="expected one of"):
+            stage_of_array(kit, case, array, port.arrays["rsm0.flux"], tier)

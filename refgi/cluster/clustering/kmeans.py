@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import get_num_threads
 
-from refgi.cluster.clustering.rounds import LINES, TILE, Metric, Rounds, iterate
+from refgi.cluster.clustering.rounds import LINES, TILE, Metric, Rounds, iterate, move_to_means, sort_lights
 from refgi.cluster.settings import Distance
 from refgi.errors import expect
 from refgi.jit import threads
@@ -84,13 +84,11 @@ def cluster(
     >>> cluster(walls, up, 2, diagonal=1.0).of.tolist()
     [0, 0, 1, 1]
     """
-    lights = np.vstack([_finite(position, "position"), _finite(normal, "normal")])
+    lights = _lights(position, normal)
     total = lights.shape[1]
     expect(count >= 1, "count", "1 or more clusters", count)
     expect(rounds >= 1, "rounds", "1 or more", rounds)
     expect(0 < diagonal < math.inf or total == 0, "diagonal", "a length above 0 m", diagonal)
-    length = np.sqrt((lights[3:] ** 2).sum(axis=0))
-    lights[3:] /= np.where(length > 0, length, 1)
     if start is not None:
         expect(start.center.shape[1] == count, "start", f"{count} clusters", start.center.shape[1])
         areas = np.vstack([start.center, start.normal]).astype(np.float64)
@@ -98,10 +96,42 @@ def cluster(
         if count > total:
             skip("cluster.kmeans", f"{count - total} of {count} area lights: there are {total} pixel lights")
         count = min(count, total)
-        areas = np.ascontiguousarray(lights[:, np.arange(count) * total // max(count, 1)])
+        areas = np.ascontiguousarray(lights[:, first_lights(total, count)])
         if count == total:
             return _each_its_own(areas)
     return _run(lights, areas, distance, weights, diagonal, rounds)
+
+
+def first_lights(total: int, count: int) -> Array:
+    """Return the light that each of `count` clusters of `total` lights begins at: floor(k N / M)."""
+    return np.arange(count) * total // max(count, 1)
+
+
+def assigned(
+    position: Array, normal: Array, center: Array, axis: Array, distance: Distance, weights: tuple[float, float],
+    diagonal: float,
+) -> tuple[Array, Array]:
+    """Return C(i) of each light, and its distance, for clusters at centres and normals (3, M): one step of `cluster`."""
+    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64), 1)
+    iterate(state, _metric(distance, weights, diagonal, _span(state)), 0, np.zeros(1))
+    return state.of, state.own
+
+
+def moved(position: Array, normal: Array, of: Array, center: Array, axis: Array) -> tuple[Array, Array]:
+    """Return centres and normals of clusters as the means of their lights, C(i) being `of`: one step of `cluster`."""
+    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64), 1)
+    state.of[:] = of
+    sort_lights(state)
+    move_to_means(state)
+    return state.areas[:3], state.areas[3:]
+
+
+def _lights(position: Array, normal: Array) -> Array:
+    """Return positions and unit normals, (6, N)."""
+    lights = np.vstack([_finite(position, "position"), _finite(normal, "normal")])
+    length = np.sqrt((lights[3:] ** 2).sum(axis=0))
+    lights[3:] /= np.where(length > 0, length, 1)
+    return lights
 
 
 def _finite(values: Array, name: str) -> Array:
@@ -120,17 +150,25 @@ def _each_its_own(lights: Array) -> Clustering:
 def _run(
     lights: Array, areas: Array, distance: Distance, weights: tuple[float, float], diagonal: float, rounds: int
 ) -> Clustering:
-    total, count = lights.shape[1], areas.shape[1]
-    metric = _metric(distance, weights, diagonal, np.ptp(np.hstack([lights, areas])[:3], axis=1).sum())
-    with threads(1 if total * count <= SMALL else None):
-        workers, most = get_num_threads(), count + total // TILE
-        state = Rounds(
-            lights, areas, np.zeros(total, np.int32), np.zeros(count, np.int64), np.zeros(total),
-            np.empty(total, np.int64), np.empty((3, most), np.int64), np.empty(most, np.int64),
-            np.empty((workers, LINES, TILE)), np.empty((workers, count)), np.empty((workers, 2, TILE), np.int64))
+    with threads(1 if lights.shape[1] * areas.shape[1] <= SMALL else None):
+        state = _state(lights, areas, get_num_threads())
         objective = np.zeros(rounds + 1)
-        done = iterate(state, metric, rounds, objective)
+        done = iterate(state, _metric(distance, weights, diagonal, _span(state)), rounds, objective)
     return Clustering(areas[:3].copy(), areas[3:].copy(), state.members, state.of, done, objective[: done + 1])
+
+
+def _state(lights: Array, areas: Array, workers: int) -> Rounds:
+    total, count = lights.shape[1], areas.shape[1]
+    most = count + total // TILE
+    return Rounds(
+        lights, areas, np.zeros(total, np.int32), np.zeros(count, np.int64), np.zeros(total), np.empty(total, np.int64),
+        np.empty((3, most), np.int64), np.empty(most, np.int64), np.empty((workers, LINES, TILE)),
+        np.empty((workers, count)), np.empty((workers, 2, TILE), np.int64))
+
+
+def _span(state: Rounds) -> float:
+    """Return a length, m, that no two of all lights and area lights are farther apart than."""
+    return float(np.ptp(np.hstack([state.lights, state.areas])[:3], axis=1).sum())
 
 
 def _metric(distance: Distance, weights: tuple[float, float], diagonal: float, span: float) -> Metric:

@@ -56,15 +56,15 @@ def iterate(state: Rounds, metric: Metric, rounds: int, objective: Array) -> int
     """
     done = 0
     while True:
-        tiles = _sort(state)
+        tiles = sort_lights(state)
         if done > 0:
-            _move_to_means(state)
+            move_to_means(state)
         _assign_all(state, metric, tiles)
         objective[done] = _total(state.own)
         if done == rounds or (done > 0 and _total(state.changed[:tiles]) == 0):
             break
         done += 1
-    _sort(state)
+    sort_lights(state)
     return done
 
 
@@ -75,7 +75,7 @@ def _assign_all(state: Rounds, metric: Metric, tiles: int) -> None:
 
 
 @kernel
-def _sort(state: Rounds) -> int:
+def sort_lights(state: Rounds) -> int:
     """Bring the lights of each area light together and split them into tiles; return how many tiles there are."""
     members, tiles = state.members, state.tiles
     members[:] = 0
@@ -97,7 +97,7 @@ def _sort(state: Rounds) -> int:
 
 
 @kernel
-def _move_to_means(state: Rounds) -> None:
+def move_to_means(state: Rounds) -> None:
     """Move each area light to the mean of its lights, summed in their order; without lights it stays.
 
     Sums are taken from the first light, so that what all have in common, a wall's coordinate, is the mean's too.

@@ -55,7 +55,7 @@ def build_mip(depth: Array, scale: DepthScale, mip: Mip) -> None:
     side = (len(depth) + 1) // 2
     for level in range(1, len(mip.first)):
         if level > 1:
-            _halve(mip.basis, mip.basis_z, mip.mean_depth, mip.first[level - 1], mip.first[level], side)
+            halve(mip.basis, mip.basis_z, mip.mean_depth, mip.first[level - 1], mip.first[level], side)
             side = (side + 1) // 2
         if mip.quantised:
             _round(mip, mip.first[level], side * side)
@@ -118,7 +118,7 @@ def _means(depths: Array, sines: Array, cosines: Array, lanes: int, means: Array
 
 
 @kernel
-def _halve(basis: Array, basis_z: Array, mean_depth: Array, source: int, target: int, side: int) -> None:
+def halve(basis: Array, basis_z: Array, mean_depth: Array, source: int, target: int, side: int) -> None:
     """Fill a level from the one before, of `side` texels a side."""
     half, width = (side + 1) // 2, basis.shape[1]
     quarter = basis.dtype.type(0.25)

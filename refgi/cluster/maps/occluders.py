@@ -135,7 +135,12 @@ def blockers(geometry: Geometry, alone: bool, ends: Ends | None = None) -> Block
     Blockers
         The triangles, in mesh order.
     """
-    selected = geometry.faces[occluders(geometry, ends, not alone)]
+    return selected_blockers(geometry, occluders(geometry, ends, not alone))
+
+
+def selected_blockers(geometry: Geometry, chosen: Array) -> Blockers:
+    """Return those triangles that are `chosen` (m,), bool."""
+    selected = geometry.faces[chosen]
     used = _used(len(geometry.vertices), selected)
     vertices = np.ascontiguousarray(geometry.vertices[used], np.float64)
     faces = np.ascontiguousarray((np.cumsum(used) - 1)[selected], np.int32)

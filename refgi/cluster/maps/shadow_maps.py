@@ -153,31 +153,36 @@ def shadow_maps(
     extent = Extent(*geometry.bounds) if ends is None else ends.extent
     drawn, both = blockers(geometry, settings.occluders_alone, ends), settings.behind == "dual_paraboloid"
     used = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
-    center = np.ascontiguousarray((areas.center + LIFT * extent.largest * areas.normal)[:, used].T)
+    center = np.ascontiguousarray(map_centers(areas.center, areas.normal, extent)[used])
     frame, radius = areas.frame[used], settings.near_share * areas.radius[used]
     rays = tracer if len(drawn.faces) == len(geometry.faces) else None
-    depth, near, left_out = _draw(drawn, center, frame, radius, settings, dtype, rays)
+    depth, near, left_out = draw_maps(drawn, center, frame, radius, settings, dtype, rays)
     behind = near_behind = None
     needed = np.isfinite(near)
     if both:
-        behind, near_behind, more = _draw(drawn, center, BACKWARD @ frame, radius, settings, dtype, rays)
+        behind, near_behind, more = draw_maps(drawn, center, BACKWARD @ frame, radius, settings, dtype, rays)
         needed, left_out = needed | np.isfinite(near_behind), left_out + more
     map_of = np.full(len(areas.members), -1, np.int32)
     map_of[used[needed]] = np.arange(needed.sum())
     if (map_of < 0).any():
         skip("cluster.depth_maps", f"nothing occludes {(map_of < 0).sum()} of {len(map_of)} area lights")
-    maps = ShadowMaps(depth, map_of, center, frame, near, _farthest(depth), _farthest_corner(extent, center), behind,
-                      near_behind, None if behind is None else _farthest(behind), int(left_out.sum()))
+    maps = ShadowMaps(depth, map_of, center, frame, near, farthest(depth), farthest_corner(extent, center), behind,
+                      near_behind, None if behind is None else farthest(behind), int(left_out.sum()))
     return maps if needed.all() else _without(maps, needed)
 
 
-def _farthest_corner(extent: Extent, center: Array) -> Array:
+def map_centers(center: Array, normal: Array, extent: Extent) -> Array:
+    """Return where maps look from, (M, 3), m: centres (3, M), lifted a little off their surface along normals."""
+    return np.asarray((center + LIFT * extent.largest * normal).T)
+
+
+def farthest_corner(extent: Extent, center: Array) -> Array:
     """Return distances to the farthest corner of the scene's extent, m."""
     low, high = extent
     return np.asarray(np.linalg.norm(np.maximum(np.abs(low - center), np.abs(high - center)), axis=1))
 
 
-def _farthest(depth: Array) -> Array:
+def farthest(depth: Array) -> Array:
     """Return the largest finite distance on each map, 0 where there is none, m."""
     columns = np.empty((depth.shape[0], depth.shape[2]), depth.dtype)
     _farthest_in_columns(depth, columns)
@@ -202,7 +207,7 @@ def _without(maps: ShadowMaps, needed: Array) -> ShadowMaps:
     return maps._replace(**shown)
 
 
-def _draw(
+def draw_maps(
     drawn: Blockers, center: Array, frame: Array, radius: Array, settings: ShadowMapSettings, dtype: npt.DTypeLike,
     tracer: "Tracer | None",
 ) -> tuple[Array, Array, Array]:

@@ -84,27 +84,51 @@ def compare_texels(
     """Compare each pending receiver with every texel of its search disc, then of its penumbra's disc.
 
     Fills `visible` and, where there are blockers, row DEPTH with z_avg (m), and S to RADIUS with the penumbra's disc.
+    The others leave `pending`.
     """
-    constants, sizing, test, depth = shadow.constants, shadow.sizing, shadow.test, shadow.depth
-    real = rows.dtype.type
-    one, near = real(1.0), constants[NEAREST]
+    find_blockers(shadow, facing, size, pending, rows)
+    filter_texels(shadow, facing, size, pending, visible, rows)
+
+
+@kernel
+def find_blockers(shadow: PcssShadow, facing: Array, size: int, pending: Array, rows: Array) -> None:
+    """Find the blockers in each pending receiver's search disc; those without leave `pending`.
+
+    Fills row DEPTH with z_avg (m), and S to RADIUS with the penumbra's disc.
+    """
+    constants, sizing, near = shadow.constants, shadow.sizing, shadow.constants[NEAREST]
     for i in range(size):
         if not pending[i]:
             continue
         x, y, z, d, extent = rows[X, i], rows[Y, i], rows[Z, i], rows[D, i], rows[EXTENT, i]
-        a, b, c = to_map_frame(constants, facing, i)
-        count, blocked, total = count_blockers(depth, test, (rows[S, i], rows[T, i], rows[RADIUS, i]), (x, y, z, d),
-                                               (a, b, c), extent, True)  # fmt: skip
+        _, blocked, total = count_blockers(
+            shadow.depth, shadow.test, (rows[S, i], rows[T, i], rows[RADIUS, i]), (x, y, z, d),
+            to_map_frame(constants, facing, i), extent, True)
+        pending[i] = blocked > 0
         if blocked == 0:
             continue
-        mean = min(max(total / real(blocked), near), d)  # Sec. 4.1: z_avg
+        mean = min(max(total / rows.dtype.type(blocked), near), d)  # Sec. 4.1: z_avg
         rows[DEPTH, i] = mean
         # Sec. 4.2: alpha = arctan(p cos(beta) / d)
         tangent = published_tangent(extent, d, mean) if sizing.alpha else cone_tangent(extent, d, mean)
         where = published_square(x, y, z, d, tangent) if sizing.alpha_over_pi else disc(x, y, z, d, tangent)
         rows[S, i], rows[T, i], rows[RADIUS, i] = where
-        count, blocked, total = count_blockers(depth, test, where, (x, y, z, d), (a, b, c), extent, False)
-        visible[i] = one - real(blocked) / real(max(count, 1))
+
+
+@kernel
+def filter_texels(
+    shadow: PcssShadow, facing: Array, size: int, pending: Array, visible: Array, rows: Array
+) -> None:
+    """Fill `visible` with the share of each pending receiver's disc, rows S to RADIUS, that does not hide it."""
+    real = rows.dtype.type
+    for i in range(size):
+        if not pending[i]:
+            continue
+        count, blocked, _ = count_blockers(
+            shadow.depth, shadow.test, (rows[S, i], rows[T, i], rows[RADIUS, i]),
+            (rows[X, i], rows[Y, i], rows[Z, i], rows[D, i]), to_map_frame(shadow.constants, facing, i),
+            rows[EXTENT, i], False)
+        visible[i] = real(1.0) - real(blocked) / real(max(count, 1))
 
 
 @kernel

@@ -61,8 +61,12 @@ def visible_extent(buffer: GBuffer) -> Extent:
     Extent
         Empty where it sees nothing.
     """
-    rows = np.empty((6, buffer.height))
-    position, covered = buffer.resolve("position", "covered")
+    return bounds_of(*buffer.resolve("position", "covered"))
+
+
+def bounds_of(position: Array, covered: Array) -> Extent:
+    """Return the box of those positions (3, h, w), m, that are `covered` (h, w)."""
+    rows = np.empty((6, len(covered)))
     _row_bounds(position, covered, rows)
     return Extent(rows[:3].min(axis=1), rows[3:].max(axis=1))
 

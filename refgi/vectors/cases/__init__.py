@@ -6,7 +6,7 @@ from importlib import import_module
 from refgi.errors import InputError
 from refgi.vectors.spec import Case
 
-MODULES = ("pairs", "sii", "gather", "multires", "hssil")  # each with QUICK and FULL: functions that make a case, by its id
+MODULES = ("pairs", "sii", "gather", "vpl", "multires", "hssil", "val")  # each with QUICK and FULL: functions that make a case, by its id
 
 
 def kit_cases(kit: str) -> dict[str, Callable[[], Case]]:

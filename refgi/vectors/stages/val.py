@@ -1,0 +1,229 @@
+"""Stages of clustered visibility as a whole: area lights, their visibility, interleaved sums, blur (VAL Sec. 4 to 6)."""
+
+from typing import Any
+
+import numpy as np
+
+from refgi.cluster.lighting.blur import blur
+from refgi.cluster.lighting.interleave import (
+    add_members,
+    assigned_subsets,
+    gather_pixels,
+    member_lights,
+    scatter_pixels,
+    subsets,
+)
+from refgi.cluster.settings import BoxBlur, Csm, GeometryBlur, Pcf, Pcss, ValSettings
+from refgi.pairs.irradiance import Receivers, checked
+from refgi.rsm import facing_normals
+from refgi.scene import Scene
+from refgi.settings import replaced
+from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.stages.buffers import VECTOR, geometry_of
+from refgi.vectors.stages.lights import light_names, pixel_lights_of
+from refgi.vectors.stages.pairs import EQ2, RECEIVERS
+from refgi.vectors.stages.val_basis import add_basis
+from refgi.vectors.stages.val_clusters import add_areas, add_extents, add_kmeans, clusters_of
+from refgi.vectors.stages.val_csm import add_csm
+from refgi.vectors.stages.val_maps import add_maps
+from refgi.vectors.stages.val_pcss import add_binary, add_pcss
+from refgi.vectors.stages.val_search import FACING, add_search
+
+BLUR = "VAL Sec. 6, E-VAL-13; docs/methods/val"
+
+
+def add_val(recipe: Recipe, scene: Scene, settings: ValSettings) -> None:
+    """Add all stages from pixel lights on to the irradiance."""
+    add_extents(recipe, len(scene.lights))
+    add_kmeans(recipe, clusters_of(settings), recipe.expected()["lights.flux"].shape[1])
+    add_areas(recipe, settings.area)
+    add_maps(recipe, settings)
+    if isinstance(settings.visibility, Csm):
+        add_basis(recipe, settings.visibility)
+    _add_facing(recipe, scene)
+    add_visibility(recipe, settings)
+    add_lighting(recipe, settings)
+
+
+def _add_facing(recipe: Recipe, scene: Scene) -> None:
+    smooth = scene.geometry.vertex_normals is not None
+    source = ("scene.vertices", "scene.faces", "scene.material_of_face", "scene.vertex_normals") if smooth else ()
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        normal = np.ascontiguousarray(arrays["gbuffer.normal"], real)
+        if not smooth:
+            return {FACING: normal}
+        return {FACING: facing_normals(geometry_of(arrays, scene), np.asarray(arrays["gbuffer.triangle_id"]), normal)}
+
+    recipe.add("facing", "normals of the triangles that pixels see, on the side of the interpolated ones", run,
+               ("gbuffer.normal", "gbuffer.triangle_id", *source),
+               {FACING: Spec("xyz, row, column", VECTOR, "plane of what a pixel sees; 0 without surface", "world")},
+               paper="A.6 P4: receiver's plane", decoys=(
+                   Decoy("they point away from the viewer", writing(run, **{"gbuffer__facing": lambda a: -a}), ""),
+                   *((Decoy("interpolated normals", lambda a, r: {FACING: a["gbuffer.normal"]}, "d_plane"),)  # noqa: ARG005
+                     if smooth else ())))
+
+
+def add_visibility(recipe: Recipe, settings: ValSettings) -> None:
+    """Add V of each area light at each pixel."""
+    kind = settings.visibility
+    if isinstance(kind, Pcf):
+        add_binary(recipe, "visibility", kind.texels)
+        return
+    if (recipe.expected()["areas.delta"] == 0).any():
+        add_binary(recipe, "hard", 1)
+    add_search(recipe, settings)
+    if isinstance(kind, Csm):
+        add_csm(recipe, settings, kind)
+    else:
+        assert isinstance(kind, Pcss)
+        add_pcss(recipe, settings, kind)
+
+
+def add_lighting(recipe: Recipe, settings: ValSettings) -> None:
+    """Add the light of each area light's members, the sum under their visibility, and the blur."""
+    block = settings.interleaving.block or 1
+    if block > 1:
+        _add_subsets(recipe, settings, block)
+    _add_parts(recipe, settings, block)
+
+    def run(arrays: Arrays, real: Any, shadowed: bool = True) -> Arrays:
+        made = np.zeros(arrays["parts.irradiance"].shape[1:], real)
+        for part, share in zip(arrays["parts.irradiance"], arrays["visibility.share"], strict=True):
+            made += part * (share if shadowed else 1)
+        return {"sum.irradiance": made}
+
+    recipe.add("sum", "E = sum V_m E_m over all area lights", run, ("parts.irradiance", "visibility.share"),
+               {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance" + (
+                   ", not blurred" if block > 1 else ""), "linear RGB")}, paper="VAL Sec. 4", decoys=(
+                   Decoy("nothing is shadowed", lambda a, r: run(a, r, shadowed=False), "VAL Sec. 4"),
+                   Decoy("V of the next area light", reading(run, visibility__share=lambda a: np.roll(a, 1, axis=0)), ""),
+                   Decoy("shadows are squared", reading(run, visibility__share=np.square), ""),
+                   Decoy("the mean over area lights", writing(run, sum__irradiance=lambda a: a / 2), "a sum")))
+    if block > 1 and settings.blur is not None:
+        _add_blur(recipe, settings.blur, block)
+
+
+def _add_subsets(recipe: Recipe, settings: ValSettings, block: int) -> None:
+    kind = settings.interleaving.assignment
+
+    def run(arrays: Arrays, real: Any, how: Any = kind, side: int = block) -> Arrays:  # noqa: ARG001
+        return {"interleaving.subset": assigned_subsets(np.asarray(arrays["clusters.of"]), side, how)}
+
+    other = "cluster" if kind == "index" else "index"
+    recipe.facts["interleaving"] = {"n": block, "assignment": kind,
+                                    "subset of a pixel": "(row mod n) n + column mod n"}
+    recipe.add("interleaving", "which of n^2 subsets each light belongs to", run, ("clusters.of",),
+               {"interleaving.subset": Spec("light", "1", "0 to n^2 - 1", tier="T0")},
+               paper="VAL Sec. 6, E-VAL-13", decoys=(
+                   Decoy(f"lights are dealt out by {other}", lambda a, r: run(a, r, other), f"by {kind}"),
+                   Decoy("n subsets, not n^2", writing(run, interleaving__subset=lambda a: a % block), "n x n pixels"),
+                   Decoy("subsets count from 1", writing(run, interleaving__subset=lambda a: (a + 1) % block**2), "0"),
+                   Decoy("rows and columns of the block are exchanged", writing(
+                       run, interleaving__subset=lambda a: a % block * block + a // block), "row n + column")))
+
+
+def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
+    pairs = settings.pairs
+    lights = light_names(recipe)
+    area = ("lights.area",) if pairs.needs_footprints else ()
+    own = ("interleaving.subset",) if block > 1 else ()
+
+    def run(arrays: Arrays, real: Any, factor: float = block**2) -> Arrays:
+        receivers = Receivers(*(np.ascontiguousarray(arrays[name], real) for name in RECEIVERS[:2]),
+                              np.asarray(arrays["gbuffer.triangle_id"]) >= 0)
+        packed = checked(receivers, pixel_lights_of(arrays, real), pairs,
+                         np.ascontiguousarray(arrays["lights.area"], real) if area else None)
+        of, count = np.asarray(arrays["clusters.of"]), arrays["clusters.center"].shape[1]
+        subset = np.asarray(arrays[own[0]], np.int64) if own else np.zeros(len(of), np.int64)
+        parts, members = subsets(receivers.covered, block), member_lights(packed, of, count, subset, block**2)
+        position, normal = (np.empty((3, len(parts.places)), real) for _ in range(2))
+        gather_pixels(receivers.position.reshape(3, -1), parts, position)
+        gather_pixels(receivers.normal.reshape(3, -1), parts, normal)
+        made = np.zeros((count, *receivers.position.shape), real)
+        for m in range(count):
+            sums = np.zeros_like(position)
+            add_members(position, normal, parts, members, m, sums)
+            scatter_pixels(sums, parts, real(factor), made[m].reshape(3, -1))
+        return {"parts.irradiance": made}
+
+    interleaved = (
+        Decoy("the factor n^2 is missing", lambda a, r: run(a, r, 1), "E-VAL-13"),
+        Decoy("the factor is n", lambda a, r: run(a, r, block), "E-VAL-13"),
+        Decoy("pixels count rows and columns the other way round", reading(
+            run, interleaving__subset=lambda a: a % block * block + a // block), "(row mod n) n + column mod n"),
+    ) if own else ()
+    recipe.facts["pairs.clamp"] = "none" if pairs.clamp is None else pairs.clamp.name()
+    recipe.add("parts", "light of each area light's members, without visibility" + (
+        ": n^2 times those of the pixel's subset" if own else ""), run,
+        (*RECEIVERS, *lights, "clusters.of", "clusters.center", *own, *area),
+        {"parts.irradiance": Spec("area light, rgb, row, column", "W/m^2", "irradiance of the cluster's lights",
+                                  "linear RGB", EQ2)},
+        paper="VAL Sec. 4, E-VAL-01, E-VAL-13", exact=("gbuffer.position", "lights.position"), decoys=(
+            *interleaved,
+            Decoy("Phi in place of Phi / pi", writing(run, parts__irradiance=lambda a: a * np.pi), "E-VAL-01"),
+            Decoy("every light has its cluster's normal", reading_normals(run), "VAL Sec. 4: visibility alone is shared"),
+            Decoy("clusters are shifted by one", reading(
+                run, clusters__of=lambda a: (a + 1) % (int(a.max()) + 1)), "C(i)"),
+            Decoy("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), EQ2)))
+
+
+def reading_normals(run: Any) -> Any:
+    """Return a stage whose lights face where the first light of their cluster does."""
+    def altered(arrays: Arrays, real: Any) -> Arrays:
+        of = np.asarray(arrays["clusters.of"])
+        first = np.array([int(np.flatnonzero(of == k)[0]) for k in of])
+        return run({**arrays, "lights.normal": arrays["lights.normal"][:, first]}, real)
+
+    return altered
+
+
+def _add_blur(recipe: Recipe, settings: BoxBlur | GeometryBlur, block: int) -> None:
+    reads = ("sum.irradiance", *RECEIVERS, "extents.visible")
+
+    def run(arrays: Arrays, real: Any, how: Any = settings, size: int = block) -> Arrays:
+        receivers = Receivers(*(np.ascontiguousarray(arrays[name], real) for name in RECEIVERS[:2]),
+                              np.ascontiguousarray(np.asarray(arrays["gbuffer.triangle_id"]) >= 0))
+        diagonal = float(np.linalg.norm(np.diff(np.asarray(arrays["extents.visible"], np.float64), axis=0)))
+        return {"blur.irradiance": blur(np.ascontiguousarray(arrays["sum.irradiance"], real), receivers, size, how,
+                                        diagonal)}
+
+    def turned(arrays: Arrays, real: Any) -> Arrays:
+        there = {name: arrays[name][..., ::-1, ::-1] for name in reads[:-1]}
+        return {"blur.irradiance": run({**arrays, **there}, real)["blur.irradiance"][..., ::-1, ::-1]}
+
+    def other(**how: Any) -> Any:
+        return lambda arrays, real: run(arrays, real, replaced(settings, how))
+
+    geometry = (
+        Decoy("pixels of other surfaces count", lambda a, r: run(a, r, BoxBlur()), BLUR),
+        Decoy("normals are not compared", other(cosine=-1.0), BLUR),
+        Decoy("distances are not compared", other(extent=10.0), BLUR),
+        Decoy("the least cosine is 0.95", other(cosine=0.95), BLUR),
+        Decoy("subsets that an edge cuts off are left out", other(every_subset=False), BLUR),
+    ) if isinstance(settings, GeometryBlur) else ()
+    recipe.facts["blur"] = {"n": block, "window": "x - n // 2 on, moved inwards at the rim"} | (
+        {"extent, of the visible box's diagonal": settings.extent, "least cosine": settings.cosine,
+         "every subset": settings.every_subset} if isinstance(settings, GeometryBlur) else {})
+    recipe.add("blur", "mean over n x n pixels of the same surface, each subset once", run, reads,
+               {"blur.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB")},
+               paper=BLUR, exact=("gbuffer.position", "gbuffer.normal"), decoys=(
+                   *geometry,
+                   Decoy("nothing is blurred", lambda a, r: {"blur.irradiance": a["sum.irradiance"]}, BLUR),  # noqa: ARG005
+                   Decoy("the window is a pixel wider", lambda a, r: run(a, r, size=block + 1), BLUR),
+                   *((Decoy("the window starts at x - (n - 1) // 2", turned, BLUR),) if block % 2 == 0 else ()),
+                   Decoy("edges of the picture repeat in place of a moved window", _clamped(run, block), BLUR)))
+
+
+def _clamped(run: Any, block: int) -> Any:
+    """Return a blur of a picture with its rim repeated, cut back to its size."""
+    def altered(arrays: Arrays, real: Any) -> Arrays:
+        wide: dict[str, Array] = {}
+        for name in ("sum.irradiance", *RECEIVERS):
+            before = [(0, 0)] * (arrays[name].ndim - 2)
+            wide[name] = np.pad(arrays[name], [*before, (block, block), (block, block)], mode="edge")
+        inner = slice(block, -block)
+        return {"blur.irradiance": run({**arrays, **wide}, real)["blur.irradiance"][:, inner, inner]}
+
+    return altered

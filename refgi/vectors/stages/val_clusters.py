@@ -1,0 +1,252 @@
+"""Stages of clustered visibility up to its area lights: extents, k-means round by round, rectangles (VAL Sec. 5, 6)."""
+
+from typing import Any
+
+import numpy as np
+
+from refgi.cluster.clustering.kmeans import Clustering, assigned, cluster, first_lights, moved
+from refgi.cluster.clustering.rectangle import AreaLights, area_lights
+from refgi.cluster.settings import AreaLightSettings, Clusters, ValSettings
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.rsm.buffers.extent import Extent, bounds_of
+from refgi.settings import replaced
+from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.stages.buffers import VECTOR
+
+ROUNDS = 2  # of k-means that a case shows one by one
+LIGHTS = ("lights.position", "lights.normal")
+METRIC = "VAL Sec. 5.1, E-VAL-11: d = w_x dx / diagonal + w_a angle / pi"
+AREA = ("frame", "axes", "side", "offset", "delta", "radius", "members")
+
+
+def add_extents(recipe: Recipe, maps: int) -> None:
+    """Add the boxes of what is visible and of what reflects direct light, to which relative settings refer."""
+    rsms = [f"rsm{k}" for k in range(maps)]
+    lobes = [f"{name}.lobe_flux" for name in rsms if f"{name}.lobe_flux" in recipe.specs]
+
+    def run(arrays: Arrays, real: Any, dark: bool = False, empty: bool = False, first: bool = False) -> Arrays:  # noqa: ARG001
+        covered = np.asarray(arrays["gbuffer.triangle_id"]) >= 0
+        visible = bounds_of(arrays["gbuffer.position"], np.ones_like(covered) if empty else covered)
+        boxes = []
+        for name in rsms[:1] if first else rsms:
+            flux = arrays[f"{name}.flux"].any(axis=0)
+            flux |= arrays[f"{name}.lobe_flux"].any(axis=0) if lobes else False
+            boxes.append(bounds_of(arrays[f"{name}.position"], np.ones_like(flux) if dark else flux))
+        low, high = np.min([box.low for box in boxes], axis=0), np.max([box.high for box in boxes], axis=0)
+        return {"extents.visible": np.stack(visible), "extents.illuminated": np.stack([low, high])}
+
+    box = "least and greatest, xyz"
+    recipe.add("extents", "boxes of what the camera sees and of what reflects direct light", run,
+               ("gbuffer.position", "gbuffer.triangle_id", *(f"{name}.{key}" for name in rsms for key in
+                                                             ("position", "flux")), *lobes),
+               {"extents.visible": Spec(box, "m", "box of the pixels' surface points", "world"),
+                "extents.illuminated": Spec(box, "m", "box of the texels with flux, of all lamps", "world")},
+               paper="docs/methods/val", decoys=(
+                   Decoy("texels without flux count", lambda a, r: run(a, r, dark=True), "what reflects direct light"),
+                   Decoy("pixels without surface count, at the origin", lambda a, r: run(a, r, empty=True), ""),
+                   Decoy("the first lamp's map alone", lambda a, r: run(a, r, first=True), "all lamps")))
+
+
+def extent_of(arrays: Arrays, *names: str) -> Extent:
+    """Return the box around some of the extents among arrays."""
+    boxes = [np.asarray(arrays[f"extents.{name}"], np.float64) for name in names]
+    return Extent(np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0))
+
+
+def add_kmeans(recipe: Recipe, settings: Clusters, total: int) -> None:
+    """Add k-means over `total` lights: start, `ROUNDS` rounds one by one, the rest as one stage."""
+    count = min(settings.count, total)
+    recipe.facts["kmeans"] = {
+        "clusters": count, "asked for": settings.count, "distance": settings.distance, "w_x": settings.position_weight,
+        "w_a": settings.normal_weight, "most rounds": settings.rounds}
+    if count == total:
+        _add_each(recipe)
+        return
+    _add_start(recipe, count, total)
+    for number in range(ROUNDS):
+        _add_assignment(recipe, settings, number)
+        _add_means(recipe, number)
+    last = f"kmeans.center{ROUNDS}", f"kmeans.normal{ROUNDS}"
+
+    def run(arrays: Arrays, real: Any, rounds: int = settings.rounds - ROUNDS, **how: Any) -> Arrays:  # noqa: ARG001
+        center, normal = (np.asarray(arrays[name], np.float64) for name in last)
+        start = Clustering(center, normal, np.zeros(count, np.int64), np.zeros(total, np.int32), 0, np.zeros(1))
+        kind = replaced(settings, how)
+        made = cluster(arrays[LIGHTS[0]], arrays[LIGHTS[1]], count, distance=kind.distance, weights=_weights(kind),
+                       diagonal=extent_of(arrays, "illuminated").diagonal, rounds=rounds, start=start)
+        return {"clusters.center": made.center, "clusters.normal": made.normal, "clusters.of": made.of}
+
+    def stopped(arrays: Arrays, real: Any) -> Arrays:
+        center, normal = (np.asarray(arrays[name], np.float64) for name in last)
+        return {"clusters.center": center, "clusters.normal": normal, "clusters.of": run(arrays, real)["clusters.of"]}
+
+    recipe.add("kmeans", "further rounds until no light changes its cluster", run,
+               (*LIGHTS, "extents.illuminated", *last), _clusters(), paper="VAL Sec. 5.1; A.6 P5",
+               exact=(*LIGHTS, *last), decoys=(
+                   Decoy("no rounds beyond those shown", stopped, "until assignments repeat"),
+                   Decoy("one round alone", lambda a, r: run(a, r, rounds=1), "until assignments repeat"),
+                   *_metric_decoys(run)))
+
+
+def _add_each(recipe: Recipe) -> None:
+    def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+        total = arrays[LIGHTS[0]].shape[1]
+        made = cluster(arrays[LIGHTS[0]], arrays[LIGHTS[1]], total, diagonal=1.0)
+        return {"clusters.center": made.center, "clusters.normal": made.normal, "clusters.of": made.of}
+
+    recipe.add("kmeans", "as many clusters as lights: each light is one, coincident lights too", run, LIGHTS,
+               _clusters(), paper="VAL Sec. 5.1", decoys=(
+                   Decoy("coincident lights join the first of their clusters", writing(run, clusters__of=_all_first),
+                         "M = N: hard shadows of each light"),
+                   Decoy("the clusters are in reverse order",
+                         writing(run, clusters__of=lambda a: a[::-1]), "cluster k begins at light floor(k N / M)")))
+
+
+def _all_first(of: Array) -> Array:
+    return np.where(of == of[-1], 0, of)
+
+
+def _clusters() -> dict[str, Spec]:
+    return {"clusters.center": Spec("xyz, cluster", "m", "mean of each cluster's lights", "world"),
+            "clusters.normal": Spec("xyz, cluster", VECTOR, "mean direction of their normals", "world"),
+            "clusters.of": Spec("light", "1", "C(i): cluster of each light", tier="T0")}
+
+
+def _weights(kind: Clusters) -> tuple[float, float]:
+    return kind.position_weight, kind.normal_weight
+
+
+def _add_start(recipe: Recipe, count: int, total: int) -> None:
+    def run(arrays: Arrays, real: Any, at: Any = first_lights) -> Arrays:  # noqa: ARG001
+        return {f"kmeans.{key}0": arrays[name][:, at(total, count)] for key, name in
+                zip(("center", "normal"), LIGHTS, strict=True)}
+
+    recipe.add("kmeans.start", "cluster k begins at light floor(k N / M)", run, LIGHTS, _centers(0),
+               paper="VAL Sec. 5.1; A.6 P5", exact=LIGHTS, decoys=(
+                   Decoy("clusters begin at the first M lights", lambda a, r: run(a, r, lambda n, m: np.arange(m)),
+                         "floor(k N / M)"),
+                   Decoy("k N / M is rounded instead of cut", lambda a, r: run(
+                       a, r, lambda n, m: (np.arange(m) * n + m // 2) // m), "floor(k N / M)"),
+                   Decoy("clusters begin in the middle of their run", lambda a, r: run(
+                       a, r, lambda n, m: (2 * np.arange(m) + 1) * n // (2 * m)), "floor(k N / M)")))
+
+
+def _centers(number: int) -> dict[str, Spec]:
+    return {f"kmeans.center{number}": Spec("xyz, cluster", "m", f"centres after round {number}", "world"),
+            f"kmeans.normal{number}": Spec("xyz, cluster", VECTOR, "their normals", "world")}
+
+
+def _add_assignment(recipe: Recipe, settings: Clusters, number: int) -> None:
+    center, normal = _centers(number)
+
+    def run(arrays: Arrays, real: Any, last: bool = False, cosine: bool = False, **how: Any) -> Arrays:  # noqa: ARG001
+        kind = replaced(settings, how)
+        lights = [arrays[name] for name in LIGHTS]
+        areas = np.asarray(arrays[center], np.float64), np.asarray(arrays[normal], np.float64)
+        if cosine:
+            return _by_cosine(lights, areas, kind, extent_of(arrays, "illuminated").diagonal)
+        order = slice(None, None, -1) if last else slice(None)
+        of, own = assigned(lights[0], lights[1], areas[0][:, order], areas[1][:, order], kind.distance, _weights(kind),
+                           extent_of(arrays, "illuminated").diagonal)
+        return {f"kmeans.of{number}": areas[0].shape[1] - 1 - of if last else of, f"kmeans.distance{number}": own}
+
+    def _by_cosine(lights: Any, areas: Any, kind: Clusters, diagonal: float) -> Arrays:
+        apart = np.linalg.norm(lights[0][:, :, None] - areas[0][:, None], axis=0) / diagonal
+        turned = 1 - (lights[1][:, :, None] * areas[1][:, None]).sum(axis=0)
+        d = kind.position_weight * apart + kind.normal_weight * turned
+        return {f"kmeans.of{number}": d.argmin(axis=1), f"kmeans.distance{number}": d.min(axis=1)}
+
+    recipe.add(f"kmeans.assign{number}", "nearest cluster of each light, the lowest index of equally near ones", run,
+               (*LIGHTS, "extents.illuminated", center, normal),
+               {f"kmeans.of{number}": Spec("light", "1", "nearest cluster", tier="T0"),
+                f"kmeans.distance{number}": Spec("light", "1", "its distance", paper=METRIC)},
+               paper=METRIC, exact=(*LIGHTS, center, normal), decoys=(
+                   Decoy("the highest index of equally near ones", lambda a, r: run(a, r, last=True), "A.6 P5"),
+                   Decoy("1 - cosine in place of the angle over pi", lambda a, r: run(a, r, cosine=True), METRIC),
+                   *_metric_decoys(run)))
+
+
+def _metric_decoys(run: Any) -> tuple[Decoy, ...]:
+    def other(**how: Any) -> Run:
+        return lambda arrays, real: run(arrays, real, **how)
+
+    return (Decoy("metres and radians are weighed, not shares of the diagonal and of pi", other(distance="raw"), METRIC),
+            Decoy("squares of distances", other(distance="squared"), METRIC),
+            Decoy("normals do not count", other(normal_weight=0.0), METRIC),
+            Decoy("the weights are exchanged", other(position_weight=0.3, normal_weight=0.7), METRIC))
+
+
+def _add_means(recipe: Recipe, number: int) -> None:
+    before, after = tuple(_centers(number)), tuple(_centers(number + 1))
+    of = f"kmeans.of{number}"
+
+    def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+        made = moved(arrays[LIGHTS[0]], arrays[LIGHTS[1]], np.asarray(arrays[of]), arrays[before[0]], arrays[before[1]])
+        return dict(zip(after, made, strict=True))
+
+    def empty_at_origin(arrays: Arrays, real: Any) -> Arrays:
+        made = run(arrays, real)
+        used = np.isin(np.arange(made[after[0]].shape[1]), arrays[of])
+        return {name: np.where(used, made[name], 0) for name in after}
+
+    def not_unit(arrays: Arrays, real: Any) -> Arrays:
+        made, chosen = dict(run(arrays, real)), np.asarray(arrays[of])
+        for k in np.unique(chosen):
+            made[after[1]][:, k] = arrays[LIGHTS[1]][:, chosen == k].mean(axis=1)
+        return made
+
+    recipe.add(f"kmeans.means{number + 1}", "means of each cluster's lights; without lights a cluster stays", run,
+               (*LIGHTS, of, *before), _centers(number + 1), paper="VAL Sec. 5.1; A.6 P5", exact=before, decoys=(
+                   Decoy("clusters without lights go to the origin", empty_at_origin, "they keep their values"),
+                   Decoy("mean normals are not of unit length", not_unit, "E-VAL-11"),
+                   Decoy("normals stay as they were", lambda a, r: {**run(a, r), after[1]: a[before[1]]}, "E-VAL-11")))
+
+
+def add_areas(recipe: Recipe, settings: AreaLightSettings) -> None:
+    """Add the rectangle of each cluster."""
+    def run(arrays: Arrays, real: Any, **how: Any) -> Arrays:  # noqa: ARG001
+        made = _areas(arrays, replaced(settings, how))
+        return {f"areas.{key}": getattr(made, key) for key in AREA}
+
+    recipe.facts["areas"] = {"axes": settings.axes, "extent": settings.extent, "up": [0, 1, 0],
+                             "up where |y| of the normal >= 0.999": [0, 0, -1], "flat below, of the radius": 1e-5}
+    recipe.add("areas", "bounding rectangle of each cluster's lights in its plane", run,
+               (LIGHTS[0], "clusters.center", "clusters.normal", "clusters.of"), {
+                   "areas.frame": Spec("cluster, (right, down, forward), xyz", VECTOR, "axes of the map", "world"),
+                   "areas.axes": Spec("cluster, side, xyz", VECTOR, "axes of the rectangle", "world"),
+                   "areas.side": Spec("side, cluster", "m", "how long it is along its axes"),
+                   "areas.offset": Spec("side, cluster", "m", "its middle from the centre, along its axes"),
+                   "areas.delta": Spec("cluster", "m", "Delta, its size; 0: a point", paper="VAL Sec. 6, E-VAL-10"),
+                   "areas.radius": Spec("cluster", "m", "from the centre to its farthest light"),
+                   "areas.members": Spec("cluster", "1", "how many lights it has", tier="T0")},
+               paper="VAL Sec. 6, E-VAL-10", decoys=(*_area_decoys(run, settings),))
+
+
+def _area_decoys(run: Any, settings: AreaLightSettings) -> tuple[Decoy, ...]:
+    other = "longer" if settings.extent == "root" else "root"
+    turned = "min_area" if settings.axes == "fixed" else "fixed"
+    return (
+        Decoy(f"Delta is another size of the rectangle: {other}", lambda a, r: run(a, r, extent=other), "E-VAL-10"),
+        Decoy(f"the axes are others: {turned}", lambda a, r: run(a, r, axes=turned), "E-VAL-10"),
+        Decoy("the area is corrected for the sample", lambda a, r: run(a, r, unbiased_area=True), "E-VAL-10"),
+        Decoy("Delta is half of the size", writing(run, areas__delta=lambda a: a / 2), "sides, not half sides"),
+        Decoy("the rectangle lies around the centre", writing(run, areas__offset=np.zeros_like), "VAL Sec. 6"),
+        Decoy("the map's second axis is up", writing(run, areas__frame=lambda a: a * ((1,), (-1,), (1,))),
+              "rows run downwards"),
+        Decoy("frames are transposed", writing(run, areas__frame=lambda a: a.transpose(0, 2, 1)), "rows are the axes"),
+        Decoy("the map looks into the surface", reading(run, clusters__normal=lambda a: -a), "along the normal"))
+
+
+def _areas(arrays: Arrays, settings: AreaLightSettings) -> AreaLights:
+    position, of = np.asarray(arrays[LIGHTS[0]], np.float64), np.asarray(arrays["clusters.of"])
+    center, normal = (np.asarray(arrays[f"clusters.{key}"], np.float64) for key in ("center", "normal"))
+    clusters = Clustering(center, normal, np.bincount(of, minlength=center.shape[1]), of, 0, np.zeros(1))
+    lights = PixelLights(position, position, position, None, None, None, position.shape[1])
+    return area_lights(lights, clusters, settings)
+
+
+def clusters_of(settings: ValSettings) -> Clusters:
+    """Return a fixed number of clusters, the only kind that a kit has."""
+    assert isinstance(settings.clusters, Clusters)
+    return settings.clusters

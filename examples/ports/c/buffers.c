@@ -86,6 +86,17 @@ static float nearness(const View *v, const vec3 *corner, vec3 place) {
     return v->kind == ORTHOGRAPHIC ? -depth / sum : sum / det;
 }
 
+static float ray_depth(Case *c, int triangle, vec3 normal, Ray ray) {
+    vec3 p[3];
+    corners(c, triangle, p);
+    return dot(normal, sub(p[0], ray.origin)) / dot(normal, ray.direction);
+}
+
+vec3 normal_at(Case *c, int triangle, Ray ray) {
+    vec3 face = face_normal(c, triangle, ray.direction);
+    return shading_normal(c, triangle, face, add(ray.origin, scale(ray.direction, ray_depth(c, triangle, face, ray))));
+}
+
 void ids_stage(Case *c, const char *name, const char *view) {
     View v = view_of(c, view);
     int *id = make(c, "%s.triangle_id", name)->i, triangles = get(c, "scene.faces")->shape[0];
@@ -119,9 +130,8 @@ void surface_stage(Case *c, const char *name, const char *view) {
         if (id[k] < 0) continue;
         int map = k / (v.rows * v.columns), row = k / v.columns % v.rows;
         Ray ray = texel_ray(&v, map, (float)row + 0.5f, (float)(k % v.columns) + 0.5f);
-        vec3 p[3], n = face_normal(c, id[k], ray.direction);
-        corners(c, id[k], p);
-        depth[k] = dot(n, sub(p[0], ray.origin)) / dot(n, ray.direction);
+        vec3 n = face_normal(c, id[k], ray.direction);
+        depth[k] = ray_depth(c, id[k], n, ray);
         put3(position, count, k, add(ray.origin, scale(ray.direction, depth[k])));
         put3(normal, count, k, shading_normal(c, id[k], n, plane3(position, count, k)));
         if (albedo) put3(albedo, count, k, row3(diffuse + 3 * material[id[k]]));

@@ -59,6 +59,11 @@ Array *get(Case *c, const char *format, ...) {
     return keep(c, name, 0, npy_read(path));
 }
 
+Array *made(Case *c, const char *format, ...) {
+    NAMED(name, format);
+    return find(c, name, 1)->array;
+}
+
 Array *make_of(Case *c, char kind, int ndim, const int *shape, const char *format, ...) {
     NAMED(name, format);
     return keep(c, name, 1, npy_new(kind, ndim, shape));

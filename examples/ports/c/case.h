@@ -15,6 +15,7 @@ typedef struct {
 
 /* Names are printf formats: get(c, "%s.depth", map). */
 Array *get(Case *c, const char *name, ...);          /* of the kit or, chained, of the port; ends where there is none */
+Array *made(Case *c, const char *name, ...);         /* what the port has made in this stage */
 int has(Case *c, const char *name, ...);
 Array *make(Case *c, const char *name, ...);         /* zeros in the shape and type that the manifest expects */
 Array *make_of(Case *c, char kind, int ndim, const int *shape, const char *name, ...);

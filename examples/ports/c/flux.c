@@ -47,7 +47,7 @@ void flux_stage(Case *c, int number) {
         vec3 kept = times(get(c, "materials.specular")->f + 3 * m, power, measure);
         if (kept.x <= 0.0f && kept.y <= 0.0f && kept.z <= 0.0f) continue;
         Ray ray = texel_ray(&v, k / (v.rows * v.columns), (float)row + 0.5f, (float)column + 0.5f);
-        vec3 d = normalize(ray.direction), n = face_normal(c, id[k], d);
+        vec3 d = normalize(ray.direction), n = normal_at(c, id[k], ray);
         put3(lobe_flux, count, k, kept);
         put3(lobe_axis, count, k, sub(d, scale(n, 2.0f * dot(n, d))));
         lobe_exponent[k] = get(c, "materials.exponent")->f[m];

@@ -77,7 +77,7 @@ static int maps_of(Case *c) {
     return maps;
 }
 
-static int sends(Case *c, int map, int texel) {
+int sends(Case *c, int map, int texel) {
     static const char *kinds[2] = {"flux", "lobe_flux"};
     for (int kind = 0; kind < 2; kind++) {
         if (!has(c, "rsm%d.%s", map, kinds[kind])) continue;

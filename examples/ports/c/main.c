@@ -15,12 +15,15 @@ static const struct { const char *end; void (*run)(Case *, int); } OF_MAPS[] = {
 static const struct { const char *format; void (*run)(Case *, int); } OF_LEVELS[] = {
     {"multires.upsample.%d%n", upsample_level_stage}, {"level%d%n", level_stage}, {"shifts of samples%d%n", shifts_stage},
     {"samples%d%n", samples_stage}, {"gather%d%n", gather_stage}, {"blur%d%n", blur_stage}, {"light%d%n", light_stage},
+    {"kmeans.assign%d%n", kmeans_assign_stage}, {"kmeans.means%d%n", kmeans_means_stage},
 };
 static const struct { const char *name; void (*run)(Case *); } STAGES[] = {
     {"multires.discontinuities", discontinuities_stage}, {"multires.states", states_stage},
     {"multires.subsplats", subsplats_stage}, {"multires.points", subsplat_points_stage},
     {"multires.irradiance", subsplat_irradiance_stage}, {"multires.upsample", upsample_nearest_stage},
-    {"multires.detail", detail_stage}, {"direct", direct_stage}, {"picture", picture_stage}, {"lights", lights_stage}, {"footprints", footprints_stage}, {"sum", sum_stage}, {"pairs", pairs_stage},
+    {"multires.detail", detail_stage}, {"direct", direct_stage}, {"picture", picture_stage}, {"extents", extents_stage}, {"kmeans.start", kmeans_start_stage}, {"kmeans", kmeans_stage}, {"series", series_stage},
+    {"scale", scale_stage}, {"maps.t", depths_stage}, {"basis", basis_stage}, {"mip", mip_stage}, {"search", search_stage},
+    {"hard", hard_stage}, {"facing", facing_stage}, {"lights", lights_stage}, {"footprints", footprints_stage}, {"sum", sum_stage}, {"pairs", pairs_stage},
 };
 #define COUNT(list) (sizeof(list) / sizeof *(list))
 
@@ -38,6 +41,13 @@ static int run(Case *c, const char *name) {
     int level = 0;
     if (!strcmp(name, "multires.depth_ranges")) return ranges_stage(c, "depth"), 1;
     if (!strcmp(name, "multires.normal_ranges")) return ranges_stage(c, "normal"), 1;
+    if (!strcmp(name, "search.means")) return means_stage(c, "search", "pending"), 1;
+    if (!strcmp(name, "penumbra.means")) return means_stage(c, "penumbra", "shaded"), 1;
+    /* Stages of one name differ in what they read. */
+    if (!strcmp(name, "sum") && has(c, "visibility.share")) return has(c, "parts.irradiance") && (shared_sum_stage(c), 1);
+    if (!strcmp(name, "penumbra")) return has(c, "search.means") && (penumbra_stage(c), 1);
+    if (!strcmp(name, "visibility") && has(c, "penumbra.means")) return csm_visibility_stage(c), 1;
+    if (!strcmp(name, "visibility")) return fact(c, "visibility.test") && (pcf_stage(c), 1);
     for (size_t k = 0; k < COUNT(OF_LEVELS); k++) {
         int length = 0;
         if (sscanf(name, OF_LEVELS[k].format, &level, &length) == 1 && !name[length]) return OF_LEVELS[k].run(c, level), 1;

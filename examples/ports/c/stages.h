@@ -16,6 +16,8 @@ View view_of(Case *c, const char *name);
 Ray texel_ray(const View *v, int map, float row, float column); /* through a place; centres lie at + 1/2 */
 vec3 view_point(const View *v, int map, vec3 world);            /* along right, down, forward */
 vec3 face_normal(Case *c, int triangle, vec3 seen_along);       /* unit, on the side that a ray sees */
+vec3 normal_at(Case *c, int triangle, Ray ray);                 /* interpolated where there are vertex normals */
+int sends(Case *c, int map, int texel);                         /* whether a texel of a map has flux */
 
 void ids_stage(Case *c, const char *name, const char *view);       /* buffers.c */
 void surface_stage(Case *c, const char *name, const char *view);
@@ -48,6 +50,25 @@ void gather_stage(Case *c, int level);
 void blur_stage(Case *c, int level);                               /* bilateral.c */
 void light_stage(Case *c, int level);
 void picture_stage(Case *c);
+
+void extents_stage(Case *c);                                       /* clusters.c */
+void kmeans_start_stage(Case *c);
+void kmeans_assign_stage(Case *c, int round);
+void kmeans_means_stage(Case *c, int round);
+void kmeans_stage(Case *c);
+void shared_sum_stage(Case *c);
+void series_stage(Case *c);                                        /* csm.c */
+void scale_stage(Case *c);
+void depths_stage(Case *c);
+void basis_stage(Case *c);
+void mip_stage(Case *c);
+void search_stage(Case *c);
+void means_stage(Case *c, const char *stage, const char *asked);
+void penumbra_stage(Case *c);
+void csm_visibility_stage(Case *c);
+void hard_stage(Case *c);                                          /* pcf.c */
+void pcf_stage(Case *c);
+void facing_stage(Case *c);
 
 float spot_integral(float x0, float x1, float y0, float y1, float inner, float outer); /* spot.c */
 float lobe_norm(vec3 normal, vec3 axis, float exponent);                               /* lobes.c */

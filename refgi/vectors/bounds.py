@@ -21,6 +21,7 @@ import numpy as np
 from refgi.vectors.spec import Array, Arrays, Case, Stage, as_read, outputs_of, stored
 
 SAFETY = 4.0
+SIGMAS = 4.0  # of an estimate's mean, and of a pixel but for a few of them
 RUNS = 6  # with changed inputs
 ROUNDING = 2.0**-24  # of float32, relative
 HALF_ROUNDING = 2.0**-11  # of float16
@@ -46,8 +47,13 @@ class Budget(NamedTuple):
     outliers: float  # share of elements
 
 
+NO_BUDGET = Budget(0.0, 0.0, 1.0)  # of estimates, which have standard errors instead
+
+
 def isolated_bounds(case: Case, step: Stage, known: Arrays, seed: int) -> dict[str, Bound]:
     """Return the bound of each array that a stage of a case writes, its inputs being the stored ones."""
+    if is_estimate(case, step):
+        return {name: _spread_bound(known, name) for name in step.writes}
     runs = [outputs_of(step, known, np.float32, run) for run in (step.run, *step.variants)]
     runs += [_run(step, changed) for changed in _changed(step, known, seed, _rounded_at_random)]
     return {name: _bound(known[name], [run[name] for run in runs], _large(case, name, known[name]))
@@ -56,6 +62,8 @@ def isolated_bounds(case: Case, step: Stage, known: Arrays, seed: int) -> dict[s
 
 def half_budgets(case: Case, step: Stage, known: Arrays, seed: int) -> dict[str, Budget]:
     """Return the budget of each array that a stage of a case writes when it reads and writes half floats (T2)."""
+    if is_estimate(case, step):
+        return dict.fromkeys(step.writes, NO_BUDGET)
     runs = [{name: _to_half(array) for name, array in _run(step, changed).items()}
             for changed in _changed(step, known, seed, _halved_at_random)]
     return {name: _budget(known[name], [run[name] for run in runs], HALF_ROUNDING, _large(case, name, known[name]))
@@ -69,13 +77,31 @@ def chained_budgets(case: Case, known: Arrays, seed: int) -> dict[str, Budget]:
         random = np.random.default_rng([seed, number])
         chain = {name: stored(array) for name, array in case.given.items()}
         for step in case.stages:
+            if is_estimate(case, step):
+                continue
             changed = {name: _rounded_at_random(array, random) for name, array in
                        as_read(chain, step.reads, np.float64).items()}
             chain.update(_run(step, changed))
         runs.append(chain)
     written = [name for step in case.stages for name in step.writes]
-    return {name: _budget(known[name], [run[name] for run in runs], ROUNDING, _large(case, name, known[name]))
+    estimates = {name for step in case.stages if is_estimate(case, step) for name in step.writes}
+    return {name: NO_BUDGET if name in estimates else
+            _budget(known[name], [run[name] for run in runs], ROUNDING, _large(case, name, known[name]))
             for name in written}
+
+
+def is_estimate(case: Case, step: Stage) -> bool:
+    """Return whether a stage writes estimates (T3), which are judged by their standard errors."""
+    return any(case.specs[name].tier == "T3" for name in step.writes)
+
+
+def _spread_bound(known: Arrays, name: str) -> Bound:
+    """Return SIGMAS standard errors of the difference of two such estimates; 0 for what is no mean."""
+    variance = known.get(name.replace(".mean", ".variance_of_mean"))
+    nowhere = np.zeros(known[name].shape, np.bool_)
+    if variance is None or variance is known[name] or variance.shape != known[name].shape:
+        return Bound(np.zeros(known[name].shape, np.float32), nowhere)
+    return Bound((SIGMAS * np.sqrt(2.0 * variance.astype(np.float64))).astype(np.float32), nowhere)
 
 
 def _changed(

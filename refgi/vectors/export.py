@@ -157,7 +157,8 @@ def _entry(case: Case, name: str, array: Array, saved: tuple[str, str]) -> Array
     kind = {"f": "<f4", "i": "<i4", "b": "|b1"}[array.dtype.kind]
     return ArrayEntry(file=saved[0], sha256=saved[1], dtype=kind, shape=array.shape,  # type: ignore[arg-type]
                       axes=spec.axes, unit=spec.unit, what=spec.what, space=spec.space, paper=spec.paper,
-                      tier="T0" if array.dtype.kind != "f" else spec.tier, index_of=spec.index_of)
+                      tier="T0" if array.dtype.kind != "f" and spec.tier != "T3" else spec.tier,
+                      index_of=spec.index_of)
 
 
 def _tolerances(

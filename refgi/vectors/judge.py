@@ -4,12 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refgi.vectors.bounds import FLUSHED, distance
+from refgi.vectors.bounds import FLUSHED, SIGMAS, distance
 from refgi.vectors.manifest import ArrayEntry, ArrayVerdict, Tolerance, Verdict
 from refgi.vectors.spec import Array
 
-SIGMAS = 4.0  # of an estimate's mean, and of a pixel but for FEW of them
-FEW = 0.005
+FEW = 0.005  # share of pixels that may be beyond SIGMAS standard errors
 STEADY = (0.4, 2.5)  # mean square of z over the pixels of an estimate: right variances, and no structure
 
 

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from refgi.errors import expect
+from refgi.vectors.bounds import SIGMAS
 from refgi.vectors.causes import Difference, explain
-from refgi.vectors.judge import SIGMAS, judge_estimate
+from refgi.vectors.judge import judge_estimate
 from refgi.vectors.manifest import ArrayEntry
 from refgi.vectors.spec import Array
 

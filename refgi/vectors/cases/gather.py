@@ -52,7 +52,7 @@ def gathering(id: str, plan: Plan) -> Case:
 
 def at_borders() -> Case:
     """Return gathering at points that are given: on a map's border, outside, behind the lamp, at it, on a texel."""
-    scene, maps, name = room(SQUARE, matte=True), 12, "gather-border"
+    scene, maps, name = room(SQUARE, matte=True), 13, "gather-border"
     recipe = Recipe(name, "gather", "points on the border of a map, beyond it, behind the lamp, at it, on a texel's "
                     "surface; a sample in the middle of the disc")
     give_scene(recipe, scene)
@@ -89,16 +89,15 @@ QUICK_PLANS: dict[str, Callable[[], Plan]] = {
                                 {"samples": 24, "radius": 0.3}),
     "gather-three-lamps": lambda: Plan(
         "spot, cube and directional maps; of glossy surfaces the diffuse part alone", room(SPOT, BULB, SUN), (17, 13),
-        11,
-        {"samples": 16, "radius": 0.5}),
+        11, {"samples": 16, "radius": 0.5}),
     "gather-behind": lambda: Plan(
         "receivers behind the lamp, texels moved back by 2 cm, xi1^2 as weight, discs of more than the map",
         room(DOWN, matte=True), (19, 23), 12, {"samples": 20, "radius": 1.5, "disc.offset": 0.02,
                                                "disc.as_published": frozenset({"rsm_weight_squared"})}),
     "gather-interpolated": lambda: Plan(
         "interpolated between 9 x 9 coarse pixels where surfaces are similar", room(SPOT, DOWN, smooth=True), (31, 25),
-        12,
-        {"samples": 12, "radius": 0.4, "interpolation": "coarse", "interpolation.grid": 9, "interpolation.reach": 0.2}),
+        12, {"samples": 12, "radius": 0.4, "interpolation": "coarse", "interpolation.grid": 9,
+             "interpolation.reach": 0.2}),
 }
 FULL_PLANS: dict[str, Callable[[], Plan]] = {
     "gather-no-flux": lambda: Plan("a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True),

@@ -119,8 +119,8 @@ def add_interpolation(recipe: Recipe, settings: Interpolation) -> None:
                        settings.least_cosine, math.inf)), "similar pixels"),
                    Decoy("the reach is not scaled by the picture's extent", lambda a, r: run(a, r, SimilarityLimits(
                        settings.least_cosine, settings.reach)), "reach times the diagonal"),
-                   Decoy("coarse pixels are the first of their cells", lambda a,
-                         r: run(a, r, places=_first(coarse, covered)),
+                   Decoy("coarse pixels are the first of their cells",
+                         lambda a, r: run(a, r, places=_first(coarse, covered)),
                          "the middles of cells"),
                    Decoy("coarse pixels are one further", lambda a, r: run(a, r, places=(
                        between(coarse[0], covered.shape[0]), between(coarse[1], covered.shape[1]))),

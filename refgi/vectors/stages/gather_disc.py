@@ -67,13 +67,10 @@ def add_centers(recipe: Recipe, index: int, maps: Projection, decided: bool) -> 
     recipe.add(f"gather{index}.center", "where on the map each pixel's surface point lies", run,
                (RECEIVERS[0], RECEIVERS[2], *planes), {
                    center: Spec("(row, column), row, column", "texel", "place on the stacked maps, texel centres at + "
-                                "1/2; "
-                                "outside: where the straight way to the middle of the first map meets its border, "
-                                "behind "
-                                "the lamp as far out as can be; 0 without surface"),
+                                "1/2; outside: where the straight way to the middle of the first map meets its border, "
+                                "behind the lamp as far out as can be; 0 without surface"),
                    depth: Spec("row, column", "m", "depth along the axis of the map it lies on, whose border is part "
-                               "of it; inf outside "
-                               "of all and without surface")},
+                               "of it; inf outside of all and without surface")},
                paper=PAPER, exact=(RECEIVERS[0], *planes) if decided else (), decoys=tuple(decoys))
 
 
@@ -89,8 +86,8 @@ def _with_distance(run: Run, origin: str, depth: str) -> Run:
 def _undivided(run: Run, maps: Projection, name: str, center: str) -> Run:
     def altered(arrays: Arrays, real: Any) -> Arrays:
         flat = np.asarray(arrays[RECEIVERS[0]], np.float64).reshape(3, -1)
-        right, down, _ = np.asarray(arrays[f"{name}.frame"])[0] @ (flat - np.asarray(arrays[f"{name}.origin"])[0][:,
-            None])
+        away = flat - np.asarray(arrays[f"{name}.origin"])[0][:, None]
+        right, down, _ = np.asarray(arrays[f"{name}.frame"])[0] @ away
         half = np.asarray(arrays[f"{name}.half"])
         plane = np.clip(np.stack([down / half[1], right / half[0]]), -1, 1)
         made = dict(run(arrays, real))
@@ -161,9 +158,8 @@ def add_disc_sum(recipe: Recipe, index: int, disc: Disc, offset: float) -> None:
 
     recipe.add(f"gather{index}.sum", "irradiance of the texels in each pixel's disc", run,
                (*RECEIVERS, texel, WEIGHT, *surface), {light: Spec(
-                   "rgb, row, column", "W/m^2", "R^2 T / S sum of weight E_t, T texels of one map, S samples, R "
-                   "radius in "
-                   "map widths, E_t the light of one texel by Eq. 2; without albedo/pi", "linear RGB")},
+                   "rgb, row, column", "W/m^2", "R^2 T / S sum of weight E_t, T texels of one map, S samples, R radius "
+                   "in map widths, E_t the light of one texel by Eq. 2; without albedo/pi", "linear RGB")},
                paper=PAPER, exact=(RECEIVERS[0], surface[0]), decoys=(
                    Decoy("the distance does not count", literal(power=0), "RSM 2005: 1/r^4 with vectors not "
                          "normalised"),
@@ -184,8 +180,7 @@ def add_disc_sum(recipe: Recipe, index: int, disc: Disc, offset: float) -> None:
 
 def literal_sum(
     arrays: Arrays, index: int, disc: Disc, offset: float, *, power: int = 2, receiver: bool = True,
-    sender: bool = True,
-    either: bool = False, on_map: bool = False,
+    sender: bool = True, either: bool = False, on_map: bool = False,
 ) -> Array:
     """Return the gathered sum with a bug, in float64: (3, h, w)."""
     x, n = (np.asarray(arrays[name], np.float64) for name in RECEIVERS[:2])
@@ -201,8 +196,8 @@ def literal_sum(
         cut = np.abs if either else lambda cosine: np.maximum(0, cosine)
         leaving, arriving = (normal[:, one] * w).sum(axis=0), -(n * w).sum(axis=0)
         fall = np.divide(1.0, r**power, out=np.zeros_like(r), where=r > 0)
-        term = (cut(leaving) if sender else leaving > 0) * (cut(arriving)
-                                                            if receiver else arriving > 0) * fall / math.pi
+        term = (cut(leaving) if sender else leaving > 0) * fall / math.pi
+        term = term * (cut(arriving) if receiver else arriving > 0)
         total += np.where(here, share * term, 0) * flux[:, one]
         counted += here
     scale = disc.texels / (np.maximum(counted, 1) if on_map else len(texel))

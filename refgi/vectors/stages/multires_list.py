@@ -40,8 +40,7 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
     whole = {name.replace(".", "__"): lambda a: np.where(a == EMPTY, ENOUGH, a) for name in states}
     beside = {name.replace(".", "__"): _spread_to_sides for name in marks}
     names = {"off": "neighbours across a corner do not count", "corner": "of neighbours across a corner only those "
-             "count "
-             "that no cell between shows", "literal": "every neighbour across a corner counts",
+             "count that no cell between shows", "literal": "every neighbour across a corner counts",
              "full8": "all eight neighbours count"}
     recipe.add("multires.states", "which cells are refined, by their own need or across a corner", run, (IDS, *marks), {
         name: Spec("row, column", "1", "0 no surface, 1 a subsplat may end here, 2 refined", tier="T0")
@@ -112,11 +111,9 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
 
     what = {"level": "cell of 2^level pixels a side", "row": "in the grid of its level", "column": "in the grid of its "
             "level", "pixel": "row * width + column of the pixel right and below of the cell's centre, or of the "
-            "nearest "
-            "that shows a surface, the first of several"}
+            "nearest that shows a surface, the first of several"}
     recipe.add("multires.subsplats", "the list of subsplats: cells of the coarsest level row by row, in each depth "
-               "first, "
-               "top left, top right, bottom left, bottom right", run, (IDS, *states),
+               "first, top left, top right, bottom left, bottom right", run, (IDS, *states),
                {f"multires.{key}": Spec("subsplat", "1", one, tier="T0") for key, one in what.items()},
                paper="AMS Sec. 3.3; E-AMS-08, E-AMS-11", decoys=(
                    Decoy("each level is read off by itself, whatever becomes of coarser cells", by_levels, "E-AMS-08"),

@@ -122,9 +122,8 @@ def add_slopes(recipe: Recipe, top: int, relative: bool) -> None:
 
     recipe.add("multires.slopes", "steepest change of depth from pixel to pixel within each cell", run,
                ("gbuffer.depth", IDS), {
-                   name: Spec("row, column", "1/pixel" if relative else "m/pixel", "sqrt(dx^2 + dy^2), the larger "
-                              "of both "
-                              "differences along each axis" + ", over the depth" * relative) for name in names},
+                   name: Spec("row, column", "1/pixel" if relative else "m/pixel", "sqrt(dx^2 + dy^2), the larger of "
+                              "both differences along each axis" + ", over the depth" * relative) for name in names},
                paper="AMS Sec. 3.2.1", exact=("gbuffer.depth",), decoys=(
                    Decoy("slopes are not divided by the depth" if relative else "slopes are divided by the depth",
                          lambda a, r: run(a, r, not relative), "measure of the settings"),

@@ -85,13 +85,12 @@ def _add_level(recipe: Recipe, mode: Upsampling, level: int, top: int, filter_al
                    Decoy("the filter of the authors' demo", lambda a, r: run(a, r, how="demo"), "E-AMS-09")]
     if above and mode == "demo":
         decoys += [Decoy("a tent at this level", lambda a, r: run(a, r, how="tent"), "E-AMS-09"),
-                   Decoy("a bilinear filter of the coarser level that counts cells without light as black",
+                   Decoy("a tent that counts cells without light as black",
                          literal(masked=False), "E-AMS-09")]
     rule = {"tent": "weights (1, 2, 1) x (1, 2, 1)", "demo": "weights (1 - f, 1, f) / 2 on the coarser level"}[mode]
-    recipe.add(f"multires.upsample.{level}", f"light of level {level} from that of level {level + 1} and its "
-               "subsplats, "
-               + rule if above else f"light of level {level}, the coarsest", run, (IDS, *SUBSPLATS[:3], LIGHT, *above),
-               {
+    recipe.add(f"multires.upsample.{level}", f"light of level {level} from that of the level above and subsplats, "
+               + rule if above else f"light of level {level}, the coarsest", run,
+               (IDS, *SUBSPLATS[:3], LIGHT, *above), {
                    light: Spec("rgb, row, column", "W/m^2", "indirect irradiance; 0 where the mask is false",
                                "linear RGB"),
                    mask: Spec("row, column", "1", "cells with light: evaluated here or coarser, with surface",
@@ -106,8 +105,8 @@ def _with_list(run: Run, order: tuple[int, int], up: int) -> Run:
         other = np.maximum(level + up, 0)
         places = [np.asarray(arrays[SUBSPLATS[1 + axis]]) for axis in order]
         height, width = covered_of(arrays).shape
-        row, column = (np.minimum(place, (size - 1) >> other) for place,
-                       size in zip(places, (height, width), strict=True))
+        row, column = (np.minimum(place, (size - 1) >> other)
+                       for place, size in zip(places, (height, width), strict=True))
         return run({**arrays, SUBSPLATS[0]: other, SUBSPLATS[1]: row, SUBSPLATS[2]: column}, real)
 
     return altered

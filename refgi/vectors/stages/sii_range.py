@@ -145,8 +145,7 @@ def _add_strengths(recipe: Recipe, parts: tuple[str, ...]) -> None:
     recipe.add("range.strengths", "B, what each light causes at each pixel at most", run,
                (*RECEIVERS, *light_names(recipe)), {name: Spec(
                    "light, row, column", "W/m^2", f"I(w) / r^2 of the {part} part, without the pixel's cosine; 0 "
-                   "without "
-                   "surface", paper=PAPER) for name, part in zip(names, parts, strict=True)},
+                   "without surface", paper=PAPER) for name, part in zip(names, parts, strict=True)},
                paper=PAPER, exact=(RECEIVERS[0], "lights.position"), decoys=(
                    Decoy("the pixel's cosine counts", with_receiver, "the pixel's cosine is taken as 1"),
                    Decoy("the light's cosine is missing", at_peak, "B = I(w) / r^2"),
@@ -168,10 +167,8 @@ def _add_length(recipe: Recipe, drawn: int) -> None:
     recipe.add("range.length", "length under which 5 % of the largest peak leave 125 of 768 pairs", run,
                (*RECEIVERS, *light_names(recipe)), {LENGTH: Spec(
                    "one", "m", "sqrt(0.05 / b), b the k-th largest B over the largest I_0 of all pairs of part and "
-                   "pixel, k "
-                   "= 125/768 of all pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels and "
-                   "lights; 1 "
-                   "where nothing is lit")},
+                   "pixel, k = 125/768 of all pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels "
+                   "and lights; 1 where nothing is lit")},
                paper="SII Fig. 8; E-SII-11", exact=(RECEIVERS[0], "lights.position"), decoys=(
                    Decoy("lights drawn without flux do not count", lambda a, r: run(
                        a, r, a["lights.flux"].shape[1]), "k counts all that were drawn"),
@@ -188,8 +185,8 @@ def _add_low(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
                               real)}
 
     peaks = {f"range__{part}_peak": _mean for part in parts}
-    recipe.add("range.low", f"I_low = {share:g} max I_0 / L^2", run, (LENGTH,
-                                                                      *(f"range.{part}_peak" for part in parts)), {
+    recipe.add("range.low", f"I_low = {share:g} max I_0 / L^2", run,
+               (LENGTH, *(f"range.{part}_peak" for part in parts)), {
         LOW: Spec("one", "W/m^2", "irradiance under which pairs are left out; 0 without lights", paper=PAPER)},
         paper=PAPER, decoys=(
             Decoy("the length is not squared", reading(run, range__length=np.sqrt), PAPER),

@@ -39,8 +39,7 @@ def add_ellipsoids(recipe: Recipe) -> None:
     what = {"center": "place of the centre along the axis", "half_width": "half axis along it",
             "height": "half axis across it"}
     recipe.add("range.ellipsoids", "ellipsoids of revolution around the region in units of R_0: centred where it is "
-               "widest, "
-               "and the least wasteful one through the light", run, ("range.exponent",), {
+               "widest, and the least wasteful one through the light", run, ("range.exponent",), {
                    name: Spec("shape", "1", what[name.split("_", 1)[1]] + ", in R_0") for name in names},
                paper="SII Eq. 7 and 8; E-SII-12, E-SII-13", decoys=(
                    Decoy("the exponent of Eq. 8 is printed as a factor", printed, "E-SII-12"),
@@ -70,9 +69,8 @@ def add_squares(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
     def run(arrays: Arrays, real: Any, own: bool = False) -> Arrays:
         low = float(np.asarray(arrays[LOW])[0])
         reach = relative_reach(share, arrays, frozenset({"per_light_ilow"})) if own else ReachSettings(cut=None)
-        ranges = [light_range(peak, low, reach, part, real) for part, peak in zip((DIFFUSE, GLOSSY),
-            peaks_of(arrays, parts),
-                                                                                 strict=False)]
+        ranges = [light_range(peak, low, reach, part, real)
+                  for part, peak in zip((DIFFUSE, GLOSSY), peaks_of(arrays, parts), strict=False)]
         return {name: one.square for name, one in zip(names, ranges, strict=True)}
 
     def all_of(change: Any) -> Run:
@@ -83,9 +81,8 @@ def add_squares(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
                    name: Spec("light", "m^2", f"square of the largest distance at which the {part} part counts")
                    for name, part in zip(names, parts, strict=True)}, paper=PAPER, decoys=(
                    Decoy("R_0 in place of its square", all_of(np.sqrt), PAPER),
-                   Decoy("I_low is a share of the light's own peak: all reach equally far", lambda a,
-                         r: run(a, r, True),
-                         "E-SII-11"),
+                   Decoy("I_low is a share of the light's own peak: all reach equally far",
+                         lambda a, r: run(a, r, True), "E-SII-11"),
                    Decoy("all have the range of the brightest", all_of(lambda a: np.full_like(a, a.max(initial=0))),
                          PAPER),
                    Decoy("a diameter in place of a radius", all_of(lambda a: a / 4), PAPER)))
@@ -103,9 +100,8 @@ def add_kept(recipe: Recipe, parts: tuple[str, ...]) -> None:
     recipe.add("range.kept", "pairs that count: B >= I_low", run, (LOW, *sources), {
         name: Spec("light, row, column", "1", f"true where the {part} part counts; never where B is 0", tier="T0")
         for name, part in zip(names, parts, strict=True)}, paper=PAPER, decoys=(
-            Decoy("pairs below I_low count", writing(run, **{name.replace(".", "__"): np.logical_not
-                                                             for name in names}),
-                  PAPER),
+            Decoy("pairs below I_low count", writing(run, **{
+                name.replace(".", "__"): np.logical_not for name in names}), PAPER),
             Decoy("all pairs count", reading(run, range__low=np.zeros_like), PAPER),
             Decoy("I_low is divided by pi", reading(run, range__low=lambda a: a / np.pi), PAPER)))
 
@@ -159,8 +155,7 @@ def add_sum(recipe: Recipe, parts: tuple[str, ...], pairs: PairSettings) -> None
         decoys += [Decoy("a light's lobe counts where its diffuse part does", masked(lambda masks: [masks[0]] * 2),
                          "each part has its range"),
                    Decoy("a light counts whole where one of its parts does",
-                         masked(lambda masks: [masks[0] | masks[1]] * 2),
-                         "each part has its range")]
+                         masked(lambda masks: [masks[0] | masks[1]] * 2), "each part has its range")]
     recipe.add("range.sum", "irradiance of the pairs that count", run, (LOW, *kept, *RECEIVERS, *names, *area), {
         LIGHT: Spec("rgb, row, column", "W/m^2", "indirect irradiance without visibility and albedo/pi", "linear RGB")},
         paper=PAPER, exact=(RECEIVERS[0], "lights.position"), decoys=tuple(decoys))

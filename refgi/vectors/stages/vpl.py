@@ -128,9 +128,9 @@ def _add_visible(recipe: Recipe, scene: Scene) -> None:
 
     recipe.add("vpl.visible", "whether light reaches each pixel from each pixel light", run,
                (*GEOMETRY, *RECEIVERS, FACING, *LIGHTS), {VISIBLE: Spec(
-                   "light, row, column", "1", "true where the normals of light and pixel and the pixel's face look "
-                   "at the "
-                   "other, whatever the lobe, and nothing lies between", tier="T0")}, paper="SII Eq. 2 with V", decoys=(
+                   "light, row, column", "1", "true where the normals of light and pixel and the pixel's face look at "
+                   "the other, whatever the lobe, and nothing lies "
+                   "between", tier="T0")}, paper="SII Eq. 2 with V", decoys=(
                    Decoy("the ray goes on behind the light", traced(lambda rays: rays.visible(rays.reach * 1e4)), "V"),
                    Decoy("rays start on the surface without any lift", traced(from_points), "ends are lifted"),
                    Decoy("rays start below the surface", lambda a, r: run(a, r, -LIFT), "lifted to the lit side"),
@@ -194,9 +194,8 @@ def _add_sum(recipe: Recipe) -> None:
     bugs = [one for one in pair_decoys(unshadowed, False, "lights.lobe_flux" in recipe.specs)
             if not any(word in one.cause for word in SHADOWED)]
     recipe.add("vpl.sum", "irradiance of the visible pixel lights at every pixel, without albedo/pi", run,
-               (*RECEIVERS, VISIBLE, *names), {LIGHT: Spec("rgb, row, column", "W/m^2", "indirect irradiance",
-                                                           "linear RGB",
-                                                           EQ2)}, paper=EQ2,
+               (*RECEIVERS, VISIBLE, *names), {LIGHT: Spec(
+                   "rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)}, paper=EQ2,
                exact=(RECEIVERS[0], "lights.position"), decoys=(
                    *(Decoy(one.cause, shadowed(one.run), EQ2) for one in bugs),
                    Decoy("visibility does not count", every, "V"),

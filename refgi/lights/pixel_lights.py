@@ -141,7 +141,20 @@ def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
 
 
 def choose_pixel_lights(rsms: Sequence[Rsm], **options: Any) -> PixelLights:
-    """Return texels of maps as pixel lights: `lights_of` what `draw_texels` draws with the same options."""
+    """Return texels of maps as pixel lights.
+
+    Parameters
+    ----------
+    rsms : sequence of Rsm
+        One map a light.
+    **options : object
+        Those of `draw_texels`.
+
+    Returns
+    -------
+    PixelLights
+        Those with flux: `lights_of` what `draw_texels` draws.
+    """
     return lights_of(rsms, draw_texels(rsms, **options))
 
 

@@ -3,6 +3,7 @@
 #include "stages.h"
 #include <stdlib.h>
 
+#define INSIDE 1.5f
 #define STEEPEST 80.0f
 #define LEAST_RATIO 1.05f /* of the farthest to the nearest */
 
@@ -37,7 +38,9 @@ void series_stage(Case *c) {
     make(c, "series.range")->f[0] = 1.0f - 2.0f * high;
 }
 
-/* Depth 0 at what is nearest, h = max(2 e - 1, e / 2) at what is farthest, log in between. */
+static int logarithmic(Case *c) { return json_is(json_at(fact(c, "csm"), "depth_scale"), "log_map"); }
+
+/* Depth 0 at what is nearest, h = max(2 e - 1, e / 2) at what is farthest; in between by the distance or its log. */
 void scale_stage(Case *c) {
     const Array *near = get(c, "maps.near");
     const float *far = get(c, "maps.far")->f;
@@ -45,18 +48,24 @@ void scale_stage(Case *c) {
     for (int k = 0; k < near->size; k++) {
         if (near->f[k] == INFINITY) continue;
         origin[k] = near->f[k];
-        slope[k] = fmaxf(2.0f * e - 1.0f, 0.5f * e) / log2f(fmaxf(far[k] / near->f[k], LEAST_RATIO));
+        float ratio = fmaxf(far[k] / near->f[k], LEAST_RATIO);
+        slope[k] = fmaxf(2.0f * e - 1.0f, 0.5f * e) / (logarithmic(c) ? log2f(ratio) : near->f[k] * (ratio - 1.0f));
     }
 }
 
-typedef struct { float origin, slope, range; } Scale;
+typedef struct { float origin, slope, range; int logarithmic; } Scale;
 
 static float depth_of(const Scale *s, float z) {
-    return z == INFINITY ? s->range : clampf(log2f(z / s->origin) * s->slope, 0.0f, s->range);
+    float beyond = s->logarithmic ? log2f(z / s->origin) : z - s->origin;
+    return z == INFINITY ? s->range : clampf(beyond * s->slope, 0.0f, s->range);
+}
+
+static float distance_of(const Scale *s, float t) {
+    return s->logarithmic ? s->origin * exp2f(t / s->slope) : s->origin + t / s->slope;
 }
 
 static Scale scale_of(Case *c, int map) {
-    Scale s = {get(c, "scale.origin")->f[map], get(c, "scale.slope")->f[map], get(c, "series.range")->f[0]};
+    Scale s = {get(c, "scale.origin")->f[map], get(c, "scale.slope")->f[map], get(c, "series.range")->f[0], logarithmic(c)};
     return s;
 }
 
@@ -70,9 +79,10 @@ void depths_stage(Case *c) {
         float s = 2.0f * ((float)(k % n) + 0.5f) / (float)n - 1.0f, t = 2.0f * ((float)(k / n % n) + 0.5f) / (float)n - 1.0f;
         float q = s * s + t * t;
         int column = k % n, row = k / n % n;
-        if (q > 1.0f) {
-            column = (int)(0.5f * (s / q + 1.0f) * (float)n);
-            row = (int)(0.5f * (t / q + 1.0f) * (float)n);
+        if (q > 1.0f) { /* no nearer to the rim than a texel whose centre lies within must be */
+            float shrink = fminf(1.0f / sqrtf(q), 1.0f - INSIDE / (float)n) / sqrtf(q);
+            column = (int)(0.5f * (s * shrink + 1.0f) * (float)n);
+            row = (int)(0.5f * (t * shrink + 1.0f) * (float)n);
         }
         if (scale.origin > 0.0f) out[k] = depth_of(&scale, depth->f[k / (n * n) * n * n + row * n + column]);
     }
@@ -202,7 +212,7 @@ void penumbra_stage(Case *c) {
         if (blocked < least) continue;
         float mean = 0.5f * means->f[(map * means->shape[1] + 4 * m) * plane + pixel];
         float behind = (mean - test(c, means, k, plane, 2 * m, t - bias)) / blocked;
-        float z = clampf(s.origin * exp2f(behind / s.slope), a.near, d);
+        float z = clampf(distance_of(&s, behind), a.near, d);
         shaded[k] = 1;
         z_avg[k] = z;
         put_region(&a, away, d, z, region + 3 * plane * map + pixel, plane);

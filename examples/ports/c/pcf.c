@@ -10,7 +10,8 @@ static int in_disc(const Test *t, int row, int column) {
     return row >= 0 && column >= 0 && row < t->n && column < t->n && s * s + r * r <= 1.0f;
 }
 
-/* Whether what a texel holds lies on the light's side of the receiver's plane, by more than the slack. */
+/* Whether what a texel holds lies on the light's side of the receiver's plane, and before the receiver, by more than
+   the slack. */
 static int hides(const Test *t, int row, int column) {
     float s = 2.0f * ((float)column + 0.5f) / (float)t->n - 1.0f, r = 2.0f * ((float)row + 0.5f) / (float)t->n - 1.0f;
     float q = 1.0f + s * s + r * r, z = t->depth[row * t->n + column];
@@ -19,6 +20,7 @@ static int hides(const Test *t, int row, int column) {
                        scale(row3(t->frame + 6), 2.0f - q)), 1.0f / q);
     float height = dot(t->normal, sub(t->center, t->place)), along = dot(t->normal, w);
     if (height < 0.0f) height = -height, along = -along;
+    if (z >= length(sub(t->place, t->center)) * (1.0f - t->slack)) return 0;
     return along >= 0.0f || z < height / -along * (1.0f - t->slack);
 }
 
@@ -29,7 +31,7 @@ static float share_of(const Test *t, int side) {
     int column = (int)(0.5f * (s + 1.0f) * (float)t->n), row = (int)(0.5f * (r + 1.0f) * (float)t->n), hidden = 0, count = 0;
     for (int y = row - side / 2; y <= row + side / 2; y++)
         for (int x = column - side / 2; x <= column + side / 2; x++) {
-            if (!in_disc(t, y, x)) continue;
+            if (!in_disc(t, y, x) && (y != row || x != column)) continue; /* the receiver's own counts always */
             hidden += hides(t, y, x);
             count++;
         }

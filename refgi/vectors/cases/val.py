@@ -56,8 +56,8 @@ SETUPS = {setup.id: setup for setup in (
           room(SPOT, matte=True, smooth=True, camera=ABOVE), (15, 11), 3, 24, clusters=9, interleaving=1,
           depth_scale="map"),
     Setup("val-interleaved", "blocks of 3 x 3 pixels in a picture of odd size, PCF, blur with every subset; 4 m from "
-          "the origin, pixels without surface", far_away(room(SPOT, BULB, matte=True), 4.0), (20, 14), 16, 36,
-          clusters=5, interleaving=3, visibility="pcf"),
+          "the origin, pixels without surface, a ball", far_away(room(SPOT, BULB, matte=True, smooth=True), 4.0),
+          (20, 14), 16, 36, clusters=5, interleaving=3, visibility="pcf", blur_extent=0.3),
 )}
 FULL_SETUPS = {setup.id: setup for setup in (
     Setup("val-published", "the printed forms: raw distances, squares of alpha / pi, the search by solid angle; blocks "

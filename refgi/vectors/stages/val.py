@@ -204,6 +204,7 @@ def _add_blur(recipe: Recipe, settings: BoxBlur | GeometryBlur, block: int) -> N
         Decoy("pixels of other surfaces count", lambda a, r: run(a, r, BoxBlur()), BLUR),
         Decoy("normals are not compared", other(cosine=-1.0), BLUR),
         Decoy("distances are not compared", other(extent=10.0), BLUR),
+        Decoy("the least cosine is 0.5", other(cosine=0.5), BLUR),
         Decoy("the extent counts across, not around", other(extent=settings.extent / 2), BLUR),
         Decoy("subsets that an edge cuts off are " + ("left out" if settings.every_subset else "replaced"),
               other(every_subset=not settings.every_subset), BLUR),

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from refgi.vectors.manifest import Result, StageVerdict
 
 
+MOST_STORIES = 20  # wrong stages that are told in full
+
+
 @click.group("vectors")
 def command() -> None:
     """Test vectors for ports: data of every stage, and the check that names the first wrong one."""
@@ -97,18 +100,21 @@ def tiers_of(texts: tuple[str, ...]) -> dict[str, str]:
 
 
 def report(result: "Result") -> str:
-    """Return what people read: one line a stage that ran, then the first wrong stage of each case."""
+    """Return what people read: one line a stage that ran, then what is wrong, stage by stage."""
     from refgi.vectors.words import story
 
     ran = [one for one in result.stages if one.verdict != "not-run"]
     rows = [("case", "stage", "verdict", "worst / bound", "")]
     rows += [(one.case, one.stage, one.verdict, _worst(one), _remark(one)) for one in ran]
     lines = [table(rows)] if ran else []
-    told: set[str] = set()
-    for one in ran:
-        if one.verdict in ("out", "invalid") and one.upstream != "dirty" and one.case not in told:
-            told.add(one.case)
-            lines += ["", *story(one)]
+    wrong = [one for one in ran if one.verdict in ("out", "invalid") and one.upstream != "dirty"]
+    for one in wrong[:MOST_STORIES]:
+        lines += ["", *story(one)]
+    if len(wrong) > MOST_STORIES:
+        lines += ["", f"and {len(wrong) - MOST_STORIES} stages more; --json and --html tell all"]
+    lines += ["", *(f"unknown: {one}" for one in result.unknown)] if result.unknown else []
+    if not ran:
+        lines.append("OUTPUT/<case>/<array>.npy is where arrays are looked for")
     idle = len(result.stages) - len(ran)
     tally = {kind: sum(one.verdict == kind for one in ran) for kind in ("exact", "within", "out", "invalid")}
     counts = ", ".join(f"{count} {kind}" for kind, count in tally.items() if count)
@@ -120,6 +126,8 @@ def report(result: "Result") -> str:
 
 def _worst(stage: "StageVerdict") -> str:
     ratios = [one.worst for one in stage.arrays if one.worst is not None]
+    if stage.verdict == "invalid" or (stage.verdict == "out" and not any(ratios)):
+        return ""
     return f"{max(ratios):.3g}" if ratios else ""
 
 

@@ -79,7 +79,7 @@ def chained_budgets(case: Case, known: Arrays, seed: int) -> dict[str, Budget]:
         for step in case.stages:
             if is_estimate(case, step):
                 continue
-            changed = {name: _rounded_at_random(array, random) for name, array in
+            changed = {name: array if name in step.exact else _rounded_at_random(array, random) for name, array in
                        as_read(chain, step.reads, np.float64).items()}
             chain.update(_run(step, changed))
         runs.append(chain)

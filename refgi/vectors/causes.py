@@ -58,7 +58,7 @@ def explain(
     list of Cause
         None where no hypothesis explains `EXPLAINED` of the elements that differ.
     """
-    found = [*_plain(difference)]
+    found = told_at_once(difference)
     if not found:
         guesses = [*_factors(difference, factors), *_axes(difference), *_coded(difference), *_indices(difference),
                    *_taken_for(difference, others)]
@@ -67,6 +67,33 @@ def explain(
         found = found or [*_order(difference), *_slight(difference)]
     unique = {cause.cause: cause for cause in sorted(found, key=lambda one: -round(one.share, 2))}
     return list(unique.values())
+
+
+def told_at_once(difference: Difference) -> list[Cause]:
+    """Return what is seen without a hypothesis; none where bytes are swapped, which makes numbers that are none."""
+    swapped = difference.expected.astype("<f4").view("<u4").byteswap().view("<f4")
+    if difference.expected.dtype.kind == "f" and np.array_equal(swapped, difference.got, equal_nan=True):
+        return [Cause(cause="bytes are swapped (big-endian)", share=1.0)]
+    return [*_plain(difference)]
+
+
+def places_of(difference: Difference) -> list[Cause]:
+    """Return where a difference without a cause lies: what all elements that differ have in common."""
+    at = np.argwhere(difference.out)
+    names = [one.strip() for one in difference.entry.axes.split(",")]
+    if not len(at) or len(names) != difference.out.ndim:
+        return []
+    found = ["they are 0 here"] if not difference.got[difference.out].any() else []
+    found += ["0 is expected of all of them"] if not difference.expected[difference.out].any() else []
+    for axis, name in enumerate(names):
+        size, indices = difference.out.shape[axis], np.unique(at[:, axis])
+        if size > 1 and len(indices) == 1:
+            found.append(f"all lie at {name} {indices[0]}{' (the last)' if indices[0] == size - 1 else ''}")
+        elif size > 4 and len(indices) == 2 and indices[0] == 0 and indices[1] == size - 1:
+            found.append(f"all lie in the first and the last {name}")
+    share = len(at) / difference.out.size
+    return [Cause(cause=f"no known cause fits; {share:.0%} of {difference.name} differ" + (
+        f": {', '.join(found)}" if found else ""), share=0.0)]
 
 
 def explained(difference: Difference, predicted: Array, places: Array | None = None) -> float:

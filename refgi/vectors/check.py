@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from refgi.errors import InputError
-from refgi.vectors.causes import EXPLAINED, Difference, explain, explained
+from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of, told_at_once
 from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
 from refgi.vectors.manifest import (
     KIT,
@@ -27,10 +27,12 @@ from refgi.vectors.manifest import (
     read_model,
 )
 from refgi.vectors.spec import Array
+from refgi.vectors.words import did_you_mean
 
 ALL_WITHIN, OUT, NOT_COMPARABLE, DAMAGED = 0, 1, 4, 5
 TIERS = ("T0", "T1", "T2")
 CAUSES = 3  # that are told
+MAGIC = b"\x93NUMPY"
 ORDER: tuple[Verdict, ...] = ("out", "invalid", "within", "exact", "not-run")
 
 
@@ -47,10 +49,19 @@ class Asked:
     cases: tuple[str, ...] = ()  # the same of ids
     tiers: Mapping[str, str] = field(default_factory=dict)  # beginning of a stage's name -> tier; "" is for all
 
+    def fits(self, stage: str) -> bool:
+        """Return whether a stage is asked for: by its beginning, or by what follows a dot."""
+        return not self.stages or fits(stage, self.stages)
+
     def tier_of(self, stage: str) -> str:
         """Return the tier of a stage's floats: that of the longest beginning of its name."""
         fitting = [start for start in self.tiers if stage.startswith(start)]
         return self.tiers[max(fitting, key=len)] if fitting else "T1"
+
+
+def fits(stage: str, names: tuple[str, ...]) -> bool:
+    """Return whether a stage's name begins with one of some, or one of its parts after a dot does."""
+    return stage.startswith(names) or any(f".{name}" in stage for name in names)
 
 
 class Kit:
@@ -112,14 +123,19 @@ def read_array(file: Path) -> Array:
     Raises
     ------
     DamagedError
-        If it is none.
+        If it is none, or holds fewer or more bytes than its header says.
     """
     try:
-        array: Array = np.load(file, allow_pickle=False)
+        with file.open("rb") as stream:
+            if stream.read(len(MAGIC)) != MAGIC:
+                raise DamagedError(f"{file}: expected an .npy file, got one without its header", file=str(file))
+            stream.seek(0)
+            array: Array = np.lib.format.read_array(stream, allow_pickle=False)
+            rest = len(stream.read())
     except (OSError, ValueError, EOFError) as error:
-        raise DamagedError(f"{file}: expected an .npy array, got {_reason(error)}", file=str(file)) from error
-    if not isinstance(array, np.ndarray):
-        raise DamagedError(f"{file}: expected an .npy array, got an archive", file=str(file))
+        raise DamagedError(f"{file}: cannot be read as .npy: {_reason(error)}", file=str(file)) from error
+    if rest:
+        raise DamagedError(f"{file}: {rest} bytes more than its header says", file=str(file))
     return array
 
 
@@ -158,27 +174,61 @@ def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
         wrong: set[str] = set()  # arrays that are out, or made from such
         names.update(step.name for step in case.stages)
         for step in case.stages:
-            if asked.stages and not step.name.startswith(asked.stages):
+            if not asked.fits(step.name):
                 continue
             verdict = check_stage(kit, case, step, output, asked, dirty=bool(wrong & set(step.reads)))
             if verdict.verdict in ("out", "invalid") or (asked.chained and wrong & set(step.reads)):
                 wrong.update(step.writes)
             verdicts.append(verdict)
-    if not verdicts:
-        raise InputError(f"--stage, --case: expected one of {', '.join(sorted(names)) or 'the kit'}, got none of them")
-    return _summed(kit, asked, verdicts, begun)
+    _require_known(kit, asked, names)
+    return _summed(kit, asked, verdicts, begun, _unknown(kit, output))
 
 
-def _summed(kit: Kit, asked: Asked, verdicts: list[StageVerdict], begun: set[str]) -> Result:
+def _require_known(kit: Kit, asked: Asked, stages: set[str]) -> None:
+    """Refuse names of cases, stages and tiers that nothing has, with the nearest that there are."""
+    ids = [entry.id for entry in kit.manifest.cases]
+    parts = {part for stage in stages for part in stage.split(".")}
+    for case in asked.cases:
+        if not any(one.startswith(case) for one in ids):
+            raise InputError(f"--case: expected the start of a case's id, got {case!r}{did_you_mean(case, ids)}")
+    for option, names in (("--stage", asked.stages), ("--tier", tuple(name for name in asked.tiers if name))):
+        for name in names:
+            if not any(fits(stage, (name,)) for stage in stages):
+                where = f" of {', '.join(asked.cases)}" if asked.cases else ""
+                raise InputError(f"{option}: expected the start of a stage's name{where}, got {name!r}"
+                                 f"{did_you_mean(name, sorted(stages | parts))}")
+
+
+def _unknown(kit: Kit, output: Path) -> tuple[str, ...]:
+    """Return what a port has written that the kit does not know: folders, arrays, files of other kinds."""
+    ids = [entry.id for entry in kit.manifest.cases]
+    found = [f"{place.name}: no such case{did_you_mean(place.name, ids)}" for place in sorted(output.iterdir())
+             if place.name not in (*ids, "cases", "scenes", "schema") and place.suffix in ("", ".npy")
+             and place.name not in ("VERSION",)]
+    for case in kit.cases(Asked(cases=tuple(ids))):
+        folder = output / case.id
+        arrays = list(case.arrays)
+        if folder.is_dir():
+            found += [f"{case.id}/{file.name}: no array of this case{did_you_mean(file.name, [*arrays])}"
+                      for file in sorted(folder.iterdir()) if file.is_file() and (
+                          file.suffix != ".npy" or file.stem not in case.arrays)]
+    return tuple(found)
+
+
+def _summed(
+    kit: Kit, asked: Asked, verdicts: list[StageVerdict], begun: set[str], unknown: tuple[str, ...]
+) -> Result:
     first = next(((one.case, one.stage) for one in verdicts if one.verdict in ("out", "invalid")
                   and one.upstream != "dirty"), None)
     found = {one.verdict for one in verdicts}
     missing = asked.stages and any(one.verdict == "not-run" and one.case in begun for one in verdicts)
+    damaged = any(array.damaged for one in verdicts for array in one.arrays)
     ran = found - {"not-run"}
-    code = OUT if "out" in found else NOT_COMPARABLE if "invalid" in found or missing or not ran else ALL_WITHIN
+    incomparable = "invalid" in found or missing or not ran
+    code = DAMAGED if damaged else OUT if "out" in found else NOT_COMPARABLE if incomparable else ALL_WITHIN
     worst = next(verdict for verdict in ORDER if verdict in found)
     return Result(kit=kit.manifest.kit, vectors=kit.manifest.vectors, mode="chained" if asked.chained else "isolated",
-                  verdict=worst, exit_code=code, first=first, stages=tuple(verdicts))
+                  verdict=worst, exit_code=code, first=first, stages=tuple(verdicts), unknown=unknown)
 
 
 def check_stage(
@@ -188,7 +238,13 @@ def check_stage(
     got = {name: file for name in step.writes if (file := find_array(output, case.id, name)) is not None}
     tier = asked.tier_of(step.name)
     judged: dict[str, Judged] = {}
-    arrays = {name: read_array(file) for name, file in got.items()}
+    arrays: dict[str, Array] = {}
+    for name, file in got.items():
+        try:
+            arrays[name] = read_array(file)
+        except DamagedError as error:
+            fault = ArrayVerdict(name=name, verdict="invalid", tier=tier, said=str(error), damaged=True)
+            judged[name] = Judged(fault)
     for name in arrays:
         judged[name] = _judged(kit, case, name, arrays, tier, asked)
     verdicts = [judged[name].verdict if name in judged else _not_run(name, tier, bool(got)) for name in step.writes]
@@ -266,6 +322,9 @@ def _causes(
     differing = {name: Difference(name, case.arrays[name], kit.array(case, name), arrays[name], one.out, one.limit)
                  for name, one in judged.items() if one.verdict.verdict == "out" and one.out is not None
                  and one.limit is not None}
+    plain = [cause for one in differing.values() for cause in told_at_once(one)]
+    if plain:
+        return plain
     shapes = {name: array.shape for name, array in arrays.items()}
     found = []
     for suspect in step.suspects:
@@ -281,6 +340,7 @@ def _causes(
     for one in differing.values():
         found += explain(one, case.factors, {name: kit.array(case, name) for name in case.arrays
                                               if case.arrays[name].shape == one.expected.shape})
+    found = found or [cause for one in differing.values() for cause in places_of(one)]
     unique = {one.cause: one for one in sorted(found, key=lambda one: -round(one.share, 2))}
     return list(unique.values())
 

@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refgi.vectors.bounds import FLUSHED, SIGMAS, distance
+from refgi.vectors.bounds import FLUSHED, SIGMAS, distance, large_value
 from refgi.vectors.manifest import ArrayEntry, ArrayVerdict, Tolerance, Verdict
 from refgi.vectors.spec import Array
 
 FEW = 0.005  # share of pixels that may be beyond SIGMAS standard errors
+WORTH = 1e-3  # of the large values: errors of which size make an element the worst one
 STEADY = (0.4, 2.5)  # mean square of z over the pixels of an estimate: right variances, and no structure
 
 
@@ -68,7 +69,7 @@ def judge(
     few = 0.0 if tolerance is None else tolerance.outliers
     count = int(np.count_nonzero(out))
     verdict: Verdict = "exact" if not off.any() else "within" if count <= few * out.size else "out"
-    worst, place = _worst(off, allowed, out)
+    worst, place = _worst(off, allowed, out, expected)
     said = ArrayVerdict(name=name, verdict=verdict, tier=tier, worst=worst, element=place, outside=count,
                         masked=int(np.count_nonzero(spared)))
     return Judged(said.model_copy(update=_values(expected, got, allowed, place)), out, allowed)
@@ -108,23 +109,29 @@ def judge_estimate(
     few = np.count_nonzero(out) <= FEW * out.size
     fine = bool(few) and bias <= SIGMAS and (STEADY[0] <= steady <= STEADY[1] or not sigma.any())
     verdict: Verdict = "exact" if not off.any() else "within" if fine else "out"
-    worst, place = _worst(off, SIGMAS * sigma, z >= z.max(initial=0.0))
+    worst, place = _worst(off, SIGMAS * sigma, z >= z.max(initial=0.0), expected)
     text = f"sum {bias:.1f} standard errors off, mean square of z {steady:.2f}"
     said = ArrayVerdict(name=name, verdict=verdict, tier="T3", worst=worst, element=place, said=text,
                         outside=int(np.count_nonzero(out)))
     return Judged(said.model_copy(update=_values(expected, got, SIGMAS * sigma, place)), out, SIGMAS * sigma)
 
 
-def _worst(off: Array, allowed: Array, out: Array) -> tuple[float | None, tuple[int, ...] | None]:
-    """Return the largest error over its bound and where it is, among the elements that are out or else all."""
+def _worst(
+    off: Array, allowed: Array, out: Array, expected: Array
+) -> tuple[float | None, tuple[int, ...] | None]:
+    """Return the largest error over its bound, and where it is worst beside the array's large values.
+
+    Among the elements that are out, or else all.
+    """
     if off.size == 0:
         return None, None
     floor = np.finfo(np.float64).tiny
     with np.errstate(over="ignore"):
         ratio = np.where(off > 0, off / np.maximum(allowed, floor), 0.0)
-    among = np.where(out, ratio, -1.0) if out.any() else ratio
-    at = np.unravel_index(int(np.argmax(among)), off.shape)
-    worst = float(ratio[at])
+    among = out if out.any() else np.ones(out.shape, np.bool_)
+    worst = float(ratio[among].max())
+    beside = off / (allowed + WORTH * large_value(expected) + floor) if expected.dtype.kind == "f" else off
+    at = np.unravel_index(int(np.argmax(np.where(among, beside, -1.0))), off.shape)
     return (worst if np.isfinite(worst) and worst < 1e30 else None), tuple(int(k) for k in at)
 
 

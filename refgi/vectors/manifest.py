@@ -122,6 +122,7 @@ class ArrayVerdict(_Strict):
     outside: int = 0  # elements beyond their bound
     masked: int = 0  # masked elements that differ
     said: str = ""  # why it is invalid
+    damaged: bool = False  # its file cannot be read
 
 
 class Cause(_Strict):
@@ -153,6 +154,7 @@ class Result(_Strict):
     exit_code: int
     first: tuple[str, str] | None  # case and stage of the first wrong one
     stages: tuple[StageVerdict, ...]
+    unknown: tuple[str, ...] = ()  # what the output holds that the kit does not know
 
 
 SCHEMAS: dict[str, type[_Strict]] = {"kit.json": KitManifest, "manifest.json": CaseManifest, "result.json": Result}

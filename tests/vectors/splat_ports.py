@@ -22,7 +22,7 @@ def made(id):
 @cache
 def bounds_of(id, name):
     """Return the bounds of one stage's arrays."""
-    return isolated_bounds(stage_of(id, name), made(id)[1], seed=1)
+    return isolated_bounds(made(id)[0], stage_of(id, name), made(id)[1], seed=1)
 
 
 def stage_of(id, name):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
-from refgi.vectors.check import ALL_WITHIN, NOT_COMPARABLE, OUT, DamagedError, Kit, stage_of_array
+from refgi.vectors.check import ALL_WITHIN, DAMAGED, NOT_COMPARABLE, OUT, DamagedError, Kit, stage_of_array
 from tests.vectors.port import Port
 
 
@@ -147,14 +147,28 @@ def test_damaged_kits_and_outputs_are_told(kit, port, tmp_path):
     with pytest.raises(DamagedError, match="strange"):
         Kit(copy)
     port.kit = kit
-    (port.folder / "sii-warp-a" / "rsm0.flux.npy").write_bytes(b"no array")
-    with pytest.raises(DamagedError, match=r"rsm0\.flux\.npy: expected an \.npy array"):
-        port.check()
+    file = port.folder / "sii-warp-a" / "rsm0.flux.npy"
+    whole = file.read_bytes()
+    for content, said in ((b"no array", "without its header"), (whole[:-5], "cannot be read"),
+                          (b"", "without its header"), (whole + b"more", "4 bytes more than its header says")):
+        file.write_bytes(content)
+        result = port.check()
+        assert (result.exit_code, result.first) == (DAMAGED, ("sii-warp-a", "rsm0.flux"))
+        assert said in port.first().arrays[1].said
+        assert {one.verdict for one in result.stages if one.stage != "rsm0.flux"} == {"exact"}
 
 
 def test_unknown_names_are_refused(kit, port, tmp_path):
-    with pytest.raises(InputError, match="--stage"):
-        port.check(stages=("rms",))
+    for asked, said in (({"stages": ("rms0",)}, r"--stage: .*did you mean 'rsm0"),
+                        ({"tiers": {"summ": "T2"}}, r"--tier: .*did you mean 'sum'")):
+        with pytest.raises(InputError, match=said):
+            port.check(**asked)
+    assert {one.stage for one in port.check(stages=("warp",)).stages} == {"rsm0.warp", "rsm1.warp"}
+    port.write("rsm0.fluxx", port.arrays["rsm0.flux"])
+    (port.folder / "sii-warp-aa").mkdir()
+    assert port.check().unknown == (
+        "sii-warp-aa: no such case; did you mean 'sii-warp-a'?",
+        "sii-warp-a/rsm0.fluxx.npy: no array of this case; did you mean 'rsm0.flux'?")
     port.folder = tmp_path / "nowhere"
     with pytest.raises(InputError, match="expected a folder"):
         port.check()

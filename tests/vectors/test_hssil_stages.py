@@ -30,7 +30,8 @@ def made(name):
     """Return a case, all its arrays and the bounds of what it writes."""
     case = CASES[name]()
     known = expected_of(case)
-    return case, known, {key: bound for step in case.stages for key, bound in isolated_bounds(step, known, 1).items()}
+    bounds = (isolated_bounds(case, step, known, 1) for step in case.stages)
+    return case, known, {key: bound for some in bounds for key, bound in some.items()}
 
 
 def outside(array, expected, bound):

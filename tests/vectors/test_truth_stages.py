@@ -89,7 +89,7 @@ def test_twins_are_a_port_of_direct_light(name):
     for step in case.stages:
         read = {key: known[key].astype(float) if known[key].dtype.kind == "f" else known[key] for key in step.reads}
         written = port.outputs(case, step, read)
-        bounds = isolated_bounds(step, known, 1) if written is not None else {}
+        bounds = isolated_bounds(case, step, known, 1) if written is not None else {}
         for key, bound in bounds.items():
             assert not outside(written[key], known[key], bound).any(), key
 

@@ -30,7 +30,8 @@ def made(name):
 @cache
 def bounds(name):
     _, known, steps = made(name)
-    return {step.name: isolated_bounds(step, known, 1) for step in steps}
+    case = ALL[name].case()
+    return {step.name: isolated_bounds(case, step, known, 1) for step in steps}
 
 
 def is_off(got, expected, bound):

@@ -6,8 +6,9 @@ With image-plane coordinates (x, y), r^2 = x^2 + y^2:
 - paraboloid: cos a = (1 - r^2)/(1 + r^2), density 4/(1 + r^2)^2, cut at the unit disc (docs/radiometry).
 
 A spot's intensity depends on r alone. Where it is constant over a texel its integral is a difference of corners; where
-a circle cuts the texel it is a closed form along y and a Gauss rule along x; elsewhere a 4 x 4 Gauss rule. All maps
-are symmetric about both axes; one quadrant is computed and mirrored.
+a circle cuts the texel it is a closed form along y and a Gauss rule along x; elsewhere a 4 x 4 Gauss rule. The texels
+of coarse maps are cut into parts for these rules. All maps are symmetric about both axes; one quadrant is computed and
+mirrored.
 """
 
 import math
@@ -37,6 +38,8 @@ NODES = (0.019855071751231912, 0.10166676129318664, 0.2372337950418355, 0.408282
          0.5917173212478248, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681)
 WEIGHTS = (0.05061426814518853, 0.11119051722668721, 0.15685332293894344, 0.18134189168918083,
            0.18134189168918083, 0.15685332293894344, 0.11119051722668721, 0.05061426814518853)
+LARGEST_PART = 0.17  # side of what the Gauss rules integrate, on the image plane
+MOST_PARTS = 64  # along a side
 SUBSAMPLES = 4  # per side of a texel that a spot's cone crosses askew
 
 
@@ -179,7 +182,14 @@ def _integral(projection: Projection, spot: Circles, i: int, j: int) -> Any:
     shift_x, shift_y = 0.5 * (projection.width % 2), 0.5 * (projection.height % 2)
     y0, y1 = max((i - shift_y) * dy, 0.0), (i + 1 - shift_y) * dy
     x0, x1 = max((j - shift_x) * dx, 0.0), (j + 1 - shift_x) * dx
-    return _power(kind, x0, x1, y0, y1, spot)
+    parts = 1 if spot.span == 0.0 else min(math.ceil(max(dx, dy) / LARGEST_PART), MOST_PARTS)
+    if parts == 1:
+        return _power(kind, x0, x1, y0, y1, spot)
+    total, wide, high = 0.0, (x1 - x0) / parts, (y1 - y0) / parts
+    for p in range(parts):
+        for q in range(parts):
+            total += _power(kind, x0 + p * wide, x0 + (p + 1) * wide, y0 + q * high, y0 + (q + 1) * high, spot)
+    return total
 
 
 @kernel

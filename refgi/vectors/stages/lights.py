@@ -116,6 +116,10 @@ def _upwards(points: Array) -> Array:
     return np.stack([points[:, 0], 1.0 - 2.0**-24 - points[:, 1]], axis=1)
 
 
+def _columns_first(importance: Array) -> Array:
+    return np.ascontiguousarray(importance.T).reshape(importance.shape)
+
+
 def _luminance(name: str, glossy: bool) -> Any:
     def run(arrays: Arrays, real: Any) -> Arrays:
         flux = arrays[f"{name}.flux"] + (arrays[f"{name}.lobe_flux"] if glossy else 0)
@@ -146,6 +150,10 @@ def _add_warped(recipe: Recipe, name: str, maps: int, warp: Warp) -> str:
               Decoy("weights are the density, not 1 / density",
                     writing(run, **{weight.replace(".", "__"): lambda a: 1 / a}), "SII Eq. 5, 6"),
               Decoy("one level more", lambda a, r: run(a, r, Warp(warp.method, warp.levels + 1)), "SII Sec. 3.5"),
+              Decoy("u and v are exchanged", reading(run, **{f"{name}__points": lambda a: a[:, ::-1]}),
+                    "u along columns, v along rows"),
+              Decoy("the importance map is transposed or read along columns",
+                    reading(run, **{f"{name}__importance": _columns_first}), "rows, then columns"),
               Decoy("the importance map is upside down",
                     reading(run, **{f"{name}__importance": lambda a: a[::-1]}), "row 0 is the top row")]
     if warp.levels:

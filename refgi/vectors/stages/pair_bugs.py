@@ -71,6 +71,7 @@ def pair_decoys(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tup
                   literal(norm="full"), "E-SII-03: (P + 1) / 2 pi K"),
             Decoy("lobes reach below the light's horizon", literal(horizon=False), "SII Eq. 3"),
             Decoy("lobes are normalised by (P + 2) / 2 pi", literal(norm="cosine"), "E-SII-03: (P + 1) / 2 pi K"),
+            Decoy("the direction is turned round in lobes", literal(lobe_turned=True), "SII Eq. 3: towards receivers"),
             Decoy("the light's cosine counts for lobes too", literal(lobe_cosine=True), "SII Eq. 3"),
         ]
     return tuple(found)
@@ -95,7 +96,7 @@ def _without_last(array: Array) -> Array:
 def _literal(
     arrays: Arrays, own: bool, *, arrives: str = "positive", leaves: str = "positive", power: int = 2,
     least: float = 0.0, norm: str = "exact", horizon: bool = True, lobe_cosine: bool = False,
-    exchanged: bool = False, joined: str = "sum",
+    lobe_turned: bool = False, exchanged: bool = False, joined: str = "sum",
 ) -> Array:
     """Return Eq. 2 and 3 as printed, or with a bug: (3, h, w), in the type of the arrays."""
     x, n = (np.asarray(arrays[name]) for name in RECEIVERS[:2])
@@ -122,7 +123,8 @@ def _literal(
         exponent = lights.lobe_exponent[None] if own else lights.lobe_exponent[:, None]
         lobe = lights.lobe_flux[:, None] if own else lights.lobe_flux[:, :, None]
         peak = _norms(lights, norm).astype(real)
-        shape_of = np.maximum(0, (axis * unit).sum(axis=0)) ** exponent * (peak[None] if own else peak[:, None])
+        cosine = (axis * unit).sum(axis=0) * (-1 if lobe_turned else 1)
+        shape_of = np.maximum(0, cosine) ** exponent * (peak[None] if own else peak[:, None])
         shape_of = np.where((sent > 0) | (not horizon), shape_of, 0) * (np.maximum(0, sent) if lobe_cosine else 1)
         total = total + lobe * (shape_of * received)
     total = total.max(axis=1, initial=0) if joined == "max" else total.sum(axis=1)

@@ -13,6 +13,8 @@ from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.lights import LIGHT, LOBE, light_names, pixel_lights_of
 from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, as_printed, pair_decoys
 
+NORM = "(P + 1) / (2 pi K), K the share of the lobe's integral above the surface; 0 where K is below 1e-12"
+
 
 def receivers_of(arrays: Arrays, real: Any) -> Receivers:
     """Return the camera's pixels among arrays as points to light."""
@@ -62,7 +64,8 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
         return {"sum.irradiance": irradiance(receivers, pixel_lights_of(arrays, real), how, footprint)}
 
     recipe.facts["sum.clamp"] = "none" if settings.clamp is None else settings.clamp.name()
-    recipe.factors["N"] = float(recipe.expected()["lights.flux"].shape[1])
+    recipe.facts["sum.lobe_norm"] = NORM
+    recipe.factors["number of lights"] = float(recipe.expected()["lights.flux"].shape[1])
     recipe.add("sum", "irradiance of every pixel light at every pixel, without visibility and albedo/pi", run,
                (*RECEIVERS, *names, *area),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)},
@@ -75,6 +78,7 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
 def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) -> None:
     """Add pairs of one light and one receiver each: (3, n) arrays, light k with receiver k alone."""
     count = position.shape[1]
+    recipe.facts |= {"pairs.clamp": "none", "pairs.lobe_norm": NORM}
     _give_lights(recipe, lights)
     recipe.give("gbuffer.position", position[:, None], Spec("xyz, row, receiver", "m", "receivers", "world"))
     recipe.give("gbuffer.normal", normal[:, None], Spec("xyz, row, receiver", VECTOR, "their normals", "world"))

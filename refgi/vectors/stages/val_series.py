@@ -28,7 +28,7 @@ def add_series(recipe: Recipe, csm: Csm) -> None:
     recipe.facts["csm"] = facts
     recipe.add("series", "weights and biases of f_M, and the far end of its depths", run, (), {
         "series.weight": Spec("term", "1", "w_k = 2 / c_k, c_k = (2k - 1) pi", paper="E-VAL-02"),
-        "series.bias": Spec("search, comparison", "1", "b*, where f_M is 1 for the first time", paper="E-VAL-03"),
+        "series.bias": Spec("(search, comparison)", "1", "b*, where f_M is 1 for the first time", paper="E-VAL-03"),
         "series.range": Spec("one", "1", "1 - 2 b*, the depth of what is farthest", paper="E-VAL-05")},
         paper="VAL Sec. 4.1, E-VAL-02, 03, 05", decoys=(
             Decoy("c_k = k pi", writing(run, series__weight=lambda a: 2 / np.pi / np.arange(1, len(a) + 1)),

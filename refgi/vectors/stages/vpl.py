@@ -30,7 +30,7 @@ LEAK = 0.05  # m: a lift through which light leaks
 def add_vpl(recipe: Recipe, scene: Scene) -> None:
     """Add the visibility of every pixel light from every pixel, and the sum of the visible ones."""
     recipe.facts["vpl"] = {"largest_lift_of_ray_ends": LIFT}
-    recipe.factors["N"] = float(recipe.expected()["lights.flux"].shape[1])
+    recipe.factors["number of lights"] = float(recipe.expected()["lights.flux"].shape[1])
     _add_facing(recipe, scene)
     _add_visible(recipe, scene)
     _add_sum(recipe)

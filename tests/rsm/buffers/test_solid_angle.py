@@ -147,3 +147,15 @@ def test_power_of_some_texels_is_that_of_the_whole_map(n, half):
     angles = light.inner_half_angle, light.outer_half_angle
     texel = np.arange(n * n)[::-1]
     np.testing.assert_array_equal(spot_power_at(maps, *angles, texel), spot_power(maps, *angles).reshape(-1)[texel])
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
+@pytest.mark.parametrize(("inner", "outer"), [(0.4, 0.8), (0.1, 1.2), (0.0, 1.3), (0.02, 0.03)])
+def test_coarse_maps_hold_a_spots_power(inner, outer, n):
+    """Texels as large as the cone: 2 pi (1 - (cos inner + cos outer) / 2), summed."""
+    light = spot(inner, outer)
+    flat = spot_projection(light, n)
+    round_ = paraboloid_projection([(0, 0, 0)], [light.direction], n, math.tan(outer / 2))
+    for maps in (flat, round_):
+        assert spot_power(maps, inner, outer).sum() == pytest.approx(
+            2 * math.pi * (1 - (math.cos(inner) + math.cos(outer)) / 2), rel=2e-8)

@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # a file's tests run in one process, so that few kernels are compiled twice
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: demo test quick test-all check evidence bench mutate docs clean
+.PHONY: demo test quick test-all check evidence bench mutate kit-score docs clean
 
 demo: $(VENV)/run.stamp
 	$(BIN)/refgi compare cornell_box --methods sii,multires,val,hssil --out out/
@@ -37,6 +37,9 @@ bench: $(VENV)/dev.stamp
 
 mutate: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks mutate --out out/mutate
+
+kit-score: $(VENV)/dev.stamp
+	$(BIN)/python -m benchmarks kit-score --out out/kit-score
 
 docs: $(VENV)/dev.stamp
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html

@@ -2,7 +2,8 @@
 
 Every figure is a ratio within one run, or reported without an aim. Results: a table here, results.json in --out.
 `python -m benchmarks paper NAME --out DIR` makes a paper's figures and tables again; `python -m benchmarks mutate` puts
-faults into a copy of the sources and counts those that no test catches.
+faults into a copy of the sources and counts those that no test catches; `python -m benchmarks kit-score` puts bugs into
+ports and counts those that the conformance kit names.
 """
 
 import argparse
@@ -20,8 +21,9 @@ from rich.table import Table
 from benchmarks.harness import Row
 
 FOLDER = Path(__file__).parent
-COMMANDS = {"paper": "benchmarks.papers.runner", "mutate": "benchmarks.mutate.runner"}
-NOT_TOPICS = {"__init__", "__main__", "harness", "signatures"}
+COMMANDS = {"paper": "benchmarks.papers.runner", "mutate": "benchmarks.mutate.runner",
+            "kit-score": "benchmarks.kit_score"}
+NOT_TOPICS = {"__init__", "__main__", "harness", "signatures", "kit_score"}
 
 
 def topics() -> list[str]:

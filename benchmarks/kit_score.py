@@ -1,0 +1,168 @@
+"""Score the checker of the conformance kit: one-line bugs are put into ports, one at a time, and must be named.
+
+`benchmarks/kit_bugs/*.toml` lists them, written by someone who had not seen the checker: file, text, replacement, the
+stages in which the bug first shows, and words that a good diagnosis holds. A bug counts as found where the first wrong
+stage is one of those, and its cause as named where one of the three causes told of such a stage holds one of the words.
+"""
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+from rich.table import Table
+
+from refgi.testing import kit_folder
+from refgi.vectors.check import ALL_WITHIN, Asked, Kit, check_output
+
+ROOT = Path(__file__).parents[1]
+BUGS = Path(__file__).with_name("kit_bugs")
+SOURCES = {"c": ROOT / "examples" / "ports" / "c", "glsl": ROOT / "examples" / "ports" / "glsl",
+           "naive": ROOT / "tests"}
+LONGEST = 300.0  # s for one run of a port
+AIMS = {"found": 1.0, "named": 0.8}
+
+
+class Score(NamedTuple):
+    """What became of one bug."""
+
+    port: str
+    number: int
+    what: str
+    state: str  # "found", "elsewhere", "silent", "does not build", "does not run"
+    named: bool
+    first: str
+    causes: tuple[str, ...]
+
+
+def main(arguments: list[str]) -> int:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks kit-score", description=__doc__)
+    parser.add_argument("--port", dest="ports", action="append", choices=[*SOURCES], help="repeatable; all if none")
+    parser.add_argument("--out", type=Path, help="folder for kit_score.json")
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args(arguments)
+    console, scores = Console(), []
+    for port in options.ports or SOURCES:
+        bugs = tomllib.loads((BUGS / f"{port}.toml").read_text(encoding="utf-8"))["bug"]
+        with tempfile.TemporaryDirectory() as folder:
+            state = _without_bugs(port, Path(folder))
+        if state:
+            console.print(f"{port}: left out, {state}")
+            continue
+        with ThreadPoolExecutor(options.jobs) as pool:
+            for score in pool.map(lambda one, port=port: _score(port, *one), enumerate(bugs)):
+                scores.append(score)
+                if score.state != "found" or not score.named:
+                    console.print(f"{port} {score.number}: {score.state}, first {score.first or 'none'}; {score.what}; "
+                                  f"told: {'; '.join(score.causes) or 'nothing'}", highlight=False)
+    console.print(_table(scores))
+    if options.out:
+        options.out.mkdir(parents=True, exist_ok=True)
+        (options.out / "kit_score.json").write_text(json.dumps([one._asdict() for one in scores], indent=1) + "\n")
+    return 0
+
+
+def _without_bugs(port: str, folder: Path) -> str:
+    """Return why a port cannot be scored, or nothing."""
+    source = _copied(port, folder)
+    said = _build(port, source) or _run(port, source, folder / "out")
+    if said:
+        return said
+    result = check_output(Kit(kit_folder()), folder / "out", Asked())
+    return "" if result.exit_code == ALL_WITHIN else f"it is wrong without a bug: {result.first}"
+
+
+def _score(port: str, number: int, bug: dict[str, Any]) -> Score:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        source = _copied(port, folder)
+        file = source / bug["file"]
+        text = file.read_text(encoding="utf-8")
+        if text.count(bug["old"]) != 1:
+            return Score(port, number, bug["what"], "does not build", False, "its text is not there once", ())
+        file.write_text(text.replace(bug["old"], bug["new"]), encoding="utf-8")
+        said = _build(port, source)
+        if said:
+            return Score(port, number, bug["what"], "does not build", False, said, ())
+        said = _run(port, source, folder / "out")
+        if said:  # a crash is seen without a checker
+            return Score(port, number, bug["what"], "does not run", False, said, ())
+        return _judged(port, number, bug, folder / "out")
+
+
+def _judged(port: str, number: int, bug: dict[str, Any], out: Path) -> Score:
+    result = check_output(Kit(kit_folder()), out, Asked())
+    if result.first is None:
+        return Score(port, number, bug["what"], "silent", False, "", ())
+    where = {_kind(stage) for stage in bug["stages"]}
+    state = "found" if _kind(result.first[1]) in where else "elsewhere"
+    causes = tuple(dict.fromkeys(cause.cause for stage in result.stages for cause in stage.causes
+                                 if _kind(stage.stage) in where))
+    named = any(word.lower() in cause.lower() for word in bug["words"] for cause in causes)
+    return Score(port, number, bug["what"], state, named, "/".join(result.first), causes[:6])
+
+
+def _kind(stage: str) -> str:
+    return re.sub(r"\.?\d+", "", stage)
+
+
+def _copied(port: str, folder: Path) -> Path:
+    target = folder / SOURCES[port].name
+    shutil.copytree(SOURCES[port], target, ignore=shutil.ignore_patterns("__pycache__", "*.o"))
+    return target
+
+
+def _build(port: str, source: Path) -> str:
+    if port != "c":
+        return ""
+    command = ["cc", "-O1", "-std=c99", "-w", "-ffp-contract=off", "-o", str(source / "port"),
+               *map(str, sorted(source.glob("*.c"))), "-lm"]
+    return _said(command, source)
+
+
+def _run(port: str, source: Path, out: Path) -> str:
+    kit = str(kit_folder())
+    out.mkdir(exist_ok=True)
+    commands = {"c": [str(source / "port"), kit, str(out)],
+                "glsl": [sys.executable, str(source / "run.py"), kit, str(out)],
+                "naive": [sys.executable, "-m", "tests.vectors.naive_run", kit, str(out)]}
+    return _said(commands[port], source.parent if port == "naive" else source)
+
+
+def _said(command: list[str], folder: Path) -> str:
+    """Run a command and return why it failed, or nothing."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, timeout=LONGEST)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    return "" if done.returncode == 0 else (done.stderr.strip().splitlines() or ["no output"])[-1]
+
+
+def _counts(scores: list[Score]) -> Iterator[tuple[str, list[Score]]]:
+    for port in SOURCES:
+        own = [one for one in scores if one.port == port]
+        if own:
+            yield port, own
+    yield "all", scores
+
+
+def _table(scores: list[Score]) -> Table:
+    table = Table("port", "bugs that run", "first wrong stage named", "cause among three", "silent", box=None)
+    for port, own in _counts(scores):
+        ran = [one for one in own if not one.state.startswith("does not")]
+        found = sum(one.state == "found" for one in ran)
+        named = sum(one.named for one in ran)
+        count = max(1, len(ran))
+        table.add_row(port, str(len(ran)), f"{found} ({found / count:.0%})", f"{named} ({named / count:.0%})",
+                      str(sum(one.state == "silent" for one in ran)))
+    return table

@@ -73,9 +73,9 @@ def _add_level_0(recipe: Recipe, csm: Csm) -> None:
         return {"basis.0": made}
 
     def literal(c: Array, weigh: bool = True) -> Any:
-        def altered(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
-            t = np.asarray(arrays["maps.t"], np.float64)
-            sine, cosine = (np.moveaxis(of(np.multiply.outer(t, c)), 3, 1) for of in (np.sin, np.cos))
+        def altered(arrays: Arrays, real: Any) -> Arrays:
+            t = np.asarray(arrays["maps.t"], real)
+            sine, cosine = (np.moveaxis(of(np.multiply.outer(t, c.astype(real))), 3, 1) for of in (np.sin, np.cos))
             by = t[:, None] if weigh else 1
             made = np.concatenate([sine, cosine, by * sine, by * cosine, t[:, None]], axis=1)
             made[~np.asarray(t.any(axis=(1, 2)))] = 0
@@ -86,7 +86,7 @@ def _add_level_0(recipe: Recipe, csm: Csm) -> None:
     k, right = np.arange(1, csm.terms + 1), frequencies(csm.terms)
     recipe.add("basis", "sines and cosines of each texel's depth, and the same times the depth", run, ("maps.t",), {
         "basis.0": Spec(CHANNELS, "1", "S_1.., C_1.., t S_1.., t C_1.., t; 0 on empty maps", paper="E-VAL-02")},
-        paper="VAL Sec. 4.1, E-VAL-02", exact=("maps.t",), decoys=(
+        paper="VAL Sec. 4.1, E-VAL-02", exact=("maps.t",), variants=(literal(right),), decoys=(
             Decoy("c_k = k pi", literal(k * np.pi), "c_k = (2k - 1) pi"),
             Decoy("c_k = 2 k pi", literal(2 * k * np.pi), "c_k = (2k - 1) pi"),
             Decoy("c_k = (2k + 1) pi", literal(right + 2 * np.pi), "k from 1 on"),

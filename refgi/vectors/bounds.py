@@ -22,7 +22,7 @@ from refgi.vectors.spec import Array, Arrays, Case, Stage, as_read, outputs_of, 
 
 SAFETY = 4.0
 SIGMAS = 4.0  # of an estimate's mean, and of a pixel but for a few of them
-RUNS = 6  # with changed inputs
+RUNS = 4  # with changed inputs
 ROUNDING = 2.0**-24  # of float32, relative
 HALF_ROUNDING = 2.0**-11  # of float16
 CHANGE = 2.0  # roundings that inputs are changed by, at most

@@ -21,6 +21,7 @@ from refgi.vectors.export import export_kit
 from refgi.vectors.manifest import CASE, SCHEMAS, VERSION, CaseManifest, KitManifest, read_model, schema_text
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Decoy, Spec, expected_of
+from tests.vectors import kit_hashes
 
 LARGEST = 20e6  # bytes of the quick kit
 
@@ -161,3 +162,10 @@ def test_manifests_speak_plainly(kit):
         assert "refgi." not in text
         assert "lambda" not in text
     assert CASE in {file.name for file in kit.folder.rglob("*.json")}
+
+
+def test_stages_without_libm_have_the_recorded_bytes(kit):
+    """A change on purpose is a new version of the vectors: CHANGES.md, VERSION, and kit_hashes.json written anew."""
+    recorded, made = json.loads(kit_hashes.FILE.read_text()), kit_hashes.hashes(kit)
+    assert {name for name in recorded.keys() | made.keys() if recorded.get(name) != made.get(name)} == set()
+    assert len(recorded) > 300

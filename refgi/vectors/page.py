@@ -9,7 +9,7 @@ import numpy as np
 
 from refgi import __version__
 from refgi.image.whole import write_text
-from refgi.vectors.check import Asked, Kit, find_array, read_array
+from refgi.vectors.kit import Asked, Kit, find_array, read_array
 from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Result, StageVerdict
 from refgi.vectors.spec import Array
 

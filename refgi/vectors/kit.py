@@ -1,0 +1,130 @@
+"""A kit on disk, what is to be checked of it, and a port's files. NumPy alone, but for reading manifests."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from refgi.errors import InputError
+from refgi.vectors.manifest import KIT, CaseManifest, KitManifest, read_model
+from refgi.vectors.spec import Array
+
+MAGIC = b"\x93NUMPY"
+
+
+class DamagedError(InputError):
+    """A kit or a port's output that cannot be read as what it says it is."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is to be checked, and how."""
+
+    chained: bool = False
+    stages: tuple[str, ...] = ()  # names or their beginnings; all where empty
+    cases: tuple[str, ...] = ()  # the same of ids
+    tiers: Mapping[str, str] = field(default_factory=dict)  # beginning of a stage's name -> tier; "" is for all
+
+    def fits(self, stage: str) -> bool:
+        """Return whether a stage is asked for: by its beginning, or by what follows a dot."""
+        return not self.stages or fits(stage, self.stages)
+
+    def tier_of(self, stage: str) -> str:
+        """Return the tier of a stage's floats: that of the longest beginning of its name."""
+        fitting = [start for start in self.tiers if stage.startswith(start)]
+        return self.tiers[max(fitting, key=len)] if fitting else "T1"
+
+
+def fits(stage: str, names: tuple[str, ...]) -> bool:
+    """Return whether a stage's name begins with one of some, or one of its parts after a dot does."""
+    return stage.startswith(names) or any(f".{name}" in stage for name in names)
+
+
+class Kit:
+    """A kit on disk.
+
+    Parameters
+    ----------
+    folder : Path
+        Its folder.
+
+    Raises
+    ------
+    DamagedError
+        If a file is absent, changed or not what its schema says.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            self.manifest = read_model(KitManifest, folder / KIT)
+        except InputError as error:
+            raise DamagedError(str(error), file=str(folder / KIT)) from error
+
+    def cases(self, asked: Asked) -> Iterator[CaseManifest]:
+        """Yield the manifests of the cases asked for."""
+        for entry in self.manifest.cases:
+            if not asked.cases or entry.id.startswith(asked.cases):
+                file = self.folder / entry.manifest
+                self._bytes(file, entry.sha256)
+                try:
+                    yield read_model(CaseManifest, file)
+                except InputError as error:
+                    raise DamagedError(str(error), file=str(file)) from error
+
+    def array(self, case: CaseManifest, name: str) -> Array:
+        """Return an expected array, checked by its hash."""
+        entry = case.arrays[name]
+        file = self.folder / "cases" / case.id / entry.file
+        self._bytes(file, entry.sha256)
+        return read_array(file)
+
+    def extra(self, case: CaseManifest, file: str) -> Array:
+        """Return an array that is no case's own: a bound, a mask, a likely bug."""
+        return read_array(self.folder / "cases" / case.id / file)
+
+    def _bytes(self, file: Path, sha256: str) -> None:
+        try:
+            found = hashlib.sha256(file.read_bytes()).hexdigest()
+        except OSError as error:
+            raise DamagedError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
+        if found != sha256:
+            raise DamagedError(f"{file}: expected the bytes of its manifest's sha256, got others: a damaged kit",
+                               file=str(file))
+
+
+def read_array(file: Path) -> Array:
+    """Return an .npy file's array.
+
+    Raises
+    ------
+    DamagedError
+        If it is none, or holds fewer or more bytes than its header says.
+    """
+    try:
+        with file.open("rb") as stream:
+            if stream.read(len(MAGIC)) != MAGIC:
+                raise DamagedError(f"{file}: expected an .npy file, got one without its header", file=str(file))
+            stream.seek(0)
+            array: Array = np.lib.format.read_array(stream, allow_pickle=False)
+            rest = len(stream.read())
+    except (OSError, ValueError, EOFError) as error:
+        raise DamagedError(f"{file}: cannot be read as .npy: {_reason(error)}", file=str(file)) from error
+    if rest:
+        raise DamagedError(f"{file}: {rest} bytes more than its header says", file=str(file))
+    return array
+
+
+def find_array(output: Path, case: str, name: str) -> Path | None:
+    """Return the file of a port's array, None where there is none."""
+    for place in (output / case, output / "cases" / case / "out", output / case / "out"):
+        if (place / f"{name}.npy").is_file():
+            return place / f"{name}.npy"
+    return None
+
+
+def _reason(error: Exception) -> str:
+    said = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]
+    return said or "nothing readable"

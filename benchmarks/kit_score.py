@@ -50,17 +50,19 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--port", dest="ports", action="append", choices=[*SOURCES], help="repeatable; all if none")
     parser.add_argument("--out", type=Path, help="folder for kit_score.json")
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--every", type=int, default=1, help="score each so many-th bug alone")
     options = parser.parse_args(arguments)
     console, scores = Console(), []
     for port in options.ports or SOURCES:
-        bugs = tomllib.loads((BUGS / f"{port}.toml").read_text(encoding="utf-8"))["bug"]
+        every = list(enumerate(tomllib.loads((BUGS / f"{port}.toml").read_text(encoding="utf-8"))["bug"]))
+        bugs = every[:: options.every]
         with tempfile.TemporaryDirectory() as folder:
             state = _without_bugs(port, Path(folder))
         if state:
             console.print(f"{port}: left out, {state}")
             continue
         with ThreadPoolExecutor(options.jobs) as pool:
-            for score in pool.map(lambda one, port=port: _score(port, *one), enumerate(bugs)):
+            for score in pool.map(lambda one, port=port: _score(port, *one), bugs):
                 scores.append(score)
                 if score.state != "found" or not score.named:
                     console.print(f"{port} {score.number}: {score.state}, first {score.first or 'none'}; {score.what}; "

@@ -37,9 +37,9 @@ from refgi.vectors.spec import Array, Arrays, Case, Decoy, Stage, expected_of, o
 
 SEED = 20090101  # of the changes that bounds are measured by
 TOLD_BY, BESIDE = 192, 64  # elements of a likely bug that are kept: those that tell it, and others
-ISOLATED = "float32 runs and 4 float64 runs on inputs changed by up to 2 roundings of float32, x 4; plus rounding"
-CHAINED = "4 float64 runs, the inputs of every stage changed by up to 2 roundings of float32, x 4"
-HALF = "4 float64 runs on inputs rounded to float16 at random, results in float16, x 4"
+ISOLATED = "float32 runs and 4 float64 runs on inputs changed by up to 2 roundings of float32, x 6; plus rounding"
+CHAINED = "4 float64 runs, the inputs of every stage changed by up to 2 roundings of float32, x 6"
+HALF = "4 float64 runs on inputs rounded to float16 at random, results in float16, x 6"
 Tell = Callable[[str, float], None]
 
 

@@ -6,26 +6,39 @@ from pathlib import Path
 import numpy as np
 
 from refgi.vectors.cases import kit_cases
+from refgi.vectors.cases.val import SETUPS
 from refgi.vectors.check import Asked, Kit
 from tests.vectors import screen_space_port
 from tests.vectors.naive_port import NaivePort
+from tests.vectors.val_port import Port
 
+CLUSTERED = ("val-",)
 SPLATTING, SCREEN = ("pairs-", "sii-halton", "sii-three", "sii-warp", "sii-grid"), ("hssil-",)
 
 
 def main(kit, out):
     """Write the arrays of every stage that a twin covers, each made from the kit's inputs."""
-    for case in kit.cases(Asked(cases=(*SPLATTING, *SCREEN))):
-        splatted = case.id.startswith(SPLATTING)
-        steps = NaivePort(case) if splatted else kit_cases("quick")[case.id]()
+    for case in kit.cases(Asked(cases=(*SPLATTING, *SCREEN, *CLUSTERED))):
         (out / case.id).mkdir(parents=True, exist_ok=True)
-        for number, step in enumerate(case.stages):
-            inputs = {name: as_read(kit.array(case, name)) for name in step.reads}
-            made = (steps.run(step.name, inputs) if splatted else
-                    screen_space_port.outputs(steps, steps.stages[number], inputs))
+        for made in outputs(kit, case):
             for name, array in (made or {}).items():
                 if name in case.arrays:
                     np.save(out / case.id / f"{name}.npy", np.asarray(array))
+
+
+def outputs(kit, case):
+    """Yield what each stage writes; None where no twin covers it."""
+    known = {name: kit.array(case, name) for name in case.arrays}
+    if case.id.startswith(CLUSTERED):
+        port, first = Port(SETUPS[case.id], known), [step.name for step in case.stages].index("extents")
+        yield from (port.outputs(step.name) for step in case.stages[first:])
+        return
+    splatted = case.id.startswith(SPLATTING)
+    steps = NaivePort(case) if splatted else kit_cases("quick")[case.id]()
+    for number, step in enumerate(case.stages):
+        inputs = {name: as_read(known[name]) for name in step.reads}
+        yield steps.run(step.name, inputs) if splatted else screen_space_port.outputs(
+            steps, steps.stages[number], inputs)
 
 
 def as_read(array):

@@ -34,7 +34,9 @@ def _check(
     tolerance: float, dtype: str, rsm_resolution: int, shadows: str | None, threads: int | None, seed: int | None,
     **options: Any,
 ) -> int:
-    """Judge PICTURE, an EXR of linear values, against a method on SCENE.
+    """Judge a port's PICTURE by a method on SCENE.
+
+    PICTURE is an EXR of linear values.
 
     Channels irradiance.R, .G, .B are compared with indirect irradiance (W/m^2), else R, G, B with radiance. The scene
     is rendered at the picture's size.

@@ -17,7 +17,7 @@ MOST_STORIES = 20  # wrong stages that are told in full
 
 @click.group("vectors")
 def command() -> None:
-    """Test vectors for ports: data of every stage, and the check that names the first wrong one."""
+    """Test vectors of every stage, and a port's check against them."""
 
 
 @command.command("export")

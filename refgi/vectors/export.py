@@ -87,7 +87,7 @@ def export_kit(kit: str, out: Path, tell: Tell = lambda _, __: None, only: str |
                                     manifest=f"cases/{name}/{CASE}", sha256=_sha256(text.encode())))
         if only is None:
             told.expect_none_blind()
-        made = KitManifest(kit=kit, vectors=VERSION, refgi=str(program()), cases=tuple(entries))
+        made = KitManifest(kit=kit, vectors=VERSION, refgi=" ".join(program().values()), cases=tuple(entries))
         _write_frame(part, made)
         if out.exists():
             shutil.rmtree(out)

@@ -2,12 +2,12 @@
 
 import base64
 import json
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from refgi import __version__
 from refgi.image.whole import write_text
 from refgi.vectors.kit import Asked, Kit, find_array, read_array
 from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Result, StageVerdict
@@ -54,7 +54,7 @@ def write_page(file: str, kit: Kit, output: Path, result: Result) -> None:
     style, script = ((FILES / name).read_text(encoding="utf-8") for name in ("style.css", "page.js"))
     safe = environment.filters["safe"]
     write_text(file, template.render(result=result, cases=cases, data=safe(text), style=safe(style),
-                                     script=safe(script), version=__version__))
+                                     script=safe(script), version=version("refgi")))
 
 
 def _stage(kit: Kit, case: CaseManifest, output: Path, verdict: StageVerdict, shown: set[str]) -> dict[str, Any]:

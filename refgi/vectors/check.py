@@ -18,7 +18,7 @@ from refgi.vectors.spec import Array
 from refgi.vectors.words import did_you_mean
 
 __all__ = ["ALL_WITHIN", "DAMAGED", "NOT_COMPARABLE", "OUT", "TIERS", "Asked", "DamagedError", "Kit", "check_output",
-           "check_stage", "stage_of_array"]
+           "stage_of_array"]
 
 ALL_WITHIN, OUT, NOT_COMPARABLE, DAMAGED = 0, 1, 4, 5
 TIERS = ("T0", "T1", "T2")
@@ -151,6 +151,24 @@ def _not_run(name: str, tier: str, others: bool) -> ArrayVerdict:
 
 def stage_of_array(kit: Kit, case: str, name: str, got: Array, tier: str = "T1") -> StageVerdict:
     """Judge one array by itself, its stage having read the kit's inputs.
+
+    Parameters
+    ----------
+    kit : Kit
+        The kit.
+    case : str
+        Id of a case.
+    name : str
+        Name of an array that a stage of it writes.
+    got : ndarray
+        What the port has.
+    tier : {"T0", "T1", "T2"}
+        How near it must be.
+
+    Returns
+    -------
+    StageVerdict
+        Of the array's stage, from that array alone.
 
     Raises
     ------

@@ -17,8 +17,8 @@ COVERED = {
         "halton", "three-lamps", "warp-a", "warp-b", "grid", "one-texel"))},
     "hssil": {*((f"hssil-{case}", f"gather{level}") for case, levels in (
         ("default", 4), ("paper", 4), ("odd", 5)) for level in range(levels))},
-    "val": {(f"val-{case}", stage) for case in ("csm", "single") for stage in (
-        "basis", "mip", "search.means", "penumbra.means", "visibility")},
+    "val": {("val-csm", "footprints"), *(("val-csm", stage) for stage in (
+        "basis", "mip", "search.means", "penumbra.means", "visibility"))},
 }
 
 

@@ -1,5 +1,6 @@
 """`refgi check`: judge a finished picture of a port against a method of refgi, or against the truth."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,7 @@ def _check(
 
     Exit codes: 0 within the tolerance or the noise, 1 not.
     """
+    from refgi import stages
     from refgi.cli.memory import require_memory
     from refgi.cli.options import on_threads
     from refgi.cli.settings import settings_for
@@ -58,13 +60,14 @@ def _check(
     expect(options["size"] in (None, size), "--size", f"{size[0]}x{size[1]} as the picture", options["size"])
     scene = View(scene=against, **{**options, "size": size}).load()
     require_memory(scene, dtype, rsm_resolution, traced=method == "truth", settings={method: settings})
-    with on_threads(threads), progress() as tell:
+    with progress() as tell:
         warm_up([method], dtype, tell)
+    with on_threads(threads), progress() as tell, stages.observe(progress=tell):
         made = render(scene, method, settings, dtype=dtype, rsm_resolution=rsm_resolution, shadows=shadows)
-    variance = None
-    if made.estimate is not None and kind == "indirect irradiance":
-        variance = made.estimate.variance_of_mean
-    verdict = judge_picture(got, made.irradiance if kind == "indirect irradiance" else made.radiance, variance,
+    variance = None if made.estimate is None else made.estimate.variance_of_mean
+    if kind == "radiance" and variance is not None:
+        variance = variance * (made.frame.gbuffer.albedo / math.pi) ** 2  # L = albedo / pi E
+    verdict = judge_picture(got, made.radiance if kind == "radiance" else made.irradiance, variance,
                             tolerance=tolerance)
     lines = [f"{picture}: {kind} {'is' if verdict.close else 'is not'} that of {scene.name} by {method}", verdict.said,
              *(f"likely: {one}" for one in verdict.causes)]

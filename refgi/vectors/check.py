@@ -12,7 +12,7 @@ import numpy as np
 from refgi.errors import InputError
 from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of, told_at_once
 from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
-from refgi.vectors.kit import Asked, DamagedError, Kit, find_array, fits, read_array
+from refgi.vectors.kit import Asked, DamagedError, Kit, find_array, fits, places_of_case, read_array
 from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Cause, Result, StageEntry, StageVerdict, Verdict
 from refgi.vectors.spec import Array
 from refgi.vectors.words import did_you_mean
@@ -23,6 +23,7 @@ __all__ = ["ALL_WITHIN", "DAMAGED", "NOT_COMPARABLE", "OUT", "TIERS", "Asked", "
 ALL_WITHIN, OUT, NOT_COMPARABLE, DAMAGED = 0, 1, 4, 5
 TIERS = ("T0", "T1", "T2")
 CAUSES = 3  # that are told
+OF_A_KIT = ("cases", "scenes", "schema")  # folders beside the cases where a kit itself is checked
 ORDER: tuple[Verdict, ...] = ("out", "invalid", "within", "exact", "not-run")
 
 
@@ -52,23 +53,18 @@ def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
     """
     if not output.is_dir():
         raise InputError(f"{output}: expected a folder of a port's arrays, got none", file=str(output))
+    cases = list(kit.cases(asked))
+    _require_known(kit, asked, {step.name for case in cases for step in case.stages})
     verdicts: list[StageVerdict] = []
-    names: set[str] = set()
-    begun: set[str] = set()  # cases of which the port has something
-    for case in kit.cases(asked):
-        if any(find_array(output, case.id, name) for step in case.stages for name in step.writes):
-            begun.add(case.id)
-        wrong: set[str] = set()  # arrays that are out, or made from such
-        names.update(step.name for step in case.stages)
-        for step in case.stages:
-            if not asked.fits(step.name):
-                continue
-            verdict = check_stage(kit, case, step, output, asked, dirty=bool(wrong & set(step.reads)))
-            if verdict.verdict in ("out", "invalid") or (asked.chained and wrong & set(step.reads)):
+    for case in cases:
+        wrong: set[str] = set()  # chained: arrays that are out, or made from such
+        for step in (step for step in case.stages if asked.fits(step.name)):
+            dirty = bool(wrong & set(step.reads))
+            verdict = check_stage(kit, case, step, output, asked, dirty=dirty)
+            if asked.chained and (dirty or verdict.verdict in ("out", "invalid")):
                 wrong.update(step.writes)
             verdicts.append(verdict)
-    _require_known(kit, asked, names)
-    return _summed(kit, asked, verdicts, begun, _unknown(kit, output))
+    return _summed(kit, asked, verdicts, output, _unknown(kit, cases, output))
 
 
 def _require_known(kit: Kit, asked: Asked, stages: set[str]) -> None:
@@ -86,28 +82,25 @@ def _require_known(kit: Kit, asked: Asked, stages: set[str]) -> None:
                                  f"{did_you_mean(name, sorted(stages | parts))}")
 
 
-def _unknown(kit: Kit, output: Path) -> tuple[str, ...]:
-    """Return what a port has written that the kit does not know: folders, arrays, files of other kinds."""
+def _unknown(kit: Kit, cases: list[CaseManifest], output: Path) -> tuple[str, ...]:
+    """Return what a port has written that the kit does not know: folders, and files beside the arrays of a case."""
     ids = [entry.id for entry in kit.manifest.cases]
     found = [f"{place.name}: no such case{did_you_mean(place.name, ids)}" for place in sorted(output.iterdir())
-             if place.name not in (*ids, "cases", "scenes", "schema") and place.suffix in ("", ".npy")
-             and place.name not in ("VERSION",)]
-    for case in kit.cases(Asked(cases=tuple(ids))):
-        folder = output / case.id
-        arrays = list(case.arrays)
-        if folder.is_dir():
-            found += [f"{case.id}/{file.name}: no array of this case{did_you_mean(file.name, [*arrays])}"
-                      for file in sorted(folder.iterdir()) if file.is_file() and (
-                          file.suffix != ".npy" or file.stem not in case.arrays)]
+             if place.is_dir() and place.name not in (*ids, *OF_A_KIT)]
+    for case in cases:
+        files = sorted((output / case.id).glob("*"))
+        found += [f"{case.id}/{file.name}: no array of this case{did_you_mean(file.name, case.arrays)}"
+                  for file in files if file.is_file() and (file.suffix != ".npy" or file.stem not in case.arrays)]
     return tuple(found)
 
 
 def _summed(
-    kit: Kit, asked: Asked, verdicts: list[StageVerdict], begun: set[str], unknown: tuple[str, ...]
+    kit: Kit, asked: Asked, verdicts: list[StageVerdict], output: Path, unknown: tuple[str, ...]
 ) -> Result:
     first = next(((one.case, one.stage) for one in verdicts if one.verdict in ("out", "invalid")
                   and one.upstream != "dirty"), None)
     found = {one.verdict for one in verdicts}
+    begun = {one.case for one in verdicts if any(place.is_dir() for place in places_of_case(output, one.case))}
     missing = asked.stages and any(one.verdict == "not-run" and one.case in begun for one in verdicts)
     damaged = any(array.damaged for one in verdicts for array in one.arrays)
     ran = found - {"not-run"}

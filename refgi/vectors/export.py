@@ -1,7 +1,7 @@
 """Writing a kit: expected arrays, bounds, likely bugs, manifests, schemas, scenes, and how to read them.
 
-A kit is written to a folder beside its own and renamed when it is whole. Its bytes depend on the cases alone: the same
-version of the vectors gives the same files anywhere, but for the last bit of stages that use libm.
+A kit is written to a folder beside its own and renamed when it is whole. Its bytes depend on the cases alone, and in
+the last bit on the platform's libm where a stage uses it.
 """
 
 import hashlib
@@ -37,9 +37,9 @@ from refgi.vectors.spec import Array, Arrays, Case, Decoy, Stage, expected_of, o
 
 SEED = 20090101  # of the changes that bounds are measured by
 TOLD_BY, BESIDE = 192, 64  # elements of a likely bug that are kept: those that tell it, and others
-ISOLATED = "float32 runs and 4 float64 runs on inputs changed by up to 2 roundings of float32, x 6; plus rounding"
-CHAINED = "4 float64 runs, the inputs of every stage changed by up to 2 roundings of float32, x 6"
-HALF = "4 float64 runs on inputs rounded to float16 at random, results in float16, x 6"
+ISOLATED = "float32 runs and 4 float64 runs on inputs changed by up to 2 roundings of float32, x 4; plus rounding"
+CHAINED = "4 float64 runs, the inputs of every stage changed by up to 2 roundings of float32, x 4"
+HALF = "4 float64 runs on inputs rounded to float16 at random, results in float16, x 4"
 Tell = Callable[[str, float], None]
 
 

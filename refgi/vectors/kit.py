@@ -1,6 +1,7 @@
 """A kit on disk, what is to be checked of it, and a port's files. NumPy alone, but for reading manifests."""
 
 import hashlib
+import io
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,15 +26,15 @@ class Asked:
     chained: bool = False
     stages: tuple[str, ...] = ()  # names or their beginnings; all where empty
     cases: tuple[str, ...] = ()  # the same of ids
-    tiers: Mapping[str, str] = field(default_factory=dict)  # beginning of a stage's name -> tier; "" is for all
+    tiers: Mapping[str, str] = field(default_factory=dict)  # stage's name or its beginning -> tier; "" is for all
 
     def fits(self, stage: str) -> bool:
         """Return whether a stage is asked for: by its beginning, or by what follows a dot."""
         return not self.stages or fits(stage, self.stages)
 
     def tier_of(self, stage: str) -> str:
-        """Return the tier of a stage's floats: that of the longest beginning of its name."""
-        fitting = [start for start in self.tiers if stage.startswith(start)]
+        """Return the tier of a stage's floats: that of the longest name that asks for it."""
+        fitting = [start for start in self.tiers if fits(stage, (start,))]
         return self.tiers[max(fitting, key=len)] if fitting else "T1"
 
 
@@ -104,25 +105,29 @@ def read_array(file: Path) -> Array:
         If it is none, or holds fewer or more bytes than its header says.
     """
     try:
-        with file.open("rb") as stream:
-            if stream.read(len(MAGIC)) != MAGIC:
-                raise DamagedError(f"{file}: expected an .npy file, got one without its header", file=str(file))
-            stream.seek(0)
-            array: Array = np.lib.format.read_array(stream, allow_pickle=False)
-            rest = len(stream.read())
+        content = io.BytesIO(file.read_bytes())
+        whole = content.getbuffer().nbytes
+        has_header = content.read(len(MAGIC)) == MAGIC
+        content.seek(0)
+        array: Array = np.lib.format.read_array(content, allow_pickle=False) if has_header else np.zeros(0)
     except (OSError, ValueError, EOFError) as error:
         raise DamagedError(f"{file}: cannot be read as .npy: {_reason(error)}", file=str(file)) from error
-    if rest:
-        raise DamagedError(f"{file}: {rest} bytes more than its header says", file=str(file))
+    if not has_header:
+        raise DamagedError(f"{file}: expected an .npy file, got one without its header", file=str(file))
+    if content.tell() < whole:
+        raise DamagedError(f"{file}: {whole - content.tell()} bytes more than its header says", file=str(file))
     return array
 
 
 def find_array(output: Path, case: str, name: str) -> Path | None:
     """Return the file of a port's array, None where there is none."""
-    for place in (output / case, output / "cases" / case / "out", output / case / "out"):
-        if (place / f"{name}.npy").is_file():
-            return place / f"{name}.npy"
-    return None
+    files = (place / f"{name}.npy" for place in places_of_case(output, case))
+    return next((file for file in files if file.is_file()), None)
+
+
+def places_of_case(output: Path, case: str) -> tuple[Path, ...]:
+    """Return the folders in which a port's arrays of a case are looked for; the last is a kit's own."""
+    return output / case, output / case / "out", output / "cases" / case / "out"
 
 
 def _reason(error: Exception) -> str:

@@ -102,7 +102,7 @@ class NaivePort:
 
     def points(self, name, _, arrays):
         count = self.case.arrays[f"{name}.points"].shape[0]
-        if "grid" in self.case.id or "one-texel" in self.case.id:
+        if self.case.facts[f"{name}.points"] == "grid":
             n = math.isqrt(count)
             return {f"{name}.points": [((i + 0.5) / n, (j + 0.5) / n) for j in range(n) for i in range(n)]}
         shift = arrays.get(f"{name}.shift", (0, 0))
@@ -125,7 +125,7 @@ class NaivePort:
         (points,) = [arrays[key] for key in (f"{name}.warped", f"{name}.points") if key in arrays]
         rows, columns = self.case.arrays[f"{name}.texel"].index_of
         weight = arrays.get(f"{name}.density_weight", np.ones(len(points)))
-        if "grid" in self.case.id:
+        if self.case.facts[f"{name}.points"] == "grid":
             n = math.isqrt(len(points))
             texel = [row * columns + column for row, column in grid_texels(n, rows, columns)]
         else:

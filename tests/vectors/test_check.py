@@ -116,6 +116,26 @@ def test_the_strictest_tier_wants_equal_floats(port):
     assert port.check(tiers={"": "T1", "rsm0": "T0"}).first[1] == "rsm0.flux"
 
 
+def test_isolated_stages_are_each_explained(port):
+    """A stage that read the kit's arrays is wrong by itself, whatever is wrong before it."""
+    port.write("rsm0.flux", np.pi * port.arrays["rsm0.flux"])
+    port.write("sum.irradiance", 2 * port.arrays["sum.irradiance"])
+    wrong = {one.stage: one for one in port.check().stages if one.verdict == "out"}
+    assert {one.upstream for one in wrong.values()} == {"isolated"}
+    assert {stage: "times what it should be" in one.causes[0].cause for stage, one in wrong.items()} == {
+        "rsm0.flux": True, "sum": True}
+    causes = {one.stage: one.causes for one in port.check(chained=True).stages if one.verdict == "out"}
+    assert [bool(causes[stage]) for stage in ("rsm0.flux", "sum")] == [True, False]
+
+
+def test_a_tier_is_asked_for_by_any_part_of_a_stages_name(port):
+    port.write("rsm0.density_weight", port.arrays["rsm0.density_weight"].astype(np.float16))
+    assert port.check().exit_code == OUT
+    for name in ("rsm0.warp", "rsm0", "warp"):
+        assert port.check(tiers={name: "T2"}).exit_code == ALL_WITHIN, name
+    assert port.check(tiers={"warp": "T2", "rsm0.warp": "T1"}).exit_code == OUT
+
+
 def test_a_chain_says_what_was_made_from_wrong_inputs(port):
     port.write("rsm0.flux", 2 * port.arrays["rsm0.flux"])
     port.write("rsm0.importance", 2 * port.arrays["rsm0.importance"])

@@ -1,45 +1,32 @@
 """Gathering from reflective shadow maps, from the buffers to the picture."""
 
 import math
-from collections.abc import Callable
-from functools import partial
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.sampling import halton
-from refgi.scene import Scene, SpotLight
+from refgi.scene import SpotLight
 from refgi.settings import of
 from refgi.splat.gather.gather import GatherSettings
-from refgi.vectors.cases.scenes import BULB, DOWN, SPOT, SUN, room
+from refgi.vectors.cases.plan import Plan, Plans, cases_of
+from refgi.vectors.cases.scenes import AWAY, BULB, DOWN, SPOT, SUN, room
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Case, Spec
 from refgi.vectors.stages.buffers import VECTOR, add_gbuffer, add_rsm, give_scene
 from refgi.vectors.stages.gather import add_gather, add_interpolation
 
 SQUARE = SpotLight((0.25, 1.5, 0.125), (0.0, -1.0, 0.0), 0.4, math.pi / 4, (3.0, 1.0, 2.0))  # a map of half extent 1
-AWAY = SpotLight((1.5, 1.5, 0.5), (1.0, 0.2, 0.1), 0.2, 0.5, (4.0, 2.0, 1.0))  # into the void
 
 
-class Plan(NamedTuple):
-    """A case in the making."""
-
-    what: str
-    scene: Scene
-    size: tuple[int, int]  # columns and rows of the picture
-    maps: int  # texels along the side of a map
-    choices: dict[str, Any]  # settings by their keys
-
-    @property
-    def settings(self) -> GatherSettings:
-        """Settings of the method; every pixel runs the sum unless they say otherwise."""
-        return of(GatherSettings, **{"interpolation": None, **self.choices})
+def settings_of(plan: Plan) -> GatherSettings:
+    """Return the settings of a plan; every pixel runs the sum unless it says otherwise."""
+    return of(GatherSettings, **{"interpolation": None, **plan.choices})
 
 
 def gathering(id: str, plan: Plan) -> Case:
     """Return `gather` as planned: buffers, pattern, places, texels, sums, interpolation."""
-    recipe, settings = Recipe(id, "gather", plan.what), plan.settings
+    recipe, settings = Recipe(id, "gather", plan.what), settings_of(plan)
     give_scene(recipe, plan.scene)
     add_gbuffer(recipe, plan.scene, *plan.size)
     for index in range(len(plan.scene.lights)):
@@ -84,32 +71,25 @@ def _give_points(recipe: Recipe, position: Array, normal: Array) -> None:
                 Spec("row, column", "1", "0: all are surfaces", tier="T0"))
 
 
-QUICK_PLANS: dict[str, Callable[[], Plan]] = {
+QUICK_PLANS: Plans = {
     "gather-spot": lambda: Plan("one spot, discs of 0.3 map widths, no lobes", room(SPOT, matte=True), (24, 18), 13,
-                                {"samples": 24, "radius": 0.3}),
+                                choices={"samples": 24, "radius": 0.3}),
     "gather-three-lamps": lambda: Plan(
         "spot, cube and directional maps; of glossy surfaces the diffuse part alone", room(SPOT, BULB, SUN), (17, 13),
-        11, {"samples": 16, "radius": 0.5}),
+        11, choices={"samples": 16, "radius": 0.5}),
     "gather-behind": lambda: Plan(
         "receivers behind the lamp, texels moved back by 2 cm, xi1^2 as weight, discs of more than the map",
-        room(DOWN, matte=True), (19, 23), 12, {"samples": 20, "radius": 1.5, "disc.offset": 0.02,
-                                               "disc.as_published": frozenset({"rsm_weight_squared"})}),
+        room(DOWN, matte=True), (19, 23), 12, choices={
+            "samples": 20, "radius": 1.5, "disc.offset": 0.02, "disc.as_published": frozenset({"rsm_weight_squared"})}),
     "gather-interpolated": lambda: Plan(
         "interpolated between 9 x 9 coarse pixels where surfaces are similar", room(SPOT, DOWN, smooth=True), (31, 25),
-        12, {"samples": 12, "radius": 0.4, "interpolation": "coarse", "interpolation.grid": 9,
+        12, choices={"samples": 12, "radius": 0.4, "interpolation": "coarse", "interpolation.grid": 9,
              "interpolation.reach": 0.2}),
 }
-FULL_PLANS: dict[str, Callable[[], Plan]] = {
+FULL_PLANS: Plans = {
     "gather-no-flux": lambda: Plan("a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True),
-                                   (12, 9), 7, {"samples": 8}),
+                                   (12, 9), 7, choices={"samples": 8}),
 }
 
 
-def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
-    def made(id: str) -> Case:
-        return gathering(id, plans[id]())
-
-    return {id: partial(made, id) for id in plans}
-
-
-QUICK, FULL = {**_cases(QUICK_PLANS), "gather-border": at_borders}, _cases(FULL_PLANS)
+QUICK, FULL = {**cases_of(QUICK_PLANS, gathering), "gather-border": at_borders}, cases_of(FULL_PLANS, gathering)

@@ -1,14 +1,13 @@
 """Adaptive multiresolution splatting, from the buffers to the picture."""
 
 import math
-from collections.abc import Callable
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
-from refgi.scene import Camera, Scene, SpotLight, merge
+from refgi.scene import Camera, Scene, merge
 from refgi.settings import of
 from refgi.splat.multires.settings import MultiresSettings
-from refgi.vectors.cases.scenes import DOWN, FLOOR, SPOT, SUN, WALL, quad, room, stored_scene
+from refgi.vectors.cases.plan import Plan, Plans, cases_of
+from refgi.vectors.cases.scenes import AWAY, DOWN, FLOOR, SPOT, SUN, WALL, quad, room, stored_scene
 from refgi.vectors.cases.sii import add_lit
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
@@ -16,28 +15,16 @@ from refgi.vectors.stages.multires import add_multires
 from refgi.vectors.stages.pairs import add_footprints
 
 AT_WALL = Camera((0.2, 1.4, 0.8), (0.1, 1.4, -1.0), (0.0, 1.0, 0.0), math.radians(30))  # the back wall alone
-AWAY = SpotLight((1.5, 1.5, 0.5), (1.0, 0.2, 0.1), 0.2, 0.5, (4.0, 2.0, 1.0))  # into the void
 
 
-class Plan(NamedTuple):
-    """A case in the making."""
-
-    what: str
-    scene: Scene
-    size: tuple[int, int]  # columns and rows of the picture
-    maps: int  # texels along the side of a map
-    lights: int  # lights of each map, on a grid
-    choices: dict[str, Any]  # settings by their keys
-
-    @property
-    def settings(self) -> MultiresSettings:
-        """Settings of the method; few cells on the coarsest level."""
-        return of(MultiresSettings, **{"lights": self.lights * len(self.scene.lights), "coarsest": 5, **self.choices})
+def settings_of(plan: Plan) -> MultiresSettings:
+    """Return the settings of a plan, whose lights lie on a grid; few cells on the coarsest level."""
+    return of(MultiresSettings, **{"lights": plan.lights * len(plan.scene.lights), "coarsest": 5, **plan.choices})
 
 
 def multiresolution(id: str, plan: Plan) -> Case:
     """Return `multires` as planned: buffers, lights, refinement, light, picture."""
-    recipe, settings, lamps = Recipe(id, "multires", plan.what), plan.settings, len(plan.scene.lights)
+    recipe, settings, lamps = Recipe(id, "multires", plan.what), settings_of(plan), len(plan.scene.lights)
     add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, pattern="grid")
     if settings.effective_pairs.needs_footprints:
         add_footprints(recipe, lamps)
@@ -58,7 +45,7 @@ def pole(*lights: Any) -> Scene:
     return stored_scene(Scene("kit pole", geometry, materials, camera, lights))
 
 
-QUICK_PLANS: dict[str, Callable[[], Plan]] = {
+QUICK_PLANS: Plans = {
     "multires-odd": lambda: Plan(
         "defaults but for the depth's threshold: ranges, bare corners, tent; 45 x 35 pixels, cut cells",
         room(SPOT), (45, 35), 12, 16, {"depth.threshold": 0.3}),
@@ -83,7 +70,7 @@ QUICK_PLANS: dict[str, Callable[[], Plan]] = {
             "diagonal": "full8", "representative": "mean", "upsampling": "demo", "derivative.threshold": 0.2,
             "curvature.threshold": 0.3}),
 }
-FULL_PLANS: dict[str, Callable[[], Plan]] = {
+FULL_PLANS: Plans = {
     "multires-large": lambda: Plan("64 x 48 pixels, 2 x 64 lights, 6 levels", room(SPOT, DOWN, smooth=True), (64, 48),
                                    24, 64, {"coarsest": 2}),
     "multires-rate": lambda: Plan(
@@ -94,11 +81,4 @@ FULL_PLANS: dict[str, Callable[[], Plan]] = {
 }
 
 
-def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
-    def made(id: str) -> Case:
-        return multiresolution(id, plans[id]())
-
-    return {id: partial(made, id) for id in plans}
-
-
-QUICK, FULL = _cases(QUICK_PLANS), _cases(FULL_PLANS)
+QUICK, FULL = cases_of(QUICK_PLANS, multiresolution), cases_of(FULL_PLANS, multiresolution)

@@ -1,14 +1,9 @@
 """The range of pixel lights: Splatting Indirect Illumination with its cut, from the buffers to the sum."""
 
-from collections.abc import Callable
-from functools import partial
-from typing import Any, NamedTuple
-
-from refgi.scene import Scene
 from refgi.settings import of
 from refgi.splat.sii.settings import RelativeCut, SiiSettings
-from refgi.vectors.cases.gather import AWAY
-from refgi.vectors.cases.scenes import DOWN, SPOT, SUN, room
+from refgi.vectors.cases.plan import Plan, Plans, cases_of
+from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, room
 from refgi.vectors.cases.sii import add_lit
 from refgi.vectors.cases.vpl import default_shifts
 from refgi.vectors.recipe import Recipe
@@ -18,26 +13,15 @@ from refgi.vectors.stages.sii_range import add_range
 from refgi.vectors.stages.sii_range_sum import add_ellipsoids
 
 
-class Plan(NamedTuple):
-    """A case in the making."""
-
-    what: str
-    scene: Scene
-    size: tuple[int, int]  # columns and rows of the picture
-    maps: int  # texels along the side of a map
-    lights: int  # lights of each map, by Halton points
-    choices: dict[str, Any]  # settings by their keys
-
-    @property
-    def settings(self) -> SiiSettings:
-        """Settings of the method; no clamp unless they say otherwise."""
-        return of(SiiSettings, **{"lights": self.lights * len(self.scene.lights), "clamp": "none", "cut": "relative",
-                                  **self.choices})
+def settings_of(plan: Plan) -> SiiSettings:
+    """Return the settings of a plan, whose lights are Halton points; no clamp unless it says otherwise."""
+    return of(SiiSettings, **{"lights": plan.lights * len(plan.scene.lights), "clamp": "none", "cut": "relative",
+                              **plan.choices})
 
 
 def ranged(id: str, plan: Plan) -> Case:
     """Return `sii` with a cut as planned: buffers, lights, ranges, sum."""
-    recipe, lamps, settings = Recipe(id, "sii", plan.what), len(plan.scene.lights), plan.settings
+    recipe, lamps, settings = Recipe(id, "sii", plan.what), len(plan.scene.lights), settings_of(plan)
     add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, shifts=default_shifts(lamps))
     if settings.pairs.needs_footprints:
         add_footprints(recipe, lamps)
@@ -48,7 +32,7 @@ def ranged(id: str, plan: Plan) -> Case:
     return recipe.case()
 
 
-QUICK_PLANS: dict[str, Callable[[], Plan]] = {
+QUICK_PLANS: Plans = {
     "sii-range-spot": lambda: Plan("the paper's cut of 5 % with the picture's reference length; no lobes",
                                    room(SPOT, matte=True), (21, 16), 13, 24, {}),
     "sii-range-lamps": lambda: Plan("lamps of unequal strength, lobes of their own range, discs", room(SPOT, DOWN, SUN),
@@ -58,17 +42,10 @@ QUICK_PLANS: dict[str, Callable[[], Plan]] = {
     "sii-range-no-flux": lambda: Plan("a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True),
                                       (12, 9), 7, 5, {}),
 }
-FULL_PLANS: dict[str, Callable[[], Plan]] = {
+FULL_PLANS: Plans = {
     "sii-range-large": lambda: Plan("32 x 24 pixels, 2 x 32 lights", room(SPOT, SUN, smooth=True), (32, 24), 23, 32,
                                     {}),
 }
 
 
-def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
-    def made(id: str) -> Case:
-        return ranged(id, plans[id]())
-
-    return {id: partial(made, id) for id in plans}
-
-
-QUICK, FULL = _cases(QUICK_PLANS), _cases(FULL_PLANS)
+QUICK, FULL = cases_of(QUICK_PLANS, ranged), cases_of(FULL_PLANS, ranged)

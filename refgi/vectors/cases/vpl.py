@@ -1,27 +1,12 @@
 """Pixel lights with visibility, from the buffers to the sum."""
 
-from collections.abc import Callable
-from functools import partial
-from typing import NamedTuple
-
 from refgi.draws import PIXEL_LIGHTS, draws
-from refgi.scene import Scene
-from refgi.vectors.cases.gather import AWAY
-from refgi.vectors.cases.scenes import DOWN, SPOT, SUN, room
+from refgi.vectors.cases.plan import Plan, Plans, cases_of
+from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, room
 from refgi.vectors.cases.sii import add_lit
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
 from refgi.vectors.stages.vpl import add_vpl
-
-
-class Plan(NamedTuple):
-    """A case in the making."""
-
-    what: str
-    scene: Scene
-    size: tuple[int, int]  # columns and rows of the picture
-    maps: int  # texels along the side of a map
-    lights: int  # lights of each map, by Halton points
 
 
 def shadowed(id: str, plan: Plan) -> Case:
@@ -39,7 +24,7 @@ def default_shifts(lamps: int) -> tuple[tuple[float, float], ...]:
     return ((0.0, 0.0), *((u, v) for u, v in drawn))
 
 
-QUICK_PLANS: dict[str, Callable[[], Plan]] = {
+QUICK_PLANS: Plans = {
     "vpl-spot": lambda: Plan("one spot, no lobes; shadows of a shelf and a lid", room(SPOT, matte=True), (24, 18), 13,
                              32),
     "vpl-smooth": lambda: Plan("interpolated normals on a ball: pixels that face lights below their triangle; lobes",
@@ -49,16 +34,9 @@ QUICK_PLANS: dict[str, Callable[[], Plan]] = {
                                 (12, 9),
                                 7, 5),
 }
-FULL_PLANS: dict[str, Callable[[], Plan]] = {
+FULL_PLANS: Plans = {
     "vpl-large": lambda: Plan("48 x 36 pixels, 2 x 64 lights", room(SPOT, DOWN), (48, 36), 23, 64),
 }
 
 
-def _cases(plans: dict[str, Callable[[], Plan]]) -> dict[str, Callable[[], Case]]:
-    def made(id: str) -> Case:
-        return shadowed(id, plans[id]())
-
-    return {id: partial(made, id) for id in plans}
-
-
-QUICK, FULL = _cases(QUICK_PLANS), _cases(FULL_PLANS)
+QUICK, FULL = cases_of(QUICK_PLANS, shadowed), cases_of(FULL_PLANS, shadowed)

@@ -5,6 +5,7 @@ half extent of the image plane. Row 0 is the top row; texel centres lie at + 1/2
 """
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
 from refgi.scene import DirectionalLight, Geometry, PointLight, Scene, SpotLight, material_table
 from refgi.scene.material import MaterialTable
 from refgi.scene.model import Light
+from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Decoy, Spec
 
@@ -89,8 +91,11 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
         mean = np.full_like(angle, angle.mean())
         return made | {even[0]: mean, even[1]: made[even[1]] * (mean / angle).astype(real)}
 
+    # a spot's falloff depends on differences of cosines, each of which float32 rounds
+    rounded = [reading(flux, **{f"{lamp}__half_angles": partial(_with_rounded_cosines, sign)}) for sign in (-1.0, 1.0)]
     recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
-               paper="SII Sec. 3.1; docs/radiometry", decoys=(
+               paper="SII Sec. 3.1; docs/radiometry", variants=tuple(rounded) if isinstance(light, SpotLight) else (),
+               decoys=(
                    Decoy("every texel has the same solid angle", equal, "Nichols and Wyman 2009, Fig. 13"),
                    Decoy("the albedo is left out", reading(flux, materials__diffuse=np.ones_like,
                                                            materials__specular=_ones_where_any), "Phi_t = albedo ..."),
@@ -135,6 +140,12 @@ def light_of(arrays: Arrays, lamp: str, light: Light) -> Light:
         value |= {"inner_half_angle": min(inner, outer), "outer_half_angle": outer}
     made: Light = type(light)(**value)
     return made
+
+
+def _with_rounded_cosines(sign: float, half_angles: Array) -> Array:
+    """Return the inner and outer half-angle whose cosines are off by a rounding of float32, in opposite directions."""
+    cosines = np.cos(half_angles.astype(np.float64)) + sign * ROUNDING * np.array([-1.0, 1.0])
+    return np.asarray(np.arccos(np.clip(cosines, -1.0, 1.0)))
 
 
 def _ones_where_any(array: Array) -> Array:

@@ -29,6 +29,8 @@ def add_lights(
     """
     texels, weights = [], []
     for index, count in enumerate(counts):
+        if pattern == "grid" and recipe.facts[f"rsm{index}"]["maps"] > 1:
+            raise ValueError(f"{recipe.id}: a grid on stacked maps: refgi lays one on each")
         add_points(recipe, index, count, pattern, shifts[index] if shifts else None)
         _add_texels(recipe, scene, resolution, index, count, warp)
         texels.append(f"rsm{index}.texel")
@@ -41,6 +43,7 @@ def add_points(
 ) -> None:
     """Add the points of the unit square that texels of a map are chosen by: computed, or given as random numbers."""
     name = f"rsm{index}.points"
+    recipe.facts[name] = pattern
     spec = Spec("point, uv", "1", "points of the unit square in [0, 1): u along columns, v along rows downwards")
     if pattern == "given":
         recipe.give(name, _below_1(np.random.default_rng([7, index]).random((count, 2))), spec)

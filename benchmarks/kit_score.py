@@ -2,12 +2,12 @@
 
 `benchmarks/kit_bugs/*.toml` lists them, written by someone who had not seen the checker: file, text, replacement, the
 stages in which the bug first shows, and words that a good diagnosis holds. A bug counts as found where the first wrong
-stage is one of those, and its cause as named where one of the three causes told of such a stage holds one of the words.
+stage is one of those, and its cause as named where one of the three causes told of that stage, over all cases, holds
+one of the words.
 """
 
 import argparse
 import json
-import re
 import shutil
 import subprocess
 import sys
@@ -23,6 +23,7 @@ from rich.table import Table
 
 from refgi.testing import kit_folder
 from refgi.vectors.check import ALL_WITHIN, Asked, Kit, check_output
+from refgi.vectors.spec import kind_of
 
 ROOT = Path(__file__).parents[1]
 BUGS = Path(__file__).with_name("kit_bugs")
@@ -106,16 +107,11 @@ def _judged(port: str, number: int, bug: dict[str, Any], out: Path) -> Score:
     result = check_output(Kit(kit_folder()), out, Asked())
     if result.first is None:
         return Score(port, number, bug["what"], "silent", False, "", ())
-    where = {_kind(stage) for stage in bug["stages"]}
-    state = "found" if _kind(result.first[1]) in where else "elsewhere"
-    causes = tuple(dict.fromkeys(cause.cause for stage in result.stages for cause in stage.causes
-                                 if _kind(stage.stage) in where))
+    where = {kind_of(stage) for stage in bug["stages"]}
+    state = "found" if kind_of(result.first[1]) in where else "elsewhere"
+    causes = tuple(cause.cause for one in result.findings[:1] for cause in one.causes)
     named = any(word.lower() in cause.lower() for word in bug["words"] for cause in causes)
-    return Score(port, number, bug["what"], state, named, "/".join(result.first), causes[:6])
-
-
-def _kind(stage: str) -> str:
-    return re.sub(r"\.?\d+", "", stage)
+    return Score(port, number, bug["what"], state, named, "/".join(result.first), causes)
 
 
 def _copied(port: str, folder: Path) -> Path:

@@ -70,8 +70,8 @@ def assert_stage_close(
         Id of a case, such as "sii-warp-a".
     name : str
         Name of an array, such as "rsm0.flux".
-    tier : {"T0", "T1", "T2"}
-        Equal; float32 rounding; storage in half floats.
+    tier : {"T0", "T1", "T2", "T2B"}
+        Equal; float32 rounding; storage in half floats; in 8 bits where they fit.
     kit : Kit, optional
         The kit; the quick one where absent.
 

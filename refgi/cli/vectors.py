@@ -12,9 +12,6 @@ if TYPE_CHECKING:
     from refgi.vectors.manifest import Result, StageVerdict
 
 
-MOST_STORIES = 20  # wrong stages that are told in full
-
-
 @click.group("vectors")
 def command() -> None:
     """Test vectors of every stage, and a port's check against them."""
@@ -45,7 +42,7 @@ def _export(session: Session, /, kit: str, out: str, case: str | None) -> None:
 @click.option("--stage", "stages", multiple=True, metavar="NAME", help="Only stages whose name begins so; repeatable.")
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only cases whose id begins so; repeatable.")
 @click.option("--tier", "tiers", multiple=True, metavar="[STAGE=]TIER",
-              help="T0 equal, T1 float32 rounding, T2 storage in half floats; repeatable.")
+              help="T0 equal, T1 float32 rounding, T2 storage in half floats, T2B in 8 bits; repeatable.")
 @click.option("--json", "json_file", metavar="FILE", help="Write the verdicts as JSON.")
 @click.option("--html", "html_file", metavar="FILE", help="Write a page with the arrays side by side.")
 def _check(
@@ -100,18 +97,15 @@ def tiers_of(texts: tuple[str, ...]) -> dict[str, str]:
 
 
 def report(result: "Result") -> str:
-    """Return what people read: one line a stage that ran, then what is wrong, stage by stage."""
-    from refgi.vectors.words import story
+    """Return what people read: one line a stage that ran, then what is wrong, by kinds of stages."""
+    from refgi.vectors.words import stories
 
     ran = [one for one in result.stages if one.verdict != "not-run"]
     rows = [("case", "stage", "verdict", "worst / bound", "")]
     rows += [(one.case, one.stage, one.verdict, _worst(one), _remark(one)) for one in ran]
     lines = [table(rows)] if ran else []
-    wrong = [one for one in ran if one.verdict in ("out", "invalid") and one.upstream != "dirty"]
-    for one in wrong[:MOST_STORIES]:
-        lines += ["", *story(one)]
-    if len(wrong) > MOST_STORIES:
-        lines += ["", f"and {len(wrong) - MOST_STORIES} stages more; --json and --html tell all"]
+    for one in stories(result):
+        lines += ["", *one]
     lines += ["", *(f"unknown: {one}" for one in result.unknown)] if result.unknown else []
     if not ran:
         lines.append("OUTPUT/<case>/<array>.npy is where arrays are looked for")

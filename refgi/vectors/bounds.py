@@ -6,8 +6,9 @@ in float32, and in float64 on inputs changed at random by up to two roundings of
 largest change seen, plus the rounding of the result and of the largest values beside it. Where a change moves a
 decision (an edge, a tie) the element is masked: it may differ at will.
 
-Tier T2 has the same for storage in half floats, as one bound for the array and a share of outliers. Bounds of a chained
-run, in which every stage reads the roundings of those before, are of that form too.
+Tier T2 has the same for storage in half floats, as one bound for the array and a share of outliers; tier T2B for 8 bits
+where values have no unit and lie in [0, 1] or [-1, 1] (normals, albedo, shares), half floats elsewhere. Bounds of a
+chained run, in which every stage reads the roundings of those before, are of that form too.
 
 Inputs that a stage takes as `exact` are not changed: points whose differences float32 finds without error, numbers that
 decide which texel is meant. The kit holds them to the bit.
@@ -25,11 +26,14 @@ SIGMAS = 4.0  # of an estimate's mean, and of a pixel but for a few of them
 RUNS = 4  # with changed inputs
 ROUNDING = 2.0**-24  # of float32, relative
 HALF_ROUNDING = 2.0**-11  # of float16
+BYTE, SIGNED_BYTE = 1 / 255, 1 / 127  # steps of [0, 1] and [-1, 1] in 8 bits
 CHANGE = 2.0  # roundings that inputs are changed by, at most
 FLUSHED = 2.0**-126  # smaller numbers are subnormal in float32: many machines flush them to 0
+LEAST_IN_BYTES = 0.1  # large values below are not kept in 8 bits: too few steps would be left
 LARGE = 0.9  # quantile of an array's magnitudes that stands for "the largest values beside it"
 USUAL = 0.995  # quantile of changes that a budget is made of; what lies beyond are outliers
 DECIDED = 0.02  # a change beyond this share of the array's large values is a decision taken otherwise
+DECIDED_IN_BYTES = 0.1  # the same in 8 bits, whose steps are 0.4 to 0.8 %
 
 
 class Bound(NamedTuple):
@@ -60,14 +64,39 @@ def isolated_bounds(case: Case, step: Stage, known: Arrays, seed: int) -> dict[s
             for name in step.writes}
 
 
-def half_budgets(case: Case, step: Stage, known: Arrays, seed: int) -> dict[str, Budget]:
-    """Return the budget of each array that a stage of a case writes when it reads and writes half floats (T2)."""
+def stored_budgets(case: Case, step: Stage, known: Arrays, seed: int, *, in_bytes: bool) -> dict[str, Budget]:
+    """Return the budget of each array that a stage of a case writes when its floats are kept in few bits.
+
+    In half floats (T2), or `in_bytes`: in 8 bits where they fit (T2B).
+    """
     if is_estimate(case, step):
         return dict.fromkeys(step.writes, NO_BUDGET)
-    runs = [{name: _to_half(array) for name, array in _run(step, changed).items()}
-            for changed in _changed(step, known, seed, _halved_at_random)]
-    return {name: _budget(known[name], [run[name] for run in runs], HALF_ROUNDING, _large(case, name, known[name]))
-            for name in step.writes}
+    steps = {name: byte_step(case, name, known[name]) if in_bytes else 0.0 for name in (*step.reads, *step.writes)}
+
+    def change(name: str, array: Array, random: np.random.Generator) -> Array:
+        if steps[name]:
+            return np.asarray(steps[name] * np.floor(array / steps[name] + random.uniform(0.0, 1.0, array.shape)))
+        return _rounded_at_random(name, array, random, HALF_ROUNDING / CHANGE)
+
+    runs = [{name: _to_bytes(array, steps[name]) if steps[name] else _to_half(array)
+             for name, array in _run(step, changed).items()} for changed in _changed(step, known, seed, change)]
+    budgets = {}
+    for name in step.writes:
+        large = _large(case, name, known[name])
+        rounding = 0.5 * steps[name] / large if steps[name] else HALF_ROUNDING
+        budgets[name] = _budget(known[name], [run[name] for run in runs], rounding, large,
+                                DECIDED_IN_BYTES if in_bytes else DECIDED)
+    return budgets
+
+
+def byte_step(case: Case, name: str, array: Array) -> float:
+    """Return the step at which 8 bits keep an array's numbers; 0 where its numbers are not of that kind."""
+    spec = case.specs[name]
+    if array.dtype.kind != "f" or spec.unit != "1" or spec.alone or not np.isfinite(array).all():
+        return 0.0
+    if large_value(array) < LEAST_IN_BYTES or np.abs(array).max(initial=0.0) > 1.0:
+        return 0.0
+    return BYTE if array.min(initial=0.0) >= 0.0 else SIGNED_BYTE
 
 
 def chained_budgets(case: Case, known: Arrays, seed: int) -> dict[str, Budget]:
@@ -79,8 +108,8 @@ def chained_budgets(case: Case, known: Arrays, seed: int) -> dict[str, Budget]:
         for step in case.stages:
             if is_estimate(case, step):
                 continue
-            changed = {name: array if name in step.exact else _rounded_at_random(array, random) for name, array in
-                       as_read(chain, step.reads, np.float64).items()}
+            changed = {name: array if name in step.exact else _rounded_at_random(name, array, random)
+                       for name, array in as_read(chain, step.reads, np.float64).items()}
             chain.update(_run(step, changed))
         runs.append(chain)
     written = [name for step in case.stages for name in step.writes]
@@ -105,12 +134,12 @@ def _spread_bound(known: Arrays, name: str) -> Bound:
 
 
 def _changed(
-    step: Stage, known: Arrays, seed: int, change: Callable[[Array, np.random.Generator], Array]
+    step: Stage, known: Arrays, seed: int, change: Callable[[str, Array, np.random.Generator], Array]
 ) -> Iterator[dict[str, Array]]:
     exact = as_read(known, step.reads, np.float64)
     for number in range(RUNS):
         random = np.random.default_rng([seed, number])
-        yield {name: array if name in step.exact else change(array, random) for name, array in exact.items()}
+        yield {name: array if name in step.exact else change(name, array, random) for name, array in exact.items()}
 
 
 def _run(step: Stage, inputs: Arrays) -> dict[str, Array]:
@@ -118,14 +147,12 @@ def _run(step: Stage, inputs: Arrays) -> dict[str, Array]:
     return {name: stored(made[name]) for name in step.writes}
 
 
-def _rounded_at_random(array: Array, random: np.random.Generator, rounding: float = ROUNDING) -> Array:
+def _rounded_at_random(
+    _: str, array: Array, random: np.random.Generator, rounding: float = ROUNDING
+) -> Array:
     if array.dtype.kind != "f":
         return array
     return np.asarray(array * (1.0 + rounding * CHANGE * random.uniform(-1.0, 1.0, array.shape)))
-
-
-def _halved_at_random(array: Array, random: np.random.Generator) -> Array:
-    return _rounded_at_random(array, random, HALF_ROUNDING / CHANGE)
 
 
 def _to_half(array: Array) -> Array:
@@ -133,6 +160,11 @@ def _to_half(array: Array) -> Array:
         return array
     with np.errstate(over="ignore", under="ignore"):
         return array.astype(np.float16).astype(np.float32)
+
+
+def _to_bytes(array: Array, step: float) -> Array:
+    least = 0.0 if step == BYTE else -1.0
+    return (step * np.rint(np.clip(array, least, 1.0) / step)).astype(np.float32)
 
 
 def _large(case: Case, name: str, expected: Array) -> float:
@@ -151,7 +183,9 @@ def _bound(expected: Array, runs: list[Array], large: float) -> Bound:
     return Bound(np.where(masked, 0.0, limit).astype(np.float32), masked)
 
 
-def _budget(expected: Array, runs: list[Array], rounding: float, large: float) -> Budget:
+def _budget(
+    expected: Array, runs: list[Array], rounding: float, large: float, decided: float = DECIDED
+) -> Budget:
     same = [run for run in runs if run.shape == expected.shape]
     if not same or expected.size == 0:
         return Budget(0.0, large, 1.0 if expected.size else 0.0)
@@ -160,7 +194,7 @@ def _budget(expected: Array, runs: list[Array], rounding: float, large: float) -
         return Budget(0.0, 0.0, _outliers(off > 0, expected.size))
     size = np.where(np.isfinite(expected), np.abs(expected), 0.0).astype(np.float64) + large
     share = np.divide(off, size, out=np.where(off > 0, np.inf, 0.0), where=size > 0)
-    usual = share[share < DECIDED]
+    usual = share[share < decided]
     relative = SAFETY * (rounding + (float(np.quantile(usual, USUAL)) if usual.size else 0.0))
     return Budget(relative, large, _outliers(share > relative, expected.size))
 

@@ -2,7 +2,7 @@
 
 A hypothesis explains a difference where it predicts what the port has, element by element, at nearly all elements.
 Those of this module hold for any array: factors, signs, axes that are flipped, exchanged or shifted, coding of values,
-order. A kit adds those of each stage as arrays (`Suspect`).
+order. A kit adds those of each stage as arrays (`BugEntry`).
 """
 
 from collections.abc import Iterator, Mapping

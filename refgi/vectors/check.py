@@ -11,6 +11,7 @@ import numpy as np
 
 from refgi.errors import InputError
 from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of, told_at_once
+from refgi.vectors.findings import CAUSES, findings
 from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
 from refgi.vectors.kit import Asked, DamagedError, Kit, find_array, fits, places_of_case, read_array
 from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Cause, Result, StageEntry, StageVerdict, Verdict
@@ -21,8 +22,7 @@ __all__ = ["ALL_WITHIN", "DAMAGED", "NOT_COMPARABLE", "OUT", "TIERS", "Asked", "
            "stage_of_array"]
 
 ALL_WITHIN, OUT, NOT_COMPARABLE, DAMAGED = 0, 1, 4, 5
-TIERS = ("T0", "T1", "T2")
-CAUSES = 3  # that are told
+TIERS = ("T0", "T1", "T2", "T2B")
 OF_A_KIT = ("cases", "scenes", "schema")  # folders beside the cases where a kit itself is checked
 ORDER: tuple[Verdict, ...] = ("out", "invalid", "within", "exact", "not-run")
 
@@ -108,13 +108,15 @@ def _summed(
     code = DAMAGED if damaged else OUT if "out" in found else NOT_COMPARABLE if incomparable else ALL_WITHIN
     worst = next(verdict for verdict in ORDER if verdict in found)
     return Result(kit=kit.manifest.kit, vectors=kit.manifest.vectors, mode="chained" if asked.chained else "isolated",
-                  verdict=worst, exit_code=code, first=first, stages=tuple(verdicts), unknown=unknown)
+                  verdict=worst, exit_code=code, first=first, findings=findings(verdicts),
+                  stages=tuple(one.model_copy(update={"causes": one.causes[:CAUSES]}) for one in verdicts),
+                  unknown=unknown)
 
 
 def check_stage(
     kit: Kit, case: CaseManifest, step: StageEntry, output: Path, asked: Asked, *, dirty: bool
 ) -> StageVerdict:
-    """Judge what a port has of one stage; `dirty`: what it read is wrong already."""
+    """Judge what a port has of one stage, with every cause; `dirty`: what it read is wrong already."""
     got = {name: file for name in step.writes if (file := find_array(output, case.id, name)) is not None}
     tier = asked.tier_of(step.name)
     judged: dict[str, Judged] = {}
@@ -133,7 +135,7 @@ def check_stage(
     causes = _causes(kit, case, step, judged, arrays) if verdict in ("out", "invalid") and not dirty else []
     upstream = ("dirty" if dirty else "clean") if asked.chained else "isolated"
     return StageVerdict(case=case.id, stage=step.name, verdict=verdict, upstream=upstream,  # type: ignore[arg-type]
-                        arrays=tuple(verdicts), causes=tuple(causes[:CAUSES]))
+                        arrays=tuple(verdicts), causes=tuple(causes))
 
 
 def _not_run(name: str, tier: str, others: bool) -> ArrayVerdict:
@@ -155,7 +157,7 @@ def stage_of_array(kit: Kit, case: str, name: str, got: Array, tier: str = "T1")
         Name of an array that a stage of it writes.
     got : ndarray
         What the port has.
-    tier : {"T0", "T1", "T2"}
+    tier : {"T0", "T1", "T2", "T2B"}
         How near it must be.
 
     Returns
@@ -195,9 +197,11 @@ def _judged(
         got = got.astype(np.bool_)
     if entry.tier == "T3":
         return _judged_estimate(kit, case, name, arrays, expected)
-    tolerance = entry.half if tier == "T2" else entry.chained if asked.chained else None
-    if tier == "T2" and asked.chained and entry.half is not None and entry.chained is not None:
-        tolerance = entry.half.model_copy(update={"outliers": max(entry.half.outliers, entry.chained.outliers)})
+    tolerance = entry.chained if asked.chained else None
+    few_bits = {"T2": entry.half, "T2B": entry.bytes}.get(tier)
+    if few_bits is not None:
+        outliers = max(few_bits.outliers, 0.0 if tolerance is None else tolerance.outliers)
+        tolerance = few_bits.model_copy(update={"outliers": outliers})
     limit = kit.extra(case, entry.bound) if entry.bound is not None else None
     masked = kit.extra(case, entry.masked) if entry.masked is not None else None
     return judge(name, expected, got, "T0" if entry.tier == "T0" else tier, limit, masked, tolerance)
@@ -225,16 +229,16 @@ def _causes(
         return plain
     shapes = {name: array.shape for name, array in arrays.items()}
     found = []
-    for suspect in step.suspects:
-        if suspect.blind or any(shapes.get(name, shape) != shape for name, shape in suspect.shapes.items()):
+    for bug in step.bugs:
+        if bug.blind or any(shapes.get(name, shape) != shape for name, shape in bug.shapes.items()):
             continue
-        shares = [explained(one, kit.extra(case, suspect.arrays[name]), kit.extra(case, suspect.places[name]))
-                  for name, one in differing.items() if name in suspect.arrays]
-        other_shape = any(case.arrays[name].shape != shape for name, shape in suspect.shapes.items() if name in shapes)
+        shares = [explained(one, kit.extra(case, bug.arrays[name]), kit.extra(case, bug.places[name]))
+                  for name, one in differing.items() if name in bug.arrays]
+        other_shape = any(case.arrays[name].shape != shape for name, shape in bug.shapes.items() if name in shapes)
         share = min(shares, default=0.0) if len(shares) == len(differing) else 0.0
         share = 1.0 if other_shape and not differing else share
         if share >= EXPLAINED:
-            found.append(Cause(cause=suspect.cause, share=share, paper=suspect.paper))
+            found.append(Cause(cause=bug.cause, share=share, paper=bug.paper))
     for one in differing.values():
         found += explain(one, case.factors, {name: kit.array(case, name) for name in case.arrays
                                               if case.arrays[name].shape == one.expected.shape})

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from refgi.errors import InputError, expect
-from refgi.vectors.bounds import Bound, Budget, chained_budgets, distance, half_budgets, isolated_bounds
+from refgi.vectors.bounds import Bound, Budget, chained_budgets, distance, isolated_bounds, stored_budgets
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.manifest import (
     CASE,
@@ -23,23 +23,24 @@ from refgi.vectors.manifest import (
     SCHEMAS,
     VERSION,
     ArrayEntry,
+    BugEntry,
     CaseManifest,
     KitEntry,
     KitManifest,
     StageEntry,
-    Suspect,
     Tolerance,
     schema_text,
     text_of,
 )
 from refgi.vectors.scenefile import write_scene
-from refgi.vectors.spec import Array, Arrays, Case, Decoy, Stage, expected_of, outputs_of
+from refgi.vectors.spec import Array, Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of
 
 SEED = 20090101  # of the changes that bounds are measured by
 TOLD_BY, BESIDE = 192, 64  # elements of a likely bug that are kept: those that tell it, and others
 ISOLATED = "float32 runs and 4 float64 runs on inputs changed by up to 2 roundings of float32, x 4; plus rounding"
 CHAINED = "4 float64 runs, the inputs of every stage changed by up to 2 roundings of float32, x 4"
 HALF = "4 float64 runs on inputs rounded to float16 at random, results in float16, x 4"
+BYTES = "the same in 8 bits, where numbers without unit lie in [0, 1] or [-1, 1]"
 Tell = Callable[[str, float], None]
 
 
@@ -108,9 +109,9 @@ class _Told:
 
     def add(self, manifest: CaseManifest) -> None:
         for step in manifest.stages:
-            for suspect in step.suspects:
-                key = _kind(step.name), suspect.cause
-                self._seen[key] = self._seen.get(key, False) or not suspect.blind
+            for bug in step.bugs:
+                key = kind_of(step.name), bug.cause
+                self._seen[key] = self._seen.get(key, False) or not bug.blind
 
     def expect_none_blind(self) -> None:
         blind = [f"{stage}: {cause}" for (stage, cause), seen in self._seen.items() if not seen]
@@ -118,30 +119,27 @@ class _Told:
             raise InputError(f"kit: expected a case that tells each likely bug, got none for {'; '.join(blind)}")
 
 
-def _kind(stage: str) -> str:
-    """Return a stage's name without the number of its map or level: rsm0.flux and rsm1.flux are one."""
-    return "".join(letter for letter in stage if not letter.isdigit())
-
-
 def write_case(case: Case, folder: Path) -> CaseManifest:
     """Write the arrays of a case below a kit's folder and return its manifest, which is not written yet."""
     home = folder / "cases" / case.id
-    for name in ("in", "out", "bound", "mask", "suspect"):
+    for name in ("in", "out", "bound", "mask", "bugs"):
         (home / name).mkdir(parents=True, exist_ok=True)
     known = expected_of(case)
     arrays = {name: _entry(case, name, known[name], _save(home, f"in/{name}.npy", known[name])) for name in case.given}
     chained = chained_budgets(case, known, SEED)
     stages = []
     for step in case.stages:
-        bounds, halves = isolated_bounds(case, step, known, SEED), half_budgets(case, step, known, SEED)
+        bounds = isolated_bounds(case, step, known, SEED)
+        halves, in_bytes = (stored_budgets(case, step, known, SEED, in_bytes=bytes_) for bytes_ in (False, True))
         for name in step.writes:
             entry = _entry(case, name, known[name], _save(home, f"out/{name}.npy", known[name]))
-            arrays[name] = entry.model_copy(update=_tolerances(home, name, entry, bounds[name], chained[name],
-                                                               halves[name]))
-        suspects = tuple(_suspect(home, step, known, bounds, decoy, number) for number, decoy in
-                         enumerate(step.decoys))
+            arrays[name] = entry.model_copy(update=_tolerances(home, name, entry, bounds[name], {
+                "chained": (chained[name], CHAINED), "half": (halves[name], HALF),
+                "bytes": (in_bytes[name], BYTES)}))
+        bugs = tuple(_bug_entry(home, step, known, bounds, bug, number) for number, bug in
+                     enumerate(step.bugs))
         stages.append(StageEntry(name=step.name, what=step.what, paper=step.paper, reads=step.reads,
-                                 writes=step.writes, exact=step.exact, suspects=suspects))
+                                 writes=step.writes, exact=step.exact, bugs=bugs))
     scene = None
     if case.scene is not None:
         scene = f"scenes/{case.id}"
@@ -162,11 +160,11 @@ def _entry(case: Case, name: str, array: Array, saved: tuple[str, str]) -> Array
 
 
 def _tolerances(
-    home: Path, name: str, entry: ArrayEntry, bound: Bound, chained: Budget, half: Budget
+    home: Path, name: str, entry: ArrayEntry, bound: Bound, budgets: Mapping[str, tuple[Budget, str]]
 ) -> Mapping[str, object]:
     """Return the fields of an array that say how far it may be off."""
-    more: dict[str, object] = {"chained": Tolerance(**chained._asdict(), source=CHAINED),
-                               "half": Tolerance(**half._asdict(), source=HALF)}
+    more: dict[str, object] = {key: Tolerance(**budget._asdict(), source=source)
+                               for key, (budget, source) in budgets.items()}
     if entry.dtype == "<f4":
         more |= {"bound": _save(home, f"bound/{name}.npy", bound.limit)[0], "bound_source": ISOLATED}
     if bound.masked.any():
@@ -175,10 +173,10 @@ def _tolerances(
     return more
 
 
-def _suspect(
-    home: Path, step: Stage, known: Arrays, bounds: Mapping[str, Bound], decoy: Decoy, number: int
-) -> Suspect:
-    made = outputs_of(step, known, np.float64, decoy.run)
+def _bug_entry(
+    home: Path, step: Stage, known: Arrays, bounds: Mapping[str, Bound], bug: Bug, number: int
+) -> BugEntry:
+    made = outputs_of(step, known, np.float64, bug.run)
     values, places, blind = {}, {}, True
     for name in step.writes:
         array, expected = made[name], known[name]
@@ -189,10 +187,10 @@ def _suspect(
         blind = blind and not off.any()
         told = np.concatenate([_spread(np.flatnonzero(off), TOLD_BY), _spread(np.flatnonzero(~off), BESIDE)])
         if off.any():
-            places[name] = _save(home, f"suspect/{step.name}.{number}.{name}.places.npy", told.astype("<i4"))[0]
-            values[name] = _save(home, f"suspect/{step.name}.{number}.{name}.npy", array.reshape(-1)[told])[0]
-    return Suspect(cause=decoy.cause, paper=decoy.paper, arrays=values, places=places, blind=blind,
-                   shapes={name: made[name].shape for name in step.writes})
+            places[name] = _save(home, f"bugs/{step.name}.{number}.{name}.places.npy", told.astype("<i4"))[0]
+            values[name] = _save(home, f"bugs/{step.name}.{number}.{name}.npy", array.reshape(-1)[told])[0]
+    return BugEntry(cause=bug.cause, paper=bug.paper, arrays=values, places=places, blind=blind,
+                    shapes={name: made[name].shape for name in step.writes})
 
 
 def _spread(indices: Array, count: int) -> Array:

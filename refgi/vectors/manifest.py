@@ -29,7 +29,7 @@ class Tolerance(_Strict):
     source: str
 
 
-class Suspect(_Strict):
+class BugEntry(_Strict):
     """A likely bug of a stage: the elements that tell it, and their values with it."""
 
     cause: str
@@ -60,6 +60,7 @@ class ArrayEntry(_Strict):
     masked_count: int = 0
     chained: Tolerance | None = None
     half: Tolerance | None = None  # tier T2
+    bytes: Tolerance | None = None  # tier T2B
 
 
 class StageEntry(_Strict):
@@ -71,7 +72,7 @@ class StageEntry(_Strict):
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     exact: tuple[str, ...] = ()  # inputs that must stay in float32 in any tier: their differences or choices count
-    suspects: tuple[Suspect, ...] = ()
+    bugs: tuple[BugEntry, ...] = ()
 
 
 class CaseManifest(_Strict):
@@ -129,7 +130,7 @@ class Cause(_Strict):
     """A likely bug that explains a difference."""
 
     cause: str
-    share: float  # of the elements that differ
+    share: float  # of the elements that differ; 0 of a remark that explains none
     paper: str = ""
 
 
@@ -144,6 +145,16 @@ class StageVerdict(_Strict):
     causes: tuple[Cause, ...] = ()
 
 
+class Finding(_Strict):
+    """What is wrong with a kind of stage over all cases."""
+
+    stage: str  # without numbers of maps, levels and rounds: "rsm.flux"
+    first: tuple[str, str]  # case and stage
+    wrong: int  # verdicts that are out or invalid
+    ran: int  # verdicts of it in all
+    causes: tuple[Cause, ...]  # `share`: of the wrong verdicts that it explains
+
+
 class Result(_Strict):
     """result.json: what a check found."""
 
@@ -153,6 +164,7 @@ class Result(_Strict):
     verdict: Verdict
     exit_code: int
     first: tuple[str, str] | None  # case and stage of the first wrong one
+    findings: tuple[Finding, ...]
     stages: tuple[StageVerdict, ...]
     unknown: tuple[str, ...] = ()  # what the output holds that the kit does not know
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from refgi.vectors.spec import Array, Arrays, Case, Decoy, Run, Spec, Stage, expected_of
+from refgi.vectors.spec import Array, Arrays, Bug, Case, Run, Spec, Stage, expected_of
 
 Change = Callable[[Array], Array]
 
@@ -38,14 +38,14 @@ class Recipe:
 
     def add(
         self, name: str, what: str, run: Run, reads: tuple[str, ...], writes: Mapping[str, Spec], *, paper: str = "",
-        decoys: tuple[Decoy, ...] = (), exact: tuple[str, ...] = (),
+        bugs: tuple[Bug, ...] = (), exact: tuple[str, ...] = (),
         variants: tuple[Run, ...] = (),
     ) -> None:
         """Add a stage that writes the arrays named, which are what their specs say; the rest as in `Stage`."""
         missing = [one for one in reads if one not in self.specs]
         if missing:
             raise ValueError(f"{self.id}: stage {name} reads {', '.join(missing)}, which nothing gives or writes")
-        self.stages.append(Stage(name, what, reads, tuple(writes), run, paper, decoys, variants, exact))
+        self.stages.append(Stage(name, what, reads, tuple(writes), run, paper, bugs, variants, exact))
         self.specs.update(writes)
 
     def case(self) -> Case:

@@ -4,6 +4,7 @@ Stages run in float64 on arrays as the kit stores them, so that each expected va
 of its storage, for exactly the inputs that a port reads.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -32,7 +33,7 @@ class Spec:
 
 
 @dataclass(frozen=True)
-class Decoy:
+class Bug:
     """A likely bug of a stage: what its outputs are with it."""
 
     cause: str  # for people: "the receiver's cosine is missing"
@@ -50,7 +51,7 @@ class Stage:
     writes: tuple[str, ...]
     run: Run
     paper: str = ""
-    decoys: tuple[Decoy, ...] = ()
+    bugs: tuple[Bug, ...] = ()
     variants: tuple[Run, ...] = ()  # other ways to compute it in float32, as ports do: the bound holds them too
     exact: tuple[str, ...] = ()  # inputs whose differences are exact in float32, or that decide: they are not changed
 
@@ -68,6 +69,11 @@ class Case:
     facts: Mapping[str, Any] = field(default_factory=dict)  # settings, sizes, counts: JSON values
     factors: Mapping[str, float] = field(default_factory=dict)  # numbers that a port may forget or repeat: "N", "T/N"
     scene: Any = None  # the Scene, where there is one; None: arrays are all there is
+
+
+def kind_of(stage: str) -> str:
+    """Return a stage's name without the numbers of maps, levels and rounds: rsm0.flux and rsm1.flux are one kind."""
+    return re.sub(r"\.?\d+", "", stage)
 
 
 def stored(array: Array) -> Array:
@@ -92,6 +98,6 @@ def expected_of(case: Case) -> dict[str, Array]:
 
 
 def outputs_of(step: Stage, known: Arrays, real: Any, run: Run | None = None) -> dict[str, Array]:
-    """Return what a stage writes, as stored; by another `run` in its place, such as that of a decoy."""
+    """Return what a stage writes, as stored; by another `run` in its place, such as that of a bug."""
     made = (run or step.run)(as_read(known, step.reads, real), real)
     return {name: stored(made[name]) for name in step.writes}

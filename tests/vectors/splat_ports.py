@@ -52,15 +52,15 @@ def expect_within(id, name, got):
 
 
 def unseen(ids, start):
-    """Return (stage, cause) of decoys of stages that start with a word which no case tells from the stage."""
+    """Return (stage, cause) of bugs of stages that start with a word which no case tells from the stage."""
     seen = {}
     for id in ids:
         known = made(id)[1]
         for name in stages_of(id, start):
             stage = stage_of(id, name)
-            for decoy in stage.decoys:
-                got = outputs_of(stage, known, np.float64, decoy.run)
-                key = re.sub(r"\d", "", name), decoy.cause
+            for bug in stage.bugs:
+                got = outputs_of(stage, known, np.float64, bug.run)
+                key = re.sub(r"\d", "", name), bug.cause
                 seen[key] = seen.get(key, False) or bool(off(id, name, got))
     return [key for key, found in seen.items() if not found]
 

@@ -73,17 +73,17 @@ def test_every_likely_bug_of_the_kit_is_told_by_the_checker(kit, tmp_path):
     for case in ("sii-three-lamps", "sii-warp-a", "sii-warp-b", "pairs-glossy"):
         port = Port(kit, case, tmp_path / case)
         for step in port.case.stages:
-            for suspect in step.suspects:
-                if suspect.blind or not suspect.arrays:
+            for bug in step.bugs:
+                if bug.blind or not bug.arrays:
                     continue
-                for name, file in suspect.arrays.items():
+                for name, file in bug.arrays.items():
                     wrong = port.arrays[name].copy()
-                    wrong.reshape(-1)[kit.extra(port.case, suspect.places[name])] = kit.extra(port.case, file)
+                    wrong.reshape(-1)[kit.extra(port.case, bug.places[name])] = kit.extra(port.case, file)
                     port.write(name, wrong)
                 first = port.first()
                 told += 1
-                seen += first.stage == step.name and suspect.cause in [one.cause for one in first.causes]
-                for name in suspect.arrays:
+                seen += first.stage == step.name and bug.cause in [one.cause for one in first.causes]
+                for name in bug.arrays:
                     port.write(name, port.arrays[name])
     assert told > 100
     assert seen >= 0.97 * told  # two bugs may have one effect, and three causes are told

@@ -110,6 +110,16 @@ def test_half_floats_pass_the_second_tier_alone(port):
     assert port.check(tiers={"rsm": "T2"}).first[1] == "gbuffer.surface"
 
 
+def test_colours_in_8_bits_pass_their_tier_and_wrong_ones_do_not(port):
+    albedo = port.arrays["gbuffer.albedo"]
+    port.write("gbuffer.albedo", np.rint(255 * albedo) / 255)
+    assert port.check().exit_code == port.check(tiers={"": "T2"}).exit_code == OUT
+    assert port.check(tiers={"": "T2B"}).exit_code == ALL_WITHIN
+    for wrong in (np.rint(15 * albedo) / 15, 0.9 * albedo, albedo[::-1]):
+        port.write("gbuffer.albedo", wrong)
+        assert port.check(tiers={"": "T2B"}).exit_code == OUT
+
+
 def test_the_strictest_tier_wants_equal_floats(port):
     port.write("rsm0.flux", np.nextafter(port.arrays["rsm0.flux"], np.float32(1)))
     assert port.check().exit_code == ALL_WITHIN

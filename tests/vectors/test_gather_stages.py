@@ -1,4 +1,4 @@
-"""Stages of `gather` in the kit: the production method at their end, the literal twin as a port, decoys.
+"""Stages of `gather` in the kit: the production method at their end, the literal twin as a port, bugs.
 
 The twin chooses its own samples and texels; here it is given the kit's. It has no depth on the map and no place on it
 for points on a lamp's axis behind it: both are written out.
@@ -12,7 +12,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.splat.gather import gather
-from refgi.vectors.cases.gather import FULL, FULL_PLANS, QUICK, QUICK_PLANS, SQUARE
+from refgi.vectors.cases.gather import FULL, FULL_PLANS, QUICK, QUICK_PLANS, SQUARE, settings_of
 from refgi.vectors.cases.scenes import room
 from refgi.vectors.stages.gather_disc import Disc, literal_sum
 from tests.naive import gather as twin
@@ -50,7 +50,7 @@ def view_of(id, index):
 def test_the_last_array_is_the_picture_of_the_method(id):
     plan = PLANS[id]()
     frame = Frame(plan.scene, width=plan.size[0], height=plan.size[1], dtype=np.float64, rsm_resolution=plan.maps)
-    expected = gather(frame, plan.settings)
+    expected = gather(frame, settings_of(plan))
     case, known = made(id)
     got = known[case.stages[-1].writes[-1]]
     np.testing.assert_allclose(got, expected, rtol=0, atol=STORED * expected.max())
@@ -61,7 +61,7 @@ def pattern(id):
     facts = made(id)[0].facts["gather"]
     xi, turn = arrays(id, "gather.xi")[0].T
     if id != "gather-border":  # whose first samples are in the middle
-        disc = PLANS[id]().settings.disc
+        disc = settings_of(PLANS[id]()).disc
         down, right, weight = twin.disc_pattern(disc).T
         return {"gather.offset": np.stack([down, right], axis=1) / disc.radius, "gather.weight": 2 * np.pi * weight}
     assert not facts["weights_squared"]
@@ -116,7 +116,7 @@ def total(id):
 
 
 def interpolated(id):
-    settings, here, known = PLANS[id]().settings.interpolation, covered(id), made(id)[1]
+    settings, here, known = settings_of(PLANS[id]()).interpolation, covered(id), made(id)[1]
     position, normal, sums = arrays(id, "gbuffer.position", "gbuffer.normal", "gather.sum")
     frame = SimpleNamespace(gbuffer=SimpleNamespace(position=position, normal=normal, covered=here))
     rows, columns = (twin.middles(size, settings.grid) for size in here.shape)

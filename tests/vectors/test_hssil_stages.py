@@ -1,4 +1,4 @@
-"""Oracle tests of the kit's screen-space stages: the chain is the method, the twins are a port, decoys are seen."""
+"""Oracle tests of the kit's screen-space stages: the chain is the method, the twins are a port, bugs are seen."""
 
 import re
 from functools import cache
@@ -103,7 +103,7 @@ def test_bounds_are_near_rounding_and_masks_are_few(name):
         assert (bound.limit > LOOSE * large_value(known[key])).mean() <= AMPLIFIED or not known[key].any(), key
 
 
-def test_each_decoy_is_seen_by_a_case():
+def test_each_bug_is_seen_by_a_case():
     seen, all_of_them = set(), set()
     for name in CASES:
         case, known, bounds = made(name)
@@ -111,11 +111,11 @@ def test_each_decoy_is_seen_by_a_case():
             kind = NO_LEVEL.sub("", step.name)
             if kind in UNCOVERED:
                 continue
-            causes = {(kind, decoy.cause): decoy for decoy in step.decoys}
+            causes = {(kind, bug.cause): bug for bug in step.bugs}
             all_of_them |= set(causes)
-            for cause, decoy in causes.items():
+            for cause, bug in causes.items():
                 if cause not in seen:
-                    wrong = outputs_of(step, known, np.float64, decoy.run)
+                    wrong = outputs_of(step, known, np.float64, bug.run)
                     if any(outside(wrong[key], known[key], bounds[key]).any() for key in step.writes):
                         seen.add(cause)
     assert not all_of_them - seen
@@ -123,7 +123,7 @@ def test_each_decoy_is_seen_by_a_case():
 
 @pytest.mark.parametrize("name", ["hssil-default", "hssil-paper", "hssil-odd"])
 def test_literal_forms_without_a_bug_are_the_stages(name):
-    """Decoys are wrong by what they say alone."""
+    """Bugs are wrong by what they say alone."""
     case, known, _ = made(name)
     exact = {key: array.astype(float) if array.dtype.kind == "f" else array for key, array in known.items()}
     facts, settings = case.facts, cases.SETTINGS[name]

@@ -20,7 +20,7 @@ from refgi.vectors.check import Asked, Kit
 from refgi.vectors.export import export_kit
 from refgi.vectors.manifest import CASE, SCHEMAS, VERSION, CaseManifest, KitManifest, read_model, schema_text
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Decoy, Spec, expected_of
+from refgi.vectors.spec import Bug, Spec, expected_of
 from tests.vectors import kit_hashes
 
 LARGEST = 20e6  # bytes of the quick kit
@@ -99,7 +99,7 @@ def test_a_bug_that_no_case_tells_is_refused(monkeypatch, tmp_path):
         recipe.give("x.in", np.arange(4.0), Spec("number", "1", "numbers"))
         recipe.add("x", "twice", lambda arrays, _: {"x.out": 2 * arrays["x.in"]}, ("x.in",),
                    {"x.out": Spec("number", "1", "twice")},
-                   decoys=(Decoy("added to itself", lambda arrays, _: {"x.out": arrays["x.in"] + arrays["x.in"]}),))
+                   bugs=(Bug("added to itself", lambda arrays, _: {"x.out": arrays["x.in"] + arrays["x.in"]}),))
         return recipe.case()
 
     monkeypatch.setattr(export, "kit_cases", lambda _: {"x-blind": twice})

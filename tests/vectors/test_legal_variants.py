@@ -93,28 +93,42 @@ def test_sums_in_any_order(kit, tmp_path, kind, order):
     assert result.exit_code == ALL_WITHIN
 
 
+@pytest.mark.parametrize("tier", ["T2", "T2B"])
 @pytest.mark.parametrize("name", CASES)
-def test_half_floats_between_stages(kit, tmp_path, name):
-    """Buffers of 16 bits pass T2 and fail T1, each stage reading the kit's inputs rounded."""
+def test_few_bits_between_stages(kit, tmp_path, name, tier):
+    """Buffers of 16 or 8 bits pass their tier and fail T1, each stage reading the kit's inputs rounded."""
     made = kit_cases("quick")[name]()
     entry = next(one for one in kit.cases(Asked(cases=(name,))) if one.id == name)
     (tmp_path / name).mkdir()
+    steps = {one: step_of_bytes(kit, entry, one) if tier == "T2B" else None for one in entry.arrays}
     for step in made.stages:
-        inputs = {one: as_half(kit.array(entry, one), one in step.exact) for one in step.reads}
+        inputs = {one: kit.array(entry, one) for one in step.reads}
+        inputs |= {one: in_few_bits(np.clip(inputs[one], -65504, 65504), steps[one]) for one in step.reads
+                   if one not in step.exact and inputs[one].dtype.kind == "f"}
         outputs = step.run(inputs, np.float32)
         for one in step.writes:
-            array = np.asarray(outputs[one])
-            with np.errstate(over="ignore"):
-                array = array.astype(np.float16) if array.dtype.kind == "f" else array
-            np.save(tmp_path / name / f"{one}.npy", array)
-    assert check_output(kit, tmp_path, Asked(tiers={"": "T2"}, cases=(name,))).exit_code == ALL_WITHIN
+            np.save(tmp_path / name / f"{one}.npy", in_few_bits(np.asarray(outputs[one]), steps[one]))
+    assert check_output(kit, tmp_path, Asked(tiers={"": tier}, cases=(name,))).exit_code == ALL_WITHIN
     assert check_output(kit, tmp_path, Asked(cases=(name,))).exit_code != ALL_WITHIN
 
 
-def as_half(array, exact):
-    if array.dtype.kind != "f" or exact:
+def step_of_bytes(kit, case, name):
+    """Return (step, least value) where docs/vectors says that 8 bits keep an array, None elsewhere."""
+    array, unit = kit.array(case, name), case.arrays[name].unit
+    if array.dtype.kind != "f" or unit != "1" or not array.any() or np.abs(array).max() > 1:
+        return None
+    if np.quantile(np.abs(array[array != 0]), 0.9) < 0.1:
+        return None
+    return (1 / 255, 0) if array.min() >= 0 else (1 / 127, -1)
+
+
+def in_few_bits(array, step):
+    if array.dtype.kind != "f":
         return array
-    return np.clip(array, -65504, 65504).astype(np.float16).astype(np.float32)
+    if step is None:
+        with np.errstate(over="ignore"):
+            return array.astype(np.float16).astype(np.float32)
+    return (step[0] * np.rint(np.clip(array, step[1], 1) / step[0])).astype(np.float32)
 
 
 def test_tiles_in_any_order(kit, tmp_path):

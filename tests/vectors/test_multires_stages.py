@@ -1,4 +1,4 @@
-"""Stages of `multires` in the kit: the production method at their end, the literal twin as a port, decoys.
+"""Stages of `multires` in the kit: the production method at their end, the literal twin as a port, bugs.
 
 No twin covers the order of the list, which means nothing to the paper: the twin's list is sorted here.
 """
@@ -9,7 +9,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.splat import multires
 from refgi.splat.multires.subsplats.upsample import black_level, filled_cells
-from refgi.vectors.cases.multires import FULL, FULL_PLANS, QUICK, QUICK_PLANS
+from refgi.vectors.cases.multires import FULL, FULL_PLANS, QUICK, QUICK_PLANS, settings_of
 from refgi.vectors.stages.lights import pixel_lights_of
 from refgi.vectors.stages.multires_list import subsplats_of
 from refgi.vectors.stages.multires_upsample import tent
@@ -36,7 +36,7 @@ class View:
 
 def of(id):
     """Return settings, arrays, view and coarsest level of a case."""
-    settings, known = PLANS[id]().settings, made(id)[1]
+    settings, known = settings_of(PLANS[id]()), made(id)[1]
     view = View(known)
     return settings, known, view, twin.coarsest_level(view.covered.shape, settings.subsplats.coarsest)
 
@@ -63,7 +63,7 @@ def named(keys, arrays):
 def test_the_last_array_is_the_picture_of_the_method(id):
     plan = PLANS[id]()
     frame = Frame(plan.scene, width=plan.size[0], height=plan.size[1], dtype=np.float64, rsm_resolution=plan.maps)
-    expected = multires(frame, plan.settings)
+    expected = multires(frame, settings_of(plan))
     case, known = made(id)
     got = known[case.stages[-1].writes[0]]
     np.testing.assert_allclose(got, expected, rtol=0, atol=STORED * expected.max())

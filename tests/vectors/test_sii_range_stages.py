@@ -1,4 +1,4 @@
-"""Stages of the range of pixel lights in the kit: the production method, the literal twin as a port, decoys.
+"""Stages of the range of pixel lights in the kit: the production method, the literal twin as a port, bugs.
 
 The twin has no ellipsoids apart from meshes: these are compared with the printed formula and their defining tangent.
 """
@@ -9,7 +9,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.pairs.settings import PairSettings
 from refgi.splat import sii
-from refgi.vectors.cases.sii_range import FULL, FULL_PLANS, QUICK, QUICK_PLANS
+from refgi.vectors.cases.sii_range import FULL, FULL_PLANS, QUICK, QUICK_PLANS, settings_of
 from refgi.vectors.stages.lights import pixel_lights_of
 from refgi.vectors.stages.sii_range_sum import BOTH
 from tests.naive import sii as twin
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")
 def test_the_last_array_is_the_picture_of_the_method(id):
     plan = PLANS[id]()
     frame = Frame(plan.scene, width=plan.size[0], height=plan.size[1], dtype=np.float64, rsm_resolution=plan.maps)
-    expected, got = sii(frame, plan.settings), made(id)[1]["range.irradiance"]
+    expected, got = sii(frame, settings_of(plan)), made(id)[1]["range.irradiance"]
     out = np.abs(got - expected).max(axis=0) > STORED * expected.max()
     assert out.sum() <= ON_EDGE
     assert (got.max() > 0) != (id == "sii-range-no-flux")
@@ -85,7 +85,7 @@ def length(given):
 
 
 def low(given):
-    share, brightest = given.plan.settings.reach.cut.share, max(given.stored("peak"), default=0.0)
+    share, brightest = settings_of(given.plan).reach.cut.share, max(given.stored("peak"), default=0.0)
     return {"range.low": share * brightest / given.known["range.length"].astype(float) ** 2}
 
 
@@ -100,7 +100,7 @@ def kept(given):
 
 
 def total(given):
-    pairs, light = given.plan.settings.pairs, np.zeros((3, given.x.shape[1]))
+    pairs, light = settings_of(given.plan).pairs, np.zeros((3, given.x.shape[1]))
     for part, counts in zip(parts(given.lights, pairs, given.known.get("lights.area")), given.stored("kept"),
                             strict=True):
         light += np.outer(part.flux, counts[given.covered] * received(part, given.x, given.n, pairs))

@@ -57,13 +57,13 @@ def test_another_estimator_agrees(name):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_each_decoy_is_seen(name):
+def test_each_bug_is_seen(name):
     case, known = made(name)
     step = case.stages[-1]
-    for decoy in step.decoys:
-        wrong = outputs_of(step, known, np.float64, decoy.run)
+    for bug in step.bugs:
+        wrong = outputs_of(step, known, np.float64, bug.run)
         found = deviation(*(known[key] for key in NAMES[:2]), *(wrong[key] for key in NAMES[:2]))
-        assert found > DIFFER, f"{decoy.cause}: {found:.2f}"
+        assert found > DIFFER, f"{bug.cause}: {found:.2f}"
 
 
 def test_a_sum_over_the_light_s_cone_agrees():

@@ -1,4 +1,4 @@
-"""Stages of clustered visibility: as the method, as the literal twins, and blind to no decoy."""
+"""Stages of clustered visibility: as the method, as the literal twins, and blind to no bug."""
 
 from functools import cache
 
@@ -77,18 +77,18 @@ def test_few_elements_are_masked():
                 assert bound.masked.sum() <= MASKED * bound.masked.size, (name, one)
 
 
-def test_every_decoy_is_seen_by_a_case():
-    """Property: a quick case tells each decoy of a stage that it has, a full one those of other settings."""
+def test_every_bug_is_seen_by_a_case():
+    """Property: a quick case tells each bug of a stage that it has, a full one those of other settings."""
     seen, known_to = set(), {}
     for name in ALL:
         _, known, steps = made(name)
         for step in steps:
-            for decoy in step.decoys:
-                key = step.name, decoy.cause
+            for bug in step.bugs:
+                key = step.name, bug.cause
                 known_to.setdefault(key, []).append(name)
                 if key in seen:
                     continue
-                got = outputs_of(step, known, np.float64, decoy.run)
+                got = outputs_of(step, known, np.float64, bug.run)
                 if any(got[one].shape != known[one].shape or is_off(got[one], known[one], bound).any()
                        for one, bound in bounds(name)[step.name].items()):
                     seen.add(key)

@@ -1,4 +1,4 @@
-"""Stages of `vpl` in the kit: the production method at their end, the literal twin as a port, decoys."""
+"""Stages of `vpl` in the kit: the production method at their end, the literal twin as a port, bugs."""
 
 import numpy as np
 import pytest

@@ -21,7 +21,7 @@ from refgi.scene.material import MaterialTable
 from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Spec
 
 VECTOR, POINT = "unit vector", "m"
 SCENE = ("scene.vertices", "scene.faces", "scene.material_of_face")
@@ -95,12 +95,12 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     rounded = [reading(flux, **{f"{lamp}__half_angles": partial(_with_rounded_cosines, sign)}) for sign in (-1.0, 1.0)]
     recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
                paper="SII Sec. 3.1; docs/radiometry", variants=tuple(rounded) if isinstance(light, SpotLight) else (),
-               decoys=(
-                   Decoy("every texel has the same solid angle", equal, "Nichols and Wyman 2009, Fig. 13"),
-                   Decoy("the albedo is left out", reading(flux, materials__diffuse=np.ones_like,
-                                                           materials__specular=_ones_where_any), "Phi_t = albedo ..."),
-                   Decoy("flux is divided by pi", writing(flux, **{f"{name}__flux": lambda a: a / np.pi}),
-                         "flux is W; 1/pi comes with Eq. 1"),
+               bugs=(
+                   Bug("every texel has the same solid angle", equal, "Nichols and Wyman 2009, Fig. 13"),
+                   Bug("the albedo is left out", reading(flux, materials__diffuse=np.ones_like,
+                                                         materials__specular=_ones_where_any), "Phi_t = albedo ..."),
+                   Bug("flux is divided by pi", writing(flux, **{f"{name}__flux": lambda a: a / np.pi}),
+                       "flux is W; 1/pi comes with Eq. 1"),
                ))
 
 
@@ -211,10 +211,10 @@ def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scen
     mirrored = reading(ids, **{f"{view}__half": lambda half: half * (1, -1)})
     recipe.add(f"{name}.ids", "nearest triangle at each texel's centre", ids, (*SCENE, *_map_names(view)),
                {f"{name}.triangle_id": Spec("row, column", "1", "nearest triangle, -1 for none", tier="T0")},
-               paper="docs/rasterizer", decoys=(
-                   Decoy("rows run upwards", mirrored, "row 0 is the top row (docs/conventions)"),
-                   Decoy("texel centres lie at 0 instead of 1/2",
-                         reading(ids, **{f"{view}__frame": _half_texel(maps)}), "centres at + 1/2 (docs/conventions)"),
+               paper="docs/rasterizer", bugs=(
+                   Bug("rows run upwards", mirrored, "row 0 is the top row (docs/conventions)"),
+                   Bug("texel centres lie at 0 instead of 1/2",
+                       reading(ids, **{f"{view}__frame": _half_texel(maps)}), "centres at + 1/2 (docs/conventions)"),
                ))
 
 
@@ -241,10 +241,10 @@ def _add_surface(
              "position": Spec("xyz, row, column", "m", "surface point; 0 without surface", "world"),
              "normal": Spec("xyz, row, column", VECTOR, "on the side that is seen; 0 without surface", "world"),
              "albedo": Spec("rgb, row, column", "1", "diffuse reflectance; 0 without surface", "linear RGB")}
-    flat = (Decoy("normals are not turned to the side that is seen", _unturned(surface, name, arrays_of=scene), ""),)
+    flat = (Bug("normals are not turned to the side that is seen", _unturned(surface, name, arrays_of=scene), ""),)
     recipe.add(f"{name}.surface", "depth, position and normal of what each texel sees", surface,
                (*SCENE, *_normals(recipe), *materials, *_map_names(view), f"{name}.triangle_id"),
-               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1", decoys=flat)
+               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1", bugs=flat)
 
 
 def _unturned(run: Any, name: str, arrays_of: Scene) -> Any:

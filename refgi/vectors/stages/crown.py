@@ -22,7 +22,7 @@ from refgi.sssil.crown.points import (
 )
 from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.levels import level_names, level_of
 
 EQ4 = "HSS Eq. 4 with its pi (E-HSS-04): pi cos R^2 / (r^2 + R^2), R^2 = cos' ds / pi"
@@ -56,20 +56,20 @@ def add_samples(recipe: Recipe, sampling: SamplingSettings, index: int, rows: in
 
     other = "uniform" if sampling.density == "inverse_distance" else "inverse_distance"
     even = f"{name}__weight"
-    decoys = [
-        Decoy(f"the density of samples is {other.replace('_', ' ')}", lambda a, r: run(a, r, density=other), CROWN),
-        Decoy("the crown reaches from 2 r to 4 r", lambda a, r: run(a, r, 2 * radius), CROWN),
-        Decoy("columns and rows are exchanged", writing(run, **{f"{name}__offsets": lambda a: a[..., ::-1]}), ""),
-        Decoy("rows run upwards", writing(run, **{f"{name}__offsets": lambda a: a * (1, -1)}), "row 0 is the top row"),
-        Decoy("offsets are cut off instead of rounded", literal(half=0.0), "texel centres (E-HSS-10)"),
-        Decoy("the disc is sampled by the crown's formula", literal(whole=True), CROWN) if inner else
-        Decoy("the crown is sampled by the disc's formula", literal(disc=True), CROWN),
-        Decoy("distance and direction are exchanged", literal(exchanged=True), "u is how far, v which way"),
-        Decoy("the crown has the weight of the disc", writing(run, **{even: lambda a: np.concatenate(
+    bugs = [
+        Bug(f"the density of samples is {other.replace('_', ' ')}", lambda a, r: run(a, r, density=other), CROWN),
+        Bug("the crown reaches from 2 r to 4 r", lambda a, r: run(a, r, 2 * radius), CROWN),
+        Bug("columns and rows are exchanged", writing(run, **{f"{name}__offsets": lambda a: a[..., ::-1]}), ""),
+        Bug("rows run upwards", writing(run, **{f"{name}__offsets": lambda a: a * (1, -1)}), "row 0 is the top row"),
+        Bug("offsets are cut off instead of rounded", literal(half=0.0), "texel centres (E-HSS-10)"),
+        Bug("the disc is sampled by the crown's formula", literal(whole=True), CROWN) if inner else
+        Bug("the crown is sampled by the disc's formula", literal(disc=True), CROWN),
+        Bug("distance and direction are exchanged", literal(exchanged=True), "u is how far, v which way"),
+        Bug("the crown has the weight of the disc", writing(run, **{even: lambda a: np.concatenate(
             [a[..., :inner], a[..., inner:] / 3], axis=-1)}), "3 pi r^2 / N (E-HSS-06)"),
-        Decoy("each sample stands for one texel", writing(run, **{even: np.ones_like}), "E-HSS-06"),
+        Bug("each sample stands for one texel", writing(run, **{even: np.ones_like}), "E-HSS-06"),
     ]
-    decoys += [Decoy("weights do not follow the density", writing(run, **{even: lambda a: np.broadcast_to(
+    bugs += [Bug("weights do not follow the density", writing(run, **{even: lambda a: np.broadcast_to(
         a.mean(axis=-1, keepdims=True), a.shape)}), CROWN)] if sampling.density != "uniform" else []
     recipe.add(name, "texels around a receiver that are its samples, and how many texels each stands for", run,
                (points, shifts), {
@@ -77,7 +77,7 @@ def add_samples(recipe: Recipe, sampling: SamplingSettings, index: int, rows: in
                                            "texels from the receiver to the sample, the disc's first", tier="T0"),
                    f"{name}.weight": Spec("row modulo tile, column modulo tile, sample; 1: all alike", "1",
                                           "texels of this level that a sample stands for", paper="E-HSS-06"),
-               }, paper=CROWN, decoys=tuple(decoys))
+               }, paper=CROWN, bugs=tuple(bugs))
 
 
 def add_gather(recipe: Recipe, settings: HssilSettings, index: int) -> None:
@@ -98,30 +98,30 @@ def add_gather(recipe: Recipe, settings: HssilSettings, index: int) -> None:
         return lambda a, r: run(a, r, replaced(plain, values))
 
     printed = {key: changed(as_published=frozenset({key})) for key in ("hss_disc_pi", "hss_level_factor")}
-    decoys = [
-        Decoy("Eq. 4 lacks its pi", printed["hss_disc_pi"], "E-HSS-04"),
-        Decoy("Eq. 3 in place of Eq. 4", changed(**{"senders.form_factor": "point"}), "HSS Eq. 4"),
-        Decoy("the disc is that of one texel, not of all that a sample stands for",
-              changed(**{"senders.form_factor": "texel"}), "E-HSS-06"),
-        Decoy("the receiver's cosine is missing", literal(receiver=False), EQ4),
-        Decoy("the sender's cosine is missing", literal(sender=False), EQ4),
-        Decoy("senders that face away send light", literal(sender="abs"), EQ4),
-        Decoy("light arrives from behind the receiver", literal(receiver="abs"), EQ4),
-        Decoy("samples outside the picture are moved to its edge", literal(outside="edge"), "E-HSS-08"),
-        Decoy("samples outside the picture are made up for by those within", literal(outside="scaled"), "E-HSS-08"),
-        Decoy("weights of samples are left out", reading(run, **{f"samples{index}__weight": np.ones_like}), "E-HSS-06"),
-        Decoy("rows and columns of the tile are exchanged", literal(turned=True), "offsets[row % m, column % P]"),
-        Decoy("samples of the receiver's left neighbour", literal(moved=1), "offsets[row % m, column % P]"),
-        Decoy("rows run upwards", reading(run, **{f"samples{index}__offsets": lambda a: a * np.array(
+    bugs = [
+        Bug("Eq. 4 lacks its pi", printed["hss_disc_pi"], "E-HSS-04"),
+        Bug("Eq. 3 in place of Eq. 4", changed(**{"senders.form_factor": "point"}), "HSS Eq. 4"),
+        Bug("the disc is that of one texel, not of all that a sample stands for",
+            changed(**{"senders.form_factor": "texel"}), "E-HSS-06"),
+        Bug("the receiver's cosine is missing", literal(receiver=False), EQ4),
+        Bug("the sender's cosine is missing", literal(sender=False), EQ4),
+        Bug("senders that face away send light", literal(sender="abs"), EQ4),
+        Bug("light arrives from behind the receiver", literal(receiver="abs"), EQ4),
+        Bug("samples outside the picture are moved to its edge", literal(outside="edge"), "E-HSS-08"),
+        Bug("samples outside the picture are made up for by those within", literal(outside="scaled"), "E-HSS-08"),
+        Bug("weights of samples are left out", reading(run, **{f"samples{index}__weight": np.ones_like}), "E-HSS-06"),
+        Bug("rows and columns of the tile are exchanged", literal(turned=True), "offsets[row % m, column % P]"),
+        Bug("samples of the receiver's left neighbour", literal(moved=1), "offsets[row % m, column % P]"),
+        Bug("rows run upwards", reading(run, **{f"samples{index}__offsets": lambda a: a * np.array(
             [1, -1], a.dtype)}), "row 0 is the top row"),
     ]
     if index:
-        decoys.append(Decoy("areas are scaled by 4^k a second time", printed["hss_level_factor"], "E-HSS-06"))
+        bugs.append(Bug("areas are scaled by 4^k a second time", printed["hss_level_factor"], "E-HSS-06"))
     recipe.facts[name.split(".")[0]] = {"form_factor": settings.senders.form_factor}
     recipe.add(name.split(".")[0], "irradiance of a level's texels by their samples, those outside the picture, on "
                "nothing or on the texel itself left out", run, (*planes, *samples), {
                    name: Spec("rgb, row, column", "W/m^2", "irradiance by this level; 0 without surface", "linear RGB",
-                              EQ4)}, paper=f"HSS Eq. 1; {EQ4}", exact=(planes[0],), decoys=tuple(decoys))
+                              EQ4)}, paper=f"HSS Eq. 1; {EQ4}", exact=(planes[0],), bugs=tuple(bugs))
 
 
 def _add_shifts(recipe: Recipe, name: str, counts: tuple[int, int], tile: tuple[int, int]) -> None:
@@ -145,22 +145,22 @@ def _add_shifts(recipe: Recipe, name: str, counts: tuple[int, int], tile: tuple[
 
         return wrong
 
-    decoys = [
-        Decoy("the steps of u and v are exchanged", literal((SECOND_STEP, FIRST_STEP)), "1/g and 1/g^2, g^3 = g + 1"),
-        Decoy("steps of the golden ratio", literal((GOLDEN, GOLDEN**2)), "1/g and 1/g^2, g^3 = g + 1"),
-        Decoy("the sequence starts at 0 instead of 1/2", literal(first=0.0), "(1/2 + j step) mod 1"),
-        Decoy("all texels of the tile have the same shift", lambda a, r: run(a, r, 0), "n crown points further on"),
-        Decoy("the tile's texels are counted column by column", literal(column=True), "row by row"),
+    bugs = [
+        Bug("the steps of u and v are exchanged", literal((SECOND_STEP, FIRST_STEP)), "1/g and 1/g^2, g^3 = g + 1"),
+        Bug("steps of the golden ratio", literal((GOLDEN, GOLDEN**2)), "1/g and 1/g^2, g^3 = g + 1"),
+        Bug("the sequence starts at 0 instead of 1/2", literal(first=0.0), "(1/2 + j step) mod 1"),
+        Bug("all texels of the tile have the same shift", lambda a, r: run(a, r, 0), "n crown points further on"),
+        Bug("the tile's texels are counted column by column", literal(column=True), "row by row"),
     ]
-    decoys += [Decoy("the disc's points count as skipped as well", lambda a, r: run(a, r, inner + crown),
-                     "n crown points further on")] if inner else []
+    bugs += [Bug("the disc's points count as skipped as well", lambda a, r: run(a, r, inner + crown),
+                 "n crown points further on")] if inner else []
     recipe.add(f"shifts of {name}", "points of the sequence, j steps from 1/2, the disc's then the crown's; texel n of "
                "the tile, row by row, is shifted by n times the crown's number of steps more; all modulo 1, in double "
                "precision", run, (f"{name}.shift",), {
                    f"{name}.points": Spec("sample, (u, cos 2 pi v, sin 2 pi v)", "1", "points that all texels share"),
                    f"{name}.shifts": Spec("row of the tile, column of the tile, uv", "1",
                                           "what each texel of a tile adds to u and v, modulo 1"),
-               }, paper=CROWN, exact=(f"{name}.shift",), decoys=tuple(decoys))
+               }, paper=CROWN, exact=(f"{name}.shift",), bugs=tuple(bugs))
 
 
 def _offsets(

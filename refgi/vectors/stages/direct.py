@@ -12,7 +12,7 @@ from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.scene import Scene, material_table
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import (
     SCENE,
     _add_ids,
@@ -73,15 +73,15 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     printed = name.replace(".", "__")
     recipe.add(f"shadow{index}", "the nearest texel's point does not lie above the receiver's own plane", test,
                (*POINTS, *_map_names(name), *depths), {f"shadow{index}.visible": _visible_spec()},
-               paper="docs/rasterizer: receiver-plane bias", exact=(*POINTS[:2], *depths), decoys=(
-                   Decoy("the bias is a constant 0", lambda a, r: test(a, r, 0.0), "receiver-plane bias"),
-                   Decoy("the bias is a constant tenth of the scene's size", lambda a, r: test(a, r, 0.2),
-                         "receiver-plane bias"),
-                   Decoy("rows of the map run upwards", reading(test, **{f"{printed}__frame": _upside_down}),
-                         "row 0 is the top row"),
-                   Decoy("the map's depths are those at its texels' corners", reading(test, **{
+               paper="docs/rasterizer: receiver-plane bias", exact=(*POINTS[:2], *depths), bugs=(
+                   Bug("the bias is a constant 0", lambda a, r: test(a, r, 0.0), "receiver-plane bias"),
+                   Bug("the bias is a constant tenth of the scene's size", lambda a, r: test(a, r, 0.2),
+                       "receiver-plane bias"),
+                   Bug("rows of the map run upwards", reading(test, **{f"{printed}__frame": _upside_down}),
+                       "row 0 is the top row"),
+                   Bug("the map's depths are those at its texels' corners", reading(test, **{
                        f"{printed}__depth": _moved, f"{printed}__position": _moved}), "texel centres at + 1/2"),
-                   Decoy("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
+                   Bug("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
                ))
 
 
@@ -96,14 +96,14 @@ def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:
                                                                     light_of(arrays, lamp, light))}
 
     place = [name for name in _light_names(lamp, light) if name.endswith("position")]
-    wrong = (Decoy("the light is looked for at the origin", reading(test, **{
+    wrong = (Bug("the light is looked for at the origin", reading(test, **{
         place[0].replace(".", "__"): np.zeros_like}), "a ray to the light"),) if place else ()
     recipe.add(f"shadow{index}", "no triangle lies between the pixel's point and the light", test,
                (*SCENE, *POINTS, *_light_names(lamp, light)), {f"shadow{index}.visible": _visible_spec()},
-               paper="shadow rays", exact=("scene.vertices", *POINTS[:2]), decoys=(
-                   Decoy("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
-                   Decoy("rays start below the surface", reading(test, gbuffer__normal=lambda a: -a),
-                         "off the surface, on the side that is seen"), *wrong))
+               paper="shadow rays", exact=("scene.vertices", *POINTS[:2]), bugs=(
+                   Bug("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
+                   Bug("rays start below the surface", reading(test, gbuffer__normal=lambda a: -a),
+                       "off the surface, on the side that is seen"), *wrong))
 
 
 def _add_sum(recipe: Recipe, scene: Scene, view: Projection) -> None:
@@ -131,23 +131,23 @@ def _add_sum(recipe: Recipe, scene: Scene, view: Projection) -> None:
         return lambda a, r: {"direct.irradiance": run(a, r)["direct.irradiance"] * away(a, power)}
 
     positions = tuple(name for name in names if name.endswith("position"))
-    near = (Decoy("1/d^2 is missing", times(2), "E = I cos / d^2"),
-            Decoy("1/d in place of 1/d^2", times(1), "E = I cos / d^2")) if positions else ()
+    near = (Bug("1/d^2 is missing", times(2), "E = I cos / d^2"),
+            Bug("1/d in place of 1/d^2", times(1), "E = I cos / d^2")) if positions else ()
     spots = [name.replace(".", "__") for name in names if name.endswith("half_angles")]
-    cones = (Decoy("the cone's edge is hard", reading(run, **{name: lambda a: a[[1, 1]] for name in spots}),
-                   "docs/conventions: smooth edge of a spot"),
-             Decoy("whole angles in place of half-angles", reading(run, **{name: lambda a: a / 2 for name in spots}),
-                   "half-angles")) if spots else ()
+    cones = (Bug("the cone's edge is hard", reading(run, **{name: lambda a: a[[1, 1]] for name in spots}),
+                 "docs/conventions: smooth edge of a spot"),
+             Bug("whole angles in place of half-angles", reading(run, **{name: lambda a: a / 2 for name in spots}),
+                 "half-angles")) if spots else ()
     recipe.add("direct", "direct irradiance of all lights, without albedo/pi", run, (*POINTS, *names, *shadows),
                {"direct.irradiance": Spec("rgb, row, column", "W/m^2", "direct irradiance; 0 without surface",
                                           "linear RGB", "E = I(w) cos / d^2")},
-               paper="HSS Sec. 4; docs/radiometry", exact=(POINTS[0], *positions), decoys=(
-                   Decoy("shadows are missing", reading(run, **{name.replace(".", "__"): unshadowed for name in
-                                                                shadows}), "HSS Sec. 4"),
-                   Decoy("the normal points inwards", reading(run, gbuffer__normal=lambda a: -a), "E = I cos / d^2"),
-                   Decoy("irradiance is divided by pi", writing(run, direct__irradiance=lambda a: a / np.pi),
-                         "albedo/pi comes with the radiance"), *near, *cones,
-                   *((Decoy("the first light alone", reading(run, **{name.replace(".", "__"): np.zeros_like for name in
+               paper="HSS Sec. 4; docs/radiometry", exact=(POINTS[0], *positions), bugs=(
+                   Bug("shadows are missing", reading(run, **{name.replace(".", "__"): unshadowed for name in
+                                                              shadows}), "HSS Sec. 4"),
+                   Bug("the normal points inwards", reading(run, gbuffer__normal=lambda a: -a), "E = I cos / d^2"),
+                   Bug("irradiance is divided by pi", writing(run, direct__irradiance=lambda a: a / np.pi),
+                       "albedo/pi comes with the radiance"), *near, *cones,
+                   *((Bug("the first light alone", reading(run, **{name.replace(".", "__"): np.zeros_like for name in
                                                                     shadows[1:]}), "all lights"),)
                      if len(lights) > 1 else ())))
 

@@ -15,7 +15,7 @@ from refgi.splat.gather.gather import DiscSettings, Interpolation
 from refgi.splat.gather.gather_sum import disc_offsets
 from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, interpolate
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.gather_disc import OFFSET, PAPER, WEIGHT, Disc, add_centers, add_disc_sum, add_texels
 from refgi.vectors.stages.pair_bugs import RECEIVERS
 
@@ -56,16 +56,16 @@ def _add_pattern(recipe: Recipe, points: Array, squared: bool) -> None:
     weights = "2 pi xi1; the weights' mean is the disc's area, pi" if not squared else "3 pi xi1^2, as is often done"
     recipe.add("gather.pattern", "offsets in a disc of radius 1 and their weights", run, ("gather.xi",), {
         OFFSET: Spec("sample, (down, right)", "1", "xi1 (cos, sin)(2 pi xi2), radii"),
-        WEIGHT: Spec("sample", "1", weights)}, paper=PAPER, decoys=(
-            Decoy("weights are xi1" if squared else "weights are xi1^2", lambda a, r: run(a, r, not squared),
-                  "papers A.5: density 1 / (2 pi rho)"),
-            Decoy("all weights are equal", writing(run, gather__weight=lambda a: np.full_like(a, np.pi)), "papers A.5"),
-            Decoy("samples are spread evenly over the disc's area", equal_area, "radius xi1, not its root"),
-            Decoy("cosine and sine are exchanged", writing(run, gather__offset=lambda a: a[:, ::-1]), "down, right"),
-            Decoy("xi2 is the radius and xi1 the angle", reading(run, gather__xi=lambda a: a[:, ::-1]), "xi1: radius"),
-            Decoy("the angle runs over half a turn", reading(run, gather__xi=lambda a: a * (1, 0.5)), "2 pi xi2"),
-            Decoy("2 pi is left out of the weights", writing(run, gather__weight=lambda a: a / (2 * np.pi)),
-                  "papers A.5")))
+        WEIGHT: Spec("sample", "1", weights)}, paper=PAPER, bugs=(
+            Bug("weights are xi1" if squared else "weights are xi1^2", lambda a, r: run(a, r, not squared),
+                "papers A.5: density 1 / (2 pi rho)"),
+            Bug("all weights are equal", writing(run, gather__weight=lambda a: np.full_like(a, np.pi)), "papers A.5"),
+            Bug("samples are spread evenly over the disc's area", equal_area, "radius xi1, not its root"),
+            Bug("cosine and sine are exchanged", writing(run, gather__offset=lambda a: a[:, ::-1]), "down, right"),
+            Bug("xi2 is the radius and xi1 the angle", reading(run, gather__xi=lambda a: a[:, ::-1]), "xi1: radius"),
+            Bug("the angle runs over half a turn", reading(run, gather__xi=lambda a: a * (1, 0.5)), "2 pi xi2"),
+            Bug("2 pi is left out of the weights", writing(run, gather__weight=lambda a: a / (2 * np.pi)),
+                "papers A.5")))
 
 
 def _add_total(recipe: Recipe, count: int) -> None:
@@ -79,9 +79,9 @@ def _add_total(recipe: Recipe, count: int) -> None:
 
     recipe.add("gather.sum", "light of all maps", run, names, {"gather.sum": Spec(
         "rgb, row, column", "W/m^2", "gathered irradiance where every pixel runs the sum", "linear RGB")}, paper=PAPER,
-        decoys=() if count == 1 else (
-            Decoy("only the first map", lambda a, r: run(a, r, 1), "all lamps"),
-            Decoy("the mean over the maps", writing(run, gather__sum=lambda a: a / count), "the sum of all lamps")))
+        bugs=() if count == 1 else (
+            Bug("only the first map", lambda a, r: run(a, r, 1), "all lamps"),
+            Bug("the mean over the maps", writing(run, gather__sum=lambda a: a / count), "the sum of all lamps")))
 
 
 def add_interpolation(recipe: Recipe, settings: Interpolation) -> None:
@@ -112,23 +112,23 @@ def add_interpolation(recipe: Recipe, settings: Interpolation) -> None:
                                                "pixels",
                                                tier="T0"),
                    "gather.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB")},
-               paper="RSM 2005, Sec. 4; SII Fig. 12", exact=(RECEIVERS[0],), decoys=(
-                   Decoy("normals are not compared", lambda a, r: run(a, r, SimilarityLimits(-2.0, reach)),
-                         "similar pixels"),
-                   Decoy("places are not compared", lambda a, r: run(a, r, SimilarityLimits(
+               paper="RSM 2005, Sec. 4; SII Fig. 12", exact=(RECEIVERS[0],), bugs=(
+                   Bug("normals are not compared", lambda a, r: run(a, r, SimilarityLimits(-2.0, reach)),
+                       "similar pixels"),
+                   Bug("places are not compared", lambda a, r: run(a, r, SimilarityLimits(
                        settings.least_cosine, math.inf)), "similar pixels"),
-                   Decoy("the reach is not scaled by the picture's extent", lambda a, r: run(a, r, SimilarityLimits(
+                   Bug("the reach is not scaled by the picture's extent", lambda a, r: run(a, r, SimilarityLimits(
                        settings.least_cosine, settings.reach)), "reach times the diagonal"),
-                   Decoy("coarse pixels are the first of their cells",
-                         lambda a, r: run(a, r, places=_first(coarse, covered)),
-                         "the middles of cells"),
-                   Decoy("coarse pixels are one further", lambda a, r: run(a, r, places=(
+                   Bug("coarse pixels are the first of their cells",
+                       lambda a, r: run(a, r, places=_first(coarse, covered)),
+                       "the middles of cells"),
+                   Bug("coarse pixels are one further", lambda a, r: run(a, r, places=(
                        between(coarse[0], covered.shape[0]), between(coarse[1], covered.shape[1]))),
                        "the middles of cells"),
-                   Decoy("every pixel runs the sum", lambda a, r: {**run(a, r), "gather.irradiance": np.asarray(
+                   Bug("every pixel runs the sum", lambda a, r: {**run(a, r), "gather.irradiance": np.asarray(
                        a["gather.sum"])}, "interpolated where similar"),
-                   Decoy("coarse pixels of any surface count", lambda a, r: run(a, r, SimilarityLimits(-2.0, math.inf)),
-                         "similar pixels")))
+                   Bug("coarse pixels of any surface count", lambda a, r: run(a, r, SimilarityLimits(-2.0, math.inf)),
+                       "similar pixels")))
 
 
 def _first(coarse: tuple[Array, Array], covered: Array) -> tuple[Array, Array]:

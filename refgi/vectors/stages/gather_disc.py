@@ -8,7 +8,7 @@ import numpy as np
 from refgi.rsm.raster.projection import Projection, project
 from refgi.splat.gather.gather_sum import GatherMap, centers, fill_texels, gather_discs
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.pair_bugs import RECEIVERS
 
 OFFSET, WEIGHT = "gather.offset", "gather.weight"
@@ -46,24 +46,24 @@ def add_centers(recipe: Recipe, index: int, maps: Projection, decided: bool) -> 
         return {center: places.reshape(2, *shape), depth: depths.reshape(shape)}
 
     scale = np.array([maps.height, maps.width])
-    decoys = [
-        Decoy("rows run upwards", reading(run, **{f"{name}__frame": lambda a: a * np.array([[1], [-1], [1]])}),
-              "row 0 is the top row"),
-        Decoy("rows and columns are exchanged", writing(run, **{f"gather{index}__center": lambda a: a[::-1]}),
-              "row, column"),
-        Decoy("half a texel is subtracted", writing(run, **{f"gather{index}__center": lambda a: a - 0.5}),
-              "centres at + 1/2"),
-        Decoy("places are shares of the map's side", writing(run, **{f"gather{index}__center": lambda a: (
+    bugs = [
+        Bug("rows run upwards", reading(run, **{f"{name}__frame": lambda a: a * np.array([[1], [-1], [1]])}),
+            "row 0 is the top row"),
+        Bug("rows and columns are exchanged", writing(run, **{f"gather{index}__center": lambda a: a[::-1]}),
+            "row, column"),
+        Bug("half a texel is subtracted", writing(run, **{f"gather{index}__center": lambda a: a - 0.5}),
+            "centres at + 1/2"),
+        Bug("places are shares of the map's side", writing(run, **{f"gather{index}__center": lambda a: (
             a.T / scale).T}), "texels"),
-        Decoy("points outside of the map gather nothing", lambda a, r: run(a, r, False),
-              "the border on the straight way to the map's middle"),
-        Decoy("depth is the distance from the map's centre", _with_distance(run, f"{name}.origin", depth),
-              "depth along the map's axis")]
+        Bug("points outside of the map gather nothing", lambda a, r: run(a, r, False),
+            "the border on the straight way to the map's middle"),
+        Bug("depth is the distance from the map's centre", _with_distance(run, f"{name}.origin", depth),
+            "depth along the map's axis")]
     if maps.maps > 1:
-        decoys.append(Decoy("all maps are taken for the first", writing(run, **{f"gather{index}__center": lambda a: (
+        bugs.append(Bug("all maps are taken for the first", writing(run, **{f"gather{index}__center": lambda a: (
             np.stack([a[0] % maps.height, a[1]]))}), "maps are stacked along rows"))
     if maps.kind == 0:
-        decoys.append(Decoy("the perspective division is left out", _undivided(run, maps, name, center), "(x, y) / z"))
+        bugs.append(Bug("the perspective division is left out", _undivided(run, maps, name, center), "(x, y) / z"))
     recipe.add(f"gather{index}.center", "where on the map each pixel's surface point lies", run,
                (RECEIVERS[0], RECEIVERS[2], *planes), {
                    center: Spec("(row, column), row, column", "texel", "place on the stacked maps, texel centres at + "
@@ -71,7 +71,7 @@ def add_centers(recipe: Recipe, index: int, maps: Projection, decided: bool) -> 
                                 "behind the lamp as far out as can be; 0 without surface"),
                    depth: Spec("row, column", "m", "depth along the axis of the map it lies on, whose border is part "
                                "of it; inf outside of all and without surface")},
-               paper=PAPER, exact=(RECEIVERS[0], *planes) if decided else (), decoys=tuple(decoys))
+               paper=PAPER, exact=(RECEIVERS[0], *planes) if decided else (), bugs=tuple(bugs))
 
 
 def _with_distance(run: Run, origin: str, depth: str) -> Run:
@@ -116,17 +116,17 @@ def add_texels(recipe: Recipe, index: int, maps: Projection, disc: Disc, decided
                (center, OFFSET, RECEIVERS[2]), {texel: Spec(
                    "sample, row, column", "1", "row * columns + column over the stacked maps; -1 outside and without "
                    "surface", tier="T0", index_of=(rows, columns))}, paper=PAPER, exact=(center, OFFSET)
-                   if decided else (), decoys=(
-                   Decoy("texels are rounded instead of cut", reading(run, **{dotted: lambda a: a + 0.5}), "floor"),
-                   Decoy("beyond the border the nearest texel is taken", lambda a, r: run(a, r, cut=False),
-                         "texels outside of the map count 0"),
-                   Decoy("the radius is one of texels, not of map widths", lambda a, r: run(a, r, 1 / side),
-                         "radius times the map's side"),
-                   Decoy("the radius is a share of half the map", lambda a, r: run(a, r, 0.5), "map widths"),
-                   Decoy("offsets along rows and columns are exchanged", reading(
+                   if decided else (), bugs=(
+                   Bug("texels are rounded instead of cut", reading(run, **{dotted: lambda a: a + 0.5}), "floor"),
+                   Bug("beyond the border the nearest texel is taken", lambda a, r: run(a, r, cut=False),
+                       "texels outside of the map count 0"),
+                   Bug("the radius is one of texels, not of map widths", lambda a, r: run(a, r, 1 / side),
+                       "radius times the map's side"),
+                   Bug("the radius is a share of half the map", lambda a, r: run(a, r, 0.5), "map widths"),
+                   Bug("offsets along rows and columns are exchanged", reading(
                        run, gather__offset=lambda a: a[:, ::-1]), "down, right"),
-                   Decoy("the disc is turned over: up for down", reading(run, gather__offset=lambda a: a * (-1, 1)),
-                         "down, right")))
+                   Bug("the disc is turned over: up for down", reading(run, gather__offset=lambda a: a * (-1, 1)),
+                       "down, right")))
 
 
 def add_disc_sum(recipe: Recipe, index: int, disc: Disc, offset: float) -> None:
@@ -160,22 +160,22 @@ def add_disc_sum(recipe: Recipe, index: int, disc: Disc, offset: float) -> None:
                (*RECEIVERS, texel, WEIGHT, *surface), {light: Spec(
                    "rgb, row, column", "W/m^2", "R^2 T / S sum of weight E_t, T texels of one map, S samples, R radius "
                    "in map widths, E_t the light of one texel by Eq. 2; without albedo/pi", "linear RGB")},
-               paper=PAPER, exact=(RECEIVERS[0], surface[0]), decoys=(
-                   Decoy("the distance does not count", literal(power=0), "RSM 2005: 1/r^4 with vectors not "
-                         "normalised"),
-                   Decoy("1/r^4 with unit directions", literal(power=4), "E-SII-02"),
-                   Decoy("1/r in place of 1/r^2", literal(power=1), "E-SII-02"),
-                   Decoy("the receiver's cosine is missing", literal(receiver=False), "Eq. 2"),
-                   Decoy("the texel's cosine is missing", literal(sender=False), "Eq. 2"),
-                   Decoy("cosines are taken as absolute values", literal(either=True), "<a.b> = max(0, a.b)"),
-                   Decoy("weights do not count", reading(run, gather__weight=np.ones_like), "papers A.5"),
-                   Decoy("the number of texels is left out", writing(run, **{
+               paper=PAPER, exact=(RECEIVERS[0], surface[0]), bugs=(
+                   Bug("the distance does not count", literal(power=0), "RSM 2005: 1/r^4 with vectors not "
+                       "normalised"),
+                   Bug("1/r^4 with unit directions", literal(power=4), "E-SII-02"),
+                   Bug("1/r in place of 1/r^2", literal(power=1), "E-SII-02"),
+                   Bug("the receiver's cosine is missing", literal(receiver=False), "Eq. 2"),
+                   Bug("the texel's cosine is missing", literal(sender=False), "Eq. 2"),
+                   Bug("cosines are taken as absolute values", literal(either=True), "<a.b> = max(0, a.b)"),
+                   Bug("weights do not count", reading(run, gather__weight=np.ones_like), "papers A.5"),
+                   Bug("the number of texels is left out", writing(run, **{
                        f"gather{index}__irradiance": lambda a: a / (disc.rows * disc.columns)}), "papers A.5"),
-                   Decoy("the radius is not squared", writing(run, **{
+                   Bug("the radius is not squared", writing(run, **{
                        f"gather{index}__irradiance": lambda a: a / disc.radius}), "papers A.5"),
-                   Decoy("only samples on the map are counted", literal(on_map=True), "texels outside count 0"),
-                   Decoy("1/pi is left out", writing(run, **{f"gather{index}__irradiance": lambda a: a * np.pi}),
-                         "Eq. 1")))
+                   Bug("only samples on the map are counted", literal(on_map=True), "texels outside count 0"),
+                   Bug("1/pi is left out", writing(run, **{f"gather{index}__irradiance": lambda a: a * np.pi}),
+                       "Eq. 1")))
 
 
 def literal_sum(

@@ -11,7 +11,7 @@ from refgi.rsm.raster.projection import Projection
 from refgi.sssil.pyramid.levels import levels, next_level
 from refgi.sssil.pyramid.view import Level
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR
 
 PLANES = ("position", "depth", "normal", "radiance", "area", "pixel")
@@ -60,28 +60,28 @@ def _add_first(recipe: Recipe, view: Projection, first: int) -> None:
     place = {"corner": lambda made: rays.through_corners(made, 0), "world": lambda made: rays.in_the_world(made, 0),
              "centre": lambda made: rays.through_centres(made, 0, first)}
     several = (
-        Decoy("the farthest pixel of a texel is kept", picked("farthest"), CLOSEST),
-        Decoy("the upper left pixel of a texel is kept", picked("first"), CLOSEST),
-        Decoy("positions, normals and radiance are means", lambda a, r: run(a, r, "average"), CLOSEST),
-        Decoy("radiance is the mean over the texel", lambda a, r: run(a, r, "closest_average"), CLOSEST),
-        Decoy("the area is that of one pixel", _with(run, "area", area["one pixel"]), EQ2),
-        Decoy("positions lie on the ray through the texel's centre", _with(run, "position", place["centre"]),
-              "E-HSS-09"),
+        Bug("the farthest pixel of a texel is kept", picked("farthest"), CLOSEST),
+        Bug("the upper left pixel of a texel is kept", picked("first"), CLOSEST),
+        Bug("positions, normals and radiance are means", lambda a, r: run(a, r, "average"), CLOSEST),
+        Bug("radiance is the mean over the texel", lambda a, r: run(a, r, "closest_average"), CLOSEST),
+        Bug("the area is that of one pixel", _with(run, "area", area["one pixel"]), EQ2),
+        Bug("positions lie on the ray through the texel's centre", _with(run, "position", place["centre"]),
+            "E-HSS-09"),
     ) if first else ()
     recipe.add("level0", f"nearest surface to each texel of {1 << first} x {1 << first} pixels, what it reflects and "
                "the surface that the texel stands for", run, reads, _specs(0, view), paper=f"{CLOSEST}; {EQ2}",
-               exact=(reads[0],), decoys=(
+               exact=(reads[0],), bugs=(
                    *several,
-                   Decoy("tan f in place of tan(f / 2)", _with(run, "area", area["tan f"]), "E-HSS-03"),
-                   Decoy("the cosine at the surface is missing in the area", _with(run, "area", area["beta"]), EQ2),
-                   Decoy("the area is computed of the distance, not of the depth",
-                         _with(run, "area", area["distance"]), EQ2),
-                   Decoy("pixel centres lie at 0 instead of 1/2", _with(run, "position", place["corner"]), "E-HSS-10"),
-                   Decoy("positions are not relative to the eye", _with(run, "position", place["world"]), ""),
-                   Decoy("radiance is not divided by pi", writing(run, level0__radiance=lambda a: a * np.pi),
-                         "L = albedo/pi E"),
-                   Decoy("the albedo is left out", reading(run, gbuffer__albedo=np.ones_like), "L = albedo/pi E"),
-                   Decoy("depth is the distance from the eye", _with(run, "depth", lambda made: (
+                   Bug("tan f in place of tan(f / 2)", _with(run, "area", area["tan f"]), "E-HSS-03"),
+                   Bug("the cosine at the surface is missing in the area", _with(run, "area", area["beta"]), EQ2),
+                   Bug("the area is computed of the distance, not of the depth",
+                       _with(run, "area", area["distance"]), EQ2),
+                   Bug("pixel centres lie at 0 instead of 1/2", _with(run, "position", place["corner"]), "E-HSS-10"),
+                   Bug("positions are not relative to the eye", _with(run, "position", place["world"]), ""),
+                   Bug("radiance is not divided by pi", writing(run, level0__radiance=lambda a: a * np.pi),
+                       "L = albedo/pi E"),
+                   Bug("the albedo is left out", reading(run, gbuffer__albedo=np.ones_like), "L = albedo/pi E"),
+                   Bug("depth is the distance from the eye", _with(run, "depth", lambda made: (
                        made["level0.depth"] * rays.lengths(made, 0))), "axial depth (E-HSS-02)"),
                ))
 
@@ -104,19 +104,19 @@ def _add_coarser(recipe: Recipe, view: Projection, first: int, index: int) -> No
 
     rays, fine = _Rays(view), level_names(index - 1, *PLANES)
     cut = any(size % (1 << number) for size in shape)
-    decoys = [
-        Decoy("the farthest of four texels is kept", picked("farthest"), CLOSEST),
-        Decoy("the upper left of four texels is kept", picked("first"), CLOSEST),
-        Decoy("areas are not four times those of the finer level", _with(run, "area", lambda made: (
+    bugs = [
+        Bug("the farthest of four texels is kept", picked("farthest"), CLOSEST),
+        Bug("the upper left of four texels is kept", picked("first"), CLOSEST),
+        Bug("areas are not four times those of the finer level", _with(run, "area", lambda made: (
             made[f"level{index}.area"] / 4), index), EQ2),
-        Decoy("positions lie on the ray through the texel's centre", _with(
+        Bug("positions lie on the ray through the texel's centre", _with(
             run, "position", lambda made: rays.through_centres(made, index, number), index), "E-HSS-09"),
-        Decoy("radiance is the mean of four texels", picked("mean"), CLOSEST),
+        Bug("radiance is the mean of four texels", picked("mean"), CLOSEST),
     ]
-    decoys += [Decoy("texels that the picture's edge cuts count as whole ones",
-                     _with(run, "area", lambda made: scaled(made, 1.0), index), EQ2)] if cut else []
+    bugs += [Bug("texels that the picture's edge cuts count as whole ones",
+                 _with(run, "area", lambda made: scaled(made, 1.0), index), EQ2)] if cut else []
     recipe.add(f"level{index}", "the nearest of four texels of the finer level, or of the two or one that there are",
-               run, fine, _specs(index, view), paper=f"{CLOSEST}; {EQ2}", exact=(fine[1],), decoys=tuple(decoys))
+               run, fine, _specs(index, view), paper=f"{CLOSEST}; {EQ2}", exact=(fine[1],), bugs=tuple(bugs))
 
 
 class _Rays:

@@ -11,7 +11,7 @@ from refgi.rsm.buffers.light_projection import light_projection
 from refgi.sampling import grid, halton
 from refgi.scene import Scene
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import REFLECTANCE, SCENE, VECTOR, _light_names, _map_names, rsm_of
 
 Pattern = Literal["halton", "grid", "given"]
@@ -60,12 +60,12 @@ def add_points(
     def start_at_one(arrays: Arrays, real: Any) -> Arrays:
         return points(arrays, real, 1)
 
-    wrong = (Decoy("the Halton sequence starts at index 1", start_at_one, "index 0 is the origin (docs/conventions)"),
-             Decoy("bases 2 and 3 are exchanged", writing(points, **{f"rsm{index}__points": lambda a: a[:, ::-1]}),
-                   "base 2 along columns, 3 along rows"))
+    wrong = (Bug("the Halton sequence starts at index 1", start_at_one, "index 0 is the origin (docs/conventions)"),
+             Bug("bases 2 and 3 are exchanged", writing(points, **{f"rsm{index}__points": lambda a: a[:, ::-1]}),
+                 "base 2 along columns, 3 along rows"))
     recipe.add(f"rsm{index}.points", "Halton points in bases 2 and 3 from index 0" if pattern == "halton" else
                "centres of n x n cells, row by row", points, (f"rsm{index}.shift",) if shift is not None else (),
-               {name: spec}, paper="SII Sec. 3.1", decoys=wrong if pattern == "halton" else ())
+               {name: spec}, paper="SII Sec. 3.1", bugs=wrong if pattern == "halton" else ())
 
 
 def _below_1(points: Array) -> Array:
@@ -88,9 +88,9 @@ def _add_texels(recipe: Recipe, scene: Scene, resolution: int, index: int, count
 
         recipe.add(f"{name}.importance", "largest channel of a texel's flux, lobe included", worth, fluxes,
                    {f"{name}.importance": Spec("row, column", "W", "importance of each texel")},
-                   paper="SII Sec. 3.5", decoys=(
-                       Decoy("luminance in place of the largest channel", _luminance(name, glossy), "SII Sec. 3.5"),
-                       Decoy("the sum of channels in place of the largest", _summed(name, glossy), "SII Sec. 3.5")))
+                   paper="SII Sec. 3.5", bugs=(
+                       Bug("luminance in place of the largest channel", _luminance(name, glossy), "SII Sec. 3.5"),
+                       Bug("the sum of channels in place of the largest", _summed(name, glossy), "SII Sec. 3.5")))
         points = _add_warped(recipe, name, maps.maps, warp)
 
     reads = (points, *((f"{name}.density_weight",) if warp is not None else ()))
@@ -106,11 +106,11 @@ def _add_texels(recipe: Recipe, scene: Scene, resolution: int, index: int, count
     recipe.add(f"{name}.texels", "the texel that each point falls on, and T/N w", chosen, reads, {
         texel: Spec("light", "1", "row * columns + column over the stacked maps", tier="T0", index_of=(rows, columns)),
         weight: Spec("light", "1", "T/N times the weight of the warp: how many texels a light stands for"),
-    }, paper="SII Sec. 3.1", exact=(points,), decoys=(
-        Decoy("rows and columns are exchanged", reading(chosen, **{points.replace(".", "__"): lambda a: a[:, ::-1]}),
-              "u along columns, v along rows"),
-        Decoy("v runs upwards", reading(chosen, **{points.replace(".", "__"): _upwards}), "row 0 is the top row"),
-        Decoy("points are rounded to texels instead of cut", reading(chosen, **{points.replace(".", "__"): lambda a: (
+    }, paper="SII Sec. 3.1", exact=(points,), bugs=(
+        Bug("rows and columns are exchanged", reading(chosen, **{points.replace(".", "__"): lambda a: a[:, ::-1]}),
+            "u along columns, v along rows"),
+        Bug("v runs upwards", reading(chosen, **{points.replace(".", "__"): _upwards}), "row 0 is the top row"),
+        Bug("points are rounded to texels instead of cut", reading(chosen, **{points.replace(".", "__"): lambda a: (
             np.minimum(a + 0.5 / np.array([columns, rows]), 1 - 2.0**-24).astype(a.dtype))}), "floor(u W)"),
     ))
 
@@ -155,26 +155,26 @@ def _add_warped(recipe: Recipe, name: str, maps: int, warp: Warp) -> str:
         return {warped: _below_1(points), weight: weights.astype(real)}
 
     other = Warp("B" if warp.method == "A" else "A", warp.levels)
-    decoys = [Decoy(f"method {other.method} in place of {warp.method}", lambda a, r: run(a, r, other), "SII Fig. 6"),
-              Decoy("weights are left at 1", writing(run, **{weight.replace(".", "__"): np.ones_like}), "SII Eq. 5, 6"),
-              Decoy("weights are the density, not 1 / density",
-                    writing(run, **{weight.replace(".", "__"): lambda a: 1 / a}), "SII Eq. 5, 6"),
-              Decoy("one level more", lambda a, r: run(a, r, Warp(warp.method, warp.levels + 1)), "SII Sec. 3.5"),
-              Decoy("u and v are exchanged", reading(run, **{f"{name}__points": lambda a: a[:, ::-1]}),
-                    "u along columns, v along rows"),
-              Decoy("the importance map is transposed or read along columns",
-                    reading(run, **{f"{name}__importance": _columns_first}), "rows, then columns"),
-              Decoy("the importance map is upside down",
-                    reading(run, **{f"{name}__importance": lambda a: a[::-1]}), "row 0 is the top row")]
+    bugs = [Bug(f"method {other.method} in place of {warp.method}", lambda a, r: run(a, r, other), "SII Fig. 6"),
+            Bug("weights are left at 1", writing(run, **{weight.replace(".", "__"): np.ones_like}), "SII Eq. 5, 6"),
+            Bug("weights are the density, not 1 / density",
+                writing(run, **{weight.replace(".", "__"): lambda a: 1 / a}), "SII Eq. 5, 6"),
+            Bug("one level more", lambda a, r: run(a, r, Warp(warp.method, warp.levels + 1)), "SII Sec. 3.5"),
+            Bug("u and v are exchanged", reading(run, **{f"{name}__points": lambda a: a[:, ::-1]}),
+                "u along columns, v along rows"),
+            Bug("the importance map is transposed or read along columns",
+                reading(run, **{f"{name}__importance": _columns_first}), "rows, then columns"),
+            Bug("the importance map is upside down",
+                reading(run, **{f"{name}__importance": lambda a: a[::-1]}), "row 0 is the top row")]
     if warp.levels:
-        decoys.append(Decoy("one level less", lambda a, r: run(a, r, Warp(warp.method, warp.levels - 1)),
-                            "SII Sec. 3.5"))
+        bugs.append(Bug("one level less", lambda a, r: run(a, r, Warp(warp.method, warp.levels - 1)),
+                        "SII Sec. 3.5"))
     recipe.facts[f"{name}.warp"] = {"method": warp.method, "levels": warp.levels}
     recipe.add(f"{name}.warp", f"points follow the importance over {warp.levels} levels, method {warp.method}", run,
                (f"{name}.points", f"{name}.importance"), {
                    warped: Spec("point, uv", "1", "warped points over the stacked maps"),
                    weight: Spec("point", "1", "w, 1 / density over the unit square")},
-               paper="SII Sec. 3.5, Eq. 5 and 6", decoys=tuple(decoys),
+               paper="SII Sec. 3.5, Eq. 5 and 6", bugs=tuple(bugs),
                variants=(reading(run, **{f"{name}__importance": _summed_row_by_row}),))
     return warped
 
@@ -213,12 +213,12 @@ def _add_chosen(recipe: Recipe, scene: Scene, resolution: int, counts: tuple[int
     unweighted = {f"rsm{k}__weight": np.ones_like for k in numbers}
     every = np.array([len(counts)], np.float64)
     recipe.add("lights", "texels with flux as pixel lights; those without are dropped", run, tuple(reads), writes,
-               paper="SII Sec. 3.1", decoys=(
-                   Decoy("T/N is left out", reading(run, **unweighted), "SII E-SII: Phi_i = T/N Phi_t"),
-                   Decoy("T/N of all maps together", reading(run, **{f"rsm{k}__weight": lambda a: (a / every).astype(
+               paper="SII Sec. 3.1", bugs=(
+                   Bug("T/N is left out", reading(run, **unweighted), "SII E-SII: Phi_i = T/N Phi_t"),
+                   Bug("T/N of all maps together", reading(run, **{f"rsm{k}__weight": lambda a: (a / every).astype(
                        a.dtype) for k in numbers}), "each map's own T/N"),
-                   Decoy("normals point into the surface",
-                         writing(run, lights__normal=lambda a: -a), "normals face the light"),
+                   Bug("normals point into the surface",
+                       writing(run, lights__normal=lambda a: -a), "normals face the light"),
                ))
 
 

@@ -14,13 +14,13 @@ from refgi.splat.multires.settings import Representative
 from refgi.splat.multires.subsplats.detail import surface_detail
 from refgi.splat.multires.subsplats.evaluate import evaluate, points_of
 from refgi.vectors.recipe import Recipe, reading
-from refgi.vectors.spec import Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import covered_of, everywhere
 from refgi.vectors.stages.multires_upsample import LIGHT
-from refgi.vectors.stages.pair_bugs import RECEIVERS, pair_decoys
+from refgi.vectors.stages.pair_bugs import RECEIVERS, pair_bugs
 
 POINTS = ("multires.point", "multires.normal")
 EQ2 = "AMS Eq. 2, E only; E-AMS-02"
@@ -39,22 +39,22 @@ def add_points(recipe: Recipe, representative: Representative, top: int) -> None
         return run({**arrays, SUBSPLATS[3]: turned}, real)
 
     other: Representative = "pixel" if representative == "mean" else "mean"
-    decoys = [Decoy("the mean of the cell's surface" if other == "mean" else "the representative pixel alone",
-                    lambda a, r: run(a, r, other), "E-AMS-11"),
-              Decoy("rows and columns of pixels are exchanged", exchanged, "row * width + column")]
+    bugs = [Bug("the mean of the cell's surface" if other == "mean" else "the representative pixel alone",
+                lambda a, r: run(a, r, other), "E-AMS-11"),
+            Bug("rows and columns of pixels are exchanged", exchanged, "row * width + column")]
     if representative == "mean":
-        decoys += [Decoy("pixels without surface count as points at 0", reading(
+        bugs += [Bug("pixels without surface count as points at 0", reading(
             run, gbuffer__triangle_id=everywhere), "mean of the surface"),
-            Decoy("mean normals are not made unit vectors", _shortened(run, top), "unit vectors")]
+            Bug("mean normals are not made unit vectors", _shortened(run, top), "unit vectors")]
     else:
-        decoys += [Decoy("the pixel to the right", reading(run, multires__pixel=lambda a: np.minimum(
+        bugs += [Bug("the pixel to the right", reading(run, multires__pixel=lambda a: np.minimum(
             a + 1, a.max(initial=0))), "E-AMS-11"),
-            Decoy("the pixel at the cell's corner", partial(_corner, run), "E-AMS-11")]
+            Bug("the pixel at the cell's corner", partial(_corner, run), "E-AMS-11")]
     recipe.add("multires.points", "where each subsplat is evaluated: its " + (
         "representative pixel" if representative == "pixel" else "mean surface"), run, (*RECEIVERS, *SUBSPLATS), {
             POINTS[0]: Spec("xyz, subsplat", "m", "surface point", "world"),
             POINTS[1]: Spec("xyz, subsplat", VECTOR, "its normal", "world")},
-        paper="AMS Sec. 3.4; E-AMS-11", exact=RECEIVERS[:2] if representative == "pixel" else (), decoys=tuple(decoys))
+        paper="AMS Sec. 3.4; E-AMS-11", exact=RECEIVERS[:2] if representative == "pixel" else (), bugs=tuple(bugs))
 
 
 def _corner(run: Run, arrays: Arrays, real: Any) -> Arrays:
@@ -93,21 +93,21 @@ def add_irradiance(recipe: Recipe, pairs: PairSettings) -> None:
 
         return run
 
-    decoys = [Decoy(one.cause, at_points(one.run), EQ2) for one in pair_decoys(sums, bool(area), _glossy(recipe))
-              if one.cause != "the distance is clamped at 0.1 m"]
-    decoys += [Decoy("1/pi is left out", at_points(reading(sums, lights__flux=lambda a: a * np.pi)), "E-AMS-02"),
-               Decoy("pairs count as at least sqrt(0.2) m apart, as in the authors' demo", at_points(
+    bugs = [Bug(one.cause, at_points(one.run), EQ2) for one in pair_bugs(sums, bool(area), _glossy(recipe))
+            if one.cause != "the distance is clamped at 0.1 m"]
+    bugs += [Bug("1/pi is left out", at_points(reading(sums, lights__flux=lambda a: a * np.pi)), "E-AMS-02"),
+             Bug("pairs count as at least sqrt(0.2) m apart, as in the authors' demo", at_points(
                    lambda a, r: sums(a, r, replaced(pairs, {"clamp": "distance", "clamp.value": 0.2**0.5}))),
                    "E-AMS-05")]
     if area:
-        decoys.append(Decoy("nothing is clamped", at_points(lambda a, r: sums(a, r,
+        bugs.append(Bug("nothing is clamped", at_points(lambda a, r: sums(a, r,
             replaced(pairs, {"clamp": "none"}))),
-                            "r^2 + A / pi"))
+                        "r^2 + A / pi"))
     recipe.facts["multires.clamp"] = "none" if pairs.clamp is None else pairs.clamp.name()
     recipe.add("multires.irradiance", "irradiance of every pixel light at every subsplat, without albedo/pi",
                at_points(sums), (*POINTS, *names, *area),
                {LIGHT: Spec("rgb, subsplat", "W/m^2", "indirect irradiance", "linear RGB", EQ2)}, paper=EQ2,
-               exact=(POINTS[0], "lights.position"), decoys=tuple(decoys))
+               exact=(POINTS[0], "lights.position"), bugs=tuple(bugs))
 
 
 def _glossy(recipe: Recipe) -> bool:
@@ -130,8 +130,8 @@ def add_detail(recipe: Recipe, a: float) -> None:
     recipe.facts["multires.detail"] = a
     recipe.add("multires.detail", "E (a <V, N> + 1 - a)", run, ("multires.upsampled.0", *RECEIVERS, "camera.origin"), {
         "multires.detailed": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", "AMS Eq. 3")},
-        paper="AMS Eq. 3", exact=(RECEIVERS[0], "camera.origin"), decoys=(
-            Decoy("a and 1 - a are exchanged", lambda a_, r: run(a_, r, 1 - a), "AMS Eq. 3"),
-            Decoy("V points from the camera to the surface", reading(run, gbuffer__normal=lambda n: -n), "AMS Eq. 3"),
-            Decoy("V is not made a unit vector", unclamped, "AMS Eq. 3"),
-            Decoy("a = 1: light is multiplied by the cosine", lambda a_, r: run(a_, r, 1.0), "AMS Eq. 3")))
+        paper="AMS Eq. 3", exact=(RECEIVERS[0], "camera.origin"), bugs=(
+            Bug("a and 1 - a are exchanged", lambda a_, r: run(a_, r, 1 - a), "AMS Eq. 3"),
+            Bug("V points from the camera to the surface", reading(run, gbuffer__normal=lambda n: -n), "AMS Eq. 3"),
+            Bug("V is not made a unit vector", unclamped, "AMS Eq. 3"),
+            Bug("a = 1: light is multiplied by the cosine", lambda a_, r: run(a_, r, 1.0), "AMS Eq. 3")))

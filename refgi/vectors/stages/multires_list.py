@@ -11,7 +11,7 @@ from refgi.splat.multires.refinement.mipmap import layout, level_views
 from refgi.splat.multires.refinement.refine import depth_first
 from refgi.splat.multires.settings import Diagonal
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.multires_ranges import IDS, covered_of, everywhere, of_levels
 
 SUBSPLATS = ("multires.level", "multires.row", "multires.column", "multires.pixel")
@@ -45,11 +45,11 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
     recipe.add("multires.states", "which cells are refined, by their own need or across a corner", run, (IDS, *marks), {
         name: Spec("row, column", "1", "0 no surface, 1 a subsplat may end here, 2 refined", tier="T0")
         for name in states},
-        paper="AMS Sec. 3.3, 5.2; E-AMS-10", decoys=(
-            *(Decoy(names[rule], partial(run, rule=rule), "E-AMS-10")
+        paper="AMS Sec. 3.3, 5.2; E-AMS-10", bugs=(
+            *(Bug(names[rule], partial(run, rule=rule), "E-AMS-10")
               for rule in get_args(Diagonal) if rule != diagonal),
-            Decoy("cells without surface are kept", writing(run, **whole), "they are never evaluated"),
-            Decoy("neighbours across an edge count, not those across a corner", reading(
+            Bug("cells without surface are kept", writing(run, **whole), "they are never evaluated"),
+            Bug("neighbours across an edge count, not those across a corner", reading(
                 lambda a, r: run(a, r, "off"), **beside), "E-AMS-10")))
 
 
@@ -115,15 +115,15 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
     recipe.add("multires.subsplats", "the list of subsplats: cells of the coarsest level row by row, in each depth "
                "first, top left, top right, bottom left, bottom right", run, (IDS, *states),
                {f"multires.{key}": Spec("subsplat", "1", one, tier="T0") for key, one in what.items()},
-               paper="AMS Sec. 3.3; E-AMS-08, E-AMS-11", decoys=(
-                   Decoy("each level is read off by itself, whatever becomes of coarser cells", by_levels, "E-AMS-08"),
-                   Decoy("the pixel left and above of the centre", placed(1), "E-AMS-11"),
-                   Decoy("the pixel at the cell's corner", placed(0, cut=False), "E-AMS-11"),
-                   Decoy("the pixel at the centre, whether it shows a surface or not", placed(0), "E-AMS-11"),
-                   Decoy("the list is sorted by levels", reordered, "order of the list"),
-                   Decoy("pixels are counted column by column", transposed, "row * width + column"),
-                   Decoy("pixels without surface are listed", reading(run, gbuffer__triangle_id=everywhere),
-                         "never evaluated")))
+               paper="AMS Sec. 3.3; E-AMS-08, E-AMS-11", bugs=(
+                   Bug("each level is read off by itself, whatever becomes of coarser cells", by_levels, "E-AMS-08"),
+                   Bug("the pixel left and above of the centre", placed(1), "E-AMS-11"),
+                   Bug("the pixel at the cell's corner", placed(0, cut=False), "E-AMS-11"),
+                   Bug("the pixel at the centre, whether it shows a surface or not", placed(0), "E-AMS-11"),
+                   Bug("the list is sorted by levels", reordered, "order of the list"),
+                   Bug("pixels are counted column by column", transposed, "row * width + column"),
+                   Bug("pixels without surface are listed", reading(run, gbuffer__triangle_id=everywhere),
+                       "never evaluated")))
 
 
 def _place(level: Array, row: Array, column: Array, top: int, columns: int) -> Array:

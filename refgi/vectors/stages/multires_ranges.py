@@ -22,7 +22,7 @@ from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
 from refgi.splat.multires.refinement.mipmap import START, Mipmap, element_count, layout, level_views
 from refgi.splat.multires.settings import Criteria, Measure
 from refgi.vectors.recipe import Recipe, reading
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 
 IDS = "gbuffer.triangle_id"
 Join = Callable[[list[Array]], Array]
@@ -68,18 +68,18 @@ def add_ranges(recipe: Recipe, what: str, top: int, rim: int, components: int) -
                (source, IDS), {
         **{name: Spec(axes, unit, text.format("least", "inf")) for name in lows},
         **{name: Spec(axes, unit, text.format("largest", "-inf")) for name in highs},
-    }, paper="AMS Sec. 3.2.1" if what == "depth" else "AMS Sec. 3.2.2", exact=(source,), decoys=(
-        Decoy("pixels without surface count as 0", reading(run, **empty), "only surfaces count"),
-        Decoy("the last row and column of odd sizes are left out", reading(run, gbuffer__triangle_id=_even_part),
-              "cells are cut by the border"),
-        Decoy("a cell takes one of its four finer cells", joined(lambda four: four[0], lambda four: four[0]),
-              "min-max"),
-        Decoy("the fourth quadrant is left out", joined(lambda four: np.min(four[:3], axis=0),
-                                                        lambda four: np.max(four[:3], axis=0)), "E-AMS-06"),
-        Decoy("least and largest are exchanged", lambda a, r: named(*(
+    }, paper="AMS Sec. 3.2.1" if what == "depth" else "AMS Sec. 3.2.2", exact=(source,), bugs=(
+        Bug("pixels without surface count as 0", reading(run, **empty), "only surfaces count"),
+        Bug("the last row and column of odd sizes are left out", reading(run, gbuffer__triangle_id=_even_part),
+            "cells are cut by the border"),
+        Bug("a cell takes one of its four finer cells", joined(lambda four: four[0], lambda four: four[0]),
+            "min-max"),
+        Bug("the fourth quadrant is left out", joined(lambda four: np.min(four[:3], axis=0),
+                                                      lambda four: np.max(four[:3], axis=0)), "E-AMS-06"),
+        Bug("least and largest are exchanged", lambda a, r: named(*(
             [run(a, r)[name] for name in names] for names in (highs, lows))), "least, largest"),
-        Decoy("the pixels around a cell are left out" if rim else "the pixels around a cell count as well",
-              lambda a, r: run(a, r, 1 - rim), "rim of the settings (AMS Fig. 15)")))
+        Bug("the pixels around a cell are left out" if rim else "the pixels around a cell count as well",
+            lambda a, r: run(a, r, 1 - rim), "rim of the settings (AMS Fig. 15)")))
 
 
 def _pyramid(plane: Array, top: int, join: Join) -> list[Array]:
@@ -124,12 +124,12 @@ def add_slopes(recipe: Recipe, top: int, relative: bool) -> None:
                ("gbuffer.depth", IDS), {
                    name: Spec("row, column", "1/pixel" if relative else "m/pixel", "sqrt(dx^2 + dy^2), the larger of "
                               "both differences along each axis" + ", over the depth" * relative) for name in names},
-               paper="AMS Sec. 3.2.1", exact=("gbuffer.depth",), decoys=(
-                   Decoy("slopes are not divided by the depth" if relative else "slopes are divided by the depth",
-                         lambda a, r: run(a, r, not relative), "measure of the settings"),
-                   Decoy("only the difference to the next pixel counts, not that to the one before", forward,
-                         "the larger of both"),
-                   Decoy("pixels without surface count as 0", reading(
+               paper="AMS Sec. 3.2.1", exact=("gbuffer.depth",), bugs=(
+                   Bug("slopes are not divided by the depth" if relative else "slopes are divided by the depth",
+                       lambda a, r: run(a, r, not relative), "measure of the settings"),
+                   Bug("only the difference to the next pixel counts, not that to the one before", forward,
+                       "the larger of both"),
+                   Bug("pixels without surface count as 0", reading(
                        run, gbuffer__depth=lambda a: np.where(np.isfinite(a), a, 0.0), gbuffer__triangle_id=everywhere),
                        "only surfaces count")))
 
@@ -149,12 +149,12 @@ def add_curvatures(recipe: Recipe, top: int, rate: bool) -> None:
                ("gbuffer.normal", "gbuffer.position", IDS), {
                    name: Spec("row, column", "1/m" if rate else "1", "largest |N1 - N2|" + " / |x1 - x2|" * rate,
                               paper="AMS Eq. 1; E-AMS-01") for name in names},
-               paper="AMS Eq. 1; E-AMS-01", exact=("gbuffer.normal", "gbuffer.position"), decoys=(
-                   Decoy("angles in place of chords", angles, "E-AMS-01: |N1 - N2|"),
-                   Decoy("the distance of the points is left out" if rate else "divided by the distance of the points",
-                         lambda a, r: run(a, r, not rate), "E-AMS-01"),
-                   Decoy("pixels without surface count", reading(run, gbuffer__triangle_id=everywhere),
-                         "only surfaces count")))
+               paper="AMS Eq. 1; E-AMS-01", exact=("gbuffer.normal", "gbuffer.position"), bugs=(
+                   Bug("angles in place of chords", angles, "E-AMS-01: |N1 - N2|"),
+                   Bug("the distance of the points is left out" if rate else "divided by the distance of the points",
+                       lambda a, r: run(a, r, not rate), "E-AMS-01"),
+                   Bug("pixels without surface count", reading(run, gbuffer__triangle_id=everywhere),
+                       "only surfaces count")))
 
 
 def add_discontinuities(
@@ -189,24 +189,24 @@ def add_discontinuities(
     def another(**parts_of: Any) -> Run:
         return lambda a, r: run(a, r, dataclasses.replace(criteria, **parts_of))
 
-    decoys = [Decoy(f"the test of {kind} is left out", another(**{kind: None}), "any test counts")
-              for kind in ("depth", "derivative", "normal", "curvature") if getattr(criteria, kind) is not None]
+    bugs = [Bug(f"the test of {kind} is left out", another(**{kind: None}), "any test counts")
+            for kind in ("depth", "derivative", "normal", "curvature") if getattr(criteria, kind) is not None]
     if criteria.depth is not None:
-        decoys += [Decoy(cause, another(depth=dataclasses.replace(criteria.depth, measure=measure)), "E-AMS-07")
-                   for measure, cause in zip(get_args(Measure), (
+        bugs += [Bug(cause, another(depth=dataclasses.replace(criteria.depth, measure=measure)), "E-AMS-07")
+                 for measure, cause in zip(get_args(Measure), (
                        "depths are compared with a share of the depth", "depths are compared with a length in metres",
                        "the threshold of depths falls as 3 / level"), strict=True) if measure != criteria.depth.measure]
     if criteria.normal is not None and criteria.normal.components == "xyz":
-        decoys.append(Decoy("z of the normals is left out", another(normal=dataclasses.replace(
+        bugs.append(Bug("z of the normals is left out", another(normal=dataclasses.replace(
             criteria.normal, components="xy")), "E-AMS-07: three components, x and y in the authors' demo"))
     if criteria.depth is not None and criteria.normal is not None:
         single = dataclasses.replace(criteria, depth=None), dataclasses.replace(criteria, normal=None)
-        decoys.append(Decoy("depth and normal must both be discontinuous", lambda a, r: dict(zip(names, level_views(
+        bugs.append(Bug("depth and normal must both be discontinuous", lambda a, r: dict(zip(names, level_views(
             marks(a, r, single[0]) & marks(a, r, single[1]), sizes, first=1), strict=True)), "any test counts"))
     if finest:
-        decoys.append(Decoy("cells of the finest level are refined", lambda a, r: run(a, r, stop=finest - 1),
-                            "the finest level is never refined"))
+        bugs.append(Bug("cells of the finest level are refined", lambda a, r: run(a, r, stop=finest - 1),
+                        "the finest level is never refined"))
     recipe.add("multires.discontinuities", "cells that a test of their own finds discontinuous", run,
                tuple(name for key in parts for name in of_levels(key, top)),
                {name: Spec("row, column", "1", "true where a test exceeds its threshold", tier="T0") for name in names},
-               paper="AMS Sec. 3.2, 3.3; E-AMS-07", decoys=tuple(decoys))
+               paper="AMS Sec. 3.2, 3.3; E-AMS-07", bugs=tuple(bugs))

@@ -18,7 +18,7 @@ from refgi.splat.multires.subsplats.upsample import (
     upsample,
 )
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import IDS, covered_of
 
@@ -66,27 +66,27 @@ def _add_level(recipe: Recipe, mode: Upsampling, level: int, top: int, filter_al
         return altered
 
     turned = (1, 0)
-    decoys = [Decoy("cells evaluated at this level are copied" if filter_all else "cells evaluated at this level are "
-                    "filtered as well", lambda a, r: run(a, r, every=not filter_all), "E-AMS-09"),
-              Decoy("rows and columns of subsplats are exchanged", _with_list(run, turned, 0), "row, column"),
-              Decoy("subsplats one level finer are taken", _with_list(run, (0, 1), -1), "level of the layer")]
+    bugs = [Bug("cells evaluated at this level are copied" if filter_all else "cells evaluated at this level are "
+                "filtered as well", lambda a, r: run(a, r, every=not filter_all), "E-AMS-09"),
+            Bug("rows and columns of subsplats are exchanged", _with_list(run, turned, 0), "row, column"),
+            Bug("subsplats one level finer are taken", _with_list(run, (0, 1), -1), "level of the layer")]
     if above:
-        decoys.append(Decoy("the coarser light is doubled but not filtered", literal(weights=(0, 1, 0)), "E-AMS-09"))
+        bugs.append(Bug("the coarser light is doubled but not filtered", literal(weights=(0, 1, 0)), "E-AMS-09"))
     if mode == "tent":
-        decoys += [Decoy("cells across a corner count only beside a cell that counts" if not corner_rule else
-                         "cells across a corner always count", lambda a, r: run(a, r, corner=not corner_rule),
-                         "E-AMS-09"),
-                   Decoy("nine equal weights", literal(weights=(1, 1, 1)), "E-AMS-09: (1, 2, 1) x (1, 2, 1)"),
-                   Decoy("cells without light count as black", literal(masked=False), "m = 1 where there is light"),
-                   Decoy("beyond the border it is black", literal(border="constant"), "the border repeats its cells")]
+        bugs += [Bug("cells across a corner count only beside a cell that counts" if not corner_rule else
+                     "cells across a corner always count", lambda a, r: run(a, r, corner=not corner_rule),
+                     "E-AMS-09"),
+                 Bug("nine equal weights", literal(weights=(1, 1, 1)), "E-AMS-09: (1, 2, 1) x (1, 2, 1)"),
+                 Bug("cells without light count as black", literal(masked=False), "m = 1 where there is light"),
+                 Bug("beyond the border it is black", literal(border="constant"), "the border repeats its cells")]
     if above and mode == "tent":
-        decoys += [Decoy("the coarser light is shifted by one cell", literal(shift=1), "cell i lies in cell i / 2"),
-                   Decoy("light spreads into cells without surface", literal(spread=True), "m = 1 where a surface is"),
-                   Decoy("the filter of the authors' demo", lambda a, r: run(a, r, how="demo"), "E-AMS-09")]
+        bugs += [Bug("the coarser light is shifted by one cell", literal(shift=1), "cell i lies in cell i / 2"),
+                 Bug("light spreads into cells without surface", literal(spread=True), "m = 1 where a surface is"),
+                 Bug("the filter of the authors' demo", lambda a, r: run(a, r, how="demo"), "E-AMS-09")]
     if above and mode == "demo":
-        decoys += [Decoy("a tent at this level", lambda a, r: run(a, r, how="tent"), "E-AMS-09"),
-                   Decoy("a tent that counts cells without light as black",
-                         literal(masked=False), "E-AMS-09")]
+        bugs += [Bug("a tent at this level", lambda a, r: run(a, r, how="tent"), "E-AMS-09"),
+                 Bug("a tent that counts cells without light as black",
+                     literal(masked=False), "E-AMS-09")]
     rule = {"tent": "weights (1, 2, 1) x (1, 2, 1)", "demo": "weights (1 - f, 1, f) / 2 on the coarser level"}[mode]
     recipe.add(f"multires.upsample.{level}", f"light of level {level} from that of the level above and subsplats, "
                + rule if above else f"light of level {level}, the coarsest", run,
@@ -95,7 +95,7 @@ def _add_level(recipe: Recipe, mode: Upsampling, level: int, top: int, filter_al
                                "linear RGB"),
                    mask: Spec("row, column", "1", "cells with light: evaluated here or coarser, with surface",
                               tier="T0")},
-               paper="AMS Sec. 3.5; E-AMS-09", decoys=tuple(decoys))
+               paper="AMS Sec. 3.5; E-AMS-09", bugs=tuple(bugs))
 
 
 def _with_list(run: Run, order: tuple[int, int], up: int) -> Run:
@@ -145,10 +145,10 @@ def _add_at_once(recipe: Recipe, mode: Upsampling, top: int) -> None:
                "sum of all levels, each interpolated as if it were black where it holds nothing"}[mode], run,
                (IDS, *SUBSPLATS[:3], LIGHT), {"multires.upsampled.0": Spec(
                    "rgb, row, column", "W/m^2", "indirect irradiance; 0 without surface", "linear RGB")},
-               paper="AMS Sec. 3.5, Fig. 7", decoys=(
-                   *(Decoy(cause, partial(run, how=how), "AMS Fig. 7") for how, cause in others.items()
+               paper="AMS Sec. 3.5, Fig. 7", bugs=(
+                   *(Bug(cause, partial(run, how=how), "AMS Fig. 7") for how, cause in others.items()
                      if how != mode),
-                   Decoy("rows and columns of subsplats are exchanged", _with_list(run, (1, 0), 0), "row, column"),
-                   Decoy("subsplats one level finer are taken", _with_list(run, (0, 1), -1), "level of the layer")))
+                   Bug("rows and columns of subsplats are exchanged", _with_list(run, (1, 0), 0), "row, column"),
+                   Bug("subsplats one level finer are taken", _with_list(run, (0, 1), -1), "level of the layer")))
 
 

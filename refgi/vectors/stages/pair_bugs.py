@@ -7,7 +7,7 @@ import numpy as np
 from refgi.lobes import lobe_norm
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.vectors.recipe import reading
-from refgi.vectors.spec import Array, Arrays, Decoy, Run
+from refgi.vectors.spec import Array, Arrays, Bug, Run
 from refgi.vectors.stages.lights import pixel_lights_of
 
 RECEIVERS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
@@ -23,7 +23,7 @@ def as_printed(own: bool) -> Run:
     return run
 
 
-def pair_decoys(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple[Decoy, ...]:
+def pair_bugs(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple[Bug, ...]:
     """Return likely bugs of Eq. 2 and 3; `own`: light k meets receiver k alone."""
     def literal(**bugs: Any) -> Run:
         def altered(arrays: Arrays, real: Any) -> Arrays:
@@ -32,47 +32,47 @@ def pair_decoys(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tup
         return altered
 
     found = [
-        Decoy("the receiver's cosine is missing", literal(arrives="none"), EQ2),
-        Decoy("the light's cosine is missing", literal(leaves="none"), EQ2),
-        Decoy("cosines are not clamped at 0", literal(arrives="any", leaves="any"), CLAMPED),
-        Decoy("the receiver's cosine is not clamped at 0: light from behind counts", literal(arrives="any"), CLAMPED),
-        Decoy("the light's cosine is not clamped at 0: lights shine backwards", literal(leaves="any"), CLAMPED),
-        Decoy("cosines are taken as absolute values", literal(arrives="abs", leaves="abs"), CLAMPED),
-        Decoy("the receiver's cosine is taken as absolute value", literal(arrives="abs"), CLAMPED),
-        Decoy("the light's cosine is taken as absolute value", literal(leaves="abs"), CLAMPED),
-        Decoy("1/r^4 with unit directions", literal(power=4), "E-SII-02"),
-        Decoy("1/r in place of 1/r^2", literal(power=1), "E-SII-02"),
-        Decoy("directions are not normalised", literal(power=0), "E-SII-02"),
-        Decoy("distances count as at least 0.1 m", literal(least=0.1), "no clamp unless asked for"),
-        Decoy("places of light and receiver are exchanged", literal(exchanged=True), EQ2),
-        Decoy("the light's normal points inwards", reading(run, lights__normal=lambda a: -a), EQ2),
-        Decoy("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), EQ2),
-        Decoy("only the first half of the lights", reading(run, lights__flux=_first_half, **(
+        Bug("the receiver's cosine is missing", literal(arrives="none"), EQ2),
+        Bug("the light's cosine is missing", literal(leaves="none"), EQ2),
+        Bug("cosines are not clamped at 0", literal(arrives="any", leaves="any"), CLAMPED),
+        Bug("the receiver's cosine is not clamped at 0: light from behind counts", literal(arrives="any"), CLAMPED),
+        Bug("the light's cosine is not clamped at 0: lights shine backwards", literal(leaves="any"), CLAMPED),
+        Bug("cosines are taken as absolute values", literal(arrives="abs", leaves="abs"), CLAMPED),
+        Bug("the receiver's cosine is taken as absolute value", literal(arrives="abs"), CLAMPED),
+        Bug("the light's cosine is taken as absolute value", literal(leaves="abs"), CLAMPED),
+        Bug("1/r^4 with unit directions", literal(power=4), "E-SII-02"),
+        Bug("1/r in place of 1/r^2", literal(power=1), "E-SII-02"),
+        Bug("directions are not normalised", literal(power=0), "E-SII-02"),
+        Bug("distances count as at least 0.1 m", literal(least=0.1), "no clamp unless asked for"),
+        Bug("places of light and receiver are exchanged", literal(exchanged=True), EQ2),
+        Bug("the light's normal points inwards", reading(run, lights__normal=lambda a: -a), EQ2),
+        Bug("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), EQ2),
+        Bug("only the first half of the lights", reading(run, lights__flux=_first_half, **(
             {"lights__lobe_flux": _first_half} if glossy else {})), "all lights"),
-        *((Decoy("distances count as at least 1 cm", literal(least=0.01), "no clamp unless asked for"),) if own else (
-            Decoy("the last light is left out", reading(run, lights__flux=_without_last, **(
+        *((Bug("distances count as at least 1 cm", literal(least=0.01), "no clamp unless asked for"),) if own else (
+            Bug("the last light is left out", reading(run, lights__flux=_without_last, **(
                 {"lights__lobe_flux": _without_last} if glossy else {})), "all lights"),
-            Decoy("the largest light in place of the sum", literal(joined="max"), "all lights"))),
+            Bug("the largest light in place of the sum", literal(joined="max"), "all lights"))),
     ] if not clamped else [
-        Decoy("the footprint is divided by 2 pi instead of pi", reading(run, lights__area=lambda a: a / 2), DISC),
-        Decoy("the footprint is not divided by pi", reading(run, lights__area=lambda a: a * np.pi), DISC),
+        Bug("the footprint is divided by 2 pi instead of pi", reading(run, lights__area=lambda a: a / 2), DISC),
+        Bug("the footprint is not divided by pi", reading(run, lights__area=lambda a: a * np.pi), DISC),
     ]
     if glossy:
         found += [
-            Decoy("lobes are missing", reading(run, lights__lobe_flux=np.zeros_like), "SII Eq. 3"),
-            Decoy("the diffuse part is missing", reading(run, lights__flux=np.zeros_like), "SII Eq. 3"),
-            Decoy("lobes are around the normal", _lobes_at_normal(run), "SII Eq. 3"),
-            Decoy("the lobe's exponent is one too high", reading(run, lights__lobe_exponent=lambda a: a + 1),
-                  "SII Eq. 3"),
+            Bug("lobes are missing", reading(run, lights__lobe_flux=np.zeros_like), "SII Eq. 3"),
+            Bug("the diffuse part is missing", reading(run, lights__flux=np.zeros_like), "SII Eq. 3"),
+            Bug("lobes are around the normal", _lobes_at_normal(run), "SII Eq. 3"),
+            Bug("the lobe's exponent is one too high", reading(run, lights__lobe_exponent=lambda a: a + 1),
+                "SII Eq. 3"),
         ]
         found += [] if clamped else [
-            Decoy("lobes are not normalised", literal(norm="none"), "E-SII-03: (P + 1) / 2 pi K"),
-            Decoy("lobes are normalised over the whole lobe, not over what lies above the surface",
-                  literal(norm="full"), "E-SII-03: (P + 1) / 2 pi K"),
-            Decoy("lobes reach below the light's horizon", literal(horizon=False), "SII Eq. 3"),
-            Decoy("lobes are normalised by (P + 2) / 2 pi", literal(norm="cosine"), "E-SII-03: (P + 1) / 2 pi K"),
-            Decoy("the direction is turned round in lobes", literal(lobe_turned=True), "SII Eq. 3: towards receivers"),
-            Decoy("the light's cosine counts for lobes too", literal(lobe_cosine=True), "SII Eq. 3"),
+            Bug("lobes are not normalised", literal(norm="none"), "E-SII-03: (P + 1) / 2 pi K"),
+            Bug("lobes are normalised over the whole lobe, not over what lies above the surface",
+                literal(norm="full"), "E-SII-03: (P + 1) / 2 pi K"),
+            Bug("lobes reach below the light's horizon", literal(horizon=False), "SII Eq. 3"),
+            Bug("lobes are normalised by (P + 2) / 2 pi", literal(norm="cosine"), "E-SII-03: (P + 1) / 2 pi K"),
+            Bug("the direction is turned round in lobes", literal(lobe_turned=True), "SII Eq. 3: towards receivers"),
+            Bug("the light's cosine counts for lobes too", literal(lobe_cosine=True), "SII Eq. 3"),
         ]
     return tuple(found)
 

@@ -8,10 +8,10 @@ from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.settings import of, replaced
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.lights import LIGHT, LOBE, light_names, pixel_lights_of
-from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, as_printed, pair_decoys
+from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, as_printed, pair_bugs
 
 NORM = "(P + 1) / (2 pi K), K the share of the lobe's integral above the surface; 0 where K is below 1e-12"
 
@@ -47,9 +47,9 @@ def add_footprints(recipe: Recipe, maps: int) -> None:
     recipe.add("footprints", "surface that each light stands for", run,
                (*light_names(recipe), "lights.texel", "lights.map", *places, *reads),
                {"lights.area": Spec("light", "m^2", "Omega d^2 / cos of the light's texel, times T/N w")},
-               paper="docs/methods/sii_sum", decoys=(
-                   Decoy("the squared distance is missing", lambda a, r: run(a, r, False), "A = Omega d^2 / cos"),
-                   Decoy("the cosine is missing", lambda a, r: run(a, r, True, False), "A = Omega d^2 / cos")))
+               paper="docs/methods/sii_sum", bugs=(
+                   Bug("the squared distance is missing", lambda a, r: run(a, r, False), "A = Omega d^2 / cos"),
+                   Bug("the cosine is missing", lambda a, r: run(a, r, True, False), "A = Omega d^2 / cos")))
 
 
 def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
@@ -69,9 +69,9 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
     recipe.add("sum", "irradiance of every pixel light at every pixel, without visibility and albedo/pi", run,
                (*RECEIVERS, *names, *area),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)},
-               paper=EQ2, decoys=(*pair_decoys(run, bool(area), "lights.lobe_flux" in recipe.specs), *(
-                   (Decoy("nothing is clamped", lambda a, r: run(a, r, replaced(settings, {"clamp": "none"})),
-                          "docs/methods/sii_sum"),) if settings.clamp is not None else ())),
+               paper=EQ2, bugs=(*pair_bugs(run, bool(area), "lights.lobe_flux" in recipe.specs), *(
+                   (Bug("nothing is clamped", lambda a, r: run(a, r, replaced(settings, {"clamp": "none"})),
+                        "docs/methods/sii_sum"),) if settings.clamp is not None else ())),
                exact=("gbuffer.position", "lights.position"), variants=(as_printed(False),))
 
 
@@ -97,7 +97,7 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
     recipe.add("pairs", "irradiance of light k at receiver k", run, (*RECEIVERS, *names), {
         "pairs.irradiance": Spec("rgb, row, pair", "W/m^2", "irradiance; 0 where light and receiver coincide",
                                  "linear RGB", EQ2, alone=True)},
-        paper=EQ2, decoys=pair_decoys(run, False, "lights.lobe_flux" in lights, own=True),
+        paper=EQ2, bugs=pair_bugs(run, False, "lights.lobe_flux" in lights, own=True),
         exact=("gbuffer.position", "lights.position"), variants=(as_printed(True),))
 
 

@@ -12,7 +12,7 @@ from refgi.sssil.reprojection import SNAP, SourceView, reproject
 from refgi.sssil.settings import TemporalSettings
 from refgi.sssil.temporal.motion import previous_points
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import (
     VECTOR,
     _half_texel,
@@ -50,10 +50,10 @@ def add_motion(recipe: Recipe, scene: Scene, before: Scene, view: Projection) ->
                    "motion.position": Spec("xyz, row, column", "m", "where it was", "world"),
                    "motion.normal": Spec("xyz, row, column", VECTOR, "its normal then", "world"),
                    "motion.speed": Spec("row, column", "pixels", "how far it moved as this frame's camera sees it"),
-               }, paper="HSS Sec. 4", exact=("scene.vertices", "before.vertices", "gbuffer.position"), decoys=(
-                   Decoy("points are taken to rest", still, "HSS Sec. 4"),
-                   Decoy("points are moved on, not back", doubled, "HSS Sec. 4"),
-                   Decoy("speed is a share of the picture, not pixels", writing(
+               }, paper="HSS Sec. 4", exact=("scene.vertices", "before.vertices", "gbuffer.position"), bugs=(
+                   Bug("points are taken to rest", still, "HSS Sec. 4"),
+                   Bug("points are moved on, not back", doubled, "HSS Sec. 4"),
+                   Bug("speed is a share of the picture, not pixels", writing(
                        run, motion__speed=lambda a: a / view.width), "pixels a frame"),
                ))
     return "motion.position", "motion.normal"
@@ -103,23 +103,23 @@ def add_reprojection(
     writes |= {"reprojected.frames": FRAMES} if counted else {}
     recipe.add("reprojected", "light of the frame before at this frame's points: the texels around, those that show "
                "the same surface by depth and normal", run, reads, writes, paper=WARP,
-               exact=(points[0], "before.origin", "before.depth"), decoys=(
-                   Decoy("this frame's camera in place of that of the frame before", reading(run, **{
+               exact=(points[0], "before.origin", "before.depth"), bugs=(
+                   Bug("this frame's camera in place of that of the frame before", reading(run, **{
                        f"before__{key}": lambda a, key=key: np.asarray(now[key], a.dtype) for key in now}), WARP),
-                   Decoy("no reprojection: the same pixel of the frame before", lambda a, r: {
+                   Bug("no reprojection: the same pixel of the frame before", lambda a, r: {
                        **run(a, r), "reprojected.irradiance": a["before.irradiance"]}, WARP),
-                   Decoy("rows run upwards", reading(run, before__frame=_upside_down),
-                         "row 0 is the top row"),
-                   Decoy("texel centres lie at 0 instead of 1/2", reading(run, before__frame=_half_texel(maps)),
-                         "centres at + 1/2"),
-                   Decoy(f"the {other} texel" if other == "nearest" else "the mean of the four texels around",
-                         changed(fetch=other), ""),
-                   Decoy("depths are not compared", changed(depth_tolerance=1.0), WARP),
-                   Decoy("normals are not compared", changed(normal_cosine=-1.0), WARP),
-                   Decoy("depths are compared with the point's alone, not with that of its plane",
-                         literal(planes=False), "docs/methods/hssil: planes at grazing angles"),
-                   Decoy("the tolerance is in metres, not a share of the depth", literal(metres=True), WARP),
-                   *((Decoy("the sum of weights is not divided by", undivided, "weighted mean"),)
+                   Bug("rows run upwards", reading(run, before__frame=_upside_down),
+                       "row 0 is the top row"),
+                   Bug("texel centres lie at 0 instead of 1/2", reading(run, before__frame=_half_texel(maps)),
+                       "centres at + 1/2"),
+                   Bug(f"the {other} texel" if other == "nearest" else "the mean of the four texels around",
+                       changed(fetch=other), ""),
+                   Bug("depths are not compared", changed(depth_tolerance=1.0), WARP),
+                   Bug("normals are not compared", changed(normal_cosine=-1.0), WARP),
+                   Bug("depths are compared with the point's alone, not with that of its plane",
+                       literal(planes=False), "docs/methods/hssil: planes at grazing angles"),
+                   Bug("the tolerance is in metres, not a share of the depth", literal(metres=True), WARP),
+                   *((Bug("the sum of weights is not divided by", undivided, "weighted mean"),)
                      if settings.fetch == "bilinear" else ())))
 
 

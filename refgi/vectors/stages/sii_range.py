@@ -15,7 +15,7 @@ from refgi.pairs.settings import LobeSettings, PairSettings
 from refgi.splat.sii.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW, reference_length, strengths
 from refgi.splat.sii.reach.threshold import all_peaks, threshold
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.pair_bugs import RECEIVERS
 from refgi.vectors.stages.sii_range_sum import (
@@ -87,17 +87,17 @@ def _add_peaks(recipe: Recipe, parts: tuple[str, ...]) -> None:
 
         return altered
 
-    decoys = [Decoy("luminance in place of the largest channel", summed((0.2126, 0.7152, 0.0722)), "largest channel"),
-              Decoy("the sum of channels in place of the largest", summed((1, 1, 1)), "largest channel"),
-              Decoy("1/pi is left out", writing(run, range__diffuse_peak=lambda a: a * np.pi), "I_0 = Phi / pi")]
+    bugs = [Bug("luminance in place of the largest channel", summed((0.2126, 0.7152, 0.0722)), "largest channel"),
+            Bug("the sum of channels in place of the largest", summed((1, 1, 1)), "largest channel"),
+            Bug("1/pi is left out", writing(run, range__diffuse_peak=lambda a: a * np.pi), "I_0 = Phi / pi")]
     if "glossy" in parts:
-        decoys += [Decoy("a lobe's peak is its flux", lambda a, r: run(a, r, PairSettings(
+        bugs += [Bug("a lobe's peak is its flux", lambda a, r: run(a, r, PairSettings(
             clamp=None, lobe=LobeSettings(norm="none"))), "E-SII-03: times (P + 1) / 2 pi K"),
-            Decoy("the norm is that of the whole lobe", lambda a, r: run(a, r, PairSettings(
+            Bug("the norm is that of the whole lobe", lambda a, r: run(a, r, PairSettings(
                 clamp=None, lobe=LobeSettings(norm="full_lobe"))), "E-SII-03")]
     recipe.add("range.peaks", "I_0, the peak intensity of each part of each light", run, light_names(recipe), {
         name: Spec("light", "W/sr", f"largest channel of I_0 of the {part} part; 0 without it", paper=PAPER)
-        for name, part in zip(names, parts, strict=True)}, paper=PAPER, decoys=tuple(decoys))
+        for name, part in zip(names, parts, strict=True)}, paper=PAPER, bugs=tuple(bugs))
 
 
 def _strengths(arrays: Arrays, parts: tuple[str, ...]) -> list[Array]:
@@ -146,12 +146,12 @@ def _add_strengths(recipe: Recipe, parts: tuple[str, ...]) -> None:
                (*RECEIVERS, *light_names(recipe)), {name: Spec(
                    "light, row, column", "W/m^2", f"I(w) / r^2 of the {part} part, without the pixel's cosine; 0 "
                    "without surface", paper=PAPER) for name, part in zip(names, parts, strict=True)},
-               paper=PAPER, exact=(RECEIVERS[0], "lights.position"), decoys=(
-                   Decoy("the pixel's cosine counts", with_receiver, "the pixel's cosine is taken as 1"),
-                   Decoy("the light's cosine is missing", at_peak, "B = I(w) / r^2"),
-                   Decoy("1/r in place of 1/r^2", powered(1), "B = I(w) / r^2"),
-                   Decoy("the distance is left out", powered(2), "B = I(w) / r^2"),
-                   Decoy("pixels without surface count", reading(run, gbuffer__triangle_id=np.zeros_like), "surfaces")))
+               paper=PAPER, exact=(RECEIVERS[0], "lights.position"), bugs=(
+                   Bug("the pixel's cosine counts", with_receiver, "the pixel's cosine is taken as 1"),
+                   Bug("the light's cosine is missing", at_peak, "B = I(w) / r^2"),
+                   Bug("1/r in place of 1/r^2", powered(1), "B = I(w) / r^2"),
+                   Bug("the distance is left out", powered(2), "B = I(w) / r^2"),
+                   Bug("pixels without surface count", reading(run, gbuffer__triangle_id=np.zeros_like), "surfaces")))
 
 
 def _add_length(recipe: Recipe, drawn: int) -> None:
@@ -169,14 +169,14 @@ def _add_length(recipe: Recipe, drawn: int) -> None:
                    "one", "m", "sqrt(0.05 / b), b the k-th largest B over the largest I_0 of all pairs of part and "
                    "pixel, k = 125/768 of all pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels "
                    "and lights; 1 where nothing is lit")},
-               paper="SII Fig. 8; E-SII-11", exact=(RECEIVERS[0], "lights.position"), decoys=(
-                   Decoy("lights drawn without flux do not count", lambda a, r: run(
+               paper="SII Fig. 8; E-SII-11", exact=(RECEIVERS[0], "lights.position"), bugs=(
+                   Bug("lights drawn without flux do not count", lambda a, r: run(
                        a, r, a["lights.flux"].shape[1]), "k counts all that were drawn"),
-                   Decoy("one metre", fixed(1.0), "E-SII-11"),
-                   Decoy("the root is missing", writing(run, range__length=lambda a: a * a), "L^2 = 0.05 / b"),
-                   Decoy("all pixels count, those without surface too", reading(
+                   Bug("one metre", fixed(1.0), "E-SII-11"),
+                   Bug("the root is missing", writing(run, range__length=lambda a: a * a), "L^2 = 0.05 / b"),
+                   Bug("all pixels count, those without surface too", reading(
                        run, gbuffer__triangle_id=np.zeros_like), "surfaces"),
-                   Decoy("half as many pairs are left", lambda a, r: run(a, r, drawn // 2), "125 of 768")))
+                   Bug("half as many pairs are left", lambda a, r: run(a, r, drawn // 2), "125 of 768")))
 
 
 def _add_low(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
@@ -188,12 +188,12 @@ def _add_low(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
     recipe.add("range.low", f"I_low = {share:g} max I_0 / L^2", run,
                (LENGTH, *(f"range.{part}_peak" for part in parts)), {
         LOW: Spec("one", "W/m^2", "irradiance under which pairs are left out; 0 without lights", paper=PAPER)},
-        paper=PAPER, decoys=(
-            Decoy("the length is not squared", reading(run, range__length=np.sqrt), PAPER),
-            Decoy("the length is left out", reading(run, range__length=np.ones_like), PAPER),
-            Decoy("the mean of the peaks in place of the largest", reading(run, **peaks), PAPER),
-            Decoy("the share is in percent", writing(run, range__low=lambda a: 100 * a), "5 % is 0.05"),
-            *((Decoy("lobes do not count", reading(run, range__glossy_peak=np.zeros_like), "all parts"),)
+        paper=PAPER, bugs=(
+            Bug("the length is not squared", reading(run, range__length=np.sqrt), PAPER),
+            Bug("the length is left out", reading(run, range__length=np.ones_like), PAPER),
+            Bug("the mean of the peaks in place of the largest", reading(run, **peaks), PAPER),
+            Bug("the share is in percent", writing(run, range__low=lambda a: 100 * a), "5 % is 0.05"),
+            *((Bug("lobes do not count", reading(run, range__glossy_peak=np.zeros_like), "all parts"),)
               if "glossy" in parts else ())))
 
 

@@ -11,7 +11,7 @@ from refgi.splat.sii.reach.threshold import DIFFUSE, GLOSSY, light_range
 from refgi.splat.sii.settings import AbsoluteCut, FullBound, ReachSettings, RelativeCut, SiiSettings
 from refgi.splat.sii.sii import splat
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.pair_bugs import RECEIVERS
 
@@ -41,15 +41,15 @@ def add_ellipsoids(recipe: Recipe) -> None:
     recipe.add("range.ellipsoids", "ellipsoids of revolution around the region in units of R_0: centred where it is "
                "widest, and the least wasteful one through the light", run, ("range.exponent",), {
                    name: Spec("shape", "1", what[name.split("_", 1)[1]] + ", in R_0") for name in names},
-               paper="SII Eq. 7 and 8; E-SII-12, E-SII-13", decoys=(
-                   Decoy("the exponent of Eq. 8 is printed as a factor", printed, "E-SII-12"),
-                   Decoy("the ellipsoid is as wide as its centre is far", writing(run, **{
+               paper="SII Eq. 7 and 8; E-SII-12, E-SII-13", bugs=(
+                   Bug("the exponent of Eq. 8 is printed as a factor", printed, "E-SII-12"),
+                   Bug("the ellipsoid is as wide as its centre is far", writing(run, **{
                        names[1].replace(".", "__"): lambda a: a * 0 + 0.438691}), "E-SII-13: max(c, 1 - c)"),
-                   Decoy("the height is that of the diffuse light", writing(run, **{
+                   Bug("the height is that of the diffuse light", writing(run, **{
                        names[2].replace(".", "__"): lambda a: np.full_like(a, a[1])}), "E-SII-13: F(c)"),
-                   Decoy("the tangent ellipsoid is the appendix's", lambda a, r: dict(zip(names, [
+                   Bug("the tangent ellipsoid is the appendix's", lambda a, r: dict(zip(names, [
                        run(a, r)[name] for name in names[:3]] * 2, strict=True)), "E-SII-13"),
-                   Decoy("n is one too high", reading(run, range__exponent=lambda a: a + 1), "SII Eq. 8")))
+                   Bug("n is one too high", reading(run, range__exponent=lambda a: a + 1), "SII Eq. 8")))
 
 
 def peaks_of(arrays: Arrays, parts: tuple[str, ...]) -> list[Array]:
@@ -79,13 +79,13 @@ def add_squares(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
     recipe.add("range.squares", "R_0^2 = I_0 / I_low of each part of each light", run,
                (LOW, LENGTH, *(f"range.{part}_peak" for part in parts)), {
                    name: Spec("light", "m^2", f"square of the largest distance at which the {part} part counts")
-                   for name, part in zip(names, parts, strict=True)}, paper=PAPER, decoys=(
-                   Decoy("R_0 in place of its square", all_of(np.sqrt), PAPER),
-                   Decoy("I_low is a share of the light's own peak: all reach equally far",
-                         lambda a, r: run(a, r, True), "E-SII-11"),
-                   Decoy("all have the range of the brightest", all_of(lambda a: np.full_like(a, a.max(initial=0))),
-                         PAPER),
-                   Decoy("a diameter in place of a radius", all_of(lambda a: a / 4), PAPER)))
+                   for name, part in zip(names, parts, strict=True)}, paper=PAPER, bugs=(
+                   Bug("R_0 in place of its square", all_of(np.sqrt), PAPER),
+                   Bug("I_low is a share of the light's own peak: all reach equally far",
+                       lambda a, r: run(a, r, True), "E-SII-11"),
+                   Bug("all have the range of the brightest", all_of(lambda a: np.full_like(a, a.max(initial=0))),
+                       PAPER),
+                   Bug("a diameter in place of a radius", all_of(lambda a: a / 4), PAPER)))
 
 
 def add_kept(recipe: Recipe, parts: tuple[str, ...]) -> None:
@@ -99,11 +99,11 @@ def add_kept(recipe: Recipe, parts: tuple[str, ...]) -> None:
 
     recipe.add("range.kept", "pairs that count: B >= I_low", run, (LOW, *sources), {
         name: Spec("light, row, column", "1", f"true where the {part} part counts; never where B is 0", tier="T0")
-        for name, part in zip(names, parts, strict=True)}, paper=PAPER, decoys=(
-            Decoy("pairs below I_low count", writing(run, **{
+        for name, part in zip(names, parts, strict=True)}, paper=PAPER, bugs=(
+            Bug("pairs below I_low count", writing(run, **{
                 name.replace(".", "__"): np.logical_not for name in names}), PAPER),
-            Decoy("all pairs count", reading(run, range__low=np.zeros_like), PAPER),
-            Decoy("I_low is divided by pi", reading(run, range__low=lambda a: a / np.pi), PAPER)))
+            Bug("all pairs count", reading(run, range__low=np.zeros_like), PAPER),
+            Bug("I_low is divided by pi", reading(run, range__low=lambda a: a / np.pi), PAPER)))
 
 
 def add_sum(recipe: Recipe, parts: tuple[str, ...], pairs: PairSettings) -> None:
@@ -143,19 +143,19 @@ def add_sum(recipe: Recipe, parts: tuple[str, ...], pairs: PairSettings) -> None
 
         return altered
 
-    decoys = [Decoy("nothing is cut", every, PAPER),
-              Decoy("what is cut is summed", lambda a, r: {LIGHT: every(a, r)[LIGHT] - run(a, r)[LIGHT]}, PAPER),
-              Decoy("a light counts at all pixels or at none", masked(lambda masks: [
+    bugs = [Bug("nothing is cut", every, PAPER),
+            Bug("what is cut is summed", lambda a, r: {LIGHT: every(a, r)[LIGHT] - run(a, r)[LIGHT]}, PAPER),
+            Bug("a light counts at all pixels or at none", masked(lambda masks: [
                   np.broadcast_to(mask.any(axis=(1, 2), keepdims=True), mask.shape) for mask in masks]),
                   "pair by pair"),
-              Decoy("pairs count by their light, the pixel's cosine included", masked(lambda masks: masks, own=True),
-                    PAPER),
-              Decoy("1/pi is left out", reading(run, lights__flux=lambda a: a * np.pi), "I_0 = Phi / pi")]
+            Bug("pairs count by their light, the pixel's cosine included", masked(lambda masks: masks, own=True),
+                PAPER),
+            Bug("1/pi is left out", reading(run, lights__flux=lambda a: a * np.pi), "I_0 = Phi / pi")]
     if len(parts) > 1:
-        decoys += [Decoy("a light's lobe counts where its diffuse part does", masked(lambda masks: [masks[0]] * 2),
-                         "each part has its range"),
-                   Decoy("a light counts whole where one of its parts does",
-                         masked(lambda masks: [masks[0] | masks[1]] * 2), "each part has its range")]
+        bugs += [Bug("a light's lobe counts where its diffuse part does", masked(lambda masks: [masks[0]] * 2),
+                     "each part has its range"),
+                 Bug("a light counts whole where one of its parts does",
+                     masked(lambda masks: [masks[0] | masks[1]] * 2), "each part has its range")]
     recipe.add("range.sum", "irradiance of the pairs that count", run, (LOW, *kept, *RECEIVERS, *names, *area), {
         LIGHT: Spec("rgb, row, column", "W/m^2", "indirect irradiance without visibility and albedo/pi", "linear RGB")},
-        paper=PAPER, exact=(RECEIVERS[0], "lights.position"), decoys=tuple(decoys))
+        paper=PAPER, exact=(RECEIVERS[0], "lights.position"), bugs=tuple(bugs))

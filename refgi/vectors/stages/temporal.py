@@ -13,7 +13,7 @@ from refgi.sssil.temporal.entering import fetch_entering
 from refgi.sssil.temporal.filter import blend
 from refgi.sssil.temporal.neighbourhood import clamp_to_neighbourhood
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, _add_ids, _add_surface, _give_maps, _map_names
 from refgi.vectors.stages.direct import _upside_down
 from refgi.vectors.stages.reprojection import FORM, FRAMES, LIGHT, add_motion, add_reprojection, view_before
@@ -85,14 +85,14 @@ def _add_entering(
                    "entering.irradiance": replace(LIGHT, what="as reprojected, with the edge's light"),
                    "entering.share": Spec("row, column", "1", "exp(-v / entering_speed), v pixels; 0 but for points "
                                           "that entered"),
-               }, paper="HSS Sec. 3.3", exact=(position, "before.origin"), decoys=(
-                   Decoy("powers of 2 in place of e", lambda a, r: run(a, r, speed / math.log(2)), "exp(-v / speed)"),
-                   Decoy("the share does not depend on the speed", writing(run, entering__share=lambda a: (
+               }, paper="HSS Sec. 3.3", exact=(position, "before.origin"), bugs=(
+                   Bug("powers of 2 in place of e", lambda a, r: run(a, r, speed / math.log(2)), "exp(-v / speed)"),
+                   Bug("the share does not depend on the speed", writing(run, entering__share=lambda a: (
                        a > 0).astype(a.dtype)), "HSS Sec. 3.3"),
-                   Decoy("entering pixels get no light", lambda a, r: {**run(a, r), "entering.irradiance": a[light]},
-                         "HSS Sec. 3.3"),
-                   Decoy("rows run upwards", reading(run, before__frame=_upside_down),
-                         "row 0 is the top row")))
+                   Bug("entering pixels get no light", lambda a, r: {**run(a, r), "entering.irradiance": a[light]},
+                       "HSS Sec. 3.3"),
+                   Bug("rows run upwards", reading(run, before__frame=_upside_down),
+                       "row 0 is the top row")))
     return "entering.irradiance"
 
 
@@ -110,11 +110,11 @@ def _add_clamp(recipe: Recipe, settings: TemporalSettings, light: str) -> str:
     recipe.add("clamp", "earlier light within some standard deviations of the mean of the new light in a square", run,
                (light, "new.irradiance", "gbuffer.triangle_id"), {
                    "clamped.irradiance": replace(LIGHT, what="earlier light, clamped")},
-               paper="docs/methods/hssil", decoys=(
-                   Decoy("the square is one pixel wider", lambda a, r: run(a, r, deviations, radius + 1), ""),
-                   Decoy("twice as many deviations", lambda a, r: run(a, r, 2 * deviations), ""),
-                   Decoy("pixels without surface count as dark", reading(run, gbuffer__triangle_id=np.zeros_like), ""),
-                   Decoy("earlier light is replaced by the mean", lambda a, r: run(a, r, 0.0), "")))
+               paper="docs/methods/hssil", bugs=(
+                   Bug("the square is one pixel wider", lambda a, r: run(a, r, deviations, radius + 1), ""),
+                   Bug("twice as many deviations", lambda a, r: run(a, r, 2 * deviations), ""),
+                   Bug("pixels without surface count as dark", reading(run, gbuffer__triangle_id=np.zeros_like), ""),
+                   Bug("earlier light is replaced by the mean", lambda a, r: run(a, r, 0.0), "")))
     return "clamped.irradiance"
 
 
@@ -142,34 +142,34 @@ def _add_blend(recipe: Recipe, settings: TemporalSettings, light: str, moved: bo
 
         return wrong
 
-    decoys = [
-        Decoy("a and 1 - a are exchanged", by(lambda _, made: 1 - made["temporal.share"]), FORM),
-        Decoy("disoccluded pixels are blended with black", by(lambda arrays, made: np.maximum(
+    bugs = [
+        Bug("a and 1 - a are exchanged", by(lambda _, made: 1 - made["temporal.share"]), FORM),
+        Bug("disoccluded pixels are blended with black", by(lambda arrays, made: np.maximum(
             made["temporal.share"], np.where(arrays["reprojected.weight"] > 0, 0, settings.weight))),
             "a = 0 (E-HSS-11)"),
-        Decoy("a is scaled by the share of texels found", by(lambda arrays, made: (
+        Bug("a is scaled by the share of texels found", by(lambda arrays, made: (
             made["temporal.share"] * arrays["reprojected.weight"])), FORM),
-        Decoy("earlier light is added, not blended", lambda a, r: {**run(a, r), "temporal.irradiance": (
+        Bug("earlier light is added, not blended", lambda a, r: {**run(a, r), "temporal.irradiance": (
             a["new.irradiance"] + settings.weight * a[light])}, FORM),
     ]
     if counted:
-        decoys += [
-            Decoy("a is the same from the first frame on", by(lambda arrays, _: np.where(
+        bugs += [
+            Bug("a is the same from the first frame on", by(lambda arrays, _: np.where(
                 arrays["reprojected.weight"] > 0, settings.weight, 0)), "min(a, n / (n + 1))"),
-            Decoy("n counts this frame as well", by(lambda arrays, _: np.where(
+            Bug("n counts this frame as well", by(lambda arrays, _: np.where(
                 arrays["reprojected.weight"] > 0, np.minimum(settings.weight, (arrays["reprojected.frames"] + 1) / (
                     arrays["reprojected.frames"] + 2)), 0)), "min(a, n / (n + 1))"),
-            Decoy("frames are not counted on", writing(run, temporal__frames=lambda a: a - 1), "n + 1"),
+            Bug("frames are not counted on", writing(run, temporal__frames=lambda a: a - 1), "n + 1"),
         ]
     if entered:
-        decoys.append(Decoy("entering pixels take their new light alone", reading(run, entering__share=np.zeros_like),
-                            "HSS Sec. 3.3"))
+        bugs.append(Bug("entering pixels take their new light alone", reading(run, entering__share=np.zeros_like),
+                        "HSS Sec. 3.3"))
     if moved:
-        decoys.append(Decoy("a does not fall with the speed", reading(run, motion__speed=np.zeros_like),
-                            "a exp(-v / speed)"))
+        bugs.append(Bug("a does not fall with the speed", reading(run, motion__speed=np.zeros_like),
+                        "a exp(-v / speed)"))
     writes = {"temporal.irradiance": replace(LIGHT, what="F_i; I_i where nothing was found"),
               "temporal.share": Spec("row, column", "1", "a of each pixel")}
     writes |= {"temporal.frames": FRAMES} if counted else {}
     recipe.add("temporal", "light of this frame and of those before" + (", at most n / (n + 1) of these" if counted
                                                                         else ""), run, reads, writes, paper=FORM,
-               decoys=tuple(decoys))
+               bugs=tuple(bugs))

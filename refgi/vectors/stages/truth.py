@@ -15,7 +15,7 @@ from refgi.settings import flat, replaced
 from refgi.truth.settings import TruthSettings
 from refgi.truth.truth import accumulate
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import REFLECTANCE, SCENE, _light_names, _map_names, geometry_of, light_of
 from refgi.vectors.stages.direct import POINTS
 
@@ -48,30 +48,30 @@ def add_truth(recipe: Recipe, scene: Scene, settings: TruthSettings) -> None:
         return {**made, NAMES[0]: made[NAMES[0]] + arrays["direct.irradiance"]}
 
     bright = {name.replace(".", "__"): _doubled for name in lights if name.endswith(("intensity", "irradiance"))}
-    decoys = [
-        Decoy("the emitter's radiance lacks 1/pi", scaled(np.pi), RADIOMETRY),
-        Decoy("irradiance is divided by pi", scaled(1 / np.pi), "E excludes the receiver's albedo/pi"),
-        Decoy("lights are twice as bright", reading(run, **bright), RADIOMETRY),
-        Decoy("the emitter's albedo is left out", reading(run, materials__diffuse=_white, materials__specular=(
+    bugs = [
+        Bug("the emitter's radiance lacks 1/pi", scaled(np.pi), RADIOMETRY),
+        Bug("irradiance is divided by pi", scaled(1 / np.pi), "E excludes the receiver's albedo/pi"),
+        Bug("lights are twice as bright", reading(run, **bright), RADIOMETRY),
+        Bug("the emitter's albedo is left out", reading(run, materials__diffuse=_white, materials__specular=(
             np.zeros_like)), RADIOMETRY),
-        Decoy("direct light is added", with_direct, "one bounce alone"),
-        Decoy("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), RADIOMETRY),
+        Bug("direct light is added", with_direct, "one bounce alone"),
+        Bug("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), RADIOMETRY),
     ]
     if settings.bounces > 1:
-        decoys.append(Decoy("one bounce less", changed(bounces=settings.bounces - 1), "number of bounces: a fact"))
+        bugs.append(Bug("one bounce less", changed(bounces=settings.bounces - 1), "number of bounces: a fact"))
     elif settings.visibility and settings.emitters == "all":
-        decoys.append(Decoy("one bounce more", changed(bounces=2), "number of bounces: a fact of the case"))
+        bugs.append(Bug("one bounce more", changed(bounces=2), "number of bounces: a fact of the case"))
     else:
-        decoys.append(Decoy("all surfaces emit and block", changed(visibility=True, emitters="all"),
-                            "facts of the case"))
+        bugs.append(Bug("all surfaces emit and block", changed(visibility=True, emitters="all"),
+                        "facts of the case"))
     if settings.visibility and settings.bounces == 1:
-        decoys.append(Decoy("nothing blocks between emitter and receiver", changed(visibility=False), RADIOMETRY))
+        bugs.append(Bug("nothing blocks between emitter and receiver", changed(visibility=False), RADIOMETRY))
     if np.any(recipe.given[REFLECTANCE[1]] > 0):
-        decoys.append(Decoy("lobes are missing", reading(run, materials__specular=np.zeros_like), "SII Eq. 3"))
+        bugs.append(Bug("lobes are missing", reading(run, materials__specular=np.zeros_like), "SII Eq. 3"))
     if len(lamps) > 1:
         last = next(name for name in reversed(lights) if name.endswith(("intensity", "irradiance")))
-        decoys.append(Decoy("the last light is left out", reading(run, **{last.replace(".", "__"): np.zeros_like}),
-                            "all lights"))
+        bugs.append(Bug("the last light is left out", reading(run, **{last.replace(".", "__"): np.zeros_like}),
+                        "all lights"))
     recipe.facts["truth"] = {key: value for key, value in flat(settings).items()
                              if isinstance(value, bool | int | float | str)}
     recipe.add("truth", "irradiance by light of so many bounces before the pixel, and the variance of this estimate; "
@@ -80,7 +80,7 @@ def add_truth(recipe: Recipe, scene: Scene, settings: TruthSettings) -> None:
                    NAMES[1]: Spec("rgb, row, column", "(W/m^2)^2", "estimated variance of that mean; 0 without surface",
                                   "linear RGB", RADIOMETRY, "T3"),
                    NAMES[2]: Spec("row, column", "1", "samples of each pixel; 0 without surface", tier="T3"),
-               }, paper=RADIOMETRY, exact=("scene.vertices", POINTS[0]), decoys=tuple(decoys))
+               }, paper=RADIOMETRY, exact=("scene.vertices", POINTS[0]), bugs=tuple(bugs))
 
 
 def deviation(mean: Array, variance: Array, other_mean: Array, other_variance: Array) -> float:

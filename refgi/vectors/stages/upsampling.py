@@ -10,7 +10,7 @@ from refgi.sssil.blur import blur
 from refgi.sssil.settings import Bilateral, GeometryBlur, HssilSettings
 from refgi.sssil.upsampling.upsample import Guide, upsample
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.levels import level_names, level_of
 
 GUIDE = ("depth", "normal")
@@ -39,22 +39,22 @@ def add_blur(recipe: Recipe, settings: GeometryBlur, index: int, number: int) ->
     first = -(settings.size // 2) + 1
     recipe.facts["blur"] = {"size": settings.size, "plane_tolerance": settings.plane_tolerance,
                             "cosine": settings.cosine}
-    rim = (Decoy("texels that the window's rim halves count whole", literal({k: 1.0 for k in range(
+    rim = (Bug("texels that the window's rim halves count whole", literal({k: 1.0 for k in range(
         -(settings.size // 2), settings.size // 2 + 1)}), "a box of n texels about the centre"),
-        Decoy("the window lies half a texel beside the texel", literal({k: 1.0 for k in range(
+        Bug("the window lies half a texel beside the texel", literal({k: 1.0 for k in range(
             first, first + settings.size)}), "a box of n texels about the centre")) if even else ()
     recipe.add(f"blur{index}", "mean over a window along the row, then along the column, of texels on the texel's "
                "tangent plane that face as it does", run, (light, *planes), {
                    name: Spec("rgb, row, column", "W/m^2", "irradiance by this level, averaged", "linear RGB", BLUR)},
-               paper=BLUR, exact=planes, decoys=(
+               paper=BLUR, exact=planes, bugs=(
                    *rim,
-                   Decoy("planes are not compared", changed(plane_tolerance=1e6), BLUR),
-                   Decoy("normals are not compared", changed(cosine=-1.0), BLUR),
-                   Decoy("the tolerance is in metres, not a share of the depth", reading(
+                   Bug("planes are not compared", changed(plane_tolerance=1e6), BLUR),
+                   Bug("normals are not compared", changed(cosine=-1.0), BLUR),
+                   Bug("the tolerance is in metres, not a share of the depth", reading(
                        run, **{planes[2].replace(".", "__"): lambda a: np.where(np.isfinite(a), 1.0, a)}), BLUR),
-                   Decoy("what is left out counts as dark", literal(dark=True), BLUR),
-                   Decoy("one window of rows and columns together", literal(together=True), "rows, then columns"),
-                   Decoy("nothing is averaged", changed(size=1), BLUR),
+                   Bug("what is left out counts as dark", literal(dark=True), BLUR),
+                   Bug("one window of rows and columns together", literal(together=True), "rows, then columns"),
+                   Bug("nothing is averaged", changed(size=1), BLUR),
                ))
 
 
@@ -86,32 +86,32 @@ def add_light(recipe: Recipe, settings: HssilSettings, index: int, added: str, c
     weights = settings.upsampling
     assert isinstance(weights, Bilateral)
     recipe.facts["upsampling"] = {"depth_sigma": weights.depth_sigma, "normal_power": weights.normal_power}
-    decoys = [
-        Decoy("bilinear upsampling", changed(upsampling="bilinear"), BILATERAL),
-        Decoy("the nearest texel", changed(upsampling="nearest"), BILATERAL),
-        Decoy("depths are not compared", changed(**{"upsampling.depth_sigma": 1e6}), BILATERAL),
-        Decoy("normals are not compared", changed(**{"upsampling.normal_power": 0.0}), BILATERAL),
-        Decoy("exp(-delta^2 / sigma^2) without the 2", changed(**{
+    bugs = [
+        Bug("bilinear upsampling", changed(upsampling="bilinear"), BILATERAL),
+        Bug("the nearest texel", changed(upsampling="nearest"), BILATERAL),
+        Bug("depths are not compared", changed(**{"upsampling.depth_sigma": 1e6}), BILATERAL),
+        Bug("normals are not compared", changed(**{"upsampling.normal_power": 0.0}), BILATERAL),
+        Bug("exp(-delta^2 / sigma^2) without the 2", changed(**{
             "upsampling.depth_sigma": weights.depth_sigma / math.sqrt(2)}), BILATERAL),
-        Decoy("a texel's depth is taken for that at its centre, not at its nearest pixel",
-              changed(**{"senders.downsample": "average"}), BILATERAL),
-        Decoy("depths are compared without the slope of the surface", literal(sloped=False), BILATERAL),
-        Decoy("weights are not divided by their sum", literal(divided=False), BILATERAL),
-        Decoy("the tent is centred on the texel of the pixel", literal(centred=True), "half-pixel (E-HSS-10)"),
-        Decoy("the tent is shifted to the wrong side", literal(mirrored=True), "half-pixel (E-HSS-10)"),
+        Bug("a texel's depth is taken for that at its centre, not at its nearest pixel",
+            changed(**{"senders.downsample": "average"}), BILATERAL),
+        Bug("depths are compared without the slope of the surface", literal(sloped=False), BILATERAL),
+        Bug("weights are not divided by their sum", literal(divided=False), BILATERAL),
+        Bug("the tent is centred on the texel of the pixel", literal(centred=True), "half-pixel (E-HSS-10)"),
+        Bug("the tent is shifted to the wrong side", literal(mirrored=True), "half-pixel (E-HSS-10)"),
     ]
     if adds:
-        decoys += [
-            Decoy("coarser levels are left out", lambda a, r: {name: np.asarray(a[added], r)}, "HSS Sec. 3.2"),
-            Decoy("the level's own light is left out", reading(run, **{added.replace(".", "__"): np.zeros_like}),
-                  "HSS Sec. 3.2"),
-            Decoy("levels are averaged, not added", writing(run, **{name.replace(".", "__"): lambda a: a / 2}),
-                  "HSS Sec. 3.2: sums of disjoint crowns"),
+        bugs += [
+            Bug("coarser levels are left out", lambda a, r: {name: np.asarray(a[added], r)}, "HSS Sec. 3.2"),
+            Bug("the level's own light is left out", reading(run, **{added.replace(".", "__"): np.zeros_like}),
+                "HSS Sec. 3.2"),
+            Bug("levels are averaged, not added", writing(run, **{name.replace(".", "__"): lambda a: a / 2}),
+                "HSS Sec. 3.2: sums of disjoint crowns"),
         ]
     recipe.add(name.split(".")[0], "light of the coarser levels at this level's texels, and this level's own" if adds
                else "light of all levels at the pixels", run, (coarse, *below, *here, *((added,) if adds else ())), {
                    name: Spec("rgb, row, column", "W/m^2", "irradiance; 0 without surface", "linear RGB", BILATERAL)},
-               paper=BILATERAL, exact=(below[0], here[0]), decoys=tuple(decoys))
+               paper=BILATERAL, exact=(below[0], here[0]), bugs=tuple(bugs))
     return name
 
 

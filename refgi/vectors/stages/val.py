@@ -19,7 +19,7 @@ from refgi.rsm import facing_normals
 from refgi.scene import Scene
 from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS
@@ -61,9 +61,9 @@ def _add_facing(recipe: Recipe, scene: Scene) -> None:
     recipe.add("facing", "normals of the triangles that pixels see, on the side of the interpolated ones", run,
                ("gbuffer.normal", "gbuffer.triangle_id", *source),
                {FACING: Spec("xyz, row, column", VECTOR, "plane of what a pixel sees; 0 without surface", "world")},
-               paper="A.6 P4: receiver's plane", decoys=(
-                   Decoy("they point away from the viewer", writing(run, **{"gbuffer__facing": lambda a: -a}), ""),
-                   *((Decoy("interpolated normals", lambda a, r: {FACING: a["gbuffer.normal"]}, "d_plane"),)  # noqa: ARG005
+               paper="A.6 P4: receiver's plane", bugs=(
+                   Bug("they point away from the viewer", writing(run, **{"gbuffer__facing": lambda a: -a}), ""),
+                   *((Bug("interpolated normals", lambda a, r: {FACING: a["gbuffer.normal"]}, "d_plane"),)  # noqa: ARG005
                      if smooth else ())))
 
 
@@ -98,11 +98,11 @@ def add_lighting(recipe: Recipe, settings: ValSettings) -> None:
 
     recipe.add("sum", "E = sum V_m E_m over all area lights", run, ("parts.irradiance", "visibility.share"),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance" + (
-                   ", not blurred" if block > 1 else ""), "linear RGB")}, paper="VAL Sec. 4", decoys=(
-                   Decoy("nothing is shadowed", lambda a, r: run(a, r, shadowed=False), "VAL Sec. 4"),
-                   Decoy("V of another area light", reading(run, visibility__share=lambda a: np.roll(a, 1, 0)), ""),
-                   Decoy("shadows are squared", reading(run, visibility__share=np.square), ""),
-                   Decoy("the mean over area lights", lambda a, r: run(
+                   ", not blurred" if block > 1 else ""), "linear RGB")}, paper="VAL Sec. 4", bugs=(
+                   Bug("nothing is shadowed", lambda a, r: run(a, r, shadowed=False), "VAL Sec. 4"),
+                   Bug("V of another area light", reading(run, visibility__share=lambda a: np.roll(a, 1, 0)), ""),
+                   Bug("shadows are squared", reading(run, visibility__share=np.square), ""),
+                   Bug("the mean over area lights", lambda a, r: run(
                        {**a, "visibility.share": a["visibility.share"] / len(a["visibility.share"])}, r), "a sum")))
     if block > 1 and settings.blur is not None:
         _add_blur(recipe, settings.blur, block)
@@ -119,11 +119,11 @@ def _add_subsets(recipe: Recipe, settings: ValSettings, block: int) -> None:
                                     "subset of a pixel": "(row mod n) n + column mod n"}
     recipe.add("interleaving", "which of n^2 subsets each light belongs to", run, ("clusters.of",),
                {"interleaving.subset": Spec("light", "1", "0 to n^2 - 1", tier="T0")},
-               paper="VAL Sec. 6, E-VAL-13", decoys=(
-                   Decoy(f"lights are dealt out by {other}", lambda a, r: run(a, r, other), f"by {kind}"),
-                   Decoy("n subsets, not n^2", writing(run, interleaving__subset=lambda a: a % block), "n x n pixels"),
-                   Decoy("subsets count from 1", writing(run, interleaving__subset=lambda a: (a + 1) % block**2), "0"),
-                   Decoy("rows and columns of the block are exchanged", writing(
+               paper="VAL Sec. 6, E-VAL-13", bugs=(
+                   Bug(f"lights are dealt out by {other}", lambda a, r: run(a, r, other), f"by {kind}"),
+                   Bug("n subsets, not n^2", writing(run, interleaving__subset=lambda a: a % block), "n x n pixels"),
+                   Bug("subsets count from 1", writing(run, interleaving__subset=lambda a: (a + 1) % block**2), "0"),
+                   Bug("rows and columns of the block are exchanged", writing(
                        run, interleaving__subset=lambda a: a % block * block + a // block), "row n + column")))
 
 
@@ -151,9 +151,9 @@ def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
         return {"parts.irradiance": made}
 
     interleaved = (
-        Decoy("the factor n^2 is missing", lambda a, r: run(a, r, 1), "E-VAL-13"),
-        Decoy("the factor is n", lambda a, r: run(a, r, block), "E-VAL-13"),
-        Decoy("pixels count rows and columns the other way round", reading(
+        Bug("the factor n^2 is missing", lambda a, r: run(a, r, 1), "E-VAL-13"),
+        Bug("the factor is n", lambda a, r: run(a, r, block), "E-VAL-13"),
+        Bug("pixels count rows and columns the other way round", reading(
             run, interleaving__subset=lambda a: a % block * block + a // block), "(row mod n) n + column mod n"),
     ) if own else ()
     recipe.facts["pairs.clamp"] = "none" if pairs.clamp is None else pairs.clamp.name()
@@ -162,13 +162,13 @@ def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
         (*RECEIVERS, *lights, "clusters.of", "clusters.center", *own, *area),
         {"parts.irradiance": Spec("area light, rgb, row, column", "W/m^2", "irradiance of the cluster's lights",
                                   "linear RGB", EQ2)},
-        paper="VAL Sec. 4, E-VAL-01, E-VAL-13", exact=("gbuffer.position", "lights.position"), decoys=(
+        paper="VAL Sec. 4, E-VAL-01, E-VAL-13", exact=("gbuffer.position", "lights.position"), bugs=(
             *interleaved,
-            Decoy("Phi in place of Phi / pi", writing(run, parts__irradiance=lambda a: a * np.pi), "E-VAL-01"),
-            Decoy("every light has its cluster's normal", _with_one_normal(run), "VAL Sec. 4: V alone is shared"),
-            Decoy("clusters are shifted by one", reading(
+            Bug("Phi in place of Phi / pi", writing(run, parts__irradiance=lambda a: a * np.pi), "E-VAL-01"),
+            Bug("every light has its cluster's normal", _with_one_normal(run), "VAL Sec. 4: V alone is shared"),
+            Bug("clusters are shifted by one", reading(
                 run, clusters__of=lambda a: (a + 1) % (int(a.max()) + 1)), "C(i)"),
-            Decoy("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), EQ2)))
+            Bug("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), EQ2)))
 
 
 def _receivers(arrays: Arrays, real: Any) -> Receivers:
@@ -201,25 +201,25 @@ def _add_blur(recipe: Recipe, settings: BoxBlur | GeometryBlur, block: int) -> N
         return lambda arrays, real: run(arrays, real, replaced(settings, how))
 
     geometry = (
-        Decoy("pixels of other surfaces count", lambda a, r: run(a, r, BoxBlur()), BLUR),
-        Decoy("normals are not compared", other(cosine=-1.0), BLUR),
-        Decoy("distances are not compared", other(extent=10.0), BLUR),
-        Decoy("the least cosine is 0.5", other(cosine=0.5), BLUR),
-        Decoy("the extent counts across, not around", other(extent=settings.extent / 2), BLUR),
-        Decoy("subsets that an edge cuts off are " + ("left out" if settings.every_subset else "replaced"),
-              other(every_subset=not settings.every_subset), BLUR),
+        Bug("pixels of other surfaces count", lambda a, r: run(a, r, BoxBlur()), BLUR),
+        Bug("normals are not compared", other(cosine=-1.0), BLUR),
+        Bug("distances are not compared", other(extent=10.0), BLUR),
+        Bug("the least cosine is 0.5", other(cosine=0.5), BLUR),
+        Bug("the extent counts across, not around", other(extent=settings.extent / 2), BLUR),
+        Bug("subsets that an edge cuts off are " + ("left out" if settings.every_subset else "replaced"),
+            other(every_subset=not settings.every_subset), BLUR),
     ) if isinstance(settings, GeometryBlur) else ()
     recipe.facts["blur"] = {"n": block, "window": "x - n // 2 on, moved inwards at the rim"} | (
         {"extent, of the visible box's diagonal": settings.extent, "least cosine": settings.cosine,
          "every subset": settings.every_subset} if isinstance(settings, GeometryBlur) else {})
     recipe.add("blur", "mean over n x n pixels of the same surface, each subset once", run, reads,
                {"blur.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB")},
-               paper=BLUR, exact=("gbuffer.position", "gbuffer.normal"), decoys=(
+               paper=BLUR, exact=("gbuffer.position", "gbuffer.normal"), bugs=(
                    *geometry,
-                   Decoy("nothing is blurred", lambda a, r: {"blur.irradiance": a["sum.irradiance"]}, BLUR),  # noqa: ARG005
-                   Decoy("the window is a pixel wider", lambda a, r: run(a, r, size=block + 1), BLUR),
-                   *((Decoy("the window starts at x - (n - 1) // 2", turned, BLUR),) if block % 2 == 0 else ()),
-                   Decoy("edges of the picture repeat in place of a moved window", _clamped(run, block), BLUR)))
+                   Bug("nothing is blurred", lambda a, r: {"blur.irradiance": a["sum.irradiance"]}, BLUR),  # noqa: ARG005
+                   Bug("the window is a pixel wider", lambda a, r: run(a, r, size=block + 1), BLUR),
+                   *((Bug("the window starts at x - (n - 1) // 2", turned, BLUR),) if block % 2 == 0 else ()),
+                   Bug("edges of the picture repeat in place of a moved window", _clamped(run, block), BLUR)))
 
 
 def _clamped(run: Any, block: int) -> Any:

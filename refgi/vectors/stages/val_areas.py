@@ -10,7 +10,7 @@ from refgi.cluster.settings import AreaLightSettings
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Arrays, Decoy, Spec
+from refgi.vectors.spec import Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.val_clusters import LIGHTS
 
@@ -36,23 +36,23 @@ def add_areas(recipe: Recipe, settings: AreaLightSettings) -> None:
                    "areas.radius": Spec("cluster", "m", "from the centre to its farthest light"),
                    "areas.members": Spec("cluster", "1", "how many lights it has", tier="T0")},
                paper="VAL Sec. 6, E-VAL-10", exact=(LIGHTS[0], "clusters.center"),
-               decoys=_area_decoys(run, settings))
+               bugs=_area_bugs(run, settings))
 
 
-def _area_decoys(run: Any, settings: AreaLightSettings) -> tuple[Decoy, ...]:
+def _area_bugs(run: Any, settings: AreaLightSettings) -> tuple[Bug, ...]:
     other = "longer" if settings.extent == "root" else "root"
     turned = "min_area" if settings.axes == "fixed" else "fixed"
     return (
-        Decoy(f"Delta is another size of the rectangle: {other}", lambda a, r: run(a, r, extent=other), "E-VAL-10"),
-        Decoy(f"the axes are others: {turned}", lambda a, r: run(a, r, axes=turned), "E-VAL-10"),
-        Decoy("the area is " + ("not " if settings.unbiased_area else "") + "corrected for the sample",
-              lambda a, r: run(a, r, unbiased_area=not settings.unbiased_area), "E-VAL-10"),
-        Decoy("Delta is half of the size", writing(run, areas__delta=lambda a: a / 2), "sides, not half sides"),
-        Decoy("the rectangle lies around the centre", writing(run, areas__offset=np.zeros_like), "VAL Sec. 6"),
-        Decoy("the map's second axis is up", writing(run, areas__frame=lambda a: a * ((1,), (-1,), (1,))),
-              "rows run downwards"),
-        Decoy("frames are transposed", writing(run, areas__frame=lambda a: a.transpose(0, 2, 1)), "rows are the axes"),
-        Decoy("the map looks into the surface", reading(run, clusters__normal=lambda a: -a), "along the normal"))
+        Bug(f"Delta is another size of the rectangle: {other}", lambda a, r: run(a, r, extent=other), "E-VAL-10"),
+        Bug(f"the axes are others: {turned}", lambda a, r: run(a, r, axes=turned), "E-VAL-10"),
+        Bug("the area is " + ("not " if settings.unbiased_area else "") + "corrected for the sample",
+            lambda a, r: run(a, r, unbiased_area=not settings.unbiased_area), "E-VAL-10"),
+        Bug("Delta is half of the size", writing(run, areas__delta=lambda a: a / 2), "sides, not half sides"),
+        Bug("the rectangle lies around the centre", writing(run, areas__offset=np.zeros_like), "VAL Sec. 6"),
+        Bug("the map's second axis is up", writing(run, areas__frame=lambda a: a * ((1,), (-1,), (1,))),
+            "rows run downwards"),
+        Bug("frames are transposed", writing(run, areas__frame=lambda a: a.transpose(0, 2, 1)), "rows are the axes"),
+        Bug("the map looks into the surface", reading(run, clusters__normal=lambda a: -a), "along the normal"))
 
 
 def _areas(arrays: Arrays, settings: AreaLightSettings) -> AreaLights:

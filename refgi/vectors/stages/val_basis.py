@@ -16,7 +16,7 @@ from refgi.cluster.filters.pyramid import Mip, level_offsets, mip_of, mips
 from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.series import frequencies
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.val_maps import SHEET
 from refgi.vectors.stages.val_series import SCALE, add_scale, add_series, scale_at
 
@@ -50,12 +50,12 @@ def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
     recipe.add("maps.t", "depths of the series: log2(z / origin) slope, 0 to the range" + (
         "; beyond the disc the texel at (s, t) / (s^2 + t^2)" if mirrored else ""), run, ("maps.depth", *SCALE),
         {"maps.t": Spec(SHEET, "1", "depth; the range where nothing is; 0 on empty maps", paper="E-VAL-05")},
-        paper="E-VAL-05", exact=("maps.depth",), decoys=(
-            Decoy("natural logarithms", natural, "log2"),
-            Decoy("texels without surface are at depth 1", writing(run, maps__t=_empty_at_1), "E-VAL-05: wrap-around"),
-            Decoy("depths are not cut at the range", reading(run, series__range=lambda a: a * 2), "E-VAL-05"),
-            *((Decoy("the square beyond the disc holds nothing", lambda a, r: run(a, r, mirror=False),
-                     "docs/methods/val_visibility"),) if mirrored else ())))
+        paper="E-VAL-05", exact=("maps.depth",), bugs=(
+            Bug("natural logarithms", natural, "log2"),
+            Bug("texels without surface are at depth 1", writing(run, maps__t=_empty_at_1), "E-VAL-05: wrap-around"),
+            Bug("depths are not cut at the range", reading(run, series__range=lambda a: a * 2), "E-VAL-05"),
+            *((Bug("the square beyond the disc holds nothing", lambda a, r: run(a, r, mirror=False),
+                   "docs/methods/val_visibility"),) if mirrored else ())))
 
 
 def _empty_at_1(t: Array) -> Array:
@@ -86,15 +86,15 @@ def _add_level_0(recipe: Recipe, csm: Csm) -> None:
     k, right = np.arange(1, csm.terms + 1), frequencies(csm.terms)
     recipe.add("basis", "sines and cosines of each texel's depth, and the same times the depth", run, ("maps.t",), {
         "basis.0": Spec(CHANNELS, "1", "S_1.., C_1.., t S_1.., t C_1.., t; 0 on empty maps", paper="E-VAL-02")},
-        paper="VAL Sec. 4.1, E-VAL-02", exact=("maps.t",), variants=(literal(right),), decoys=(
-            Decoy("c_k = k pi", literal(k * np.pi), "c_k = (2k - 1) pi"),
-            Decoy("c_k = 2 k pi", literal(2 * k * np.pi), "c_k = (2k - 1) pi"),
-            Decoy("c_k = (2k + 1) pi", literal(right + 2 * np.pi), "k from 1 on"),
-            Decoy("sines and cosines are not weighed by the depth", literal(right, weigh=False), "E-VAL-02"),
-            Decoy("sines and cosines are exchanged", writing(run, basis__0=_exchanged), "E-VAL-02"),
-            Decoy("sines and cosines take turns", writing(run, basis__0=_in_turns), "order of channels"),
-            Decoy("the mean depth itself is left out",
-                  writing(run, basis__0=lambda a: np.concatenate([a[:, :-1], 0 * a[:, -1:]], axis=1)), "E-VAL-02: Z")))
+        paper="VAL Sec. 4.1, E-VAL-02", exact=("maps.t",), variants=(literal(right),), bugs=(
+            Bug("c_k = k pi", literal(k * np.pi), "c_k = (2k - 1) pi"),
+            Bug("c_k = 2 k pi", literal(2 * k * np.pi), "c_k = (2k - 1) pi"),
+            Bug("c_k = (2k + 1) pi", literal(right + 2 * np.pi), "k from 1 on"),
+            Bug("sines and cosines are not weighed by the depth", literal(right, weigh=False), "E-VAL-02"),
+            Bug("sines and cosines are exchanged", writing(run, basis__0=_exchanged), "E-VAL-02"),
+            Bug("sines and cosines take turns", writing(run, basis__0=_in_turns), "order of channels"),
+            Bug("the mean depth itself is left out",
+                writing(run, basis__0=lambda a: np.concatenate([a[:, :-1], 0 * a[:, -1:]], axis=1)), "E-VAL-02: Z")))
 
 
 def _exchanged(basis: Array) -> Array:
@@ -138,15 +138,15 @@ def _add_levels(recipe: Recipe, terms: int) -> None:
     recipe.add("mip", "each level halves the one before by means of 2 x 2 texels; of an odd side the last counts twice",
                run, ("basis.0",), {name: Spec(CHANNELS, "1", f"means over {2**level} x {2**level} texels")
                                    for level, name in enumerate(names, 1)},
-               paper="VAL Sec. 6", decoys=(
-                   Decoy("one texel of four", chained(lambda a: a[:, :, ::2, ::2]), "means"),
-                   Decoy("sums of four texels", chained(lambda a: 4 * _mean_of_four(a, "edge")), "means"),
-                   Decoy("beyond an odd side is 0", chained(lambda a: _mean_of_four(a, "constant")), "docs/methods"),
-                   Decoy("columns are halved alone, then rows shifted", chained(
+               paper="VAL Sec. 6", bugs=(
+                   Bug("one texel of four", chained(lambda a: a[:, :, ::2, ::2]), "means"),
+                   Bug("sums of four texels", chained(lambda a: 4 * _mean_of_four(a, "edge")), "means"),
+                   Bug("beyond an odd side is 0", chained(lambda a: _mean_of_four(a, "constant")), "docs/methods"),
+                   Bug("columns are halved alone, then rows shifted", chained(
                        lambda a: _mean_of_four(np.roll(a, -1, axis=2), "edge")), "texels 2 i and 2 i + 1"),
-                   Decoy("the depth is that of the nearest texel, not the mean",
-                         chained(lambda a: np.concatenate([_mean_of_four(a, "edge")[:, :-1], _least_of_four(a)], 1)),
-                         "E-VAL-02: Z = w * z")))
+                   Bug("the depth is that of the nearest texel, not the mean",
+                       chained(lambda a: np.concatenate([_mean_of_four(a, "edge")[:, :-1], _least_of_four(a)], 1)),
+                       "E-VAL-02: Z = w * z")))
 
 
 def _halved(level: Array, terms: int) -> Array:

@@ -9,7 +9,7 @@ from refgi.cluster.settings import Clusters, ValSettings
 from refgi.rsm.buffers.extent import Extent, bounds_of
 from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR
 
 ROUNDS = 2  # of k-means that a case shows one by one
@@ -39,10 +39,10 @@ def add_extents(recipe: Recipe, maps: int) -> None:
                                                              ("position", "flux")), *lobes),
                {"extents.visible": Spec(box, "m", "box of the pixels' surface points", "world"),
                 "extents.illuminated": Spec(box, "m", "box of the texels with flux, of all lamps", "world")},
-               paper="docs/methods/val", decoys=(
-                   Decoy("texels without flux count", lambda a, r: run(a, r, dark=True), "what reflects direct light"),
-                   Decoy("pixels without surface count, at the origin", lambda a, r: run(a, r, empty=True), ""),
-                   Decoy("the first lamp's map alone", lambda a, r: run(a, r, first=True), "all lamps")))
+               paper="docs/methods/val", bugs=(
+                   Bug("texels without flux count", lambda a, r: run(a, r, dark=True), "what reflects direct light"),
+                   Bug("pixels without surface count, at the origin", lambda a, r: run(a, r, empty=True), ""),
+                   Bug("the first lamp's map alone", lambda a, r: run(a, r, first=True), "all lamps")))
 
 
 def extent_of(arrays: Arrays, *names: str) -> Extent:
@@ -80,9 +80,9 @@ def add_kmeans(recipe: Recipe, settings: Clusters, total: int) -> None:
 
     recipe.add("kmeans", "further rounds until no light changes its cluster", run,
                (*LIGHTS, "extents.illuminated", *last), _clusters(), paper="VAL Sec. 5.1; A.6 P5",
-               exact=(*LIGHTS, *last), decoys=(
-                   Decoy("no rounds beyond those shown", stopped, "until assignments repeat"),
-                   Decoy("normals do not count", lambda a, r: run(a, r, normal_weight=0.0), METRIC)))
+               exact=(*LIGHTS, *last), bugs=(
+                   Bug("no rounds beyond those shown", stopped, "until assignments repeat"),
+                   Bug("normals do not count", lambda a, r: run(a, r, normal_weight=0.0), METRIC)))
 
 
 def _add_each(recipe: Recipe) -> None:
@@ -92,11 +92,11 @@ def _add_each(recipe: Recipe) -> None:
         return {"clusters.center": made.center, "clusters.normal": made.normal, "clusters.of": made.of}
 
     recipe.add("kmeans", "as many clusters as lights: each light is one, coincident lights too", run, LIGHTS,
-               _clusters(), paper="VAL Sec. 5.1", decoys=(
-                   Decoy("coincident lights join the first of their clusters", writing(run, clusters__of=_all_first),
-                         "M = N: hard shadows of each light"),
-                   Decoy("the clusters are in reverse order",
-                         writing(run, clusters__of=lambda a: a[::-1]), "cluster k begins at light floor(k N / M)")))
+               _clusters(), paper="VAL Sec. 5.1", bugs=(
+                   Bug("coincident lights join the first of their clusters", writing(run, clusters__of=_all_first),
+                       "M = N: hard shadows of each light"),
+                   Bug("the clusters are in reverse order",
+                       writing(run, clusters__of=lambda a: a[::-1]), "cluster k begins at light floor(k N / M)")))
 
 
 def _all_first(of: Array) -> Array:
@@ -119,12 +119,12 @@ def _add_start(recipe: Recipe, count: int, total: int) -> None:
                 zip(("center", "normal"), LIGHTS, strict=True)}
 
     recipe.add("kmeans.start", "cluster k begins at light floor(k N / M)", run, LIGHTS, _centers(0),
-               paper="VAL Sec. 5.1; A.6 P5", exact=LIGHTS, decoys=(
-                   Decoy("clusters begin at the first M lights", lambda a, r: run(a, r, lambda _, m: np.arange(m)),
-                         "floor(k N / M)"),
-                   Decoy("k N / M is rounded instead of cut", lambda a, r: run(
+               paper="VAL Sec. 5.1; A.6 P5", exact=LIGHTS, bugs=(
+                   Bug("clusters begin at the first M lights", lambda a, r: run(a, r, lambda _, m: np.arange(m)),
+                       "floor(k N / M)"),
+                   Bug("k N / M is rounded instead of cut", lambda a, r: run(
                        a, r, lambda n, m: (np.arange(m) * n + m // 2) // m), "floor(k N / M)"),
-                   Decoy("clusters begin in the middle of their run", lambda a, r: run(
+                   Bug("clusters begin in the middle of their run", lambda a, r: run(
                        a, r, lambda n, m: (2 * np.arange(m) + 1) * n // (2 * m)), "floor(k N / M)")))
 
 
@@ -157,23 +157,23 @@ def _add_assignment(recipe: Recipe, settings: Clusters, number: int) -> None:
                (*LIGHTS, "extents.illuminated", center, normal),
                {f"kmeans.of{number}": Spec("light", "1", "nearest cluster", tier="T0"),
                 f"kmeans.distance{number}": Spec("light", "1", "its distance", paper=METRIC)},
-               paper=METRIC, exact=(*LIGHTS, center, normal), decoys=(
-                   Decoy("the highest index of equally near ones", lambda a, r: run(a, r, last=True), "A.6 P5"),
-                   Decoy("1 - cosine in place of the angle over pi", lambda a, r: run(a, r, cosine=True), METRIC),
-                   *_metric_decoys(run, settings)))
+               paper=METRIC, exact=(*LIGHTS, center, normal), bugs=(
+                   Bug("the highest index of equally near ones", lambda a, r: run(a, r, last=True), "A.6 P5"),
+                   Bug("1 - cosine in place of the angle over pi", lambda a, r: run(a, r, cosine=True), METRIC),
+                   *_metric_bugs(run, settings)))
 
 
-def _metric_decoys(run: Any, settings: Clusters) -> tuple[Decoy, ...]:
+def _metric_bugs(run: Any, settings: Clusters) -> tuple[Bug, ...]:
     forms = {"raw": "metres and radians are weighed, not shares of the diagonal and of pi", "squared": "squares",
              "normalised": "shares of the diagonal and of pi"}
 
     def other(**how: Any) -> Run:
         return lambda arrays, real: run(arrays, real, **how)
 
-    return (*(Decoy(f"distances are others: {what}", other(distance=kind), METRIC) for kind, what in forms.items()
+    return (*(Bug(f"distances are others: {what}", other(distance=kind), METRIC) for kind, what in forms.items()
               if kind != settings.distance),
-            Decoy("normals do not count", other(normal_weight=0.0), METRIC),
-            Decoy("the weights are exchanged", other(position_weight=0.3, normal_weight=0.7), METRIC))
+            Bug("normals do not count", other(normal_weight=0.0), METRIC),
+            Bug("the weights are exchanged", other(position_weight=0.3, normal_weight=0.7), METRIC))
 
 
 def _add_means(recipe: Recipe, number: int) -> None:
@@ -196,10 +196,10 @@ def _add_means(recipe: Recipe, number: int) -> None:
         return made
 
     recipe.add(f"kmeans.means{number + 1}", "means of each cluster's lights; without lights a cluster stays", run,
-               (*LIGHTS, of, *before), _centers(number + 1), paper="VAL Sec. 5.1; A.6 P5", exact=before, decoys=(
-                   Decoy("clusters without lights go to the origin", empty_at_origin, "they keep their values"),
-                   Decoy("mean normals are not of unit length", not_unit, "E-VAL-11"),
-                   Decoy("normals stay as they were", lambda a, r: {**run(a, r), after[1]: a[before[1]]}, "E-VAL-11")))
+               (*LIGHTS, of, *before), _centers(number + 1), paper="VAL Sec. 5.1; A.6 P5", exact=before, bugs=(
+                   Bug("clusters without lights go to the origin", empty_at_origin, "they keep their values"),
+                   Bug("mean normals are not of unit length", not_unit, "E-VAL-11"),
+                   Bug("normals stay as they were", lambda a, r: {**run(a, r), after[1]: a[before[1]]}, "E-VAL-11")))
 
 
 def clusters_of(settings: ValSettings) -> Clusters:

@@ -14,7 +14,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.scene import Geometry
 from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import SCENE
 from refgi.vectors.stages.val_clusters import extent_of
 
@@ -36,11 +36,11 @@ def add_maps(recipe: Recipe, settings: ValSettings) -> None:
     recipe.add("maps.range", "nearest and farthest distance on each map", run, ("maps.depth",), {
         "maps.near": Spec("area light", "m", "least distance; inf on an empty map"),
         "maps.far": Spec("area light", "m", "greatest finite distance; 0 on an empty map")},
-        paper="E-VAL-05", decoys=(
-            Decoy("texels without surface count as the farthest",
-                  writing(run, maps__far=lambda a: np.full_like(a, 1e4)), "E-VAL-05"),
-            Decoy("the nearest of all maps counts for each",
-                  writing(run, maps__near=lambda a: np.full_like(a, a.min())), "E-VAL-05: each map")))
+        paper="E-VAL-05", bugs=(
+            Bug("texels without surface count as the farthest",
+                writing(run, maps__far=lambda a: np.full_like(a, 1e4)), "E-VAL-05"),
+            Bug("the nearest of all maps counts for each",
+                writing(run, maps__near=lambda a: np.full_like(a, a.min())), "E-VAL-05: each map")))
 
 
 def _add_views(recipe: Recipe, settings: ValSettings) -> None:
@@ -59,12 +59,12 @@ def _add_views(recipe: Recipe, settings: ValSettings) -> None:
                {"maps.center": Spec("area light, xyz", "m", "centre of the map, a little off the surface", "world"),
                 "maps.ball": Spec("area light", "m", "what is nearer to the centre blocks nothing"),
                 "maps.scene_far": Spec("area light", "m", "to the farthest corner of the extents' common box")},
-               paper="VAL Sec. 5.1, E-VAL-12", decoys=(
-                   Decoy("the centre is not lifted off the surface",
-                         lambda a, r: {**run(a, r), "maps.center": a["clusters.center"].T}, "docs/methods/val"),
-                   Decoy("the ball has the cluster's radius", lambda a, r: run(a, r, 1.0), "a share of the radius"),
-                   Decoy("nothing is left out near the centre", lambda a, r: run(a, r, 0.0), "E-VAL-12"),
-                   Decoy("centres are lifted into the surface", reading(run, clusters__normal=lambda a: -a), "")))
+               paper="VAL Sec. 5.1, E-VAL-12", bugs=(
+                   Bug("the centre is not lifted off the surface",
+                       lambda a, r: {**run(a, r), "maps.center": a["clusters.center"].T}, "docs/methods/val"),
+                   Bug("the ball has the cluster's radius", lambda a, r: run(a, r, 1.0), "a share of the radius"),
+                   Bug("nothing is left out near the centre", lambda a, r: run(a, r, 0.0), "E-VAL-12"),
+                   Bug("centres are lifted into the surface", reading(run, clusters__normal=lambda a: -a), "")))
 
 
 def _add_blockers(recipe: Recipe, settings: ValSettings) -> None:
@@ -83,10 +83,10 @@ def _add_blockers(recipe: Recipe, settings: ValSettings) -> None:
     recipe.add("maps.blockers", "triangles with ends of light, seen vertices and pixel lights, on both sides", run,
                ("scene.vertices", "scene.faces", "gbuffer.triangle_id", "lights.position", *EXTENTS),
                {"maps.blocks": Spec("triangle", "1", "whether it may lie between a light and a receiver", tier="T0")},
-               paper="docs/methods/val_visibility", decoys=(
-                   Decoy("all triangles block", writing(run, maps__blocks=np.ones_like), "walls of a room do not"),
-                   Decoy("pixel lights do not count as ends", lambda a, r: run(a, r, lights=False), ""),
-                   Decoy("triangles on the hull block too", lambda a, r: run(a, r, touching=True), "")))
+               paper="docs/methods/val_visibility", bugs=(
+                   Bug("all triangles block", writing(run, maps__blocks=np.ones_like), "walls of a room do not"),
+                   Bug("pixel lights do not count as ends", lambda a, r: run(a, r, lights=False), ""),
+                   Bug("triangles on the hull block too", lambda a, r: run(a, r, touching=True), "")))
 
 
 def _add_depth(recipe: Recipe, settings: ValSettings) -> None:
@@ -109,17 +109,17 @@ def _add_depth(recipe: Recipe, settings: ValSettings) -> None:
                {"maps.depth": Spec(SHEET, "m", "distance along the texel's direction (2s, 2t, 1 - q) / (1 + q), "
                                    "q = s^2 + t^2; inf without blocker, outside the disc, without lights",
                                    paper="VAL Sec. 4.2, E-VAL-06")},
-               paper="VAL Sec. 4.2, E-VAL-06, E-VAL-12", exact=("scene.vertices", *VIEW), decoys=(
-                   Decoy("rows run upwards", writing(run, maps__depth=lambda a: a[:, ::-1]), "right, down, forward"),
-                   Decoy("rows and columns are exchanged", writing(run, maps__depth=lambda a: a.swapaxes(1, 2)), ""),
-                   Decoy("texel centres lie at 0 instead of 1/2", moved, "centres at + 1/2"),
-                   Decoy("depth along the axis, not distance", writing(run, maps__depth=_axial), "E-VAL-06"),
-                   Decoy("directions are linear in the angle", writing(run, maps__depth=_equiangular),
-                         "s = x / (1 + z), VAL-11"),
-                   Decoy("surfaces near the centre block", reading(run, maps__ball=np.zeros_like), "E-VAL-12"),
-                   Decoy("triangles are left out whole where they reach into the ball",
-                         lambda a, r: run(a, r, near_geometry="planes"), "E-VAL-12"),
-                   Decoy("the map of a cluster behind its plane", reading(run, areas__frame=lambda a: a * (
+               paper="VAL Sec. 4.2, E-VAL-06, E-VAL-12", exact=("scene.vertices", *VIEW), bugs=(
+                   Bug("rows run upwards", writing(run, maps__depth=lambda a: a[:, ::-1]), "right, down, forward"),
+                   Bug("rows and columns are exchanged", writing(run, maps__depth=lambda a: a.swapaxes(1, 2)), ""),
+                   Bug("texel centres lie at 0 instead of 1/2", moved, "centres at + 1/2"),
+                   Bug("depth along the axis, not distance", writing(run, maps__depth=_axial), "E-VAL-06"),
+                   Bug("directions are linear in the angle", writing(run, maps__depth=_equiangular),
+                       "s = x / (1 + z), VAL-11"),
+                   Bug("surfaces near the centre block", reading(run, maps__ball=np.zeros_like), "E-VAL-12"),
+                   Bug("triangles are left out whole where they reach into the ball",
+                       lambda a, r: run(a, r, near_geometry="planes"), "E-VAL-12"),
+                   Bug("the map of a cluster behind its plane", reading(run, areas__frame=lambda a: a * (
                        (-1,), (1,), (-1,))), "forward is the normal")))
 
 

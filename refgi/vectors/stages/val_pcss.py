@@ -11,8 +11,8 @@ from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, filter_texel
 from refgi.cluster.visibility.search_region import RADIUS, S, filter_sizing
 from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run
-from refgi.vectors.stages.val_decoys import dark_where_1, local_of, scaled, size_decoys
+from refgi.vectors.spec import Array, Arrays, Bug, Run
+from refgi.vectors.stages.val_bugs import dark_where_1, local_of, scaled, size_bugs
 from refgi.vectors.stages.val_maps import shadow_maps_of
 from refgi.vectors.stages.val_search import (
     FACING,
@@ -52,7 +52,7 @@ def add_pcss(recipe: Recipe, settings: ValSettings, pcss: Pcss) -> None:
     recipe.add("penumbra", "mean depth of the texels in the search disc that lie before the pixel's plane and within "
                "the cone from it to the light, and the disc of the penumbra", penumbra,
                (*PIXELS, *LIGHT, *own, "search.pending", "search.region"), penumbra_specs(),
-               paper="A.6 P4, E-VAL-14", decoys=_blocker_decoys(penumbra, settings, pcss))
+               paper="A.6 P4, E-VAL-14", bugs=_blocker_bugs(penumbra, settings, pcss))
     hard = ("hard.share",) if "hard.share" in recipe.specs else ()
 
     def share(arrays: Arrays, real: Any, kind: Pcss = pcss) -> Arrays:
@@ -68,7 +68,7 @@ def add_pcss(recipe: Recipe, settings: ValSettings, pcss: Pcss) -> None:
 
     recipe.add("visibility", "V: share of the texels of the penumbra's disc that do not hide the pixel, where shaded",
                share, (*PIXELS, *LIGHT, *own, "penumbra.shaded", "penumbra.region", *hard),
-               {"visibility.share": share_spec()}, paper="A.6 P4, E-VAL-14", decoys=_counted_decoys(share, pcss))
+               {"visibility.share": share_spec()}, paper="A.6 P4, E-VAL-14", bugs=_counted_bugs(share, pcss))
 
 
 def add_binary(recipe: Recipe, name: str, texels: int) -> None:
@@ -89,19 +89,19 @@ def add_binary(recipe: Recipe, name: str, texels: int) -> None:
     recipe.add(name, "V by one depth test, of area lights without extent; 1 elsewhere" if name == "hard" else
                f"V: share of {texels} x {texels} texels that do not hide the pixel; of one for lights without extent",
                run, (*PIXELS, FACING, "maps.depth", *LIGHT), {f"{name}.share": share_spec()},
-               paper="VAL-03; A.6 P4: receiver's plane, E-VAL-14", decoys=_binary_decoys(run, name, texels))
+               paper="VAL-03; A.6 P4: receiver's plane, E-VAL-14", bugs=_binary_bugs(run, name, texels))
 
 
-def _blocker_decoys(run: Any, settings: ValSettings, pcss: Pcss) -> tuple[Decoy, ...]:
+def _blocker_bugs(run: Any, settings: ValSettings, pcss: Pcss) -> tuple[Bug, ...]:
     """Return likely bugs of the mean depth of blockers and of the penumbra's disc, by depth tests."""
     return (
-        Decoy("depths are compared with the pixel's distance, not with its plane", _with(run, settings, _plain(pcss)),
-              "E-VAL-14"),
-        Decoy("blockers outside the cone to the light count", _with(run, settings, replaced(pcss, {"cone": False})),
-              "E-VAL-14"),
-        Decoy("normals point inwards within the map", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
-        Decoy("z_avg is the nearest distance", writing(run, penumbra__z_avg=_least), "the mean"),
-        *size_decoys(run, settings))
+        Bug("depths are compared with the pixel's distance, not with its plane", _with(run, settings, _plain(pcss)),
+            "E-VAL-14"),
+        Bug("blockers outside the cone to the light count", _with(run, settings, replaced(pcss, {"cone": False})),
+            "E-VAL-14"),
+        Bug("normals point inwards within the map", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
+        Bug("z_avg is the nearest distance", writing(run, penumbra__z_avg=_least), "the mean"),
+        *size_bugs(run, settings))
 
 
 def _with(run: Any, *how: Any) -> Run:
@@ -117,31 +117,31 @@ def _least(z_avg: Array) -> Array:
     return np.where(z_avg > 0, least, 0)
 
 
-def _counted_decoys(run: Any, pcss: Pcss) -> tuple[Decoy, ...]:
+def _counted_bugs(run: Any, pcss: Pcss) -> tuple[Bug, ...]:
     """Return likely bugs of V by depth tests of a disc."""
     return (
-        Decoy("depths are compared with the pixel's distance, not with its plane", _with(run, _plain(pcss)),
-              "E-VAL-14"),
-        Decoy("V is the hidden share", writing(run, visibility__share=lambda a: 1 - a), "V = 1 - blocked / tested"),
-        Decoy("V of one test: hidden or not", writing(run, visibility__share=np.floor), "a share"),
-        Decoy("one texel alone", reading(run, penumbra__region=scaled(0.0)), "all texels of the disc"),
-        Decoy("half of the disc's radius", reading(run, penumbra__region=scaled(0.5)), "radius, not diameter"),
-        Decoy("rows run upwards", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
-        Decoy("pixels without blockers are dark", writing(run, visibility__share=dark_where_1), "1"))
+        Bug("depths are compared with the pixel's distance, not with its plane", _with(run, _plain(pcss)),
+            "E-VAL-14"),
+        Bug("V is the hidden share", writing(run, visibility__share=lambda a: 1 - a), "V = 1 - blocked / tested"),
+        Bug("V of one test: hidden or not", writing(run, visibility__share=np.floor), "a share"),
+        Bug("one texel alone", reading(run, penumbra__region=scaled(0.0)), "all texels of the disc"),
+        Bug("half of the disc's radius", reading(run, penumbra__region=scaled(0.5)), "radius, not diameter"),
+        Bug("rows run upwards", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
+        Bug("pixels without blockers are dark", writing(run, visibility__share=dark_where_1), "1"))
 
 
-def _binary_decoys(run: Any, name: str, texels: int) -> tuple[Decoy, ...]:
+def _binary_bugs(run: Any, name: str, texels: int) -> tuple[Bug, ...]:
     """Return likely bugs of depth tests of a square of texels, or of one."""
     facing, share = "gbuffer__facing", f"{name}__share"
     return (
-        Decoy("depths are compared with the pixel's distance, not with its plane",
-              reading(run, **{facing: np.zeros_like}), "E-VAL-14"),
-        Decoy("the kernel is two texels wider" if texels > 1 else "3 x 3 texels in place of one",
-              _with(run, texels + 2), f"{texels} x {texels}"),
-        Decoy("V is the hidden share", writing(run, **{share: lambda a: 1 - a}), "V = 1 - blocked / tested"),
-        Decoy("rows run upwards", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
-        Decoy("a texel too far left", reading(run, maps__depth=lambda a: np.roll(a, 1, axis=2)), "floor(s n)"),
-        Decoy("pixels behind the light's plane are hidden", _hidden_behind(run, name), "E-VAL-12: V = 1"))
+        Bug("depths are compared with the pixel's distance, not with its plane",
+            reading(run, **{facing: np.zeros_like}), "E-VAL-14"),
+        Bug("the kernel is two texels wider" if texels > 1 else "3 x 3 texels in place of one",
+            _with(run, texels + 2), f"{texels} x {texels}"),
+        Bug("V is the hidden share", writing(run, **{share: lambda a: 1 - a}), "V = 1 - blocked / tested"),
+        Bug("rows run upwards", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
+        Bug("a texel too far left", reading(run, maps__depth=lambda a: np.roll(a, 1, axis=2)), "floor(s n)"),
+        Bug("pixels behind the light's plane are hidden", _hidden_behind(run, name), "E-VAL-12: V = 1"))
 
 
 def _hidden_behind(run: Any, name: str) -> Run:

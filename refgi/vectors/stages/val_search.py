@@ -23,7 +23,7 @@ from refgi.cluster.visibility.search_region import (
 from refgi.cluster.visibility.series import Series
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Spec
-from refgi.vectors.stages.val_decoys import search_decoys
+from refgi.vectors.stages.val_bugs import search_bugs
 from refgi.vectors.stages.val_maps import VIEW, shadow_maps_of
 
 PIXELS = ("gbuffer.position", "gbuffer.triangle_id")
@@ -132,4 +132,4 @@ def add_search(recipe: Recipe, settings: ValSettings) -> None:
                    "search.region": REGION,
                    "search.distance": Spec(PLACE, "m", "d, from the map's centre; 0 where not pending")},
                paper="VAL Sec. 4.2, E-VAL-09; disc: E-VAL-08", exact=("maps.center",),
-               decoys=search_decoys(run, settings))
+               bugs=search_bugs(run, settings))

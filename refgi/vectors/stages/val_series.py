@@ -10,7 +10,7 @@ from refgi.cluster.visibility.search_region import scale_of
 from refgi.cluster.visibility.series import series
 from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Arrays, Decoy, Spec
+from refgi.vectors.spec import Arrays, Bug, Spec
 from refgi.vectors.stages.val_maps import shadow_maps_of
 
 SCALE = ("scale.origin", "scale.slope", "series.range")
@@ -30,15 +30,15 @@ def add_series(recipe: Recipe, csm: Csm) -> None:
         "series.weight": Spec("term", "1", "w_k = 2 / c_k, c_k = (2k - 1) pi", paper="E-VAL-02"),
         "series.bias": Spec("(search, comparison)", "1", "b*, where f_M is 1 for the first time", paper="E-VAL-03"),
         "series.range": Spec("one", "1", "1 - 2 b*, the depth of what is farthest", paper="E-VAL-05")},
-        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", decoys=(
-            Decoy("c_k = k pi", writing(run, series__weight=lambda a: 2 / np.pi / np.arange(1, len(a) + 1)),
-                  "E-VAL-02"),
-            Decoy("w_k = 1 / c_k", writing(run, series__weight=lambda a: a / 2), "E-VAL-02"),
-            Decoy("terms are damped more", lambda a, r: run(a, r, replaced(csm, {
+        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", bugs=(
+            Bug("c_k = k pi", writing(run, series__weight=lambda a: 2 / np.pi / np.arange(1, len(a) + 1)),
+                "E-VAL-02"),
+            Bug("w_k = 1 / c_k", writing(run, series__weight=lambda a: a / 2), "E-VAL-02"),
+            Bug("terms are damped more", lambda a, r: run(a, r, replaced(csm, {
                 "attenuation": csm.attenuation + 1.0})), f"A = {csm.attenuation:g}"),
-            Decoy("no bias", writing(run, series__bias=np.zeros_like), "E-VAL-03"),
-            Decoy("depths fill the whole period", writing(run, series__range=np.ones_like), "E-VAL-05"),
-            Decoy("the bias is that of one term less", lambda a, r: {
+            Bug("no bias", writing(run, series__bias=np.zeros_like), "E-VAL-03"),
+            Bug("depths fill the whole period", writing(run, series__range=np.ones_like), "E-VAL-05"),
+            Bug("the bias is that of one term less", lambda a, r: {
                 **run(a, r, replaced(csm, {"terms": csm.terms - 1})), "series.weight": series(csm).weight}, "b*(M)")))
 
 
@@ -63,13 +63,13 @@ def add_scale(recipe: Recipe, csm: Csm) -> None:
                ("maps.near", "maps.far", "maps.scene_far", "series.range"),
                {"scale.origin": Spec("area light", "m", "distance of depth 0; 0 for empty maps"),
                 "scale.slope": Spec("area light", unit, "depths per octave of distance or per metre; 0 on empty maps")},
-               paper="E-VAL-05", decoys=(
-                   *(Decoy(f"depths are {what}", other(kind), "E-VAL-05") for kind, what in forms.items()
+               paper="E-VAL-05", bugs=(
+                   *(Bug(f"depths are {what}", other(kind), "E-VAL-05") for kind, what in forms.items()
                      if kind != csm.depth_scale),
-                   *((Decoy("one scale for all maps", reading(run, **every), "E-VAL-05: what each map holds"),)
+                   *((Bug("one scale for all maps", reading(run, **every), "E-VAL-05: what each map holds"),)
                      if csm.depth_scale != "scene" else ()),
-                   Decoy("the farthest depth is the far end of the range",
-                         writing(run, scale__slope=lambda a: a * _top(csm)), "b* is left behind the farthest blocker")))
+                   Bug("the farthest depth is the far end of the range",
+                       writing(run, scale__slope=lambda a: a * _top(csm)), "b* is left behind the farthest blocker")))
 
 
 def _top(csm: Csm) -> float:

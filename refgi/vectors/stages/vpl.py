@@ -13,10 +13,10 @@ from refgi.pairs.shadow_rays import RayReceivers, add_unoccluded, fill_shadow_ra
 from refgi.rays import Tracer
 from refgi.scene import Geometry, Scene
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
-from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, pair_decoys
+from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, pair_bugs
 
 GEOMETRY = ("scene.vertices", "scene.faces")
 LIGHTS = ("lights.position", "lights.normal")
@@ -54,11 +54,11 @@ def _add_facing(recipe: Recipe, scene: Scene) -> None:
     recipe.add("vpl.facing", "normal of the triangle that each pixel sees", run, (*GEOMETRY, *RECEIVERS), {FACING: Spec(
         "xyz, row, column", VECTOR, "the face's normal, on the side of the pixel's normal; 0 without surface",
         "world")},
-        paper="docs/conventions", exact=(GEOMETRY[0],), decoys=(
-            Decoy("faces are not turned to the side that is seen", wound, "docs/conventions"),
-            Decoy("interpolated normals in place of faces'", lambda a, r: {FACING: np.asarray(a[RECEIVERS[1]], r)},
-                  "rays leave faces"),
-            Decoy("normals are not made unit vectors", writing(run, vpl__facing=lambda a: 0.5 * a), "unit vectors")))
+        paper="docs/conventions", exact=(GEOMETRY[0],), bugs=(
+            Bug("faces are not turned to the side that is seen", wound, "docs/conventions"),
+            Bug("interpolated normals in place of faces'", lambda a, r: {FACING: np.asarray(a[RECEIVERS[1]], r)},
+                "rays leave faces"),
+            Bug("normals are not made unit vectors", writing(run, vpl__facing=lambda a: 0.5 * a), "unit vectors")))
 
 
 def _geometry(arrays: Arrays, scene: Scene) -> Geometry:
@@ -130,20 +130,20 @@ def _add_visible(recipe: Recipe, scene: Scene) -> None:
                (*GEOMETRY, *RECEIVERS, FACING, *LIGHTS), {VISIBLE: Spec(
                    "light, row, column", "1", "true where the normals of light and pixel and the pixel's face look at "
                    "the other, whatever the lobe, and nothing lies "
-                   "between", tier="T0")}, paper="SII Eq. 2 with V", decoys=(
-                   Decoy("the ray goes on behind the light", traced(lambda rays: rays.visible(rays.reach * 1e4)), "V"),
-                   Decoy("rays start on the surface without any lift", traced(from_points), "ends are lifted"),
-                   Decoy("rays start below the surface", lambda a, r: run(a, r, -LIFT), "lifted to the lit side"),
-                   Decoy("ends are lifted by 5 cm: light leaks", lambda a, r: run(a, r, LEAK), "a thousandth at most"),
-                   Decoy("nothing blocks", traced(lambda rays: rays.visible(np.where(rays.reach > 0, 1e-9, 0).astype(
+                   "between", tier="T0")}, paper="SII Eq. 2 with V", bugs=(
+                   Bug("the ray goes on behind the light", traced(lambda rays: rays.visible(rays.reach * 1e4)), "V"),
+                   Bug("rays start on the surface without any lift", traced(from_points), "ends are lifted"),
+                   Bug("rays start below the surface", lambda a, r: run(a, r, -LIFT), "lifted to the lit side"),
+                   Bug("ends are lifted by 5 cm: light leaks", lambda a, r: run(a, r, LEAK), "a thousandth at most"),
+                   Bug("nothing blocks", traced(lambda rays: rays.visible(np.where(rays.reach > 0, 1e-9, 0).astype(
                        np.float32))), "V"),
-                   Decoy("visibility is inverted", writing(run, vpl__visible=np.logical_not), "V = 1: nothing between"),
-                   Decoy("pairs that face away count as visible", traced(lambda rays: rays.visible(np.ones_like(
+                   Bug("visibility is inverted", writing(run, vpl__visible=np.logical_not), "V = 1: nothing between"),
+                   Bug("pairs that face away count as visible", traced(lambda rays: rays.visible(np.ones_like(
                        rays.reach)) | ~_sends(rays)), "facing each other"),
-                   Decoy("lights are in reverse order", writing(run, vpl__visible=lambda a: a[::-1]),
-                         "light, row, column"),
-                   Decoy("the last two triangles are left out", fewer, "all triangles"),
-                   Decoy("rays end halfway", traced(lambda rays: rays.visible(0.5 * rays.reach)), "V")))
+                   Bug("lights are in reverse order", writing(run, vpl__visible=lambda a: a[::-1]),
+                       "light, row, column"),
+                   Bug("the last two triangles are left out", fewer, "all triangles"),
+                   Bug("rays end halfway", traced(lambda rays: rays.visible(0.5 * rays.reach)), "V")))
 
 
 def _sends(rays: _Rays) -> Array:
@@ -191,18 +191,18 @@ def _add_sum(recipe: Recipe) -> None:
 
         return altered
 
-    bugs = [one for one in pair_decoys(unshadowed, False, "lights.lobe_flux" in recipe.specs)
+    bugs = [one for one in pair_bugs(unshadowed, False, "lights.lobe_flux" in recipe.specs)
             if not any(word in one.cause for word in SHADOWED)]
     recipe.add("vpl.sum", "irradiance of the visible pixel lights at every pixel, without albedo/pi", run,
                (*RECEIVERS, VISIBLE, *names), {LIGHT: Spec(
                    "rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)}, paper=EQ2,
-               exact=(RECEIVERS[0], "lights.position"), decoys=(
-                   *(Decoy(one.cause, shadowed(one.run), EQ2) for one in bugs),
-                   Decoy("visibility does not count", every, "V"),
-                   Decoy("one visibility, the mean of all lights, for the whole sum", mean, "V of each pair"),
-                   Decoy("each light has the visibility of the next", reading(run, vpl__visible=lambda a: np.roll(
+               exact=(RECEIVERS[0], "lights.position"), bugs=(
+                   *(Bug(one.cause, shadowed(one.run), EQ2) for one in bugs),
+                   Bug("visibility does not count", every, "V"),
+                   Bug("one visibility, the mean of all lights, for the whole sum", mean, "V of each pair"),
+                   Bug("each light has the visibility of the next", reading(run, vpl__visible=lambda a: np.roll(
                        a, 1, axis=0)), "V of each pair"),
-                   Decoy("the sum is divided by the number of visible lights", _averaged(run), "T/N is in the flux")))
+                   Bug("the sum is divided by the number of visible lights", _averaged(run), "T/N is in the flux")))
 
 
 def _averaged(run: Run) -> Run:

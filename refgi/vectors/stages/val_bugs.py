@@ -8,7 +8,7 @@ import numpy as np
 from refgi.cluster.settings import Csm, ValSettings
 from refgi.settings import replaced
 from refgi.vectors.recipe import reading, writing
-from refgi.vectors.spec import Array, Arrays, Decoy, Run
+from refgi.vectors.spec import Array, Arrays, Bug, Run
 
 DISC = "E-VAL-08: centre sin th / (cos th + cos a), radius sin a / (cos th + cos a)"
 FINAL = "VAL Sec. 4.2, E-VAL-07: tan a = Delta (d - z_avg) / (2 d z_avg)"
@@ -50,24 +50,24 @@ def scaled(factor: float) -> Callable[[Array], Array]:
     return lambda region: region * np.array([1, 1, factor])[:, None, None]
 
 
-def search_decoys(run: Any, settings: ValSettings) -> tuple[Decoy, ...]:
+def search_bugs(run: Any, settings: ValSettings) -> tuple[Bug, ...]:
     """Return likely bugs of the search region."""
     region = "search.region"
     return (
-        Decoy("the search takes blockers half-way: the light's solid angle",
-              _printed(run, settings, "val_search_solid_angle"), "E-VAL-09"),
-        Decoy("squares of side alpha / pi", _printed(run, settings, "val_alpha_over_pi"), DISC),
-        Decoy("the disc lies around the pixel's own place",
-              _placed(run, region, "search.pending", _without_cosine), DISC),
-        Decoy("the map is orthographic: x / d", _placed(run, region, "search.pending", lambda p, d: p[:2] / d),
-              "(x, y) / (d + z)"),
-        Decoy("Delta counts from the centre, not half of it", reading(run, areas__delta=lambda a: 2 * a), "E-VAL-09"),
-        Decoy("rows run upwards", writing(run, search__region=lambda a: a * np.array([1, -1, 1])[:, None, None]),
-              "right, down, forward"),
-        Decoy("pixels behind the light's plane are searched", _all_pending(run), "E-VAL-12: V = 1"),
-        Decoy("the nearest distance of all maps", reading(run, maps__near=lambda a: np.where(
+        Bug("the search takes blockers half-way: the light's solid angle",
+            _printed(run, settings, "val_search_solid_angle"), "E-VAL-09"),
+        Bug("squares of side alpha / pi", _printed(run, settings, "val_alpha_over_pi"), DISC),
+        Bug("the disc lies around the pixel's own place",
+            _placed(run, region, "search.pending", _without_cosine), DISC),
+        Bug("the map is orthographic: x / d", _placed(run, region, "search.pending", lambda p, d: p[:2] / d),
+            "(x, y) / (d + z)"),
+        Bug("Delta counts from the centre, not half of it", reading(run, areas__delta=lambda a: 2 * a), "E-VAL-09"),
+        Bug("rows run upwards", writing(run, search__region=lambda a: a * np.array([1, -1, 1])[:, None, None]),
+            "right, down, forward"),
+        Bug("pixels behind the light's plane are searched", _all_pending(run), "E-VAL-12: V = 1"),
+        Bug("the nearest distance of all maps", reading(run, maps__near=lambda a: np.where(
             np.isfinite(a), a.min(), a)), "E-VAL-09: of each map"),
-        Decoy("the distance is the depth along the axis", _axial(run), "E-VAL-06"))
+        Bug("the distance is the depth along the axis", _axial(run), "E-VAL-06"))
 
 
 def _all_pending(run: Any) -> Run:
@@ -88,7 +88,7 @@ def _axial(run: Any) -> Run:
     return altered
 
 
-def means_decoys(run: Any, name: str, csm: Csm) -> tuple[Decoy, ...]:
+def means_bugs(run: Any, name: str, csm: Csm) -> tuple[Bug, ...]:
     """Return likely bugs of reading the filtered map."""
     region, means = f"{name}__region", f"{name}__means"
 
@@ -98,35 +98,35 @@ def means_decoys(run: Any, name: str, csm: Csm) -> tuple[Decoy, ...]:
     finer, coarser = ("a level too fine", "a level too coarse") if csm.prefilter == "mip" else (
         "half of the disc's radius", "twice the disc's radius")
     return (
-        Decoy(coarser, moved(scaled(2.0)), "docs/methods/val_visibility"),
-        Decoy(finer, moved(scaled(0.5)), "docs/methods/val_visibility"),
-        Decoy("the nearest texel of the map alone", moved(scaled(0.0)), "VAL Sec. 6"),
-        Decoy("rows run upwards", moved(lambda a: a * np.array([1, -1, 1])[:, None, None]), "right, down, forward"),
-        Decoy("s and t are exchanged", moved(lambda a: a[:, [1, 0, 2]]), "s along columns"),
-        Decoy("a texel too far right and down", moved(lambda a: a + np.array([0.125, 0.125, 0])[:, None, None]),
-              "texel centres at + 1/2"),
-        Decoy("places are of [0, 1], not of [-1, 1]", moved(lambda a: (a + np.array([1, 1, 0])[:, None, None]) / 2),
-              "[-1, 1] units"),
-        Decoy("sines and cosines are exchanged", writing(run, **{means: _swapped(csm.terms)}), "order of channels"))
+        Bug(coarser, moved(scaled(2.0)), "docs/methods/val_visibility"),
+        Bug(finer, moved(scaled(0.5)), "docs/methods/val_visibility"),
+        Bug("the nearest texel of the map alone", moved(scaled(0.0)), "VAL Sec. 6"),
+        Bug("rows run upwards", moved(lambda a: a * np.array([1, -1, 1])[:, None, None]), "right, down, forward"),
+        Bug("s and t are exchanged", moved(lambda a: a[:, [1, 0, 2]]), "s along columns"),
+        Bug("a texel too far right and down", moved(lambda a: a + np.array([0.125, 0.125, 0])[:, None, None]),
+            "texel centres at + 1/2"),
+        Bug("places are of [0, 1], not of [-1, 1]", moved(lambda a: (a + np.array([1, 1, 0])[:, None, None]) / 2),
+            "[-1, 1] units"),
+        Bug("sines and cosines are exchanged", writing(run, **{means: _swapped(csm.terms)}), "order of channels"))
 
 
 def _swapped(m: int) -> Callable[[Array], Array]:
     return lambda a: np.concatenate([a[:, m : 2 * m], a[:, :m], a[:, 2 * m :]], axis=1)
 
 
-def series_decoys(run: Any, settings: ValSettings, csm: Csm) -> tuple[Decoy, ...]:
+def series_bugs(run: Any, settings: ValSettings, csm: Csm) -> tuple[Bug, ...]:
     """Return likely bugs of the mean depth of blockers and of the penumbra's disc, by series."""
     def literal(**bugs: Any) -> Run:
         return lambda arrays, real: _literal_penumbra(run(arrays, real), arrays, csm, **bugs)
 
     return (
-        Decoy("the sum is divided by V, not by 1 - V", literal(lit=True), Z_AVG),
-        Decoy("z_avg of the scale is taken for metres", literal(metres=True), Z_AVG),
-        Decoy("the mean depth Z counts whole, not by half", literal(half=1.0), "E-VAL-02: Z/2 - ..."),
-        Decoy("means of all depths, blockers or not", literal(all_depths=True), Z_AVG),
-        Decoy("the sine's term is added", reading(run, search__means=_negated(csm.terms)), "E-VAL-02"),
-        Decoy("no bias in the search", reading(run, series__bias=np.zeros_like), "E-VAL-04"),
-        *size_decoys(run, settings))
+        Bug("the sum is divided by V, not by 1 - V", literal(lit=True), Z_AVG),
+        Bug("z_avg of the scale is taken for metres", literal(metres=True), Z_AVG),
+        Bug("the mean depth Z counts whole, not by half", literal(half=1.0), "E-VAL-02: Z/2 - ..."),
+        Bug("means of all depths, blockers or not", literal(all_depths=True), Z_AVG),
+        Bug("the sine's term is added", reading(run, search__means=_negated(csm.terms)), "E-VAL-02"),
+        Bug("no bias in the search", reading(run, series__bias=np.zeros_like), "E-VAL-04"),
+        *size_bugs(run, settings))
 
 
 def _negated(m: int) -> Callable[[Array], Array]:
@@ -163,28 +163,28 @@ def _literal_penumbra(
     return {**made, "penumbra.z_avg": np.where(shaded, z, 0), "penumbra.region": np.where(shaded[:, None], disc, 0)}
 
 
-def size_decoys(run: Any, settings: ValSettings) -> tuple[Decoy, ...]:
+def size_bugs(run: Any, settings: ValSettings) -> tuple[Bug, ...]:
     """Return likely bugs of the size of the penumbra."""
     return (
-        Decoy("alpha starts at the axis", _printed(run, settings, "val_alpha"), "E-VAL-07"),
-        Decoy("squares of side alpha / pi", _printed(run, settings, "val_alpha_over_pi"), DISC),
-        Decoy("the penumbra is twice as wide", writing(run, penumbra__region=scaled(2.0)), FINAL),
-        Decoy("the disc lies around the pixel's own place",
-              _placed(run, "penumbra.region", "penumbra.shaded", _without_cosine), DISC),
-        Decoy("the light's whole size in place of half", reading(run, areas__delta=lambda a: 2 * a), FINAL))
+        Bug("alpha starts at the axis", _printed(run, settings, "val_alpha"), "E-VAL-07"),
+        Bug("squares of side alpha / pi", _printed(run, settings, "val_alpha_over_pi"), DISC),
+        Bug("the penumbra is twice as wide", writing(run, penumbra__region=scaled(2.0)), FINAL),
+        Bug("the disc lies around the pixel's own place",
+            _placed(run, "penumbra.region", "penumbra.shaded", _without_cosine), DISC),
+        Bug("the light's whole size in place of half", reading(run, areas__delta=lambda a: 2 * a), FINAL))
 
 
-def compared_decoys(run: Any) -> tuple[Decoy, ...]:
+def compared_bugs(run: Any) -> tuple[Bug, ...]:
     """Return likely bugs of V by the series."""
     return (
-        Decoy("no bias in the comparison", reading(run, series__bias=np.zeros_like), "E-VAL-03"),
-        Decoy("the bias is added to the depth", reading(run, series__bias=lambda a: -a), "E-VAL-02: d' = d - b"),
-        Decoy("V is 1 - f", writing(run, visibility__share=lambda a: 1 - a), "E-VAL-02: f = 1 for d <= z"),
-        Decoy("w_k = 1 / c_k", reading(run, series__weight=lambda a: a / 2), "E-VAL-02"),
-        Decoy("sines and cosines are exchanged", reading(run, penumbra__means=_halves_swapped), "E-VAL-02"),
-        Decoy("the cosine's term is missing", reading(run, penumbra__means=_without_sines), "E-VAL-02"),
-        Decoy("V is doubled and cut", writing(run, visibility__share=lambda a: np.minimum(2 * a, 1)), "E-VAL-03"),
-        Decoy("pixels without blockers are dark", writing(run, visibility__share=dark_where_1), "1"))
+        Bug("no bias in the comparison", reading(run, series__bias=np.zeros_like), "E-VAL-03"),
+        Bug("the bias is added to the depth", reading(run, series__bias=lambda a: -a), "E-VAL-02: d' = d - b"),
+        Bug("V is 1 - f", writing(run, visibility__share=lambda a: 1 - a), "E-VAL-02: f = 1 for d <= z"),
+        Bug("w_k = 1 / c_k", reading(run, series__weight=lambda a: a / 2), "E-VAL-02"),
+        Bug("sines and cosines are exchanged", reading(run, penumbra__means=_halves_swapped), "E-VAL-02"),
+        Bug("the cosine's term is missing", reading(run, penumbra__means=_without_sines), "E-VAL-02"),
+        Bug("V is doubled and cut", writing(run, visibility__share=lambda a: np.minimum(2 * a, 1)), "E-VAL-03"),
+        Bug("pixels without blockers are dark", writing(run, visibility__share=dark_where_1), "1"))
 
 
 def dark_where_1(share: Array) -> Array:

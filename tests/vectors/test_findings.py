@@ -1,0 +1,46 @@
+"""Findings over all cases: kinds of stages in order, causes that explain most of them first."""
+
+from refgi.vectors.findings import findings
+from refgi.vectors.manifest import Cause, StageVerdict
+from refgi.vectors.spec import kind_of
+
+
+def verdict(case, stage, *causes, verdict="out", upstream="isolated"):
+    told = tuple(Cause(cause=name, share=share) for name, share in causes)
+    return StageVerdict(case=case, stage=stage, verdict=verdict, upstream=upstream, arrays=(), causes=told)
+
+
+def test_maps_levels_and_rounds_are_one_kind():
+    assert [kind_of(name) for name in ("rsm0.flux", "rsm12.flux", "clusters.3.assign", "sum")] == [
+        "rsm.flux", "rsm.flux", "clusters.assign", "sum"]
+
+
+def test_a_cause_that_fits_every_case_leads_one_that_fits_better_once():
+    found = findings([
+        verdict("a", "sum", verdict="within"),
+        verdict("a", "rsm0.flux", ("chance", 1.0), ("bug", 0.92)),
+        verdict("a", "rsm1.flux", ("bug", 0.95), ("other chance", 0.99)),
+        verdict("b", "rsm0.flux", ("bug", 0.91)),
+        verdict("b", "rsm1.flux", verdict="not-run"),
+        verdict("b", "sum", ("of the sum", 1.0)),
+    ])
+    assert [(one.stage, one.first, one.wrong, one.ran) for one in found] == [
+        ("rsm.flux", ("a", "rsm0.flux"), 3, 3), ("sum", ("b", "sum"), 1, 2)]
+    assert [cause.cause for cause in found[0].causes] == ["bug", "chance", "other chance"]
+    assert [cause.share for cause in found[0].causes] == [1, 1 / 3, 1 / 3]
+
+
+def test_what_is_made_from_wrong_inputs_is_not_blamed():
+    assert findings([verdict("a", "sum", upstream="dirty"), verdict("a", "rsm0.flux", verdict="exact")]) == ()
+
+
+def test_where_no_cause_explains_the_places_of_the_first_are_told():
+    remark = ("no known cause fits: all lie at row 0", 0.0)
+    found = findings([verdict("a", "sum", remark), verdict("b", "sum", ("no known cause fits", 0.0))])
+    assert [cause.cause for cause in found[0].causes] == [remark[0]]
+    found = findings([verdict("a", "sum", remark), verdict("b", "sum", ("bug", 1.0))])
+    assert [(cause.cause, cause.share) for cause in found[0].causes] == [("bug", 0.5)]
+
+
+def test_at_most_three_causes_are_told():
+    assert len(findings([verdict("a", "sum", *((str(k), 1.0) for k in range(9)))])[0].causes) == 3

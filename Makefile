@@ -30,7 +30,7 @@ check: $(VENV)/dev.stamp
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 
 evidence: $(VENV)/dev.stamp
-	$(PYTEST) tests -m feature --evidence -q
+	$(PYTEST) tests -m feature --all --evidence -q
 
 bench: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks --out out/bench

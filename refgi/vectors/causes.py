@@ -5,6 +5,7 @@ Those of this module hold for any array: factors, signs, axes that are flipped, 
 order. A kit adds those of each stage as arrays (`BugEntry`).
 """
 
+import itertools
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
@@ -156,7 +157,7 @@ def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
     for axis, name in enumerate(names):
         if expected.shape[axis] < 2:
             continue
-        if name in ("xyz", "rgb") and expected.shape[axis] == 3:
+        if name in ("xy", "xyz", "rgb") and expected.shape[axis] == len(name):
             yield from _components(expected, axis, name)
             continue
         words = {"row": "rows run upwards", "column": "columns run leftwards"}
@@ -179,16 +180,17 @@ def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
 
 
 def _components(expected: Array, axis: int, name: str) -> Iterator[tuple[str, Array]]:
-    letters = tuple(name)
-    for order in ((2, 1, 0), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1)):
-        yield f"components are in the order {''.join(letters[k] for k in order)}", np.take(expected, order, axis)
+    for order in [*itertools.permutations(range(len(name)))][1:]:
+        yield f"components are in the order {''.join(name[k] for k in order)}", np.take(expected, order, axis)
     if name == "rgb":
         yield "all channels hold red", np.repeat(np.take(expected, [0], axis), 3, axis)
         return
     along = [-1 if one == axis else 1 for one in range(expected.ndim)]
-    signs = [np.where(np.arange(3) == k, -1.0, 1.0).reshape(along) for k in range(3)]
-    for letter, sign in zip(letters, signs, strict=True):
+    signs = [np.where(np.arange(len(name)) == k, -1.0, 1.0).reshape(along) for k in range(len(name))]
+    for letter, sign in zip(name, signs, strict=True):
         yield f"{letter} is mirrored", expected * sign
+    if name == "xy":
+        return
     swapped = np.take(expected, (0, 2, 1), axis)
     yield "y and z are exchanged and y is turned round (z up)", swapped * signs[1]
     yield "y and z are exchanged and z is turned round (z up)", swapped * signs[2]

@@ -105,11 +105,12 @@ def written(path: Path, content: bytes) -> Path:
     return path
 
 
-MAKERS = (flat_nodes, chained_nodes, rootless_nodes, own_meshes, many_lights, many_objects, many_groups,
-          repeated_keys, unknown_materials, missing_meshes)
+MAKERS = (chained_nodes, own_meshes, many_objects, unknown_materials)
+MORE = (flat_nodes, rootless_nodes, many_lights, many_groups, repeated_keys, missing_meshes)
 
 
-@pytest.mark.parametrize("make", MAKERS, ids=lambda make: make.__name__)
+@pytest.mark.parametrize("make", [*MAKERS, *(pytest.param(make, marks=pytest.mark.slow) for make in MORE)],
+                         ids=lambda make: make.__name__)
 def test_time_grows_with_the_file(tmp_path: Path, make: Callable[[Path, int], Path]) -> None:
     few, many = make(tmp_path, FEW), make(tmp_path, MANY)
     seconds_of(few)  # imports

@@ -56,6 +56,7 @@ def test_another_estimator_agrees(name):
     assert 0.5 < against(known, trace_truth(frame_of(name), other)) < AGREE
 
 
+@pytest.mark.slow  # the exporter refuses a bug that no case tells; this asks it of each case
 @pytest.mark.parametrize("name", CASES)
 def test_each_bug_is_seen(name):
     case, known = made(name)

@@ -5,7 +5,6 @@ half extent of the image plane. Row 0 is the top row; texel centres lie at + 1/2
 """
 
 import dataclasses
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 
 VECTOR, POINT = "unit vector", "m"
+QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
 SCENE = ("scene.vertices", "scene.faces", "scene.material_of_face")
 REFLECTANCE = ("materials.diffuse", "materials.specular", "materials.exponent")
 NAMES = {SpotLight: "spot", PointLight: "point", DirectionalLight: "directional"}
@@ -91,10 +91,10 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
         mean = np.full_like(angle, angle.mean())
         return made | {even[0]: mean, even[1]: made[even[1]] * (mean / angle).astype(real)}
 
-    # a spot's falloff depends on differences of cosines, each of which float32 rounds
-    rounded = [reading(flux, **{f"{lamp}__half_angles": partial(_with_rounded_cosines, sign)}) for sign in (-1.0, 1.0)]
+    # a spot's flux is an integral over each texel, which refgi takes in float64 in any run
+    summed = writing(flux, **{f"{name}__flux": lambda a: (a * (1.0 + QUADRATURE * ROUNDING)).astype(a.dtype)})
     recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
-               paper="SII Sec. 3.1; docs/radiometry", variants=tuple(rounded) if isinstance(light, SpotLight) else (),
+               paper="SII Sec. 3.1; docs/radiometry", variants=(summed,) if isinstance(light, SpotLight) else (),
                bugs=(
                    Bug("every texel has the same solid angle", equal, "Nichols and Wyman 2009, Fig. 13"),
                    Bug("the albedo is left out", reading(flux, materials__diffuse=np.ones_like,
@@ -140,12 +140,6 @@ def light_of(arrays: Arrays, lamp: str, light: Light) -> Light:
         value |= {"inner_half_angle": min(inner, outer), "outer_half_angle": outer}
     made: Light = type(light)(**value)
     return made
-
-
-def _with_rounded_cosines(sign: float, half_angles: Array) -> Array:
-    """Return the inner and outer half-angle whose cosines are off by a rounding of float32, in opposite directions."""
-    cosines = np.cos(half_angles.astype(np.float64)) + sign * ROUNDING * np.array([-1.0, 1.0])
-    return np.asarray(np.arccos(np.clip(cosines, -1.0, 1.0)))
 
 
 def _ones_where_any(array: Array) -> Array:

@@ -62,7 +62,7 @@ def add_ranges(recipe: Recipe, what: str, top: int, rim: int, components: int) -
         return altered
 
     empty = {source.replace(".", "__"): lambda a: np.where(np.isfinite(a), a, 0.0), "gbuffer__triangle_id": everywhere}
-    axes, unit = ("row, column", "m") if what == "depth" else ("xyz, row, column", "1")
+    axes, unit = ("row, column", "m") if what == "depth" else (f"{'xyz'[:components]}, row, column", "1")
     text = "{} " + ("depth" if what == "depth" else "of each component of normals") + " in each cell; {} where empty"
     recipe.add(f"multires.{what}_ranges", f"least and largest {what} within each cell of each level", run,
                (source, IDS), {

@@ -35,6 +35,8 @@ from refgi.sssil.settings import PRESETS, TemporalSettings
 from tests.benchmarks.papers.conftest import SMALL
 from tests.sssil.crown.counting import COUNTED, reads_of_levels
 
+pytestmark = pytest.mark.slow  # the whole paper is made
+
 PRINTED = {  # Figure 6: sampling, upsampling, compositing, total, on the 8800 GTS and the GTX 260, ms
     "quarter, 4 levels, 64 samples": (7.1, 2.3, 5.7, 1.7, 1.1, 0.6, 13.9, 4.6),
     "quarter, 4 levels, 256 samples": (26.8, 8.9, 5.7, 1.7, 1.1, 0.6, 33.6, 11.2),

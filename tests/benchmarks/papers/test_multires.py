@@ -7,6 +7,8 @@ import pytest
 
 from benchmarks.papers.multires.subjects import BUILDERS
 
+pytestmark = pytest.mark.slow  # the whole paper is made
+
 
 @pytest.fixture
 def figures(reproduced):

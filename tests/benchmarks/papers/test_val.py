@@ -38,6 +38,8 @@ from refgi.scene.model import merge
 from refgi.stages import Run, observe
 from tests.benchmarks.papers.conftest import SMALL
 
+pytestmark = pytest.mark.slow  # the whole paper is made
+
 PAPER_STEPS = {"deferred rendering": 0.4, "VPL generation": 0.1, "VAL clustering": 0.5, "CSSM": 4.2,
                "indirect illumination": 35.0, "geometry-aware blur": 10.7}  # ms, Table 2
 STAGES_OF_STEPS = {

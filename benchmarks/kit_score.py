@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -57,13 +57,13 @@ def main(arguments: list[str]) -> int:
     for port in options.ports or SOURCES:
         every = list(enumerate(tomllib.loads((BUGS / f"{port}.toml").read_text(encoding="utf-8"))["bug"]))
         bugs = every[:: options.every]
-        with tempfile.TemporaryDirectory() as folder:
-            state = _without_bugs(port, Path(folder))
-        if state:
-            console.print(f"{port}: left out, {state}")
-            continue
-        with ThreadPoolExecutor(options.jobs) as pool:
-            for score in pool.map(lambda one, port=port: _score(port, *one), bugs):
+        with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.jobs) as pool:
+            right = _copied(SOURCES[port], Path(folder))
+            state = _without_bugs(port, right, Path(folder) / "out")
+            if state:
+                console.print(f"{port}: left out, {state}")
+                continue
+            for score in pool.map(lambda one, port=port, right=right: _score(port, right, *one), bugs):
                 scores.append(score)
                 if score.state != "found" or not score.named:
                     console.print(f"{port} {score.number}: {score.state}, first {score.first or 'none'}; {score.what}; "
@@ -75,29 +75,28 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _without_bugs(port: str, folder: Path) -> str:
-    """Return why a port cannot be scored, or nothing."""
-    source = _copied(port, folder)
-    said = _build(port, source) or _run(port, source, folder / "out")
+def _without_bugs(port: str, source: Path, out: Path) -> str:
+    """Build and run a port; return why it cannot be scored, or nothing."""
+    said = _build(port, source, "") or _run(port, source, out)
     if said:
         return said
-    result = check_output(Kit(kit_folder()), folder / "out", Asked())
+    result = check_output(Kit(kit_folder()), out, Asked())
     return "" if result.exit_code == ALL_WITHIN else f"it is wrong without a bug: {result.first}"
 
 
-def _score(port: str, number: int, bug: dict[str, Any]) -> Score:
+def _score(port: str, right: Path, number: int, bug: dict[str, Any]) -> Score:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        source = _copied(port, folder)
+        source = _copied(right, folder)
         file = source / bug["file"]
         text = file.read_text(encoding="utf-8")
         if text.count(bug["old"]) != 1:
             return Score(port, number, bug["what"], "does not build", False, "its text is not there once", ())
         file.write_text(text.replace(bug["old"], bug["new"]), encoding="utf-8")
-        said = _build(port, source)
+        said = _build(port, source, bug["file"])
         if said:
             return Score(port, number, bug["what"], "does not build", False, said, ())
-        said = _run(port, source, folder / "out")
+        said = _run(port, source, folder / "out", _cases_with(bug["stages"]))
         if said:  # a crash is seen without a checker
             return Score(port, number, bug["what"], "does not run", False, said, ())
         return _judged(port, number, bug, folder / "out")
@@ -114,26 +113,34 @@ def _judged(port: str, number: int, bug: dict[str, Any], out: Path) -> Score:
     return Score(port, number, bug["what"], state, named, "/".join(result.first), causes)
 
 
-def _copied(port: str, folder: Path) -> Path:
-    target = folder / SOURCES[port].name
-    shutil.copytree(SOURCES[port], target, ignore=shutil.ignore_patterns("__pycache__", "*.o"))
+def _copied(source: Path, folder: Path) -> Path:
+    target = folder / source.name
+    shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
     return target
 
 
-def _build(port: str, source: Path) -> str:
+def _build(port: str, source: Path, changed: str) -> str:
+    """Compile what has changed, all where that is no single unit."""
     if port != "c":
         return ""
-    command = ["cc", "-O1", "-std=c99", "-w", "-ffp-contract=off", "-o", str(source / "port"),
-               *map(str, sorted(source.glob("*.c"))), "-lm"]
-    return _said(command, source)
+    units = [changed] if changed.endswith(".c") else [file.name for file in sorted(source.glob("*.c"))]
+    compile_ = ["cc", "-O2", "-std=c99", "-w", "-ffp-contract=off", "-c", *units]
+    return _said(compile_, source) or _said(["cc", "-o", "port", *(
+        file.name for file in sorted(source.glob("*.o"))), "-lm"], source)
 
 
-def _run(port: str, source: Path, out: Path) -> str:
+def _cases_with(stages: list[str]) -> list[str]:
+    """Return the cases in which some of these stages run: a bug elsewhere is not looked for."""
+    kinds = {kind_of(stage) for stage in stages}
+    return [case.id for case in Kit(kit_folder()).cases(Asked()) if kinds & {kind_of(one.name) for one in case.stages}]
+
+
+def _run(port: str, source: Path, out: Path, cases: Iterable[str] = ()) -> str:
     kit = str(kit_folder())
     out.mkdir(exist_ok=True)
-    commands = {"c": [str(source / "port"), kit, str(out)],
-                "glsl": [sys.executable, str(source / "run.py"), kit, str(out)],
-                "naive": [sys.executable, "-m", "tests.vectors.naive_run", kit, str(out)]}
+    commands = {"c": [str(source / "port"), kit, str(out), *cases],
+                "glsl": [sys.executable, str(source / "run.py"), kit, str(out), *cases],
+                "naive": [sys.executable, "-m", "tests.vectors.naive_run", kit, str(out), *cases]}
     return _said(commands[port], source.parent if port == "naive" else source)
 
 

@@ -1,4 +1,4 @@
-"""The literal twins as a program: `python -m tests.vectors.naive_run KIT OUT` writes what they cover of a kit."""
+"""The literal twins as a program: `python -m tests.vectors.naive_run KIT OUT [CASE ...]` writes what they cover."""
 
 import sys
 from pathlib import Path
@@ -16,9 +16,10 @@ CLUSTERED = ("val-",)
 SPLATTING, SCREEN = ("pairs-", "sii-halton", "sii-three", "sii-warp", "sii-grid"), ("hssil-",)
 
 
-def main(kit, out):
-    """Write the arrays of every stage that a twin covers, each made from the kit's inputs."""
-    for case in kit.cases(Asked(cases=(*SPLATTING, *SCREEN, *CLUSTERED))):
+def main(kit, out, only=()):
+    """Write the arrays of every stage that a twin covers, each made from the kit's inputs; of some cases or of all."""
+    covered = kit.cases(Asked(cases=(*SPLATTING, *SCREEN, *CLUSTERED)))
+    for case in (one for one in covered if not only or one.id in only):
         (out / case.id).mkdir(parents=True, exist_ok=True)
         for made in outputs(kit, case):
             for name, array in (made or {}).items():
@@ -46,4 +47,4 @@ def as_read(array):
 
 
 if __name__ == "__main__":
-    main(Kit(Path(sys.argv[1])), Path(sys.argv[2]))
+    main(Kit(Path(sys.argv[1])), Path(sys.argv[2]), sys.argv[3:])

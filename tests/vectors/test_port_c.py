@@ -55,3 +55,12 @@ def test_stages_are_within_their_bounds(port, kit, tmp_path, evidence, name, cha
     worst = max(array.worst or 0.0 for one in result.stages for array in one.arrays)
     evidence(f"{name}, {'chained' if chained else 'isolated'}: {len(ran)} kinds of stages within, "
              f"worst {worst:.2g} bounds")
+
+
+def test_the_buffers_of_every_method_are_within(port, kit, tmp_path):
+    """Whatever the program has of methods that it does not know."""
+    subprocess.run([port, kit.folder, tmp_path], check=True, capture_output=True)
+    result = check_output(kit, tmp_path, Asked())
+    assert result.findings == ()
+    assert {one.case.split("-")[0] for one in result.stages if one.verdict != "not-run"} >= {
+        "gather", "vpl", "truth", *COVERED}

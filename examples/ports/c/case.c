@@ -38,7 +38,7 @@ static Array *keep(Case *c, const char *name, int own, Array *array) {
     return array;
 }
 
-static const char *entry(Case *c, const char *name) { return json_at(json_at(c->manifest, "arrays"), name); }
+static const char *entry(Case *c, const char *name) { return json_at(c->arrays, name); }
 
 int has(Case *c, const char *format, ...) {
     NAMED(name, format);
@@ -79,7 +79,7 @@ Array *make(Case *c, const char *format, ...) {
 
 const char *fact(Case *c, const char *format, ...) {
     NAMED(name, format);
-    return json_at(json_at(c->manifest, "facts"), name);
+    return json_at(c->facts, name);
 }
 
 char *text_of(const char *path) {
@@ -106,6 +106,8 @@ void case_open(Case *c, const char *kit, const char *out, const char *id, int ch
     snprintf(c->id, sizeof c->id, "%s", id);
     snprintf(path, sizeof path, "%s/cases/%s/manifest.json", kit, id);
     c->manifest = text_of(path);
+    c->arrays = json_at(c->manifest, "arrays");
+    c->facts = json_at(c->manifest, "facts");
 }
 
 void case_store(Case *c) {

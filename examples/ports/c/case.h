@@ -8,6 +8,7 @@ typedef struct {
     const char *kit, *out;
     char id[80];
     const char *manifest; /* JSON text */
+    const char *arrays, *facts; /* its objects of these names */
     const char *stage;    /* the manifest's entry of the stage that runs */
     int chained;          /* stages read what the port has written */
     struct Kept *kept;

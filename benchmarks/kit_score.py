@@ -52,11 +52,13 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--out", type=Path, help="folder for kit_score.json")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--every", type=int, default=1, help="score each so many-th bug alone")
+    parser.add_argument("--first", type=int, default=0, help="and begin with that one")
+    parser.add_argument("--bugs", type=lambda text: {int(one) for one in text.split(",")}, help="score these alone")
     options = parser.parse_args(arguments)
     console, scores = Console(), []
     for port in options.ports or SOURCES:
         every = list(enumerate(tomllib.loads((BUGS / f"{port}.toml").read_text(encoding="utf-8"))["bug"]))
-        bugs = every[:: options.every]
+        bugs = [bug for bug in every[options.first :: options.every] if not options.bugs or bug[0] in options.bugs]
         with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.jobs) as pool:
             right = _copied(SOURCES[port], Path(folder))
             state = _without_bugs(port, right, Path(folder) / "out")

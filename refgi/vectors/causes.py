@@ -13,20 +13,22 @@ import numpy as np
 
 from refgi.vectors.bounds import distance, large_value
 from refgi.vectors.manifest import ArrayEntry, Cause
-from refgi.vectors.spec import Array
+from refgi.vectors.spec import Array, axes_of
 
 EXPLAINED = 0.9  # share of the differing elements from which on a hypothesis counts
+SEEN = EXPLAINED  # share of what is seen without a hypothesis: one that explains more comes first
 ROOM = 8.0  # how much farther off than its bound an explained element may be: the bug changes the rounding too
 FEWEST = 4  # elements that a factor can be told from
 NEARER = 0.25  # of its distance from what is expected: how near an element must be to what explains it
 SORTED = 1e-3  # the same, of elements in order
 SLIGHT = 100.0  # bounds: a difference without an explanation that stays below may be rounding
 SINGLE = 2.0**-22
+FEW_VALUES = 8  # of whole numbers: states, not indices
 FACTORS = {"2": 2.0, "1/2": 0.5, "pi": np.pi, "1/pi": 1 / np.pi, "2 pi": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi,
            "4 pi": 4 * np.pi, "1/(4 pi)": 0.25 / np.pi, "pi^2": np.pi**2, "1/pi^2": np.pi**-2, "4": 4.0, "1/4": 0.25,
            "3": 3.0, "1/3": 1 / 3, "-1": -1.0, "-2": -2.0, "1000": 1000.0, "1/1000": 1e-3, "100": 100.0, "1/100": 0.01,
            "255": 255.0, "1/255": 1 / 255, "2/pi": 2 / np.pi, "pi/2": np.pi / 2, "180/pi": 180 / np.pi,
-           "pi/180": np.pi / 180}
+           "pi/180": np.pi / 180, "6": 6.0, "1/6": 1 / 6}
 
 
 class Difference(NamedTuple):
@@ -81,7 +83,7 @@ def told_at_once(difference: Difference) -> list[Cause]:
 def places_of(difference: Difference) -> list[Cause]:
     """Return where a difference without a cause lies: what all elements that differ have in common."""
     at = np.argwhere(difference.out)
-    names = [one.strip() for one in difference.entry.axes.split(",")]
+    names = axes_of(difference.entry.axes)
     if not len(at) or len(names) != difference.out.ndim:
         return []
     found = ["they are 0 here"] if not difference.got[difference.out].any() else []
@@ -121,11 +123,12 @@ def _plain(difference: Difference) -> Iterator[Cause]:
     if got.dtype.kind == "f" and not np.isfinite(got[out]).all() and np.isfinite(difference.expected[out]).all():
         bad = int(np.count_nonzero(~np.isfinite(got[out])))
         what = "NaN" if np.isnan(got[out]).any() else "infinite"
-        yield Cause(cause=f"{bad} elements are {what}", share=bad / max(1, int(out.sum())))
+        count = "1 element is" if bad == 1 else f"{bad} elements are"
+        yield Cause(cause=f"{count} {what}", share=min(SEEN, bad / max(1, int(out.sum()))))
     elif not got.any() and difference.expected.any():
-        yield Cause(cause="all elements are 0: nothing was written", share=1.0)
+        yield Cause(cause="all elements are 0: nothing was written", share=SEEN)
     elif got.size > 1 and (got == got.reshape(-1)[0]).all():
-        yield Cause(cause=f"all elements are {got.reshape(-1)[0]:g}", share=1.0)
+        yield Cause(cause=f"all elements are {got.reshape(-1)[0]:g}", share=SEEN)
 
 
 def _factors(difference: Difference, factors: Mapping[str, float]) -> Iterator[tuple[str, Array]]:
@@ -144,14 +147,23 @@ def _factors(difference: Difference, factors: Mapping[str, float]) -> Iterator[t
     elif factor and abs(factor - 1) < 1e-3:
         yield f"every element is {factor - 1:+.2g} of itself off: a constant with too few digits", expected * factor
     elif factor:
-        yield f"every element is {name or f'{factor:.6g}'} times what it should be", expected * factor
+        yield f"every element is {name or f'{factor:.6g}'} times what it should be{_missing(name)}", expected * factor
     shift = float(np.median(got[usable].astype(np.float64) - expected[usable]))
     yield f"{shift:.6g} is added to every element", expected + shift
 
 
+def _missing(factor: str | None) -> str:
+    """Return which factor is missing or too many, where its name says it."""
+    if factor is None:
+        return ""
+    if factor.startswith("1/"):
+        return f": a factor {factor[2:].strip('()')} is missing"
+    return "" if "/" in factor else f": a factor {factor} too many"
+
+
 def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
     expected = difference.expected
-    names = [one.strip() for one in difference.entry.axes.split(",")]
+    names = axes_of(difference.entry.axes)
     if len(names) != expected.ndim:
         return
     for axis, name in enumerate(names):
@@ -160,7 +172,7 @@ def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
         if name in ("xy", "xyz", "rgb") and expected.shape[axis] == len(name):
             yield from _components(expected, axis, name)
             continue
-        words = {"row": "rows run upwards", "column": "columns run leftwards"}
+        words = {"row": "rows run upwards: upside down", "column": "columns run leftwards: mirrored"}
         yield words.get(name, f"{name}s are in reverse order"), np.flip(expected, axis)
         for step, which in ((1, "before"), (-1, "after")):
             yield f"{name}s are shifted by one: each holds the one {which} it", np.roll(expected, step, axis)
@@ -221,6 +233,7 @@ def _coded(difference: Difference) -> Iterator[tuple[str, Array]]:
         yield "bytes are swapped (big-endian)", expected.astype("<f4").view("<u4").byteswap().view("<f4")
         yield "the natural logarithm", np.log(expected)
         yield "the logarithm to base 2", np.log2(expected)
+        yield "0 in place of infinity", np.where(np.isinf(expected), 0.0, expected)
         if np.array_equal(got, expected.astype(np.float16).astype(got.dtype)):
             yield "stored as float16: tier T2 allows that", got
         if difference.entry.axes.startswith("xyz") and expected.ndim > 1:
@@ -244,12 +257,33 @@ def _indices(difference: Difference) -> Iterator[tuple[str, Array]]:
     yield "every index is one too low", np.where(some, expected - 1, expected)
     yield "none is marked by 0", np.where(some, expected, 0)
     yield "none is marked by the largest number", np.where(some, expected, -1).view(np.uint32).astype(np.int64)
+    yield from _exchanged(difference)
     if entry.index_of is not None:
         rows, columns = entry.index_of
         row, column = expected // columns, expected % columns
         yield "indices count column by column", np.where(some, column * rows + row, expected)
         yield "rows of indices run upwards", np.where(some, (rows - 1 - row) * columns + column, expected)
         yield "columns of indices run leftwards", np.where(some, row * columns + columns - 1 - column, expected)
+
+
+def _exchanged(difference: Difference) -> Iterator[tuple[str, Array]]:
+    """Yield which of a few values stand for which others."""
+    expected, got = difference.expected, difference.got
+    values = np.unique(expected)
+    if len(values) > FEW_VALUES:
+        return
+    predicted, said = np.array(expected), []
+    for value in values:
+        here = expected == value
+        found, counts = np.unique(got[here], return_counts=True)
+        usual = found[np.argmax(counts)]
+        if usual != value:
+            predicted[here] = usual
+            said.append((int(value), int(usual)))
+    if len(said) == 2 and said[0] == said[1][::-1]:
+        yield f"{said[0][0]} and {said[0][1]} are exchanged", predicted
+    elif said:
+        yield " and ".join(f"every {a} is {b}" for a, b in said), predicted
 
 
 def _taken_for(difference: Difference, others: Mapping[str, Array]) -> Iterator[tuple[str, Array]]:
@@ -275,5 +309,7 @@ def _order(difference: Difference) -> Iterator[Cause]:
         return
     a, b = np.sort(expected.astype(np.float64), axis=None), np.sort(got.astype(np.float64), axis=None)
     apart = np.median(distance(got, expected)[difference.out])
+    if not np.isfinite(apart):
+        return
     if bool((distance(a, b) <= 4 * SINGLE * np.abs(a) + SORTED * apart).all()):
         yield Cause(cause="the right values in another order", share=1.0)

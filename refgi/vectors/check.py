@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from refgi.errors import InputError
-from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of, told_at_once
+from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of
 from refgi.vectors.findings import CAUSES, findings
 from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
 from refgi.vectors.kit import Asked, DamagedError, Kit, find_array, fits, places_of_case, read_array
@@ -224,9 +224,6 @@ def _causes(
     differing = {name: Difference(name, case.arrays[name], kit.array(case, name), arrays[name], one.out, one.limit)
                  for name, one in judged.items() if one.verdict.verdict == "out" and one.out is not None
                  and one.limit is not None}
-    plain = [cause for one in differing.values() for cause in told_at_once(one)]
-    if plain:
-        return plain
     shapes = {name: array.shape for name, array in arrays.items()}
     found = []
     for bug in step.bugs:
@@ -242,6 +239,8 @@ def _causes(
     for one in differing.values():
         found += explain(one, case.factors, {name: kit.array(case, name) for name in case.arrays
                                               if case.arrays[name].shape == one.expected.shape})
+    if not found and not differing:
+        found = [Cause(cause="no known cause fits this shape", share=0.0)]
     found = found or [cause for one in differing.values() for cause in places_of(one)]
     unique = {one.cause: one for one in sorted(found, key=lambda one: -round(one.share, 2))}
     return list(unique.values())

@@ -6,7 +6,7 @@ import numpy as np
 
 from refgi.vectors.bounds import FLUSHED, SIGMAS, distance, large_value
 from refgi.vectors.manifest import ArrayEntry, ArrayVerdict, Tolerance, Verdict
-from refgi.vectors.spec import Array
+from refgi.vectors.spec import Array, axes_of
 
 FEW = 0.005  # share of pixels that may be beyond SIGMAS standard errors
 WORTH = 1e-3  # of the large values: errors of which size make an element the worst one
@@ -166,7 +166,7 @@ def _shape_fault(entry: ArrayEntry, got: Array) -> str:
         return f"{said}: as many elements, in another shape"
     if got.ndim == len(entry.shape):
         differing = [k for k in range(got.ndim) if got.shape[k] != entry.shape[k]]
-        names = [one.strip() for one in entry.axes.split(",")]
+        names = axes_of(entry.axes)
         if len(differing) == 1 and len(names) == got.ndim:
             more = got.shape[differing[0]] - entry.shape[differing[0]]
             return f"{said}: {abs(more)} {'more' if more > 0 else 'fewer'} along {names[differing[0]]}"

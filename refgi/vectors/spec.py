@@ -71,6 +71,11 @@ class Case:
     scene: Any = None  # the Scene, where there is one; None: arrays are all there is
 
 
+def axes_of(axes: str) -> list[str]:
+    """Return the names of an array's axes, outermost first; "(inner, outer)" is one."""
+    return [one.strip() for one in re.split(r",(?![^(]*\))", axes)]
+
+
 def kind_of(stage: str) -> str:
     """Return a stage's name without the numbers of maps, levels and rounds: rsm0.flux and rsm1.flux are one kind."""
     return re.sub(r"\.?\d+", "", stage)

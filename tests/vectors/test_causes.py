@@ -13,6 +13,8 @@ def srgb(a):
 BUGS = [
     ("rsm0.flux", lambda a: a * np.pi, "pi times"),
     ("rsm0.flux", lambda a: a / (2 * np.pi), "1/(2 pi) times"),
+    ("rsm0.flux", lambda a: a / (2 * np.pi), "a factor 2 pi is missing"),
+    ("rsm0.flux", lambda a: a * 4, "a factor 4 too many"),
     ("rsm0.flux", lambda a: -a, "sign is turned"),
     ("rsm0.flux", lambda a: a * 1.234, "1.234 times"),
     ("rsm0.flux", lambda a: a * 6.4, "T/N of rsm0 times"),
@@ -47,6 +49,9 @@ BUGS = [
     ("gbuffer.triangle_id", lambda a: np.where(a < 0, 0, a + 1), "one too high"),
     ("gbuffer.triangle_id", lambda a: np.where(a < 0, 0, a), "none is marked by 0"),
     ("rsm0.position", lambda a: a[:, [*range(8, 16), *range(8)]], "the right values in another order"),
+    ("lights.map", lambda a: 1 - a, "0 and 1 are exchanged"),
+    ("lights.map", lambda a: np.where(a == 0, 2, a), "every 0 is 2"),
+    ("gbuffer.depth", lambda a: np.where(np.isinf(a), 0, a), "0 in place of infinity"),
     ("lights.lobe_exponent", lambda a: a[::-1], "lights are in reverse order"),
 ]
 

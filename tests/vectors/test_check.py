@@ -82,7 +82,7 @@ def test_numbers_that_are_none_are_out(port):
         flux[0, 5, 5] = value
         port.write("rsm0.flux", flux)
         assert port.check().exit_code == OUT
-        assert "1 elements are" in port.first().causes[0].cause
+        assert "1 element is" in port.first().causes[0].cause
 
 
 def test_stages_that_did_not_run_do_not_count_unless_asked_for(port):

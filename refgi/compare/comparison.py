@@ -206,7 +206,9 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
 
 
 def _without_visibility(settings: Any) -> Any:
-    checkpoint = settings.checkpoint and f"{settings.checkpoint}.{UNOCCLUDED}"
+    checkpoint = settings.checkpoint
+    if checkpoint and not Path(checkpoint).is_dir():  # a folder has a file for each
+        checkpoint = f"{checkpoint}.{UNOCCLUDED}"
     return dataclasses.replace(settings, visibility=False, checkpoint=checkpoint)
 
 

@@ -51,7 +51,8 @@ class TruthSettings(Settings):
                                      least=1, most=65536, study=True)
     bound: float = setting(BOUND, "largest geometry term left to the light side, in 1 / footprint of a direction",
                            above=0.0, study=True)
-    checkpoint: Path | str | None = setting(None, "file of all passes so far, continued where it exists", study=True)
+    checkpoint: Path | str | None = setting(None, "file of all passes so far, continued where it exists; in a folder: "
+                                           "one of its own for all that the passes depend on", study=True)
     batch: int = setting(1 << 18, "rays traced at a time: memory, never a bit of the result", least=1, most=2**30,
                          study=True)
 

@@ -112,14 +112,16 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
     if settings.seconds is not None:
         _warm_up(scene, tracer, buffer, settings)
     started = time.perf_counter()
-    task = task_of(scene, tracer, *buffer, settings)
+    task = _without_pilot(scene, tracer, *buffer, settings)
     block, grid = blocks_of(task.receivers.pixel, triangle_id.shape)
     values = len(block) + grid[0] * grid[1] + 1
-    file = Checkpoint(Path(settings.checkpoint), _fingerprint(task, triangle_id.shape), values) \
+    file = _checkpoint(Path(settings.checkpoint), _fingerprint(task, triangle_id.shape), values) \
         if settings.checkpoint else None
     moments = file.moments if file else no_passes(values)
+    ready: Task | None = None
     while not _is_done(moments, len(block), settings, time.perf_counter() - started):
-        add_pass(moments, with_means(one_pass(task, int(moments.passes)), block, grid[0] * grid[1]))
+        ready = ready or task._replace(densities=pilot(task))
+        add_pass(moments, with_means(one_pass(ready, int(moments.passes)), block, grid[0] * grid[1]))
         if file:
             file.save_when_due()
         report_progress(min(1.0, int(moments.passes) / settings.passes))
@@ -170,13 +172,23 @@ def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_
     `position`, `normal` (3, h, w): the G-buffer's, world space. `triangle_id` (h, w) int: which triangle each pixel
     sees; -1 for none. Result: with the densities that the pilot found.
     """
+    task = _without_pilot(scene, tracer, position, normal, triangle_id, settings)
+    return task._replace(densities=pilot(task))
+
+
+def _without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
+                   settings: TruthSettings) -> Task:
     points = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
     set_of = sets_of(points.pixel, triangle_id.shape[1], settings.interleave)
     caustics, left_to_photons = _photons(scene, triangle_id.shape, settings)
     reflecting = surfaces(scene, left_to_photons)
     view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "visible" else None
-    task = Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, caustics, view)
-    return task._replace(densities=pilot(task))
+    return Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, caustics, view)
+
+
+def _checkpoint(place: Path, computation: bytes, values: int) -> Checkpoint:
+    """Return the checkpoint in a file, or in a folder's file that is named by what is computed."""
+    return Checkpoint(place / f"{computation.hex()}.truth" if place.is_dir() else place, computation, values)
 
 
 def _is_done(moments: Moments, receivers: int, settings: TruthSettings, seconds: float) -> bool:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import sys
 import types
 import warnings
 from typing import Any
@@ -222,6 +223,23 @@ def test_an_interrupted_truth_can_go_on_and_the_second_keeps_its_own_file():
     settings = module._without_visibility(TruthSettings(checkpoint="sums.npz"))
     assert (settings.visibility, settings.checkpoint) == (False, "sums.npz.unoccluded")
     assert module._without_visibility(TruthSettings()).checkpoint is None
+
+
+def test_a_second_comparison_traces_no_truth_that_a_folder_holds(box, tmp_path, monkeypatch):
+    truth = sys.modules["refgi.truth.truth"]
+
+    settings = TruthSettings(samples=48, checkpoint=tmp_path)
+    first = compare(box, ["sii"], truth_settings=settings, **SIZE)
+    traced, one_pass = [], truth.one_pass
+    monkeypatch.setattr(truth, "one_pass", lambda task, number: traced.append(len(task.receivers.pixel)) or one_pass(
+        task, number))
+    again = compare(box, ["gather"], truth_settings=settings, **SIZE)
+    assert len(traced) == 4  # two warm-ups of two passes, on other pixels
+    assert int(first.truth.samples.max()) == 48
+    assert all(count > (first.truth.samples > 0).sum() for count in traced)
+    assert set(first.references) == {"truth", "unoccluded"}
+    for name, reference in first.references.items():
+        assert np.array_equal(reference.irradiance, again.references[name].irradiance)
 
 
 @pytest.mark.feature("REF-21")

@@ -107,6 +107,31 @@ def test_a_checkpoint_of_another_picture_or_version_is_refused(frame, tmp_path, 
         trace_truth(frame, settings)
 
 
+def test_a_folder_keeps_each_truth_once_and_nothing_is_traced_again(frame, tmp_path, monkeypatch):
+    module = sys.modules["refgi.truth.truth"]
+
+    settings = TruthSettings(samples=48, checkpoint=tmp_path)
+    first = trace_truth(frame, settings)
+    other = trace_truth(frame, dataclasses.replace(settings, visibility=False))
+    assert len(list(tmp_path.iterdir())) == 2
+    for name in ("one_pass", "pilot"):
+        monkeypatch.setattr(module, name, lambda *_: pytest.fail("traced again"))
+    for visibility, before in ((True, first), (False, other)):
+        again = trace_truth(Frame(frame.scene, width=SIZE, height=SIZE),
+                            dataclasses.replace(settings, visibility=visibility))
+        assert np.array_equal(again.mean, before.mean)
+        assert np.array_equal(again.variance_of_mean, before.variance_of_mean)
+
+
+def test_a_folder_s_truth_goes_on_to_the_same_bits(frame, tmp_path):
+    trace_truth(frame, TruthSettings(samples=48, checkpoint=tmp_path))
+    more = trace_truth(frame, TruthSettings(samples=96, checkpoint=tmp_path))
+    straight = trace_truth(frame, TruthSettings(samples=96))
+    assert more.passes == straight.passes == 4
+    assert np.array_equal(more.mean, straight.mean)
+    assert len(list(tmp_path.iterdir())) == 1
+
+
 def test_when_it_stops_makes_no_other_computation(frame, tmp_path):
     settings = TruthSettings(samples=48, checkpoint=tmp_path / "c")
     trace_truth(frame, settings)
@@ -174,7 +199,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_computing(frame, tmp_p
 
     blocking = tmp_path / "file"
     blocking.write_text("not a folder")
-    for place in (blocking / "c", tmp_path):
+    for place in (blocking / "c", tmp_path / "none" / "c"):
         with pytest.raises(InputError, match="checkpoint"):
             trace_truth(frame, TruthSettings(samples=48, checkpoint=place))
     monkeypatch.setattr(passes, "one_pass", lambda *_: pytest.fail("computed first"))

@@ -38,6 +38,7 @@ class Axes(NamedTuple):
     y: str
     log_x: bool = False
     log_y: bool = False
+    decimal_x: bool = False  # places along a logarithmic axis are named by 1, 2 and 5, not by the points or powers of 2
 
 
 def time_against_error(points: list[Point], noise: float, error_name: str = "relMSE") -> str:
@@ -140,7 +141,9 @@ def _draw_curves(plot: Any, curves: Sequence[Curve], axes: Axes) -> None:
     for axis in (plot.xaxis, plot.yaxis):
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter("")
-    if axes.log_x:
+    if axes.log_x and axes.decimal_x:
+        plot.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    elif axes.log_x:
         plot.set_xticks(_steps(curves))
     if axes.log_y:
         plot.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -148,7 +148,8 @@ def is_from_refgi(path: str | Path) -> bool:
         False where the file is another program's, or so damaged that its mark is lost.
     """
     path = Path(path)
-    has_mark = {".exr": _exr, ".png": _png, ".json": _json, ".html": _page}.get(path.suffix.lower())
+    has_mark = {".exr": _exr, ".png": _png, ".json": _json, ".html": _page, ".csv": _first_line,
+                ".md": _first_line}.get(path.suffix.lower())
     try:
         return has_mark is not None and has_mark(path)
     except Exception:  # a damaged header makes OpenEXR raise nearly anything
@@ -172,6 +173,11 @@ def _png(path: Path) -> bool:
 def _json(path: Path) -> bool:
     content = json.loads(path.read_text("utf-8"))
     return isinstance(content, dict) and MARK in content
+
+
+def _first_line(path: Path) -> bool:
+    with path.open(encoding="utf-8") as file:
+        return MARK in file.readline(1000)
 
 
 def _page(path: Path) -> bool:

@@ -1,0 +1,90 @@
+"""The error of a method's pictures, bias and variance apart.
+
+Pictures of several seeds differ by their variance; what all share is bias. With S pictures x_s of a reference R whose
+mean has the variance v: MSE = mean |x_s - R|^2, variance = mean of the unbiased variance of x_s over s, and
+bias^2 = mean |mean_s x_s - R|^2 - variance / S - mean v: neither few seeds nor the reference's noise counts as bias.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.errors import expect
+
+Array = npt.NDArray[Any]
+
+BLOCK = 16  # pixels along a side of the blocks that an interval is drawn from: errors of neighbours go together
+CONFIDENCE, RESAMPLES = 0.95, 999
+
+
+class Error(NamedTuple):
+    """Errors over the mean of the reference; nan where one picture alone cannot say it."""
+
+    rmse: float  # root of the mean of squares over all pixels, channels and pictures
+    low: float  # 95 % interval of rmse over other parts of such a picture
+    high: float
+    bias: float  # root of bias^2
+    spread: float  # root of the variance over seeds
+    noise: float  # rmse of a perfect picture: the reference's own standard error
+
+
+def error_of(pictures: Sequence[Array], reference: Array, variance: Array, covered: Array) -> Error:
+    """Judge pictures of several seeds by a reference.
+
+    Parameters
+    ----------
+    pictures : sequence of (3, h, w) ndarray
+        Of one method and setting, a seed each; W/m^2.
+    reference, variance : (3, h, w) ndarray
+        What they estimate, and the variance of its mean, the unit squared.
+    covered : (h, w) ndarray of bool
+        Pixels that show a surface.
+
+    Returns
+    -------
+    Error
+        Figures over the reference's mean; infinite where that is 0.
+
+    Raises
+    ------
+    InputError
+        If there is no picture, or no pixel is covered.
+    """
+    expect(len(pictures) > 0, "pictures", "one or more", 0)
+    expect(bool(covered.any()), "covered", "some pixel that shows a surface", "none")
+    made = np.array([picture[:, covered] for picture in pictures], np.float64)
+    right, noise = reference[:, covered].astype(np.float64), float(variance[:, covered].mean(dtype=np.float64))
+    squares = ((made - right) ** 2).mean(axis=(0, 1))
+    scale = float(right.mean())
+    count = len(pictures)
+    spread = float((made - made[0]).var(axis=0, ddof=1).mean()) if count > 1 else math.nan
+    bias = float(((made.mean(axis=0) - right) ** 2).mean()) - spread / count - noise
+    low, high = _interval(squares, covered)
+    return Error(*(_over(value, scale) for value in (math.sqrt(squares.mean()), low, high, _root(bias), _root(spread),
+                                                     math.sqrt(noise))))
+
+
+def _interval(squares: Array, covered: Array) -> tuple[float, float]:
+    """Return the interval of the root mean square over resampled blocks; nan where there is one block alone."""
+    from scipy.stats import bootstrap
+
+    row, column = np.nonzero(covered)
+    _, block = np.unique(row // BLOCK * covered.shape[1] + column // BLOCK, return_inverse=True)
+    if not np.isfinite(squares).all() or block.max() == 0:
+        return math.nan, math.nan
+    sums, counts = np.bincount(block, squares), np.bincount(block)
+    found = bootstrap((sums, counts), lambda s, n, axis: np.sqrt(s.sum(axis=axis) / n.sum(axis=axis)), paired=True,
+                      vectorized=True, n_resamples=RESAMPLES, confidence_level=CONFIDENCE, method="percentile",
+                      rng=np.random.default_rng(0))
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+
+def _root(square: float) -> float:
+    return math.nan if math.isnan(square) else math.sqrt(max(0.0, square))
+
+
+def _over(value: float, scale: float) -> float:
+    return value / scale if scale else math.inf if value else 0.0

@@ -1,0 +1,150 @@
+"""Which settings of which methods are run: a grid as TOML.
+
+One table a method, or several as an array of tables; each key holds a value or a list of values, and all combinations
+are run. `[truth]` has the key `passes`: after how many the path tracer is stopped, for the line to beat.
+"""
+
+import itertools
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from refgi.errors import InputError, expect
+from refgi.methods import find_method
+from refgi.settings import Settings, from_text
+
+FILES = Path(__file__).with_name("files")
+TRUTH = "truth"
+
+
+class Choice(NamedTuple):
+    """One method with one choice of settings."""
+
+    method: str
+    changes: tuple[str, ...]  # "key=value" beside the defaults
+    settings: Settings
+
+    @property
+    def label(self) -> str:
+        """What is said of it: the changes."""
+        return ", ".join(self.changes) or "default"
+
+
+class Grid(NamedTuple):
+    """What is run on a scene."""
+
+    choices: tuple[Choice, ...]
+    passes: tuple[int, ...]  # of the truth, stopped early
+
+
+def built_in(quick: bool) -> Grid:
+    """Return the grid that refgi comes with.
+
+    Parameters
+    ----------
+    quick : bool
+        Three settings a method in place of ten and more.
+
+    Returns
+    -------
+    Grid
+        Of all methods.
+    """
+    return read_grid(FILES / ("quick.toml" if quick else "grid.toml"))
+
+
+def read_grid(file: Path) -> Grid:
+    """Read a grid.
+
+    Parameters
+    ----------
+    file : Path
+        TOML.
+
+    Returns
+    -------
+    Grid
+        Choices in the file's order, each once.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a method or key is unknown or a value not usable; names all of them.
+    """
+    try:
+        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: no TOML: {error}", file=str(file)) from error
+    passes = _passes(tables.pop(TRUTH, {}), file)
+    choices: dict[tuple[str, tuple[str, ...]], Choice] = {}
+    faults = []
+    for name, entry in tables.items():
+        for table in entry if isinstance(entry, list) else [entry]:
+            for changes in _combinations(table, f"{file}: {name}"):
+                try:
+                    method = find_method(name)
+                    settings = from_text(method.settings(), changes)
+                    choices[method.name, changes] = Choice(method.name, changes, settings)
+                except InputError as error:
+                    faults.append(f"{file}: {name}: {error}")
+    if faults:
+        raise InputError("\n".join(dict.fromkeys(faults)), file=str(file))
+    return Grid(tuple(choices.values()), passes)
+
+
+def chosen(grid: Grid, methods: Sequence[str] | None) -> Grid:
+    """Return the part of a grid that is of some methods.
+
+    Parameters
+    ----------
+    grid : Grid
+        Of all methods.
+    methods : sequence of str, optional
+        Short names; all where absent.
+
+    Returns
+    -------
+    Grid
+        Their choices, in the grid's order.
+
+    Raises
+    ------
+    InputError
+        If a method is unknown or the grid has no setting of it.
+    """
+    if methods is None:
+        return grid
+    names = {find_method(name).name for name in methods}
+    missing = names - {choice.method for choice in grid.choices}
+    expect(not missing, "methods", "some that the grid has settings of", ", ".join(sorted(missing)))
+    return grid._replace(choices=tuple(choice for choice in grid.choices if choice.method in names))
+
+
+def _passes(table: Mapping[str, Any], file: Path) -> tuple[int, ...]:
+    expect(set(table) <= {"passes"}, f"{file}: {TRUTH}", "the key passes alone", ", ".join(map(str, table)))
+    passes = table.get("passes", [])
+    good = isinstance(passes, list) and all(isinstance(one, int) and one >= 2 for one in passes)
+    expect(good, f"{file}: {TRUTH}.passes", "whole numbers of 2 and more", passes)
+    return tuple(sorted(set(passes)))
+
+
+def _combinations(table: Any, where: str) -> Iterable[tuple[str, ...]]:
+    expect(isinstance(table, dict), where, "a table of settings", type(table).__name__)
+    lists = [[f"{key}={_text(value)}" for value in (values if isinstance(values, list) else [values])]
+             for key, values in sorted(_flat(table).items())]
+    return itertools.product(*lists)
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return values by their dotted keys: TOML reads `a.b = 1` as a table in a table."""
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        found |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return found
+
+
+def _text(value: Any) -> str:
+    return {True: "true", False: "false"}.get(value, str(value)) if isinstance(value, bool) else str(value)

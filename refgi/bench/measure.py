@@ -1,0 +1,208 @@
+"""Methods run and judged on one scene: a grid of settings in turn, a seed a round, and the path tracer stopped early.
+
+Every round runs each choice once on a frame of its own, whose buffers are part of the time, with the round's seed; so a
+slow moment of the machine falls on all, and each picture counts for the spread over seeds. Kernels are compiled, or
+loaded, before the first round.
+"""
+
+import contextlib
+import dataclasses
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi import stages
+from refgi.bench.curves import error_in, front
+from refgi.bench.error import error_of
+from refgi.bench.grid import TRUTH, Choice, Grid
+from refgi.bench.results import Run, SceneResult, figures_of
+from refgi.compare.flip import flip
+from refgi.compare.outcome import UNOCCLUDED, measure
+from refgi.errors import RefgiError, RefgiWarning, expect
+from refgi.frame import Frame
+from refgi.methods import METHODS
+from refgi.provenance import estimate_record, plain
+from refgi.scene import Scene
+from refgi.settings import Settings, from_text, leaves
+from refgi.truth import TruthSettings, trace_truth
+
+Array = npt.NDArray[Any]
+Tell = Callable[[str, float], None]
+
+WARM_UP_SIZE = 96  # pixels along a side: more than the coarse grid of `gather`
+REFERENCE_SEED = 2**31  # of the truth: none of the rounds'
+
+
+class _Reference(NamedTuple):
+    mean: Array  # (3, h, w), W/m^2
+    variance: Array  # of the mean
+    radiance: Array
+    statement: str
+
+
+class _Made(NamedTuple):
+    pictures: list[Array]
+    times: list[float]
+    stages: dict[str, float]
+
+
+def bench_scene(
+    scene: Scene, grid: Grid, *, rounds: int = 3, truth: TruthSettings | None = None, tell: Tell = lambda *_: None,
+    **frame_options: Any,
+) -> SceneResult:
+    """Run a grid on a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    grid : Grid
+        Choices of settings, and passes of the truth.
+    rounds : int
+        How often each is run, a seed each; from two on bias and variance are told apart.
+    truth : TruthSettings, optional
+        How the reference is traced; its seed is one that no round has.
+    tell : callable
+        Called with (what runs, share done).
+    **frame_options : object
+        Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
+
+    Returns
+    -------
+    SceneResult
+        A choice that gives no picture is in `failures` and stops none of the others.
+
+    Raises
+    ------
+    InputError
+        If the camera sees no surface.
+    """
+    frame = Frame(scene, **frame_options)
+    covered = frame.gbuffer.covered
+    expect(bool(covered.any()), f"scene {scene.name!r}: camera", "a view of some surface", "a view past all of it")
+    settings = dataclasses.replace(truth or TruthSettings(), seed=REFERENCE_SEED)
+    references = {TRUTH: _traced(frame, settings, tell)}
+    if not all(METHODS[choice.method].knows_visibility(choice.settings) for choice in grid.choices):
+        references[UNOCCLUDED] = _traced(frame, dataclasses.replace(settings, visibility=False), tell)
+    stops = [_stop(passes) for passes in grid.passes]
+    made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, frame_options, tell)
+    runs = [_judged(choice, made[number], references, frame) for number, choice in enumerate(
+        (*grid.choices, *stops)) if number in made]
+    methods = [run for run in runs if run.method != TRUTH]
+    line = [run for run in runs if run.method == TRUTH]
+    return SceneResult(scene=scene.name, width=frame.width, height=frame.height, covered=int(covered.sum()),
+                       mean=float(references[TRUTH].mean[:, covered].mean(dtype=np.float64)),
+                       truth=references[TRUTH].statement, runs=_compared(methods, line), line=tuple(line),
+                       failures=failures)
+
+
+def _traced(frame: Frame, settings: TruthSettings, tell: Tell) -> _Reference:
+    with stages.observe(progress=lambda stage, done: tell(f"{TRUTH}: {stage}", done)):
+        found = trace_truth(frame, settings)
+    radiance = frame.radiance(np.asarray(found.mean, frame.dtype))
+    return _Reference(found.mean, found.variance_of_mean, radiance, estimate_record(found)["estimate"]["statement"])
+
+
+def _stop(passes: int) -> Choice:
+    """Return the truth, stopped after some passes."""
+    settings = TruthSettings()
+    samples = passes * (settings.picks_per_pass + settings.directions_per_pass)
+    return Choice(TRUTH, (f"samples={samples}",), dataclasses.replace(settings, samples=samples))
+
+
+def _in_turn(
+    scene: Scene, choices: list[Choice], rounds: int, options: Mapping[str, Any], tell: Tell
+) -> tuple[dict[int, _Made], dict[str, str]]:
+    """Run all choices once a round; return what they made by number, and why the others made nothing."""
+    made: dict[int, _Made] = {}
+    failures: dict[str, str] = {}
+    for number, choice in enumerate(choices):
+        tell(f"warming up {choice.method}: {choice.label}", number / len(choices))
+        with _quietly():
+            METHODS[choice.method].function(Frame(scene, **{**options, "width": WARM_UP_SIZE, "height": WARM_UP_SIZE}),
+                                            choice.settings)
+    for turn in range(rounds):
+        for number, choice in enumerate(choices):
+            name = f"{choice.method}: {choice.label}"
+            if name in failures:
+                continue
+            tell(name, (turn + number / len(choices)) / rounds)
+            try:
+                picture, seconds, spent = _timed(Frame(scene, **options), choice.method,
+                                                 with_seed(choice.settings, turn))
+            except RefgiError as error:
+                failures[name] = str(error)
+                made.pop(number, None)
+                continue
+            one = made.setdefault(number, _Made([], [], spent))
+            one.pictures.append(picture)
+            one.times.append(seconds)
+    return made, failures
+
+
+def _timed(frame: Frame, method: str, settings: Settings) -> tuple[Array, float, dict[str, float]]:
+    with stages.observe() as log:
+        started = time.perf_counter()
+        picture = METHODS[method].function(frame, settings)
+        seconds = time.perf_counter() - started
+    spent: dict[str, float] = {}
+    for run in log.runs:
+        if run.depth == 0 and run.status == "ran":
+            spent[run.name] = spent.get(run.name, 0.0) + run.seconds
+    return picture, seconds, spent
+
+
+def with_seed(settings: Settings, seed: int) -> Settings:
+    """Return settings with another seed; the same where they draw no random numbers.
+
+    Parameters
+    ----------
+    settings : Settings
+        Of a method.
+    seed : int
+        The seed.
+
+    Returns
+    -------
+    Settings
+        With it.
+    """
+    if not any(leaf.key.rpartition(".")[2] == "seed" for leaf in leaves(type(settings))):
+        return settings
+    return from_text(settings, [f"seed={seed}"])
+
+
+def _judged(choice: Choice, made: _Made, references: Mapping[str, _Reference], frame: Frame) -> Run:
+    covered, method = frame.gbuffer.covered, METHODS[choice.method]
+    judges = [TRUTH] if method.knows_visibility(choice.settings) else [TRUTH, UNOCCLUDED]
+    errors = {name: figures_of(error_of(made.pictures, references[name].mean, references[name].variance, covered))
+              for name in judges}
+    figures = measure(made.pictures[0], references[TRUTH].mean, references[TRUTH].variance, covered).figures
+    ssim = figures["ssim"].value if "ssim" in figures else float("nan")
+    seen = flip(frame.radiance(made.pictures[0]), references[TRUTH].radiance, covered)
+    return Run(method=choice.method, changes=choice.changes, settings=plain(choice.settings), times=tuple(made.times),
+               stages=made.stages, errors=errors, flip=seen.mean if np.isfinite(seen.mean) else None,
+               ssim=ssim if np.isfinite(ssim) else None)
+
+
+def _compared(runs: list[Run], line: list[Run]) -> tuple[Run, ...]:
+    """Return the runs with their place among all: on the front or not, and beside the path tracer."""
+    on_front = front([(run.seconds, run.rmse) for run in (*runs, *line)])
+    known = [(run.seconds, run.rmse) for run in line]
+    said = []
+    for run, best in zip(runs, on_front, strict=False):
+        ratio = run.rmse / error_in(known, run.seconds)
+        said.append(run.model_copy(update={"front": best, "in_equal_time": ratio if ratio > 0 else None}))
+    return tuple(said)
+
+
+@contextlib.contextmanager
+def _quietly() -> Iterator[None]:
+    """Leave warnings and errors to the real run, which says them."""
+    with warnings.catch_warnings(), contextlib.suppress(RefgiError):
+        warnings.simplefilter("ignore", RefgiWarning)
+        yield

@@ -1,0 +1,198 @@
+"""What a bench found, as data: results.json by its schema, and tables as CSV and Markdown."""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pydantic
+
+from refgi.bench.error import Error
+from refgi.image import write_text
+
+FORMAT = "bench 1"
+COLUMNS = ("scene", "method", "settings", "seconds", "fastest", "slowest", "rmse", "low", "high", "bias", "spread",
+           "noise", "rmse_unoccluded", "flip", "ssim", "against_truth_in_equal_time", "on_the_front", "refgi")
+
+
+class _Strict(pydantic.BaseModel):
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+
+
+class Figures(_Strict):
+    """Errors over the mean of the reference (`refgi.bench.error.Error`); None where not known."""
+
+    rmse: float | None
+    low: float | None
+    high: float | None
+    bias: float | None
+    spread: float | None
+    noise: float | None
+
+
+class Run(_Strict):
+    """One method with one choice of settings on one scene."""
+
+    method: str
+    changes: tuple[str, ...]  # beside the defaults
+    settings: dict[str, Any]
+    times: tuple[float, ...]  # s of whole frames with their buffers, a seed each
+    stages: dict[str, float]  # s of the first of them, outermost stages
+    errors: dict[str, Figures]  # by reference: "truth", "unoccluded"
+    flip: float | None = None  # of the first seed's picture
+    ssim: float | None = None
+    in_equal_time: float | None = None  # rmse over that of the path tracer in equal time: above 1 it is beaten
+    front: bool = False  # nothing measured here is both faster and nearer
+
+    @property
+    def label(self) -> str:
+        """The settings in short."""
+        return ", ".join(self.changes) or "default"
+
+    @property
+    def seconds(self) -> float:
+        """Median time."""
+        ordered = sorted(self.times)
+        return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+
+    @property
+    def rmse(self) -> float:
+        """Plain RMSE against the truth over its mean; nan where not known."""
+        value = self.errors["truth"].rmse
+        return math.nan if value is None else value
+
+
+class SceneResult(_Strict):
+    """All runs on one scene."""
+
+    scene: str
+    width: int
+    height: int
+    covered: int  # pixels that show a surface
+    mean: float  # W/m^2, of the truth
+    truth: str  # how well it is known
+    runs: tuple[Run, ...]
+    line: tuple[Run, ...]  # the path tracer, stopped early
+    failures: dict[str, str]  # what gave no picture, and why
+
+
+class Result(_Strict):
+    """results.json."""
+
+    refgi: str = FORMAT
+    environment: dict[str, Any]
+    scenes: tuple[SceneResult, ...]
+
+
+def figures_of(error: Error) -> Figures:
+    """Return an error as data.
+
+    Parameters
+    ----------
+    error : Error
+        Figures, nan and infinity among them.
+
+    Returns
+    -------
+    Figures
+        None in their place.
+    """
+    return Figures(**{key: value if math.isfinite(value) else None for key, value in error._asdict().items()})
+
+
+def schema_text() -> str:
+    """Return the JSON Schema of results.json.
+
+    Returns
+    -------
+    str
+        As the repository holds it.
+    """
+    return json.dumps(Result.model_json_schema(), indent=1, sort_keys=True) + "\n"
+
+
+def rows_of(result: Result) -> Iterable[dict[str, Any]]:
+    """Yield one row a run, the path tracer's among them.
+
+    Parameters
+    ----------
+    result : Result
+        Of all scenes.
+
+    Yields
+    ------
+    dict
+        By `COLUMNS`; None where there is nothing to say.
+    """
+    for scene in result.scenes:
+        for run in (*scene.runs, *scene.line):
+            unoccluded = run.errors.get("unoccluded")
+            yield {"scene": scene.scene, "method": run.method, "settings": run.label, "seconds": run.seconds,
+                   "fastest": min(run.times), "slowest": max(run.times), **run.errors["truth"].model_dump(),
+                   "rmse_unoccluded": None if unoccluded is None else unoccluded.rmse, "flip": run.flip,
+                   "ssim": run.ssim, "against_truth_in_equal_time": run.in_equal_time, "on_the_front": run.front,
+                   "refgi": result.refgi}
+
+
+def write_results(result: Result, folder: Path) -> None:
+    """Write results.json, results.csv and results.md, each whole or not at all.
+
+    Parameters
+    ----------
+    result : Result
+        Of all scenes.
+    folder : Path
+        An existing folder.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    table = io.StringIO()
+    writer = csv.DictWriter(table, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows_of(result))
+    write_text(folder / "results.json", result.model_dump_json(indent=1) + "\n")
+    write_text(folder / "results.csv", table.getvalue())
+    write_text(folder / "results.md", markdown(result))
+
+
+def markdown(result: Result) -> str:
+    """Return the table of each scene, fastest first.
+
+    Parameters
+    ----------
+    result : Result
+        Of all scenes.
+
+    Returns
+    -------
+    str
+        Markdown; errors in % of the truth's mean, times in ms.
+    """
+    lines = [f"<!-- refgi {result.refgi} -->", ""]
+    for scene in result.scenes:
+        lines += [f"## {scene.scene}, {scene.width} x {scene.height}", "", scene.truth, "",
+                  "| method | settings | ms | RMSE % | bias % | spread % | over truth in equal time | front |",
+                  "|---|---|--:|--:|--:|--:|--:|---|"]
+        for run in sorted((*scene.runs, *scene.line), key=lambda one: one.seconds):
+            known = run.errors["truth"]
+            lines.append(f"| {run.method} | {run.label} | {1e3 * run.seconds:.3g} | {percent(known.rmse)} | "
+                         f"{percent(known.bias)} | {percent(known.spread)} | {times(run.in_equal_time)} | "
+                         f"{'yes' if run.front else ''} |")
+        lines += ["", *(f"{name} gave no picture: {why}" for name, why in scene.failures.items()), ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def percent(value: float | None) -> str:
+    """Return a share in %; nothing where it is not known."""
+    return "" if value is None else f"{100 * value:.3g}"
+
+
+def times(value: float | None) -> str:
+    """Return a ratio; nothing where it is not known."""
+    return "" if value is None else f"{value:.3g}"

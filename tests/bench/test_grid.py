@@ -1,0 +1,84 @@
+"""Grids as TOML: all combinations, each once; every fault of a file at once."""
+
+import pytest
+
+from refgi.bench.grid import TRUTH, built_in, chosen, read_grid
+from refgi.errors import InputError
+from refgi.methods import METHODS
+
+
+@pytest.fixture
+def file(tmp_path):
+    def written(text):
+        (tmp_path / "grid.toml").write_text(text)
+        return tmp_path / "grid.toml"
+
+    return written
+
+
+def test_all_combinations_in_order_each_once(file):
+    grid = read_grid(file("""
+        [truth]
+        passes = [8, 2, 2]
+        [[sii]]
+        lights = [16, 64]
+        half_resolution = [true, false]
+        [[sii]]
+        lights = 64
+        half_resolution = false
+        [multires]
+        subsplats.criteria.depth.threshold = [0.1, 0.2]
+    """))
+    assert grid.passes == (2, 8)
+    assert [(one.method, one.label) for one in grid.choices] == [
+        ("sii", "half_resolution=true, lights=16"), ("sii", "half_resolution=true, lights=64"),
+        ("sii", "half_resolution=false, lights=16"), ("sii", "half_resolution=false, lights=64"),
+        ("multires", "subsplats.criteria.depth.threshold=0.1"),
+        ("multires", "subsplats.criteria.depth.threshold=0.2")]
+    settings = grid.choices[1].settings
+    assert (settings.lights.count, settings.half_resolution) == (64, True)
+    assert grid.choices[5].settings.subsplats.criteria.depth.threshold == 0.2
+
+
+def test_a_method_alone_is_its_default(file):
+    (choice,) = read_grid(file("[val]\n")).choices
+    assert (choice.label, choice.settings) == ("default", METHODS["val"].settings())
+
+
+def test_the_built_in_grids_have_every_method():
+    full, quick = built_in(quick=False), built_in(quick=True)
+    for name in set(METHODS) - {TRUTH}:
+        assert sum(choice.method == name for choice in full.choices) >= 10
+        assert sum(choice.method == name for choice in quick.choices) >= 3
+    assert len(set(full.choices)) == len(full.choices)
+
+
+def test_methods_are_chosen_in_the_grid_s_order():
+    some = chosen(built_in(quick=True), ["val", "sii"])
+    assert list(dict.fromkeys(choice.method for choice in some.choices)) == ["sii", "val"]
+    assert chosen(built_in(quick=True), None) == built_in(quick=True)
+    with pytest.raises(InputError, match="expected one of"):
+        chosen(some, ["siii"])
+    with pytest.raises(InputError, match="got 'hssil'"):
+        chosen(some, ["hssil"])
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("sii = 3", "expected a table"),
+    ("[sii\n", "no TOML"),
+    ("[siii]\n", "siii"),
+    ("[sii]\nlihgts = 3", "did you mean"),
+    ("[sii]\nlights = 'many'", "lights"),
+    ("[truth]\npasses = [1]", "2 and more"),
+    ("[truth]\nsamples = 3", "passes alone"),
+])
+def test_what_is_wrong_is_said(file, text, said):
+    with pytest.raises(InputError, match=said):
+        read_grid(file(text))
+
+
+def test_all_faults_are_told_at_once(file):
+    with pytest.raises(InputError, match=r"(?s)lihgts.*samplse"):
+        read_grid(file("[sii]\nlihgts = 3\n[gather]\nsamplse = 4"))
+    with pytest.raises(InputError, match="cannot be read"):
+        read_grid(file("").with_name("none.toml"))

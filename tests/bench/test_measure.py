@@ -1,0 +1,110 @@
+"""A bench of one scene: pictures, seeds and references are those of the methods run by hand."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+from refgi.bench import measure
+from refgi.bench.error import error_of
+from refgi.bench.grid import Choice, Grid
+from refgi.bench.measure import REFERENCE_SEED, bench_scene, with_seed
+from refgi.errors import InputError, RefgiWarning
+from refgi.frame import Frame
+from refgi.methods import METHODS
+from refgi.scene import load_scene
+from refgi.settings import of
+from refgi.truth import TruthSettings, trace_truth
+
+SIZE = {"width": 40, "height": 36, "rsm_resolution": 64, "shadows": "exact"}
+ROUNDS = 2
+
+
+def choice(method, **changes):
+    made = of(METHODS[method].settings, **changes)
+    return Choice(method, tuple(f"{key}={value}" for key, value in changes.items()), made)
+
+
+GRID = Grid((choice("sii", lights=32), choice("sii", lights=256), choice("vpl", lights=32), choice("gather")), (2, 4))
+
+
+@pytest.fixture(scope="module")
+def box():
+    return load_scene("cornell_box")
+
+
+@pytest.fixture(scope="module")
+def bench(box):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)
+        return bench_scene(box, GRID, rounds=ROUNDS, truth=TruthSettings(samples=96), **SIZE)
+
+
+def picture_of(frame, choice, seed):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)
+        return METHODS[choice.method].function(frame, with_seed(choice.settings, seed))
+
+
+def test_errors_are_those_of_the_method_run_by_hand_with_each_seed(box, bench):
+    frame = Frame(box, **SIZE)
+    for number, judges in ((0, ("truth", "unoccluded")), (2, ("truth",))):
+        one, run = GRID.choices[number], bench.runs[number]
+        assert (run.method, run.changes) == (one.method, one.changes)
+        pictures = [picture_of(frame, one, seed) for seed in range(ROUNDS)]
+        assert not np.array_equal(*pictures)
+        assert set(run.errors) == set(judges)
+        for name in judges:
+            truth = trace_truth(frame, TruthSettings(samples=96, seed=REFERENCE_SEED, visibility=name == "truth"))
+            expected = error_of(pictures, truth.mean, truth.variance_of_mean, frame.gbuffer.covered)
+            assert list(run.errors[name].model_dump().values()) == pytest.approx(list(expected))
+
+
+def test_the_path_tracer_comes_nearer_and_has_no_bias(bench):
+    two, four = bench.line
+    assert (two.changes, four.changes) == (("samples=48",), ("samples=96",))
+    known = [one.errors["truth"] for one in bench.line]
+    assert known[1].spread == pytest.approx(known[0].spread / math.sqrt(2), rel=0.3)
+    for one in known:
+        assert one.bias**2 < 0.2 * (one.spread**2 + one.noise**2)
+        assert one.rmse == pytest.approx(math.hypot(one.spread, one.noise), rel=0.2)
+
+
+def test_times_stages_and_places(bench):
+    for run in (*bench.runs, *bench.line):
+        assert len(run.times) == ROUNDS
+        assert 0 < sum(run.stages.values()) <= run.times[0]
+    assert "rsm.gbuffer" in bench.runs[0].stages
+    assert any(run.front for run in bench.runs)
+    assert bench.failures == {}
+    assert (bench.width, bench.height, bench.covered) == (40, 36, int(Frame(load_scene(
+        "cornell_box"), **SIZE).gbuffer.covered.sum()))
+
+
+def test_a_seed_reaches_every_method_that_has_one():
+    for name, method in METHODS.items():
+        settings = with_seed(method.settings(), 7)
+        assert type(settings) is method.settings
+        if name != "gather" or settings != method.settings():
+            assert settings != method.settings(), name
+        assert with_seed(settings, 7) == settings
+
+
+def test_what_gives_no_picture_stops_nothing_else(box):
+    grid = Grid((choice("sii", lights=32), choice("val", **{"maps.resolution": 64, "lights": 16})), ())
+    timed = measure._timed
+
+    def refusing(frame, method, settings):
+        if method == "val":
+            raise InputError("refused here")
+        return timed(frame, method, settings)
+
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)
+        patch.setattr(measure, "_timed", refusing)
+        found = bench_scene(box, grid, rounds=1, truth=TruthSettings(samples=48), **SIZE)
+    assert [run.method for run in found.runs] == ["sii"]
+    assert found.failures == {"val: maps.resolution=64, lights=16": "refused here"}
+    assert found.runs[0].errors["truth"].spread is None
+    assert found.runs[0].in_equal_time is None  # no line

@@ -1,0 +1,68 @@
+"""`refgi bench`: files, what is said, exit codes, wrong grids."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from refgi.bench import measure
+from refgi.bench.results import Result
+from refgi.cli.group import VerbGroup
+from refgi.errors import InputError
+
+SMALL = ("--size", "24x18", "--rounds", "2", "--set", "samples=48", "--threads", "2")
+
+
+def run(*arguments):
+    return CliRunner().invoke(VerbGroup.refgi(), ["bench", *map(str, arguments)])
+
+
+@pytest.fixture
+def grid(tmp_path):
+    (tmp_path / "grid.toml").write_text("[truth]\npasses = [2]\n[sii]\nlights = [16, 64]\n[gather]\nsamples = 20\n")
+    return tmp_path / "grid.toml"
+
+
+def test_scenes_of_a_grid(tmp_path, grid):
+    done = run("cornell_box", "atrium:faces=2000", "--grid", grid, *SMALL, "--json", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
+        "index.html", "results.csv", "results.json", "results.md"]
+    result = Result.model_validate_json((tmp_path / "out" / "results.json").read_text())
+    assert [len(scene.runs) for scene in result.scenes] == [3, 3]
+    assert [run.label for run in result.scenes[1].runs] == ["lights=16", "lights=64", "samples=20"]
+    assert json.loads(done.stdout)["scenes"] == result.model_dump(mode="json")["scenes"]
+    again = run("--grid", grid, *SMALL, "--methods", "gather", "--out", tmp_path / "out")
+    assert again.exit_code == 0, again.output  # over its own files
+    assert "gather comes to" in again.stdout
+
+
+def test_a_choice_that_gives_no_picture_is_told(tmp_path, grid, monkeypatch):
+    timed = measure._timed
+
+    def refusing(frame, method, settings):
+        if method == "gather":
+            raise InputError("refused here")
+        return timed(frame, method, settings)
+
+    monkeypatch.setattr(measure, "_timed", refusing)
+    done = run("--grid", grid, *SMALL, "--out", tmp_path / "out")
+    assert done.exit_code == 1
+    assert "gather: samples=20 gave no picture: refused here" in done.stderr
+    assert "sii comes to" in done.stdout
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (["--grid", "GRID", "--quick"], "not both"),
+    (["--grid", "none.toml"], "cannot be read"),
+    (["--quick", "--methods", "siii"], "siii"),
+    (["--quick", "--set", "samplse=3"], "samplse"),
+    (["cornel_box", "--quick"], "cornel_box"),
+    (["--quick", "--rounds", "0"], "rounds"),
+])
+def test_wrong_use_is_one_clear_error_before_anything_runs(tmp_path, grid, monkeypatch, arguments, said):
+    monkeypatch.setattr(measure, "bench_scene", lambda *_, **__: pytest.fail("ran"))
+    done = run(*(grid if one == "GRID" else one for one in arguments), "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert not (tmp_path / "out").exists()

@@ -24,7 +24,7 @@ def grid(tmp_path):
 
 
 def test_scenes_of_a_grid(tmp_path, grid):
-    done = run("cornell_box", "atrium:faces=2000", "--grid", grid, *SMALL, "--json", "--out", tmp_path / "out")
+    done = run("cornell_box", "cornell_sphere:faces=80", "--grid", grid, *SMALL, "--json", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
         "index.html", "results.csv", "results.json", "results.md"]

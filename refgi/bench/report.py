@@ -8,7 +8,7 @@ from typing import Any
 from refgi.bench.grid import FILES, TRUTH
 from refgi.bench.results import Result, Run, SceneResult, percent, times
 from refgi.compare.plot import Axes, Curve, curves_plot
-from refgi.compare.report import PAGE, machine, templates
+from refgi.compare.report import PAGE, machine, number, templates
 from refgi.image import write_text
 
 COLUMNS = ("method", "settings", "time, ms", "RMSE, %", "95 % interval", "bias, %", "spread, %",
@@ -85,7 +85,7 @@ def said_of(scene: SceneResult) -> Iterator[str]:
     """
     best = {run.method: run for run in sorted(scene.runs, key=lambda one: -one.rmse)}
     for method, run in sorted(best.items(), key=lambda one: one[1].rmse):
-        text = f"{method} comes to {percent(run.errors[TRUTH].rmse)} % in {1e3 * run.seconds:.3g} ms ({run.label})"
+        text = f"{method} comes to {percent(run.errors[TRUTH].rmse)} % in {number(1e3 * run.seconds)} ms ({run.label})"
         ahead = [one for one in scene.runs if one.method == method and (one.in_equal_time or 0) <= 1]
         if not scene.line:
             yield f"{text}."
@@ -95,7 +95,7 @@ def said_of(scene: SceneResult) -> Iterator[str]:
             yield f"{text}; no setting of it is beaten by the path tracer in equal time."
         else:
             slowest = max(ahead, key=lambda one: one.seconds)
-            yield f"{text}; from {1e3 * slowest.seconds:.3g} ms on the path tracer is nearer in equal time."
+            yield f"{text}; from {number(1e3 * slowest.seconds)} ms on the path tracer is nearer in equal time."
 
 
 def _curve(name: str, runs: list[Run], *, dashed: bool = False) -> Curve:
@@ -106,7 +106,7 @@ def _curve(name: str, runs: list[Run], *, dashed: bool = False) -> Curve:
 def _row(run: Run) -> dict[str, Any]:
     known, unoccluded = run.errors[TRUTH], run.errors.get("unoccluded")
     interval = "" if known.low is None else f"{percent(known.low)} to {percent(known.high)}"
-    cells = (f"{1e3 * run.seconds:.3g}", percent(known.rmse), interval, percent(known.bias),
+    cells = (number(1e3 * run.seconds), percent(known.rmse), interval, percent(known.bias),
              percent(known.spread), percent(unoccluded.rmse) if unoccluded else "", times(run.in_equal_time),
              times(run.flip), times(run.ssim))
     return {"method": run.method, "settings": run.label, "cells": cells, "front": run.front}

@@ -11,6 +11,7 @@ from typing import Any
 import pydantic
 
 from refgi.bench.error import Error
+from refgi.compare.report import number
 from refgi.image import write_text
 
 FORMAT = "bench 1"
@@ -181,7 +182,7 @@ def markdown(result: Result) -> str:
                   "|---|---|--:|--:|--:|--:|--:|---|"]
         for run in sorted((*scene.runs, *scene.line), key=lambda one: one.seconds):
             known = run.errors["truth"]
-            lines.append(f"| {run.method} | {run.label} | {1e3 * run.seconds:.3g} | {percent(known.rmse)} | "
+            lines.append(f"| {run.method} | {run.label} | {number(1e3 * run.seconds)} | {percent(known.rmse)} | "
                          f"{percent(known.bias)} | {percent(known.spread)} | {times(run.in_equal_time)} | "
                          f"{'yes' if run.front else ''} |")
         lines += ["", *(f"{name} gave no picture: {why}" for name, why in scene.failures.items()), ""]

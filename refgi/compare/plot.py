@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 INK, LINE, CARD = "#010203", "#010204", "#010205"  # stand-ins, replaced by the page's own colours
-METHOD_COLOURS = [f"#0102{16 + i:02x}" for i in range(6)]
-MARKERS = "os^Dvp"
+METHOD_COLOURS = [f"#0102{16 + i:02x}" for i in range(7)]
+MARKERS = "os^DvpX"
 MOST_MARKED = 64  # points of a curve that are marked; more would hide it
 
 

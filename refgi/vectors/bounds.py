@@ -29,6 +29,7 @@ HALF_ROUNDING = 2.0**-11  # of float16
 BYTE, SIGNED_BYTE = 1 / 255, 1 / 127  # steps of [0, 1] and [-1, 1] in 8 bits
 CHANGE = 2.0  # roundings that inputs are changed by, at most
 FLUSHED = 2.0**-126  # smaller numbers are subnormal in float32: many machines flush them to 0
+BELOW_1 = 1.0 - 2.0**-24  # sample points stay in [0, 1)
 LEAST_IN_BYTES = 0.1  # large values below are not kept in 8 bits: too few steps would be left
 LARGE = 0.9  # quantile of an array's magnitudes that stands for "the largest values beside it"
 USUAL = 0.995  # quantile of changes that a budget is made of; what lies beyond are outliers
@@ -75,7 +76,8 @@ def stored_budgets(case: Case, step: Stage, known: Arrays, seed: int, *, in_byte
 
     def change(name: str, array: Array, random: np.random.Generator) -> Array:
         if steps[name]:
-            return np.asarray(steps[name] * np.floor(array / steps[name] + random.uniform(0.0, 1.0, array.shape)))
+            stored_near = steps[name] * np.floor(array / steps[name] + random.uniform(0.0, 1.0, array.shape))
+            return np.asarray(np.where(array < 1.0, np.minimum(stored_near, BELOW_1), stored_near))
         return _rounded_at_random(name, array, random, HALF_ROUNDING / CHANGE)
 
     runs = [{name: _to_bytes(array, steps[name]) if steps[name] else _to_half(array)

@@ -12,6 +12,7 @@ from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.lights import LIGHT, LOBE, light_names, pixel_lights_of
 from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, as_printed, pair_bugs
+from refgi.vectors.stages.pair_family import pair_family
 
 NORM = "(P + 1) / (2 pi K), K the share of the lobe's integral above the surface; 0 where K is below 1e-12"
 
@@ -57,6 +58,7 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
     settings = of(PairSettings, clamp="none") if pairs is None else pairs
     names = light_names(recipe)
     area = ("lights.area",) if settings.needs_footprints else ()
+    glossy = "lights.lobe_flux" in recipe.specs
 
     def run(arrays: Arrays, real: Any, how: PairSettings = settings) -> Arrays:
         receivers = receivers_of(arrays, real)
@@ -65,11 +67,13 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
 
     recipe.facts["sum.clamp"] = "none" if settings.clamp is None else settings.clamp.name()
     recipe.facts["sum.lobe_norm"] = NORM
-    recipe.factors["number of lights"] = float(recipe.expected()["lights.flux"].shape[1])
+    count = recipe.expected()["lights.flux"].shape[1]
+    recipe.factors["number of lights"] = float(count)
     recipe.add("sum", "irradiance of every pixel light at every pixel, without visibility and albedo/pi", run,
                (*RECEIVERS, *names, *area),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)},
-               paper=EQ2, bugs=(*pair_bugs(run, bool(area), "lights.lobe_flux" in recipe.specs), *(
+               paper=EQ2, bugs=(*pair_bugs(run, bool(area), glossy), *pair_family(
+                   run, bool(area), glossy, count), *(
                    (Bug("nothing is clamped", lambda a, r: run(a, r, replaced(settings, {"clamp": "none"})),
                         "docs/methods/sii_sum"),) if settings.clamp is not None else ())),
                exact=("gbuffer.position", "lights.position"), variants=(as_printed(False),))
@@ -84,7 +88,7 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
     recipe.give("gbuffer.normal", normal[:, None], Spec("xyz, row, receiver", VECTOR, "their normals", "world"))
     recipe.give("gbuffer.triangle_id", np.zeros((1, count), np.int32),
                 Spec("row, receiver", "1", "0: all are surfaces", tier="T0"))
-    names = light_names(recipe)
+    names, glossy = light_names(recipe), "lights.lobe_flux" in lights
 
     def run(arrays: Arrays, real: Any) -> Arrays:
         made = np.zeros((3, 1, count), real)
@@ -97,7 +101,7 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
     recipe.add("pairs", "irradiance of light k at receiver k", run, (*RECEIVERS, *names), {
         "pairs.irradiance": Spec("rgb, row, pair", "W/m^2", "irradiance; 0 where light and receiver coincide",
                                  "linear RGB", EQ2, alone=True)},
-        paper=EQ2, bugs=pair_bugs(run, False, "lights.lobe_flux" in lights, own=True),
+        paper=EQ2, bugs=(*pair_bugs(run, False, glossy, own=True), *pair_family(run, False, glossy, count, own=True)),
         exact=("gbuffer.position", "lights.position"), variants=(as_printed(True),))
 
 

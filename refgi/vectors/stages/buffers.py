@@ -21,11 +21,13 @@ from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.stages.ids_bugs import ids_family
 
 VECTOR, POINT = "unit vector", "m"
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
 SCENE = ("scene.vertices", "scene.faces", "scene.material_of_face")
 REFLECTANCE = ("materials.diffuse", "materials.specular", "materials.exponent")
+EARLIER = "before"  # the camera of the frame before, whose bugs are those of the camera
 NAMES = {SpotLight: "spot", PointLight: "point", DirectionalLight: "directional"}
 
 
@@ -206,10 +208,8 @@ def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scen
     recipe.add(f"{name}.ids", "nearest triangle at each texel's centre", ids, (*SCENE, *_map_names(view)),
                {f"{name}.triangle_id": Spec("row, column", "1", "nearest triangle, -1 for none", tier="T0")},
                paper="docs/rasterizer", bugs=(
-                   Bug("rows run upwards", mirrored, "row 0 is the top row (docs/conventions)"),
-                   Bug("texel centres lie at 0 instead of 1/2",
-                       reading(ids, **{f"{view}__frame": _half_texel(maps)}), "centres at + 1/2 (docs/conventions)"),
-               ))
+                   *(() if name == EARLIER else ids_family(name, view, maps)),
+                   Bug("rows run upwards: upside down", mirrored, "row 0 is the top row (docs/conventions)")))
 
 
 def _half_texel(maps: Projection) -> Any:

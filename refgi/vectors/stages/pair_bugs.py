@@ -98,7 +98,7 @@ def literal_pairs(
     least: float = 0.0, softened: float = 0.0, most: float = np.inf, norm: str = "exact", horizon: bool = True,
     lobe_cosine: bool = False, lobe_arrives: bool = True, lobe_turned: bool = False, lobe_abs: bool = False,
     lobe_power: tuple[float, float] = (1.0, 0.0), lobe_unit: bool = True, exchanged: bool = False,
-    joined: str = "sum", disc: str = "added",
+    joined: str = "sum", disc: str = "added", shortened: bool = False,
 ) -> Array:
     """Return Eq. 2 and 3 as printed, or with a bug: (3, h, w), in the type of the arrays."""
     x, n = (np.asarray(arrays[name]) for name in RECEIVERS[:2])
@@ -109,6 +109,8 @@ def literal_pairs(
     if own:  # (3, 1, n): light k with receiver k
         d = x.reshape(3, 1, -1) - lights.position[:, None]
     unit, r = _directions(-d if exchanged else d)
+    unit = unit * np.where(r > 0, r / np.sqrt(np.maximum(np.maximum(r, real(least)) ** 2 + real(softened), real(
+        1e-30))), 0) if shortened else unit
     facing, leaving = n.reshape(3, 1, -1), (lights.normal[:, None] if own else lights.normal[:, :, None])
     arriving, sent = -(facing * unit).sum(axis=0), (leaving * unit).sum(axis=0)
     area = np.asarray(arrays["lights.area"], real)[:, None] if "lights.area" in arrays else real(0)
@@ -128,7 +130,7 @@ def literal_pairs(
         peak = _norms(lights, norm).astype(real)
         cosine = (axis * unit).sum(axis=0) * (-1 if lobe_turned else 1) * (1 if lobe_unit else r)
         cosine = np.abs(cosine) if lobe_abs else np.maximum(0, cosine)
-        with np.errstate(over="ignore"):
+        with np.errstate(all="ignore"):
             shape_of = cosine ** (lobe_power[0] * exponent + lobe_power[1]) * (peak[None] if own else peak[:, None])
         shape_of = np.where((sent > 0) | (not horizon), shape_of, 0) * (np.maximum(0, sent) if lobe_cosine else 1)
         total = total + lobe * (shape_of * (received if lobe_arrives else fall))
@@ -140,8 +142,8 @@ def literal_pairs(
 def _square(r: Array, power: int, disc: Array, how: str) -> Array:
     """Return what the pair is divided by: r^2, with the disc's A/pi where there is one."""
     if how == "largest":
-        return np.maximum(r**power, disc)
-    return (r + np.sqrt(disc)) ** power if how == "radius" else r**power + disc
+        return np.asarray(np.maximum(r**power, disc))
+    return np.asarray((r + np.sqrt(disc)) ** power if how == "radius" else r**power + disc)
 
 
 def _directions(d: Array) -> tuple[Array, Array]:

@@ -42,7 +42,12 @@ def pair_family(run: Run, clamped: bool, glossy: bool, count: int, own: bool = F
     found += _disc_bugs(literal, run) if clamped else [
         *(Bug(f"distances count as at least {text} m: a clamp of the minimum distance", literal(least=square**0.5),
               NO_CLAMP) for square, text in LEAST_SQUARES.items() if own or square < 1),
+        *(Bug(f"distances count as at least {text} m and so directions are shortened: a clamp before normalisation",
+              literal(least=square**0.5, shortened=True), NO_CLAMP) for square, text in LEAST_SQUARES.items()
+          if own or square < 1),
         *(Bug(f"{term:g} is added to r^2: a softened distance", literal(softened=term), NO_CLAMP) for term in ADDED),
+        *(Bug(f"{term:g} is added to r^2 before directions are normalised", literal(softened=term, shortened=True),
+              NO_CLAMP) for term in ADDED),
         *(Bug(f"the geometry term is bounded by {most}", literal(most=most), NO_CLAMP) for most in (1, 10)
           if not glossy)]
     if not own:

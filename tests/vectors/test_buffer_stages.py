@@ -1,0 +1,41 @@
+"""Oracle tests of the kit's buffers: the literal forms that bugs are put into have none of their own."""
+
+from functools import cache
+
+import pytest
+
+from refgi.rsm.buffers.light_projection import light_projection
+from refgi.rsm.raster.projection import camera_projection
+from refgi.vectors.cases import hssil, sii
+from refgi.vectors.spec import expected_of
+from refgi.vectors.stages.ids_bugs import literal_ids
+from refgi.vectors.stages.views import view_of
+
+CASES = {**sii.QUICK, **{name: hssil.QUICK[name] for name in ("hssil-default",)}}
+EDGES = 0.004  # share of texels whose centre lies on an edge to rounding
+
+
+@cache
+def made(name):
+    """Return a case and all its arrays."""
+    case = CASES[name]()
+    return case, expected_of(case)
+
+
+def views(name):
+    """Yield each view's prefix of arrays, the name of what it sees and its maps."""
+    case, _ = made(name)
+    camera = case.facts["camera"]
+    yield "camera", "gbuffer", camera_projection(case.scene.camera, camera["columns"], camera["rows"])
+    for index, light in enumerate(case.scene.lights):
+        rsm = f"rsm{index}"
+        if rsm in case.facts:
+            yield rsm, rsm, light_projection(light, case.scene.geometry, case.facts[rsm]["columns"])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_literal_ids_without_a_bug_are_the_rasterizers(name):
+    _, known = made(name)
+    for view, seen, maps in views(name):
+        ids = literal_ids(known, view_of(known, view, maps))
+        assert (ids != known[f"{seen}.triangle_id"]).mean() <= EDGES

@@ -2,16 +2,20 @@
 
 from functools import cache
 
+import numpy as np
 import pytest
 
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.rsm.raster.projection import camera_projection
+from refgi.vectors.bounds import large_value
 from refgi.vectors.cases import hssil, sii
 from refgi.vectors.spec import expected_of
 from refgi.vectors.stages.ids_bugs import literal_ids
+from refgi.vectors.stages.surface_bugs import literal_surface
 from refgi.vectors.stages.views import view_of
 
-CASES = {**sii.QUICK, **{name: hssil.QUICK[name] for name in ("hssil-default",)}}
+CASES = {**sii.QUICK, "sii-smooth": sii.FULL["sii-smooth"], **{name: hssil.QUICK[name] for name in ("hssil-default",)}}
+SINGLE = 2.0**-22  # of an array's largest value: what storage in float32 leaves
 EDGES = 0.004  # share of texels whose centre lies on an edge to rounding
 
 
@@ -39,3 +43,16 @@ def test_literal_ids_without_a_bug_are_the_rasterizers(name):
     for view, seen, maps in views(name):
         ids = literal_ids(known, view_of(known, view, maps))
         assert (ids != known[f"{seen}.triangle_id"]).mean() <= EDGES
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_literal_surfaces_without_a_bug_are_those_of_the_gbuffer(name):
+    _, known = made(name)
+    for view, seen, maps in views(name):
+        surface = literal_surface(known, known[f"{seen}.triangle_id"], view_of(known, view, maps))
+        for key, found in surface.items():
+            if f"{seen}.{key}" in known:
+                expected = known[f"{seen}.{key}"]
+                np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
+                finite = np.isfinite(expected)
+                assert np.abs(found[finite] - expected[finite]).max(initial=0.0) <= SINGLE * large_value(expected)

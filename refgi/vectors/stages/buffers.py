@@ -22,6 +22,7 @@ from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.ids_bugs import ids_family
+from refgi.vectors.stages.surface_bugs import surface_family
 
 VECTOR, POINT = "unit vector", "m"
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
@@ -235,10 +236,11 @@ def _add_surface(
              "position": Spec("xyz, row, column", "m", "surface point; 0 without surface", "world"),
              "normal": Spec("xyz, row, column", VECTOR, "on the side that is seen; 0 without surface", "world"),
              "albedo": Spec("rgb, row, column", "1", "diffuse reflectance; 0 without surface", "linear RGB")}
-    flat = (Bug("normals are not turned to the side that is seen", _unturned(surface, name, arrays_of=scene), ""),)
+    flat = Bug("normals are not turned to the side that is seen", _unturned(surface, name, arrays_of=scene), "")
+    family = () if name == EARLIER else surface_family(name, view, maps, channels, bool(_normals(recipe)))
     recipe.add(f"{name}.surface", "depth, position and normal of what each texel sees", surface,
                (*SCENE, *_normals(recipe), *materials, *_map_names(view), f"{name}.triangle_id"),
-               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1", bugs=flat)
+               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1", bugs=(flat, *family))
 
 
 def _unturned(run: Any, name: str, arrays_of: Scene) -> Any:

@@ -10,12 +10,15 @@ from refgi.rsm.raster.projection import camera_projection
 from refgi.vectors.bounds import large_value
 from refgi.vectors.cases import hssil, sii
 from refgi.vectors.spec import expected_of
+from refgi.vectors.stages.direct_bugs import literal_direct
+from refgi.vectors.stages.flux_form import literal_flux
 from refgi.vectors.stages.ids_bugs import literal_ids
 from refgi.vectors.stages.surface_bugs import literal_surface
 from refgi.vectors.stages.views import view_of
 
 CASES = {**sii.QUICK, "sii-smooth": sii.FULL["sii-smooth"], **{name: hssil.QUICK[name] for name in ("hssil-default",)}}
 SINGLE = 2.0**-22  # of an array's largest value: what storage in float32 leaves
+FEW = 4.0  # times as much for integrals: refgi's rules of 4 and 8 nodes
 EDGES = 0.004  # share of texels whose centre lies on an edge to rounding
 
 
@@ -56,3 +59,25 @@ def test_literal_surfaces_without_a_bug_are_those_of_the_gbuffer(name):
                 np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
                 finite = np.isfinite(expected)
                 assert np.abs(found[finite] - expected[finite]).max(initial=0.0) <= SINGLE * large_value(expected)
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name.startswith("sii")])
+def test_literal_flux_without_a_bug_is_that_of_the_map(name):
+    case, known = made(name)
+    for view, seen, maps in views(name):
+        if view != "camera":
+            light = case.scene.lights[int(view[-1])]
+            flux = literal_flux(known, seen, (f"light{view[-1]}", light), view_of(known, view, maps))
+            for key, found in flux.items():
+                if f"{seen}.{key}" in known:
+                    expected = known[f"{seen}.{key}"]
+                    assert np.abs(found - expected).max() <= FEW * SINGLE * large_value(expected), key
+
+
+@pytest.mark.parametrize("name", hssil.VIEWS)
+def test_literal_direct_light_without_a_bug_is_the_stages(name):
+    case = {**hssil.QUICK, **hssil.FULL}[name]()
+    known = expected_of(case)
+    found = literal_direct(known, [(f"light{k}", light) for k, light in enumerate(case.scene.lights)])
+    expected = known["direct.irradiance"]
+    assert np.abs(found - expected).max() <= SINGLE * large_value(expected)

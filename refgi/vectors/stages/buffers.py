@@ -21,6 +21,7 @@ from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.stages.flux_bugs import flux_family
 from refgi.vectors.stages.ids_bugs import ids_family
 from refgi.vectors.stages.surface_bugs import surface_family
 
@@ -104,7 +105,7 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
                                                          materials__specular=_ones_where_any), "Phi_t = albedo ..."),
                    Bug("flux is divided by pi", writing(flux, **{f"{name}__flux": lambda a: a / np.pi}),
                        "flux is W; 1/pi comes with Eq. 1"),
-               ))
+                   *flux_family(name, lamp, light, maps, glossy)))
 
 
 def rsm_of(

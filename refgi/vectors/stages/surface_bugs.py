@@ -138,7 +138,7 @@ def literal_surface(
         point = origin + depth * d if measure == "mixed" else point
         position = {"world": point, "eye": point - origin, "corner": p[0], "middle": p.mean(axis=0),
                     "view": np.einsum("hwij,jhw->ihw", frame, point - origin)}[space]
-    shading = shading_normal(arrays, corners, p, normal, origin + t * d, d, (t, frame, origin), smooth)
+        shading = shading_normal(arrays, corners, p, normal, origin + t * d, d, (t, frame, origin), smooth)
     shading = shading if unit else shading * length
     if normal_space == "view":
         shading = np.einsum("hwij,jhw->ihw", frame, shading)

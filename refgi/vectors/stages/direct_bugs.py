@@ -14,9 +14,6 @@ Lamps = list[tuple[str, Light]]
 LAW, ALL, SHADOW = "E = I(w) cos / d^2", "all lights", "each light has its own shadows"
 COSINES = {
     "the cosine at the receiver is missing": "step",
-    "the cosine at the receiver is missing, and light from behind counts": "one",
-    "the cosine at the receiver is not clamped at 0: light from behind is negative": "any",
-    "the cosine at the receiver is taken as absolute value: light from behind counts": "abs",
     "the cosine at the receiver is squared": "squared",
     "sine in place of cosine at the receiver": "sine",
 }
@@ -138,6 +135,6 @@ def _strength(arrays: Arrays, lamps: Lamps, k: int, how: str, outer: float) -> A
 
 def _cosine(cosine: Array, how: str) -> Array:
     positive = np.maximum(0, cosine)
-    return {"step": (cosine > 0).astype(np.float64), "one": np.ones_like(cosine), "any": cosine,
-            "abs": np.abs(cosine), "squared": positive**2,
-            "sine": (cosine > 0) * np.sqrt(np.maximum(0, 1 - cosine**2))}.get(how, positive)
+    return np.asarray({
+        "step": (cosine > 0).astype(np.float64), "squared": positive**2,
+        "sine": (cosine > 0) * np.sqrt(np.maximum(0, 1 - cosine**2))}.get(how, positive))

@@ -60,12 +60,11 @@ def ids_family(name: str, view: str, maps: Projection) -> tuple[Bug, ...]:
     if maps.kind == ORTHOGRAPHIC:
         found.append(Bug("perspective division in a parallel projection", literal(parallel=False), "orthographic"))
     else:
-        found += [
-            Bug("no perspective division: a parallel projection", literal(parallel=True), "(x, y) / depth"),
-            Bug("triangles that reach behind the eye are left out and not clipped", literal(whole=True), LOWEST),
-            Bug("depth is interpolated without perspective: z and not 1/z", literal(compared="affine"),
-                "1/z is linear"),
-        ]
+        found.append(
+            Bug("no perspective division: a parallel projection", literal(parallel=True), "(x, y) / depth"))
+    if maps.maps > 1:
+        found.append(Bug("triangles that reach behind the eye are left out and not clipped", literal(whole=True),
+                         LOWEST))
     return tuple(found)
 
 
@@ -101,8 +100,6 @@ def literal_ids(
             if flat:
                 near = -(share * depth[..., None]).sum(axis=1) / share.sum(axis=1)
             covers &= (near > 0) | view.parallel
-            if compared == "affine":
-                near = (share * depth[..., None]).sum(axis=1) / (share * depth[..., None] ** 2).sum(axis=1)
         if compared in ("first", "mean"):
             key = depth[:, 0] if compared == "first" else depth.mean(axis=1)
             near = np.broadcast_to(-key[:, None], near.shape)

@@ -48,7 +48,6 @@ def surface_family(name: str, view: str, maps: Projection, channels: tuple[str, 
         Bug("positions are the triangle's first corner", literal(space="corner"), WORLD),
         Bug("positions are the triangle's centre", literal(space="middle"), WORLD),
         Bug("normals are turned away from the side that is seen", literal(side="away"), SIDE),
-        Bug("normals are turned upwards: to +y and not to the side that is seen", literal(side="up"), SIDE),
         Bug("normals are as the triangle is wound: not turned to the side that is seen", literal(side="wound"), SIDE),
         Bug("normals are not normalised: the cross product of two edges", literal(unit=False), "unit vector"),
         *(Bug(f"the sign of the cross product's {which} component", literal(turned=k), "a x b")
@@ -75,7 +74,8 @@ def surface_family(name: str, view: str, maps: Projection, channels: tuple[str, 
     if smooth:
         found += _smooth_bugs(literal)
     if "albedo" in channels:
-        found += _albedo_bugs(literal)
+        found += [*_albedo_bugs(literal), Bug("normals are turned upwards: to +y and not to the side that is seen",
+                                              literal(side="up"), SIDE)]
     return tuple(found)
 
 
@@ -87,8 +87,6 @@ def _smooth_bugs(literal: Any) -> list[Bug]:
             SMOOTH),
         Bug("the mean of the vertex normals for the whole triangle: not interpolated", literal(smooth="mean"), SMOOTH),
         Bug("interpolated normals are not normalised", literal(smooth="long"), "unit vector"),
-        Bug("interpolated normals are not turned to the side that is seen", literal(smooth="unturned"), SIDE),
-        Bug("interpolated normals are turned by the ray, not with the face", literal(smooth="by ray"), SIDE),
         Bug("barycentric coordinates belong to the corner after theirs", literal(smooth="after"), SMOOTH),
         Bug("barycentric coordinates belong to the corner before theirs", literal(smooth="before"), SMOOTH),
         Bug("normals are interpolated on the image plane: not perspective-correct", literal(smooth="affine"), SMOOTH),
@@ -138,7 +136,7 @@ def literal_surface(
         point = origin + depth * d if measure == "mixed" else point
         position = {"world": point, "eye": point - origin, "corner": p[0], "middle": p.mean(axis=0),
                     "view": np.einsum("hwij,jhw->ihw", frame, point - origin)}[space]
-        shading = shading_normal(arrays, corners, p, normal, origin + t * d, d, (t, frame, origin), smooth)
+        shading = shading_normal(arrays, corners, p, normal, origin + t * d, (frame, origin), smooth)
     shading = shading if unit else shading * length
     if normal_space == "view":
         shading = np.einsum("hwij,jhw->ihw", frame, shading)
@@ -166,13 +164,12 @@ def rays(
 
 
 def shading_normal(
-    arrays: Arrays, corners: Array, p: Array, face: Array, point: Array, d: Array, seen: tuple[Array, Array, Array],
-    how: str,
+    arrays: Arrays, corners: Array, p: Array, face: Array, point: Array, view: tuple[Array, Array], how: str
 ) -> Array:
     """Return the normal interpolated at points of triangles, or with a bug; the face's where there is none."""
     if "scene.vertex_normals" not in arrays or how == "no":
         return face
-    _, frame, origin = seen
+    frame, origin = view
     normals = np.moveaxis(np.asarray(arrays["scene.vertex_normals"], np.float64)[corners], (2, 3), (0, 1))
     share = np.stack([(face * np.cross(p[(k + 1) % 3] - point, p[(k + 2) % 3] - point, axis=0)).sum(axis=0)
                       for k in range(3)])
@@ -183,9 +180,7 @@ def shading_normal(
     total = (share[:, None] * normals).sum(axis=0)
     if how == "long":
         total = total / share.sum(axis=0)
-    side = -d if how == "by ray" else face
-    if how != "unturned":
-        total = np.where((total * side).sum(axis=0) < 0, -total, total)
+    total = np.where((total * face).sum(axis=0) < 0, -total, total)
     with np.errstate(all="ignore"):
         return total if how == "long" else np.asarray(total / np.sqrt((total**2).sum(axis=0)))
 

@@ -27,6 +27,7 @@ from refgi.vectors.stages.buffers import (
     light_of,
 )
 from refgi.vectors.stages.direct_bugs import direct_family
+from refgi.vectors.stages.shadow_bugs import shadow_map_family
 
 POINTS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
 Shadows = Literal["map", "exact"]
@@ -83,7 +84,7 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
                    Bug("the map's depths are those at its texels' corners", reading(test, **{
                        f"{printed}__depth": _moved, f"{printed}__position": _moved}), "texel centres at + 1/2"),
                    Bug("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
-               ))
+                   *shadow_map_family(test, name, maps, index)))
 
 
 def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:

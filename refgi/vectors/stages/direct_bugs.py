@@ -24,6 +24,8 @@ def direct_family(lamps: Lamps) -> tuple[Bug, ...]:
     def literal(**bugs: Any) -> Run:
         return lambda arrays, real: {"direct.irradiance": literal_direct(arrays, lamps, **bugs).astype(real)}
 
+    if not lamps:
+        return ()
     spot = any(isinstance(light, SpotLight) for _, light in lamps)
     found = [Bug(cause, literal(cosine=how), LAW) for cause, how in COSINES.items()]
     found += [

@@ -130,9 +130,10 @@ def literal_pairs(
         peak = _norms(lights, norm).astype(real)
         cosine = (axis * unit).sum(axis=0) * (-1 if lobe_turned else 1) * (1 if lobe_unit else r)
         cosine = np.abs(cosine) if lobe_abs else np.maximum(0, cosine)
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"):  # 0 to the power of -1
             shape_of = cosine ** (lobe_power[0] * exponent + lobe_power[1]) * (peak[None] if own else peak[:, None])
-        shape_of = np.where((sent > 0) | (not horizon), shape_of, 0) * (np.maximum(0, sent) if lobe_cosine else 1)
+        shape_of = np.where(np.isfinite(shape_of) & ((sent > 0) | (not horizon)), shape_of, 0)
+        shape_of = shape_of * (np.maximum(0, sent) if lobe_cosine else 1)
         total = total + lobe * (shape_of * (received if lobe_arrives else fall))
     total = {"max": lambda: total.max(axis=1, initial=0), "last": lambda: total[:, -1:].sum(axis=1),
              "sum": lambda: total.sum(axis=1)}[joined]()

@@ -21,11 +21,15 @@ from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.stages.flux_bugs import flux_family
+from refgi.vectors.stages.ids_bugs import ids_family
+from refgi.vectors.stages.surface_bugs import surface_family
 
 VECTOR, POINT = "unit vector", "m"
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
 SCENE = ("scene.vertices", "scene.faces", "scene.material_of_face")
 REFLECTANCE = ("materials.diffuse", "materials.specular", "materials.exponent")
+EARLIER = "before"  # the camera of the frame before, whose bugs are those of the camera
 NAMES = {SpotLight: "spot", PointLight: "point", DirectionalLight: "directional"}
 
 
@@ -101,7 +105,7 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
                                                          materials__specular=_ones_where_any), "Phi_t = albedo ..."),
                    Bug("flux is divided by pi", writing(flux, **{f"{name}__flux": lambda a: a / np.pi}),
                        "flux is W; 1/pi comes with Eq. 1"),
-               ))
+                   *flux_family(name, lamp, light, maps, glossy)))
 
 
 def rsm_of(
@@ -206,10 +210,8 @@ def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scen
     recipe.add(f"{name}.ids", "nearest triangle at each texel's centre", ids, (*SCENE, *_map_names(view)),
                {f"{name}.triangle_id": Spec("row, column", "1", "nearest triangle, -1 for none", tier="T0")},
                paper="docs/rasterizer", bugs=(
-                   Bug("rows run upwards", mirrored, "row 0 is the top row (docs/conventions)"),
-                   Bug("texel centres lie at 0 instead of 1/2",
-                       reading(ids, **{f"{view}__frame": _half_texel(maps)}), "centres at + 1/2 (docs/conventions)"),
-               ))
+                   *(() if name == EARLIER else ids_family(name, view, maps)),
+                   Bug("rows run upwards: upside down", mirrored, "row 0 is the top row (docs/conventions)")))
 
 
 def _half_texel(maps: Projection) -> Any:
@@ -235,10 +237,11 @@ def _add_surface(
              "position": Spec("xyz, row, column", "m", "surface point; 0 without surface", "world"),
              "normal": Spec("xyz, row, column", VECTOR, "on the side that is seen; 0 without surface", "world"),
              "albedo": Spec("rgb, row, column", "1", "diffuse reflectance; 0 without surface", "linear RGB")}
-    flat = (Bug("normals are not turned to the side that is seen", _unturned(surface, name, arrays_of=scene), ""),)
+    flat = Bug("normals are not turned to the side that is seen", _unturned(surface, name, arrays_of=scene), "")
+    family = () if name == EARLIER else surface_family(name, view, maps, channels, bool(_normals(recipe)))
     recipe.add(f"{name}.surface", "depth, position and normal of what each texel sees", surface,
                (*SCENE, *_normals(recipe), *materials, *_map_names(view), f"{name}.triangle_id"),
-               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1", bugs=flat)
+               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1", bugs=(flat, *family))
 
 
 def _unturned(run: Any, name: str, arrays_of: Scene) -> Any:

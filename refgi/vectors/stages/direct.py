@@ -26,6 +26,8 @@ from refgi.vectors.stages.buffers import (
     geometry_of,
     light_of,
 )
+from refgi.vectors.stages.direct_bugs import direct_family
+from refgi.vectors.stages.shadow_bugs import shadow_map_family
 
 POINTS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
 Shadows = Literal["map", "exact"]
@@ -82,7 +84,7 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
                    Bug("the map's depths are those at its texels' corners", reading(test, **{
                        f"{printed}__depth": _moved, f"{printed}__position": _moved}), "texel centres at + 1/2"),
                    Bug("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
-               ))
+                   *shadow_map_family(test, name, maps, index)))
 
 
 def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:
@@ -121,23 +123,10 @@ def _add_sum(recipe: Recipe, scene: Scene, view: Projection) -> None:
     def unshadowed(array: Array) -> Array:
         return np.ones_like(array)
 
-    def away(arrays: Arrays, power: int) -> Array:
-        """Distance from the first light that has a place, to a power, at pixels with a surface."""
-        place = next((arrays[name] for name in names if name.endswith("position")), np.zeros(3))
-        square = ((arrays[POINTS[0]] - np.reshape(place, (3, 1, 1))) ** 2).sum(axis=0)
-        return np.asarray(np.where(np.asarray(arrays[POINTS[2]]) >= 0, square ** (power / 2), 1.0))
-
-    def times(power: int) -> Any:
-        return lambda a, r: {"direct.irradiance": run(a, r)["direct.irradiance"] * away(a, power)}
-
     positions = tuple(name for name in names if name.endswith("position"))
-    near = (Bug("1/d^2 is missing", times(2), "E = I cos / d^2"),
-            Bug("1/d in place of 1/d^2", times(1), "E = I cos / d^2")) if positions else ()
     spots = [name.replace(".", "__") for name in names if name.endswith("half_angles")]
-    cones = (Bug("the cone's edge is hard", reading(run, **{name: lambda a: a[[1, 1]] for name in spots}),
-                 "docs/conventions: smooth edge of a spot"),
-             Bug("whole angles in place of half-angles", reading(run, **{name: lambda a: a / 2 for name in spots}),
-                 "half-angles")) if spots else ()
+    cones = (Bug("the outer half-angle for both: the cone's edge is hard", reading(run, **{
+        name: lambda a: a[[1, 1]] for name in spots}), "docs/conventions: smooth edge of a spot"),) if spots else ()
     recipe.add("direct", "direct irradiance of all lights, without albedo/pi", run, (*POINTS, *names, *shadows),
                {"direct.irradiance": Spec("rgb, row, column", "W/m^2", "direct irradiance; 0 without surface",
                                           "linear RGB", "E = I(w) cos / d^2")},
@@ -146,10 +135,7 @@ def _add_sum(recipe: Recipe, scene: Scene, view: Projection) -> None:
                                                               shadows}), "HSS Sec. 4"),
                    Bug("the normal points inwards", reading(run, gbuffer__normal=lambda a: -a), "E = I cos / d^2"),
                    Bug("irradiance is divided by pi", writing(run, direct__irradiance=lambda a: a / np.pi),
-                       "albedo/pi comes with the radiance"), *near, *cones,
-                   *((Bug("the first light alone", reading(run, **{name.replace(".", "__"): np.zeros_like for name in
-                                                                    shadows[1:]}), "all lights"),)
-                     if len(lights) > 1 else ())))
+                       "albedo/pi comes with the radiance"), *cones, *direct_family(lights)))
 
 
 def _visible_spec() -> Spec:

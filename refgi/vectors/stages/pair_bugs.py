@@ -18,7 +18,7 @@ CLAMPED, DISC = "<a.b> = max(0, a.b)", "r^2 + A/pi"
 def as_printed(own: bool) -> Run:
     """Return Eq. 2 and 3 as a port would write them from the paper; with footprints the disc's r^2 + A/pi for r^2."""
     def run(arrays: Arrays, real: Any) -> Arrays:
-        return {("pairs" if own else "sum") + ".irradiance": _literal(arrays, own).astype(real)}
+        return {("pairs" if own else "sum") + ".irradiance": literal_pairs(arrays, own).astype(real)}
 
     return run
 
@@ -27,7 +27,7 @@ def pair_bugs(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple
     """Return likely bugs of Eq. 2 and 3; `own`: light k meets receiver k alone."""
     def literal(**bugs: Any) -> Run:
         def altered(arrays: Arrays, real: Any) -> Arrays:
-            return {("pairs" if own else "sum") + ".irradiance": _literal(arrays, own, **bugs).astype(real)}
+            return {("pairs" if own else "sum") + ".irradiance": literal_pairs(arrays, own, **bugs).astype(real)}
 
         return altered
 
@@ -93,10 +93,12 @@ def _without_last(array: Array) -> Array:
     return kept
 
 
-def _literal(
+def literal_pairs(
     arrays: Arrays, own: bool, *, arrives: str = "positive", leaves: str = "positive", power: int = 2,
-    least: float = 0.0, norm: str = "exact", horizon: bool = True, lobe_cosine: bool = False,
-    lobe_turned: bool = False, exchanged: bool = False, joined: str = "sum",
+    least: float = 0.0, softened: float = 0.0, most: float = np.inf, norm: str = "exact", horizon: bool = True,
+    lobe_cosine: bool = False, lobe_arrives: bool = True, lobe_turned: bool = False, lobe_abs: bool = False,
+    lobe_power: tuple[float, float] = (1.0, 0.0), lobe_unit: bool = True, exchanged: bool = False,
+    joined: str = "sum", disc: str = "added", shortened: bool = False,
 ) -> Array:
     """Return Eq. 2 and 3 as printed, or with a bug: (3, h, w), in the type of the arrays."""
     x, n = (np.asarray(arrays[name]) for name in RECEIVERS[:2])
@@ -107,28 +109,42 @@ def _literal(
     if own:  # (3, 1, n): light k with receiver k
         d = x.reshape(3, 1, -1) - lights.position[:, None]
     unit, r = _directions(-d if exchanged else d)
+    unit = unit * np.where(r > 0, r / np.sqrt(np.maximum(np.maximum(r, real(least)) ** 2 + real(softened), real(
+        1e-30))), 0) if shortened else unit
     facing, leaving = n.reshape(3, 1, -1), (lights.normal[:, None] if own else lights.normal[:, :, None])
     arriving, sent = -(facing * unit).sum(axis=0), (leaving * unit).sum(axis=0)
     area = np.asarray(arrays["lights.area"], real)[:, None] if "lights.area" in arrays else real(0)
     with np.errstate(divide="ignore"):
-        square = np.maximum(r, real(least)) ** power + area / real(np.pi)
+        square = _square(np.maximum(r, real(least)), power, area / real(np.pi), disc) + real(softened)
         fall = {0: np.ones_like(r), 1: 1 / r}.get(power, 1 / square)
     if power == 0:
         arriving, sent = arriving * r, sent * r
-    received = _cosine(arriving, arrives) * np.where(r > 0, fall, 0)
+    fall = np.where(r > 0, fall, 0)
+    received = _cosine(arriving, arrives) * fall
     flux = lights.flux[:, None] if own else lights.flux[:, :, None]
-    total = flux / real(np.pi) * (_cosine(sent, leaves) * received)
+    total = flux / real(np.pi) * np.minimum(_cosine(sent, leaves) * received, real(most))
     if lights.lobe_flux is not None and lights.lobe_axis is not None and lights.lobe_exponent is not None:
         axis = lights.lobe_axis[:, None] if own else lights.lobe_axis[:, :, None]
         exponent = lights.lobe_exponent[None] if own else lights.lobe_exponent[:, None]
         lobe = lights.lobe_flux[:, None] if own else lights.lobe_flux[:, :, None]
         peak = _norms(lights, norm).astype(real)
-        cosine = (axis * unit).sum(axis=0) * (-1 if lobe_turned else 1)
-        shape_of = np.maximum(0, cosine) ** exponent * (peak[None] if own else peak[:, None])
-        shape_of = np.where((sent > 0) | (not horizon), shape_of, 0) * (np.maximum(0, sent) if lobe_cosine else 1)
-        total = total + lobe * (shape_of * received)
-    total = total.max(axis=1, initial=0) if joined == "max" else total.sum(axis=1)
+        cosine = (axis * unit).sum(axis=0) * (-1 if lobe_turned else 1) * (1 if lobe_unit else r)
+        cosine = np.abs(cosine) if lobe_abs else np.maximum(0, cosine)
+        with np.errstate(all="ignore"):  # 0 to the power of -1
+            shape_of = cosine ** (lobe_power[0] * exponent + lobe_power[1]) * (peak[None] if own else peak[:, None])
+        shape_of = np.where(np.isfinite(shape_of) & ((sent > 0) | (not horizon)), shape_of, 0)
+        shape_of = shape_of * (np.maximum(0, sent) if lobe_cosine else 1)
+        total = total + lobe * (shape_of * (received if lobe_arrives else fall))
+    total = {"max": lambda: total.max(axis=1, initial=0), "last": lambda: total[:, -1:].sum(axis=1),
+             "sum": lambda: total.sum(axis=1)}[joined]()
     return np.asarray(np.where(covered, total, 0).reshape(3, *shape))
+
+
+def _square(r: Array, power: int, disc: Array, how: str) -> Array:
+    """Return what the pair is divided by: r^2, with the disc's A/pi where there is one."""
+    if how == "largest":
+        return np.asarray(np.maximum(r**power, disc))
+    return np.asarray((r + np.sqrt(disc)) ** power if how == "radius" else r**power + disc)
 
 
 def _directions(d: Array) -> tuple[Array, Array]:
@@ -139,7 +155,9 @@ def _directions(d: Array) -> tuple[Array, Array]:
 def _cosine(cosine: Array, how: str) -> Array:
     if how == "none":
         return (cosine > 0).astype(cosine.dtype)
-    return {"positive": np.maximum(0, cosine), "any": cosine, "abs": np.abs(cosine)}[how]
+    positive = np.maximum(0, cosine)
+    return {"positive": positive, "any": cosine, "abs": np.abs(cosine), "one": np.ones_like(cosine),
+            "squared": positive**2, "sine": np.where(cosine > 0, np.sqrt(np.maximum(0, 1 - cosine**2)), 0)}[how]
 
 
 def _norms(lights: PixelLights, norm: str) -> Array:
@@ -147,8 +165,9 @@ def _norms(lights: PixelLights, norm: str) -> Array:
     assert lights.lobe_exponent is not None
     if norm == "none":
         return np.ones(lights.position.shape[1], lights.position.dtype)
-    if norm in ("full", "cosine"):
-        return (lights.lobe_exponent + (1 if norm == "full" else 2)) / (2 * np.pi)
+    more = {"full": 1, "cosine": 2, "short": 0}.get(norm)
+    if more is not None:
+        return (lights.lobe_exponent + more) / (2 * np.pi)
     cosine = np.clip((lights.normal * lights.lobe_axis).sum(axis=0), -1, 1)
     return np.array([lobe_norm(c, p) for c, p in zip(cosine, lights.lobe_exponent, strict=True)], np.float64)
 

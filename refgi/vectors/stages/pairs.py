@@ -7,12 +7,14 @@ import numpy as np
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.settings import of, replaced
-from refgi.vectors.recipe import Recipe
+from refgi.vectors.recipe import Recipe, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.lights import LIGHT, LOBE, light_names, pixel_lights_of
 from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, as_printed, pair_bugs
+from refgi.vectors.stages.pair_family import pair_family
 
+AREA = "A = Omega d^2 / cos, times T/N w"
 NORM = "(P + 1) / (2 pi K), K the share of the lobe's integral above the surface; 0 where K is below 1e-12"
 
 
@@ -28,28 +30,37 @@ def add_footprints(recipe: Recipe, maps: int) -> None:
     places = tuple(f"light{k}.position" if f"light{k}.position" in recipe.specs else f"light{k}.direction"
                    for k in range(maps))
 
-    def run(arrays: Arrays, real: Any, squared: bool = True, slanted: bool = True) -> Arrays:
+    def run(arrays: Arrays, real: Any, power: float = 1, slant: float = -1, weighted: bool = True) -> Arrays:
         lights, chosen = pixel_lights_of(arrays, real), np.asarray(arrays["lights.map"])
         area = np.zeros(len(chosen), real)
         for k in range(maps):
             here = chosen == k
             texel = np.asarray(arrays["lights.texel"])[here]
             weight = dict(zip(np.asarray(arrays[f"rsm{k}.texel"]).tolist(), arrays[f"rsm{k}.weight"], strict=True))
-            angle = arrays[f"rsm{k}.solid_angle"].reshape(-1)[texel] * np.array([weight[int(t)] for t in texel], real)
+            angle = arrays[f"rsm{k}.solid_angle"].reshape(-1)[texel]
+            angle = angle * np.array([weight[int(t)] for t in texel], real) if weighted else angle
             near = f"light{k}.position" in arrays
             away = (arrays[f"light{k}.position"][:, None] - lights.position[:, here] if near else
                     np.broadcast_to(-arrays[f"light{k}.direction"][:, None], (3, int(here.sum()))))
             square = (away**2).sum(axis=0)
             cosine = np.abs((away * lights.normal[:, here]).sum(axis=0)) / np.sqrt(square)
-            area[here] = angle * (square if near and squared else 1) / (np.maximum(cosine, 1e-3) if slanted else 1)
+            area[here] = angle * (square**power if near else 1) * np.maximum(cosine, 1e-3) ** slant
         return {"lights.area": area}
 
     recipe.add("footprints", "surface that each light stands for", run,
                (*light_names(recipe), "lights.texel", "lights.map", *places, *reads),
                {"lights.area": Spec("light", "m^2", "Omega d^2 / cos of the light's texel, times T/N w")},
                paper="docs/methods/sii_sum", bugs=(
-                   Bug("the squared distance is missing", lambda a, r: run(a, r, False), "A = Omega d^2 / cos"),
-                   Bug("the cosine is missing", lambda a, r: run(a, r, True, False), "A = Omega d^2 / cos")))
+                   Bug("the squared distance is missing", lambda a, r: run(a, r, 0), AREA),
+                   Bug("the distance in place of its square", lambda a, r: run(a, r, 0.5), AREA),
+                   Bug("divided by the squared distance, not multiplied", lambda a, r: run(a, r, -1), AREA),
+                   Bug("the cosine is missing", lambda a, r: run(a, r, 1, 0), AREA),
+                   Bug("multiplied by the cosine, not divided", lambda a, r: run(a, r, 1, 1), AREA),
+                   Bug("divided by the squared cosine", lambda a, r: run(a, r, 1, -2), AREA),
+                   Bug("the light's weight T/N w is missing: the area of one texel", lambda a, r: run(
+                       a, r, weighted=False), AREA),
+                   Bug("the footprint is divided by pi already", writing(run, lights__area=lambda a: a / np.pi),
+                       AREA)))
 
 
 def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
@@ -57,6 +68,7 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
     settings = of(PairSettings, clamp="none") if pairs is None else pairs
     names = light_names(recipe)
     area = ("lights.area",) if settings.needs_footprints else ()
+    glossy = "lights.lobe_flux" in recipe.specs
 
     def run(arrays: Arrays, real: Any, how: PairSettings = settings) -> Arrays:
         receivers = receivers_of(arrays, real)
@@ -65,11 +77,13 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
 
     recipe.facts["sum.clamp"] = "none" if settings.clamp is None else settings.clamp.name()
     recipe.facts["sum.lobe_norm"] = NORM
-    recipe.factors["number of lights"] = float(recipe.expected()["lights.flux"].shape[1])
+    count = recipe.expected()["lights.flux"].shape[1]
+    recipe.factors["number of lights"] = float(count)
     recipe.add("sum", "irradiance of every pixel light at every pixel, without visibility and albedo/pi", run,
                (*RECEIVERS, *names, *area),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)},
-               paper=EQ2, bugs=(*pair_bugs(run, bool(area), "lights.lobe_flux" in recipe.specs), *(
+               paper=EQ2, bugs=(*pair_bugs(run, bool(area), glossy), *pair_family(
+                   run, bool(area), glossy, count), *(
                    (Bug("nothing is clamped", lambda a, r: run(a, r, replaced(settings, {"clamp": "none"})),
                         "docs/methods/sii_sum"),) if settings.clamp is not None else ())),
                exact=("gbuffer.position", "lights.position"), variants=(as_printed(False),))
@@ -84,7 +98,7 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
     recipe.give("gbuffer.normal", normal[:, None], Spec("xyz, row, receiver", VECTOR, "their normals", "world"))
     recipe.give("gbuffer.triangle_id", np.zeros((1, count), np.int32),
                 Spec("row, receiver", "1", "0: all are surfaces", tier="T0"))
-    names = light_names(recipe)
+    names, glossy = light_names(recipe), "lights.lobe_flux" in lights
 
     def run(arrays: Arrays, real: Any) -> Arrays:
         made = np.zeros((3, 1, count), real)
@@ -97,7 +111,7 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
     recipe.add("pairs", "irradiance of light k at receiver k", run, (*RECEIVERS, *names), {
         "pairs.irradiance": Spec("rgb, row, pair", "W/m^2", "irradiance; 0 where light and receiver coincide",
                                  "linear RGB", EQ2, alone=True)},
-        paper=EQ2, bugs=pair_bugs(run, False, "lights.lobe_flux" in lights, own=True),
+        paper=EQ2, bugs=(*pair_bugs(run, False, glossy, own=True), *pair_family(run, False, glossy, count, own=True)),
         exact=("gbuffer.position", "lights.position"), variants=(as_printed(True),))
 
 

@@ -13,6 +13,7 @@ from refgi.splat.multires.settings import Diagonal
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.multires_ranges import IDS, covered_of, everywhere, of_levels
+from refgi.vectors.stages.states_bugs import states_bugs
 
 SUBSPLATS = ("multires.level", "multires.row", "multires.column", "multires.pixel")
 
@@ -39,8 +40,8 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
 
     whole = {name.replace(".", "__"): lambda a: np.where(a == EMPTY, ENOUGH, a) for name in states}
     beside = {name.replace(".", "__"): _spread_to_sides for name in marks}
-    names = {"off": "neighbours across a corner do not count", "corner": "of neighbours across a corner only those "
-             "count that no cell between shows", "literal": "every neighbour across a corner counts",
+    names = {"off": "cells are not refined for their neighbours' sake, across a corner",
+             "corner": "of neighbours across a corner only those count that no cell between shows", "literal": "every neighbour across a corner counts",
              "full8": "all eight neighbours count"}
     recipe.add("multires.states", "which cells are refined, by their own need or across a corner", run, (IDS, *marks), {
         name: Spec("row, column", "1", "0 no surface, 1 a subsplat may end here, 2 refined", tier="T0")
@@ -50,7 +51,8 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
               for rule in get_args(Diagonal) if rule != diagonal),
             Bug("cells without surface are kept", writing(run, **whole), "they are never evaluated"),
             Bug("neighbours across an edge count, not those across a corner", reading(
-                lambda a, r: run(a, r, "off"), **beside), "E-AMS-10")))
+                lambda a, r: run(a, r, "off"), **beside), "E-AMS-10"),
+            *states_bugs(run, diagonal, marks, states)))
 
 
 def _spread_to_sides(marks: Array) -> Array:

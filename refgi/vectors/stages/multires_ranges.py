@@ -23,6 +23,7 @@ from refgi.splat.multires.refinement.mipmap import START, Mipmap, element_count,
 from refgi.splat.multires.settings import Criteria, Measure
 from refgi.vectors.recipe import Recipe, reading
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
+from refgi.vectors.stages.marks_bugs import marks_bugs
 from refgi.vectors.stages.ranges_bugs import ranges_bugs
 from refgi.vectors.stages.slopes_bugs import curvatures_bugs, slopes_bugs
 
@@ -189,15 +190,14 @@ def add_discontinuities(
     if criteria.depth is not None:
         bugs += [Bug(cause, another(depth=dataclasses.replace(criteria.depth, measure=measure)), "E-AMS-07")
                  for measure, cause in zip(get_args(Measure), (
-                       "depths are compared with a share of the depth", "depths are compared with a length in metres",
+                       "depths are compared with a share of the depth (relative, not absolute)",
+                       "depths are compared with a length in metres (absolute, not relative)",
                        "the threshold of depths falls as 3 / level"), strict=True) if measure != criteria.depth.measure]
     if criteria.normal is not None and criteria.normal.components == "xyz":
         bugs.append(Bug("z of the normals is left out", another(normal=dataclasses.replace(
             criteria.normal, components="xy")), "E-AMS-07: three components, x and y in the authors' demo"))
-    if criteria.depth is not None and criteria.normal is not None:
-        single = dataclasses.replace(criteria, depth=None), dataclasses.replace(criteria, normal=None)
-        bugs.append(Bug("depth and normal must both be discontinuous", lambda a, r: dict(zip(names, level_views(
-            marks(a, r, single[0]) & marks(a, r, single[1]), sizes, first=1), strict=True)), "any test counts"))
+    if criteria.depth is not None or criteria.derivative is not None:
+        bugs += marks_bugs(names, criteria, finest)
     if finest:
         bugs.append(Bug("cells of the finest level are refined", lambda a, r: run(a, r, stop=finest - 1),
                         "the finest level is never refined"))

@@ -21,11 +21,12 @@ def ranges_bugs(what: str, top: int, rim: int, components: int) -> Iterator[Bug]
 
         return altered
 
-    for cause, trim in (("the last row of each cell is left out (or of its rim)", (0, -1, 0, 0)),
-                        ("the last column of each cell is left out (or of its rim)", (0, 0, 0, -1)),
-                        ("the last row and the last column of each cell are left out", (0, -1, 0, -1)),
-                        ("the first row of each cell is left out (or of its rim)", (-1, 0, 0, 0)),
-                        ("the first column of each cell is left out (or of its rim)", (0, 0, -1, 0)),
+    sides = {"last row": ("below", (0, -1, 0, 0)), "last column": ("right", (0, 0, 0, -1)),
+             "first row": ("above", (-1, 0, 0, 0)), "first column": ("left", (0, 0, -1, 0))}
+    for line, (side, trim) in sides.items():
+        yield Bug(f"the rim lies on one side of a cell alone, none {side}: the {line} is left out" if rim else
+                  f"the {line} of each cell is left out", literal(trim=trim), CUT)
+    for cause, trim in (("the last row and the last column of each cell are left out", (0, -1, 0, -1)),
                         ("one row too many: the next cell's first row counts as well", (0, 1, 0, 0)),
                         ("one column too many: the next cell's first column counts as well", (0, 0, 0, 1)),
                         ("one row and one column of the next cell count as well", (0, 1, 0, 1)),

@@ -81,8 +81,7 @@ def warp_bugs(name: str, maps: int, warp: Warp, run: Run) -> Iterator[Bug]:
     yield Bug("cells of odd sides count as halved evenly: 1/2 in place of the share of their texels",
               literal(even=True), EQ)
     yield Bug("borders of cells as if sides were powers of two: (i + x) / 2^levels", literal(powers=True), EQ)
-    if maps > 1:
-        yield from _face_bugs(literal)
+    yield from _face_bugs(literal) if maps > 1 else ()
 
 
 def _renormalised(name: str, run: Run) -> Iterator[Bug]:

@@ -12,7 +12,7 @@ from refgi.splat.multires.subsplats.upsample import black_level, filled_cells
 from refgi.vectors.cases.multires import FULL, FULL_PLANS, QUICK, QUICK_PLANS, settings_of
 from refgi.vectors.stages.lights import pixel_lights_of
 from refgi.vectors.stages.multires_list import subsplats_of
-from refgi.vectors.stages.multires_upsample import tent
+from refgi.vectors.stages.upsample_bugs import tent
 from tests.naive import multires as twin
 from tests.naive import per_light, refinement, upsample
 from tests.vectors.splat_ports import LARGEST_MASK, expect_within, made, masked_shares, stages_of, unseen

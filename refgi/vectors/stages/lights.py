@@ -13,6 +13,10 @@ from refgi.scene import Scene
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import REFLECTANCE, SCENE, VECTOR, _light_names, _map_names, rsm_of
+from refgi.vectors.stages.lights_bugs import lights_bugs
+from refgi.vectors.stages.points_bugs import below_1, grid_bugs, halton_bugs, importance_bugs
+from refgi.vectors.stages.texel_bugs import texel_bugs
+from refgi.vectors.stages.warp_bugs import warp_bugs
 
 Pattern = Literal["halton", "grid", "given"]
 LIGHT = ("position", "normal", "flux")
@@ -31,50 +35,48 @@ def add_lights(
     for index, count in enumerate(counts):
         if pattern == "grid" and recipe.facts[f"rsm{index}"]["maps"] > 1:
             raise ValueError(f"{recipe.id}: a grid on stacked maps: refgi lays one on each")
-        add_points(recipe, index, count, pattern, shifts[index] if shifts else None)
-        _add_texels(recipe, scene, resolution, index, count, warp)
+        add_points(recipe, index, count, pattern, shifts[index] if shifts else None, before=sum(counts[:index]),
+                   first=shifts[0] if shifts and index else None)
+        _add_texels(recipe, scene, resolution, index, counts, warp)
         texels.append(f"rsm{index}.texel")
         weights.append(f"rsm{index}.weight")
     _add_chosen(recipe, scene, resolution, counts)
 
 
 def add_points(
-    recipe: Recipe, index: int, count: int, pattern: Pattern, shift: tuple[float, float] | None = None
+    recipe: Recipe, index: int, count: int, pattern: Pattern, shift: tuple[float, float] | None = None, *,
+    before: int = 0, first: tuple[float, float] | None = None,
 ) -> None:
-    """Add the points of the unit square that texels of a map are chosen by: computed, or given as random numbers."""
+    """Add the points of the unit square that texels of a map are chosen by: computed, or given as random numbers.
+
+    `before`, `first`: points of the maps before and the first map's shift, which a port may take for this one's.
+    """
     name = f"rsm{index}.points"
     recipe.facts[name] = pattern
     spec = Spec("point, uv", "1", "points of the unit square in [0, 1): u along columns, v along rows downwards")
     if pattern == "given":
-        recipe.give(name, _below_1(np.random.default_rng([7, index]).random((count, 2))), spec)
+        recipe.give(name, below_1(np.random.default_rng([7, index]).random((count, 2))), spec)
         return
     if shift is not None:
         recipe.give(f"rsm{index}.shift", np.array(shift), Spec("uv", "1", "added to every point, modulo 1"))
 
-    def points(arrays: Arrays, real: Any, start: int = 0) -> Arrays:  # noqa: ARG001 numbers, the same in any type
+    def points(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 numbers, the same in any type
         if pattern == "grid":
             return {name: grid(int(np.sqrt(count)))}
         moved = None if shift is None else arrays[f"rsm{index}.shift"].tolist()
-        return {name: _below_1(halton(count, shift=moved, start=start))}
+        return {name: below_1(halton(count, shift=moved))}
 
-    def start_at_one(arrays: Arrays, real: Any) -> Arrays:
-        return points(arrays, real, 1)
-
-    wrong = (Bug("the Halton sequence starts at index 1", start_at_one, "index 0 is the origin (docs/conventions)"),
-             Bug("bases 2 and 3 are exchanged", writing(points, **{f"rsm{index}__points": lambda a: a[:, ::-1]}),
-                 "base 2 along columns, 3 along rows"))
+    wrong = (halton_bugs(name, count, shift, before, first) if pattern == "halton" else
+             grid_bugs(name, int(np.sqrt(count))))
     recipe.add(f"rsm{index}.points", "Halton points in bases 2 and 3 from index 0" if pattern == "halton" else
                "centres of n x n cells, row by row", points, (f"rsm{index}.shift",) if shift is not None else (),
-               {name: spec}, paper="SII Sec. 3.1", bugs=wrong if pattern == "halton" else ())
+               {name: spec}, paper="SII Sec. 3.1", bugs=tuple(wrong))
 
 
-def _below_1(points: Array) -> Array:
-    """Return points that stay below 1 in float32."""
-    return np.minimum(points, 1.0 - 2.0**-24)
-
-
-def _add_texels(recipe: Recipe, scene: Scene, resolution: int, index: int, count: int, warp: Warp | None) -> None:
-    name, light = f"rsm{index}", scene.lights[index]
+def _add_texels(
+    recipe: Recipe, scene: Scene, resolution: int, index: int, counts: tuple[int, ...], warp: Warp | None
+) -> None:
+    name, light, count = f"rsm{index}", scene.lights[index], counts[index]
     maps = light_projection(light, scene.geometry, resolution)
     points, texel, weight = f"{name}.points", f"{name}.texel", f"{name}.weight"
     rows, columns = maps.shape
@@ -88,9 +90,7 @@ def _add_texels(recipe: Recipe, scene: Scene, resolution: int, index: int, count
 
         recipe.add(f"{name}.importance", "largest channel of a texel's flux, lobe included", worth, fluxes,
                    {f"{name}.importance": Spec("row, column", "W", "importance of each texel")},
-                   paper="SII Sec. 3.5", bugs=(
-                       Bug("luminance in place of the largest channel", _luminance(name, glossy), "SII Sec. 3.5"),
-                       Bug("the sum of channels in place of the largest", _summed(name, glossy), "SII Sec. 3.5")))
+                   paper="SII Sec. 3.5", bugs=tuple(importance_bugs(name, glossy, maps.maps)))
         points = _add_warped(recipe, name, maps.maps, warp)
 
     reads = (points, *((f"{name}.density_weight",) if warp is not None else ()))
@@ -101,22 +101,15 @@ def _add_texels(recipe: Recipe, scene: Scene, resolution: int, index: int, count
         return {texel: texel_of(at[:, 1], rows) * columns + texel_of(at[:, 0], columns),
                 weight: (rows * columns / count * own).astype(real)}
 
-    recipe.factors |= {f"T/N of rsm{index}": rows * columns / count}
+    recipe.factors |= {f"T/N of rsm{index}": rows * columns / count, f"number of lights N of rsm{index}": count,
+                       f"number of texels T of rsm{index}": rows * columns}
     recipe.facts[f"{name}.lights"] = {"T": rows * columns, "N": count}
     recipe.add(f"{name}.texels", "the texel that each point falls on, and T/N w", chosen, reads, {
         texel: Spec("light", "1", "row * columns + column over the stacked maps", tier="T0", index_of=(rows, columns)),
         weight: Spec("light", "1", "T/N times the weight of the warp: how many texels a light stands for"),
-    }, paper="SII Sec. 3.1", exact=(points,), bugs=(
-        Bug("rows and columns are exchanged", reading(chosen, **{points.replace(".", "__"): lambda a: a[:, ::-1]}),
-            "u along columns, v along rows"),
-        Bug("v runs upwards", reading(chosen, **{points.replace(".", "__"): _upwards}), "row 0 is the top row"),
-        Bug("points are rounded to texels instead of cut", reading(chosen, **{points.replace(".", "__"): lambda a: (
-            np.minimum(a + 0.5 / np.array([columns, rows]), 1 - 2.0**-24).astype(a.dtype))}), "floor(u W)"),
-    ))
-
-
-def _upwards(points: Array) -> Array:
-    return np.stack([points[:, 0], 1.0 - 2.0**-24 - points[:, 1]], axis=1)
+    }, paper="SII Sec. 3.1", exact=(points,), bugs=tuple(texel_bugs(
+        name, points, f"{name}.density_weight" if warp is not None else "", chosen,
+        (maps.maps, rows // maps.maps, columns), (count, sum(counts)))))
 
 
 def _summed_row_by_row(importance: Array) -> Array:
@@ -130,45 +123,27 @@ def _columns_first(importance: Array) -> Array:
     return np.ascontiguousarray(importance.T).reshape(importance.shape)
 
 
-def _luminance(name: str, glossy: bool) -> Any:
-    def run(arrays: Arrays, real: Any) -> Arrays:
-        flux = arrays[f"{name}.flux"] + (arrays[f"{name}.lobe_flux"] if glossy else 0)
-        return {f"{name}.importance": np.tensordot((0.2126, 0.7152, 0.0722), flux, 1).astype(real)}
-
-    return run
-
-
-def _summed(name: str, glossy: bool) -> Any:
-    def run(arrays: Arrays, real: Any) -> Arrays:
-        flux = arrays[f"{name}.flux"] + (arrays[f"{name}.lobe_flux"] if glossy else 0)
-        return {f"{name}.importance": flux.sum(axis=0).astype(real)}
-
-    return run
-
-
 def _add_warped(recipe: Recipe, name: str, maps: int, warp: Warp) -> str:
     warped, weight = f"{name}.warped", f"{name}.density_weight"
 
     def run(arrays: Arrays, real: Any, how: Warp = warp) -> Arrays:
         points, weights = warp_stacked(np.asarray(arrays[f"{name}.points"], np.float64),
                                        np.asarray(arrays[f"{name}.importance"]), maps, how)
-        return {warped: _below_1(points), weight: weights.astype(real)}
+        return {warped: below_1(points), weight: weights.astype(real)}
 
     other = Warp("B" if warp.method == "A" else "A", warp.levels)
-    bugs = [Bug(f"method {other.method} in place of {warp.method}", lambda a, r: run(a, r, other), "SII Fig. 6"),
-            Bug("weights are left at 1", writing(run, **{weight.replace(".", "__"): np.ones_like}), "SII Eq. 5, 6"),
-            Bug("weights are the density, not 1 / density",
+    bugs = [Bug(f"method {other.method} in place of method {warp.method}", lambda a, r: run(a, r, other), "SII Fig. 6"),
+            Bug("weights are left at 1: the density is not counted",
+                writing(run, **{weight.replace(".", "__"): np.ones_like}), "SII Eq. 5, 6"),
+            Bug("weights are the density, not its inverse (reciprocal) 1 / density",
                 writing(run, **{weight.replace(".", "__"): lambda a: 1 / a}), "SII Eq. 5, 6"),
-            Bug("one level more", lambda a, r: run(a, r, Warp(warp.method, warp.levels + 1)), "SII Sec. 3.5"),
             Bug("u and v are exchanged", reading(run, **{f"{name}__points": lambda a: a[:, ::-1]}),
                 "u along columns, v along rows"),
             Bug("the importance map is transposed or read along columns",
                 reading(run, **{f"{name}__importance": _columns_first}), "rows, then columns"),
             Bug("the importance map is upside down",
                 reading(run, **{f"{name}__importance": lambda a: a[::-1]}), "row 0 is the top row")]
-    if warp.levels:
-        bugs.append(Bug("one level less", lambda a, r: run(a, r, Warp(warp.method, warp.levels - 1)),
-                        "SII Sec. 3.5"))
+    bugs += warp_bugs(name, maps, warp, run)
     recipe.facts[f"{name}.warp"] = {"method": warp.method, "levels": warp.levels}
     recipe.add(f"{name}.warp", f"points follow the importance over {warp.levels} levels, method {warp.method}", run,
                (f"{name}.points", f"{name}.importance"), {
@@ -210,16 +185,10 @@ def _add_chosen(recipe: Recipe, scene: Scene, resolution: int, counts: tuple[int
     writes = {f"lights.{key}": specs[key] for key in kinds}
     writes |= {"lights.texel": Spec("light", "1", "each light's texel", tier="T0"),
                "lights.map": Spec("light", "1", "each light's map", tier="T0")}
-    unweighted = {f"rsm{k}__weight": np.ones_like for k in numbers}
-    every = np.array([len(counts)], np.float64)
+    shapes = [(maps.maps, maps.shape[0] // maps.maps, maps.shape[1]) for _, _, maps in lamps]
+    warped = any(f"rsm{k}.density_weight" in recipe.specs for k in numbers)
     recipe.add("lights", "texels with flux as pixel lights; those without are dropped", run, tuple(reads), writes,
-               paper="SII Sec. 3.1", bugs=(
-                   Bug("T/N is left out", reading(run, **unweighted), "SII E-SII: Phi_i = T/N Phi_t"),
-                   Bug("T/N of all maps together", reading(run, **{f"rsm{k}__weight": lambda a: (a / every).astype(
-                       a.dtype) for k in numbers}), "each map's own T/N"),
-                   Bug("normals point into the surface",
-                       writing(run, lights__normal=lambda a: -a), "normals face the light"),
-               ))
+               paper="SII Sec. 3.1", bugs=tuple(lights_bugs(kinds, shapes, warped)))
 
 
 def pixel_lights_of(arrays: Arrays, real: Any) -> PixelLights:

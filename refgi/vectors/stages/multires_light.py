@@ -3,7 +3,6 @@
 A level is the irradiance of its cells and a mask of those that hold any, evaluated there or at a coarser level.
 """
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,13 @@ from refgi.splat.multires.subsplats.evaluate import evaluate, points_of
 from refgi.vectors.recipe import Recipe, reading
 from refgi.vectors.spec import Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR
+from refgi.vectors.stages.detail_bugs import detail_bugs, light_bugs
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import covered_of, everywhere
 from refgi.vectors.stages.multires_upsample import LIGHT
 from refgi.vectors.stages.pair_bugs import RECEIVERS, pair_bugs
+from refgi.vectors.stages.subsplat_bugs import point_bugs
 
 POINTS = ("multires.point", "multires.normal")
 EQ2 = "AMS Eq. 2, E only; E-AMS-02"
@@ -39,27 +40,20 @@ def add_points(recipe: Recipe, representative: Representative, top: int) -> None
         return run({**arrays, SUBSPLATS[3]: turned}, real)
 
     other: Representative = "pixel" if representative == "mean" else "mean"
-    bugs = [Bug("the mean of the cell's surface" if other == "mean" else "the representative pixel alone",
+    bugs = [Bug("the mean (average) of the cell's surface, not its representative pixel" if other == "mean" else
+                "the representative pixel alone, not the mean of the cell's surface",
                 lambda a, r: run(a, r, other), "E-AMS-11"),
             Bug("rows and columns of pixels are exchanged", exchanged, "row * width + column")]
     if representative == "mean":
         bugs += [Bug("pixels without surface count as points at 0", reading(
             run, gbuffer__triangle_id=everywhere), "mean of the surface"),
-            Bug("mean normals are not made unit vectors", _shortened(run, top), "unit vectors")]
-    else:
-        bugs += [Bug("the pixel to the right", reading(run, multires__pixel=lambda a: np.minimum(
-            a + 1, a.max(initial=0))), "E-AMS-11"),
-            Bug("the pixel at the cell's corner", partial(_corner, run), "E-AMS-11")]
+            Bug("mean normals are not made unit vectors (not normalised)", _shortened(run, top), "unit vectors")]
+    bugs += point_bugs(representative)
     recipe.add("multires.points", "where each subsplat is evaluated: its " + (
         "representative pixel" if representative == "pixel" else "mean surface"), run, (*RECEIVERS, *SUBSPLATS), {
             POINTS[0]: Spec("xyz, subsplat", "m", "surface point", "world"),
             POINTS[1]: Spec("xyz, subsplat", VECTOR, "its normal", "world")},
         paper="AMS Sec. 3.4; E-AMS-11", exact=RECEIVERS[:2] if representative == "pixel" else (), bugs=tuple(bugs))
-
-
-def _corner(run: Run, arrays: Arrays, real: Any) -> Arrays:
-    level, row, column = (np.asarray(arrays[name]) for name in SUBSPLATS[:3])
-    return run({**arrays, SUBSPLATS[3]: (row << level) * covered_of(arrays).shape[1] + (column << level)}, real)
 
 
 def _shortened(run: Run, top: int) -> Run:
@@ -103,6 +97,7 @@ def add_irradiance(recipe: Recipe, pairs: PairSettings) -> None:
         bugs.append(Bug("nothing is clamped", at_points(lambda a, r: sums(a, r,
             replaced(pairs, {"clamp": "none"}))),
                         "r^2 + A / pi"))
+    bugs += light_bugs(at_points(sums), LIGHT)
     recipe.facts["multires.clamp"] = "none" if pairs.clamp is None else pairs.clamp.name()
     recipe.add("multires.irradiance", "irradiance of every pixel light at every subsplat, without albedo/pi",
                at_points(sums), (*POINTS, *names, *area),
@@ -116,22 +111,13 @@ def _glossy(recipe: Recipe) -> bool:
 
 def add_detail(recipe: Recipe, a: float) -> None:
     """Add Eq. 3, which darkens what turns away from the camera."""
-    def run(arrays: Arrays, real: Any, share: float = a) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         light, position, normal = (np.ascontiguousarray(arrays[name], real) for name in (
             "multires.upsampled.0", *RECEIVERS[:2]))
         eye = np.asarray(arrays["camera.origin"], real)[0]
-        return {"multires.detailed": surface_detail(light, position, normal, covered_of(arrays), eye, share)}
-
-    def unclamped(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
-        light, x, n = (np.asarray(arrays[name], np.float64) for name in ("multires.upsampled.0", *RECEIVERS[:2]))
-        v = np.asarray(arrays["camera.origin"], np.float64)[0][:, None, None] - x
-        return {"multires.detailed": np.where(covered_of(arrays), light * (a * (v * n).sum(axis=0) + 1 - a), 0)}
+        return {"multires.detailed": surface_detail(light, position, normal, covered_of(arrays), eye, a)}
 
     recipe.facts["multires.detail"] = a
     recipe.add("multires.detail", "E (a <V, N> + 1 - a)", run, ("multires.upsampled.0", *RECEIVERS, "camera.origin"), {
         "multires.detailed": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", "AMS Eq. 3")},
-        paper="AMS Eq. 3", exact=(RECEIVERS[0], "camera.origin"), bugs=(
-            Bug("a and 1 - a are exchanged", lambda a_, r: run(a_, r, 1 - a), "AMS Eq. 3"),
-            Bug("V points from the camera to the surface", reading(run, gbuffer__normal=lambda n: -n), "AMS Eq. 3"),
-            Bug("V is not made a unit vector", unclamped, "AMS Eq. 3"),
-            Bug("a = 1: light is multiplied by the cosine", lambda a_, r: run(a_, r, 1.0), "AMS Eq. 3")))
+        paper="AMS Eq. 3", exact=(RECEIVERS[0], "camera.origin"), bugs=tuple(detail_bugs(a)))

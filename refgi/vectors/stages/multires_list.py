@@ -11,8 +11,10 @@ from refgi.splat.multires.refinement.mipmap import layout, level_views
 from refgi.splat.multires.refinement.refine import depth_first
 from refgi.splat.multires.settings import Diagonal
 from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.stages.list_bugs import list_bugs
 from refgi.vectors.stages.multires_ranges import IDS, covered_of, everywhere, of_levels
+from refgi.vectors.stages.states_bugs import states_bugs
 
 SUBSPLATS = ("multires.level", "multires.row", "multires.column", "multires.pixel")
 
@@ -39,8 +41,9 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
 
     whole = {name.replace(".", "__"): lambda a: np.where(a == EMPTY, ENOUGH, a) for name in states}
     beside = {name.replace(".", "__"): _spread_to_sides for name in marks}
-    names = {"off": "neighbours across a corner do not count", "corner": "of neighbours across a corner only those "
-             "count that no cell between shows", "literal": "every neighbour across a corner counts",
+    names = {"off": "cells are not refined for their neighbours' sake, across a corner",
+             "corner": "of neighbours across a corner only those count that no cell between shows",
+             "literal": "every neighbour across a corner counts",
              "full8": "all eight neighbours count"}
     recipe.add("multires.states", "which cells are refined, by their own need or across a corner", run, (IDS, *marks), {
         name: Spec("row, column", "1", "0 no surface, 1 a subsplat may end here, 2 refined", tier="T0")
@@ -50,7 +53,8 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
               for rule in get_args(Diagonal) if rule != diagonal),
             Bug("cells without surface are kept", writing(run, **whole), "they are never evaluated"),
             Bug("neighbours across an edge count, not those across a corner", reading(
-                lambda a, r: run(a, r, "off"), **beside), "E-AMS-10")))
+                lambda a, r: run(a, r, "off"), **beside), "E-AMS-10"),
+            *states_bugs(run, diagonal, marks, states)))
 
 
 def _spread_to_sides(marks: Array) -> Array:
@@ -89,26 +93,6 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
         place = _place(listed[0], listed[1], listed[2], top, grids[top].shape[1])
         return named(*(column[np.argsort(place, kind="stable")] for column in listed))
 
-    def placed(down: int, cut: bool = True) -> Run:
-        """Return the stage with the pixel at or before the centre, whether it shows a surface or not."""
-        def altered(arrays: Arrays, real: Any) -> Arrays:
-            made = run(arrays, real)
-            (height, width), (level, row, column) = covered_of(arrays).shape, (made[name] for name in SUBSPLATS[:3])
-            half = (1 << level) // 2 - down * (level > 0) if cut else 0
-            y, x = (np.minimum((k << level) + half, size - 1) for k, size in ((row, height), (column, width)))
-            return {**made, SUBSPLATS[3]: y * width + x}
-
-        return altered
-
-    def reordered(arrays: Arrays, real: Any) -> Arrays:
-        made = run(arrays, real)
-        order = np.argsort(-made[SUBSPLATS[0]], kind="stable")
-        return {name: one[order] for name, one in made.items()}
-
-    def transposed(arrays: Arrays, real: Any) -> Arrays:
-        made, shape = run(arrays, real), covered_of(arrays).shape
-        return {**made, SUBSPLATS[3]: made[SUBSPLATS[3]] % shape[1] * shape[0] + made[SUBSPLATS[3]] // shape[1]}
-
     what = {"level": "cell of 2^level pixels a side", "row": "in the grid of its level", "column": "in the grid of its "
             "level", "pixel": "row * width + column of the pixel right and below of the cell's centre, or of the "
             "nearest that shows a surface, the first of several"}
@@ -117,13 +101,9 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
                {f"multires.{key}": Spec("subsplat", "1", one, tier="T0") for key, one in what.items()},
                paper="AMS Sec. 3.3; E-AMS-08, E-AMS-11", bugs=(
                    Bug("each level is read off by itself, whatever becomes of coarser cells", by_levels, "E-AMS-08"),
-                   Bug("the pixel left and above of the centre", placed(1), "E-AMS-11"),
-                   Bug("the pixel at the cell's corner", placed(0, cut=False), "E-AMS-11"),
-                   Bug("the pixel at the centre, whether it shows a surface or not", placed(0), "E-AMS-11"),
-                   Bug("the list is sorted by levels", reordered, "order of the list"),
-                   Bug("pixels are counted column by column", transposed, "row * width + column"),
-                   Bug("pixels without surface are listed", reading(run, gbuffer__triangle_id=everywhere),
-                       "never evaluated")))
+                   Bug("pixels without surface (background) are listed", reading(run, gbuffer__triangle_id=everywhere),
+                       "never evaluated"),
+                   *list_bugs(run, states, recipe.facts["multires"]["finest_level"])))
 
 
 def _place(level: Array, row: Array, column: Array, top: int, columns: int) -> Array:

@@ -23,6 +23,9 @@ from refgi.splat.multires.refinement.mipmap import START, Mipmap, element_count,
 from refgi.splat.multires.settings import Criteria, Measure
 from refgi.vectors.recipe import Recipe, reading
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
+from refgi.vectors.stages.marks_bugs import marks_bugs
+from refgi.vectors.stages.ranges_bugs import ranges_bugs
+from refgi.vectors.stages.slopes_bugs import curvatures_bugs, slopes_bugs
 
 IDS = "gbuffer.triangle_id"
 Join = Callable[[list[Array]], Array]
@@ -79,7 +82,8 @@ def add_ranges(recipe: Recipe, what: str, top: int, rim: int, components: int) -
         Bug("least and largest are exchanged", lambda a, r: named(*(
             [run(a, r)[name] for name in names] for names in (highs, lows))), "least, largest"),
         Bug("the pixels around a cell are left out" if rim else "the pixels around a cell count as well",
-            lambda a, r: run(a, r, 1 - rim), "rim of the settings (AMS Fig. 15)")))
+            lambda a, r: run(a, r, 1 - rim), "rim of the settings (AMS Fig. 15)"),
+        *ranges_bugs(what, top, rim, components)))
 
 
 def _pyramid(plane: Array, top: int, join: Join) -> list[Array]:
@@ -112,14 +116,6 @@ def add_slopes(recipe: Recipe, top: int, relative: bool) -> None:
         mip = depth_slopes(np.ascontiguousarray(arrays["gbuffer.depth"], real), covered_of(arrays), top, share)
         return dict(zip(names, mip.high[1:], strict=True))
 
-    def forward(arrays: Arrays, real: Any) -> Arrays:
-        z, here = np.asarray(arrays["gbuffer.depth"], real), covered_of(arrays)
-        z = np.where(here, z, 0)
-        steps = [np.where(here & np.roll(here, -1, axis), np.abs(np.roll(z, -1, axis) - z), 0) for axis in (0, 1)]
-        steps[0][-1], steps[1][:, -1] = 0, 0
-        slope = np.hypot(*steps) / np.where(here & relative, z, 1)
-        return dict(zip(names, _pyramid(slope, top, lambda four: np.max(four, axis=0)), strict=True))
-
     recipe.add("multires.slopes", "steepest change of depth from pixel to pixel within each cell", run,
                ("gbuffer.depth", IDS), {
                    name: Spec("row, column", "1/pixel" if relative else "m/pixel", "sqrt(dx^2 + dy^2), the larger of "
@@ -127,8 +123,7 @@ def add_slopes(recipe: Recipe, top: int, relative: bool) -> None:
                paper="AMS Sec. 3.2.1", exact=("gbuffer.depth",), bugs=(
                    Bug("slopes are not divided by the depth" if relative else "slopes are divided by the depth",
                        lambda a, r: run(a, r, not relative), "measure of the settings"),
-                   Bug("only the difference to the next pixel counts, not that to the one before", forward,
-                       "the larger of both"),
+                   *slopes_bugs(names, relative),
                    Bug("pixels without surface count as 0", reading(
                        run, gbuffer__depth=lambda a: np.where(np.isfinite(a), a, 0.0), gbuffer__triangle_id=everywhere),
                        "only surfaces count")))
@@ -150,6 +145,7 @@ def add_curvatures(recipe: Recipe, top: int, rate: bool) -> None:
                    name: Spec("row, column", "1/m" if rate else "1", "largest |N1 - N2|" + " / |x1 - x2|" * rate,
                               paper="AMS Eq. 1; E-AMS-01") for name in names},
                paper="AMS Eq. 1; E-AMS-01", exact=("gbuffer.normal", "gbuffer.position"), bugs=(
+                   *curvatures_bugs(names, rate),
                    Bug("angles in place of chords", angles, "E-AMS-01: |N1 - N2|"),
                    Bug("the distance of the points is left out" if rate else "divided by the distance of the points",
                        lambda a, r: run(a, r, not rate), "E-AMS-01"),
@@ -194,15 +190,14 @@ def add_discontinuities(
     if criteria.depth is not None:
         bugs += [Bug(cause, another(depth=dataclasses.replace(criteria.depth, measure=measure)), "E-AMS-07")
                  for measure, cause in zip(get_args(Measure), (
-                       "depths are compared with a share of the depth", "depths are compared with a length in metres",
+                       "depths are compared with a share of the depth (relative, not absolute)",
+                       "depths are compared with a length in metres (absolute, not relative)",
                        "the threshold of depths falls as 3 / level"), strict=True) if measure != criteria.depth.measure]
     if criteria.normal is not None and criteria.normal.components == "xyz":
         bugs.append(Bug("z of the normals is left out", another(normal=dataclasses.replace(
             criteria.normal, components="xy")), "E-AMS-07: three components, x and y in the authors' demo"))
-    if criteria.depth is not None and criteria.normal is not None:
-        single = dataclasses.replace(criteria, depth=None), dataclasses.replace(criteria, normal=None)
-        bugs.append(Bug("depth and normal must both be discontinuous", lambda a, r: dict(zip(names, level_views(
-            marks(a, r, single[0]) & marks(a, r, single[1]), sizes, first=1), strict=True)), "any test counts"))
+    if criteria.depth is not None or criteria.derivative is not None:
+        bugs += marks_bugs(names, criteria, finest)
     if finest:
         bugs.append(Bug("cells of the finest level are refined", lambda a, r: run(a, r, stop=finest - 1),
                         "the finest level is never refined"))

@@ -21,6 +21,7 @@ from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import IDS, covered_of
+from refgi.vectors.stages.upsample_bugs import nearest_bugs, tent, tent_bugs
 
 LIGHT = "multires.irradiance"
 
@@ -70,21 +71,17 @@ def _add_level(recipe: Recipe, mode: Upsampling, level: int, top: int, filter_al
                 "filtered as well", lambda a, r: run(a, r, every=not filter_all), "E-AMS-09"),
             Bug("rows and columns of subsplats are exchanged", _with_list(run, turned, 0), "row, column"),
             Bug("subsplats one level finer are taken", _with_list(run, (0, 1), -1), "level of the layer")]
-    if above:
-        bugs.append(Bug("the coarser light is doubled but not filtered", literal(weights=(0, 1, 0)), "E-AMS-09"))
     if mode == "tent":
         bugs += [Bug("cells across a corner count only beside a cell that counts" if not corner_rule else
                      "cells across a corner always count", lambda a, r: run(a, r, corner=not corner_rule),
-                     "E-AMS-09"),
-                 Bug("nine equal weights", literal(weights=(1, 1, 1)), "E-AMS-09: (1, 2, 1) x (1, 2, 1)"),
-                 Bug("cells without light count as black", literal(masked=False), "m = 1 where there is light"),
-                 Bug("beyond the border it is black", literal(border="constant"), "the border repeats its cells")]
+                     "E-AMS-09"), *tent_bugs(literal, corner_rule, not above)]
     if above and mode == "tent":
-        bugs += [Bug("the coarser light is shifted by one cell", literal(shift=1), "cell i lies in cell i / 2"),
-                 Bug("light spreads into cells without surface", literal(spread=True), "m = 1 where a surface is"),
-                 Bug("the filter of the authors' demo", lambda a, r: run(a, r, how="demo"), "E-AMS-09")]
+        bugs.append(Bug("the filter of the authors' demo", lambda a, r: run(a, r, how="demo"), "E-AMS-09"))
     if above and mode == "demo":
-        bugs += [Bug("a tent at this level", lambda a, r: run(a, r, how="tent"), "E-AMS-09"),
+        bugs += [Bug("the coarser light is doubled but not filtered", literal(weights=(0, 1, 0)), "E-AMS-09"),
+                 Bug("light does not come down from the coarser level (level above): own cells alone are known",
+                     literal(coarse_light=False), "E-AMS-09"),
+                 Bug("a tent at this level", lambda a, r: run(a, r, how="tent"), "E-AMS-09"),
                  Bug("a tent that counts cells without light as black",
                      literal(masked=False), "E-AMS-09")]
     rule = {"tent": "weights (1, 2, 1) x (1, 2, 1)", "demo": "weights (1 - f, 1, f) / 2 on the coarser level"}[mode]
@@ -112,28 +109,6 @@ def _with_list(run: Run, order: tuple[int, int], up: int) -> Run:
     return altered
 
 
-def tent(
-    layer: Array, leaf: Array, coarse: tuple[Array, Array], filled: Array, *, every: bool, corner: bool,
-    weights: tuple[int, int, int] = (1, 2, 1), masked: bool = True, border: Any = "edge", shift: int = 0,
-    spread: bool = False,
-) -> tuple[Array, Array]:
-    """Return a level of the masked tent filter and its mask, with bugs, in float64."""
-    rows, columns = (np.minimum((np.arange(size) + shift) // 2, (size - 1) // 2) for size in filled.shape)
-    mask = coarse[1][rows][:, columns] & (filled | spread) | leaf
-    texels = np.where(leaf, layer, coarse[0][:, rows][:, :, columns].astype(np.float64)) * mask
-    around, known = np.pad(texels, ((0, 0), (1, 1), (1, 1)), mode=border), np.pad(mask, 1, mode="edge")
-    total, weight = np.zeros_like(texels), np.zeros(filled.shape)
-    for i, j in np.ndindex(3, 3):
-        part = np.s_[i : i + filled.shape[0], j : j + filled.shape[1]]
-        counts = known[part]
-        if corner and i != 1 and j != 1:
-            counts = counts & (known[1:-1, part[1]] | known[part[0], 1:-1])
-        share = weights[i] * weights[j] * (counts if masked else np.ones_like(counts))
-        total, weight = total + share * around[:, *part], weight + share
-    mean = np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
-    return np.where(mask, np.where(leaf & (not every), texels, mean), 0.0), mask
-
-
 def _add_at_once(recipe: Recipe, mode: Upsampling, top: int) -> None:
     def run(arrays: Arrays, real: Any, how: Upsampling = mode) -> Arrays:
         values = np.ascontiguousarray(arrays[LIGHT], real)
@@ -148,7 +123,6 @@ def _add_at_once(recipe: Recipe, mode: Upsampling, top: int) -> None:
                paper="AMS Sec. 3.5, Fig. 7", bugs=(
                    *(Bug(cause, partial(run, how=how), "AMS Fig. 7") for how, cause in others.items()
                      if how != mode),
+                   *(nearest_bugs(run) if mode == "nearest" else ()),
                    Bug("rows and columns of subsplats are exchanged", _with_list(run, (1, 0), 0), "row, column"),
                    Bug("subsplats one level finer are taken", _with_list(run, (0, 1), -1), "level of the layer")))
-
-

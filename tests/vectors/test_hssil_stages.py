@@ -12,7 +12,14 @@ from refgi.sssil.hssil import hssil
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.cases import hssil as cases
 from refgi.vectors.spec import expected_of, outputs_of
-from refgi.vectors.stages import crown, levels, reprojection, upsampling
+from refgi.vectors.stages import (
+    crown_gather_bugs,
+    crown_points_bugs,
+    crown_sample_bugs,
+    levels,
+    reprojection,
+    upsampling,
+)
 from tests.vectors import screen_space_port as port
 
 CASES = {**cases.QUICK, **cases.FULL}
@@ -129,10 +136,14 @@ def test_literal_forms_without_a_bug_are_the_stages(name):
     facts, settings = case.facts, cases.SETTINGS[name]
     for index in range(facts["hssil"]["levels"]):
         one = facts[f"samples{index}"]
-        offsets = crown._offsets(exact[f"samples{index}.points"], exact[f"samples{index}.shifts"], one["disc"],
-                                 one["radius"], one["density"])
-        np.testing.assert_array_equal(offsets, known[f"samples{index}.offsets"])
-        same(crown._gathered(exact, index), known[f"gather{index}.irradiance"])
+        name, counts = f"samples{index}", (one["disc"], one["crown"])
+        same(crown_points_bugs.sequence(*counts), known[f"{name}.points"])
+        same(crown_points_bugs.shifted(exact[f"{name}.shift"], tuple(one["tile"]), counts[1]), known[f"{name}.shifts"])
+        offsets, weight = crown_sample_bugs.crown_samples(exact[f"{name}.points"], exact[f"{name}.shifts"], counts[0],
+                                                          one["radius"], one["density"])
+        np.testing.assert_array_equal(offsets, known[f"{name}.offsets"])
+        same(weight, known[f"{name}.weight"])
+        same(crown_gather_bugs.gathered(exact, index), known[f"gather{index}.irradiance"])
         if index:
             fine = {f"level0.{key}": exact[f"level{index - 1}.{key}"] for key in levels.PLANES}
             nearest = levels._picked(fine, index, 2, "closest")

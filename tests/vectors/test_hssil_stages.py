@@ -13,6 +13,7 @@ from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.cases import hssil as cases
 from refgi.vectors.spec import expected_of, outputs_of
 from refgi.vectors.stages import (
+    blur_bugs,
     crown_gather_bugs,
     crown_points_bugs,
     crown_sample_bugs,
@@ -149,11 +150,8 @@ def test_literal_forms_without_a_bug_are_the_stages(name):
             nearest = levels._picked(fine, index, 2, "closest")
             same(nearest[f"level{index}.depth"], known[f"level{index}.depth"])
         if settings.blur is not None:
-            half, size = settings.blur.size // 2, settings.blur.size
-            box = {k: 0.5 if 2 * abs(k) == size else 1.0 for k in range(-half, half + 1)}
             planes = levels.level_names(index, "position", "normal", "depth")
-            same(upsampling._boxed(exact, f"gather{index}.irradiance", planes, box,
-                                   (settings.blur.plane_tolerance, settings.blur.cosine)),
+            same(blur_bugs.boxed(exact, f"gather{index}.irradiance", planes, settings.blur),
                  known[f"blur{index}.irradiance"])
     for step in case.stages:
         if step.name.startswith(("light", "picture")):

@@ -11,11 +11,11 @@ from refgi.sssil.settings import Bilateral, GeometryBlur, HssilSettings
 from refgi.sssil.upsampling.upsample import Guide, upsample
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
+from refgi.vectors.stages.blur_bugs import BLUR, blur_bugs
 from refgi.vectors.stages.levels import level_names, level_of
 
 GUIDE = ("depth", "normal")
 BILATERAL = "HSS Sec. 3.2, 5: joint bilateral, 3 x 3; weights in docs/methods/hssil (E-HSS-12)"
-BLUR = "docs/methods/hssil: mean over a tile's texels on one plane (after Keller and Heidrich 2001)"
 
 
 def add_blur(recipe: Recipe, settings: GeometryBlur, index: int, number: int) -> None:
@@ -23,39 +23,15 @@ def add_blur(recipe: Recipe, settings: GeometryBlur, index: int, number: int) ->
     light, name = f"gather{index}.irradiance", f"blur{index}.irradiance"
     planes = level_names(index, "position", "normal", "depth")
 
-    def run(arrays: Arrays, real: Any, how: GeometryBlur = settings) -> Arrays:
-        return {name: blur(np.ascontiguousarray(arrays[light], real), level_of(arrays, index, number, real), how)}
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        return {name: blur(np.ascontiguousarray(arrays[light], real), level_of(arrays, index, number, real), settings)}
 
-    def literal(weights: dict[int, float] | None = None, **bugs: Any) -> Run:
-        half = settings.size // 2
-        box = {k: 0.5 if 2 * abs(k) == settings.size else 1.0 for k in range(-half, half + 1)}
-        return lambda arrays, real: {name: _boxed(  # noqa: ARG005
-            arrays, light, planes, weights or box, (settings.plane_tolerance, settings.cosine), **bugs)}
-
-    def changed(**values: Any) -> Run:
-        return lambda a, r: run(a, r, replaced(settings, values))
-
-    even = settings.size % 2 == 0
-    first = -(settings.size // 2) + 1
     recipe.facts["blur"] = {"size": settings.size, "plane_tolerance": settings.plane_tolerance,
                             "cosine": settings.cosine}
-    rim = (Bug("texels that the window's rim halves count whole", literal({k: 1.0 for k in range(
-        -(settings.size // 2), settings.size // 2 + 1)}), "a box of n texels about the centre"),
-        Bug("the window lies half a texel beside the texel", literal({k: 1.0 for k in range(
-            first, first + settings.size)}), "a box of n texels about the centre")) if even else ()
     recipe.add(f"blur{index}", "mean over a window along the row, then along the column, of texels on the texel's "
                "tangent plane that face as it does", run, (light, *planes), {
                    name: Spec("rgb, row, column", "W/m^2", "irradiance by this level, averaged", "linear RGB", BLUR)},
-               paper=BLUR, exact=planes, bugs=(
-                   *rim,
-                   Bug("planes are not compared", changed(plane_tolerance=1e6), BLUR),
-                   Bug("normals are not compared", changed(cosine=-1.0), BLUR),
-                   Bug("the tolerance is in metres, not a share of the depth", reading(
-                       run, **{planes[2].replace(".", "__"): lambda a: np.where(np.isfinite(a), 1.0, a)}), BLUR),
-                   Bug("what is left out counts as dark", literal(dark=True), BLUR),
-                   Bug("one window of rows and columns together", literal(together=True), "rows, then columns"),
-                   Bug("nothing is averaged", changed(size=1), BLUR),
-               ))
+               paper=BLUR, exact=planes, bugs=tuple(blur_bugs(light, name, planes, settings)))
 
 
 def add_light(recipe: Recipe, settings: HssilSettings, index: int, added: str, coarse: str) -> str:
@@ -115,30 +91,6 @@ def add_light(recipe: Recipe, settings: HssilSettings, index: int, added: str, c
     return name
 
 
-def _boxed(
-    arrays: Arrays, light: str, planes: tuple[str, ...], weights: dict[int, float], limits: tuple[float, float], *,
-    dark: bool = False, together: bool = False,
-) -> Array:
-    """Return means over windows, in float64, with a bug; `weights` of the texels by their place in the window."""
-    values = np.asarray(arrays[light], np.float64)
-    place, normal, depth = (np.asarray(arrays[name], np.float64) for name in planes)
-    boxes = [{(0, k): w for k, w in weights.items()}, {(k, 0): w for k, w in weights.items()}]
-    if together:
-        boxes = [{(i, j): v * w for i, v in weights.items() for j, w in weights.items()}]
-    for box in boxes:
-        total, count = np.zeros_like(values), np.zeros_like(depth)
-        for step, weight in box.items():
-            there = _beside(place, step), _beside(normal, step), _beside(values, step)
-            off = np.abs((normal * (there[0] - place)).sum(axis=0))
-            same = (off <= limits[0] * np.where(np.isfinite(depth), depth, 0)) & (
-                (normal * there[1]).sum(axis=0) >= limits[1])
-            same |= step == (0, 0)
-            total += np.where(same, weight * there[2], 0)
-            count += weight * (same | dark)
-        values = np.where(np.isfinite(depth), total / count, 0)
-    return values
-
-
 def _bilateral(
     arrays: Arrays, coarse: str, below: tuple[str, ...], here: tuple[str, ...], settings: HssilSettings, *,
     sloped: bool = True, divided: bool = True, centred: bool = False, mirrored: bool = False,
@@ -194,11 +146,3 @@ def _tent(step: int, t: Array) -> Array:
     half = np.where(np.abs(t) < 0.5, (4 + np.abs(t)) / 3, 1.0)
     parts = [np.clip(1 - np.abs(t - place) / half, 0, None) for place in (-1, 0, 1)]
     return np.asarray(parts[step + 1] / sum(parts))
-
-
-def _beside(array: Array, step: tuple[int, int]) -> Array:
-    """Return each texel's neighbour some rows down and columns to the right; NaN beyond the edge."""
-    (dy, dx), (h, w) = step, array.shape[-2:]
-    padded = np.pad(array, [(0, 0)] * (array.ndim - 2) + [(abs(dy), abs(dy)), (abs(dx), abs(dx))],
-                    constant_values=np.nan)
-    return padded[..., abs(dy) + dy : abs(dy) + dy + h, abs(dx) + dx : abs(dx) + dx + w]

@@ -13,13 +13,13 @@ from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.cases import hssil as cases
 from refgi.vectors.spec import expected_of, outputs_of
 from refgi.vectors.stages import (
+    bilateral,
     blur_bugs,
     crown_gather_bugs,
     crown_points_bugs,
     crown_sample_bugs,
     levels,
     reprojection,
-    upsampling,
 )
 from tests.vectors import screen_space_port as port
 
@@ -156,7 +156,7 @@ def test_literal_forms_without_a_bug_are_the_stages(name):
     for step in case.stages:
         if step.name.startswith(("light", "picture")):
             coarse, *guides = step.reads[:5]
-            light = upsampling._bilateral(exact, coarse, tuple(guides[:2]), tuple(guides[2:]), settings)
+            light = bilateral.bilateral(exact, coarse, tuple(guides[:2]), tuple(guides[2:]), settings.upsampling)
             same(light + (exact[step.reads[5]] if len(step.reads) > 5 else 0), known[step.writes[0]])
 
 

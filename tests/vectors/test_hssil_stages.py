@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.rsm.raster.projection import camera_projection
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.hssil import hssil
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
@@ -19,6 +20,7 @@ from refgi.vectors.stages import (
     crown_points_bugs,
     crown_sample_bugs,
     levels,
+    nearest_texels,
     reprojection,
 )
 from tests.vectors import screen_space_port as port
@@ -137,18 +139,19 @@ def test_literal_forms_without_a_bug_are_the_stages(name):
     facts, settings = case.facts, cases.SETTINGS[name]
     for index in range(facts["hssil"]["levels"]):
         one = facts[f"samples{index}"]
-        name, counts = f"samples{index}", (one["disc"], one["crown"])
-        same(crown_points_bugs.sequence(*counts), known[f"{name}.points"])
-        same(crown_points_bugs.shifted(exact[f"{name}.shift"], tuple(one["tile"]), counts[1]), known[f"{name}.shifts"])
-        offsets, weight = crown_sample_bugs.crown_samples(exact[f"{name}.points"], exact[f"{name}.shifts"], counts[0],
+        key, counts = f"samples{index}", (one["disc"], one["crown"])
+        same(crown_points_bugs.sequence(*counts), known[f"{key}.points"])
+        same(crown_points_bugs.shifted(exact[f"{key}.shift"], tuple(one["tile"]), counts[1]), known[f"{key}.shifts"])
+        offsets, weight = crown_sample_bugs.crown_samples(exact[f"{key}.points"], exact[f"{key}.shifts"], counts[0],
                                                           one["radius"], one["density"])
-        np.testing.assert_array_equal(offsets, known[f"{name}.offsets"])
-        same(weight, known[f"{name}.weight"])
+        np.testing.assert_array_equal(offsets, known[f"{key}.offsets"])
+        same(weight, known[f"{key}.weight"])
         same(crown_gather_bugs.gathered(exact, index), known[f"gather{index}.irradiance"])
-        if index:
-            fine = {f"level0.{key}": exact[f"level{index - 1}.{key}"] for key in levels.PLANES}
-            nearest = levels._picked(fine, index, 2, "closest")
-            same(nearest[f"level{index}.depth"], known[f"level{index}.depth"])
+        view, first = camera_projection(case.scene.camera, *cases.VIEWS[name][1]), facts["hssil"]["first level"]
+        made_of = nearest_texels.coarser_level(exact, index, first + index, (view.height, view.width)) if index else \
+            nearest_texels.first_level(exact, view, first)
+        for key, array in made_of.items():
+            same(array, known[f"level{index}.{key}"])
         if settings.blur is not None:
             planes = levels.level_names(index, "position", "normal", "depth")
             same(blur_bugs.boxed(exact, f"gather{index}.irradiance", planes, settings.blur),

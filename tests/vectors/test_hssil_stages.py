@@ -7,12 +7,22 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.rsm.raster.projection import camera_projection
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.hssil import hssil
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.cases import hssil as cases
 from refgi.vectors.spec import expected_of, outputs_of
-from refgi.vectors.stages import crown, levels, reprojection, upsampling
+from refgi.vectors.stages import (
+    bilateral,
+    blur_bugs,
+    crown_gather_bugs,
+    crown_points_bugs,
+    crown_sample_bugs,
+    levels,
+    nearest_texels,
+    reprojection,
+)
 from tests.vectors import screen_space_port as port
 
 CASES = {**cases.QUICK, **cases.FULL}
@@ -129,25 +139,27 @@ def test_literal_forms_without_a_bug_are_the_stages(name):
     facts, settings = case.facts, cases.SETTINGS[name]
     for index in range(facts["hssil"]["levels"]):
         one = facts[f"samples{index}"]
-        offsets = crown._offsets(exact[f"samples{index}.points"], exact[f"samples{index}.shifts"], one["disc"],
-                                 one["radius"], one["density"])
-        np.testing.assert_array_equal(offsets, known[f"samples{index}.offsets"])
-        same(crown._gathered(exact, index), known[f"gather{index}.irradiance"])
-        if index:
-            fine = {f"level0.{key}": exact[f"level{index - 1}.{key}"] for key in levels.PLANES}
-            nearest = levels._picked(fine, index, 2, "closest")
-            same(nearest[f"level{index}.depth"], known[f"level{index}.depth"])
+        key, counts = f"samples{index}", (one["disc"], one["crown"])
+        same(crown_points_bugs.sequence(*counts), known[f"{key}.points"])
+        same(crown_points_bugs.shifted(exact[f"{key}.shift"], tuple(one["tile"]), counts[1]), known[f"{key}.shifts"])
+        offsets, weight = crown_sample_bugs.crown_samples(exact[f"{key}.points"], exact[f"{key}.shifts"], counts[0],
+                                                          one["radius"], one["density"])
+        np.testing.assert_array_equal(offsets, known[f"{key}.offsets"])
+        same(weight, known[f"{key}.weight"])
+        same(crown_gather_bugs.gathered(exact, index), known[f"gather{index}.irradiance"])
+        view, first = camera_projection(case.scene.camera, *cases.VIEWS[name][1]), facts["hssil"]["first level"]
+        made_of = nearest_texels.coarser_level(exact, index, first + index, (view.height, view.width)) if index else \
+            nearest_texels.first_level(exact, view, first)
+        for key, array in made_of.items():
+            same(array, known[f"level{index}.{key}"])
         if settings.blur is not None:
-            half, size = settings.blur.size // 2, settings.blur.size
-            box = {k: 0.5 if 2 * abs(k) == size else 1.0 for k in range(-half, half + 1)}
             planes = levels.level_names(index, "position", "normal", "depth")
-            same(upsampling._boxed(exact, f"gather{index}.irradiance", planes, box,
-                                   (settings.blur.plane_tolerance, settings.blur.cosine)),
+            same(blur_bugs.boxed(exact, f"gather{index}.irradiance", planes, settings.blur),
                  known[f"blur{index}.irradiance"])
     for step in case.stages:
         if step.name.startswith(("light", "picture")):
             coarse, *guides = step.reads[:5]
-            light = upsampling._bilateral(exact, coarse, tuple(guides[:2]), tuple(guides[2:]), settings)
+            light = bilateral.bilateral(exact, coarse, tuple(guides[:2]), tuple(guides[2:]), settings.upsampling)
             same(light + (exact[step.reads[5]] if len(step.reads) > 5 else 0), known[step.writes[0]])
 
 

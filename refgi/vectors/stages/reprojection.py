@@ -114,6 +114,22 @@ def add_reprojection(
                        "centres at + 1/2"),
                    Bug(f"the {other} texel" if other == "nearest" else "the mean of the four texels around",
                        changed(fetch=other), ""),
+                   Bug("columns run leftwards", reading(run, before__frame=lambda a: a * np.array(
+                       [[-1.0], [1.0], [1.0]], a.dtype)), "column 0 is at the left"),
+                   Bug("positions are not relative to the eye of the frame before: its origin is left out", reading(
+                       run, before__origin=np.zeros_like), WARP),
+                   Bug("neither depths nor normals are compared", changed(
+                       depth_tolerance=1.0, normal_cosine=-1.0), WARP),
+                   Bug("the tolerance of depth is twice as large", changed(
+                       depth_tolerance=2 * settings.depth_tolerance), WARP),
+                   Bug("the tolerance of depth is half as large", changed(
+                       depth_tolerance=settings.depth_tolerance / 2), WARP),
+                   Bug("tangents of the whole angles of view, not of half", reading(run, before__half=lambda a: (
+                       2 * a / (1 - a**2))), "half angles"),
+                   Bug("tangents across and down are exchanged", reading(run, before__half=lambda a: a[::-1]),
+                       "across, then down"),
+                   Bug("where nothing was found the old light of the pixel stays", lambda a, r: _kept(a, run(a, r)),
+                       "0 where disoccluded"),
                    Bug("depths are not compared", changed(depth_tolerance=1.0), WARP),
                    Bug("normals are not compared", changed(normal_cosine=-1.0), WARP),
                    Bug("depths are compared with the point's alone, not with that of its plane",
@@ -121,6 +137,12 @@ def add_reprojection(
                    Bug("the tolerance is in metres, not a share of the depth", literal(metres=True), WARP),
                    *((Bug("the sum of weights is not divided by", undivided, "weighted mean"),)
                      if settings.fetch == "bilinear" else ())))
+
+
+def _kept(arrays: Arrays, made: Arrays) -> dict[str, Array]:
+    """Return what the stage writes with the same pixel's light where no texel was found."""
+    return {**made, "reprojected.irradiance": np.where(
+        made["reprojected.weight"] > 0, made["reprojected.irradiance"], arrays["before.irradiance"])}
 
 
 def _reprojected(

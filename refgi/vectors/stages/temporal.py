@@ -89,6 +89,18 @@ def _add_entering(
                    Bug("powers of 2 in place of e", lambda a, r: run(a, r, speed / math.log(2)), "exp(-v / speed)"),
                    Bug("the share does not depend on the speed", writing(run, entering__share=lambda a: (
                        a > 0).astype(a.dtype)), "HSS Sec. 3.3"),
+                   Bug("the share grows with the speed: exp(v / speed)", writing(
+                       run, entering__share=lambda a: (a > 0).astype(a.dtype) / np.where(a > 0, a, 1)),
+                       "exp(-v / speed)"),
+                   Bug("the share is 1 - exp(-v / speed)", writing(run, entering__share=lambda a: np.where(
+                       a > 0, 1 - a, 0)), "exp(-v / speed)"),
+                   Bug("the speed is squared: a gaussian, not an exponential", writing(
+                       run, entering__share=lambda a: np.where(a > 0, np.exp(-np.log(np.where(a > 0, a, 1)) ** 2), 0)),
+                       "exp(-v / speed)"),
+                   Bug("the speed is half as large", lambda a, r: run(a, r, speed / 2), "exp(-v / speed)"),
+                   Bug("the speed is twice as large", lambda a, r: run(a, r, 2 * speed), "exp(-v / speed)"),
+                   Bug("columns run leftwards", reading(run, before__frame=lambda a: a * np.array(
+                       [[-1.0], [1.0], [1.0]], a.dtype)), "column 0 is at the left"),
                    Bug("entering pixels get no light", lambda a, r: {**run(a, r), "entering.irradiance": a[light]},
                        "HSS Sec. 3.3"),
                    Bug("rows run upwards", reading(run, before__frame=_upside_down),
@@ -112,10 +124,25 @@ def _add_clamp(recipe: Recipe, settings: TemporalSettings, light: str) -> str:
                    "clamped.irradiance": replace(LIGHT, what="earlier light, clamped")},
                paper="docs/methods/hssil", bugs=(
                    Bug("the square is one pixel wider", lambda a, r: run(a, r, deviations, radius + 1), ""),
+                   Bug("the square is one pixel narrower", lambda a, r: run(a, r, deviations, radius - 1), ""),
+                   Bug("the square is twice as wide: its size is taken for its radius",
+                       lambda a, r: run(a, r, deviations, 2 * radius), ""),
+                   Bug("earlier light is not clamped", lambda a, r: {
+                       "clamped.irradiance": np.asarray(a[light], r)}, ""),
+                   Bug("half as many deviations", lambda a, r: run(a, r, deviations / 2), ""),
+                   Bug("the new light is clamped, not the earlier one", lambda a, r: run(
+                       {**a, light: a["new.irradiance"]}, r), ""),
+                   Bug("the square is taken of the earlier light, not of the new", lambda a, r: run(
+                       {**a, "new.irradiance": a[light]}, r), ""),
                    Bug("twice as many deviations", lambda a, r: run(a, r, 2 * deviations), ""),
                    Bug("pixels without surface count as dark", reading(run, gbuffer__triangle_id=np.zeros_like), ""),
                    Bug("earlier light is replaced by the mean", lambda a, r: run(a, r, 0.0), "")))
     return "clamped.irradiance"
+
+
+def _summed(made: Arrays, earlier: Array, new: Array, share_of_new: float) -> dict[str, Array]:
+    """Return what the blend writes with a fixed share of the new light."""
+    return {**made, "temporal.irradiance": made["temporal.share"] * earlier + share_of_new * new}
 
 
 def _add_blend(recipe: Recipe, settings: TemporalSettings, light: str, moved: bool) -> None:
@@ -149,6 +176,18 @@ def _add_blend(recipe: Recipe, settings: TemporalSettings, light: str, moved: bo
             "a = 0 (E-HSS-11)"),
         Bug("a is scaled by the share of texels found", by(lambda arrays, made: (
             made["temporal.share"] * arrays["reprojected.weight"])), FORM),
+        Bug("a is the same for pixels that were not found: no test of the weight", by(lambda _, made: np.full_like(
+            made["temporal.share"], settings.weight)), "a = 0 (E-HSS-11)"),
+        Bug("a is squared", by(lambda _, made: made["temporal.share"] ** 2), FORM),
+        Bug("a is half as large", by(lambda _, made: made["temporal.share"] / 2), FORM),
+        Bug("this frame's light is not multiplied by 1 - a: new light counts whole", lambda a, r: _summed(
+            run(a, r), a[light], a["new.irradiance"], 1.0), FORM),
+        Bug("new light is left out: earlier light times a alone", lambda a, r: _summed(
+            run(a, r), a[light], a["new.irradiance"], 0.0), FORM),
+        Bug("light of this frame alone: nothing is blended", lambda a, r: {
+            **run(a, r), "temporal.irradiance": a["new.irradiance"]}, FORM),
+        Bug("earlier light replaces the new where it was found: a is 1", by(lambda arrays, _: np.where(
+            arrays["reprojected.weight"] > 0, 1.0, 0.0)), FORM),
         Bug("earlier light is added, not blended", lambda a, r: {**run(a, r), "temporal.irradiance": (
             a["new.irradiance"] + settings.weight * a[light])}, FORM),
     ]
@@ -159,6 +198,18 @@ def _add_blend(recipe: Recipe, settings: TemporalSettings, light: str, moved: bo
             Bug("n counts this frame as well", by(lambda arrays, _: np.where(
                 arrays["reprojected.weight"] > 0, np.minimum(settings.weight, (arrays["reprojected.frames"] + 1) / (
                     arrays["reprojected.frames"] + 2)), 0)), "min(a, n / (n + 1))"),
+            Bug("a is the larger of a and n / (n + 1): max in place of min", by(lambda arrays, _: np.where(
+                arrays["reprojected.weight"] > 0, np.maximum(settings.weight, arrays["reprojected.frames"] / (
+                    arrays["reprojected.frames"] + 1)), 0)), "min(a, n / (n + 1))"),
+            Bug("a is at most 1 / (n + 1), not n / (n + 1): shares are exchanged", by(lambda arrays, _: np.where(
+                arrays["reprojected.weight"] > 0, np.minimum(settings.weight, 1 / (
+                    arrays["reprojected.frames"] + 1)), 0)), "min(a, n / (n + 1))"),
+            Bug("the count of frames starts at 0 where nothing was found, not at 1", writing(
+                run, temporal__frames=lambda a: np.where(a == 1, 0, a)), "n + 1"),
+            Bug("frames are counted twice", writing(run, temporal__frames=lambda a: a + 1), "n + 1"),
+            Bug("the count of frames does not start again where nothing was found", lambda a, r: {
+                **run(a, r), "temporal.frames": np.where(a["reprojected.weight"] > 0, a["reprojected.frames"],
+                                                         settings.weight) + 1}, "n + 1"),
             Bug("frames are not counted on", writing(run, temporal__frames=lambda a: a - 1), "n + 1"),
         ]
     if entered:

@@ -30,6 +30,7 @@ from refgi.vectors.stages.val_csm import add_csm
 from refgi.vectors.stages.val_maps import add_maps
 from refgi.vectors.stages.val_pcss import add_binary, add_pcss
 from refgi.vectors.stages.val_search import FACING, add_search
+from refgi.vectors.stages.val_sum_bugs import sum_bugs
 
 BLUR = "VAL Sec. 6, E-VAL-13; docs/methods/val"
 
@@ -103,7 +104,8 @@ def add_lighting(recipe: Recipe, settings: ValSettings) -> None:
                    Bug("V of another area light", reading(run, visibility__share=lambda a: np.roll(a, 1, 0)), ""),
                    Bug("shadows are squared", reading(run, visibility__share=np.square), ""),
                    Bug("the mean over area lights", lambda a, r: run(
-                       {**a, "visibility.share": a["visibility.share"] / len(a["visibility.share"])}, r), "a sum")))
+                       {**a, "visibility.share": a["visibility.share"] / len(a["visibility.share"])}, r), "a sum"),
+                   *sum_bugs()))
     if block > 1 and settings.blur is not None:
         _add_blur(recipe, settings.blur, block)
 

@@ -9,6 +9,7 @@ from refgi.vectors.spec import expected_of, outputs_of
 from refgi.vectors.stages.val_basis_bugs import chain_by
 from refgi.vectors.stages.val_cone_bugs import Cone, searched_by
 from refgi.vectors.stages.val_depth_bugs import basis_by, depths_by
+from refgi.vectors.stages.val_facing_bugs import faced_by
 from refgi.vectors.stages.val_kmeans_bugs import Metric, assigned_by, mean_of, means_by, unit_sum
 from refgi.vectors.stages.val_lookup_bugs import Lookup
 from refgi.vectors.stages.val_lookup_bugs import means_by as looked_up_by
@@ -27,6 +28,8 @@ def literal_forms(name):
     forms = {f"kmeans.assign{k}": assigned_by(k, (clusters.position_weight, clusters.normal_weight), Metric())
              for k in (0, 1)}
     forms |= {f"kmeans.means{k}": means_by(k, f"kmeans.of{k - 1}", mean_of, unit_sum) for k in (1, 2)}
+    if SETUPS[name].scene.geometry.vertex_normals is not None:
+        forms |= {"facing": faced_by()}
     forms |= {"hard": depth_tests_by("hard", 1, DepthTests()), "search": searched_by(Cone()),
               "sum": summed_by(lambda parts, share: (parts * share).sum(axis=0))}
     if name in ("val-single", "val-interleaved"):

@@ -122,6 +122,8 @@ def scale_bugs(run: Run, csm: Csm) -> tuple[Bug, ...]:
         "the natural logarithm of far / near: ln for log2": lambda near, far, ratio: np.log(ratio),  # noqa: ARG005
         "the logarithm to base 10 of far / near, for log2": lambda near, far, ratio: np.log10(ratio),  # noqa: ARG005
         "the ratio far / near, not its logarithm": lambda near, far, ratio: ratio,  # noqa: ARG005
+        "near / far: the ratio is turned round, cut at 1.05 on all maps": lambda near, far, ratio: np.log2(  # noqa: ARG005
+            LEAST_RATIO + 0 * ratio),
         "far alone: the logarithm of far, not of far / near": lambda near, far, ratio: np.log2(1 + far),  # noqa: ARG005
     } if logs else {
         "far alone: near is not subtracted": lambda near, far, ratio: far,  # noqa: ARG005

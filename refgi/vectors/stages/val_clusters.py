@@ -12,7 +12,8 @@ from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR
-from refgi.vectors.stages.val_kmeans_bugs import box_bugs, mean_bugs, metric_bugs
+from refgi.vectors.stages.val_box_bugs import box_bugs
+from refgi.vectors.stages.val_kmeans_bugs import mean_bugs, metric_bugs
 
 ROUNDS = 2  # of k-means that a case shows one by one
 LIGHTS = ("lights.position", "lights.normal")

@@ -27,9 +27,11 @@ def _depths(
     arrays: Arrays, logs: bool, mirrored: bool, *, logarithm: Callable[[Any], Any] = np.log2, origin: bool = True,
     slope: Callable[[Any], Any] = lambda slope: slope, most: Any = None, least: float = 0.0, empty: float | None = None,
     shrink: Callable[[Any, int], Any] = lambda q, n: np.minimum(1 / np.sqrt(q), 1 - INSIDE / n) / np.sqrt(q),
-    half: float = 0.5, exchanged: bool = False, signs: tuple[int, int] = (1, 1), first: bool = False,
+    first_depth: bool = False, half: float = 0.5, exchanged: bool = False, signs: tuple[int, int] = (1, 1),
+    first: bool = False,
 ) -> Array:
     depth = np.asarray(arrays["maps.depth"], np.float64)
+    depth = np.repeat(depth[:1], len(depth), axis=0) if first_depth else depth
     begin, steep = (np.asarray(arrays[f"scale.{name}"], np.float64)[:, None, None] for name in ("origin", "slope"))
     begin, steep = (np.where(steep > 0, one[:1], one) if first else one for one in (begin, steep))
     end = float(arrays["series.range"][0])
@@ -74,6 +76,7 @@ def depth_bugs(csm: Csm) -> tuple[Bug, ...]:
         "nothing there (inf) is at depth 0, not at the far end of the range": {"empty": 0.0},
         "nothing there (inf) is at depth 1, not at the far end of the range": {"empty": 1.0},
         "the first map's scale for all": {"first": True},
+        "the first map's depths for all": {"first_depth": True},
     }
     mirrors: Mapping[str, Any] = {
         "mirrored rows and columns are exchanged (swapped)": {"exchanged": True},

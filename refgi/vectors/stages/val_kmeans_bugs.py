@@ -1,4 +1,4 @@
-"""Boxes and k-means of pixel lights as a port writes them, and as it gets them wrong (VAL Sec. 5.1, E-VAL-11)."""
+"""K-means of pixel lights as a port writes them, and as it gets them wrong (VAL Sec. 5.1, E-VAL-11)."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -70,6 +70,8 @@ METRICS: Mapping[str, Metric] = {
     "half of 1 - cosine in place of the angle over pi": Metric(
         turned=lambda along, across: np.pi * (1 - along) / 2 + 0 * across),
     "places do not count: normals alone": Metric(weights=lambda wx, wa: (0.0, wa)),  # noqa: ARG005
+    "the weight of places w_x is missing: it counts as 1": Metric(weights=lambda wx, wa: (1.0, wa)),  # noqa: ARG005
+    "the weight of angles w_a is missing: it counts as 1": Metric(weights=lambda wx, wa: (wx, 1.0)),  # noqa: ARG005
     "both weights are 1": Metric(weights=lambda wx, wa: (1.0, 1.0)),  # noqa: ARG005
     "both weights are that of places, w_x": Metric(weights=lambda wx, wa: (wx, wx)),  # noqa: ARG005
     "both weights are that of angles, w_a": Metric(weights=lambda wx, wa: (wa, wa)),  # noqa: ARG005
@@ -172,6 +174,9 @@ def mean_bugs(run: Run, number: int) -> tuple[Bug, ...]:
     return (
         *(Bug(cause, means_by(number, of, how, unit_sum), "VAL Sec. 5.1") for cause, how in CENTERS.items()),
         *(Bug(cause, means_by(number, of, mean_of, how), "E-VAL-11") for cause, how in AXES.items()),
+        *(Bug(f"the {what} of all is left out of the means", _without_light(run, of, light), "all lights")
+          for what, light in (("first light", 0), ("last light", -1))),
+        Bug("lights of the clusters before count as members as well: <= for ==", _with_lower(of, number), "C(i) = k"),
         Bug("the last cluster does not move", _one_stays(run, number), "all clusters"),
         Bug("clusters are shifted by one: means stand at the cluster before", writing(
             run, **{name: lambda a: np.roll(a, -1, axis=1) for name in (center, normal)}), "C(i)"))
@@ -182,50 +187,35 @@ def mean_of(lights: Array, before: Array, of: Array) -> Array:  # noqa: ARG001
     return np.asarray(lights.mean(axis=1))
 
 
+def _without_light(run: Run, of: str, light: int) -> Run:
+    def altered(arrays: Arrays, real: Any) -> Arrays:
+        names = ("lights.position", "lights.normal")
+        rest = {name: np.delete(arrays[name], light, axis=1) for name in names} | {of: np.delete(arrays[of], light)}
+        return run({**arrays, **rest}, real)
+
+    return altered
+
+
+def _with_lower(of: str, number: int) -> Run:
+    def altered(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+        made, chosen = {}, np.asarray(arrays[of])
+        for key, source in (("center", "position"), ("normal", "normal")):
+            new = np.array(arrays[f"kmeans.{key}{number - 1}"], np.float64)
+            for k in range(new.shape[1]):
+                some = np.asarray(arrays[f"lights.{source}"], np.float64)[:, chosen <= k]
+                if some.any():
+                    new[:, k] = some.mean(axis=1) if key == "center" else unit_sum(some)
+            made[f"kmeans.{key}{number}"] = new
+        return made
+
+    return altered
+
+
 def _one_stays(run: Run, number: int) -> Run:
     def altered(arrays: Arrays, real: Any) -> Arrays:
         made = {name: np.array(array) for name, array in run(arrays, real).items()}
         for key in ("center", "normal"):
             made[f"kmeans.{key}{number}"][:, -1] = arrays[f"kmeans.{key}{number - 1}"][:, -1]
         return made
-
-    return altered
-
-
-def box_bugs(run: Run) -> tuple[Bug, ...]:
-    """Return likely bugs of boxes of points."""
-    both = ("extents__visible", "extents__illuminated")
-
-    def changed(change: Callable[[Array], Array]) -> Run:
-        return writing(run, **dict.fromkeys(both, change))
-
-    wider: dict[str, Callable[[Array], Array]] = {
-        "least and greatest corner are exchanged": lambda a: a[::-1],
-        "boxes are centre and half sides, not corners": lambda a: np.stack([(a[0] + a[1]) / 2, (a[1] - a[0]) / 2]),
-        "boxes are corner and size, not two corners": lambda a: np.stack([a[0], a[1] - a[0]]),
-        "boxes hold the world's origin: the least and greatest begin at 0": lambda a: np.stack([
-            np.minimum(a[0], 0), np.maximum(a[1], 0)]),
-        "the least corner begins at 0: not above it": lambda a: np.stack([np.minimum(a[0], 0), a[1]]),
-        "the least corner for both": lambda a: np.stack([a[0], a[0]]),
-        "the greatest corner for both": lambda a: np.stack([a[1], a[1]]),
-    }
-    return (*(Bug(cause, changed(change), "least and greatest, xyz") for cause, change in wider.items()),
-            Bug("one box for both: what is visible and illuminated together", _as_one(run), "two boxes"),
-            Bug("the visible and the illuminated box are exchanged", _exchanged(run), "visible: the camera's pixels"))
-
-
-def _as_one(run: Run) -> Run:
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        a, b = run(arrays, real).values()
-        one = np.stack([np.minimum(a[0], b[0]), np.maximum(a[1], b[1])])
-        return {"extents.visible": one, "extents.illuminated": one}
-
-    return altered
-
-
-def _exchanged(run: Run) -> Run:
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        made = run(arrays, real)
-        return {"extents.visible": made["extents.illuminated"], "extents.illuminated": made["extents.visible"]}
 
     return altered

@@ -96,6 +96,8 @@ def _hides(z: Array, s: Array, t: Array, place: Array, d: Array, normal: Array, 
     below = height < 0
     out = below if how.turned == "none" else False
     slope = np.where(below, -slope, slope) if how.turned in ("both", "slope") else slope
+    slope = np.where(below, slope, -slope) if how.turned == "opposite" else slope
+    height = np.abs(height) if how.turned == "opposite" else height
     height = np.where(below, -height, height) if how.turned in ("both", "height") else height
     room = 1 - how.slack
     at_plane = z < how.limit(height, -slope) * room
@@ -110,6 +112,10 @@ TESTS: Mapping[str, DepthTests] = {
     "normals are not turned to the light's side: height and slope keep their sign": DepthTests(turned=""),
     "the height alone is turned to the light's side, not the slope: wrong sign": DepthTests(turned="height"),
     "the slope alone is turned to the light's side, not the height: wrong sign": DepthTests(turned="slope"),
+    "the height of the plane has the wrong sign: from the pixel to the light, turned against the slope": DepthTests(
+        turned="opposite"),
+    "height over slope has the wrong sign: the plane never hides": DepthTests(
+        limit=lambda height, slope: -height / slope),
     "directions away from the receiver's plane never hide": DepthTests(away=False),
     "height times slope for height over slope": DepthTests(limit=lambda height, slope: height * slope),
     "slope over height for height over slope": DepthTests(limit=lambda height, slope: slope / height),
@@ -130,8 +136,10 @@ TESTS: Mapping[str, DepthTests] = {
     "the receiver's texel is one too far left and up": DepthTests(place=lambda s, n: (s + 1) / 2 * n - 1),
     "the receiver's texel is one too far right and down": DepthTests(place=lambda s, n: (s + 1) / 2 * n + 1),
     "the receiver's texel is scaled by n - 1, not n": DepthTests(place=lambda s, n: (s + 1) / 2 * (n - 1)),
-    "the map is orthographic: x / d for the paraboloid's x / (d + z)": DepthTests(total=lambda d, forward: d + 0 * forward),
-    "the map is perspective: x / z for the paraboloid's x / (d + z)": DepthTests(total=lambda d, forward: forward + 0 * d),
+    "the map is orthographic: x / d for the paraboloid's x / (d + z)": DepthTests(
+        total=lambda d, forward: d + 0 * forward),
+    "the map is perspective: x / z for the paraboloid's x / (d + z)": DepthTests(
+        total=lambda d, forward: forward + 0 * d),
     "the paraboloid divides by 1 + z: the direction is not normalised": DepthTests(
         total=lambda d, forward: 1 + forward + 0 * d),
     "the texel's direction is taken at its corner, not its centre: no half texel (0.5)": DepthTests(half=0.0),
@@ -141,6 +149,10 @@ TESTS: Mapping[str, DepthTests] = {
         direction=lambda s, t, q: np.stack([s, t, 1 - q]) / (1 + q)),
     "the texel's direction is (s, t, sqrt(1 - q)), of an orthographic map": DepthTests(
         direction=lambda s, t, q: np.stack([s, t, np.sqrt(np.maximum(1 - q, 0))])),
+    "the texel's forward component is -q, one too low: 1 - q for 2 - q where q holds the 1": DepthTests(
+        direction=lambda s, t, q: np.stack([2 * s, 2 * t, -q]) / (1 + q)),
+    "the texel's forward component is 1, not 1 - q": DepthTests(
+        direction=lambda s, t, q: np.stack([2 * s, 2 * t, 1 + 0 * q]) / (1 + q)),
     "the texel's direction is mirrored, sign of down": DepthTests(
         direction=lambda s, t, q: np.stack([2 * s, -2 * t, 1 - q]) / (1 + q)),
     "the first map's depths for all": DepthTests(cone=Cone(of_first=("maps.depth",))),
@@ -150,7 +162,8 @@ TESTS: Mapping[str, DepthTests] = {
         cone=Cone(of_first=("areas.frame", "maps.center", "maps.depth"))),
     "the next area light's map: maps are shifted by one": DepthTests(depth_of=lambda depth: np.roll(depth, -1, axis=0)),
     "rows and columns of the map are exchanged (transposed)": DepthTests(depth_of=lambda depth: depth.swapaxes(1, 2)),
-    "empty texels count as blockers at distance 0": DepthTests(depth_of=lambda depth: np.where(np.isinf(depth), 0, depth)),
+    "empty texels count as blockers at distance 0": DepthTests(
+        depth_of=lambda depth: np.where(np.isinf(depth), 0, depth)),
     "the frame of the area light is transposed": DepthTests(cone=Cone(transposed=True)),
     "positions count from the world's origin, not from the map's centre": DepthTests(cone=Cone(from_center=False)),
     "lights with and without extent are exchanged: Delta 0": DepthTests(extents="swapped"),
@@ -159,7 +172,7 @@ HARD: Mapping[str, DepthTests] = {
     "area lights with extent have hard shadows as well": DepthTests(extents="all"),
 }
 NO_TEXEL: Mapping[str, DepthTests] = {
-    "the kernel leaves out its last row or column (loop with < for <=): of one texel nothing remains, V is 1": DepthTests(
+    "the kernel leaves out its last row or column (loop with < for <=): nothing remains of one, V is 1": DepthTests(
         only=lambda dy, dx: False),  # noqa: ARG005
 }
 KERNEL: Mapping[str, DepthTests] = {
@@ -198,7 +211,8 @@ def _one_alone() -> dict[str, DepthTests]:
     return {cause.format(one): how._replace(alone=one) for one in ("column", "row") for cause, how in (
         ("the receiver's {} alone is s n: of [0, 1], not of [-1, 1]", DepthTests(place=lambda s, n: s * n)),
         ("the receiver's {} alone is not halved: s + 1 for (s + 1) / 2", DepthTests(place=lambda s, n: (s + 1) * n)),
-        ("half a texel is subtracted from the receiver's {} alone", DepthTests(place=lambda s, n: (s + 1) / 2 * n - 0.5)),
+        ("half a texel is subtracted from the receiver's {} alone", DepthTests(
+            place=lambda s, n: (s + 1) / 2 * n - 0.5)),
         ("half a texel is added to the receiver's {} alone", DepthTests(place=lambda s, n: (s + 1) / 2 * n + 0.5)),
         ("the receiver's {} alone is one too low", DepthTests(place=lambda s, n: (s + 1) / 2 * n - 1)),
         ("the receiver's {} alone is one too high", DepthTests(place=lambda s, n: (s + 1) / 2 * n + 1)))}

@@ -27,9 +27,11 @@ from refgi.vectors.stages.val_areas import add_areas
 from refgi.vectors.stages.val_basis import add_basis
 from refgi.vectors.stages.val_clusters import add_extents, add_kmeans, clusters_of, extent_of
 from refgi.vectors.stages.val_csm import add_csm
+from refgi.vectors.stages.val_facing_bugs import facing_bugs
 from refgi.vectors.stages.val_maps import add_maps
 from refgi.vectors.stages.val_pcss import add_binary, add_pcss
 from refgi.vectors.stages.val_search import FACING, add_search
+from refgi.vectors.stages.val_sum_bugs import sum_bugs
 
 BLUR = "VAL Sec. 6, E-VAL-13; docs/methods/val"
 
@@ -63,8 +65,8 @@ def _add_facing(recipe: Recipe, scene: Scene) -> None:
                {FACING: Spec("xyz, row, column", VECTOR, "plane of what a pixel sees; 0 without surface", "world")},
                paper="A.6 P4: receiver's plane", bugs=(
                    Bug("they point away from the viewer", writing(run, **{"gbuffer__facing": lambda a: -a}), ""),
-                   *((Bug("interpolated normals", lambda a, r: {FACING: a["gbuffer.normal"]}, "d_plane"),)  # noqa: ARG005
-                     if smooth else ())))
+                   *((Bug("interpolated normals", lambda a, r: {FACING: a["gbuffer.normal"]}, "d_plane"),  # noqa: ARG005
+                      *facing_bugs()) if smooth else ())))
 
 
 def add_visibility(recipe: Recipe, settings: ValSettings, delta: Array) -> None:
@@ -103,7 +105,8 @@ def add_lighting(recipe: Recipe, settings: ValSettings) -> None:
                    Bug("V of another area light", reading(run, visibility__share=lambda a: np.roll(a, 1, 0)), ""),
                    Bug("shadows are squared", reading(run, visibility__share=np.square), ""),
                    Bug("the mean over area lights", lambda a, r: run(
-                       {**a, "visibility.share": a["visibility.share"] / len(a["visibility.share"])}, r), "a sum")))
+                       {**a, "visibility.share": a["visibility.share"] / len(a["visibility.share"])}, r), "a sum"),
+                   *sum_bugs()))
     if block > 1 and settings.blur is not None:
         _add_blur(recipe, settings.blur, block)
 

@@ -17,7 +17,9 @@ from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.series import frequencies
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.stages.val_depth_bugs import basis_bugs, depth_bugs
 from refgi.vectors.stages.val_maps import SHEET
+from refgi.vectors.stages.val_mip_bugs import mip_bugs
 from refgi.vectors.stages.val_series import SCALE, add_scale, add_series, scale_at
 
 CHANNELS = "area light, channel, row, column"
@@ -51,15 +53,13 @@ def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
         "; beyond the disc the texel at (s, t) / (s^2 + t^2)" if mirrored else ""), run, ("maps.depth", *SCALE),
         {"maps.t": Spec(SHEET, "1", "depth; the range where nothing is; 0 on empty maps", paper="E-VAL-05")},
         paper="E-VAL-05", exact=("maps.depth",), bugs=(
-            Bug("natural logarithms", natural, "log2"),
-            Bug("texels without surface are at depth 1", writing(run, maps__t=_empty_at_1), "E-VAL-05: wrap-around"),
-            Bug("depths are not cut at the range", reading(run, series__range=lambda a: a * 2), "E-VAL-05"),
-            *((Bug("the square beyond the disc holds nothing", lambda a, r: run(a, r, mirror=False),
-                   "docs/methods/val_visibility"),) if mirrored else ())))
-
-
-def _empty_at_1(t: Array) -> Array:
-    return np.where(t == t.max(), 1, t).astype(t.dtype)
+            Bug("the natural logarithm, ln for log2", natural, "log2"),
+            Bug("the range is twice as far: empty texels lie beyond it", reading(run, series__range=lambda a: a * 2),
+                "E-VAL-05"),
+            *((Bug("texels beyond the disc are not mirrored: the square's corners hold nothing",
+                   lambda a, r: run(a, r, mirror=False),
+                   "docs/methods/val_visibility"),) if mirrored else ()),
+            *depth_bugs(csm)))
 
 
 def _add_level_0(recipe: Recipe, csm: Csm) -> None:
@@ -88,13 +88,17 @@ def _add_level_0(recipe: Recipe, csm: Csm) -> None:
         "basis.0": Spec(CHANNELS, "1", "S_1.., C_1.., t S_1.., t C_1.., t; 0 on empty maps", paper="E-VAL-02")},
         paper="VAL Sec. 4.1, E-VAL-02", exact=("maps.t",), variants=(literal(right),), bugs=(
             Bug("c_k = k pi", literal(k * np.pi), "c_k = (2k - 1) pi"),
-            Bug("c_k = 2 k pi", literal(2 * k * np.pi), "c_k = (2k - 1) pi"),
+            Bug("even multiples of pi: c_k = 2 k pi", literal(2 * k * np.pi), "c_k = (2k - 1) pi"),
             Bug("c_k = (2k + 1) pi", literal(right + 2 * np.pi), "k from 1 on"),
-            Bug("sines and cosines are not weighed by the depth", literal(right, weigh=False), "E-VAL-02"),
-            Bug("sines and cosines are exchanged", writing(run, basis__0=_exchanged), "E-VAL-02"),
-            Bug("sines and cosines take turns", writing(run, basis__0=_in_turns), "order of channels"),
+            Bug("sines and cosines of the second half are not weighed by the depth", literal(right, weigh=False),
+                "E-VAL-02"),
+            Bug("sines and cosines are exchanged, also those times the depth",
+                writing(run, basis__0=_exchanged), "E-VAL-02"),
+            Bug("sines and cosines alternate (interleaved), also those times the depth",
+                writing(run, basis__0=_in_turns), "order of channels"),
             Bug("the mean depth itself is left out",
-                writing(run, basis__0=lambda a: np.concatenate([a[:, :-1], 0 * a[:, -1:]], axis=1)), "E-VAL-02: Z")))
+                writing(run, basis__0=lambda a: np.concatenate([a[:, :-1], 0 * a[:, -1:]], axis=1)), "E-VAL-02: Z"),
+            *basis_bugs(run, csm.terms)))
 
 
 def _exchanged(basis: Array) -> Array:
@@ -146,7 +150,8 @@ def _add_levels(recipe: Recipe, terms: int) -> None:
                        lambda a: _mean_of_four(np.roll(a, -1, axis=2), "edge")), "texels 2 i and 2 i + 1"),
                    Bug("the depth is that of the nearest texel, not the mean",
                        chained(lambda a: np.concatenate([_mean_of_four(a, "edge")[:, :-1], _least_of_four(a)], 1)),
-                       "E-VAL-02: Z = w * z")))
+                       "E-VAL-02: Z = w * z"),
+                   *mip_bugs(names)))
 
 
 def _halved(level: Array, terms: int) -> Array:

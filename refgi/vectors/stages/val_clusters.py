@@ -1,5 +1,6 @@
 """Stages of clusters of pixel lights: extents, k-means round by round (VAL Sec. 5.1)."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR
+from refgi.vectors.stages.val_box_bugs import box_bugs
+from refgi.vectors.stages.val_kmeans_bugs import mean_bugs, metric_bugs
 
 ROUNDS = 2  # of k-means that a case shows one by one
 LIGHTS = ("lights.position", "lights.normal")
@@ -42,7 +45,9 @@ def add_extents(recipe: Recipe, maps: int) -> None:
                paper="docs/methods/val", bugs=(
                    Bug("texels without flux count", lambda a, r: run(a, r, dark=True), "what reflects direct light"),
                    Bug("pixels without surface count, at the origin", lambda a, r: run(a, r, empty=True), ""),
-                   Bug("the first lamp's map alone", lambda a, r: run(a, r, first=True), "all lamps")))
+                   Bug("the first light's map alone (rsm0), not all lights'", lambda a, r: run(a, r, first=True),
+                       "all lamps"),
+                   *box_bugs(run)))
 
 
 def extent_of(arrays: Arrays, *names: str) -> Extent:
@@ -81,7 +86,11 @@ def add_kmeans(recipe: Recipe, settings: Clusters, total: int) -> None:
     recipe.add("kmeans", "further rounds until no light changes its cluster", run,
                (*LIGHTS, "extents.illuminated", *last), _clusters(), paper="VAL Sec. 5.1; A.6 P5",
                exact=(*LIGHTS, *last), bugs=(
-                   Bug("no rounds beyond those shown", stopped, "until assignments repeat"),
+                   Bug("no rounds beyond those shown: centres stay as they were", stopped, "until assignments repeat"),
+                   Bug("the last cluster gets no lights: one too few", writing(
+                       run, clusters__of=lambda a: np.where(a == count - 1, 0, a)), "all clusters"),
+                   Bug("clusters count from 1", writing(run, clusters__of=lambda a: a + 1), "from 0"),
+                   Bug("mean normals point the other way", writing(run, clusters__normal=lambda a: -a), ""),
                    Bug("normals do not count", lambda a, r: run(a, r, normal_weight=0.0), METRIC)))
 
 
@@ -118,6 +127,9 @@ def _add_start(recipe: Recipe, count: int, total: int) -> None:
         return {f"kmeans.{key}0": arrays[name][:, at(total, count)] for key, name in
                 zip(("center", "normal"), LIGHTS, strict=True)}
 
+    def begun(at: Any) -> Run:
+        return lambda arrays, real: run(arrays, real, at)
+
     recipe.add("kmeans.start", "cluster k begins at light floor(k N / M)", run, LIGHTS, _centers(0),
                paper="VAL Sec. 5.1; A.6 P5", exact=LIGHTS, bugs=(
                    Bug("clusters begin at the first M lights", lambda a, r: run(a, r, lambda _, m: np.arange(m)),
@@ -125,7 +137,24 @@ def _add_start(recipe: Recipe, count: int, total: int) -> None:
                    Bug("k N / M is rounded instead of cut", lambda a, r: run(
                        a, r, lambda n, m: (np.arange(m) * n + m // 2) // m), "floor(k N / M)"),
                    Bug("clusters begin in the middle of their run", lambda a, r: run(
-                       a, r, lambda n, m: (2 * np.arange(m) + 1) * n // (2 * m)), "floor(k N / M)")))
+                       a, r, lambda n, m: (2 * np.arange(m) + 1) * n // (2 * m)), "floor(k N / M)"),
+                   *(Bug(cause, begun(at), "floor(k N / M)") for cause, at in STARTS.items()),
+                   Bug("all clusters face as the first light does: one normal", writing(
+                       run, kmeans__normal0=lambda a: np.repeat(a[:, :1], a.shape[1], axis=1)), "each its own light")))
+
+
+STARTS: dict[str, Callable[[int, int], Array]] = {
+    "clusters begin at every floor(N / M)-th light: k (N / M) in whole numbers": lambda n, m: np.arange(m) * (n // m),
+    "clusters begin at k (N - 1) / (M - 1): the last at the last light": lambda n, m: (
+        np.arange(m) * (n - 1) // max(m - 1, 1)),
+    "clusters begin at k (N - 1) / M: one light too few": lambda n, m: np.arange(m) * (n - 1) // m,
+    "clusters begin at the ends of their runs, (k + 1) N / M - 1": lambda n, m: (np.arange(m) + 1) * n // m - 1,
+    "clusters begin one light too late: floor(k N / M) + 1": lambda n, m: np.minimum(np.arange(m) * n // m + 1, n - 1),
+    "clusters begin at the next run's light: k + 1 in place of k": lambda n, m: (np.arange(m) + 1) * n // m % n,
+    "clusters begin at the last M lights": lambda n, m: np.arange(n - m, n),
+    "all clusters begin at the first light": lambda n, m: np.zeros(m, int),  # noqa: ARG005
+    "k N / M is rounded up": lambda n, m: -(-np.arange(m) * n // m),
+}
 
 
 def _centers(number: int) -> dict[str, Spec]:
@@ -135,6 +164,8 @@ def _centers(number: int) -> dict[str, Spec]:
 
 def _add_assignment(recipe: Recipe, settings: Clusters, number: int) -> None:
     center, normal = _centers(number)
+    known = recipe.expected()
+    boxes = known["extents.visible"], known["extents.illuminated"]
 
     def run(arrays: Arrays, real: Any, last: bool = False, cosine: bool = False, **how: Any) -> Arrays:  # noqa: ARG001
         kind = replaced(settings, how)
@@ -160,7 +191,8 @@ def _add_assignment(recipe: Recipe, settings: Clusters, number: int) -> None:
                paper=METRIC, exact=(*LIGHTS, center, normal), bugs=(
                    Bug("the highest index of equally near ones", lambda a, r: run(a, r, last=True), "A.6 P5"),
                    Bug("1 - cosine in place of the angle over pi", lambda a, r: run(a, r, cosine=True), METRIC),
-                   *_metric_bugs(run, settings)))
+                   *_metric_bugs(run, settings),
+                   *(metric_bugs(number, _weights(settings), *boxes) if settings.distance == "normalised" else ())))
 
 
 def _metric_bugs(run: Any, settings: Clusters) -> tuple[Bug, ...]:
@@ -173,7 +205,8 @@ def _metric_bugs(run: Any, settings: Clusters) -> tuple[Bug, ...]:
     return (*(Bug(f"distances are others: {what}", other(distance=kind), METRIC) for kind, what in forms.items()
               if kind != settings.distance),
             Bug("normals do not count", other(normal_weight=0.0), METRIC),
-            Bug("the weights are exchanged", other(position_weight=0.3, normal_weight=0.7), METRIC))
+            *(() if settings.distance == "normalised" else (
+                Bug("the weights are exchanged", other(position_weight=0.3, normal_weight=0.7), METRIC),)))
 
 
 def _add_means(recipe: Recipe, number: int) -> None:
@@ -199,7 +232,8 @@ def _add_means(recipe: Recipe, number: int) -> None:
                (*LIGHTS, of, *before), _centers(number + 1), paper="VAL Sec. 5.1; A.6 P5", exact=before, bugs=(
                    Bug("clusters without lights go to the origin", empty_at_origin, "they keep their values"),
                    Bug("mean normals are not of unit length", not_unit, "E-VAL-11"),
-                   Bug("normals stay as they were", lambda a, r: {**run(a, r), after[1]: a[before[1]]}, "E-VAL-11")))
+                   Bug("normals stay as they were", lambda a, r: {**run(a, r), after[1]: a[before[1]]}, "E-VAL-11"),
+                   *mean_bugs(run, number + 1)))
 
 
 def clusters_of(settings: ValSettings) -> Clusters:

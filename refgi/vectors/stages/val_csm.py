@@ -12,11 +12,13 @@ from refgi.cluster.visibility.series import Series, series
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.val_basis import filters_of, level_names
-from refgi.vectors.stages.val_bugs import compared_bugs, means_bugs, series_bugs
+from refgi.vectors.stages.val_bugs import compared_bugs, means_bugs, size_bugs
+from refgi.vectors.stages.val_lookup_bugs import lookup_bugs
 from refgi.vectors.stages.val_search import (
     LIGHT,
     PIXELS,
     PLACE,
+    by_default,
     lanes,
     penumbra_planes,
     penumbra_specs,
@@ -25,6 +27,7 @@ from refgi.vectors.stages.val_search import (
     share_spec,
 )
 from refgi.vectors.stages.val_series import SCALE, scale_at
+from refgi.vectors.stages.val_series_bugs import series_search_bugs, verdict_bugs
 
 
 def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
@@ -50,7 +53,7 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
                (*PIXELS, *LIGHT, *SCALE, "series.weight", "series.bias", "search.pending", "search.means"),
                {**penumbra_specs(), "penumbra.t": Spec(PLACE, "1", "depth of the pixel on the series' scale")},
                paper="VAL Sec. 4.1, E-VAL-02, 04, 07", exact=("maps.center",),
-               bugs=series_bugs(penumbra, settings, csm))
+               bugs=(*size_bugs(penumbra, settings), *(series_search_bugs(csm) if by_default(settings) else ())))
     _add_means(recipe, settings, csm, "penumbra", "penumbra.shaded", 2 * csm.terms)
     hard = ("hard.share",) if "hard.share" in recipe.specs else ()
 
@@ -69,7 +72,8 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
 
     recipe.add("visibility", "V = gain (1/2 + sum w_k (cos(c_k d') S_k - sin(c_k d') C_k)), where shaded", share,
                ("penumbra.shaded", "penumbra.t", "penumbra.means", "series.weight", "series.bias", *hard),
-               {"visibility.share": share_spec()}, paper="VAL Sec. 4.1, E-VAL-02", bugs=compared_bugs(share))
+               {"visibility.share": share_spec()}, paper="VAL Sec. 4.1, E-VAL-02",
+               bugs=(*compared_bugs(share), *verdict_bugs(series(csm).gain, bool(hard))))
 
 
 def _add_means(recipe: Recipe, settings: ValSettings, csm: Csm, name: str, flag: str, channels: int) -> None:
@@ -94,7 +98,8 @@ def _add_means(recipe: Recipe, settings: ValSettings, csm: Csm, name: str, flag:
                (flag, f"{name}.region", *levels),
                {f"{name}.means": Spec("area light, channel, row, column", "1",
                                       "means of the channels of basis.0 over the disc; 0 where none is asked for")},
-               paper="VAL Sec. 6", bugs=means_bugs(run, name, csm))
+               paper="VAL Sec. 6",
+               bugs=(*means_bugs(run, name, csm), *(lookup_bugs(name, flag) if csm.prefilter == "mip" else ())))
 
 
 def _chain(arrays: Arrays, csm: Csm, real: Any) -> tuple[Array, Series]:

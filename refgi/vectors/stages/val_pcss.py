@@ -13,12 +13,15 @@ from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run
 from refgi.vectors.stages.val_bugs import dark_where_1, local_of, scaled, size_bugs
+from refgi.vectors.stages.val_cone_bugs import cone_bugs
 from refgi.vectors.stages.val_maps import shadow_maps_of
+from refgi.vectors.stages.val_pcf_bugs import pcf_bugs
 from refgi.vectors.stages.val_search import (
     FACING,
     LIGHT,
     PIXELS,
     Lane,
+    by_default,
     lanes,
     penumbra_planes,
     penumbra_specs,
@@ -101,6 +104,7 @@ def _blocker_bugs(run: Any, settings: ValSettings, pcss: Pcss) -> tuple[Bug, ...
             "E-VAL-14"),
         Bug("normals point inwards within the map", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
         Bug("z_avg is the nearest distance", writing(run, penumbra__z_avg=_least), "the mean"),
+        *(cone_bugs(run) if by_default(settings) else ()),
         *size_bugs(run, settings))
 
 
@@ -141,7 +145,8 @@ def _binary_bugs(run: Any, name: str, texels: int) -> tuple[Bug, ...]:
         Bug("V is the hidden share", writing(run, **{share: lambda a: 1 - a}), "V = 1 - blocked / tested"),
         Bug("rows run upwards", reading(run, maps__depth=lambda a: a[:, ::-1]), "rows downwards"),
         Bug("a texel too far left", reading(run, maps__depth=lambda a: np.roll(a, 1, axis=2)), "floor(s n)"),
-        Bug("pixels behind the light's plane are hidden", _hidden_behind(run, name), "E-VAL-12: V = 1"))
+        Bug("pixels behind the light's plane are hidden", _hidden_behind(run, name), "E-VAL-12: V = 1"),
+        *pcf_bugs(name, texels))
 
 
 def _hidden_behind(run: Any, name: str) -> Run:

@@ -24,6 +24,7 @@ from refgi.cluster.visibility.series import Series
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.val_bugs import search_bugs
+from refgi.vectors.stages.val_cone_bugs import search_disc_bugs
 from refgi.vectors.stages.val_maps import VIEW, shadow_maps_of
 
 PIXELS = ("gbuffer.position", "gbuffer.triangle_id")
@@ -80,6 +81,11 @@ class Planes:
         here[..., flags] = values[..., flags]
 
 
+def by_default(settings: ValSettings) -> bool:
+    """Tell whether discs are found as errata say: by no printed form, nor by the light's foreshortened size."""
+    return not settings.as_published and not settings.area.foreshortened
+
+
 def share_spec() -> Spec:
     """Return what V is."""
     return Spec(PLACE, "1", "V, 0 hidden to 1 seen; 1 behind the light's plane, on empty maps, without surface")
@@ -132,4 +138,4 @@ def add_search(recipe: Recipe, settings: ValSettings) -> None:
                    "search.region": REGION,
                    "search.distance": Spec(PLACE, "m", "d, from the map's centre; 0 where not pending")},
                paper="VAL Sec. 4.2, E-VAL-09; disc: E-VAL-08", exact=("maps.center",),
-               bugs=search_bugs(run, settings))
+               bugs=(*search_bugs(run, settings), *(search_disc_bugs(run) if by_default(settings) else ())))

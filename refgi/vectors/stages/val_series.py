@@ -11,6 +11,7 @@ from refgi.cluster.visibility.series import series
 from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Arrays, Bug, Spec
+from refgi.vectors.stages.val_basis_bugs import chain_bugs, scale_bugs
 from refgi.vectors.stages.val_maps import shadow_maps_of
 
 SCALE = ("scale.origin", "scale.slope", "series.range")
@@ -31,15 +32,15 @@ def add_series(recipe: Recipe, csm: Csm) -> None:
         "series.bias": Spec("(search, comparison)", "1", "b*, where f_M is 1 for the first time", paper="E-VAL-03"),
         "series.range": Spec("one", "1", "1 - 2 b*, the depth of what is farthest", paper="E-VAL-05")},
         paper="VAL Sec. 4.1, E-VAL-02, 03, 05", bugs=(
-            Bug("c_k = k pi", writing(run, series__weight=lambda a: 2 / np.pi / np.arange(1, len(a) + 1)),
-                "E-VAL-02"),
-            Bug("w_k = 1 / c_k", writing(run, series__weight=lambda a: a / 2), "E-VAL-02"),
+            Bug("weights are half as large, w_k = 1 / c_k: the factor 2 is missing, or "
+                "frequencies are twice as high", writing(run, series__weight=lambda a: a / 2), "E-VAL-02"),
             Bug("terms are damped more", lambda a, r: run(a, r, replaced(csm, {
                 "attenuation": csm.attenuation + 1.0})), f"A = {csm.attenuation:g}"),
-            Bug("no bias", writing(run, series__bias=np.zeros_like), "E-VAL-03"),
+            Bug("no bias, the range right", writing(run, series__bias=np.zeros_like), "E-VAL-03"),
             Bug("depths fill the whole period", writing(run, series__range=np.ones_like), "E-VAL-05"),
             Bug("the bias is that of one term less", lambda a, r: {
-                **run(a, r, replaced(csm, {"terms": csm.terms - 1})), "series.weight": series(csm).weight}, "b*(M)")))
+                **run(a, r, replaced(csm, {"terms": csm.terms - 1})), "series.weight": series(csm).weight}, "b*(M)"),
+            *(chain_bugs(run, csm) if csm.attenuation == 0 and csm.rescale == "none" and csm.bias is None else ())))
 
 
 def add_scale(recipe: Recipe, csm: Csm) -> None:
@@ -68,7 +69,8 @@ def add_scale(recipe: Recipe, csm: Csm) -> None:
                      if kind != csm.depth_scale),
                    *((Bug("one scale for all maps", reading(run, **every), "E-VAL-05: what each map holds"),)
                      if csm.depth_scale != "scene" else ()),
-                   Bug("the farthest depth is the far end of the range",
+                   *(scale_bugs(run, csm) if csm.depth_scale != "scene" else ()),
+                   Bug("the farthest blocker's depth is the far end of the range e: no room for the bias",
                        writing(run, scale__slope=lambda a: a * _top(csm)), "b* is left behind the farthest blocker")))
 
 

@@ -124,7 +124,8 @@ def _plain(difference: Difference) -> Iterator[Cause]:
         bad = int(np.count_nonzero(~np.isfinite(got[out])))
         what = "NaN" if np.isnan(got[out]).any() else "infinite"
         count = "1 element is" if bad == 1 else f"{bad} elements are"
-        yield Cause(cause=f"{count} {what}", share=min(SEEN, bad / max(1, int(out.sum()))))
+        zero = " where 0 is expected: 0 over 0" if not difference.expected[out & ~np.isfinite(got)].any() else ""
+        yield Cause(cause=f"{count} {what}{zero}", share=min(SEEN, bad / max(1, int(out.sum()))))
     elif not got.any() and difference.expected.any():
         yield Cause(cause="all elements are 0: nothing was written", share=SEEN)
     elif got.size > 1 and (got == got.reshape(-1)[0]).all():
@@ -173,8 +174,9 @@ def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
             yield from _components(expected, axis, name)
             continue
         words = {"row": "rows run upwards: upside down", "column": "columns run leftwards: mirrored"}
-        yield words.get(name, f"{name}s are in reverse order"), np.flip(expected, axis)
-        for step, which in ((1, "before"), (-1, "after")):
+        order = f"both {name} are exchanged" if expected.shape[axis] == 2 else f"{name}s are in reverse order"
+        yield words.get(name, order), np.flip(expected, axis)
+        for step, which in ((1, "before"), (-1, "after"))[: 2 * (expected.shape[axis] > 2)]:
             yield f"{name}s are shifted by one: each holds the one {which} it", np.roll(expected, step, axis)
             if name in ("row", "column") and expected.dtype.kind == "f":
                 with np.errstate(invalid="ignore"):

@@ -64,7 +64,7 @@ def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
             if asked.chained and (dirty or verdict.verdict in ("out", "invalid")):
                 wrong.update(step.writes)
             verdicts.append(verdict)
-    return _summed(kit, asked, verdicts, output, _unknown(kit, cases, output))
+    return _summed(kit, asked, cases, verdicts, output, _unknown(kit, cases, output))
 
 
 def _require_known(kit: Kit, asked: Asked, stages: set[str]) -> None:
@@ -95,7 +95,8 @@ def _unknown(kit: Kit, cases: list[CaseManifest], output: Path) -> tuple[str, ..
 
 
 def _summed(
-    kit: Kit, asked: Asked, verdicts: list[StageVerdict], output: Path, unknown: tuple[str, ...]
+    kit: Kit, asked: Asked, cases: list[CaseManifest], verdicts: list[StageVerdict], output: Path,
+    unknown: tuple[str, ...],
 ) -> Result:
     first = next(((one.case, one.stage) for one in verdicts if one.verdict in ("out", "invalid")
                   and one.upstream != "dirty"), None)
@@ -107,8 +108,13 @@ def _summed(
     incomparable = "invalid" in found or missing or not ran
     code = DAMAGED if damaged else OUT if "out" in found else NOT_COMPARABLE if incomparable else ALL_WITHIN
     worst = next(verdict for verdict in ORDER if verdict in found)
+    manifests = {case.id: case for case in cases}
+
+    def tried(verdict: StageVerdict) -> set[str]:
+        return {bug.cause for bug in kit.bugs(manifests[verdict.case]).of(verdict.stage) if not bug.blind}
+
     return Result(kit=kit.manifest.kit, vectors=kit.manifest.vectors, mode="chained" if asked.chained else "isolated",
-                  verdict=worst, exit_code=code, first=first, findings=findings(verdicts),
+                  verdict=worst, exit_code=code, first=first, findings=findings(verdicts, tried),
                   stages=tuple(one.model_copy(update={"causes": one.causes[:CAUSES]}) for one in verdicts),
                   unknown=unknown)
 
@@ -225,12 +231,12 @@ def _causes(
                  for name, one in judged.items() if one.verdict.verdict == "out" and one.out is not None
                  and one.limit is not None}
     shapes = {name: array.shape for name, array in arrays.items()}
-    found = []
-    for bug in step.bugs:
+    found, bugs = [], kit.bugs(case)
+    for bug in bugs.of(step.name):
         if bug.blind or any(shapes.get(name, shape) != shape for name, shape in bug.shapes.items()):
             continue
-        shares = [explained(one, kit.extra(case, bug.arrays[name]), kit.extra(case, bug.places[name]))
-                  for name, one in differing.items() if name in bug.arrays]
+        told = {name: bugs.told(bug, name, one.expected) for name, one in differing.items() if name in bug.arrays}
+        shares = [explained(differing[name], one.values, one.places) for name, one in told.items()]
         other_shape = any(case.arrays[name].shape != shape for name, shape in bug.shapes.items() if name in shapes)
         share = min(shares, default=0.0) if len(shares) == len(differing) else 0.0
         share = 1.0 if other_shape and not differing else share

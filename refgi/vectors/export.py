@@ -16,6 +16,8 @@ import numpy as np
 
 from refgi.errors import InputError, expect
 from refgi.vectors.bounds import Bound, Budget, chained_budgets, distance, isolated_bounds, stored_budgets
+from refgi.vectors.bugfile import FILE as BUGS
+from refgi.vectors.bugfile import BugEntry, BugWriter, Told
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.manifest import (
     CASE,
@@ -23,7 +25,6 @@ from refgi.vectors.manifest import (
     SCHEMAS,
     VERSION,
     ArrayEntry,
-    BugEntry,
     CaseManifest,
     KitEntry,
     KitManifest,
@@ -36,7 +37,8 @@ from refgi.vectors.scenefile import write_scene
 from refgi.vectors.spec import Array, Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of
 
 SEED = 20090101  # of the changes that bounds are measured by
-TOLD_BY, BESIDE = 192, 64  # elements of a likely bug that are kept: those that tell it, and others
+TOLD_BY, BESIDE = 96, 32  # elements of a likely bug that are kept: those that tell it, and others
+TOLD_IN = 3  # cases of a method that tell a likely bug: it is tried in no further ones
 ISOLATED = "float32 runs and 4 float64 runs on inputs changed by up to 2 roundings of float32, x 4; plus rounding"
 CHAINED = "4 float64 runs, the inputs of every stage changed by up to 2 roundings of float32, x 4"
 HALF = "4 float64 runs on inputs rounded to float16 at random, results in float16, x 4"
@@ -80,8 +82,7 @@ def export_kit(kit: str, out: Path, tell: Tell = lambda _, __: None, only: str |
         entries, told = [], _Told()
         for number, (name, make) in enumerate(cases.items()):
             tell(name, number / len(cases))
-            manifest = write_case(make(), part)
-            told.add(manifest)
+            manifest = write_case(make(), part, told)
             text = text_of(manifest)
             (part / "cases" / name / CASE).write_text(text, encoding="utf-8", newline="\n")
             entries.append(KitEntry(id=name, method=manifest.method, what=manifest.what,
@@ -102,32 +103,39 @@ def export_kit(kit: str, out: Path, tell: Tell = lambda _, __: None, only: str |
 
 
 class _Told:
-    """Which likely bugs some case tells from the right stage."""
+    """Which likely bugs cases tell from the right stage: a few of each method are enough."""
 
     def __init__(self) -> None:
-        self._seen: dict[tuple[str, str], bool] = {}
+        self._cases: dict[tuple[str, str, str], int] = {}
 
-    def add(self, manifest: CaseManifest) -> None:
-        for step in manifest.stages:
-            for bug in step.bugs:
-                key = kind_of(step.name), bug.cause
-                self._seen[key] = self._seen.get(key, False) or not bug.blind
+    def enough(self, method: str, stage: str, cause: str) -> bool:
+        """Return whether enough cases of a method tell a bug."""
+        return self._cases.get((method, kind_of(stage), cause), 0) >= TOLD_IN
+
+    def add(self, method: str, stage: str, cause: str, told: bool) -> None:
+        """Count a case that tells a bug, or cannot."""
+        key = method, kind_of(stage), cause
+        self._cases[key] = self._cases.get(key, 0) + told
 
     def expect_none_blind(self) -> None:
-        blind = [f"{stage}: {cause}" for (stage, cause), seen in self._seen.items() if not seen]
+        """Refuse bugs that no case tells."""
+        told: dict[tuple[str, str], int] = {}
+        for (_, stage, cause), count in self._cases.items():
+            told[stage, cause] = told.get((stage, cause), 0) + count
+        blind = [f"{stage}: {cause}" for (stage, cause), count in told.items() if not count]
         if blind:
             raise InputError(f"kit: expected a case that tells each likely bug, got none for {'; '.join(blind)}")
 
 
-def write_case(case: Case, folder: Path) -> CaseManifest:
+def write_case(case: Case, folder: Path, told: _Told) -> CaseManifest:
     """Write the arrays of a case below a kit's folder and return its manifest, which is not written yet."""
     home = folder / "cases" / case.id
-    for name in ("in", "out", "bound", "mask", "bugs"):
+    for name in ("in", "out", "bound", "mask"):
         (home / name).mkdir(parents=True, exist_ok=True)
     known = expected_of(case)
     arrays = {name: _entry(case, name, known[name], _save(home, f"in/{name}.npy", known[name])) for name in case.given}
     chained = chained_budgets(case, known, SEED)
-    stages = []
+    stages, bugs = [], BugWriter()
     for step in case.stages:
         bounds = isolated_bounds(case, step, known, SEED)
         halves, in_bytes = (stored_budgets(case, step, known, SEED, in_bytes=bytes_) for bytes_ in (False, True))
@@ -136,10 +144,14 @@ def write_case(case: Case, folder: Path) -> CaseManifest:
             arrays[name] = entry.model_copy(update=_tolerances(home, name, entry, bounds[name], {
                 "chained": (chained[name], CHAINED), "half": (halves[name], HALF),
                 "bytes": (in_bytes[name], BYTES)}))
-        bugs = tuple(_bug_entry(home, step, known, bounds, bug, number) for number, bug in
-                     enumerate(step.bugs))
+        for bug in step.bugs:
+            if not told.enough(case.method, step.name, bug.cause):
+                blind = _keep_bug(bugs, step, known, bounds, bug)
+                told.add(case.method, step.name, bug.cause, not blind)
         stages.append(StageEntry(name=step.name, what=step.what, paper=step.paper, reads=step.reads,
-                                 writes=step.writes, exact=step.exact, bugs=bugs))
+                                 writes=step.writes, exact=step.exact))
+    content = bugs.content()
+    (home / BUGS).write_bytes(content)
     scene = None
     if case.scene is not None:
         scene = f"scenes/{case.id}"
@@ -147,7 +159,7 @@ def write_case(case: Case, folder: Path) -> CaseManifest:
         write_scene(case.scene, (size["columns"], size["rows"]), folder / scene)
     return CaseManifest(id=case.id, method=case.method, what=case.what, vectors=VERSION, facts=dict(case.facts),
                         factors=dict(case.factors), scene=scene, given=tuple(case.given), stages=tuple(stages),
-                        arrays=arrays)
+                        arrays=arrays, bugs_sha256=_sha256(content))
 
 
 def _entry(case: Case, name: str, array: Array, saved: tuple[str, str]) -> ArrayEntry:
@@ -173,24 +185,26 @@ def _tolerances(
     return more
 
 
-def _bug_entry(
-    home: Path, step: Stage, known: Arrays, bounds: Mapping[str, Bound], bug: Bug, number: int
-) -> BugEntry:
+def _keep_bug(
+    bugs: BugWriter, step: Stage, known: Arrays, bounds: Mapping[str, Bound], bug: Bug
+) -> bool:
+    """Run a stage with a likely bug and keep elements that tell it; return whether none does."""
     made = outputs_of(step, known, np.float64, bug.run)
-    values, places, blind = {}, {}, True
+    told, blind = {}, True
     for name in step.writes:
         array, expected = made[name], known[name]
         if array.shape != expected.shape:
             blind = False
             continue
         off = (distance(array, expected) > bounds[name].limit) & ~bounds[name].masked
-        blind = blind and not off.any()
-        told = np.concatenate([_spread(np.flatnonzero(off), TOLD_BY), _spread(np.flatnonzero(~off), BESIDE)])
         if off.any():
-            places[name] = _save(home, f"bugs/{step.name}.{number}.{name}.places.npy", told.astype("<i4"))[0]
-            values[name] = _save(home, f"bugs/{step.name}.{number}.{name}.npy", array.reshape(-1)[told])[0]
-    return BugEntry(cause=bug.cause, paper=bug.paper, arrays=values, places=places, blind=blind,
-                    shapes={name: made[name].shape for name in step.writes})
+            blind = False
+            places = np.concatenate([_spread(np.flatnonzero(off), TOLD_BY), _spread(np.flatnonzero(~off), BESIDE)])
+            told[name] = Told(places, array.reshape(-1)[places])
+    entry = BugEntry(cause=bug.cause, paper=bug.paper, arrays={}, blind=blind,
+                     shapes={name: made[name].shape for name in step.writes})
+    bugs.add(step.name, entry, told, known)
+    return blind
 
 
 def _spread(indices: Array, count: int) -> Array:

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from refgi.errors import InputError
+from refgi.vectors.bugfile import FILE as BUGS
+from refgi.vectors.bugfile import Bugs
 from refgi.vectors.manifest import KIT, CaseManifest, KitManifest, read_model
 from refgi.vectors.spec import Array
 
@@ -59,6 +61,7 @@ class Kit:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._bugs: dict[str, Bugs] = {}
         try:
             self.manifest = read_model(KitManifest, folder / KIT)
         except InputError as error:
@@ -83,17 +86,28 @@ class Kit:
         return read_array(file)
 
     def extra(self, case: CaseManifest, file: str) -> Array:
-        """Return an array that is no case's own: a bound, a mask, a likely bug."""
+        """Return an array that is no case's own: a bound, a mask."""
         return read_array(self.folder / "cases" / case.id / file)
 
-    def _bytes(self, file: Path, sha256: str) -> None:
+    def bugs(self, case: CaseManifest) -> Bugs:
+        """Return the likely bugs of a case, checked by their hash and read once."""
+        if case.id not in self._bugs:
+            file = self.folder / "cases" / case.id / BUGS
+            try:
+                self._bugs[case.id] = Bugs(self._bytes(file, case.bugs_sha256))
+            except ValueError as error:
+                raise DamagedError(f"{file}: cannot be read: {error}", file=str(file)) from error
+        return self._bugs[case.id]
+
+    def _bytes(self, file: Path, sha256: str) -> bytes:
         try:
-            found = hashlib.sha256(file.read_bytes()).hexdigest()
+            content = file.read_bytes()
         except OSError as error:
             raise DamagedError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
-        if found != sha256:
+        if hashlib.sha256(content).hexdigest() != sha256:
             raise DamagedError(f"{file}: expected the bytes of its manifest's sha256, got others: a damaged kit",
                                file=str(file))
+        return content
 
 
 def read_array(file: Path) -> Array:

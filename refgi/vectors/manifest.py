@@ -29,17 +29,6 @@ class Tolerance(_Strict):
     source: str
 
 
-class BugEntry(_Strict):
-    """A likely bug of a stage: the elements that tell it, and their values with it."""
-
-    cause: str
-    paper: str = ""
-    arrays: dict[str, str]  # file of (n,) values by array
-    places: dict[str, str]  # file of (n,) flat indices by array
-    shapes: dict[str, tuple[int, ...]]  # of the arrays with the bug
-    blind: bool = False  # this case cannot tell it from the right stage
-
-
 class ArrayEntry(_Strict):
     """One array of a case."""
 
@@ -72,7 +61,6 @@ class StageEntry(_Strict):
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     exact: tuple[str, ...] = ()  # inputs that must stay in float32 in any tier: their differences or choices count
-    bugs: tuple[BugEntry, ...] = ()
 
 
 class CaseManifest(_Strict):
@@ -88,6 +76,7 @@ class CaseManifest(_Strict):
     given: tuple[str, ...]
     stages: tuple[StageEntry, ...]
     arrays: dict[str, ArrayEntry]
+    bugs_sha256: str  # of bugs.npz: likely bugs, for the checker alone
 
 
 class KitEntry(_Strict):
@@ -145,6 +134,15 @@ class StageVerdict(_Strict):
     causes: tuple[Cause, ...] = ()
 
 
+class CommonCause(_Strict):
+    """A likely bug and how many wrong verdicts it explains."""
+
+    cause: str
+    paper: str = ""
+    explained: int  # 0 of a remark that explains none
+    tried: int  # wrong verdicts of cases that know the bug
+
+
 class Finding(_Strict):
     """What is wrong with a kind of stage over all cases."""
 
@@ -152,7 +150,7 @@ class Finding(_Strict):
     first: tuple[str, str]  # case and stage
     wrong: int  # verdicts that are out or invalid
     ran: int  # verdicts of it in all
-    causes: tuple[Cause, ...]  # `share`: of the wrong verdicts that it explains
+    causes: tuple[CommonCause, ...]
 
 
 class Result(_Strict):

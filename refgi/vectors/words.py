@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Iterable
 
-from refgi.vectors.manifest import ArrayVerdict, Cause, Result, StageVerdict
+from refgi.vectors.manifest import ArrayVerdict, Cause, CommonCause, Result, StageVerdict
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
@@ -15,7 +15,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 def story(stage: StageVerdict) -> list[str]:
     """Return what is wrong with a stage of one case, line by line: arrays, worst elements, causes."""
     return [f"{stage.case}: {stage.stage} is {stage.verdict}", *_faults(stage),
-            *(_likely(one, f"{one.share:.0%} of what differs") for one in stage.causes)]
+            *(_likely(one, f"{one.share:.0%} of what differs" if one.share else "") for one in stage.causes)]
 
 
 def stories(result: Result) -> list[list[str]]:
@@ -23,7 +23,8 @@ def stories(result: Result) -> list[list[str]]:
     verdicts = {(one.case, one.stage): one for one in result.stages}
     return [[f"{one.stage} is wrong in {one.wrong} of {one.ran}, first {one.first[1]} of {one.first[0]}",
              *_faults(verdicts[one.first]),
-             *(_likely(cause, f"explains {round(cause.share * one.wrong)} of {one.wrong}") for cause in one.causes)]
+             *(_likely(cause, f"explains {cause.explained} of {cause.tried}" if cause.explained else "")
+               for cause in one.causes)]
             for one in result.findings]
 
 
@@ -31,9 +32,9 @@ def _faults(stage: StageVerdict) -> list[str]:
     return [f"  {fault(one)}" for one in stage.arrays if one.verdict in ("out", "invalid")]
 
 
-def _likely(cause: Cause, fit: str) -> str:
+def _likely(cause: Cause | CommonCause, fit: str) -> str:
     paper = f"; {cause.paper}" if cause.paper else ""
-    return f"  likely: {cause.cause} ({fit}{paper})" if cause.share else f"  {cause.cause}"
+    return f"  likely: {cause.cause} ({fit}{paper})" if fit else f"  {cause.cause}"
 
 
 def fault(array: ArrayVerdict) -> str:

@@ -1,6 +1,6 @@
 """Findings over all cases: kinds of stages in order, causes that explain most of them first."""
 
-from refgi.vectors.findings import findings
+from refgi.vectors.findings import findings as found_in
 from refgi.vectors.manifest import Cause, StageVerdict
 from refgi.vectors.spec import kind_of
 
@@ -8,6 +8,10 @@ from refgi.vectors.spec import kind_of
 def verdict(case, stage, *causes, verdict="out", upstream="isolated"):
     told = tuple(Cause(cause=name, share=share) for name, share in causes)
     return StageVerdict(case=case, stage=stage, verdict=verdict, upstream=upstream, arrays=(), causes=told)
+
+
+def findings(verdicts, tried=lambda _: set()):
+    return found_in(verdicts, tried)
 
 
 def test_maps_levels_and_rounds_are_one_kind():
@@ -27,7 +31,18 @@ def test_a_cause_that_fits_every_case_leads_one_that_fits_better_once():
     assert [(one.stage, one.first, one.wrong, one.ran) for one in found] == [
         ("rsm.flux", ("a", "rsm0.flux"), 3, 3), ("sum", ("b", "sum"), 1, 2)]
     assert [cause.cause for cause in found[0].causes] == ["bug", "chance", "other chance"]
-    assert [cause.share for cause in found[0].causes] == [1, 1 / 3, 1 / 3]
+    assert [(cause.explained, cause.tried) for cause in found[0].causes] == [(3, 3), (1, 3), (1, 3)]
+
+
+def test_a_bug_counts_where_a_case_knows_it():
+    """One that explains two of the two cases that know it leads a remark that fits three of five."""
+    wrong = [verdict(case, "sum", *causes) for case, causes in (
+        ("a", [("bug", 1.0), ("remark", 1.0)]), ("b", [("bug", 0.95), ("remark", 1.0)]), ("c", [("remark", 1.0)]),
+        ("d", []), ("e", []))]
+    found = findings(wrong, lambda one: {"bug"} if one.case in "ab" else set())
+    assert [(one.cause, one.explained, one.tried) for one in found[0].causes] == [("bug", 2, 2), ("remark", 3, 5)]
+    once = findings(wrong, lambda _: {"bug"})
+    assert [one.cause for one in once[0].causes] == ["remark", "bug"]
 
 
 def test_what_is_made_from_wrong_inputs_is_not_blamed():
@@ -39,7 +54,7 @@ def test_where_no_cause_explains_the_places_of_the_first_are_told():
     found = findings([verdict("a", "sum", remark), verdict("b", "sum", ("no known cause fits", 0.0))])
     assert [cause.cause for cause in found[0].causes] == [remark[0]]
     found = findings([verdict("a", "sum", remark), verdict("b", "sum", ("bug", 1.0))])
-    assert [(cause.cause, cause.share) for cause in found[0].causes] == [("bug", 0.5)]
+    assert [(cause.cause, cause.explained, cause.tried) for cause in found[0].causes] == [("bug", 1, 2)]
 
 
 def test_at_most_three_causes_are_told():

@@ -61,12 +61,14 @@ def test_the_quick_kit_is_small(kit, evidence):
 
 
 def test_the_same_bytes_each_time(kit, tmp_path):
-    """But for the list, which names the cases and the program."""
-    made = export_kit("quick", tmp_path / "again", only="sii-warp-b")
-    (entry,) = made.cases
-    assert entry.sha256 == next(one.sha256 for one in kit.manifest.cases if one.id == entry.id)
-    for file in (tmp_path / "again" / "cases" / entry.id).rglob("*.npy"):
-        assert file.read_bytes() == (kit.folder / file.relative_to(tmp_path / "again")).read_bytes(), file.name
+    once, again = (export_kit("quick", tmp_path / name, only="sii-warp-b") for name in ("once", "again"))
+    assert once == again
+    (entry,) = once.cases
+    for file in (tmp_path / "once" / "cases" / entry.id).rglob("*.*"):
+        content, where = file.read_bytes(), file.relative_to(tmp_path / "once")
+        assert content == (tmp_path / "again" / where).read_bytes(), file.name
+        if file.suffix == ".npy":  # which of a method's cases know a likely bug depends on those before
+            assert content == (kit.folder / where).read_bytes(), file.name
 
 
 def test_scenes_are_those_of_the_cases(kit):

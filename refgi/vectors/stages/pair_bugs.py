@@ -42,7 +42,9 @@ def pair_bugs(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple
         Bug("the light's cosine is taken as absolute value", literal(leaves="abs"), CLAMPED),
         Bug("1/r^4 with unit directions", literal(power=4), "E-SII-02"),
         Bug("1/r in place of 1/r^2", literal(power=1), "E-SII-02"),
-        Bug("directions are not normalised", literal(power=0), "E-SII-02"),
+        Bug("directions are not normalised and 1/r^2 is missing", literal(power=0), "E-SII-02"),
+        Bug("directions are not normalised though the sum divides by r^2", literal(raw=True), "E-SII-02"),
+        Bug("no falloff with distance: 1/r^2 is missing", literal(power=-1), "E-SII-02"),
         Bug("distances count as at least 0.1 m", literal(least=0.1), "no clamp unless asked for"),
         Bug("places of light and receiver are exchanged", literal(exchanged=True), EQ2),
         Bug("the light's normal points inwards", reading(run, lights__normal=lambda a: -a), EQ2),
@@ -59,6 +61,10 @@ def pair_bugs(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple
     ]
     if glossy:
         found += [
+            *((Bug("the first light's exponent for all lobes",
+                   reading(run, lights__lobe_exponent=lambda a: np.full_like(a, a.flat[0])), "SII Eq. 3"),)
+              if own else ()),
+            Bug("lobes are normalised by P + 2 in place of P + 1", _scaled_lobes(run), "E-SII-03: (P + 1) / 2 pi K"),
             Bug("lobes are missing", reading(run, lights__lobe_flux=np.zeros_like), "SII Eq. 3"),
             Bug("the diffuse part is missing", reading(run, lights__flux=np.zeros_like), "SII Eq. 3"),
             Bug("lobes are around the normal", _lobes_at_normal(run), "SII Eq. 3"),
@@ -69,6 +75,7 @@ def pair_bugs(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple
             Bug("lobes are not normalised", literal(norm="none"), "E-SII-03: (P + 1) / 2 pi K"),
             Bug("lobes are normalised over the whole lobe, not over what lies above the surface",
                 literal(norm="full"), "E-SII-03: (P + 1) / 2 pi K"),
+            Bug("a half is missing in 1 - |r - w|^2 / 2: lobes are too narrow", literal(lobe_narrow=True), "SII Eq. 3"),
             Bug("lobes reach below the light's horizon", literal(horizon=False), "SII Eq. 3"),
             Bug("lobes are normalised by (P + 2) / 2 pi", literal(norm="cosine"), "E-SII-03: (P + 1) / 2 pi K"),
             Bug("the direction is turned round in lobes", literal(lobe_turned=True), "SII Eq. 3: towards receivers"),
@@ -79,6 +86,16 @@ def pair_bugs(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple
 
 def _lobes_at_normal(run: Run) -> Run:
     return lambda arrays, real: run({**arrays, "lights.lobe_axis": arrays["lights.normal"]}, real)
+
+
+def _scaled_lobes(run: Run) -> Run:
+    """Return the sum with lobes of P + 2 in place of P + 1."""
+    def scaled(arrays: Arrays, real: Any) -> Arrays:
+        exponent = arrays["lights.lobe_exponent"]
+        return run({**arrays, "lights.lobe_flux": arrays["lights.lobe_flux"] * ((exponent + 2) / (exponent + 1)).astype(
+            real)}, real)
+
+    return scaled
 
 
 def _first_half(array: Array) -> Array:
@@ -98,7 +115,7 @@ def literal_pairs(
     least: float = 0.0, softened: float = 0.0, most: float = np.inf, norm: str = "exact", horizon: bool = True,
     lobe_cosine: bool = False, lobe_arrives: bool = True, lobe_turned: bool = False, lobe_abs: bool = False,
     lobe_power: tuple[float, float] = (1.0, 0.0), lobe_unit: bool = True, exchanged: bool = False,
-    joined: str = "sum", disc: str = "added", shortened: bool = False,
+    joined: str = "sum", disc: str = "added", shortened: bool = False, raw: bool = False, lobe_narrow: bool = False,
 ) -> Array:
     """Return Eq. 2 and 3 as printed, or with a bug: (3, h, w), in the type of the arrays."""
     x, n = (np.asarray(arrays[name]) for name in RECEIVERS[:2])
@@ -116,8 +133,8 @@ def literal_pairs(
     area = np.asarray(arrays["lights.area"], real)[:, None] if "lights.area" in arrays else real(0)
     with np.errstate(divide="ignore"):
         square = _square(np.maximum(r, real(least)), power, area / real(np.pi), disc) + real(softened)
-        fall = {0: np.ones_like(r), 1: 1 / r}.get(power, 1 / square)
-    if power == 0:
+        fall = {-1: np.ones_like(r), 0: np.ones_like(r), 1: 1 / r}.get(power, 1 / square)
+    if power == 0 or raw:
         arriving, sent = arriving * r, sent * r
     fall = np.where(r > 0, fall, 0)
     received = _cosine(arriving, arrives) * fall
@@ -129,6 +146,7 @@ def literal_pairs(
         lobe = lights.lobe_flux[:, None] if own else lights.lobe_flux[:, :, None]
         peak = _norms(lights, norm).astype(real)
         cosine = (axis * unit).sum(axis=0) * (-1 if lobe_turned else 1) * (1 if lobe_unit else r)
+        cosine = 2 * cosine - 1 if lobe_narrow else cosine
         cosine = np.abs(cosine) if lobe_abs else np.maximum(0, cosine)
         with np.errstate(all="ignore"):  # 0 to the power of -1
             shape_of = cosine ** (lobe_power[0] * exponent + lobe_power[1]) * (peak[None] if own else peak[:, None])

@@ -1,13 +1,10 @@
 """What the tests of the kit's stages of splatting share: cases, bounds, and a port's arrays judged by them."""
 
-import re
 from functools import cache
-
-import numpy as np
 
 from refgi.vectors.bounds import distance, isolated_bounds
 from refgi.vectors.cases import kit_cases
-from refgi.vectors.spec import expected_of, outputs_of, stored
+from refgi.vectors.spec import expected_of, stored
 
 LARGEST_MASK = 0.05  # share of an array's elements that rounding may decide
 
@@ -49,20 +46,6 @@ def out_of_bounds(expected, got, bound):
 def expect_within(id, name, got):
     wrong = off(id, name, got)
     assert not wrong, f"{id}, {name}: {wrong}"
-
-
-def unseen(ids, start):
-    """Return (stage, cause) of bugs of stages that start with a word which no case tells from the stage."""
-    seen = {}
-    for id in ids:
-        known = made(id)[1]
-        for name in stages_of(id, start):
-            stage = stage_of(id, name)
-            for bug in stage.bugs:
-                got = outputs_of(stage, known, np.float64, bug.run)
-                key = re.sub(r"\d", "", name), bug.cause
-                seen[key] = seen.get(key, False) or bool(off(id, name, got))
-    return [key for key, found in seen.items() if not found]
 
 
 def masked_shares(id, start):

@@ -8,13 +8,13 @@ import pytest
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.rsm.raster.projection import camera_projection
 from refgi.vectors.bounds import large_value
+from refgi.vectors.bugs.direct import literal_direct
+from refgi.vectors.bugs.flux_form import literal_flux
+from refgi.vectors.bugs.ids import literal_ids
+from refgi.vectors.bugs.surface import literal_surface
+from refgi.vectors.bugs.views import view_of
 from refgi.vectors.cases import hssil, sii
 from refgi.vectors.spec import expected_of
-from refgi.vectors.stages.direct_bugs import literal_direct
-from refgi.vectors.stages.flux_form import literal_flux
-from refgi.vectors.stages.ids_bugs import literal_ids
-from refgi.vectors.stages.surface_bugs import literal_surface
-from refgi.vectors.stages.views import view_of
 
 CASES = {**sii.QUICK, "sii-smooth": sii.FULL["sii-smooth"], **{name: hssil.QUICK[name] for name in ("hssil-default",)}}
 SINGLE = 2.0**-22  # of an array's largest value: what storage in float32 leaves

@@ -11,18 +11,10 @@ from refgi.rsm.raster.projection import camera_projection
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.hssil import hssil
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
+from refgi.vectors.bugs import bilateral, blur, crown_gather, crown_points, crown_sample, nearest_texels
 from refgi.vectors.cases import hssil as cases
-from refgi.vectors.spec import expected_of, outputs_of
-from refgi.vectors.stages import (
-    bilateral,
-    blur_bugs,
-    crown_gather_bugs,
-    crown_points_bugs,
-    crown_sample_bugs,
-    levels,
-    nearest_texels,
-    reprojection,
-)
+from refgi.vectors.spec import expected_of
+from refgi.vectors.stages import levels, reprojection
 from tests.vectors import screen_space_port as port
 
 CASES = {**cases.QUICK, **cases.FULL}
@@ -113,24 +105,6 @@ def test_bounds_are_near_rounding_and_masks_are_few(name):
         assert (bound.limit > LOOSE * large_value(known[key])).mean() <= AMPLIFIED or not known[key].any(), key
 
 
-def test_each_bug_is_seen_by_a_case():
-    seen, all_of_them = set(), set()
-    for name in CASES:
-        case, known, bounds = made(name)
-        for step in case.stages:
-            kind = NO_LEVEL.sub("", step.name)
-            if kind in UNCOVERED:
-                continue
-            causes = {(kind, bug.cause): bug for bug in step.bugs}
-            all_of_them |= set(causes)
-            for cause, bug in causes.items():
-                if cause not in seen:
-                    wrong = outputs_of(step, known, np.float64, bug.run)
-                    if any(outside(wrong[key], known[key], bounds[key]).any() for key in step.writes):
-                        seen.add(cause)
-    assert not all_of_them - seen
-
-
 @pytest.mark.parametrize("name", ["hssil-default", "hssil-paper", "hssil-odd"])
 def test_literal_forms_without_a_bug_are_the_stages(name):
     """Bugs are wrong by what they say alone."""
@@ -140,13 +114,13 @@ def test_literal_forms_without_a_bug_are_the_stages(name):
     for index in range(facts["hssil"]["levels"]):
         one = facts[f"samples{index}"]
         key, counts = f"samples{index}", (one["disc"], one["crown"])
-        same(crown_points_bugs.sequence(*counts), known[f"{key}.points"])
-        same(crown_points_bugs.shifted(exact[f"{key}.shift"], tuple(one["tile"]), counts[1]), known[f"{key}.shifts"])
-        offsets, weight = crown_sample_bugs.crown_samples(exact[f"{key}.points"], exact[f"{key}.shifts"], counts[0],
+        same(crown_points.sequence(*counts), known[f"{key}.points"])
+        same(crown_points.shifted(exact[f"{key}.shift"], tuple(one["tile"]), counts[1]), known[f"{key}.shifts"])
+        offsets, weight = crown_sample.crown_samples(exact[f"{key}.points"], exact[f"{key}.shifts"], counts[0],
                                                           one["radius"], one["density"])
         np.testing.assert_array_equal(offsets, known[f"{key}.offsets"])
         same(weight, known[f"{key}.weight"])
-        same(crown_gather_bugs.gathered(exact, index), known[f"gather{index}.irradiance"])
+        same(crown_gather.gathered(exact, index), known[f"gather{index}.irradiance"])
         view, first = camera_projection(case.scene.camera, *cases.VIEWS[name][1]), facts["hssil"]["first level"]
         made_of = nearest_texels.coarser_level(exact, index, first + index, (view.height, view.width)) if index else \
             nearest_texels.first_level(exact, view, first)
@@ -154,7 +128,7 @@ def test_literal_forms_without_a_bug_are_the_stages(name):
             same(array, known[f"level{index}.{key}"])
         if settings.blur is not None:
             planes = levels.level_names(index, "position", "normal", "depth")
-            same(blur_bugs.boxed(exact, f"gather{index}.irradiance", planes, settings.blur),
+            same(blur.boxed(exact, f"gather{index}.irradiance", planes, settings.blur),
                  known[f"blur{index}.irradiance"])
     for step in case.stages:
         if step.name.startswith(("light", "picture")):

@@ -16,7 +16,7 @@ from refgi.vectors import export
 from refgi.vectors.bounds import isolated_bounds
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.cases.scenes import SPOT, room
-from refgi.vectors.check import Asked, Kit
+from refgi.vectors.check import Asked, Kit, check_output
 from refgi.vectors.export import export_kit
 from refgi.vectors.manifest import CASE, SCHEMAS, VERSION, CaseManifest, KitManifest, read_model, schema_text
 from refgi.vectors.recipe import Recipe
@@ -108,6 +108,13 @@ def test_a_bug_that_no_case_tells_is_refused(monkeypatch, tmp_path):
     with pytest.raises(InputError, match="got none for x: added to itself"):
         export_kit("quick", tmp_path / "kit")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_the_full_kit_is_made_and_every_case_of_it_is_exact(tmp_path):
+    made = export_kit("full", tmp_path / "kit")
+    assert [entry.id for entry in made.cases] == list(kit_cases("full"))
+    assert check_output(Kit(tmp_path / "kit"), tmp_path / "kit", Asked()).exit_code == 0
 
 
 def test_folders_of_others_are_kept(tmp_path):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from refgi.lights.warp import Warp
+from refgi.vectors.bugs.lights import literal_lights
+from refgi.vectors.bugs.warp import literal_warp
 from refgi.vectors.cases.sii import QUICK
-from refgi.vectors.stages.lights_bugs import literal_lights
-from refgi.vectors.stages.warp_bugs import literal_warp
-from tests.vectors.splat_ports import expect_within, made, unseen
+from tests.vectors.splat_ports import expect_within, made
 
 KINDS = "position", "normal", "flux", "lobe_flux", "lobe_axis", "lobe_exponent"
 
@@ -30,9 +30,3 @@ def test_the_list_of_lights_that_bugs_are_put_into_has_none_of_its_own(id):
               for name in names]
     kinds = [kind for kind in KINDS if f"lights.{kind}" in known]
     expect_within(id, "lights", literal_lights(known, kinds, shapes))
-
-
-def test_every_likely_bug_of_pixel_lights_is_seen():
-    assert unseen(QUICK, "lights") == []
-    buffers = ("rsm.ids", "rsm.surface", "rsm.flux")  # which cases of other methods may tell
-    assert [found for found in unseen(QUICK, "rsm") if found[0] not in buffers] == []

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from refgi.vectors.cases.multires import FULL_PLANS, QUICK, QUICK_PLANS, settings_of
-from refgi.vectors.stages.detail_bugs import literal_detail
-from refgi.vectors.stages.list_bugs import literal_list
-from refgi.vectors.stages.marks_bugs import literal_marks
+from refgi.vectors.bugs.detail import literal_detail
+from refgi.vectors.bugs.list import literal_list
+from refgi.vectors.bugs.marks import literal_marks
+from refgi.vectors.bugs.ranges import literal_ranges
+from refgi.vectors.bugs.slopes import depth_steps, literal_differences, normal_chords
+from refgi.vectors.bugs.states import literal_states
+from refgi.vectors.bugs.subsplat import literal_points
+from refgi.vectors.bugs.upsample import literal_nearest
+from refgi.vectors.cases.multires import FULL_PLANS, QUICK_PLANS, settings_of
 from refgi.vectors.stages.multires_ranges import of_levels
-from refgi.vectors.stages.ranges_bugs import literal_ranges
-from refgi.vectors.stages.slopes_bugs import depth_steps, literal_differences, normal_chords
-from refgi.vectors.stages.states_bugs import literal_states
-from refgi.vectors.stages.subsplat_bugs import literal_points
-from refgi.vectors.stages.upsample_bugs import literal_nearest
-from tests.vectors.splat_ports import expect_within, made, stages_of, unseen
+from tests.vectors.splat_ports import expect_within, made, stages_of
 
 PLANS = QUICK_PLANS | FULL_PLANS
 
@@ -78,7 +78,3 @@ def test_the_stages_that_bugs_are_put_into_have_none_of_their_own(id):
 def test_the_nearest_subsplats_light_has_no_bug_of_its_own():
     expect_within("multires-wall", "multires.upsample", {"multires.upsampled.0": literal_nearest(exact(
         "multires-wall"))})
-
-
-def test_every_likely_bug_is_seen_by_a_quick_case():
-    assert unseen(QUICK, "multires") == []

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from refgi.vectors.bounds import distance, isolated_bounds
+from refgi.vectors.bugs.val_basis import chain_by
+from refgi.vectors.bugs.val_cone import Cone, searched_by
+from refgi.vectors.bugs.val_depth import basis_by, depths_by
+from refgi.vectors.bugs.val_facing import faced_by
+from refgi.vectors.bugs.val_kmeans import Metric, assigned_by, mean_of, means_by, unit_sum
+from refgi.vectors.bugs.val_lookup import Lookup
+from refgi.vectors.bugs.val_lookup import means_by as looked_up_by
+from refgi.vectors.bugs.val_mip import levels_by, mean_of_four
+from refgi.vectors.bugs.val_pcf import DepthTests, depth_tests_by
+from refgi.vectors.bugs.val_series import Penumbra, Verdict, penumbra_by, verdict_by
+from refgi.vectors.bugs.val_sum import summed_by
 from refgi.vectors.cases.val import SETUPS
 from refgi.vectors.spec import expected_of, outputs_of
-from refgi.vectors.stages.val_basis_bugs import chain_by
-from refgi.vectors.stages.val_cone_bugs import Cone, searched_by
-from refgi.vectors.stages.val_depth_bugs import basis_by, depths_by
-from refgi.vectors.stages.val_facing_bugs import faced_by
-from refgi.vectors.stages.val_kmeans_bugs import Metric, assigned_by, mean_of, means_by, unit_sum
-from refgi.vectors.stages.val_lookup_bugs import Lookup
-from refgi.vectors.stages.val_lookup_bugs import means_by as looked_up_by
-from refgi.vectors.stages.val_mip_bugs import levels_by, mean_of_four
-from refgi.vectors.stages.val_pcf_bugs import DepthTests, depth_tests_by
-from refgi.vectors.stages.val_series_bugs import Penumbra, Verdict, penumbra_by, verdict_by
-from refgi.vectors.stages.val_sum_bugs import summed_by
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 

@@ -19,11 +19,11 @@ from refgi.scene import DirectionalLight, Geometry, PointLight, Scene, SpotLight
 from refgi.scene.material import MaterialTable
 from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
+from refgi.vectors.bugs.flux import flux_family
+from refgi.vectors.bugs.ids import ids_family
+from refgi.vectors.bugs.surface import surface_family
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
-from refgi.vectors.stages.flux_bugs import flux_family
-from refgi.vectors.stages.ids_bugs import ids_family
-from refgi.vectors.stages.surface_bugs import surface_family
 
 VECTOR, POINT = "unit vector", "m"
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide

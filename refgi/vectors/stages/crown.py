@@ -20,11 +20,11 @@ from refgi.sssil.crown.points import (
     tile_shifts,
 )
 from refgi.sssil.settings import HssilSettings, SamplingSettings
+from refgi.vectors.bugs.crown_gather import EQ4, SENDER, gather_bugs
+from refgi.vectors.bugs.crown_points import sequence_bugs
+from refgi.vectors.bugs.crown_sample import CROWN, sample_bugs
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Arrays, Spec
-from refgi.vectors.stages.crown_gather_bugs import EQ4, SENDER, gather_bugs
-from refgi.vectors.stages.crown_points_bugs import sequence_bugs
-from refgi.vectors.stages.crown_sample_bugs import CROWN, sample_bugs
 from refgi.vectors.stages.levels import level_names, level_of
 
 

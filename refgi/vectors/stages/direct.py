@@ -11,6 +11,8 @@ from refgi.rsm.buffers.light_projection import light_projection
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.scene import Scene, material_table
+from refgi.vectors.bugs.direct import direct_family
+from refgi.vectors.bugs.shadow import shadow_map_family
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import (
@@ -26,8 +28,6 @@ from refgi.vectors.stages.buffers import (
     geometry_of,
     light_of,
 )
-from refgi.vectors.stages.direct_bugs import direct_family
-from refgi.vectors.stages.shadow_bugs import shadow_map_family
 
 POINTS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
 Shadows = Literal["map", "exact"]

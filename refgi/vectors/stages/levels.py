@@ -10,11 +10,11 @@ import numpy as np
 from refgi.rsm.raster.projection import Projection
 from refgi.sssil.pyramid.levels import levels, next_level
 from refgi.sssil.pyramid.view import Level
+from refgi.vectors.bugs.level import CLOSEST, EQ2, coarser_level_bugs, first_level_bugs
+from refgi.vectors.bugs.nearest_texels import PLANES, VECTORS
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import VECTOR
-from refgi.vectors.stages.level_bugs import CLOSEST, EQ2, coarser_level_bugs, first_level_bugs
-from refgi.vectors.stages.nearest_texels import PLANES, VECTORS
 
 
 def add_levels(recipe: Recipe, view: Projection, first: int, count: int) -> None:

@@ -10,13 +10,13 @@ from refgi.pairs.pixel_lights import PixelLights
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.sampling import grid, halton
 from refgi.scene import Scene
+from refgi.vectors.bugs.lights import lights_bugs
+from refgi.vectors.bugs.points import below_1, grid_bugs, halton_bugs, importance_bugs
+from refgi.vectors.bugs.texel import texel_bugs
+from refgi.vectors.bugs.warp import warp_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import REFLECTANCE, SCENE, VECTOR, _light_names, _map_names, rsm_of
-from refgi.vectors.stages.lights_bugs import lights_bugs
-from refgi.vectors.stages.points_bugs import below_1, grid_bugs, halton_bugs, importance_bugs
-from refgi.vectors.stages.texel_bugs import texel_bugs
-from refgi.vectors.stages.warp_bugs import warp_bugs
 
 Pattern = Literal["halton", "grid", "given"]
 LIGHT = ("position", "normal", "flux")

@@ -12,16 +12,16 @@ from refgi.settings import replaced
 from refgi.splat.multires.settings import Representative
 from refgi.splat.multires.subsplats.detail import surface_detail
 from refgi.splat.multires.subsplats.evaluate import evaluate, points_of
+from refgi.vectors.bugs.detail import detail_bugs, light_bugs
+from refgi.vectors.bugs.pair import RECEIVERS, pair_bugs
+from refgi.vectors.bugs.subsplat import point_bugs
 from refgi.vectors.recipe import Recipe, reading
 from refgi.vectors.spec import Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR
-from refgi.vectors.stages.detail_bugs import detail_bugs, light_bugs
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import covered_of, everywhere
 from refgi.vectors.stages.multires_upsample import LIGHT
-from refgi.vectors.stages.pair_bugs import RECEIVERS, pair_bugs
-from refgi.vectors.stages.subsplat_bugs import point_bugs
 
 POINTS = ("multires.point", "multires.normal")
 EQ2 = "AMS Eq. 2, E only; E-AMS-02"

@@ -10,11 +10,11 @@ from refgi.splat.multires.refinement.grid import Subsplats, level_shape, represe
 from refgi.splat.multires.refinement.mipmap import layout, level_views
 from refgi.splat.multires.refinement.refine import depth_first
 from refgi.splat.multires.settings import Diagonal
+from refgi.vectors.bugs.list import list_bugs
+from refgi.vectors.bugs.states import states_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
-from refgi.vectors.stages.list_bugs import list_bugs
 from refgi.vectors.stages.multires_ranges import IDS, covered_of, everywhere, of_levels
-from refgi.vectors.stages.states_bugs import states_bugs
 
 SUBSPLATS = ("multires.level", "multires.row", "multires.column", "multires.pixel")
 

@@ -21,11 +21,11 @@ from refgi.splat.multires.refinement.criteria import (
 from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
 from refgi.splat.multires.refinement.mipmap import START, Mipmap, element_count, layout, level_views
 from refgi.splat.multires.settings import Criteria, Measure
+from refgi.vectors.bugs.marks import marks_bugs
+from refgi.vectors.bugs.ranges import ranges_bugs
+from refgi.vectors.bugs.slopes import curvatures_bugs, slopes_bugs
 from refgi.vectors.recipe import Recipe, reading
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
-from refgi.vectors.stages.marks_bugs import marks_bugs
-from refgi.vectors.stages.ranges_bugs import ranges_bugs
-from refgi.vectors.stages.slopes_bugs import curvatures_bugs, slopes_bugs
 
 IDS = "gbuffer.triangle_id"
 Join = Callable[[list[Array]], Array]

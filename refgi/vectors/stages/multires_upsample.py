@@ -17,11 +17,11 @@ from refgi.splat.multires.subsplats.upsample import (
     tent_level,
     upsample,
 )
+from refgi.vectors.bugs.upsample import nearest_bugs, tent, tent_bugs
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import IDS, covered_of
-from refgi.vectors.stages.upsample_bugs import nearest_bugs, tent, tent_bugs
 
 LIGHT = "multires.irradiance"
 

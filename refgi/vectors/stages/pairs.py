@@ -7,12 +7,12 @@ import numpy as np
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.settings import of, replaced
+from refgi.vectors.bugs.pair import EQ2, RECEIVERS, as_printed, pair_bugs
+from refgi.vectors.bugs.pair_family import pair_family
 from refgi.vectors.recipe import Recipe, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.lights import LIGHT, LOBE, light_names, pixel_lights_of
-from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, as_printed, pair_bugs
-from refgi.vectors.stages.pair_family import pair_family
 
 AREA = "A = Omega d^2 / cos, times T/N w"
 NORM = "(P + 1) / (2 pi K), K the share of the lobe's integral above the surface; 0 where K is below 1e-12"

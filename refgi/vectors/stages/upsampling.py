@@ -7,11 +7,11 @@ import numpy as np
 from refgi.sssil.blur import blur
 from refgi.sssil.settings import Bilateral, GeometryBlur, HssilSettings
 from refgi.sssil.upsampling.upsample import Guide, upsample
+from refgi.vectors.bugs.blur import BLUR, blur_bugs
+from refgi.vectors.bugs.light import BILATERAL, sum_bugs, upsampling_bugs
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Arrays, Spec
-from refgi.vectors.stages.blur_bugs import BLUR, blur_bugs
 from refgi.vectors.stages.levels import level_names, level_of
-from refgi.vectors.stages.light_bugs import BILATERAL, sum_bugs, upsampling_bugs
 
 GUIDE = ("depth", "normal")
 

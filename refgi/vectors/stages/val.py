@@ -18,20 +18,20 @@ from refgi.pairs.irradiance import Receivers, checked
 from refgi.rsm import facing_normals
 from refgi.scene import Scene
 from refgi.settings import replaced
+from refgi.vectors.bugs.pair import EQ2, RECEIVERS
+from refgi.vectors.bugs.val_facing import facing_bugs
+from refgi.vectors.bugs.val_sum import sum_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
-from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS
 from refgi.vectors.stages.val_areas import add_areas
 from refgi.vectors.stages.val_basis import add_basis
 from refgi.vectors.stages.val_clusters import add_extents, add_kmeans, clusters_of, extent_of
 from refgi.vectors.stages.val_csm import add_csm
-from refgi.vectors.stages.val_facing_bugs import facing_bugs
 from refgi.vectors.stages.val_maps import add_maps
 from refgi.vectors.stages.val_pcss import add_binary, add_pcss
 from refgi.vectors.stages.val_search import FACING, add_search
-from refgi.vectors.stages.val_sum_bugs import sum_bugs
 
 BLUR = "VAL Sec. 6, E-VAL-13; docs/methods/val"
 

@@ -15,11 +15,11 @@ from refgi.cluster.filters.prefilter import LEVEL_SHIFT
 from refgi.cluster.filters.pyramid import Mip, level_offsets, mip_of, mips
 from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.series import frequencies
+from refgi.vectors.bugs.val_depth import basis_bugs, depth_bugs
+from refgi.vectors.bugs.val_mip import mip_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
-from refgi.vectors.stages.val_depth_bugs import basis_bugs, depth_bugs
 from refgi.vectors.stages.val_maps import SHEET
-from refgi.vectors.stages.val_mip_bugs import mip_bugs
 from refgi.vectors.stages.val_series import SCALE, add_scale, add_series, scale_at
 
 CHANNELS = "area light, channel, row, column"

@@ -9,11 +9,11 @@ from refgi.cluster.clustering.kmeans import Clustering, assigned, cluster, first
 from refgi.cluster.settings import Clusters, ValSettings
 from refgi.rsm.buffers.extent import Extent, bounds_of
 from refgi.settings import replaced
+from refgi.vectors.bugs.val_box import box_bugs
+from refgi.vectors.bugs.val_kmeans import mean_bugs, metric_bugs
 from refgi.vectors.recipe import Recipe, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR
-from refgi.vectors.stages.val_box_bugs import box_bugs
-from refgi.vectors.stages.val_kmeans_bugs import mean_bugs, metric_bugs
 
 ROUNDS = 2  # of k-means that a case shows one by one
 LIGHTS = ("lights.position", "lights.normal")

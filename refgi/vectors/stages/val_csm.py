@@ -9,11 +9,12 @@ from refgi.cluster.settings import Csm, ValSettings
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
 from refgi.cluster.visibility.search_region import BIAS, CONSTANTS, GAIN, ON_SERIES, SCRATCH_ROWS, filter_sizing
 from refgi.cluster.visibility.series import Series, series
+from refgi.vectors.bugs.val import compared_bugs, means_bugs, size_bugs
+from refgi.vectors.bugs.val_lookup import lookup_bugs
+from refgi.vectors.bugs.val_series import series_search_bugs, verdict_bugs
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.val_basis import filters_of, level_names
-from refgi.vectors.stages.val_bugs import compared_bugs, means_bugs, size_bugs
-from refgi.vectors.stages.val_lookup_bugs import lookup_bugs
 from refgi.vectors.stages.val_search import (
     LIGHT,
     PIXELS,
@@ -27,7 +28,6 @@ from refgi.vectors.stages.val_search import (
     share_spec,
 )
 from refgi.vectors.stages.val_series import SCALE, scale_at
-from refgi.vectors.stages.val_series_bugs import series_search_bugs, verdict_bugs
 
 
 def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:

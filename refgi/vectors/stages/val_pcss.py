@@ -10,12 +10,12 @@ from refgi.cluster.visibility.pcf import pcf_shadow, pcf_tile
 from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, filter_texels, find_blockers
 from refgi.cluster.visibility.search_region import RADIUS, S, filter_sizing
 from refgi.settings import replaced
+from refgi.vectors.bugs.val import dark_where_1, local_of, scaled, size_bugs
+from refgi.vectors.bugs.val_cone import cone_bugs
+from refgi.vectors.bugs.val_pcf import pcf_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.val_bugs import dark_where_1, local_of, scaled, size_bugs
-from refgi.vectors.stages.val_cone_bugs import cone_bugs
 from refgi.vectors.stages.val_maps import shadow_maps_of
-from refgi.vectors.stages.val_pcf_bugs import pcf_bugs
 from refgi.vectors.stages.val_search import (
     FACING,
     LIGHT,

@@ -21,10 +21,10 @@ from refgi.cluster.visibility.search_region import (
     light_constants,
 )
 from refgi.cluster.visibility.series import Series
+from refgi.vectors.bugs.val import search_bugs
+from refgi.vectors.bugs.val_cone import search_disc_bugs
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Spec
-from refgi.vectors.stages.val_bugs import search_bugs
-from refgi.vectors.stages.val_cone_bugs import search_disc_bugs
 from refgi.vectors.stages.val_maps import VIEW, shadow_maps_of
 
 PIXELS = ("gbuffer.position", "gbuffer.triangle_id")

@@ -9,9 +9,9 @@ from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.search_region import scale_of
 from refgi.cluster.visibility.series import series
 from refgi.settings import replaced
+from refgi.vectors.bugs.val_basis import chain_bugs, scale_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Arrays, Bug, Spec
-from refgi.vectors.stages.val_basis_bugs import chain_bugs, scale_bugs
 from refgi.vectors.stages.val_maps import shadow_maps_of
 
 SCALE = ("scale.origin", "scale.slope", "series.range")

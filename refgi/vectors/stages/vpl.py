@@ -12,11 +12,11 @@ from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.shadow_rays import RayReceivers, add_unoccluded, fill_shadow_rays, receivers, senders_of
 from refgi.rays import Tracer
 from refgi.scene import Geometry, Scene
+from refgi.vectors.bugs.pair import EQ2, RECEIVERS, pair_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
-from refgi.vectors.stages.pair_bugs import EQ2, RECEIVERS, pair_bugs
 
 GEOMETRY = ("scene.vertices", "scene.faces")
 LIGHTS = ("lights.position", "lights.normal")

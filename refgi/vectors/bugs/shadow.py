@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from refgi.rsm.raster.projection import PARABOLOID, Projection, project
+from refgi.vectors.bugs.views import ViewChange, view_changes, view_of
 from refgi.vectors.recipe import reading
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.views import ViewChange, view_changes, view_of
 
 PLANE, OUTSIDE = "receiver-plane bias", "false outside the map and without surface"
 BIASES = (0.001, 0.01, 0.05)

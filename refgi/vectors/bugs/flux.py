@@ -7,10 +7,10 @@ import numpy as np
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 from refgi.scene import SpotLight
 from refgi.scene.model import Light
+from refgi.vectors.bugs.falloffs import CONE, FALLOFFS
+from refgi.vectors.bugs.flux_form import EVERY, literal_flux
+from refgi.vectors.bugs.views import CENTRES, CUBE, ViewChange, view_changes, view_of
 from refgi.vectors.spec import Arrays, Bug, Run
-from refgi.vectors.stages.falloffs import CONE, FALLOFFS
-from refgi.vectors.stages.flux_form import EVERY, literal_flux
-from refgi.vectors.stages.views import CENTRES, CUBE, ViewChange, view_changes, view_of
 
 PHI, MIRROR = "Phi_t = albedo I(w) Omega_t, calibrated: no cosine, no distance", "r = d - 2 (n . d) n"
 OWN, ANGLE = "reflectance of the triangle's material", "solid angle: density cos^3 on the image plane"

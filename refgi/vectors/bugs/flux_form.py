@@ -4,10 +4,10 @@ import numpy as np
 
 from refgi.scene import DirectionalLight, SpotLight
 from refgi.scene.model import Light
+from refgi.vectors.bugs.spot_integral import Falloff, share_at, smooth, spot_integrals
+from refgi.vectors.bugs.surface import literal_surface, rays
+from refgi.vectors.bugs.views import View, ViewChange
 from refgi.vectors.spec import Array, Arrays
-from refgi.vectors.stages.spot_integral import Falloff, share_at, smooth, spot_integrals
-from refgi.vectors.stages.surface_bugs import literal_surface, rays
-from refgi.vectors.stages.views import View, ViewChange
 
 EVERY = slice(None)
 

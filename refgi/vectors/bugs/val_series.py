@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.cluster.settings import Csm
+from refgi.vectors.bugs.val_basis import FREQUENCIES
+from refgi.vectors.bugs.val_cone import CONES, Cone, disc_of, seen_from
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.val_basis_bugs import FREQUENCIES
-from refgi.vectors.stages.val_cone_bugs import CONES, Cone, disc_of, seen_from
 
 F_M = "E-VAL-02: 1/2 + sum w_k (cos(c_k d') S_k - sin(c_k d') C_k)"
 Z_AVG = "E-VAL-02, E-VAL-04: (Z/2 - sum w_k (cos(c_k d') SZ_k - sin(c_k d') CZ_k)) / (1 - V)"

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from refgi.rsm.raster.projection import PARABOLOID, Projection
+from refgi.vectors.bugs.views import ALL_CENTRES, CENTRES, View, ViewChange, view_changes, view_of
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.views import ALL_CENTRES, CENTRES, View, ViewChange, view_changes, view_of
 
 DEPTH, SIDE, WORLD = "depth along the view's axis, not along the ray", "on the side that is seen", "world space"
 EMPTY, SMOOTH = "depth inf, all else 0", "interpolated over the triangle at the point, then normalised"

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from refgi.vectors.bugs.val_cone import Cone, first, seen_from
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.val_cone_bugs import Cone, first, seen_from
 
 PLANE, OWN = "E-VAL-14: before the receiver's plane and the receiver", "floor((s + 1) / 2 n)"
 SLACK = 1e-3

@@ -6,9 +6,9 @@ import numpy as np
 
 from refgi.scene import DirectionalLight, SpotLight
 from refgi.scene.model import Light
+from refgi.vectors.bugs.falloffs import CONE, FALLOFFS
+from refgi.vectors.bugs.spot_integral import Falloff, share_at, smooth
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.falloffs import CONE, FALLOFFS
-from refgi.vectors.stages.spot_integral import Falloff, share_at, smooth
 
 Lamps = list[tuple[str, Light]]
 LAW, ALL, SHADOW = "E = I(w) cos / d^2", "all lights", "each light has its own shadows"

@@ -7,9 +7,9 @@ import numpy as np
 
 from refgi.cluster.filters.basis import INSIDE
 from refgi.cluster.settings import Csm
+from refgi.vectors.bugs.val_basis import FREQUENCIES, LAW
 from refgi.vectors.recipe import writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.val_basis_bugs import FREQUENCIES, LAW
 
 MIRROR = "docs/methods/val_visibility: the texel at (s, t) / (s^2 + t^2)"
 CHANNELS = "S_1.., C_1.., t S_1.., t C_1.., t"

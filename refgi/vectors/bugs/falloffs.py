@@ -5,8 +5,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from refgi.vectors.bugs.spot_integral import Falloff, clamped, smoothstep
 from refgi.vectors.spec import Array
-from refgi.vectors.stages.spot_integral import Falloff, clamped, smoothstep
 
 CONE = "docs/conventions: smoothstep between the cosines of the cones"
 

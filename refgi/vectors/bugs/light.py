@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from refgi.sssil.settings import Bilateral
+from refgi.vectors.bugs.bilateral import bilateral, tent
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.bilateral import bilateral, tent
 
 BILATERAL = "HSS Sec. 3.2, 5: joint bilateral, 3 x 3; weights in docs/methods/hssil (E-HSS-12)"
 HALF, PLANE = "half-pixel (E-HSS-10)", "docs/methods/hssil: the pixel's plane, 1/z is linear in the picture"

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from refgi.rsm.raster.projection import Projection
+from refgi.vectors.bugs.nearest_texels import Surface, area_of, coarser_level, first_level
 from refgi.vectors.spec import Array, Arrays, Bug
-from refgi.vectors.stages.nearest_texels import Surface, area_of, coarser_level, first_level
 
 EQ2 = "HSS Eq. 2 with tan(f / 2) (E-HSS-03), dP = 4^k pixels (E-HSS-06)"
 CLOSEST = "HSS Sec. 4: the closest of four, with its own position, normal and colour (E-HSS-09)"

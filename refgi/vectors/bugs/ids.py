@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
+from refgi.vectors.bugs.views import ALL_CENTRES, CENTRES, View, ViewChange, view_changes, view_of
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.views import ALL_CENTRES, CENTRES, View, ViewChange, view_changes, view_of
 
 NEAREST, LOWEST = "the nearest triangle", "docs/rasterizer"
 

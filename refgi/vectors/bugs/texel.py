@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from refgi.vectors.bugs.points import ORDER, upwards
 from refgi.vectors.recipe import reading, writing
 from refgi.vectors.spec import Arrays, Bug, Run
-from refgi.vectors.stages.points_bugs import ORDER, upwards
 
 
 def texel_bugs(

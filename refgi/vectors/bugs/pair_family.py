@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from refgi.vectors.bugs.pair import CLAMPED, DISC, EQ2, literal_pairs
 from refgi.vectors.recipe import reading
 from refgi.vectors.spec import Array, Arrays, Bug, Run
-from refgi.vectors.stages.pair_bugs import CLAMPED, DISC, EQ2, literal_pairs
 
 NO_CLAMP, NORM = "no clamp unless asked for", "E-SII-03: (P + 1) / 2 pi K"
 SPREAD = {"the sphere: 1/(4 pi) in place of 1/pi, as of an isotropic light": 0.25,

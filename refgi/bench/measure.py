@@ -20,6 +20,7 @@ from refgi.bench.curves import error_in, front
 from refgi.bench.error import error_of
 from refgi.bench.grid import TRUTH, Choice, Grid
 from refgi.bench.results import Run, SceneResult, figures_of
+from refgi.compare.comparison import without_visibility
 from refgi.compare.flip import flip
 from refgi.compare.outcome import UNOCCLUDED, measure
 from refgi.errors import RefgiError, RefgiWarning, expect
@@ -87,8 +88,8 @@ def bench_scene(
     settings = dataclasses.replace(truth or TruthSettings(), seed=REFERENCE_SEED)
     references = {TRUTH: _traced(frame, settings, tell)}
     if not all(METHODS[choice.method].knows_visibility(choice.settings) for choice in grid.choices):
-        references[UNOCCLUDED] = _traced(frame, dataclasses.replace(settings, visibility=False), tell)
-    stops = [_stop(passes) for passes in grid.passes]
+        references[UNOCCLUDED] = _traced(frame, without_visibility(settings), tell)
+    stops = [_stop(settings, passes) for passes in grid.passes]
     made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, frame_options, tell)
     runs = [_judged(choice, made[number], references, frame) for number, choice in enumerate(
         (*grid.choices, *stops)) if number in made]
@@ -107,11 +108,11 @@ def _traced(frame: Frame, settings: TruthSettings, tell: Tell) -> _Reference:
     return _Reference(found.mean, found.variance_of_mean, radiance, estimate_record(found)["estimate"]["statement"])
 
 
-def _stop(passes: int) -> Choice:
-    """Return the truth, stopped after some passes."""
-    settings = TruthSettings()
+def _stop(settings: TruthSettings, passes: int) -> Choice:
+    """Return the truth, stopped after some passes that no file holds already."""
     samples = passes * (settings.picks_per_pass + settings.directions_per_pass)
-    return Choice(TRUTH, (f"samples={samples}",), dataclasses.replace(settings, samples=samples))
+    return Choice(TRUTH, (f"samples={samples}",), dataclasses.replace(
+        settings, samples=samples, seconds=None, target_error=None, checkpoint=None))
 
 
 def _in_turn(

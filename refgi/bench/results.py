@@ -16,7 +16,7 @@ from refgi.image import write_text
 
 FORMAT = "bench 1"
 COLUMNS = ("scene", "method", "settings", "seconds", "fastest", "slowest", "rmse", "low", "high", "bias", "spread",
-           "noise", "rmse_unoccluded", "flip", "ssim", "against_truth_in_equal_time", "on_the_front", "refgi")
+           "noise", "rmse_unoccluded", "flip", "ssim", "against_truth_in_equal_time", "on_the_front", "refgi_format")
 
 
 class _Strict(pydantic.BaseModel):
@@ -135,7 +135,7 @@ def rows_of(result: Result) -> Iterable[dict[str, Any]]:
                    "fastest": min(run.times), "slowest": max(run.times), **run.errors["truth"].model_dump(),
                    "rmse_unoccluded": None if unoccluded is None else unoccluded.rmse, "flip": run.flip,
                    "ssim": run.ssim, "against_truth_in_equal_time": run.in_equal_time, "on_the_front": run.front,
-                   "refgi": result.refgi}
+                   "refgi_format": result.refgi}
 
 
 def write_results(result: Result, folder: Path) -> None:

@@ -93,7 +93,7 @@ def compare(
         require_folder(Path(out))
     references = {TRUTH: runner.reference(TRUTH, settings[TRUTH])}
     if not all(METHODS[name].knows_visibility(settings[name]) for name in names):
-        references[UNOCCLUDED] = runner.reference(UNOCCLUDED, _without_visibility(settings[TRUTH]))
+        references[UNOCCLUDED] = runner.reference(UNOCCLUDED, without_visibility(settings[TRUTH]))
     results, failures = {}, {}
     for name in names:
         try:
@@ -205,7 +205,19 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
     return settings
 
 
-def _without_visibility(settings: Any) -> Any:
+def without_visibility(settings: Any) -> Any:
+    """Return how the truth is traced in which nothing blocks indirect light.
+
+    Parameters
+    ----------
+    settings : TruthSettings
+        Of the truth itself.
+
+    Returns
+    -------
+    TruthSettings
+        With a checkpoint file of its own, where there is one.
+    """
     checkpoint = settings.checkpoint
     if checkpoint and not Path(checkpoint).is_dir():  # a folder has a file for each
         checkpoint = f"{checkpoint}.{UNOCCLUDED}"

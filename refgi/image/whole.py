@@ -148,8 +148,8 @@ def is_from_refgi(path: str | Path) -> bool:
         False where the file is another program's, or so damaged that its mark is lost.
     """
     path = Path(path)
-    has_mark = {".exr": _exr, ".png": _png, ".json": _json, ".html": _page, ".csv": _first_line,
-                ".md": _first_line}.get(path.suffix.lower())
+    has_mark = {".exr": _exr, ".png": _png, ".json": _json, ".html": _page, ".csv": _table,
+                ".md": _table}.get(path.suffix.lower())
     try:
         return has_mark is not None and has_mark(path)
     except Exception:  # a damaged header makes OpenEXR raise nearly anything
@@ -175,9 +175,11 @@ def _json(path: Path) -> bool:
     return isinstance(content, dict) and MARK in content
 
 
-def _first_line(path: Path) -> bool:
+def _table(path: Path) -> bool:
+    """Return whether Markdown begins with refgi's comment, or the last column of a CSV file is named by its mark."""
     with path.open(encoding="utf-8") as file:
-        return MARK in file.readline(1000)
+        first = file.readline(1000).rstrip("\n")
+    return (first.startswith(f"<!-- {MARK} ") and first.endswith(" -->")) or first.endswith(f",{MARK}_format")
 
 
 def _page(path: Path) -> bool:

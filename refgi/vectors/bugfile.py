@@ -7,7 +7,7 @@ the expected ones by exclusive or: most are 0 and take no room).
 
 import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -108,9 +108,6 @@ class Bugs:
         right = expected.reshape(-1)[places]
         words = self._bits[piece] ^ _words(right)
         return Told(places, words.astype(np.bool_) if right.dtype.kind == "b" else words.view(right.dtype))
-
-    def __iter__(self) -> Iterator[tuple[str, BugEntry]]:
-        return ((stage, bug) for stage, bugs in self._of.items() for bug in bugs)
 
 
 def _words(array: Array) -> Array:

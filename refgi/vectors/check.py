@@ -98,8 +98,6 @@ def _summed(
     kit: Kit, asked: Asked, cases: list[CaseManifest], verdicts: list[StageVerdict], output: Path,
     unknown: tuple[str, ...],
 ) -> Result:
-    first = next(((one.case, one.stage) for one in verdicts if one.verdict in ("out", "invalid")
-                  and one.upstream != "dirty"), None)
     found = {one.verdict for one in verdicts}
     begun = {one.case for one in verdicts if any(place.is_dir() for place in places_of_case(output, one.case))}
     missing = asked.stages and any(one.verdict == "not-run" and one.case in begun for one in verdicts)
@@ -113,8 +111,9 @@ def _summed(
     def tried(verdict: StageVerdict) -> set[str]:
         return {bug.cause for bug in kit.bugs(manifests[verdict.case]).of(verdict.stage) if not bug.blind}
 
+    wrong = findings(verdicts, tried)
     return Result(kit=kit.manifest.kit, vectors=kit.manifest.vectors, mode="chained" if asked.chained else "isolated",
-                  verdict=worst, exit_code=code, first=first, findings=findings(verdicts, tried),
+                  verdict=worst, exit_code=code, first=wrong[0].first if wrong else None, findings=wrong,
                   stages=tuple(one.model_copy(update={"causes": one.causes[:CAUSES]}) for one in verdicts),
                   unknown=unknown)
 

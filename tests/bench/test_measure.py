@@ -71,6 +71,29 @@ def test_the_path_tracer_comes_nearer_and_has_no_bias(bench):
         assert one.rmse == pytest.approx(math.hypot(one.spread, one.noise), rel=0.2)
 
 
+def test_the_path_tracer_s_line_estimates_what_the_reference_does(box, tmp_path):
+    """Its own settings reach both, and no stop reads what the reference has left in a file."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)
+        found = bench_scene(box, GRID._replace(choices=GRID.choices[2:3]), rounds=1, truth=TruthSettings(
+            samples=96, bounces=2, checkpoint=tmp_path / "sums", target_error=0.5), **SIZE)
+    frame, stop = Frame(box, **SIZE), found.line[1]
+    assert (stop.settings["bounces"], stop.settings["samples"]) == (2, 96)
+    assert stop.settings["checkpoint"] is stop.settings["target_error"] is None
+    truth = trace_truth(frame, TruthSettings(samples=96, bounces=2, seed=REFERENCE_SEED, target_error=0.5))
+    picture = trace_truth(frame, TruthSettings(samples=96, bounces=2)).mean.astype(frame.dtype)
+    expected = error_of([picture], truth.mean, truth.variance_of_mean, frame.gbuffer.covered)
+    assert stop.errors["truth"].rmse == pytest.approx(expected.rmse)
+
+
+def test_a_checkpoint_file_serves_both_references(box, tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)
+        bench_scene(box, Grid(GRID.choices[:1], ()), rounds=1, truth=TruthSettings(
+            samples=48, checkpoint=tmp_path / "sums"), **SIZE)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["sums", "sums.unoccluded"]
+
+
 def test_times_stages_and_places(bench):
     for run in (*bench.runs, *bench.line):
         assert len(run.times) == ROUNDS

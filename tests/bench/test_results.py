@@ -11,6 +11,7 @@ import pytest
 import refgi.bench
 from refgi.bench.report import said_of, write_page
 from refgi.bench.results import Figures, Result, Run, SceneResult, rows_of, schema_text, write_results
+from refgi.image import is_from_refgi
 from tests.compare.test_report import Outline
 
 FIGURES = Figures(rmse=0.5, low=0.4, high=0.6, bias=0.3, spread=0.4, noise=0.01)
@@ -47,6 +48,16 @@ def test_files_say_the_same(tmp_path):
     assert times == sorted(times)
     assert len(times) == 7
     assert "val: broken gave no picture: no & way" in text
+
+
+def test_tables_are_known_by_their_mark_and_no_others(tmp_path):
+    write_results(RESULT, tmp_path)
+    write_page(RESULT, tmp_path)
+    assert all(map(is_from_refgi, tmp_path.iterdir()))
+    for name, text in (("results.md", "# Notes on refgi\n"), ("results.md", "<!-- refgi is slow\n"),
+                       ("results.csv", "mine,refgi\n1,2\n"), ("results.csv", "run of refgi\n"), ("results.md", "")):
+        (tmp_path / name).write_text(text)
+        assert not is_from_refgi(tmp_path / name), text
 
 
 def test_the_median_is_the_middle_one():

@@ -1,5 +1,6 @@
 """Eq. 2 and 3 as a port writes them from the paper, and as it gets them wrong (SII; docs/radiometry)."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,22 +16,20 @@ EQ2 = "SII Eq. 2 and 3; unit directions and r^2 (E-SII-02)"
 CLAMPED, DISC = "<a.b> = max(0, a.b)", "r^2 + A/pi"
 
 
-def as_printed(own: bool) -> Run:
-    """Return Eq. 2 and 3 as a port would write them from the paper; with footprints the disc's r^2 + A/pi for r^2."""
+def as_printed(own: bool, **bugs: Any) -> Run:
+    """Return Eq. 2 and 3 as a port would write them from the paper, or with bugs that `literal_pairs` knows.
+
+    With footprints they have the disc's r^2 + A/pi for r^2.
+    """
     def run(arrays: Arrays, real: Any) -> Arrays:
-        return {("pairs" if own else "sum") + ".irradiance": literal_pairs(arrays, own).astype(real)}
+        return {("pairs" if own else "sum") + ".irradiance": literal_pairs(arrays, own, **bugs).astype(real)}
 
     return run
 
 
 def pair_bugs(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple[Bug, ...]:
     """Return likely bugs of Eq. 2 and 3; `own`: light k meets receiver k alone."""
-    def literal(**bugs: Any) -> Run:
-        def altered(arrays: Arrays, real: Any) -> Arrays:
-            return {("pairs" if own else "sum") + ".irradiance": literal_pairs(arrays, own, **bugs).astype(real)}
-
-        return altered
-
+    literal = partial(as_printed, own)
     found = [
         Bug("the receiver's cosine is missing", literal(arrives="none"), EQ2),
         Bug("the light's cosine is missing", literal(leaves="none"), EQ2),

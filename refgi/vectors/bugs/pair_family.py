@@ -1,10 +1,11 @@
 """More that goes wrong in sums over pixel lights: other constants, clamps, powers and lobes (SII Eq. 2 and 3)."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from refgi.vectors.bugs.pair import CLAMPED, DISC, EQ2, literal_pairs
+from refgi.vectors.bugs.pair import CLAMPED, DISC, EQ2, as_printed
 from refgi.vectors.recipe import reading
 from refgi.vectors.spec import Array, Arrays, Bug, Run
 
@@ -18,12 +19,7 @@ ADDED = (1e-4, 1e-3, 0.01, 0.1, 1.0)
 
 def pair_family(run: Run, clamped: bool, glossy: bool, count: int, own: bool = False) -> tuple[Bug, ...]:
     """Return likely bugs of sums over pixel lights beside those of `pair_bugs`; `count`: number of lights."""
-    def literal(**bugs: Any) -> Run:
-        def altered(arrays: Arrays, real: Any) -> Arrays:
-            return {("pairs" if own else "sum") + ".irradiance": literal_pairs(arrays, own, **bugs).astype(real)}
-
-        return altered
-
+    literal = partial(as_printed, own)
     found = [
         Bug("the cosine at the receiver is squared", literal(arrives="squared"), EQ2),
         Bug("the light's cosine is squared: cos^2", literal(leaves="squared"), EQ2),

@@ -16,6 +16,7 @@ ROOT = Path(__file__).parents[1]
 SMALLER = {
     "render": ["--size", "24x18"], "compare": ["--size", "24x18", "--set", "truth.samples=48"],
     "bench": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii"],
+    "choose": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii,truth"],
     "sequence": ["--size", "24x18", "--frames", "2"], "explain": ["--size", "24x18"],
     "vectors": ["--case", "pairs-diffuse"],
 }
@@ -36,9 +37,10 @@ def clone(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("document", ["README.md", "docs/cli.md"])
-def test_every_example_runs_as_printed(document, clone, evidence):
-    commands = examples((ROOT / document).read_text("utf-8"))
+def test_every_example_runs_as_printed(clone, evidence):
+    """Those of both documents, each once."""
+    of = {document: examples((ROOT / document).read_text("utf-8")) for document in ("README.md", "docs/cli.md")}
+    commands = list(dict.fromkeys(tuple(arguments) for document in of.values() for arguments in document))
     for arguments in commands:
         smaller = [] if "--again" in arguments else SMALLER.get(arguments[0], [])
         result = CliRunner().invoke(VerbGroup.refgi(), [*arguments, *smaller])
@@ -48,8 +50,8 @@ def test_every_example_runs_as_printed(document, clone, evidence):
             files = [out] if out.is_file() else list(out.iterdir())
             assert files
             assert all(map(is_from_refgi, files)), arguments
-    assert {arguments[0] for arguments in commands} == set(VERBS)
-    evidence(f"{document}: {len(commands)} of {len(commands)} commands run")
+    assert all({arguments[0] for arguments in document} == set(VERBS) for document in of.values())
+    evidence(f"{', '.join(of)}: {len(commands)} of {len(commands)} commands run")
 
 
 def test_the_examples_of_a_text_are_found():

@@ -5,6 +5,7 @@ are run. `[truth]` has the key `passes`: after how many the path tracer is stopp
 """
 
 import itertools
+import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -72,12 +73,7 @@ def read_grid(file: Path) -> Grid:
     InputError
         If the file cannot be read, a method or key is unknown or a value not usable; names all of them.
     """
-    try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: no TOML: {error}", file=str(file)) from error
+    tables = read_tables(file)
     passes = _passes(tables.pop(TRUTH, {}), file)
     choices: dict[tuple[str, tuple[str, ...]], Choice] = {}
     faults = []
@@ -93,6 +89,32 @@ def read_grid(file: Path) -> Grid:
     if faults:
         raise InputError("\n".join(dict.fromkeys(faults)), file=str(file))
     return Grid(tuple(choices.values()), passes)
+
+
+def read_tables(file: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    file : Path
+        TOML.
+
+    Returns
+    -------
+    dict
+        Its tables by name.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: no TOML: {error}", file=str(file)) from error
 
 
 def chosen(grid: Grid, methods: Sequence[str] | None) -> Grid:
@@ -133,18 +155,60 @@ def _passes(table: Mapping[str, Any], file: Path) -> tuple[int, ...]:
 
 def _combinations(table: Any, where: str) -> Iterable[tuple[str, ...]]:
     expect(isinstance(table, dict), where, "a table of settings", type(table).__name__)
-    lists = [[f"{key}={_text(value)}" for value in (values if isinstance(values, list) else [values])]
-             for key, values in sorted(_flat(table).items())]
+    lists = [[f"{key}={text_of(value)}" for value in (values if isinstance(values, list) else [values])]
+             for key, values in sorted(flat(table).items())]
     return itertools.product(*lists)
 
 
-def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return values by their dotted keys: TOML reads `a.b = 1` as a table in a table."""
+def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return values by their dotted keys: TOML reads `a.b = 1` as a table in a table.
+
+    Parameters
+    ----------
+    table : mapping
+        Of values and tables.
+    prefix : str
+        What keys begin with.
+
+    Returns
+    -------
+    dict
+        By key.
+    """
     found: dict[str, Any] = {}
     for key, value in table.items():
-        found |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+        found |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
     return found
 
 
-def _text(value: Any) -> str:
+def text_of(value: Any) -> str:
+    """Return a value as `--set` takes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def toml_line(key: str, value: Any) -> str:
+    """Return one line of a table: a list, a number, true or false as it is, any other text in quotes.
+
+    Parameters
+    ----------
+    key : str
+        Bare or dotted.
+    value : str, number or list
+        The value, or its text as `--set` takes it.
+
+    Returns
+    -------
+    str
+        TOML.
+
+    Examples
+    --------
+    >>> [toml_line("a.b", "0.5"), toml_line("kind", "csm"), toml_line("size", [64, 48])]
+    ['a.b = 0.5', 'kind = "csm"', 'size = [64, 48]']
+    """
+    try:
+        tomllib.loads(f"value = {value}")
+        text = str(value)
+    except tomllib.TOMLDecodeError:
+        text = json.dumps(str(value))
+    return f"{key} = {json.dumps(value) if isinstance(value, list) else text}"

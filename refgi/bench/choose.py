@@ -1,0 +1,214 @@
+"""`choose`: the cheapest method and settings that meet a wish on a scene."""
+
+import contextlib
+import dataclasses
+import math
+import statistics
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi import stages
+from refgi.bench.error import error_of
+from refgi.bench.grid import TRUTH, Choice
+from refgi.bench.measure import REFERENCE_SEED, WARM_UP_SIZE, with_seed
+from refgi.bench.search import Found, for_error, for_time
+from refgi.bench.tracks import Track
+from refgi.errors import RefgiError, RefgiWarning, expect
+from refgi.frame import Frame
+from refgi.methods import METHODS
+from refgi.provenance import estimate_record
+from refgi.scene import Scene
+from refgi.settings import Settings
+from refgi.truth import TruthSettings, trace_truth
+
+Array = npt.NDArray[Any]
+Tell = Callable[[str, float], None]
+
+SMALL = 128  # pixels along the longer side of the small picture
+SMALL_ROUNDS = 2
+NOISE_SHARE = 0.5  # of the error wished for: the truth's standard error, which is taken out of every figure
+NOISE_FOR_TIME = 0.02
+TRUTH_SECONDS = 60.0  # for each of the two truths, unless it is said how they are traced
+
+
+class Wish(NamedTuple):
+    """What is wished for: one of the two."""
+
+    error: float | None = None  # RMSE over the truth's mean
+    seconds: float | None = None  # of a frame with its buffers
+
+    def check(self) -> None:
+        """Raise `InputError` unless one of the two is a number above 0."""
+        asked = [value for value in self if value is not None]
+        expect(len(asked) == 1, "wish", "an error or a time", "both" if asked else "neither")
+        expect(0 < asked[0] < math.inf, "wish", "a number above 0", asked[0])
+
+    @property
+    def truth(self) -> TruthSettings:
+        """How well the truth must be known."""
+        noise = NOISE_FOR_TIME if self.error is None else NOISE_SHARE * self.error
+        return TruthSettings(samples=2**31, seconds=TRUTH_SECONDS, target_error=noise)
+
+
+class Chosen(NamedTuple):
+    """What was found on a scene."""
+
+    found: Found
+    skips: tuple[tuple[str, str], ...]  # stages that the best leaves out on this scene, and why
+    truth: str  # how well it is known
+
+
+def choose(
+    scene: Scene, tracks: Sequence[Track], wish: Wish, *, rounds: int = 3, truth: TruthSettings | None = None,
+    tell: Tell = lambda *_: None, **frame_options: Any,
+) -> Chosen:
+    """Find the cheapest choice of settings that meets a wish on a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    tracks : sequence of Track
+        Where to look.
+    wish : Wish
+        The largest error or the longest time.
+    rounds : int
+        How often each choice runs at full size, with a seed each.
+    truth : TruthSettings, optional
+        How references are traced, and with which bounces; by the wish where absent.
+    tell : callable
+        Called with (what runs, share done), the share not known and 0.
+    **frame_options : object
+        Passed to `Frame`.
+
+    Returns
+    -------
+    Chosen
+        The best, all that was tried, and what the best leaves out.
+
+    Raises
+    ------
+    InputError
+        If not one thing is wished for, a wish is not above 0 or the camera sees no surface.
+    """
+    wish.check()
+    truth = dataclasses.replace(truth or wish.truth, seed=REFERENCE_SEED)
+    tracks = [_of_truth(track, truth) if track.method == TRUTH else track for track in tracks]
+    full = Pictures(scene, truth, rounds, tell, frame_options)
+    _load_kernels(scene, tracks, frame_options, tell)
+    small = Pictures(scene, truth, SMALL_ROUNDS, tell, {**frame_options, **_small_size(full.frame)})
+    if wish.error is not None:
+        found = for_error(tracks, wish.error, small, full)
+    else:
+        found = for_time(tracks, wish.seconds or 0.0, small, full)
+    return Chosen(found, full.skips(found.best.choice) if found.best else (), full.truth)
+
+
+class Pictures:
+    """A scene at one size: runs choices and judges them by a truth that is traced once.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    truth : TruthSettings
+        How the reference is traced.
+    rounds : int
+        How often each choice is run, a seed each.
+    tell : callable
+        Called with (what runs, share done).
+    frame_options : dict
+        Passed to `Frame`.
+    """
+
+    def __init__(self, scene: Scene, truth: TruthSettings, rounds: int, tell: Tell,
+                 frame_options: dict[str, Any]) -> None:
+        self._scene, self._rounds, self._tell, self._options = scene, rounds, tell, frame_options
+        self.frame = Frame(scene, **frame_options)
+        expect(bool(self.frame.gbuffer.covered.any()), f"scene {scene.name!r}: camera", "a view of some surface",
+               "a view past all of it")
+        self._size = f"{self.frame.width}x{self.frame.height}"
+        with stages.observe(progress=lambda stage, done: tell(f"truth at {self._size}: {stage}", done)):
+            self._reference = trace_truth(self.frame, truth)
+        self.truth: str = estimate_record(self._reference)["estimate"]["statement"]
+        self._known: dict[Choice, _Run] = {}
+
+    def seconds(self, choice: Choice) -> float:
+        """Return the median time of a frame with its buffers; infinite where it gives no picture."""
+        return self._run(choice).seconds
+
+    def error(self, choice: Choice) -> float:
+        """Return the RMSE of all rounds without the truth's noise, over the truth's mean; infinite for no picture."""
+        return self._run(choice).error
+
+    def skips(self, choice: Choice) -> tuple[tuple[str, str], ...]:
+        """Return the stages that a choice left out, and why."""
+        return self._run(choice).skips
+
+    def _run(self, choice: Choice) -> "_Run":
+        if choice not in self._known:
+            self._tell(f"{self._size}: {choice.method}, {choice.label}", 0.0)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RefgiWarning)  # of settings that nobody asked for
+                try:
+                    self._known[choice] = self._judged(choice)
+                except RefgiError:
+                    self._known[choice] = _Run(math.inf, math.inf, ())
+        return self._known[choice]
+
+    def _judged(self, choice: Choice) -> "_Run":
+        runs = [self._made(choice.method, with_seed(choice.settings, turn)) for turn in range(self._rounds)]
+        known = error_of([one.picture for one in runs], self._reference.mean, self._reference.variance_of_mean,
+                         self.frame.gbuffer.covered)
+        error = math.sqrt(max(0.0, known.rmse**2 - known.noise**2)) if np.isfinite(known.rmse) else math.inf
+        return _Run(statistics.median(one.seconds for one in runs), error, runs[0].skips)
+
+
+    def _made(self, method: str, settings: Settings) -> "_Made":
+        frame = Frame(self._scene, **self._options)
+        with stages.observe() as log:
+            started = time.perf_counter()
+            picture = METHODS[method].function(frame, settings)
+            seconds = time.perf_counter() - started
+        skips = dict.fromkeys((run.name, run.reason) for run in log.runs if run.status == "skipped")
+        return _Made(picture, seconds, tuple(skips))
+
+
+class _Made(NamedTuple):
+    picture: Array
+    seconds: float
+    skips: tuple[tuple[str, str], ...]
+
+
+class _Run(NamedTuple):
+    seconds: float
+    error: float
+    skips: tuple[tuple[str, str], ...]
+
+
+def _load_kernels(scene: Scene, tracks: Sequence[Track], options: dict[str, Any], tell: Tell) -> None:
+    """Compile or load what tracks need: no time that is measured later has it in it."""
+    for number, track in enumerate(tracks):
+        tell(f"loading {track.method}", number / len(tracks))
+        with warnings.catch_warnings(), contextlib.suppress(RefgiError):
+            warnings.simplefilter("ignore", RefgiWarning)
+            METHODS[track.method].function(Frame(scene, **{**options, "width": WARM_UP_SIZE, "height": WARM_UP_SIZE}),
+                                           track.rungs[0].settings)
+
+
+def _of_truth(track: Track, truth: TruthSettings) -> Track:
+    """Return the path tracer's track with the reference's bounces and emitters, stopped by its samples alone."""
+    rungs = [one._replace(settings=dataclasses.replace(truth, samples=value, seconds=None, target_error=None,
+                                                       checkpoint=None))
+             for one, value in zip(track.rungs, track.values, strict=True)]
+    return Track(tuple(rungs), track.values)
+
+
+def _small_size(frame: Frame) -> dict[str, int]:
+    factor = min(1.0, SMALL / max(frame.width, frame.height))
+    return {"width": max(1, round(frame.width * factor)), "height": max(1, round(frame.height * factor))}

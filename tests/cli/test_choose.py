@@ -1,0 +1,104 @@
+"""`refgi choose`: what is chosen, said and written; wishes that cannot be."""
+
+import json
+import shlex
+import tomllib
+
+import pytest
+from click.testing import CliRunner
+
+from refgi.bench import choose
+from refgi.bench.grid import read_grid
+from refgi.cli.group import VerbGroup
+
+SMALL = ("cornell_box", "--size", "24x18", "--methods", "sii,truth", "--rounds", "1", "--threads", "2")
+TRUTH = ("--set", "samples=96")
+
+
+def run(*arguments):
+    return CliRunner().invoke(VerbGroup.refgi(), ["choose", *map(str, arguments)])
+
+
+def test_an_error_is_met_and_the_line_renders(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = run(*SMALL, *TRUTH, "--error", "60%", "--json", "--emit", "plan.toml")
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert found["wish"] == {"error": 0.6, "seconds": None}
+    assert found["best"] in found["judged"]
+    assert found["best"]["error"] <= 0.6
+    assert all(one["seconds"] >= found["best"]["seconds"] for one in found["judged"] if one["error"] <= 0.6 * 0.97)
+    assert {one["method"] for one in found["small"]} <= {"sii", "truth"}
+    assert {"stage": "pairs.lobes", "reason": "no pixel light is glossy"} in found["skips"]
+    rendered = CliRunner().invoke(VerbGroup.refgi(), shlex.split(found["line"])[1:])
+    assert rendered.exit_code == 0, rendered.output
+    plan = tomllib.loads((tmp_path / "plan.toml").read_text())
+    assert plan.pop("batch") == {"scenes": ["cornell_box"], "size": [24, 18]}
+    assert list(plan) == [found["best"]["method"]]
+    (tmp_path / "grid.toml").write_text((tmp_path / "plan.toml").read_text().partition("\n\n")[2])
+    (choice,) = read_grid(tmp_path / "grid.toml").choices
+    assert sorted(choice.changes) == sorted(found["best"]["changes"])
+
+
+def test_a_time_is_kept():
+    done = run(*SMALL, *TRUTH, "--time", "0.5s", "--methods", "truth", "--json")
+    assert done.exit_code == 0, done.output
+    best = json.loads(done.stdout)["best"]
+    assert best["seconds"] <= 0.5
+    assert best["method"] == "truth"
+
+
+def test_what_nothing_meets_is_said():
+    done = run(*SMALL, *TRUTH, "--methods", "gather", "--error", "1%")
+    assert done.exit_code == 1
+    assert "nothing meets an error of 1 %" in done.stdout
+    assert "nearest on the small picture" in done.stdout
+
+
+def test_the_path_tracer_has_the_truths_bounces(monkeypatch):
+    asked = []
+    monkeypatch.setattr(choose, "for_error", lambda tracks, *_: asked.extend(tracks) or choose.Found(None, (), ()))
+    assert run(*SMALL, *TRUTH, "--set", "bounces=2", "--set", "seconds=9", "--methods", "truth", "--error", "9%"
+               ).exit_code == 1
+    (track,) = asked
+    assert {rung.settings.bounces for rung in track.rungs} == {2}
+    assert [rung.settings.samples for rung in track.rungs] == list(track.values)
+    assert {(rung.settings.seconds, rung.settings.target_error) for rung in track.rungs} == {(None, None)}
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    ([], "one of the two"),
+    (["--error", "3%", "--time", "50ms"], "one of the two"),
+    (["--error", "-3%"], "a share such as"),
+    (["--error", "3 cm"], "a share such as"),
+    (["--time", "0"], "a time such as"),
+    (["--time", "5 min"], "a time such as"),
+    (["--error", "3%", "--methods", "siii"], "siii"),
+    (["--error", "3%", "--set", "samplse=3"], "samplse"),
+])
+def test_wrong_wishes_are_one_clear_error_before_anything_runs(monkeypatch, arguments, said):
+    monkeypatch.setattr(choose, "choose", lambda *_, **__: pytest.fail("ran"))
+    done = run("cornell_box", *arguments)
+    assert done.exit_code == 2
+    assert said in done.stderr
+
+
+def test_a_plan_that_is_there_stays(tmp_path, monkeypatch):
+    monkeypatch.setattr(choose, "choose", lambda *_, **__: pytest.fail("ran"))
+    (tmp_path / "plan.toml").write_text("mine")
+    done = run("cornell_box", "--error", "3%", "--emit", tmp_path / "plan.toml")
+    assert done.exit_code == 2
+    assert (tmp_path / "plan.toml").read_text() == "mine"
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("50ms", 0.05), ("0.05 s", 0.05), ("2", 2.0), ("1e3us", 1e-3)])
+def test_times_have_units(monkeypatch, text, seconds):
+    asked = []
+
+    def stopped(_scene, _tracks, wish, **_):
+        asked.append(wish)
+        return choose.Chosen(choose.Found(None, (), ()), (), "none")
+
+    monkeypatch.setattr(choose, "choose", stopped)
+    run("cornell_box", "--time", text)
+    assert asked[0].seconds == pytest.approx(seconds)

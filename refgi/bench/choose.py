@@ -124,11 +124,14 @@ class Pictures:
         Called with (what runs, share done).
     frame_options : dict
         Passed to `Frame`.
+    first_seed : int
+        Of the first round; each round has the next one.
     """
 
-    def __init__(self, scene: Scene, truth: TruthSettings, rounds: int, tell: Tell,
-                 frame_options: dict[str, Any]) -> None:
-        self._scene, self._rounds, self._tell, self._options = scene, rounds, tell, frame_options
+    def __init__(self, scene: Scene, truth: TruthSettings, rounds: int, tell: Tell, frame_options: dict[str, Any],
+                 first_seed: int = 0) -> None:
+        self._scene, self._tell, self._options = scene, tell, frame_options
+        self._seeds = range(first_seed, first_seed + rounds)
         self.frame = Frame(scene, **frame_options)
         expect(bool(self.frame.gbuffer.covered.any()), f"scene {scene.name!r}: camera", "a view of some surface",
                "a view past all of it")
@@ -162,7 +165,7 @@ class Pictures:
         return self._known[choice]
 
     def _judged(self, choice: Choice) -> "_Run":
-        runs = [self._made(choice.method, with_seed(choice.settings, turn)) for turn in range(self._rounds)]
+        runs = [self._made(choice.method, with_seed(choice.settings, seed)) for seed in self._seeds]
         known = error_of([one.picture for one in runs], self._reference.mean, self._reference.variance_of_mean,
                          self.frame.gbuffer.covered)
         error = math.sqrt(max(0.0, known.rmse**2 - known.noise**2)) if np.isfinite(known.rmse) else math.inf

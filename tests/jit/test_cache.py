@@ -70,7 +70,7 @@ def test_a_caller_imported_after_an_edit_does_not_pass_for_the_edited_one(packag
     assert run(package) == "7.0 0"
 
 
-@pytest.mark.parametrize("damage", [b"", b"\x80\x05garbage"])
+@pytest.mark.parametrize("damage", [b"\x80\x05garbage", pytest.param(b"", marks=pytest.mark.slow)])
 def test_a_damaged_cache_is_dropped_and_rebuilt(package, damage):
     run(package)
     files = list((package.parent / "cache").rglob("outer.*.kernel"))

@@ -105,8 +105,9 @@ def written(path: Path, content: bytes) -> Path:
     return path
 
 
-MAKERS = (chained_nodes, own_meshes, many_objects, unknown_materials)
-MORE = (flat_nodes, rootless_nodes, many_lights, many_groups, repeated_keys, missing_meshes)
+MAKERS = (own_meshes, many_objects)
+MORE = (chained_nodes, unknown_materials, flat_nodes, rootless_nodes, many_lights, many_groups, repeated_keys,
+        missing_meshes)
 
 
 @pytest.mark.parametrize("make", [*MAKERS, *(pytest.param(make, marks=pytest.mark.slow) for make in MORE)],

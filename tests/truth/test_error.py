@@ -87,6 +87,7 @@ def test_scene_means_lie_within_their_own_standard_error(frame, long_run, eviden
 CERTAIN = 1e-4  # a chi-square value beyond the quantiles of this tail comes once in 5,000 runs
 
 
+@pytest.mark.slow
 def test_stated_block_and_picture_errors_are_the_spread_over_seeds(frame, evidence):
     """Chi-square: squared deviations of 24 runs over the variance that they state on average."""
     seeds, passes = 24, 6
@@ -107,7 +108,7 @@ def test_stated_block_and_picture_errors_are_the_spread_over_seeds(frame, eviden
              f"{ratio:.2f} (blocks) of what is stated")
 
 
-@pytest.mark.parametrize("name", ["cornell_box", "atrium"])
+@pytest.mark.parametrize("name", ["cornell_box", pytest.param("atrium", marks=pytest.mark.slow)])
 def test_the_default_knows_the_pictures_mean_to_a_thousandth(name, evidence):
     result = trace_truth(Frame(load_scene(name), width=256, height=192), TruthSettings())
     evidence(f"{name} at 256x192: {result.error_statement}")

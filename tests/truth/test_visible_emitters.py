@@ -16,7 +16,8 @@ from refgi.truth.truth import accumulate
 from tests.form_factors import polygon_form_factor
 from tests.truth.scenes import WHITE, rectangle
 
-ESTIMATORS = ["combined", "hemisphere", "light"]
+ALL = ["combined", "hemisphere", "light"]
+ESTIMATORS = ["combined", *(pytest.param(alone, marks=pytest.mark.slow) for alone in ALL[1:])]
 SIGMAS, BIAS = 4.0, 1e-4  # a mean of a few dozen passes lies outside once in some 5,000 runs; float32 rays
 BLACK = Material("black", (0.0, 0.0, 0.0))
 SUN = DirectionalLight((0.1, -1.0, 0.0), (3.0, 2.0, 1.0))
@@ -125,10 +126,10 @@ def frame():
 
 def test_estimators_agree_and_all_is_more(frame, evidence):
     results = {kind: trace_truth(frame, TruthSettings(estimator=kind, emitters="visible", samples=24 * 40))
-               for kind in ESTIMATORS}
+               for kind in ALL}
     everything = trace_truth(frame, TruthSettings(samples=24 * 40))
     a = results["combined"]
-    for kind in ESTIMATORS[1:]:
+    for kind in ALL[1:]:
         b = results[kind]
         z = np.abs(a.picture_mean - b.picture_mean) / np.sqrt(a.picture_variance + b.picture_variance)
         assert (z < SIGMAS).all()

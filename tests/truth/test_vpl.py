@@ -25,7 +25,7 @@ def relative_error(picture, reference, seen):
 
 
 @pytest.mark.feature("REF-02", "REF-03")
-@pytest.mark.parametrize("name", ["cornell_box", "atrium"])
+@pytest.mark.parametrize("name", ["cornell_box", pytest.param("atrium", marks=pytest.mark.slow)])
 def test_all_texels_converge_to_the_truth(name, evidence):
     found = load_scene(name)
     reference = trace_truth(Frame(found, width=32, height=32), TruthSettings(samples=24 * 100))

@@ -72,10 +72,13 @@ def test_another_array_in_its_place_is_named(kit, tmp_path):
     assert "it holds gbuffer.position" in [one.cause for one in port.first().causes]
 
 
-def test_every_likely_bug_of_the_kit_is_told_by_the_checker(kit, tmp_path):
+@pytest.mark.parametrize(("cases", "least"), [
+    (("pairs-glossy", "sii-warp-a"), 60),
+    pytest.param(("sii-three-lamps", "sii-warp-a", "sii-warp-b", "pairs-glossy"), 100, marks=pytest.mark.slow)])
+def test_every_likely_bug_of_the_kit_is_told_by_the_checker(kit, tmp_path, cases, least):
     """The exporter keeps a sample of elements of each; here it is put over the right arrays, as a port has it."""
     told = seen = 0
-    for case in ("sii-three-lamps", "sii-warp-a", "sii-warp-b", "pairs-glossy"):
+    for case in cases:
         port = Port(kit, case, tmp_path / case)
         bugs = kit.bugs(port.case)
         for step in port.case.stages:
@@ -92,7 +95,7 @@ def test_every_likely_bug_of_the_kit_is_told_by_the_checker(kit, tmp_path):
                 seen += first.stage == step.name and bug.cause in [one.cause for one in first.causes]
                 for name in bug.arrays:
                     port.write(name, port.arrays[name])
-    assert told > 100
+    assert told > least
     assert seen >= 0.97 * told  # two bugs may have one effect, and three causes are told
 
 

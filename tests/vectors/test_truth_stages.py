@@ -47,7 +47,8 @@ def test_the_chain_is_the_method(name):
     assert (known[NAMES[2]] == settings.samples * (known["gbuffer.triangle_id"] >= 0)).all()
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [name if name in cases.QUICK else pytest.param(name, marks=pytest.mark.slow)
+                                  for name in CASES])
 def test_another_estimator_agrees(name):
     """Vertices of light paths and directions of the hemisphere, combined, with other random numbers."""
     known, settings = made(name)[1], cases.VIEWS[name][1]

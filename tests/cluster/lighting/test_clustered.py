@@ -131,7 +131,7 @@ def test_a_block_of_equal_pixels_has_the_full_sum_as_its_mean(real, assignment, 
     evidence(f"{assignment}, {np.dtype(real).name}: means of 8 x 8 pixels at any place {error:.1e} off the full sum")
 
 
-@pytest.fixture(scope="module", params=[np.float32, np.float64])
+@pytest.fixture(scope="module", params=[np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 def scene(request):
     frame = Frame(load_scene("cornell_sphere:faces=200"), width=37, height=29, rsm_resolution=64, dtype=request.param)
     settings = of(ValSettings, lights=48, maps_resolution=32)

@@ -57,5 +57,6 @@ def clicked(page, script, folder, width=1400):
         [browser, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--window-size={width},1000", "--dump-dom",
          f"--virtual-time-budget={BUDGET}", copy.as_uri()], capture_output=True, text=True, timeout=120, check=False)
     said = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert said and said[1], f"the script did not end: {done.stderr[-2000:]}"
+    assert said is not None
+    assert said[1], f"the script did not end: {done.stderr[-2000:]}"
     return json.loads(html.unescape(said[1]))

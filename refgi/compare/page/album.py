@@ -91,7 +91,7 @@ def _described(view: View, store: Store) -> dict[str, Any]:
     mask, surface = store.add_mask(view.covered), _surface(view)
     truth = view.judges[TRUTH].irradiance
     references = [_reference(view, name, surface, store) for name in view.judges]
-    shared = {"surface": store.add(np.concatenate(surface), view.covered),
+    shared = {"emitted": store.add(surface[0], view.covered), "reflectance": store.add(surface[1], view.covered),
               "ids": {name: store.add_ids(plane) for name, plane in sorted(view.ids.items())}}
     pictures, errors = [], []
     for picture in view.pictures:

@@ -16,8 +16,8 @@ from refgi.compare.outcome import NOISE_MARGIN
 
 Array = npt.NDArray[Any]
 
-STREAKS, SPIKES, BLOCKS, FACTOR = 0.15, 3.0, 1.3, 0.5  # thresholds of the figures
-TILE = 32  # pixels: the median over tiles leaves out edges of objects, which lie in few of them
+STREAKS, SPIKES, BLOCKS, FACTOR = 0.2, 3.0, 1.3, 0.5  # thresholds of the figures
+TILE, LEAST_TILES = 32, 16  # pixels: the median over tiles leaves out edges of objects, which lie in few of them
 LAG = 3  # pixels along which streaks go on and noise does not
 SPIKE_RATIO = 4.0  # times the second largest error around it
 PERIODS = (2, 4, 8, 16)  # pixels along a side of blocks
@@ -69,9 +69,11 @@ def findings(irradiance: Array, mean: Array, variance: Array, covered: Array) ->
 
 
 def streaks(seen: Seen) -> Iterator[Finding]:
-    """Yield how much further the error goes on along rows than along columns, and the other way round.
+    """Yield how much further the error's detail goes on along rows than along columns, and the other way round.
 
-    Autocorrelation of e without its mean over each tile, along x less that along y; the median over tiles.
+    Detail across rows is e less the mean of the pixels above and below, which smooth errors have little of; streaks
+    are where it goes on along x. The median over tiles of its autocorrelation, less that of columns; a picture of few
+    tiles has too many edges of objects in each.
 
     Parameters
     ----------
@@ -83,16 +85,16 @@ def streaks(seen: Seen) -> Iterator[Finding]:
     Finding
         Of rows or of columns.
     """
-    differences = []
-    for rows in range(0, seen.error.shape[0] - TILE + 1, TILE):
-        for columns in range(0, seen.error.shape[1] - TILE + 1, TILE):
-            place = slice(rows, rows + TILE), slice(columns, columns + TILE)
-            if seen.covered[place].all():
-                detail = _detail(seen.error[place])
-                differences.append(_correlation(detail) - _correlation(detail.T))
-    figure = float(np.median(differences)) if differences else 0.0
+    height, width = (side // TILE for side in seen.error.shape)
+    places = [(slice(TILE * y, TILE * y + TILE), slice(TILE * x, TILE * x + TILE))
+              for y in range(height) for x in range(width)]
+    tiles = [seen.error[place] for place in places if seen.covered[place].all()]
+    if len(tiles) < LEAST_TILES:
+        return
+    figure = float(np.median([_run_along(tile) - _run_along(tile.T) for tile in tiles]))
     name = "row streaks" if figure > 0 else "column streaks"
-    yield Finding(name, abs(figure), STREAKS, f"autocorrelation of the error over {LAG} pixels, along x less along y")
+    along = "along x less along y" if figure > 0 else "along y less along x"
+    yield Finding(name, abs(figure), STREAKS, f"autocorrelation of the error's detail over {LAG} pixels, {along}")
 
 
 def spikes(seen: Seen) -> Iterator[Finding]:
@@ -165,17 +167,11 @@ def factor(seen: Seen) -> Iterator[Finding]:
 DETECTORS: tuple[Callable[[Seen], Iterator[Finding]], ...] = (streaks, spikes, blocks, factor)
 
 
-def _detail(tile: Array) -> Array:
-    """Return a tile without the plane that fits it best, large values clipped."""
-    y, x = np.indices(tile.shape) - (TILE - 1) / 2
-    flat = tile - tile.mean()
-    flat = flat - x * (flat * x).sum() / (x * x).sum() - y * (flat * y).sum() / (y * y).sum()
-    limit = CLIP * float(np.median(np.abs(flat)))
-    clipped: Array = np.clip(flat, -limit, limit)
-    return clipped
-
-
-def _correlation(detail: Array) -> float:
+def _run_along(tile: Array) -> float:
+    """Return the autocorrelation along x of the detail across rows, large values clipped."""
+    detail = tile[1:-1] - 0.5 * (tile[2:] + tile[:-2])
+    limit = CLIP * float(np.median(np.abs(detail)))
+    detail = np.clip(detail, -limit, limit)
     power = float((detail * detail).mean())
     return float((detail[:, LAG:] * detail[:, :-LAG]).mean()) / power if power > 0 else 0.0
 

@@ -48,7 +48,7 @@ function readoutRows(viewer) {
 /* The numbers of every picture at the pixel. */
 function showPixel(viewer) {
   const { scene, pixel, key, rows, root } = viewer;
-  if (!pixel || !scene.surface) return;
+  if (!pixel || !scene.covered) return;
   const [x, y] = pixel;
   const ids = scene.idsAt(x, y).map(([name, id]) => `${name} ${id}`);
   const what = scene.isCovered(x, y) ? ids : ["no surface"];

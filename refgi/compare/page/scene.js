@@ -13,7 +13,8 @@ class Scene {
 
   /* Unpack what all pictures need, then the pictures; tell of each that is ready. */
   async open(tell) {
-    [this.mask, this.surface] = await Promise.all([this.data.mask, this.data.surface].map((n) => this.planes(n)));
+    const { mask, emitted, reflectance } = this.data;
+    [this.mask, this.emitted, this.reflectance] = await Promise.all([mask, emitted, reflectance].map((n) => this.planes(n)));
     this.covered = this.mask.bits[0].map((bits) => HALVES[bits]);
     this.ids = {};
     for (const [name, number] of Object.entries(this.data.ids)) this.ids[name] = await this.planes(number);
@@ -42,7 +43,7 @@ class Scene {
 
   radiance(item, channel, x, y) {
     if (item.own) return item.own.at(channel, x, y);
-    return this.surface.at(channel, x, y) + this.surface.at(channel + 3, x, y) * item.light.at(channel, x, y);
+    return this.emitted.at(channel, x, y) + this.reflectance.at(channel, x, y) * item.light.at(channel, x, y);
   }
 
   luminance(item, x, y) {

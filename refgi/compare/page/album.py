@@ -129,7 +129,8 @@ def _picture(view: View, picture: Picture, surface: Surface, store: Store) -> tu
     error = maps.luminance(light[0]) - maps.luminance(view.judges[TRUTH].irradiance)
     seen = findings(light[0], own.irradiance, own.variance, view.covered)
     return {"name": picture.name, "label": picture.label, "said": picture.said, "judges": list(picture.judges),
-            "findings": list(_said(seen)), "crops": [crop._asdict() for crop in worst_crops(error, view.covered)],
+            "findings": list(_said(seen, LABELS[picture.judges[-1]])),
+            "crops": [crop._asdict() for crop in worst_crops(error, view.covered)],
             **_light(view, light, surface, store, picture.importance)}, error.astype(np.float32)
 
 
@@ -141,6 +142,7 @@ def _light(view: View, light: tuple[Array, Array], surface: Surface, store: Stor
     return stored
 
 
-def _said(seen: Sequence[Finding]) -> Iterator[dict[str, str]]:
+def _said(seen: Sequence[Finding], judge: str) -> Iterator[dict[str, str]]:
     for one in seen:
-        yield {"name": one.name, "about": f"{one.said}: {one.figure:.3g}, named from {one.threshold:g} on"}
+        yield {"name": one.name, "about": f"{one.said}, against the {judge.lower()}: {one.figure:.3g}, named from "
+                                          f"{one.threshold:g} on"}

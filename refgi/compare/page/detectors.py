@@ -19,6 +19,7 @@ Array = npt.NDArray[Any]
 STREAKS, SPIKES, BLOCKS, FACTOR = 0.2, 3.0, 1.3, 0.5  # thresholds of the figures
 TILE, LEAST_TILES = 32, 16  # pixels: the median over tiles leaves out edges of objects, which lie in few of them
 LAG = 3  # pixels along which streaks go on and noise does not
+LEAST_DETAIL = 0.05  # of the error's deviation in a tile: the rest is curvature of a smooth error
 SPIKE_RATIO = 4.0  # times the second largest error around it
 PERIODS = (2, 4, 8, 16)  # pixels along a side of blocks
 CLIP = 3.0  # times the median: edges and spikes count no more than this
@@ -71,9 +72,9 @@ def findings(irradiance: Array, mean: Array, variance: Array, covered: Array) ->
 def streaks(seen: Seen) -> Iterator[Finding]:
     """Yield how much further the error's detail goes on along rows than along columns, and the other way round.
 
-    Detail across rows is e less the mean of the pixels above and below, which smooth errors have little of; streaks
-    are where it goes on along x. The median over tiles of its autocorrelation, less that of columns; a picture of few
-    tiles has too many edges of objects in each.
+    Detail across rows is e less the mean of the pixels above and below; where it goes on along x there are streaks.
+    The median over tiles of its autocorrelation, less that of columns; in a picture of few tiles objects have edges in
+    too many of them.
 
     Parameters
     ----------
@@ -113,7 +114,7 @@ def spikes(seen: Seen) -> Iterator[Finding]:
         One.
     """
     height, width = seen.error.shape
-    wide = np.pad(np.abs(seen.error), 1, mode="edge")
+    wide = np.pad(np.abs(seen.error), 1)
     around = [wide[1 + y:1 + y + height, 1 + x:1 + x + width] for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y]
     second = np.partition(np.stack(around), -2, axis=0)[-2]
     alone = (seen.error > SPIKE_RATIO * second) & (seen.error > seen.reference) & (seen.error > 5 * seen.deviation)
@@ -168,8 +169,10 @@ DETECTORS: tuple[Callable[[Seen], Iterator[Finding]], ...] = (streaks, spikes, b
 
 
 def _run_along(tile: Array) -> float:
-    """Return the autocorrelation along x of the detail across rows, large values clipped."""
+    """Return the autocorrelation along x of the detail across rows, large values clipped; 0 where it is a trifle."""
     detail = tile[1:-1] - 0.5 * (tile[2:] + tile[:-2])
+    if detail.std() < LEAST_DETAIL * tile.std():
+        return 0.0
     limit = CLIP * float(np.median(np.abs(detail)))
     detail = np.clip(detail, -limit, limit)
     power = float((detail * detail).mean())

@@ -95,7 +95,7 @@ def remake(folder: Path, folders: Sequence[Path], refresh: int | None = None) ->
     folders : sequence of Path
         What `folders_of` gave.
     refresh : int, optional
-        Seconds after which a browser reads the pages again; never where absent.
+        Seconds after which a browser reads the pages again unless they are in use; never where absent.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def index_page(folder: Path, held: Sequence[Held], refresh: int | None = None) -
     held : sequence of Held
         The folders with their results.
     refresh : int, optional
-        Seconds after which a browser reads the page again; never where absent.
+        Seconds after which a browser reads the page again unless it is in use; never where absent.
 
     Returns
     -------

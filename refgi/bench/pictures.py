@@ -1,5 +1,6 @@
 """The pictures of a bench, in `pictures/SCENE/` of its folder: references, ids, and the first seed of every setting."""
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -50,9 +51,12 @@ def places(out: Path, scenes: Sequence[str]) -> list[Place]:
     list of Place
         Folders named after the scenes; of scenes of one name the later ones have a number.
     """
-    stems = [re.sub(r"[^A-Za-z0-9_-]+", "_", scene) or "_" for scene in scenes]
-    numbered = [f"{stem}-{1 + Counter(stems[:i])[stem]}" if stem in stems[:i] else stem for i, stem in enumerate(stems)]
-    return [Place(out, f"{FOLDER}/{name}") for name in numbered]
+    names: list[str] = []
+    for scene in scenes:
+        stem = re.sub(r"[^A-Za-z0-9_-]+", "_", scene) or "_"
+        numbered = (f"{stem}-{number}" for number in itertools.count(2))
+        names.append(next(name for name in itertools.chain([stem], numbered) if name not in names))
+    return [Place(out, f"{FOLDER}/{name}") for name in names]
 
 
 class Writer(NamedTuple):

@@ -35,7 +35,7 @@ def write_page(result: Result, folder: Path, refresh: int | None = None) -> None
     folder : Path
         An existing folder, with the pictures.
     refresh : int, optional
-        Seconds after which a browser reads the page again; never where absent.
+        Seconds after which a browser reads the page again unless it is in use; never where absent.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def page(result: Result, folder: Path, refresh: int | None = None) -> str:
     folder : Path
         With the pictures; those that are missing are left out.
     refresh : int, optional
-        Seconds after which a browser reads the page again; never where absent.
+        Seconds after which a browser reads the page again unless it is in use; never where absent.
 
     Returns
     -------

@@ -27,8 +27,16 @@ function makeSortable(table) {
   });
 }
 
+/* Read the page again every so often, but not while somebody uses it. */
+function refresh(seconds) {
+  let touched = Date.now();
+  for (const kind of ["pointermove", "keydown", "wheel"]) document.addEventListener(kind, () => { touched = Date.now(); });
+  setInterval(() => { if (Date.now() - touched > 1000 * seconds) location.reload(); }, 1000 * seconds);
+}
+
 (() => {
   document.querySelectorAll("table.sortable").forEach(makeSortable);
+  if (document.body.dataset.refresh) refresh(Number(document.body.dataset.refresh));
   const source = document.getElementById("album");
   if (!source) return;
   const album = JSON.parse(source.textContent);
@@ -46,7 +54,6 @@ function makeSortable(table) {
     Viewer.active = viewer;
     viewer.show(name);
     viewer.root.scrollIntoView({ block: "start" });
-    history.replaceState(null, "", `#${name}`);
     return true;
   }
 

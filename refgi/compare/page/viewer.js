@@ -116,8 +116,10 @@ class Viewer {
     });
   }
 
+  /* Show a picture on the left, and name it in the address. */
   show(name) {
     this.left.value = name;
+    history.replaceState(null, "", `#${name}`);
     this.open();
     this.showPair();
   }

@@ -47,7 +47,7 @@ def test_every_example_runs_as_printed(clone, evidence):
         assert result.exit_code == 0, f"{shlex.join(arguments)}: {result.output}"
         if "--out" in arguments and arguments[0] != "vectors":
             out = clone / arguments[arguments.index("--out") + 1]
-            files = [out] if out.is_file() else list(out.iterdir())
+            files = [out] if out.is_file() else [file for file in out.rglob("*") if file.is_file()]
             assert files
             assert all(map(is_from_refgi, files)), arguments
     assert all({arguments[0] for arguments in document} == set(VERBS) for document in of.values())

@@ -1,5 +1,6 @@
 """The page of a paper: one file that works from disk, each figure beside the numbers that were printed."""
 
+import base64
 from pathlib import Path
 from typing import Any
 
@@ -7,8 +8,8 @@ from markupsafe import Markup
 
 from benchmarks.papers.records import Cell, Figure, Outcome, Picture, Ratios, Reproduction, Table
 from refgi.compare.report import PAGE as COMMON
-from refgi.compare.report import TIMES, data_uri, machine, number, templates
-from refgi.image import write_text
+from refgi.compare.report import TIMES, machine, number, templates
+from refgi.image import png_bytes, write_text
 from refgi.provenance import plain
 
 PAGE = Path(__file__).with_name("page")
@@ -62,7 +63,7 @@ def _figure(outcome: Outcome, figure: Figure) -> dict[str, Any]:
 def _picture(picture: Picture) -> dict[str, Any]:
     height, width = picture.pixels.shape[:2]
     return {"title": picture.title, "said": picture.said, "width": width, "height": height,
-            "source": data_uri(picture.pixels)}
+            "source": "data:image/png;base64," + base64.b64encode(png_bytes(picture.pixels)).decode("ascii")}
 
 
 def _ratios(ratios: Ratios) -> dict[str, Any]:

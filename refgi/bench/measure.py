@@ -10,6 +10,7 @@ import dataclasses
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,14 +20,16 @@ from refgi import stages
 from refgi.bench.curves import error_in, front
 from refgi.bench.error import error_of
 from refgi.bench.grid import TRUTH, Choice, Grid
+from refgi.bench.pictures import TRUTH_FILES, Place, Writer
 from refgi.bench.results import Run, SceneResult, figures_of
 from refgi.compare.comparison import without_visibility
 from refgi.compare.flip import flip
 from refgi.compare.outcome import UNOCCLUDED, measure
+from refgi.compare.pictures import linear_planes
 from refgi.errors import RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS
-from refgi.provenance import estimate_record, plain
+from refgi.provenance import Record, estimate_record, method_record, plain
 from refgi.scene import Scene
 from refgi.settings import Settings, from_text, leaves
 from refgi.truth import TruthSettings, trace_truth
@@ -43,6 +46,8 @@ class _Reference(NamedTuple):
     variance: Array  # of the mean
     radiance: Array
     statement: str
+    samples: Array  # (h, w)
+    record: Record  # of its own
 
 
 class _Made(NamedTuple):
@@ -53,7 +58,7 @@ class _Made(NamedTuple):
 
 def bench_scene(
     scene: Scene, grid: Grid, *, rounds: int = 3, truth: TruthSettings | None = None, tell: Tell = lambda *_: None,
-    **frame_options: Any,
+    place: Place | None = None, **frame_options: Any,
 ) -> SceneResult:
     """Run a grid on a scene.
 
@@ -69,6 +74,8 @@ def bench_scene(
         How the reference is traced; its seed is one that no round has.
     tell : callable
         Called with (what runs, share done).
+    place : Place, optional
+        Where the pictures of the first seed and of the references are written; nowhere where absent.
     **frame_options : object
         Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
 
@@ -91,8 +98,14 @@ def bench_scene(
         references[UNOCCLUDED] = _traced(frame, without_visibility(settings), tell)
     stops = [_stop(settings, passes) for passes in grid.passes]
     made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, frame_options, tell)
-    runs = [_judged(choice, made[number], references, frame) for number, choice in enumerate(
-        (*grid.choices, *stops)) if number in made]
+    done = [(choice, made[number]) for number, choice in enumerate((*grid.choices, *stops)) if number in made]
+    runs = [_judged(choice, one, references, frame) for choice, one in done]
+    if place is not None:
+        writer = Writer(place, scene, frame)
+        _write(writer, references)
+        firsts = [(choice.method, with_seed(choice.settings, 0), one.pictures[0]) for choice, one in done]
+        runs = [run.model_copy(update={"picture": file})
+                for run, file in zip(runs, writer.write_runs(firsts), strict=True)]
     methods = [run for run in runs if run.method != TRUTH]
     line = [run for run in runs if run.method == TRUTH]
     return SceneResult(scene=scene.name, width=frame.width, height=frame.height, covered=int(covered.sum()),
@@ -105,7 +118,16 @@ def _traced(frame: Frame, settings: TruthSettings, tell: Tell) -> _Reference:
     with stages.observe(progress=lambda stage, done: tell(f"{TRUTH}: {stage}", done)):
         found = trace_truth(frame, settings)
     radiance = frame.radiance(np.asarray(found.mean, frame.dtype))
-    return _Reference(found.mean, found.variance_of_mean, radiance, estimate_record(found)["estimate"]["statement"])
+    estimate = estimate_record(found)
+    return _Reference(found.mean, found.variance_of_mean, radiance, estimate["estimate"]["statement"], found.samples,
+                      {**method_record(TRUTH, settings), **estimate})
+
+
+def _write(writer: Writer, references: Mapping[str, _Reference]) -> None:
+    for name, one in references.items():
+        planes = linear_planes(one.radiance, one.mean, one.variance, one.samples)
+        writer.write(Path(TRUTH_FILES[name]).stem, planes, one.record)
+    writer.write_ids()
 
 
 def _stop(settings: TruthSettings, passes: int) -> Choice:

@@ -6,10 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from refgi.bench.grid import FILES, TRUTH
+from refgi.bench.overview import Place, overview
 from refgi.bench.results import Result, Run, SceneResult, percent, times
+from refgi.bench.views import named, provenance_of, view_of
+from refgi.compare.page.album import album
 from refgi.compare.plot import Axes, Curve, curves_plot
-from refgi.compare.report import PAGE, machine, number, templates
+from refgi.compare.report import PAGE, machine, number, script, sort_key, templates
 from refgi.image import write_text
+from refgi.provenance import Record
 
 COLUMNS = ("method", "settings", "time, ms", "RMSE, %", "95 % interval", "bias, %", "spread, %",
            "without visibility, %", "over truth's in equal time", "FLIP", "SSIM")
@@ -17,10 +21,11 @@ AXES = Axes("time of a frame, ms", "RMSE of indirect irradiance, %", log_x=True,
 HOW = ("Each round runs every choice once on a frame of its own, buffers included, with a seed of its own; times are "
        "medians. RMSE is plain, over all pixels that show a surface. Spread is the deviation between seeds, bias what "
        "is left without it and without the truth's own noise. Bold rows are on the front: nothing here is both faster "
-       "and nearer.")
+       "and nearer. Bars are 95 % intervals of the RMSE. A click on a mark or on a method's name opens the picture of "
+       "its first seed; a click on a column's name sorts by it.")
 
 
-def write_page(result: Result, folder: Path) -> None:
+def write_page(result: Result, folder: Path, refresh: int | None = None) -> None:
     """Write index.html, whole or not at all.
 
     Parameters
@@ -28,35 +33,82 @@ def write_page(result: Result, folder: Path) -> None:
     result : Result
         Of all scenes.
     folder : Path
-        An existing folder.
+        An existing folder, with the pictures.
+    refresh : int, optional
+        Seconds after which a browser reads the page again unless it is in use; never where absent.
 
     Raises
     ------
     InputError
-        If it cannot be written.
+        If it cannot be written, or a picture is damaged.
+    """
+    write_text(folder / "index.html", page(result, folder, refresh))
+
+
+def page(result: Result, folder: Path, refresh: int | None = None) -> str:
+    """Return the page of a bench as HTML that refers to nothing outside itself.
+
+    Parameters
+    ----------
+    result : Result
+        Of all scenes.
+    folder : Path
+        With the pictures; those that are missing are left out.
+    refresh : int, optional
+        Seconds after which a browser reads the page again unless it is in use; never where absent.
+
+    Returns
+    -------
+    str
+        The same text for equal input.
     """
     from markupsafe import Markup
 
-    scenes = [{"name": scene.scene, "size": f"{scene.width} x {scene.height}", "truth": scene.truth,
-               "plot": Markup(plot_of(scene)), "said": list(said_of(scene)), "failures": scene.failures,
-               "rows": [_row(run) for run in sorted((*scene.runs, *scene.line), key=lambda one: one.seconds)]}
-              for scene in result.scenes]
-    names = ", ".join(scene.scene for scene in result.scenes)
-    text = templates(FILES).get_template("bench.html.j2").render(
-        style=Markup((PAGE / "style.css").read_text("utf-8")), script="", kind="bench", title="Run time against error",
-        lead=names, facts=[f"{sum(len(scene.runs) for scene in result.scenes)} runs"], verdict="", failures=[],
-        scenes=scenes, columns=COLUMNS, how=HOW, versions=result.environment["versions"],
-        machine=machine(result.environment))
-    write_text(folder / "index.html", text)
+    views = {number: found for number, scene in enumerate(result.scenes, 1)
+             if (found := view_of(scene, number, folder)) is not None}
+    pictures = album([view for view, _ in views.values()])
+    shown = {number: position for position, number in enumerate(views)}
+    scenes = [_scene(scene, number, shown.get(number), views[number][1] if number in views else {})
+              for number, scene in enumerate(result.scenes, 1)]
+    rows = overview([Place(scene, f"#scene{number}") for number, scene in enumerate(result.scenes, 1)])
+    return templates(FILES).get_template("bench.html.j2").render(
+        style=Markup((PAGE / "style.css").read_text("utf-8")), script=script(), kind="bench",
+        title="Run time against error", lead=", ".join(scene.scene for scene in result.scenes),
+        facts=[f"{sum(len(scene.runs) for scene in result.scenes)} runs"], verdict="", failures=[], scenes=scenes,
+        columns=COLUMNS, how=HOW, overview=rows if len(result.scenes) > 1 else None, album=pictures, refresh=refresh,
+        versions=result.environment["versions"], machine=machine(result.environment))
 
 
-def plot_of(scene: SceneResult) -> str:
-    """Draw one curve a method, and the path tracer's dashed.
+def _scene(scene: SceneResult, number: int, view: int | None, record: Record) -> dict[str, Any]:
+    from markupsafe import Markup
+
+    runs = sorted(named(scene, number), key=lambda one: one[1].seconds)
+    return {"name": scene.scene, "number": number, "size": f"{scene.width} x {scene.height}", "truth": scene.truth,
+            "plot": Markup(plot_of(scene, number)), "said": list(said_of(scene)), "failures": scene.failures,
+            "rows": [_row(name, run) for name, run in runs], "view": view, "provenance": list(provenance_of(record)),
+            "made": [_made(run) for _, run in runs]}
+
+
+def _made(run: Run) -> dict[str, Any]:
+    return {"method": run.method, "label": run.label, "settings": run.settings, "picture": run.picture,
+            "times": ", ".join(_ms(seconds) for seconds in run.times),
+            "stages": {name: f"{_ms(seconds)} ms" for name, seconds in run.stages.items()}}
+
+
+def _ms(seconds: float) -> str:
+    """Return a time in ms with three digits."""
+    return number(1e3 * seconds)
+
+
+def plot_of(scene: SceneResult, position: int = 1) -> str:
+    """Draw one curve a method, and the path tracer's dashed; bars are 95 % intervals, marks lead to pictures.
 
     Parameters
     ----------
     scene : SceneResult
         Of one scene.
+    position : int
+        Of the scene on the page.
 
     Returns
     -------
@@ -65,9 +117,11 @@ def plot_of(scene: SceneResult) -> str:
     """
     if not any(0 < run.rmse < math.inf for run in (*scene.runs, *scene.line)):
         return ""
+    runs = named(scene, position)
     methods = list(dict.fromkeys(run.method for run in scene.runs))
-    drawn = [_curve(name, [run for run in scene.runs if run.method == name]) for name in methods]
-    return curves_plot([*drawn, *([_curve("path tracer", list(scene.line), dashed=True)] if scene.line else [])], AXES)
+    drawn = [_curve(name, [one for one in runs if one[1].method == name]) for name in methods]
+    line = [one for one in runs if one[1].method == TRUTH]
+    return curves_plot([*drawn, *([_curve("path tracer", line, dashed=True)] if line else [])], AXES)
 
 
 def said_of(scene: SceneResult) -> Iterator[str]:
@@ -98,15 +152,25 @@ def said_of(scene: SceneResult) -> Iterator[str]:
             yield f"{text}; from {number(1e3 * slowest.seconds)} ms on the path tracer is nearer in equal time."
 
 
-def _curve(name: str, runs: list[Run], *, dashed: bool = False) -> Curve:
-    ordered = sorted(runs, key=lambda one: one.seconds)
-    return Curve(name, [1e3 * run.seconds for run in ordered], [100 * run.rmse for run in ordered], dashed)
+def _curve(label: str, runs: list[tuple[str, Run]], *, dashed: bool = False) -> Curve:
+    ordered = sorted(runs, key=lambda one: one[1].seconds)
+    links = [(name, f"{label}, {run.label}: {percent(run.rmse)} % in {_ms(run.seconds)} ms")
+             for name, run in ordered]
+    return Curve(label, [1e3 * run.seconds for _, run in ordered], [100 * run.rmse for _, run in ordered], dashed,
+                 [_interval(run) for _, run in ordered], links)
 
 
-def _row(run: Run) -> dict[str, Any]:
+def _interval(run: Run) -> tuple[float, float]:
+    known = run.errors[TRUTH]
+    return (math.nan, math.nan) if known.low is None or known.high is None else (100 * known.low, 100 * known.high)
+
+
+def _row(name: str, run: Run) -> dict[str, Any]:
     known, unoccluded = run.errors[TRUTH], run.errors.get("unoccluded")
     interval = "" if known.low is None else f"{percent(known.low)} to {percent(known.high)}"
-    cells = (number(1e3 * run.seconds), percent(known.rmse), interval, percent(known.bias),
-             percent(known.spread), percent(unoccluded.rmse) if unoccluded else "", times(run.in_equal_time),
-             times(run.flip), times(run.ssim))
-    return {"method": run.method, "settings": run.label, "cells": cells, "front": run.front}
+    cells = [(_ms(run.seconds), run.seconds), (percent(known.rmse), known.rmse), (interval, known.low),
+             (percent(known.bias), known.bias), (percent(known.spread), known.spread),
+             (percent(unoccluded.rmse), unoccluded.rmse) if unoccluded else ("", None),
+             (times(run.in_equal_time), run.in_equal_time), (times(run.flip), run.flip), (times(run.ssim), run.ssim)]
+    return {"name": name, "method": run.method, "settings": run.label, "front": run.front,
+            "cells": [(text, sort_key(value)) for text, value in cells]}

@@ -47,6 +47,7 @@ class Run(_Strict):
     ssim: float | None = None
     in_equal_time: float | None = None  # rmse over that of the path tracer in equal time: above 1 it is beaten
     front: bool = False  # nothing measured here is both faster and nearer
+    picture: str | None = None  # EXR of the first seed, from the folder of results.json
 
     @property
     def label(self) -> str:

@@ -23,7 +23,7 @@ FILES = ("index.html", "results.json", "results.csv", "results.md")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE",
               help="A setting of the truth, such as samples=1024 or checkpoint=DIR; repeatable.")
 @click.option("--threads", type=click.IntRange(1), help="Threads of compiled kernels; all where absent.")
-@click.option("--out", required=True, help="Folder for index.html, results.json, results.csv and results.md.")
+@click.option("--out", required=True, help="Folder for index.html, results.json, results.csv, results.md and pictures.")
 @writing
 @speech
 @click.pass_obj
@@ -38,6 +38,7 @@ def _bench(
     """
     from refgi.bench.grid import TRUTH, built_in, chosen, read_grid
     from refgi.bench.measure import bench_scene
+    from refgi.bench.pictures import FOLDER, places
     from refgi.bench.report import said_of, write_page
     from refgi.bench.results import Result, markdown, write_results
     from refgi.cli.destination import Permission, folder
@@ -51,16 +52,18 @@ def _bench(
     grid = chosen(read_grid(Path(grid_file)) if grid_file else built_in(quick), names)
     truth = settings_for(TRUTH, pairs)
     loaded = [View(scene, size, None, None, None, None, ()).load() for scene in scenes or ("cornell_box",)]
-    path = folder(out, Permission(parents, force), FILES)
+    kept = (str(file.relative_to(out)) for file in Path(out, FOLDER).rglob("*.exr"))
+    path = folder(out, Permission(parents, force), (*FILES, *kept))
     path.mkdir(parents=True, exist_ok=True)
     made: list[Any] = []
     with on_threads(threads), progress() as tell, warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)  # of each of many settings in each round
-        for number, scene in enumerate(loaded):
+        for number, (scene, place) in enumerate(zip(loaded, places(path, [one.name for one in loaded]), strict=True)):
             def told(what: str, done: float, number: int = number, name: str = scene.name) -> None:
                 tell(f"{name} ({number + 1} of {len(loaded)}): {what}", done)
 
-            made.append(bench_scene(scene, grid, rounds=rounds, truth=truth, tell=told, shadows="exact"))
+            made.append(bench_scene(scene, grid, rounds=rounds, truth=truth, tell=told, place=place,
+                                    shadows="exact"))
             result = Result(environment=environment(), scenes=tuple(made))
             write_results(result, path)
             write_page(result, path)

@@ -1,15 +1,17 @@
 """Plots as SVG that lives inside a page and takes its colours: run time against error, and curves over an axis."""
 
 import hashlib
+import html
 import io
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 INK, LINE, CARD = "#010203", "#010204", "#010205"  # stand-ins, replaced by the page's own colours
 METHOD_COLOURS = [f"#0102{16 + i:02x}" for i in range(7)]
 MARKERS = "os^DvpX"
+MARK = "mark:"  # what stands before a name that a mark leads to, until the plot is whole
 MOST_MARKED = 64  # points of a curve that are marked; more would hide it
 
 
@@ -29,6 +31,9 @@ class Curve(NamedTuple):
     x: Sequence[float]
     y: Sequence[float]
     dashed: bool = False
+    bars: Sequence[tuple[float, float]] = ()  # an interval of y at each point
+    links: Sequence[tuple[str, str]] = ()  # of each point: the name on the page that its mark leads to, and a text
+    joined: bool = True  # by lines
 
 
 class Axes(NamedTuple):
@@ -78,7 +83,8 @@ def curves_plot(curves: Sequence[Curve], axes: Axes) -> str:
     str
         An ``<svg>`` element without references to anything outside; the same for equal input.
     """
-    return _svg(lambda plot: _draw_curves(plot, curves, axes), axes, 9.2, f"{axes.y} over {axes.x}")
+    svg = _svg(lambda plot: _draw_curves(plot, curves, axes), axes, 9.2, f"{axes.y} over {axes.x}")
+    return _linked(svg, dict(link for curve in curves for link in curve.links))
 
 
 def _svg(draw: Callable[[Any], None], axes: Axes, width: float, label: str) -> str:
@@ -135,8 +141,10 @@ def _draw_curves(plot: Any, curves: Sequence[Curve], axes: Axes) -> None:
         marked = {"marker": MARKERS[number % len(MARKERS)], "markersize": 5, "markerfacecolor": colour,
                   "linewidth": 1.6}
         plot.plot([x for x, _ in points], [y for _, y in points], color=colour, label=curve.name,
-                  **(marked if len(points) <= MOST_MARKED else {"linewidth": 1.1}),
-                  linestyle=(0, (4, 3)) if curve.dashed else "-")
+                  **(marked if len(points) <= MOST_MARKED or not curve.joined else {"linewidth": 1.1}),
+                  linestyle=((0, (4, 3)) if curve.dashed else "-") if curve.joined else "none")
+        _draw_bars(plot, curve, colour, axes)
+        _draw_links(plot, curve, axes)
     plot.set(xscale="log" if axes.log_x else "linear", yscale="log" if axes.log_y else "linear")
     for axis in (plot.xaxis, plot.yaxis):
         axis.set_major_formatter("{x:g}")
@@ -150,6 +158,31 @@ def _draw_curves(plot: Any, curves: Sequence[Curve], axes: Axes) -> None:
     else:
         plot.set_ylim(bottom=0)
     plot.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=9, facecolor=CARD)
+
+
+def _draw_bars(plot: Any, curve: Curve, colour: str, axes: Axes) -> None:
+    bars = [(x, *bar) for x, bar in zip(curve.x, curve.bars, strict=False) if all(_drawable(x, y, axes) for y in bar)]
+    if bars:
+        plot.vlines(*zip(*bars, strict=True), color=colour, linewidth=2.2, alpha=0.4)
+
+
+def _draw_links(plot: Any, curve: Curve, axes: Axes) -> None:
+    """Lay a nearly invisible mark that can be clicked over each point, larger than the one that is seen."""
+    points = [(x, y, name) for x, y, (name, _) in zip(curve.x, curve.y, curve.links, strict=False)
+              if _drawable(x, y, axes)]
+    if points:
+        marks = plot.scatter([x for x, _, _ in points], [y for _, y, _ in points], s=170, color=CARD, alpha=0.01)
+        marks.set_zorder(5)
+        marks.set_urls([MARK + name for _, _, name in points])
+
+
+def _linked(svg: str, texts: Mapping[str, str]) -> str:
+    """Return a plot whose marks lead to names of the page, each with its text."""
+    def link(match: re.Match[str]) -> str:
+        name, text = match[1], html.escape(texts[match[1]])
+        return f'<a href="#{name}" data-picture="{name}" aria-label="{text}"><title>{text}</title>'
+
+    return re.sub(rf'<a xlink:href="{MARK}([^"]*)"[^>]*>', link, svg)
 
 
 def _steps(curves: Sequence[Curve]) -> list[float]:

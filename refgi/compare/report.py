@@ -1,6 +1,6 @@
-"""The page of a comparison: one file that works from disk, with pictures, maps, table, plot and stages inside."""
+"""The page of a comparison: one file that works from disk, with pictures as numbers, table, plot and stages inside."""
 
-import base64
+import functools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,23 +10,23 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi import stages
-from refgi.compare import maps
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, Figure, Measurement, MethodResult, Reference
+from refgi.compare.page.album import LABELS, Judge, Picture, View, album
 from refgi.compare.plot import Point, time_against_error
 from refgi.compare.provenance import provenance_rows
-from refgi.compare.results import error_scale, signed_error
-from refgi.image import png_bytes, write_text
+from refgi.image import write_text
 from refgi.provenance import plain
 
 if TYPE_CHECKING:
     import jinja2
+    from markupsafe import Markup
 
 Array = npt.NDArray[Any]
 
 PAGE = Path(__file__).with_name("page")
+SCRIPTS = ("floats", "scene", "paint", "panels", "input", "viewer", "page")  # each after what it builds on
 MINUS, DASH, TIMES = "\N{MINUS SIGN}", "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
 JUDGES = {TRUTH: "truth", UNOCCLUDED: "truth without visibility"}
-LABELS = {TRUTH: "Truth", UNOCCLUDED: "Truth without visibility"}
 COLUMNS = {
     "relmse": ("relMSE", "mean of (x-r)² / (r² + (0.1 mean r)²)"), "rmse": ("RMSE", "W/m²"), "mae": ("MAE", "W/m²"),
     "smape": ("SMAPE", "mean of |x-r| / (|x|+|r|)"), "bias": ("bias", "mean of x-r, W/m²"),
@@ -71,6 +71,19 @@ def templates(*folders: Path) -> "jinja2.Environment":
                               lstrip_blocks=True, undefined=jinja2.StrictUndefined)
 
 
+def script() -> "Markup":
+    """Return the script of a page: its viewers and its tables.
+
+    Returns
+    -------
+    Markup
+        JavaScript that asks for nothing else.
+    """
+    from markupsafe import Markup
+
+    return Markup("\n".join((PAGE / f"{name}.js").read_text("utf-8") for name in SCRIPTS))
+
+
 def page(comparison: Comparison) -> str:
     """Return the page as HTML that refers to nothing outside itself.
 
@@ -86,15 +99,12 @@ def page(comparison: Comparison) -> str:
     """
     from markupsafe import Markup
 
-    pictures = _pictures(comparison)
-    names = [picture["name"] for picture in pictures]
     return templates().get_template("report.html.j2").render(
-        style=Markup((PAGE / "style.css").read_text("utf-8")), script=Markup((PAGE / "viewer.js").read_text("utf-8")),
+        style=Markup((PAGE / "style.css").read_text("utf-8")), script=script(),
         kind="comparison", title=comparison.scene.name, lead=comparison.scene.description, facts=_facts(comparison),
         verdict=_verdict(comparison),
         failures=[(name, f"gave no picture: {reason}") for name, reason in comparison.failures.items()],
-        width=comparison.width, height=comparison.height,
-        quantities=_quantities(comparison), pictures=pictures, left=names[0], right=TRUTH,
+        album=album([_view(comparison)]), again=next(iter(comparison.results), TRUTH),
         columns=[{"label": label, "about": about} for label, about in (*COLUMNS.values(), ("FLIP", "of the picture"))],
         rows=_rows(comparison), notes=_notes(comparison), plot=Markup(_plot(comparison)), made=_made(comparison),
         ledgers=[_ledger(result) for result in comparison.results.values() if result.ledger is not None],
@@ -134,22 +144,20 @@ def number(value: float) -> str:
     return f"{rounded:.10f}".rstrip("0").rstrip(".").replace("-", MINUS)
 
 
-def data_uri(rgb: Array, exposure: float = 1.0) -> str:
-    """Return a picture as the source of an ``img`` element.
+def sort_key(value: float | None) -> str:
+    """Return what a table sorts a number by; nothing where it is not known, which stands last.
 
     Parameters
     ----------
-    rgb : (h, w, 3) ndarray
-        Display colours in bytes, or linear values.
-    exposure : float
-        Factor of linear values before the sRGB curve.
+    value : float or None
+        Any number.
 
     Returns
     -------
     str
-        A PNG in a data URI.
+        All its digits.
     """
-    return "data:image/png;base64," + base64.b64encode(png_bytes(rgb, exposure)).decode("ascii")
+    return "" if value is None or math.isnan(value) else repr(float(value)).replace("inf", "Infinity")
 
 
 def machine(environment: Mapping[str, Any]) -> str:
@@ -220,62 +228,24 @@ def _verdict(comparison: Comparison) -> str:
     return f"Closest to the truth: {best.name}, relMSE {number(figure.value)} in {_seconds(best.seconds)}{noise}."
 
 
-def _quantities(comparison: Comparison) -> list[dict[str, Any]]:
-    errors, brightness = error_scale(comparison), maps.luminance_scale(comparison.truth.irradiance, comparison.covered)
-    found = [
-        {"key": "picture", "label": "Picture", "gradient": None,
-         "about": "What the camera sees: direct and indirect light, sRGB, at the exposure of the scene."},
-        {"key": "indirect", "label": "Indirect", "gradient": None,
-         "about": "Indirect irradiance alone, as on white surfaces; one exposure for all."},
-        {"key": "error", "label": "Error", **_ramp(errors),
-         "about": "Luminance of the indirect irradiance less that of the truth. For the truths: their standard error."},
-    ]
-    if UNOCCLUDED in comparison.references:
-        found.append({"key": "error_unoccluded", "label": "Error without visibility", **_ramp(errors),
-                      "about": "Less the truth without visibility, which methods without visibility converge to."})
-    found.append({"key": "false", "label": "False colour", **_ramp(brightness),
-                  "about": "Luminance of the indirect irradiance, logarithmic."})
-    return found
+def _light(made: MethodResult) -> tuple[Array, Array]:
+    return made.irradiance, made.radiance
 
 
-def _ramp(scale: maps.Scale) -> dict[str, Any]:
-    span = np.linspace(0, 1, 5)
-    values = scale.low * (scale.high / scale.low) ** span if scale.logarithmic else (
-        scale.low + (scale.high - scale.low) * span)
-    return {"gradient": maps.gradient(scale), "ticks": [number(float(v)) for v in values], "unit": scale.label}
-
-
-def _pictures(comparison: Comparison) -> list[dict[str, Any]]:
-    errors, brightness = error_scale(comparison), maps.luminance_scale(comparison.truth.irradiance, comparison.covered)
-
-    def shown(made: Reference | MethodResult, painted: dict[str, maps.Pixels]) -> dict[str, str]:
-        painted["false"] = maps.paint(maps.luminance(made.irradiance), comparison.covered, brightness)
-        lit = {"picture": (made.radiance, comparison.scene.exposure),
-               "indirect": (made.irradiance, maps.indirect_exposure(comparison.truth.irradiance, comparison.covered))}
-        return {key: data_uri(np.moveaxis(rgb, 0, -1), exposure) for key, (rgb, exposure) in lit.items()} | {
-            key: data_uri(pixels, 1.0) for key, pixels in painted.items()}
-
-    pictures = []
-    for result in comparison.results.values():
-        maps_of = {"error" if judge == TRUTH else f"error_{judge}":
-                   maps.paint(signed_error(comparison, result, judge), comparison.covered, errors)
-                   for judge in result.against}
-        pictures.append({"name": result.name, "label": result.name, "images": shown(result, maps_of),
-                         "said": f"relMSE {number(result.against[TRUTH].figures['relmse'].value)}, "
-                                 + _seconds(result.seconds),
-                         "without": "This method knows what blocks light: see its error."})
-    for reference in comparison.references.values():
-        deviation = maps.luminance(np.sqrt(reference.variance))
-        painted = {"error": maps.paint(deviation, comparison.covered, errors)}
-        pictures.append({"name": reference.name, "label": LABELS[reference.name], "images": shown(reference, painted),
-                         "said": _seconds(reference.seconds), "without": "A reference: see its standard error."})
-    return pictures
+def _view(comparison: Comparison) -> View:
+    judges = {one.name: Judge(one.irradiance, one.variance, one.radiance, _seconds(one.seconds))
+              for one in comparison.references.values()}
+    pictures = [Picture(one.name, one.name, f"relMSE {number(one.against[TRUTH].figures['relmse'].value)}, "
+                                            + _seconds(one.seconds),
+                        tuple(one.against), functools.partial(_light, one))
+                for one in comparison.results.values()]
+    return View("scene", comparison.scene.name, comparison.scene.exposure, comparison.covered, judges, pictures, {})
 
 
 def _rows(comparison: Comparison) -> list[dict[str, Any]]:
     return [
         {"name": result.name, "first": index == 0, "judge": JUDGES[judge],
-         "seconds": _seconds(result.seconds) if index == 0 else "",
+         "seconds": _seconds(result.seconds), "sort": result.seconds,
          "cells": [*(_cell(measurement.figures[name]) for name in COLUMNS), _flip_cell(result, judge)]}
         for result in comparison.results.values() for index, (judge, measurement) in enumerate(result.against.items())
     ]
@@ -283,12 +253,12 @@ def _rows(comparison: Comparison) -> list[dict[str, Any]]:
 
 def _cell(figure: Figure) -> dict[str, Any]:
     noise = "" if math.isnan(figure.noise) else number(figure.noise)
-    return {"value": number(figure.value), "noise": noise, "is_noise": figure.is_noise}
+    return {"value": number(figure.value), "noise": noise, "is_noise": figure.is_noise, "sort": sort_key(figure.value)}
 
 
 def _flip_cell(result: MethodResult, judge: str) -> dict[str, Any]:
-    value = "" if judge != TRUTH else number(result.flip.mean)
-    return {"value": value, "noise": "", "is_noise": False}
+    mean = result.flip.mean if judge == TRUTH else math.nan
+    return {"value": "" if judge != TRUTH else number(mean), "noise": "", "is_noise": False, "sort": sort_key(mean)}
 
 
 def _notes(comparison: Comparison) -> list[str]:

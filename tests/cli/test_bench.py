@@ -27,10 +27,11 @@ def test_scenes_of_a_grid(tmp_path, grid):
     done = run("cornell_box", "cornell_sphere:faces=80", "--grid", grid, *SMALL, "--json", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
-        "index.html", "results.csv", "results.json", "results.md"]
+        "index.html", "pictures", "results.csv", "results.json", "results.md"]
     result = Result.model_validate_json((tmp_path / "out" / "results.json").read_text())
     assert [len(scene.runs) for scene in result.scenes] == [3, 3]
     assert [run.label for run in result.scenes[1].runs] == ["lights=16", "lights=64", "samples=20"]
+    assert all((tmp_path / "out" / run.picture).is_file() for scene in result.scenes for run in scene.runs)
     assert json.loads(done.stdout)["scenes"] == result.model_dump(mode="json")["scenes"]
     again = run("--grid", grid, *SMALL, "--methods", "gather", "--out", tmp_path / "out")
     assert again.exit_code == 0, again.output  # over its own files

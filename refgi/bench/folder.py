@@ -1,0 +1,185 @@
+"""Folders of results and their pages: one bench or batch, or a folder of such folders with an index over all scenes."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import quote
+
+import pydantic
+
+from refgi.bench.grid import FILES
+from refgi.bench.overview import Place, overview
+from refgi.bench.report import write_page
+from refgi.bench.results import Result
+from refgi.compare.report import PAGE, machine, script, templates
+from refgi.errors import InputError
+from refgi.image import write_text
+
+RESULTS, INDEX = "results.json", "index.html"
+SECONDS_BETWEEN_LOOKS = 2.0
+REFRESH = 10  # s after which a browser reads a page again that is kept up to date
+
+Say = Callable[[str], None]
+
+
+class Held(NamedTuple):
+    """A folder with results."""
+
+    folder: Path
+    result: Result
+
+
+def read_result(file: Path) -> Result:
+    """Read what a bench or batch found.
+
+    Parameters
+    ----------
+    file : Path
+        A results.json.
+
+    Returns
+    -------
+    Result
+        By its schema.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is of another kind; names the first key that is wrong.
+    """
+    try:
+        return Result.model_validate_json(file.read_bytes())
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
+    except pydantic.ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"])) or "JSON"
+        raise InputError(f"{file}: {key}: expected results of `refgi bench` or `refgi batch`, got another kind: "
+                         f"{first['msg'].lower()}", file=str(file), key=key) from error
+
+
+def folders_of(folder: Path) -> list[Path]:
+    """Return the folders with results: the folder itself, or those in it.
+
+    Parameters
+    ----------
+    folder : Path
+        An existing folder.
+
+    Returns
+    -------
+    list of Path
+        Sorted by name.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    if (folder / RESULTS).is_file():
+        return [folder]
+    found = sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
+    if not found:
+        raise InputError(f"{folder}: expected {RESULTS}, or folders with one, got neither", file=str(folder))
+    return found
+
+
+def remake(folder: Path, folders: Sequence[Path], refresh: int | None = None) -> list[Held]:
+    """Write the pages of folders with results, and the index over them where they lie in a common folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The one folder, or the common one.
+    folders : sequence of Path
+        What `folders_of` gave.
+    refresh : int, optional
+        Seconds after which a browser reads the pages again unless they are in use; never where absent.
+
+    Returns
+    -------
+    list of Held
+        What was read.
+
+    Raises
+    ------
+    InputError
+        If results or pictures cannot be read, or a page not written.
+    """
+    held = [Held(one, read_result(one / RESULTS)) for one in folders]
+    for one in held:
+        write_page(one.result, one.folder, refresh)
+    if list(folders) != [folder]:
+        write_text(folder / INDEX, index_page(folder, held, refresh))
+    return held
+
+
+def index_page(folder: Path, held: Sequence[Held], refresh: int | None = None) -> str:
+    """Return the page over all scenes of several folders.
+
+    Parameters
+    ----------
+    folder : Path
+        In which they lie.
+    held : sequence of Held
+        The folders with their results.
+    refresh : int, optional
+        Seconds after which a browser reads the page again unless it is in use; never where absent.
+
+    Returns
+    -------
+    str
+        HTML; it leads to the folders' own pages.
+    """
+    from markupsafe import Markup
+
+    places = [Place(scene, f"{quote(one.folder.name)}/{INDEX}#scene{number}")
+              for one in held for number, scene in enumerate(one.result.scenes, 1)]
+    made = [{"name": one.folder.name, "machine": machine(one.result.environment),
+             "runs": sum(len(scene.runs) for scene in one.result.scenes)} for one in held]
+    return templates(FILES).get_template("index.html.j2").render(
+        style=Markup((PAGE / "style.css").read_text("utf-8")), script=script(), kind="report",
+        title=folder.resolve().name, lead=f"{len(places)} scenes of {len(held)} folders", facts=[], verdict="",
+        failures=[], overview=overview(places), held=made, refresh=refresh,
+        versions=held[0].result.environment["versions"], machine=machine(held[0].result.environment))
+
+
+def watch(folder: Path, say: Say, wait: Callable[[float], None] = time.sleep) -> None:
+    """Keep pages up to date until interrupted; the last ones do not refresh any more.
+
+    Parameters
+    ----------
+    folder : Path
+        As of `folders_of`; folders may come.
+    say : callable
+        Called with a line for each time that pages were made, or why they were not.
+    wait : callable
+        Called with seconds between looks.
+    """
+    known: dict[Path, int] = {}
+    try:
+        while True:
+            if (now := _stamps(folder)) != known:
+                say(_remade(folder, REFRESH))
+                known = now
+            wait(SECONDS_BETWEEN_LOOKS)
+    except KeyboardInterrupt:
+        say(_remade(folder, None))
+
+
+def _remade(folder: Path, refresh: int | None) -> str:
+    try:
+        return "; ".join(_counted(remake(folder, folders_of(folder), refresh)))
+    except InputError as error:
+        return str(error)
+
+
+def _counted(held: Sequence[Held]) -> Iterator[str]:
+    for one in held:
+        yield f"{one.folder}: {sum(len(scene.runs) for scene in one.result.scenes)} runs"
+
+
+def _stamps(folder: Path) -> dict[Path, int]:
+    files = [folder / RESULTS, *folder.glob(f"*/{RESULTS}")]
+    return {file: file.stat().st_mtime_ns for file in files if file.is_file()}

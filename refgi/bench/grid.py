@@ -72,17 +72,60 @@ def read_grid(file: Path) -> Grid:
     InputError
         If the file cannot be read, a method or key is unknown or a value not usable; names all of them.
     """
+    return grid_of(read_tables(file), file)
+
+
+def read_tables(file: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    file : Path
+        TOML.
+
+    Returns
+    -------
+    dict
+        Its tables by name.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
     try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: no TOML: {error}", file=str(file)) from error
-    passes = _passes(tables.pop(TRUTH, {}), file)
+
+
+def grid_of(tables: Mapping[str, Any], file: Path) -> Grid:
+    """Return the grid that tables describe.
+
+    Parameters
+    ----------
+    tables : mapping
+        By method, and that of the truth.
+    file : Path
+        Where they come from, for errors.
+
+    Returns
+    -------
+    Grid
+        Choices in the tables' order, each once.
+
+    Raises
+    ------
+    InputError
+        If a method or key is unknown or a value not usable; names all of them.
+    """
+    passes = _passes(tables.get(TRUTH, {}), file)
     choices: dict[tuple[str, tuple[str, ...]], Choice] = {}
     faults = []
     for name, entry in tables.items():
-        for table in entry if isinstance(entry, list) else [entry]:
+        for table in [] if name == TRUTH else entry if isinstance(entry, list) else [entry]:
             for changes in _combinations(table, f"{file}: {name}"):
                 try:
                     method = find_method(name)

@@ -1,0 +1,197 @@
+"""What all jobs of one frame share: scene, G-buffer, RSMs, Embree's tree and the truth.
+
+Buffers are computed once in a process, with all their channels; the time that took counts for each job that uses them,
+so that a job's time is that of a whole frame. Truths stay in a store that batches share: a folder for each choice of
+how they are traced and by which sources, in it a checkpoint for each scene. A process that needs a truth which another
+one is tracing waits for it.
+"""
+
+import contextlib
+import dataclasses
+import hashlib
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from refgi import stages
+from refgi.batch.code import code_key
+from refgi.batch.jobs import Shot, key_of_scene, reference_settings, scene_at
+from refgi.batch.outcome import View
+from refgi.bench.grid import TRUTH
+from refgi.bench.measure import Reference, traced
+from refgi.compare.comparison import without_visibility
+from refgi.compare.outcome import UNOCCLUDED
+from refgi.compare.pictures import linear_planes
+from refgi.errors import InputError, expect
+from refgi.frame import Frame
+from refgi.image import canonical_json, read_exr, write_exr
+from refgi.provenance import Record, method_record, plain, scene_record
+from refgi.scene import Scene
+from refgi.truth import TruthSettings
+
+try:
+    import fcntl
+except ImportError:  # Windows: two processes may trace the same truth, one after the other's file
+    fcntl = None  # type: ignore[assignment]
+
+BUFFERS = frozenset({"rsm.gbuffer", "rsm.reflective_shadow_map", "rays.build"})  # stages
+STOPS = ("samples", "seconds", "target_error")  # settings of the truth that no checkpoint knows
+DIGITS = 16  # of folders' names
+
+Tell = Callable[[str, float], None]
+
+
+class Common(NamedTuple):
+    """What all jobs of a batch share."""
+
+    folder: Path
+    store: Path
+    truth: TruthSettings
+    rsm_resolution: int
+    threads: int | None = None
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Of every `Frame`."""
+        return {"rsm_resolution": self.rsm_resolution, "shadows": "exact"}
+
+
+class Buffers(stages.Memory):
+    """Memory of a frame's buffers alone, which counts the time that was spent on those it gives back."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._begun: dict[str, float] = {}
+        self.spent: dict[str, float] = {}  # s, of buffers given back since `forget_times`
+
+    def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
+        """Return whether a buffer is known, and the buffer."""
+        if name not in BUFFERS:
+            return False, None
+        known, kept = super().recall(name, inputs)
+        if not known:
+            self._begun[name] = time.perf_counter()
+            return False, None
+        output, seconds = kept
+        self.spent[name] = self.spent.get(name, 0.0) + seconds
+        return True, output
+
+    def keep(self, name: str, inputs: tuple[Any, ...], output: Any) -> None:
+        """Keep a buffer with all its channels and the time that they took."""
+        if name in BUFFERS:
+            if hasattr(output, "recorded"):
+                output.recorded()
+            seconds = time.perf_counter() - self._begun.pop(name)
+            self._kept[name].append((inputs, (output, seconds)))
+
+    def forget_times(self) -> None:
+        """Start to count anew."""
+        self.spent = {}
+
+
+class Shared:
+    """What all jobs of one frame share, each part made on first use.
+
+    Parameters
+    ----------
+    shot : Shot
+        The frame.
+    scene_key : str
+        What its scene was when the job was named.
+    common : Common
+        Of the batch.
+    tell : callable
+        Called with (what runs, share done).
+
+    Raises
+    ------
+    InputError
+        If the scene is another by now, or its camera sees no surface.
+    """
+
+    def __init__(self, shot: Shot, scene_key: str, common: Common, tell: Tell) -> None:
+        self.scene = scene_at(shot)
+        self.shot, self._key, self._common, self._tell = shot, scene_key, common, tell
+        expect(key_of_scene(self.scene) == scene_key, f"scene {shot.name!r}", "what it was when the batch began",
+               "another")
+        self.buffers = Buffers()
+        self._frame: Frame | None = None
+        self.references: dict[str, Reference] = {}
+
+    @property
+    def frame(self) -> Frame:
+        """A frame with its own G-buffer and tracer, which shows all pictures; never timed."""
+        if self._frame is None:
+            frame = Frame(self.scene, **self._common.options)
+            with stages.observe(memory=self.buffers):
+                covered = frame.gbuffer.covered
+                expect(bool(covered.any()), f"scene {self.shot.name!r}: camera", "a view of some surface",
+                       "a view past all of it")
+                frame.tracer  # noqa: B018  # for the truth, the direct light and jobs
+            self._frame = frame
+        return self._frame
+
+    def fresh_frame(self) -> Frame:
+        """Return a frame with nothing computed, of the geometry that the buffers are of."""
+        return Frame(self.frame.scene, **self._common.options)
+
+    def reference(self, name: str) -> Reference:
+        """Return the truth or the one in which nothing blocks indirect light; its picture is written."""
+        if name not in self.references:
+            settings = reference_settings(self._common.truth, self.shot)
+            settings = settings if name == TRUTH else without_visibility(settings)
+            self.references[name] = self._traced(settings)
+            self._write(name, settings, self.references[name])
+        return self.references[name]
+
+    def view(self) -> View:
+        """Return what the results of the frame share."""
+        covered, truth = self.frame.gbuffer.covered, self.reference(TRUTH)
+        return View(width=self.frame.width, height=self.frame.height, covered=int(covered.sum()),
+                    mean=float(truth.mean[:, covered].mean(dtype=np.float64)), truth=truth.statement)
+
+    def record(self, method: str, settings: Any) -> Record:
+        """Return the record of a picture."""
+        options = {"dtype": self.frame.dtype.name, **self._common.options}
+        return {**scene_record(self.scene, options), **method_record(method, settings)}
+
+    def _traced(self, settings: TruthSettings) -> Reference:
+        chosen = canonical_json([code_key("refgi.truth:trace_truth", "refgi.frame:Frame"),
+                                 {key: plain(settings)[key] for key in STOPS}])
+        folder = self._common.store / "truths" / hashlib.sha256(chosen.encode()).hexdigest()[:DIGITS] / self._key[:DIGITS]
+        folder.mkdir(parents=True, exist_ok=True)
+        with _alone_in(folder):
+            return traced(self.frame, dataclasses.replace(settings, checkpoint=folder), self._tell)
+
+    def _write(self, name: str, settings: TruthSettings, reference: Reference) -> None:
+        """Write a reference's picture unless the same is there."""
+        file = self._common.folder / "pictures" / self.shot.name / f"{TRUTH}{'' if name == TRUTH else f'_{name}'}.exr"
+        record = self.record(TRUTH, settings)
+        if _record_in(file) != record:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_exr(file, linear_planes(reference.radiance, reference.mean, reference.variance), record)
+
+
+def _record_in(file: Path) -> Record | None:
+    try:
+        return read_exr(file)[1] if file.exists() else None
+    except InputError:
+        return None
+
+
+@contextlib.contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Wait until no other process is in a block on the same folder; a killed process leaves nothing behind."""
+    if fcntl is None:
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)

@@ -5,16 +5,19 @@ result. A job that ends several workers has failed.
 """
 
 from collections.abc import Sequence
+from concurrent.futures import Future
+from pathlib import Path
 
-from refgi.batch.schedule import fail_first, follow, unfinished
+from refgi.batch.schedule import Written, fail_first, follow, unfinished
 from refgi.batch.shared import Tell
 from refgi.batch.work import Chunk, run_chunk
 from refgi.errors import InputError
 
 SCHEME = "dask:"
+SECONDS_TO_ANSWER = 10
 
 
-def run_on_cluster(address: str, chunks: Sequence[Chunk], tell: Tell, written: "Written") -> None:
+def run_on_cluster(address: str, chunks: Sequence[Chunk], tell: Tell, written: Written) -> None:
     """Do chunks on the workers of a scheduler.
 
     Parameters
@@ -22,7 +25,7 @@ def run_on_cluster(address: str, chunks: Sequence[Chunk], tell: Tell, written: "
     address : str
         Of the scheduler, such as ``tcp://10.0.0.1:8786``.
     chunks : sequence of Chunk
-        The jobs; their folders are there on every worker.
+        The jobs; their folders and scenes are there on every worker.
     tell : callable
         Called with (what runs, share done).
     written : callable
@@ -33,4 +36,31 @@ def run_on_cluster(address: str, chunks: Sequence[Chunk], tell: Tell, written: "
     InputError
         If dask.distributed is not installed or nobody answers at the address.
     """
-    pass
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError as error:
+        raise InputError("--executor: expected the extra refgi[distributed], got none installed",
+                         key="--executor") from error
+    try:
+        client = Client(address, timeout=SECONDS_TO_ANSWER)
+    except (OSError, ValueError) as error:
+        raise InputError(f"--executor: expected a scheduler at {address}, got {error}", key="--executor") from error
+    with client:
+        executor = client.get_executor(pure=False)
+
+        def died(chunk: Chunk, error: BaseException) -> "Future[int] | None":
+            if not isinstance(error, KilledWorker):
+                raise error
+            left = unfinished([chunk])
+            if left:
+                fail_first(left[0])
+            left = unfinished(left)
+            return executor.submit(run_chunk, left[0]) if left else None
+
+        follow([(chunk, executor.submit(run_chunk, chunk)) for chunk in map(absolute, chunks)], tell, written, died)
+
+
+def absolute(chunk: Chunk) -> Chunk:
+    """Return a chunk whose folders have the same names from wherever they are looked for."""
+    common = chunk.common._replace(folder=chunk.common.folder.resolve(), store=chunk.common.store.resolve())
+    return chunk._replace(common=common, working_folder=str(Path(chunk.working_folder).resolve()))

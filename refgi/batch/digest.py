@@ -2,7 +2,7 @@
 
 import dataclasses
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,29 +12,32 @@ from refgi.stages import Log
 DIGITS = 16
 
 
-def hashes_of(log: Log) -> tuple[tuple[str, str], ...]:
+def hashes_of(log: Log, buffers: Mapping[str, Sequence[str]]) -> tuple[tuple[str, str], ...]:
     """Return the name and the digest of each stage's output.
 
     Parameters
     ----------
     log : Log
         Recorded.
+    buffers : mapping of str to sequence of str
+        Digests of shared buffers by stage, in the order in which they were used. They stand for what the stage gives
+        whether it ran or gave back an earlier result; stages inside it are left out.
 
     Returns
     -------
     tuple of (str, str)
-        Stages that ran, in the order in which they ended: one that others call comes after them.
+        In the order in which stages ended: one that others call comes after them.
     """
-    ended = list[tuple[str, str]]()
-    open_: list[tuple[int, str, str]] = []
+    left = {name: list(digests) for name, digests in buffers.items()}
+    ended: list[tuple[str, str]] = []
+    running: list[tuple[int, str, str]] = []  # depth, name, digest of stages that are not known to have ended
     for run in log.runs:  # in the order in which they began
-        if run.status != "ran":
+        while running and running[-1][0] >= run.depth:
+            ended.append(running.pop()[1:])
+        if run.status == "skipped" or any(name in left for _, name, _ in running):
             continue
-        while open_ and open_[-1][0] >= run.depth:
-            ended.append(open_.pop()[1:])
-        open_.append((run.depth, run.name, digest_of(run.output)))
-    ended += [one[1:] for one in reversed(open_)]
-    return tuple(ended)
+        running.append((run.depth, run.name, left[run.name].pop(0) if run.name in left else digest_of(run.output)))
+    return (*ended, *(one[1:] for one in reversed(running)))
 
 
 def digest_of(value: Any) -> str:

@@ -27,7 +27,7 @@ class Estimate(NamedTuple):
     truth_seconds: float  # of the truths, one a frame
 
 
-def estimate(jobs: Sequence[Job], common: Common, rounds: int, tell: Tell) -> Estimate:
+def estimate(jobs: Sequence[Job], common: Common, tell: Tell) -> Estimate:
     """Estimate the time of jobs.
 
     Parameters
@@ -36,8 +36,6 @@ def estimate(jobs: Sequence[Job], common: Common, rounds: int, tell: Tell) -> Es
         Those to do.
     common : Common
         What they share.
-    rounds : int
-        Seeds of each.
     tell : callable
         Called with (what runs, share done).
 
@@ -53,7 +51,7 @@ def estimate(jobs: Sequence[Job], common: Common, rounds: int, tell: Tell) -> Es
         key = job.shot.scene, job.choice
         if key not in known:
             known[key] = _seconds(job, job.choice.method, job.choice.settings, common)
-        seconds += known[key] * (rounds + 1)
+        seconds += known[key] * (len(job.seeds) + 1)
         if job.shot not in seen:
             seen.add(job.shot)
             settings = reference_settings(common.truth, job.shot)

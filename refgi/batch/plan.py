@@ -95,7 +95,8 @@ def read_plan(file: Path) -> Plan:
     return Plan(file, scenes, size or None, own.rounds, own.rsm_resolution,
                 _settings(TruthSettings(), own.truth, f"{file}: batch.truth"), grid,
                 None if own.path is None else str(file.parent / own.path), own.frames,
-                None if own.temporal is None else _settings(TemporalSettings(), own.temporal, f"{file}: batch.temporal"),
+                own.temporal if own.temporal is None else _settings(
+                    TemporalSettings(), own.temporal, f"{file}: batch.temporal"),
                 tuple(read_threshold(key, text, scenes, methods, str(file)) for key, text in thresholds.items()))
 
 
@@ -114,7 +115,8 @@ def _named(scenes: list[str] | dict[str, str], file: Path) -> dict[str, str]:
     expect(len(named) == len(scenes), f"{file}: {BATCH}.scenes", "scenes of different names, or a table of names",
            ", ".join(scenes))
     for name in named:
-        expect(name != "" and not set(name) & set("@/\\"), f"{file}: {BATCH}.scenes", "names without @ and slashes", name)
+        expect(name != "" and not set(name) & set("@/\\"), f"{file}: {BATCH}.scenes", "names without @ and slashes",
+               name)
     return {name: scene if scene.partition(":")[0] in builtin_scenes() else str(file.parent / scene)
             for name, scene in named.items()}
 

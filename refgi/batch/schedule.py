@@ -8,7 +8,6 @@ import math
 import os
 import signal
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
@@ -19,7 +18,7 @@ from multiprocessing.connection import Connection
 from refgi.batch.jobs import Job
 from refgi.batch.outcome import failed, is_done, write_outcome
 from refgi.batch.shared import Common, Tell
-from refgi.batch.work import Chunk, run_chunk
+from refgi.batch.work import Chunk, forget, run_chunk
 
 SECONDS_BETWEEN_LOOKS = 0.5
 DIED = "its process died: out of memory, or a fault of compiled code"
@@ -71,6 +70,7 @@ def run_here(chunks: Sequence[Chunk], tell: Tell, written: Written) -> None:
     for number, chunk in enumerate(chunks):
         run_chunk(chunk, lambda what, _, number=number: tell(what, number / len(chunks)))  # type: ignore[misc]
         written()
+    forget()
 
 
 def run_in_processes(chunks: Sequence[Chunk], workers: int, tell: Tell, written: Written) -> None:

@@ -10,6 +10,7 @@ import contextlib
 import dataclasses
 import hashlib
 import os
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,12 +20,12 @@ import numpy as np
 
 from refgi import stages
 from refgi.batch.code import code_key
+from refgi.batch.digest import digest_of
 from refgi.batch.jobs import Shot, key_of_scene, reference_settings, scene_at
 from refgi.batch.outcome import View
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import Reference, traced
 from refgi.compare.comparison import without_visibility
-from refgi.compare.outcome import UNOCCLUDED
 from refgi.compare.pictures import linear_planes
 from refgi.errors import InputError, expect
 from refgi.frame import Frame
@@ -33,14 +34,13 @@ from refgi.provenance import Record, method_record, plain, scene_record
 from refgi.scene import Scene
 from refgi.truth import TruthSettings
 
-try:
+if sys.platform != "win32":
     import fcntl
-except ImportError:  # Windows: two processes may trace the same truth, one after the other's file
-    fcntl = None  # type: ignore[assignment]
 
 BUFFERS = frozenset({"rsm.gbuffer", "rsm.reflective_shadow_map", "rays.build"})  # stages
 STOPS = ("samples", "seconds", "target_error")  # settings of the truth that no checkpoint knows
 DIGITS = 16  # of folders' names
+TINY = 8  # pixels along a side
 
 Tell = Callable[[str, float], None]
 
@@ -60,13 +60,21 @@ class Common(NamedTuple):
         return {"rsm_resolution": self.rsm_resolution, "shadows": "exact"}
 
 
+class Buffer(NamedTuple):
+    """What is known of a buffer."""
+
+    stage: str
+    seconds: float  # that it took with all its channels
+    digest: str
+
+
 class Buffers(stages.Memory):
-    """Memory of a frame's buffers alone, which counts the time that was spent on those it gives back."""
+    """Memory of a frame's buffers alone, which says what those that it gave back took and what they hold."""
 
     def __init__(self) -> None:
         super().__init__()
         self._begun: dict[str, float] = {}
-        self.spent: dict[str, float] = {}  # s, of buffers given back since `forget_times`
+        self.used: list[Buffer] = []  # since `start_anew`, in order
 
     def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
         """Return whether a buffer is known, and the buffer."""
@@ -76,21 +84,32 @@ class Buffers(stages.Memory):
         if not known:
             self._begun[name] = time.perf_counter()
             return False, None
-        output, seconds = kept
-        self.spent[name] = self.spent.get(name, 0.0) + seconds
+        output, buffer = kept
+        self.used.append(buffer)
         return True, output
 
     def keep(self, name: str, inputs: tuple[Any, ...], output: Any) -> None:
         """Keep a buffer with all its channels and the time that they took."""
-        if name in BUFFERS:
-            if hasattr(output, "recorded"):
-                output.recorded()
-            seconds = time.perf_counter() - self._begun.pop(name)
-            self._kept[name].append((inputs, (output, seconds)))
+        if name not in BUFFERS:
+            return
+        with stages.observe():  # apart from the log of the job that happens to be the first
+            content = output.recorded() if hasattr(output, "recorded") else output
+        seconds = time.perf_counter() - self._begun.pop(name)
+        buffer = Buffer(name, seconds, digest_of(content))
+        self._kept[name].append((inputs, (output, buffer)))  # all: a scene may have many lights
+        self.used.append(buffer)
 
-    def forget_times(self) -> None:
-        """Start to count anew."""
-        self.spent = {}
+    def start_anew(self) -> None:
+        """Forget what was used, not what is kept."""
+        self.used = []
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """What the buffers used took, by stage, s."""
+        spent: dict[str, float] = {}
+        for buffer in self.used:
+            spent[buffer.stage] = spent.get(buffer.stage, 0.0) + buffer.seconds
+        return spent
 
 
 class Shared:
@@ -127,6 +146,7 @@ class Shared:
         """A frame with its own G-buffer and tracer, which shows all pictures; never timed."""
         if self._frame is None:
             frame = Frame(self.scene, **self._common.options)
+            _load_kernels(frame.scene)
             with stages.observe(memory=self.buffers):
                 covered = frame.gbuffer.covered
                 expect(bool(covered.any()), f"scene {self.shot.name!r}: camera", "a view of some surface",
@@ -162,7 +182,8 @@ class Shared:
     def _traced(self, settings: TruthSettings) -> Reference:
         chosen = canonical_json([code_key("refgi.truth:trace_truth", "refgi.frame:Frame"),
                                  {key: plain(settings)[key] for key in STOPS}])
-        folder = self._common.store / "truths" / hashlib.sha256(chosen.encode()).hexdigest()[:DIGITS] / self._key[:DIGITS]
+        how = hashlib.sha256(chosen.encode()).hexdigest()
+        folder = self._common.store / "truths" / how[:DIGITS] / self._key[:DIGITS]
         folder.mkdir(parents=True, exist_ok=True)
         with _alone_in(folder):
             return traced(self.frame, dataclasses.replace(settings, checkpoint=folder), self._tell)
@@ -176,6 +197,14 @@ class Shared:
             write_exr(file, linear_planes(reference.radiance, reference.mean, reference.variance), record)
 
 
+def _load_kernels(scene: Scene) -> None:
+    """Make the smallest of buffers, so that the time of no other holds that of loading its kernels."""
+    small = Frame(scene, width=TINY, height=TINY, rsm_resolution=TINY)
+    small.gbuffer.recorded()
+    for rsm in small.rsms:
+        rsm.recorded()
+
+
 def _record_in(file: Path) -> Record | None:
     try:
         return read_exr(file)[1] if file.exists() else None
@@ -186,7 +215,7 @@ def _record_in(file: Path) -> Record | None:
 @contextlib.contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
     """Wait until no other process is in a block on the same folder; a killed process leaves nothing behind."""
-    if fcntl is None:
+    if sys.platform == "win32":  # two processes may trace the same truth; the last one's file stays
         yield
         return
     handle = os.open(folder, os.O_RDONLY)

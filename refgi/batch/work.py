@@ -6,10 +6,8 @@ whichever job computed them.
 """
 
 import contextlib
-import functools
 import time
 import warnings
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy.typing as npt
@@ -19,7 +17,7 @@ from refgi.batch.digest import hashes_of
 from refgi.batch.filtered import blended, filter_record
 from refgi.batch.jobs import Job, Shot
 from refgi.batch.outcome import Outcome, failed, is_done, write_outcome
-from refgi.batch.shared import Buffers, Common, Shared, Tell
+from refgi.batch.shared import BUFFERS, Buffers, Common, Shared, Tell
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import Made, judged, with_seed
 from refgi.compare.outcome import UNOCCLUDED
@@ -28,6 +26,7 @@ from refgi.errors import RefgiError, RefgiWarning
 from refgi.frame import Frame
 from refgi.image import write_exr
 from refgi.jit import threads
+from refgi.method import Method
 from refgi.methods import METHODS
 
 Array = npt.NDArray[Any]
@@ -38,7 +37,10 @@ class Chunk(NamedTuple):
 
     jobs: tuple[Job, ...]
     common: Common
-    working_folder: Path  # from which scenes are named
+    working_folder: str  # from which scenes are named
+
+
+_kept: dict[tuple[Shot, str, Common], Shared] = {}  # of this process: what the jobs of a frame share
 
 
 def run_chunk(chunk: Chunk, tell: Tell = lambda *_: None) -> int:
@@ -90,24 +92,24 @@ def outcome_of(job: Job, common: Common, tell: Tell) -> Outcome:
         Figures, or the error of whatever went wrong.
     """
     try:
-        return _done(job, common, _shared(job.shot, job.scene_key, common, tell))
+        return _done(job, common, _shared(job, common, tell))
     except RefgiError as error:
         return failed(job, str(error))
     except Exception as error:  # a fault of refgi or of the machine ends this job alone
         return failed(job, f"{type(error).__name__}: {' '.join(str(error).split())}")
 
 
-@functools.lru_cache(maxsize=1)
-def _kept(shot: Shot, scene_key: str, common: Common) -> list[Shared]:
-    """Return a place for what the jobs of a frame share; those of the frame before are let go."""
-    return []
+def forget() -> None:
+    """Let go of what this process keeps for the next job."""
+    _kept.clear()
 
 
-def _shared(shot: Shot, scene_key: str, common: Common, tell: Tell) -> Shared:
-    place = _kept(shot, scene_key, common)
-    if not place:
-        place.append(Shared(shot, scene_key, common, tell))
-    return place[0]
+def _shared(job: Job, common: Common, tell: Tell) -> Shared:
+    key = job.shot, job.scene_key, common
+    if key not in _kept:
+        _kept.clear()  # a process keeps one frame
+        _kept[key] = Shared(job.shot, job.scene_key, common, tell)
+    return _kept[key]
 
 
 def _done(job: Job, common: Common, shared: Shared) -> Outcome:
@@ -115,8 +117,7 @@ def _done(job: Job, common: Common, shared: Shared) -> Outcome:
     if not method.knows_visibility(job.choice.settings):
         references[UNOCCLUDED] = shared.reference(UNOCCLUDED)
     settings = [with_seed(job.choice.settings, seed) for seed in job.seeds]
-    with stages.observe(record=True, memory=shared.buffers) as log:
-        method.function(shared.fresh_frame(), settings[0])
+    hashes = _hashes(method, settings[0], shared)
     made = Made([], [], {})
     for one in settings:
         _timed(job, one, made, shared)
@@ -126,16 +127,28 @@ def _done(job: Job, common: Common, shared: Shared) -> Outcome:
         made.pictures[0], frames = filtered.irradiance, filtered.frames
     _write(job, common, shared, settings[0], made.pictures[0], frames)
     run = judged(job.choice, made, references, shared.frame)
-    run = run.model_copy(update={"picture": job.picture, "hashes": hashes_of(log)})
+    run = run.model_copy(update={"picture": job.picture, "hashes": hashes})
     return Outcome(job=job.name, scene=job.shot.name, method=job.choice.method, changes=job.choice.changes,
                    status="done", view=shared.view(), run=run)
+
+
+def _hashes(method: Method, settings: Any, shared: Shared) -> tuple[tuple[str, str], ...]:
+    """Run a method with every stage recorded, and return what each gave."""
+    frame, buffers = shared.fresh_frame(), shared.buffers
+    buffers.start_anew()
+    with stages.observe(record=True, memory=buffers) as log:
+        method.function(frame, settings)
+    digests: dict[str, list[str]] = {name: [] for name in BUFFERS}
+    for buffer in buffers.used:
+        digests[buffer.stage].append(buffer.digest)
+    return hashes_of(log, digests)
 
 
 def _timed(job: Job, settings: Any, made: Made, shared: Shared) -> None:
     """Run a method on the shared buffers and add its picture and its time."""
     frame: Frame = shared.fresh_frame()
     buffers: Buffers = shared.buffers
-    buffers.forget_times()
+    buffers.start_anew()
     with stages.observe(memory=buffers) as log:
         started = time.perf_counter()
         picture = METHODS[job.choice.method].function(frame, settings)
@@ -143,12 +156,12 @@ def _timed(job: Job, settings: Any, made: Made, shared: Shared) -> None:
     if not made.times:
         made.stages.update(_spent(log, buffers))
     made.pictures.append(picture)
-    made.times.append(seconds + sum(buffers.spent.values()))
+    made.times.append(seconds + sum(buffers.seconds.values()))
 
 
 def _spent(log: stages.Log, buffers: Buffers) -> dict[str, float]:
     """Return the seconds of outermost stages, and of buffers what they took when they were made."""
-    spent = dict(buffers.spent)
+    spent = buffers.seconds
     for run in log.runs:
         if run.depth == 0 and run.status == "ran":
             spent[run.name] = spent.get(run.name, 0.0) + run.seconds

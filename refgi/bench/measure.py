@@ -39,6 +39,8 @@ REFERENCE_SEED = 2**31  # of the truth: none of the rounds'
 
 
 class Reference(NamedTuple):
+    """What pictures are judged by."""
+
     mean: Array  # (3, h, w), W/m^2
     variance: Array  # of the mean
     radiance: Array
@@ -46,6 +48,8 @@ class Reference(NamedTuple):
 
 
 class Made(NamedTuple):
+    """Pictures of one choice with their times, a seed each."""
+
     pictures: list[Array]
     times: list[float]
     stages: dict[str, float]
@@ -102,6 +106,7 @@ def bench_scene(
 
 
 def traced(frame: Frame, settings: TruthSettings, tell: Tell) -> Reference:
+    """Trace the truth, or what else its settings say, of a frame."""
     with stages.observe(progress=lambda stage, done: tell(f"{TRUTH}: {stage}", done)):
         found = trace_truth(frame, settings)
     radiance = frame.radiance(np.asarray(found.mean, frame.dtype))
@@ -178,6 +183,7 @@ def with_seed(settings: Settings, seed: int) -> Settings:
 
 
 def judged(choice: Choice, made: Made, references: Mapping[str, Reference], frame: Frame) -> Run:
+    """Return all figures of a choice's pictures; `references` by name, the unoccluded one where its method needs it."""
     covered, method = frame.gbuffer.covered, METHODS[choice.method]
     judges = [TRUTH] if method.knows_visibility(choice.settings) else [TRUTH, UNOCCLUDED]
     errors = {name: figures_of(error_of(made.pictures, references[name].mean, references[name].variance, covered))

@@ -139,6 +139,7 @@ class Shared:
                "another")
         self.buffers = Buffers()
         self._frame: Frame | None = None
+        self._record: Record = {}
         self.references: dict[str, Reference] = {}
 
     @property
@@ -176,8 +177,9 @@ class Shared:
 
     def record(self, method: str, settings: Any) -> Record:
         """Return the record of a picture."""
-        options = {"dtype": self.frame.dtype.name, **self._common.options}
-        return {**scene_record(self.scene, options), **method_record(method, settings)}
+        if not self._record:
+            self._record = scene_record(self.scene, {"dtype": self.frame.dtype.name, **self._common.options})
+        return {**self._record, **method_record(method, settings)}
 
     def _traced(self, settings: TruthSettings) -> Reference:
         chosen = canonical_json([code_key("refgi.truth:trace_truth", "refgi.frame:Frame"),

@@ -184,7 +184,13 @@ def _content(job: Job, plan: Plan) -> dict[str, Any]:
     return {"format": FORMAT, "scene": job.scene_key, "rsm_resolution": plan.rsm_resolution, "seeds": job.seeds,
             "method": job.choice.method, "settings": plain(job.choice.settings), "truth": plain(truth),
             "before": job.before, "temporal": plain(job.temporal), "code": _code(job.choice.method),
-            "versions": {name: versions()[name] for name in COMPUTING}}
+            "versions": _versions()}
+
+
+@functools.cache
+def _versions() -> dict[str, str | None]:
+    known = versions()
+    return {name: known[name] for name in COMPUTING}
 
 
 @functools.cache

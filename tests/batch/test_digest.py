@@ -32,7 +32,8 @@ def last(value):
 def test_a_digest_is_of_all_that_a_value_holds():
     a = np.arange(6, dtype=np.float32)
     values = [a, a.reshape(2, 3), a.astype(np.float64), a + np.float32(1e-6), (a,), [a], (a, a), None, 1, 1.0, True,
-              "1", {"a": 1}, {"b": 1}, {"a": 2}, Pair(1, 2), Pair(2, 1), {"a": a}, np.float32(1), (1, (2, 3)), ((1, 2), 3)]
+              "1", {"a": 1}, {"b": 1}, {"a": 2}, Pair(1, 2), Pair(2, 1), {"a": a}, np.float32(1),
+              (1, (2, 3)), ((1, 2), 3)]
     assert len({digest_of(value) for value in values}) == len(values)
     assert digest_of(a[::-1]) == digest_of(a[::-1].copy())
     assert digest_of({"a": 1, "b": 2}) == digest_of({"b": 2, "a": 1})

@@ -70,7 +70,7 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks kill-batch", description=__doc__)
     parser.add_argument("--times", type=int, default=50)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--longest", type=float, default=1.5, help="seconds until a kill, at most")
+    parser.add_argument("--longest", type=float, default=4.0, help="seconds until a kill, at most")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from pathlib import Path
 
-from refgi.batch.schedule import Written, fail_first, follow, unfinished
-from refgi.batch.shared import Tell
+from refgi.batch.jobs import Job
+from refgi.batch.schedule import Written, chunks_of, fail_first, follow, unfinished
+from refgi.batch.shared import Common, Tell
 from refgi.batch.work import Chunk, run_chunk
 from refgi.errors import InputError
 
@@ -17,15 +18,17 @@ SCHEME = "dask:"
 SECONDS_TO_ANSWER = 10
 
 
-def run_on_cluster(address: str, chunks: Sequence[Chunk], tell: Tell, written: Written) -> None:
-    """Do chunks on the workers of a scheduler.
+def run_on_cluster(address: str, jobs: Sequence[Job], common: Common, tell: Tell, written: Written) -> None:
+    """Do jobs on the workers of a scheduler.
 
     Parameters
     ----------
     address : str
         Of the scheduler, such as ``tcp://10.0.0.1:8786``.
-    chunks : sequence of Chunk
-        The jobs; their folders and scenes are there on every worker.
+    jobs : sequence of Job
+        Those of one frame side by side; their scenes are there on every worker.
+    common : Common
+        What they share; its folders are there on every worker.
     tell : callable
         Called with (what runs, share done).
     written : callable
@@ -57,6 +60,7 @@ def run_on_cluster(address: str, chunks: Sequence[Chunk], tell: Tell, written: W
             left = unfinished(left)
             return executor.submit(run_chunk, left[0]) if left else None
 
+        chunks = chunks_of(jobs, common, len(client.scheduler_info(n_workers=-1)["workers"]))
         follow([(chunk, executor.submit(run_chunk, chunk)) for chunk in map(absolute, chunks)], tell, written, died)
 
 

@@ -26,7 +26,7 @@ DIED = "its process died: out of memory, or a fault of compiled code"
 Written = Callable[[], None]
 
 
-def chunks_of(jobs: Sequence[Job], common: Common, workers: int, working_folder: str | os.PathLike[str]) -> list[Chunk]:
+def chunks_of(jobs: Sequence[Job], common: Common, workers: int) -> list[Chunk]:
     """Cut jobs into chunks: a frame each, or parts of one where there are fewer frames than workers.
 
     Parameters
@@ -37,8 +37,6 @@ def chunks_of(jobs: Sequence[Job], common: Common, workers: int, working_folder:
         What they share.
     workers : int
         How many processes there are.
-    working_folder : path
-        From which scenes are named.
 
     Returns
     -------
@@ -52,7 +50,7 @@ def chunks_of(jobs: Sequence[Job], common: Common, workers: int, working_folder:
             ways.setdefault((job.shot.scene, job.choice), []).append(job)
     parts = math.ceil(workers / max(1, len(alone) + len(ways)))
     cut = [group[part::parts] for group in alone for part in range(min(parts, len(group)))]
-    return [Chunk(tuple(group), common, os.fspath(working_folder)) for group in (*cut, *ways.values())]
+    return [Chunk(tuple(group), common) for group in (*cut, *ways.values())]
 
 
 def run_here(chunks: Sequence[Chunk], tell: Tell, written: Written) -> None:

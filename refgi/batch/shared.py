@@ -30,6 +30,8 @@ from refgi.compare.pictures import linear_planes
 from refgi.errors import InputError, expect
 from refgi.frame import Frame
 from refgi.image import canonical_json, read_exr, write_exr
+from refgi.jit import most_threads
+from refgi.jit.ahead import cores
 from refgi.provenance import Record, method_record, plain, scene_record
 from refgi.scene import Scene
 from refgi.truth import TruthSettings
@@ -52,7 +54,12 @@ class Common(NamedTuple):
     store: Path
     truth: TruthSettings
     rsm_resolution: int
-    threads: int | None = None
+    processes: int = 1  # that share the cores of a machine
+
+    @property
+    def threads(self) -> int | None:
+        """Of compiled kernels on this machine; None for all there are."""
+        return None if self.processes == 1 else min(most_threads(), max(1, cores() // self.processes))
 
     @property
     def options(self) -> dict[str, Any]:

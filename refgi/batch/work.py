@@ -6,6 +6,7 @@ whichever job computed them.
 """
 
 import contextlib
+import os
 import time
 import warnings
 from typing import Any, NamedTuple
@@ -37,7 +38,7 @@ class Chunk(NamedTuple):
 
     jobs: tuple[Job, ...]
     common: Common
-    working_folder: str  # from which scenes are named
+    working_folder: str = os.curdir  # from which scenes are named
 
 
 _kept: dict[tuple[Shot, str, Common], Shared] = {}  # of this process: what the jobs of a frame share

@@ -1,6 +1,5 @@
 """`refgi batch`: scenes x methods x settings x frames as jobs that are done once."""
 
-import os
 import re
 import time
 from pathlib import Path
@@ -54,7 +53,7 @@ class Share(click.ParamType[float]):
 @click.option("--out", required=True, help="Folder for results, jobs, pictures and, unless --store, truths.")
 @click.option("--store", metavar="DIR", help="Folder of truths that batches share; in --out where absent.")
 @click.option("--workers", type=click.IntRange(1, 1024), default=1, show_default=True,
-              help="Processes; each has its part of the cores.")
+              help="Processes of a machine, each with its part of the cores.")
 @click.option("--executor", metavar="dask:ADDRESS", help="Scheduler of dask.distributed; its workers see all folders.")
 @click.option("--shard", type=Shard(), help="Do this part of the jobs alone, such as 2/8.")
 @click.option("--since", metavar="COMMIT", help="Do jobs of methods alone whose code differs from a commit's.")
@@ -114,16 +113,14 @@ class _Request(NamedTuple):
 def _request(plan: "Plan", jobs: "list[Job]", path: Path, options: dict[str, Any]) -> _Request:
     from refgi.batch.schedule import chunks_of
     from refgi.batch.shared import Common
-    from refgi.jit.ahead import cores
 
     workers = options["workers"]
     store = Path(options["store"]) if options["store"] else path / "store"
-    threads = max(1, cores() // workers) if workers > 1 else None
-    common = Common(path, store, plan.truth, plan.rsm_resolution, threads)
+    common = Common(path, store, plan.truth, plan.rsm_resolution, workers)
     chosen = set(jobs)
     if options["shard"] is not None:
         part, parts = options["shard"]
-        chosen = {job for chunk in chunks_of(jobs, common, parts, "")[part - 1::parts] for job in chunk.jobs}
+        chosen = {job for chunk in chunks_of(jobs, common, parts)[part - 1::parts] for job in chunk.jobs}
     return _Request(plan, jobs, [job for job in jobs if job in chosen], common, workers, options["retry_failed"])
 
 
@@ -166,14 +163,13 @@ def _do(request: _Request, executor: str | None, tell: "Tell") -> int:
     for job in jobs:
         outcome_file(request.common.folder, job).unlink(missing_ok=True)
     warm_up(dict.fromkeys(job.choice.method for job in jobs), "float32", tell)
-    chunks = chunks_of(jobs, request.common, request.workers, os.curdir)
     written = _from_time_to_time(request)
     if executor is not None:
-        run_on_cluster(executor.removeprefix(SCHEME), chunks, tell, written)
+        run_on_cluster(executor.removeprefix(SCHEME), jobs, request.common, tell, written)
     elif request.workers == 1:
-        run_here(chunks, tell, written)
+        run_here(chunks_of(jobs, request.common, 1), tell, written)
     else:
-        run_in_processes(chunks, request.workers, tell, written)
+        run_in_processes(chunks_of(jobs, request.common, request.workers), request.workers, tell, written)
     return len(jobs)
 
 

@@ -56,20 +56,20 @@ BOX, HALL = [job(n) for n in range(5)], [job(n, "hall") for n in range(3)]
     ([], 2, []),
 ])
 def test_a_worker_keeps_to_a_frame_unless_there_are_too_few(common, jobs, workers, expected):
-    chunks = chunks_of(jobs, common, workers, ".")
+    chunks = chunks_of(jobs, common, workers)
     assert names(chunks) == expected
-    assert all(chunk.common == common and chunk.working_folder == "." for chunk in chunks)
+    assert all(chunk.common == common for chunk in chunks)
 
 
 def test_frames_behind_a_temporal_filter_are_one_chunk(common):
     frames = [job(n, path="way.toml", frame=k, frames=2) for k in range(2) for n in range(2)]
     frames = [one if n % 2 else one._replace(temporal=TemporalSettings(), name=f"filtered{n // 2}")
               for n, one in enumerate(frames)]
-    assert names(chunks_of(frames, common, 2, ".")) == [["box1"], ["box1"], ["filtered0", "filtered1"]]
+    assert names(chunks_of(frames, common, 2)) == [["box1"], ["box1"], ["filtered0", "filtered1"]]
 
 
 def test_what_is_left_of_chunks(common):
-    chunks = chunks_of(BOX + HALL, common, 1, ".")
+    chunks = chunks_of(BOX + HALL, common, 1)
     for one in (*BOX[1:3], *HALL):
         write_outcome(common.folder, failed(one, "x"))
     assert names(unfinished(chunks)) == [["box0", "box3", "box4"]]
@@ -77,7 +77,7 @@ def test_what_is_left_of_chunks(common):
 
 def test_what_ends_a_chunk_is_replaced_or_raised(common):
     first, second, third = Future(), Future(), Future()
-    chunks = chunks_of(BOX + HALL, common, 1, ".")
+    chunks = chunks_of(BOX + HALL, common, 1)
     first.set_exception(KeyError("a"))
     second.set_result(3)
     third.set_result(1)
@@ -98,7 +98,7 @@ def test_what_ends_a_chunk_is_replaced_or_raised(common):
 @pytest.mark.slow
 def test_a_job_that_ends_its_process_takes_no_other_along(common):
     jobs = [job(0), job(1, kind=Deadly), job(2), job(3)]
-    chunks = chunks_of(jobs, common, 2, ".")
+    chunks = chunks_of(jobs, common, 2)
     assert names(chunks) == [["box0", "box2"], ["box1", "box3"]]
     written = []
     run_in_processes(chunks, 2, lambda *_: None, lambda: written.append(1))
@@ -112,7 +112,7 @@ def test_a_job_that_ends_its_process_takes_no_other_along(common):
 def test_what_cannot_be_written_ends_the_batch(common):
     (common.folder / "jobs").rmdir()
     with pytest.raises(InputError, match="cannot be written"):
-        run_in_processes(chunks_of(BOX, common, 2, "."), 2, lambda *_: None, lambda: None)
+        run_in_processes(chunks_of(BOX, common, 2), 2, lambda *_: None, lambda: None)
 
 
 def test_chunks_in_this_process(common, monkeypatch):
@@ -123,7 +123,7 @@ def test_chunks_in_this_process(common, monkeypatch):
         return 1
 
     monkeypatch.setattr(schedule, "run_chunk", run)
-    schedule.run_here(chunks_of(BOX + HALL, common, 1, "."), lambda *what: told.append(what), lambda: written.append(1))
+    schedule.run_here(chunks_of(BOX + HALL, common, 1), lambda *what: told.append(what), lambda: written.append(1))
     assert told == [("box0", 0.0), ("hall0", 0.5)]
     assert written == [1, 1]
     assert not is_done(common.folder, BOX[0])

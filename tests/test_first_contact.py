@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 # appended, so that a printed command means the same and ends soon: fewer pixels, samples, frames or repeats
 SMALLER = {
     "render": ["--size", "24x18"], "compare": ["--size", "24x18", "--set", "truth.samples=48"],
+    "batch": ["--shard", "1/6"],
     "bench": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii"],
     "sequence": ["--size", "24x18", "--frames", "2"], "explain": ["--size", "24x18"],
     "vectors": ["--case", "pairs-diffuse"],
@@ -45,7 +46,7 @@ def test_every_example_runs_as_printed(document, clone, evidence):
         assert result.exit_code == 0, f"{shlex.join(arguments)}: {result.output}"
         if "--out" in arguments and arguments[0] != "vectors":
             out = clone / arguments[arguments.index("--out") + 1]
-            files = [out] if out.is_file() else list(out.iterdir())
+            files = [out] if out.is_file() else [file for file in out.rglob("*") if file.is_file()]
             assert files
             assert all(map(is_from_refgi, files)), arguments
     assert {arguments[0] for arguments in commands} == set(VERBS)

@@ -86,7 +86,7 @@ def read_threshold(key: str, text: object, scenes: Collection[str], methods: Col
     return Threshold(key, scene, method, ".".join(middle) or None, figure, found[1], bound)
 
 
-def broken(thresholds: Collection[Threshold], result: Result) -> list[Finding]:
+def broken(thresholds: Collection[Threshold], result: Result, *, whole: bool = True) -> list[Finding]:
     """Return thresholds that do not hold.
 
     Parameters
@@ -95,6 +95,8 @@ def broken(thresholds: Collection[Threshold], result: Result) -> list[Finding]:
         Of a plan.
     result : Result
         Of its batch.
+    whole : bool
+        Whether all jobs of the plan are done, so that a threshold has to find its figure.
 
     Returns
     -------
@@ -104,7 +106,7 @@ def broken(thresholds: Collection[Threshold], result: Result) -> list[Finding]:
     found = []
     for one in thresholds:
         values = list(_values(one, result))
-        if not values:
+        if not values and whole:
             found.append(Finding(one.key, one.figure, f"expected {one.sign} {one.bound:g}, nothing was measured"))
         for place, value, picture in values:
             if value is None or not COMPARISONS[one.sign](value, one.bound):

@@ -91,7 +91,8 @@ def _batch(session: Session, /, plan_file: str, out: str, parents: bool, force: 
     with progress() as tell:
         begun = _do(request, options["executor"], tell)
         result = _written(request)
-    findings = [*broken(plan.thresholds, result), *(worse(
+    whole = not (options["since"] or _open_jobs(request._replace(jobs=request.all_jobs, retry=False)))
+    findings = [*broken(plan.thresholds, result, whole=whole), *(worse(
         result, baseline, options["tolerance"], folder_of(options["baseline"])) if baseline else [])]
     return say_done(session, Done(len(request.jobs), begun, failures_of(result), findings, out), options["form"])
 

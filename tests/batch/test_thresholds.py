@@ -50,6 +50,12 @@ def test_what_is_said_of_a_broken_threshold():
     assert str(finding) == "box.sii (lights=16): rmse is 0.4, expected <= 0.31; a.exr"
 
 
+def test_a_part_of_a_batch_need_not_hold_all_figures():
+    missing, present = (read_threshold(f"box.sii.{label}rmse", "< 0.3", ("box",), {"sii"}, "plan.toml")
+                        for label in ("lights=8.", ""))
+    assert [finding.place for finding in broken([missing, present], RESULT, whole=False)] == [SMALL]
+
+
 def test_figures_of_a_run():
     run = run_of("sii", rmse=0.4, unoccluded=0.2, seconds=(3.0, 1.0, 1.5), flip=0.25)
     expected = {"rmse": 0.4, "bias": 0.1, "spread": 0.05, "noise": 0.01, "rmse_unoccluded": 0.2, "seconds": 1.5,

@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 # appended, so that a printed command means the same and ends soon: fewer pixels, samples, frames or repeats
 SMALLER = {
     "render": ["--size", "24x18"], "compare": ["--size", "24x18", "--set", "truth.samples=48"],
+    "batch": ["--shard", "1/6"],
     "bench": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii"],
     "choose": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii,truth"],
     "sequence": ["--size", "24x18", "--frames", "2"], "explain": ["--size", "24x18"],

@@ -73,22 +73,7 @@ def read_grid(file: Path) -> Grid:
     InputError
         If the file cannot be read, a method or key is unknown or a value not usable; names all of them.
     """
-    tables = read_tables(file)
-    passes = _passes(tables.pop(TRUTH, {}), file)
-    choices: dict[tuple[str, tuple[str, ...]], Choice] = {}
-    faults = []
-    for name, entry in tables.items():
-        for table in entry if isinstance(entry, list) else [entry]:
-            for changes in _combinations(table, f"{file}: {name}"):
-                try:
-                    method = find_method(name)
-                    settings = from_text(method.settings(), changes)
-                    choices[method.name, changes] = Choice(method.name, changes, settings)
-                except InputError as error:
-                    faults.append(f"{file}: {name}: {error}")
-    if faults:
-        raise InputError("\n".join(dict.fromkeys(faults)), file=str(file))
-    return Grid(tuple(choices.values()), passes)
+    return grid_of(read_tables(file), file)
 
 
 def read_tables(file: Path) -> dict[str, Any]:
@@ -115,6 +100,43 @@ def read_tables(file: Path) -> dict[str, Any]:
         raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: no TOML: {error}", file=str(file)) from error
+
+
+def grid_of(tables: Mapping[str, Any], file: Path) -> Grid:
+    """Return the grid that tables describe.
+
+    Parameters
+    ----------
+    tables : mapping
+        By method, and that of the truth.
+    file : Path
+        Where they come from, for errors.
+
+    Returns
+    -------
+    Grid
+        Choices in the tables' order, each once.
+
+    Raises
+    ------
+    InputError
+        If a method or key is unknown or a value not usable; names all of them.
+    """
+    passes = _passes(tables.get(TRUTH, {}), file)
+    choices: dict[tuple[str, tuple[str, ...]], Choice] = {}
+    faults = []
+    for name, entry in tables.items():
+        for table in [] if name == TRUTH else entry if isinstance(entry, list) else [entry]:
+            for changes in _combinations(table, f"{file}: {name}"):
+                try:
+                    method = find_method(name)
+                    settings = from_text(method.settings(), changes)
+                    choices[method.name, changes] = Choice(method.name, changes, settings)
+                except InputError as error:
+                    faults.append(f"{file}: {name}: {error}")
+    if faults:
+        raise InputError("\n".join(dict.fromkeys(faults)), file=str(file))
+    return Grid(tuple(choices.values()), passes)
 
 
 def chosen(grid: Grid, methods: Sequence[str] | None) -> Grid:

@@ -21,7 +21,7 @@ from refgi.bench.curves import error_in, front
 from refgi.bench.error import error_of
 from refgi.bench.grid import TRUTH, Choice, Grid
 from refgi.bench.pictures import TRUTH_FILES, Place, Writer
-from refgi.bench.results import Run, SceneResult, figures_of
+from refgi.bench.results import Run, SceneResult, figures_of, known
 from refgi.compare.comparison import without_visibility
 from refgi.compare.flip import flip
 from refgi.compare.outcome import UNOCCLUDED, measure
@@ -41,7 +41,9 @@ WARM_UP_SIZE = 96  # pixels along a side: more than the coarse grid of `gather`
 REFERENCE_SEED = 2**31  # of the truth: none of the rounds'
 
 
-class _Reference(NamedTuple):
+class Reference(NamedTuple):
+    """What pictures are judged by."""
+
     mean: Array  # (3, h, w), W/m^2
     variance: Array  # of the mean
     radiance: Array
@@ -50,7 +52,9 @@ class _Reference(NamedTuple):
     record: Record  # of its own
 
 
-class _Made(NamedTuple):
+class Made(NamedTuple):
+    """Pictures of one choice with their times, a seed each."""
+
     pictures: list[Array]
     times: list[float]
     stages: dict[str, float]
@@ -93,13 +97,13 @@ def bench_scene(
     covered = frame.gbuffer.covered
     expect(bool(covered.any()), f"scene {scene.name!r}: camera", "a view of some surface", "a view past all of it")
     settings = dataclasses.replace(truth or TruthSettings(), seed=REFERENCE_SEED)
-    references = {TRUTH: _traced(frame, settings, tell)}
+    references = {TRUTH: traced(frame, settings, tell)}
     if not all(METHODS[choice.method].knows_visibility(choice.settings) for choice in grid.choices):
-        references[UNOCCLUDED] = _traced(frame, without_visibility(settings), tell)
-    stops = [_stop(settings, passes) for passes in grid.passes]
+        references[UNOCCLUDED] = traced(frame, without_visibility(settings), tell)
+    stops = [stop(settings, passes) for passes in grid.passes]
     made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, frame_options, tell)
     done = [(choice, made[number]) for number, choice in enumerate((*grid.choices, *stops)) if number in made]
-    runs = [_judged(choice, one, references, frame) for choice, one in done]
+    runs = [judged(choice, one, references, frame) for choice, one in done]
     if place is not None:
         writer = Writer(place, scene, frame)
         _write(writer, references)
@@ -110,27 +114,28 @@ def bench_scene(
     line = [run for run in runs if run.method == TRUTH]
     return SceneResult(scene=scene.name, width=frame.width, height=frame.height, covered=int(covered.sum()),
                        mean=float(references[TRUTH].mean[:, covered].mean(dtype=np.float64)),
-                       truth=references[TRUTH].statement, runs=_compared(methods, line), line=tuple(line),
+                       truth=references[TRUTH].statement, runs=compared(methods, line), line=tuple(line),
                        failures=failures)
 
 
-def _traced(frame: Frame, settings: TruthSettings, tell: Tell) -> _Reference:
+def traced(frame: Frame, settings: TruthSettings, tell: Tell) -> Reference:
+    """Trace the truth, or what else its settings say, of a frame."""
     with stages.observe(progress=lambda stage, done: tell(f"{TRUTH}: {stage}", done)):
         found = trace_truth(frame, settings)
     radiance = frame.radiance(np.asarray(found.mean, frame.dtype))
     estimate = estimate_record(found)
-    return _Reference(found.mean, found.variance_of_mean, radiance, estimate["estimate"]["statement"], found.samples,
+    return Reference(found.mean, found.variance_of_mean, radiance, estimate["estimate"]["statement"], found.samples,
                       {**method_record(TRUTH, settings), **estimate})
 
 
-def _write(writer: Writer, references: Mapping[str, _Reference]) -> None:
+def _write(writer: Writer, references: Mapping[str, Reference]) -> None:
     for name, one in references.items():
         planes = linear_planes(one.radiance, one.mean, one.variance, one.samples)
         writer.write(Path(TRUTH_FILES[name]).stem, planes, one.record)
     writer.write_ids()
 
 
-def _stop(settings: TruthSettings, passes: int) -> Choice:
+def stop(settings: TruthSettings, passes: int) -> Choice:
     """Return the truth, stopped after some passes that no file holds already."""
     samples = passes * (settings.picks_per_pass + settings.directions_per_pass)
     return Choice(TRUTH, (f"samples={samples}",), dataclasses.replace(
@@ -139,9 +144,9 @@ def _stop(settings: TruthSettings, passes: int) -> Choice:
 
 def _in_turn(
     scene: Scene, choices: list[Choice], rounds: int, options: Mapping[str, Any], tell: Tell
-) -> tuple[dict[int, _Made], dict[str, str]]:
+) -> tuple[dict[int, Made], dict[str, str]]:
     """Run all choices once a round; return what they made by number, and why the others made nothing."""
-    made: dict[int, _Made] = {}
+    made: dict[int, Made] = {}
     failures: dict[str, str] = {}
     for number, choice in enumerate(choices):
         tell(f"warming up {choice.method}: {choice.label}", number / len(choices))
@@ -161,7 +166,7 @@ def _in_turn(
                 failures[name] = str(error)
                 made.pop(number, None)
                 continue
-            one = made.setdefault(number, _Made([], [], spent))
+            one = made.setdefault(number, Made([], [], spent))
             one.pictures.append(picture)
             one.times.append(seconds)
     return made, failures
@@ -199,26 +204,26 @@ def with_seed(settings: Settings, seed: int) -> Settings:
     return from_text(settings, [f"seed={seed}"])
 
 
-def _judged(choice: Choice, made: _Made, references: Mapping[str, _Reference], frame: Frame) -> Run:
+def judged(choice: Choice, made: Made, references: Mapping[str, Reference], frame: Frame) -> Run:
+    """Return all figures of a choice's pictures; `references` by name, the unoccluded one where its method needs it."""
     covered, method = frame.gbuffer.covered, METHODS[choice.method]
     judges = [TRUTH] if method.knows_visibility(choice.settings) else [TRUTH, UNOCCLUDED]
     errors = {name: figures_of(error_of(made.pictures, references[name].mean, references[name].variance, covered))
               for name in judges}
     figures = measure(made.pictures[0], references[TRUTH].mean, references[TRUTH].variance, covered).figures
-    ssim = figures["ssim"].value if "ssim" in figures else float("nan")
     seen = flip(frame.radiance(made.pictures[0]), references[TRUTH].radiance, covered)
     return Run(method=choice.method, changes=choice.changes, settings=plain(choice.settings), times=tuple(made.times),
-               stages=made.stages, errors=errors, flip=seen.mean if np.isfinite(seen.mean) else None,
-               ssim=ssim if np.isfinite(ssim) else None)
+               stages=made.stages, errors=errors, flip=known(seen.mean), ssim=known(figures["ssim"].value),
+               relmse=known(figures["relmse"].value))
 
 
-def _compared(runs: list[Run], line: list[Run]) -> tuple[Run, ...]:
+def compared(runs: list[Run], line: list[Run]) -> tuple[Run, ...]:
     """Return the runs with their place among all: on the front or not, and beside the path tracer."""
     on_front = front([(run.seconds, run.rmse) for run in (*runs, *line)])
-    known = [(run.seconds, run.rmse) for run in line]
+    tracer = [(run.seconds, run.rmse) for run in line]
     said = []
     for run, best in zip(runs, on_front, strict=False):
-        ratio = run.rmse / error_in(known, run.seconds)
+        ratio = run.rmse / error_in(tracer, run.seconds)
         said.append(run.model_copy(update={"front": best, "in_equal_time": ratio if ratio > 0 else None}))
     return tuple(said)
 

@@ -45,9 +45,11 @@ class Run(_Strict):
     errors: dict[str, Figures]  # by reference: "truth", "unoccluded"
     flip: float | None = None  # of the first seed's picture
     ssim: float | None = None
+    relmse: float | None = None
+    picture: str | None = None  # EXR of the first seed, from the folder of results.json
+    hashes: tuple[tuple[str, str], ...] = ()  # stages in the order in which they ended, and of each one's output
     in_equal_time: float | None = None  # rmse over that of the path tracer in equal time: above 1 it is beaten
     front: bool = False  # nothing measured here is both faster and nearer
-    picture: str | None = None  # EXR of the first seed, from the folder of results.json
 
     @property
     def label(self) -> str:
@@ -81,12 +83,30 @@ class SceneResult(_Strict):
     failures: dict[str, str]  # what gave no picture, and why
 
 
+class PathResult(_Strict):
+    """One method with one choice of settings over all frames of a path (`refgi.batch.temporal`)."""
+
+    scene: str
+    method: str
+    changes: tuple[str, ...]
+    frames: int
+    flicker: float | None  # RMS of what changes from frame to frame beside the truth's change, over the truth's mean
+    noise: float | None  # flicker of a perfect picture
+    lag: float | None  # frames that the light is behind the truth's
+
+    @property
+    def label(self) -> str:
+        """The settings in short."""
+        return ", ".join(self.changes) or "default"
+
+
 class Result(_Strict):
     """results.json."""
 
     refgi: str = FORMAT
     environment: dict[str, Any]
     scenes: tuple[SceneResult, ...]
+    paths: tuple[PathResult, ...] = ()  # of a batch along a path
 
 
 def figures_of(error: Error) -> Figures:
@@ -102,7 +122,23 @@ def figures_of(error: Error) -> Figures:
     Figures
         None in their place.
     """
-    return Figures(**{key: value if math.isfinite(value) else None for key, value in error._asdict().items()})
+    return Figures(**{key: known(value) for key, value in error._asdict().items()})
+
+
+def known(value: float) -> float | None:
+    """Return a figure as data.
+
+    Parameters
+    ----------
+    value : float
+        Nan and infinity where it is not known.
+
+    Returns
+    -------
+    float or None
+        None in their place.
+    """
+    return value if math.isfinite(value) else None
 
 
 def schema_text() -> str:
@@ -182,9 +218,9 @@ def markdown(result: Result) -> str:
                   "| method | settings | ms | RMSE % | bias % | spread % | over truth in equal time | front |",
                   "|---|---|--:|--:|--:|--:|--:|---|"]
         for run in sorted((*scene.runs, *scene.line), key=lambda one: one.seconds):
-            known = run.errors["truth"]
-            lines.append(f"| {run.method} | {run.label} | {number(1e3 * run.seconds)} | {percent(known.rmse)} | "
-                         f"{percent(known.bias)} | {percent(known.spread)} | {times(run.in_equal_time)} | "
+            error = run.errors["truth"]
+            lines.append(f"| {run.method} | {run.label} | {number(1e3 * run.seconds)} | {percent(error.rmse)} | "
+                         f"{percent(error.bias)} | {percent(error.spread)} | {times(run.in_equal_time)} | "
                          f"{'yes' if run.front else ''} |")
         lines += ["", *(f"{name} gave no picture: {why}" for name, why in scene.failures.items()), ""]
     return "\n".join(lines).rstrip() + "\n"

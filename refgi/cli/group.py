@@ -18,7 +18,7 @@ from refgi import __version__
 from refgi.cli.session import DONE, FAILED, INTERRUPTED, USAGE, Fault, Session
 from refgi.errors import InputError, RefgiError
 
-VERBS = ("scenes", "render", "sequence", "compare", "bench", "choose", "report", "vectors", "check", "explain",
+VERBS = ("scenes", "render", "sequence", "compare", "bench", "batch", "choose", "report", "vectors", "check", "explain",
          "settings", "warm", "info")
 HELP = """Indirect light by four published methods on the CPU, judged by path tracing.
 

@@ -1,7 +1,7 @@
 """Atomic file writes (whole or not at all), and the mark by which files of refgi are recognised.
 
 The mark is a JSON object under one name: an attribute of an EXR, a tEXt chunk of a PNG, a key of a JSON file; a page
-has a `generator` of that name.
+has a `generator` of that name, a checkpoint of the truth begins with it.
 """
 
 import contextlib
@@ -149,7 +149,7 @@ def is_from_refgi(path: str | Path) -> bool:
     """
     path = Path(path)
     has_mark = {".exr": _exr, ".png": _png, ".json": _json, ".html": _page, ".csv": _table,
-                ".md": _table}.get(path.suffix.lower())
+                ".md": _table, ".truth": _truth}.get(path.suffix.lower())
     try:
         return has_mark is not None and has_mark(path)
     except Exception:  # a damaged header makes OpenEXR raise nearly anything
@@ -180,6 +180,11 @@ def _table(path: Path) -> bool:
     with path.open(encoding="utf-8") as file:
         first = file.readline(1000).rstrip("\n")
     return (first.startswith(f"<!-- {MARK} ") and first.endswith(" -->")) or first.endswith(f",{MARK}_format")
+
+
+def _truth(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.readline(100).startswith(f"{MARK} truth checkpoint ".encode())
 
 
 def _page(path: Path) -> bool:

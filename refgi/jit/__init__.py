@@ -13,11 +13,11 @@ from typing import Any, ParamSpec, TypeVar, overload
 
 import numba
 
-from refgi.jit.bands import in_bands, threads
+from refgi.jit.bands import in_bands, most_threads, threads
 from refgi.jit.cache import cache_root
 from refgi.jit.dispatch import Kernel, by_type
 
-__all__ = ["Kernel", "by_type", "cache_root", "kernel", "prange", "threads"]
+__all__ = ["Kernel", "by_type", "cache_root", "kernel", "most_threads", "prange", "threads"]
 
 P = ParamSpec("P")
 R = TypeVar("R")

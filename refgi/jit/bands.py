@@ -52,6 +52,18 @@ def threads(count: int | None) -> Iterator[None]:
         numba.set_num_threads(before)
 
 
+def most_threads() -> int:
+    """Return on how many threads kernels of this process can run.
+
+    Returns
+    -------
+    int
+        As many as Numba started with.
+    """
+    config: Any = numba.config
+    return int(config.NUMBA_NUM_THREADS)
+
+
 def in_bands(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function that does what a parallel kernel says, by calls of serial kernels.
 

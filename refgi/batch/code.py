@@ -1,0 +1,180 @@
+"""Which sources a method's pictures depend on: the modules that its imports reach, name by name.
+
+`from refgi.scene import Scene` reaches the module that defines `Scene` and not whatever else the package's `__init__`
+imports, so that methods of one package depend on each other only where one uses the other. Imports inside functions
+count, those for type checkers do not. A source counts by its syntax tree without docstrings: comments, line breaks and
+documentation change nothing.
+"""
+
+import ast
+import functools
+import hashlib
+from collections.abc import Iterator
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+from refgi.methods import BUILT_IN, GROUP
+
+# what every result depends on beside its method: the buffers, the truth and what judges
+SHARED = ("refgi.frame:Frame", "refgi.truth:trace_truth", "refgi.bench.error:error_of", "refgi.compare.outcome:measure",
+          "refgi.compare.flip:flip")
+RUNNERS = ("refgi.bench.measure", "refgi.batch.work")  # by themselves: what else they import changes no result
+
+
+class Import(NamedTuple):
+    """One name that a module imports."""
+
+    module: str
+    name: str | None  # None: the module itself
+    bound: str  # what the importing module calls it
+
+
+class Source(NamedTuple):
+    """What matters of a source file."""
+
+    digest: str
+    imports: tuple[Import, ...]
+
+
+def code_key(*places: str, alone: tuple[str, ...] = ()) -> str:
+    """Return a digest of all sources that some objects reach.
+
+    Parameters
+    ----------
+    *places : str
+        Module and name with a colon between, such as "refgi.splat.sii:METHOD".
+    alone : tuple of str
+        Modules that count by themselves, without what they import.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits; equal where all reached sources are the same but for comments and docstrings.
+    """
+    modules = sorted({*alone}.union(*(reached(place) for place in places)))
+    text = "\n".join(f"{module} {_source(file_of(module)).digest}" for module in modules)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@functools.cache
+def reached(place: str) -> frozenset[str]:
+    """Return the modules that an object reaches by imports, in its own package and in refgi.
+
+    Parameters
+    ----------
+    place : str
+        Module and name with a colon between.
+
+    Returns
+    -------
+    frozenset of str
+        Names of modules.
+    """
+    module, _, name = place.partition(":")
+    packages = {"refgi", module.partition(".")[0]}
+    found: set[str] = set()
+    waiting = [_home(module, name or None)]
+    while waiting:
+        one = waiting.pop()
+        if one in found or one.partition(".")[0] not in packages:
+            continue
+        found.add(one)
+        waiting += [_home(entry.module, entry.name) for entry in _source(file_of(one)).imports
+                    if entry.module.partition(".")[0] in packages]
+    return frozenset(found)
+
+
+def place_of(method: str) -> str:
+    """Return where a method is declared.
+
+    Parameters
+    ----------
+    method : str
+        Short name of a method.
+
+    Returns
+    -------
+    str
+        Module and name with a colon between.
+    """
+    return BUILT_IN[method] if method in BUILT_IN else entry_points(group=GROUP)[method].value
+
+
+def source_digest(text: bytes) -> str:
+    """Return a digest of a source without its comments and docstrings.
+
+    Parameters
+    ----------
+    text : bytes
+        Python.
+
+    Returns
+    -------
+    str
+        Hexadecimal digits.
+    """
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(
+                node, clean=False) is not None:
+            node.body = node.body[1:]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
+def _home(module: str, name: str | None) -> str:
+    """Return the module that defines a name: a submodule, or what a package's `__init__` takes it from."""
+    if name is None:
+        return module
+    if _is_module(f"{module}.{name}"):
+        return f"{module}.{name}"
+    file = file_of(module)
+    if file.name == "__init__.py":
+        for entry in _source(file).imports:
+            if entry.bound == name and entry.module != module and _is_module(entry.module):
+                return _home(entry.module, entry.name)
+    return module
+
+
+@functools.cache
+def _source(file: Path) -> Source:
+    text = file.read_bytes()
+    return Source(source_digest(text), tuple(_imports(ast.parse(text))))
+
+
+def _imports(node: ast.AST) -> Iterator[Import]:
+    if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+        return
+    if isinstance(node, ast.Import):
+        yield from (Import(alias.name, None, alias.asname or alias.name) for alias in node.names)
+    if isinstance(node, ast.ImportFrom) and node.level == 0:
+        yield from (Import(node.module or "", alias.name, alias.asname or alias.name) for alias in node.names)
+    for child in ast.iter_child_nodes(node):
+        yield from _imports(child)
+
+
+def _is_module(name: str) -> bool:
+    return _found(name) is not None
+
+
+def file_of(module: str) -> Path:
+    """Return the source file of a module of refgi or of a method."""
+    file = _found(module)
+    assert file is not None, module
+    return file
+
+
+@functools.cache
+def _found(module: str) -> Path | None:
+    """Return a module's source file, without importing any module."""
+    top, *rest = module.split(".")
+    spec = find_spec(top)
+    if spec is None or spec.origin is None:
+        return None
+    base = Path(spec.origin)
+    if not rest:
+        return base
+    place = base.parent.joinpath(*rest)
+    files = (place / "__init__.py", place.with_suffix(".py"))
+    return next((file for file in files if file.is_file()), None)

@@ -1,0 +1,235 @@
+"""What all jobs of one frame share: scene, G-buffer, RSMs, Embree's tree and the truth.
+
+Buffers are computed once in a process, with all their channels; the time that took counts for each job that uses them,
+so that a job's time is that of a whole frame. Truths stay in a store that batches share: a folder for each choice of
+how they are traced and by which sources, in it a checkpoint for each scene. A process that needs a truth which another
+one is tracing waits for it.
+"""
+
+import contextlib
+import dataclasses
+import hashlib
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from refgi import stages
+from refgi.batch.code import code_key
+from refgi.batch.digest import digest_of
+from refgi.batch.jobs import Shot, key_of_scene, reference_settings, scene_at
+from refgi.batch.outcome import View
+from refgi.bench.grid import TRUTH
+from refgi.bench.measure import Reference, traced
+from refgi.compare.comparison import without_visibility
+from refgi.compare.pictures import linear_planes
+from refgi.errors import InputError, expect
+from refgi.frame import Frame
+from refgi.image import canonical_json, read_exr, write_exr
+from refgi.jit import most_threads
+from refgi.jit.ahead import cores
+from refgi.provenance import Record, method_record, plain, scene_record
+from refgi.scene import Scene
+from refgi.truth import TruthSettings
+
+if sys.platform != "win32":
+    import fcntl
+
+BUFFERS = frozenset({"rsm.gbuffer", "rsm.reflective_shadow_map", "rays.build"})  # stages
+STOPS = ("samples", "seconds", "target_error")  # settings of the truth that no checkpoint knows
+DIGITS = 16  # of folders' names
+TINY = 8  # pixels along a side
+
+Tell = Callable[[str, float], None]
+
+
+class Common(NamedTuple):
+    """What all jobs of a batch share."""
+
+    folder: Path
+    store: Path
+    truth: TruthSettings
+    rsm_resolution: int
+    processes: int = 1  # that share the cores of a machine
+
+    @property
+    def threads(self) -> int | None:
+        """Of compiled kernels on this machine; None for all there are."""
+        return None if self.processes == 1 else min(most_threads(), max(1, cores() // self.processes))
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Of every `Frame`."""
+        return {"rsm_resolution": self.rsm_resolution, "shadows": "exact"}
+
+
+class Buffer(NamedTuple):
+    """What is known of a buffer."""
+
+    stage: str
+    seconds: float  # that it took with all its channels
+    digest: str
+
+
+class Buffers(stages.Memory):
+    """Memory of a frame's buffers alone, which says what those that it gave back took and what they hold."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._begun: dict[str, float] = {}
+        self.used: list[Buffer] = []  # since `start_anew`, in order
+
+    def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
+        """Return whether a buffer is known, and the buffer."""
+        if name not in BUFFERS:
+            return False, None
+        known, kept = super().recall(name, inputs)
+        if not known:
+            self._begun[name] = time.perf_counter()
+            return False, None
+        output, buffer = kept
+        self.used.append(buffer)
+        return True, output
+
+    def keep(self, name: str, inputs: tuple[Any, ...], output: Any) -> None:
+        """Keep a buffer with all its channels and the time that they took."""
+        if name not in BUFFERS:
+            return
+        with stages.observe():  # apart from the log of the job that happens to be the first
+            content = output.recorded() if hasattr(output, "recorded") else output
+        seconds = time.perf_counter() - self._begun.pop(name)
+        buffer = Buffer(name, seconds, digest_of(content))
+        self._kept[name].append((inputs, (output, buffer)))  # all: a scene may have many lights
+        self.used.append(buffer)
+
+    def start_anew(self) -> None:
+        """Forget what was used, not what is kept."""
+        self.used = []
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """What the buffers used took, by stage, s."""
+        spent: dict[str, float] = {}
+        for buffer in self.used:
+            spent[buffer.stage] = spent.get(buffer.stage, 0.0) + buffer.seconds
+        return spent
+
+
+class Shared:
+    """What all jobs of one frame share, each part made on first use.
+
+    Parameters
+    ----------
+    shot : Shot
+        The frame.
+    scene_key : str
+        What its scene was when the job was named.
+    common : Common
+        Of the batch.
+    tell : callable
+        Called with (what runs, share done).
+
+    Raises
+    ------
+    InputError
+        If the scene is another by now, or its camera sees no surface.
+    """
+
+    def __init__(self, shot: Shot, scene_key: str, common: Common, tell: Tell) -> None:
+        self.scene = scene_at(shot)
+        self.shot, self._key, self._common, self._tell = shot, scene_key, common, tell
+        expect(key_of_scene(self.scene) == scene_key, f"scene {shot.name!r}", "what it was when the batch began",
+               "another")
+        self.buffers = Buffers()
+        self._frame: Frame | None = None
+        self._record: Record = {}
+        self.references: dict[str, Reference] = {}
+
+    @property
+    def frame(self) -> Frame:
+        """A frame with its own G-buffer and tracer, which shows all pictures; never timed."""
+        if self._frame is None:
+            frame = Frame(self.scene, **self._common.options)
+            _load_kernels(frame.scene)
+            with stages.observe(memory=self.buffers):
+                covered = frame.gbuffer.covered
+                expect(bool(covered.any()), f"scene {self.shot.name!r}: camera", "a view of some surface",
+                       "a view past all of it")
+                frame.tracer  # noqa: B018  # for the truth, the direct light and jobs
+            self._frame = frame
+        return self._frame
+
+    def fresh_frame(self) -> Frame:
+        """Return a frame with nothing computed, of the geometry that the buffers are of."""
+        return Frame(self.frame.scene, **self._common.options)
+
+    def reference(self, name: str) -> Reference:
+        """Return the truth or the one in which nothing blocks indirect light; its picture is written."""
+        if name not in self.references:
+            settings = reference_settings(self._common.truth, self.shot)
+            settings = settings if name == TRUTH else without_visibility(settings)
+            self.references[name] = self._traced(settings)
+            self._write(name, settings, self.references[name])
+        return self.references[name]
+
+    def view(self) -> View:
+        """Return what the results of the frame share."""
+        covered, truth = self.frame.gbuffer.covered, self.reference(TRUTH)
+        return View(width=self.frame.width, height=self.frame.height, covered=int(covered.sum()),
+                    mean=float(truth.mean[:, covered].mean(dtype=np.float64)), truth=truth.statement)
+
+    def record(self, method: str, settings: Any) -> Record:
+        """Return the record of a picture."""
+        if not self._record:
+            self._record = scene_record(self.scene, {"dtype": self.frame.dtype.name, **self._common.options})
+        return {**self._record, **method_record(method, settings)}
+
+    def _traced(self, settings: TruthSettings) -> Reference:
+        chosen = canonical_json([code_key("refgi.truth:trace_truth", "refgi.frame:Frame"),
+                                 {key: plain(settings)[key] for key in STOPS}])
+        how = hashlib.sha256(chosen.encode()).hexdigest()
+        folder = self._common.store / "truths" / how[:DIGITS] / self._key[:DIGITS]
+        folder.mkdir(parents=True, exist_ok=True)
+        with _alone_in(folder):
+            return traced(self.frame, dataclasses.replace(settings, checkpoint=folder), self._tell)
+
+    def _write(self, name: str, settings: TruthSettings, reference: Reference) -> None:
+        """Write a reference's picture unless the same is there."""
+        file = self._common.folder / "pictures" / self.shot.name / f"{TRUTH}{'' if name == TRUTH else f'_{name}'}.exr"
+        record = self.record(TRUTH, settings)
+        if _record_in(file) != record:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_exr(file, linear_planes(reference.radiance, reference.mean, reference.variance), record)
+
+
+def _load_kernels(scene: Scene) -> None:
+    """Make the smallest of buffers, so that the time of no other holds that of loading its kernels."""
+    small = Frame(scene, width=TINY, height=TINY, rsm_resolution=TINY)
+    small.gbuffer.recorded()
+    for rsm in small.rsms:
+        rsm.recorded()
+
+
+def _record_in(file: Path) -> Record | None:
+    try:
+        return read_exr(file)[1] if file.exists() else None
+    except InputError:
+        return None
+
+
+@contextlib.contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Wait until no other process is in a block on the same folder; a killed process leaves nothing behind."""
+    if sys.platform == "win32":  # two processes may trace the same truth; the last one's file stays
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)

@@ -1,0 +1,169 @@
+"""Thresholds of a plan: `"atrium.sii.relmse" = "<= 0.31"` under `[expect]`.
+
+A key is scene, method, the setting as tables label it where one alone is meant, and figure, with dots between. Without
+a setting all of the method's have to hold, and a scene on a path stands for each of its frames.
+"""
+
+import operator
+import re
+from collections.abc import Callable, Collection, Iterator
+from typing import NamedTuple
+
+from refgi.bench.results import Result, Run, SceneResult
+from refgi.errors import expect
+
+FRAME = "@"  # between a scene and the number of a frame
+ERRORS = ("rmse", "bias", "spread", "noise")  # against the truth, over its mean
+FIGURES = (*ERRORS, "relmse", "flip", "ssim", "seconds", "rmse_unoccluded")
+OVER_TIME = ("flicker", "lag")
+COMPARISONS: dict[str, Callable[[float, float], bool]] = {
+    "<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
+
+
+class Threshold(NamedTuple):
+    """What is expected of one figure."""
+
+    key: str  # as in the plan
+    scene: str
+    method: str
+    label: str | None  # of the setting; None for all
+    figure: str
+    sign: str  # of `COMPARISONS`
+    bound: float
+
+
+class Finding(NamedTuple):
+    """What is not as it should be."""
+
+    place: str  # scene, method and setting
+    figure: str
+    text: str  # what was expected and what was found
+    pictures: tuple[str, ...] = ()
+    stage: str | None = None  # the first whose output is another
+
+    def __str__(self) -> str:
+        first = [] if self.stage is None else [f"first stage that changed: {self.stage}"]
+        return "; ".join([f"{self.place}: {self.figure} {self.text}", *self.pictures, *first])
+
+
+def read_threshold(key: str, text: object, scenes: Collection[str], methods: Collection[str], file: str) -> Threshold:
+    """Read one line of `[expect]`.
+
+    Parameters
+    ----------
+    key : str
+        Such as ``atrium.sii.relmse`` or ``atrium.val.clusters.count=8, lights=256.rmse``.
+    text : object
+        Such as ``<= 0.31``.
+    scenes, methods : collection of str
+        Of the plan.
+    file : str
+        The plan, for errors.
+
+    Returns
+    -------
+    Threshold
+        What it says.
+
+    Raises
+    ------
+    InputError
+        If scene, method, figure or comparison is unknown.
+    """
+    where = f'{file}: expect."{key}"'
+    scene = max((name for name in scenes if key.startswith(f"{name}.")), key=len, default="")
+    expect(scene != "", where, f"a scene of the plan ({', '.join(scenes)}) first", key)
+    method, *middle = key[len(scene) + 1:].split(".")
+    expect(method in methods, where, f"a method of the plan ({', '.join(sorted(methods))}) after the scene", method)
+    figure = middle.pop() if middle else ""
+    known = (*FIGURES, *OVER_TIME)
+    expect(figure in known, where, f"a figure at the end, one of {', '.join(known)}", figure)
+    found = re.fullmatch(r"\s*(<=|>=|<|>)\s*([-+\d.eE]+)\s*", text) if isinstance(text, str) else None
+    bound = _number(found[2]) if found else None
+    expect(bound is not None, where, 'a comparison such as "<= 0.31"', text)
+    assert found is not None
+    assert bound is not None
+    return Threshold(key, scene, method, ".".join(middle) or None, figure, found[1], bound)
+
+
+def broken(thresholds: Collection[Threshold], result: Result, *, whole: bool = True) -> list[Finding]:
+    """Return thresholds that do not hold.
+
+    Parameters
+    ----------
+    thresholds : collection of Threshold
+        Of a plan.
+    result : Result
+        Of its batch.
+    whole : bool
+        Whether all jobs of the plan are done, so that a threshold has to find its figure.
+
+    Returns
+    -------
+    list of Finding
+        One for each figure that is missed, or that is not there although its threshold speaks of it.
+    """
+    found = []
+    for one in thresholds:
+        values = list(_values(one, result))
+        if not values and whole:
+            found.append(Finding(one.key, one.figure, f"expected {one.sign} {one.bound:g}, nothing was measured"))
+        for place, value, picture in values:
+            if value is None or not COMPARISONS[one.sign](value, one.bound):
+                text = "is not known" if value is None else f"is {value:.4g}"
+                found.append(Finding(place, one.figure, f"{text}, expected {one.sign} {one.bound:g}",
+                                     () if picture is None else (picture,)))
+    return found
+
+
+def figure_of(run: Run, figure: str) -> float | None:
+    """Return a figure of a run.
+
+    Parameters
+    ----------
+    run : Run
+        Method and setting on one scene.
+    figure : str
+        Of `FIGURES`.
+
+    Returns
+    -------
+    float or None
+        None where it is not known.
+    """
+    if figure in ERRORS:
+        value: float | None = getattr(run.errors["truth"], figure)
+        return value
+    if figure == "rmse_unoccluded":
+        return run.errors["unoccluded"].rmse if "unoccluded" in run.errors else None
+    own: float | None = getattr(run, figure)
+    return own
+
+
+def place_of(scene: str, method: str, label: str) -> str:
+    """Return how a run is named in a finding: scene, method and setting."""
+    return f"{scene}.{method} ({label})"
+
+
+def _values(one: Threshold, result: Result) -> Iterator[tuple[str, float | None, str | None]]:
+    """Yield place, value and picture of each figure that a threshold speaks of."""
+    if one.figure in OVER_TIME:
+        for way in result.paths:
+            if (way.scene, way.method) == (one.scene, one.method) and one.label in (None, way.label):
+                yield place_of(way.scene, way.method, way.label), getattr(way, one.figure), None
+        return
+    for scene in result.scenes:
+        if scene.scene == one.scene or scene.scene.startswith(f"{one.scene}{FRAME}"):
+            yield from ((place_of(scene.scene, run.method, run.label), figure_of(run, one.figure), run.picture)
+                        for run in _runs(scene) if run.method == one.method and one.label in (None, run.label))
+
+
+def _runs(scene: SceneResult) -> tuple[Run, ...]:
+    return (*scene.runs, *scene.line)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

@@ -1,0 +1,177 @@
+"""Jobs done one after the other in one process, each leaving its picture and then its result.
+
+A job first runs once with every stage recorded: that loads its kernels, fills the buffers it shares and gives the
+digests of its stages. Then it runs once a seed, timed; its time is that of its own stages and of the buffers it used,
+whichever job computed them.
+"""
+
+import contextlib
+import os
+import time
+import warnings
+from typing import Any, NamedTuple
+
+import numpy.typing as npt
+
+from refgi import stages
+from refgi.batch.digest import hashes_of
+from refgi.batch.filtered import blended, filter_record
+from refgi.batch.jobs import Job, Shot
+from refgi.batch.outcome import Outcome, failed, is_done, write_outcome
+from refgi.batch.shared import BUFFERS, Buffers, Common, Shared, Tell
+from refgi.bench.grid import TRUTH
+from refgi.bench.measure import Made, judged, with_seed
+from refgi.compare.outcome import UNOCCLUDED
+from refgi.compare.pictures import linear_planes
+from refgi.errors import RefgiError, RefgiWarning
+from refgi.frame import Frame
+from refgi.image import write_exr
+from refgi.jit import threads
+from refgi.method import Method
+from refgi.methods import METHODS
+
+Array = npt.NDArray[Any]
+
+
+class Chunk(NamedTuple):
+    """Jobs that one process does in their order."""
+
+    jobs: tuple[Job, ...]
+    common: Common
+    working_folder: str = os.curdir  # from which scenes are named
+
+
+_kept: dict[tuple[Shot, str, Common], Shared] = {}  # of this process: what the jobs of a frame share
+
+
+def run_chunk(chunk: Chunk, tell: Tell = lambda *_: None) -> int:
+    """Do jobs one after the other, those without a result.
+
+    Parameters
+    ----------
+    chunk : Chunk
+        The jobs.
+    tell : callable
+        Called with (what runs, share done).
+
+    Returns
+    -------
+    int
+        How many were done; errors of a job are its result.
+
+    Raises
+    ------
+    InputError
+        If a result cannot be written.
+    """
+    done = 0
+    with contextlib.chdir(chunk.working_folder), threads(chunk.common.threads), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)  # of each of many settings with each seed
+        for job in chunk.jobs:
+            if not is_done(chunk.common.folder, job):
+                tell(job.label, done / len(chunk.jobs))
+                write_outcome(chunk.common.folder, outcome_of(job, chunk.common, tell))
+                done += 1
+    return done
+
+
+def outcome_of(job: Job, common: Common, tell: Tell) -> Outcome:
+    """Do a job and write its picture.
+
+    Parameters
+    ----------
+    job : Job
+        The job.
+    common : Common
+        What it shares with the batch.
+    tell : callable
+        Called with (what runs, share done).
+
+    Returns
+    -------
+    Outcome
+        Figures, or the error of whatever went wrong.
+    """
+    try:
+        return _done(job, common, _shared(job, common, tell))
+    except RefgiError as error:
+        return failed(job, str(error))
+    except Exception as error:  # a fault of refgi or of the machine ends this job alone
+        return failed(job, f"{type(error).__name__}: {' '.join(str(error).split())}")
+
+
+def forget() -> None:
+    """Let go of what this process keeps for the next job."""
+    _kept.clear()
+
+
+def _shared(job: Job, common: Common, tell: Tell) -> Shared:
+    key = job.shot, job.scene_key, common
+    if key not in _kept:
+        _kept.clear()  # a process keeps one frame
+        _kept[key] = Shared(job.shot, job.scene_key, common, tell)
+    return _kept[key]
+
+
+def _done(job: Job, common: Common, shared: Shared) -> Outcome:
+    method, references = METHODS[job.choice.method], {TRUTH: shared.reference(TRUTH)}
+    if not method.knows_visibility(job.choice.settings):
+        references[UNOCCLUDED] = shared.reference(UNOCCLUDED)
+    settings = [with_seed(job.choice.settings, seed) for seed in job.seeds]
+    hashes = _hashes(method, settings[0], shared)
+    made = Made([], [], {})
+    for one in settings:
+        _timed(job, one, made, shared)
+    frames = None
+    if job.temporal is not None:
+        filtered = blended(job, common, shared, made.pictures[0])
+        made.pictures[0], frames = filtered.irradiance, filtered.frames
+    _write(job, common, shared, settings[0], made.pictures[0], frames)
+    run = judged(job.choice, made, references, shared.frame)
+    run = run.model_copy(update={"picture": job.picture, "hashes": hashes})
+    return Outcome(job=job.name, scene=job.shot.name, method=job.choice.method, changes=job.choice.changes,
+                   status="done", view=shared.view(), run=run)
+
+
+def _hashes(method: Method, settings: Any, shared: Shared) -> tuple[tuple[str, str], ...]:
+    """Run a method with every stage recorded, and return what each gave."""
+    frame, buffers = shared.fresh_frame(), shared.buffers
+    buffers.start_anew()
+    with stages.observe(record=True, memory=buffers) as log:
+        method.function(frame, settings)
+    digests: dict[str, list[str]] = {name: [] for name in BUFFERS}
+    for buffer in buffers.used:
+        digests[buffer.stage].append(buffer.digest)
+    return hashes_of(log, digests)
+
+
+def _timed(job: Job, settings: Any, made: Made, shared: Shared) -> None:
+    """Run a method on the shared buffers and add its picture and its time."""
+    frame: Frame = shared.fresh_frame()
+    buffers: Buffers = shared.buffers
+    buffers.start_anew()
+    with stages.observe(memory=buffers) as log:
+        started = time.perf_counter()
+        picture = METHODS[job.choice.method].function(frame, settings)
+        seconds = time.perf_counter() - started
+    if not made.times:
+        made.stages.update(_spent(log, buffers))
+    made.pictures.append(picture)
+    made.times.append(seconds + sum(buffers.seconds.values()))
+
+
+def _spent(log: stages.Log, buffers: Buffers) -> dict[str, float]:
+    """Return the seconds of outermost stages, and of buffers what they took when they were made."""
+    spent = buffers.seconds
+    for run in log.runs:
+        if run.depth == 0 and run.status == "ran":
+            spent[run.name] = spent.get(run.name, 0.0) + run.seconds
+    return spent
+
+
+def _write(job: Job, common: Common, shared: Shared, settings: Any, irradiance: Array, frames: Array | None) -> None:
+    """Write the picture of the first seed."""
+    file = common.folder / job.picture
+    file.parent.mkdir(parents=True, exist_ok=True)
+    planes = linear_planes(shared.frame.radiance(irradiance), irradiance, frames=frames)
+    write_exr(file, planes, shared.record(job.choice.method, settings) | filter_record(job))

@@ -177,10 +177,10 @@ def _draw_links(plot: Any, curve: Curve, axes: Axes) -> None:
 
 
 def _linked(svg: str, texts: Mapping[str, str]) -> str:
-    """Return a plot whose marks lead to names of the page, each with its text."""
+    """Return a plot whose marks lead to rows of the page's table, and by its script to pictures, each with its text."""
     def link(match: re.Match[str]) -> str:
         name, text = match[1], html.escape(texts[match[1]])
-        return f'<a href="#{name}" data-picture="{name}" aria-label="{text}"><title>{text}</title>'
+        return f'<a href="#row-{name}" data-picture="{name}" aria-label="{text}"><title>{text}</title>'
 
     return re.sub(rf'<a xlink:href="{MARK}([^"]*)"[^>]*>', link, svg)
 

@@ -110,7 +110,7 @@ def test_without_pictures_there_are_still_tables_and_plots(result, tmp_path):
 
 def test_marks_lead_to_the_rows_of_their_runs():
     svg = plot_of(make_scene("box", "p"), 3)
-    links = re.findall(r'<a href="#([^"]*)" data-picture="[^"]*" aria-label="([^"]*)"', svg)
+    links = re.findall(r'<a href="#row-([^"]*)" data-picture="[^"]*" aria-label="([^"]*)"', svg)
     assert links == [("scene3-sii-1", "sii, lights=16: 50 % in 10 ms"),
                      ("scene3-sii-2", "sii, lights=64: 30 % in 40 ms"),
                      ("scene3-vpl-3", "vpl, lights=64: 35 % in 200 ms"),
@@ -149,7 +149,8 @@ def test_marks_and_rows_open_their_pictures(found):
 
 
 def test_tables_sort_by_error(found):
-    assert found["sorted"] == [f"scene1-{name}" for name in ("truth-6", "sii-2", "vpl-3", "truth-5", "vpl-4", "sii-1")]
+    right = ("truth-6", "sii-2", "vpl-3", "truth-5", "vpl-4", "sii-1")
+    assert found["sorted"] == [f"row-scene1-{name}" for name in right]
 
 
 def test_coarse_pictures_are_said_to_be_and_judged_by_the_same_means(result, folder, tmp_path, monkeypatch):

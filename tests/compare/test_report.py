@@ -184,7 +184,7 @@ def test_marks_lead_to_their_pictures_and_bars_are_drawn():
     axes = Axes("lights", "error", log_x=True, log_y=True)
     svg = curves_plot([curve], axes)
     assert re.findall(r'<a href="#([^"]*)" data-picture="([^"]*)" aria-label="([^"]*)"', svg) == [
-        ("a-1", "a-1", "first &lt;1&gt;"), ("a-3", "a-3", "third")]
+        ("row-a-1", "a-1", "first &lt;1&gt;"), ("row-a-3", "a-3", "third")]
     assert "mark:" not in svg
     assert svg.count("LineCollection") == 1 + curves_plot([curve._replace(bars=())], axes).count("LineCollection")
 

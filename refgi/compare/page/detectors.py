@@ -16,7 +16,7 @@ from refgi.compare.outcome import NOISE_MARGIN
 
 Array = npt.NDArray[Any]
 
-STREAKS, SPIKES, BLOCKS, FACTOR = 0.2, 3.0, 1.3, 0.5  # thresholds of the figures
+STREAKS, SPIKES, BLOCKS, FACTOR = 0.12, 3.0, 1.3, 0.5  # thresholds of the figures
 TILE, LEAST_TILES = 32, 16  # pixels: the median over tiles leaves out edges of objects, which lie in few of them
 LAG = 3  # pixels along which streaks go on and noise does not
 LEAST_DETAIL = 0.05  # of the error's deviation in a tile: the rest is curvature of a smooth error

@@ -1,7 +1,7 @@
 """Kill a batch at random moments and count what is lost: `python -m benchmarks kill-batch --times 50 --workers 2`.
 
 Every time the batch goes on in the same folder and is killed (SIGKILL to its first process, which its workers have to
-notice) at a random moment after it has begun a job, each fifth time while it starts. Then every file must be whole,
+notice) at a random moment after a first new result, each fifth time from its start on. Then every file must be whole,
 every result that was there must be there unchanged, and of the jobs that were begun at most one a worker may be without
 a result. A batch that is finished begins anew; at the end the last one is finished undisturbed.
 """
@@ -96,7 +96,7 @@ def killed(folder: Path, times: int, workers: int, longest: float, seed: int) ->
         begun = len(_begun(folder))
         process = subprocess.Popen(command, **quietly, start_new_session=True)
         if number % 5:
-            _wait_for(lambda: len(_begun(folder)) > begun or process.poll() is not None)  # noqa: B023
+            _wait_for(lambda: len(_results(folder)) > len(kept) or process.poll() is not None)  # noqa: B023
         time.sleep(moments.uniform(0.0, longest))
         process.kill()
         process.wait()

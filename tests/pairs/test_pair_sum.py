@@ -238,7 +238,7 @@ def test_black_lights_change_no_bit():
     assert packed.shape == (9, 130)
     assert not packed[6:, -1].any()
     bare = np.zeros((3, 129))
-    sum_pairs(*(np.ascontiguousarray(part[:, 0]) for part in receivers[:2]), packed, None, bare)
+    sum_pairs(*(np.ascontiguousarray(part[:, 0]) for part in receivers[:2]), packed, None, True, bare)
     # the public function drops black lights, which moves the others into other groups: rounding may differ
     np.testing.assert_allclose(summed(receivers, lights._replace(flux=flux)), bare, rtol=ROUNDING[np.float64])
 

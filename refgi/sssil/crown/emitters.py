@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
+from refgi.skips import left_out
 from refgi.sssil.pyramid.view import Level
 
 Array = npt.NDArray[Any]
@@ -68,6 +69,23 @@ def pack(level: Level, phases: int, farthest: int, most_lanes: int) -> Emitters:
     _pack(level.position, level.normal, level.radiance, level.area, phases, line, pad, real(scale),
           real(scale * scale / math.pi), packed, emit_from, emit_to)
     return Emitters(packed, emit_from, emit_to, phases, line, pad, strip, scale)
+
+
+def reading(emitters: Emitters) -> Emitters:
+    """Return emitters of which dark ends of rows are not read; without the skip they count as emitting."""
+    if left_out("sssil.senders", lambda: _dark_ends(emitters)):
+        return emitters
+    every = np.arange(emitters.emit_to.shape[2], dtype=np.int32) * BLOCK
+    all_emit = np.ascontiguousarray(np.broadcast_to(every, emitters.emit_to.shape))
+    return emitters._replace(emit_from=all_emit, emit_to=all_emit)
+
+
+def _dark_ends(emitters: Emitters) -> tuple[int, int]:
+    """Return how many lanes of all rows lie before the first emitting block of a row or after its last."""
+    first = np.maximum(emitters.emit_from[:-1, :, 0], emitters.pad)
+    last = np.minimum(emitters.emit_to[:-1, :, -1], emitters.line - emitters.pad)
+    total = first.size * (emitters.line - 2 * emitters.pad)
+    return total - int(np.maximum(last - first, 0).sum()), total
 
 
 def length_scale(depth: Array) -> float:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
 from refgi.sssil.crown.add import ROWS, TEXEL, WIDE, add_two, close_group, form_of
-from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, pack
+from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, pack, reading
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.points import level_key, pixel_key, row_key, sample_points, sample_weight, shift_of, shifted
 from refgi.sssil.crown.reach import chosen_radius
@@ -69,7 +69,7 @@ def gather(
         return result
     shared = shared_offsets(sampling, index, level.number, rows, radius, columns) if samples is None else samples
     offsets, weight = _reaching(*shared, rows, columns)
-    emitters = pack(senders, offsets.shape[1], farthest, WIDE)
+    emitters = reading(pack(senders, offsets.shape[1], farthest, WIDE))
     paired = sampling.pattern in ("fixed", "all")
     _gather_shared(emitters, level.position, level.normal, offsets, weight.astype(real), paired, form, factor, result)
     return result

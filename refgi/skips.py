@@ -44,7 +44,8 @@ SKIPS: Mapping[str, Skip] = MappingProxyType({
     "cluster.receivers": Skip("visibility of an area light at pixels that it does not light",
                               "pairs of area light and pixel"),
     "sssil.levels": Skip("levels of which no texel has another in its crown", "levels"),
-    "sssil.senders": Skip("dark texels at either end of a row of senders", "texels, in blocks of 8"),
+    "sssil.senders": Skip("receivers at either end of a strip that a sample is dark for",
+                          "texels at dark ends of rows"),
     "truth.photons": Skip("photons, where no lobe is sharp", "photons a pass"),
 })
 

@@ -70,7 +70,7 @@ def dim_lights(frame: Frame, settings: Settings, rounds: int, share: float = SHA
     if lights.flux.shape[1] > MOST:
         return None
     parts = parts_of_lights(receivers, lights, pairs, footprint)
-    kept = _brightest(parts, share)
+    kept = brightest(parts, share)
     if not len(kept):
         return None
     some = (receivers, selected(lights, kept), pairs, None if footprint is None else footprint[kept])
@@ -121,8 +121,8 @@ def selected(lights: PixelLights, index: Any) -> PixelLights:
     return lights._replace(**parts)
 
 
-def _brightest(parts: Array, share: float) -> Array:
-    """Return the fewest lights that carry a share of the sum, in rising order; none where the sum is 0."""
+def brightest(parts: Array, share: float) -> Array:
+    """Return the fewest lights (n,) that carry a share of the sum of all parts (N,), rising; none where that is 0."""
     order = np.argsort(-parts, kind="stable")
     sums = np.cumsum(parts[order])
     if not len(sums) or sums[-1] <= 0:

@@ -1,7 +1,8 @@
 """From pixel lights to irradiance at every pixel: checks, packing and the choice of kernels around Eq. 2.
 
-What the lights do not need does not run: pixels without surface are left out, a light without diffuse flux is no
-diffuse light, and without a glossy light no lobe code is compiled. The picture is the same to the bit either way.
+What the lights do not need does not run: pixels without surface are left out, lights that cannot reach a tile are
+passed over, and without a glossy light no lobe code is compiled: all skips that change no bit (`refgi.skips`). A light
+without diffuse flux is no diffuse light; among others it would move where sums over 64 lights end, and their rounding.
 """
 
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from refgi.pairs.pair_sum import TILE, sum_pairs
 from refgi.pairs.settings import PairSettings, SphereClamp
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.pairs.tile_counts import lobe_tiles, tiles_behind
-from refgi.pairs.tiles import block_by_block, put, receiving, taken
+from refgi.pairs.tiles import block_by_block, clear, put, receiving, taken
 from refgi.skips import left_out
 from refgi.stages import report_progress, skip, stage
 
@@ -154,7 +155,8 @@ def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, A
     """
     position, covered = np.asarray(receivers.position), np.asarray(receivers.covered, np.bool_)
     normal = np.asarray(receivers.normal, position.dtype)
-    places = block_by_block(receiving(covered))
+    shown = receiving(covered)
+    places = block_by_block(shown)
     result = np.zeros(position.shape, position.dtype)
     step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
     for first in range(0, len(places), step):
@@ -164,6 +166,7 @@ def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, A
         add(points, normals, part, sums)
         put(result, part, sums)
         report_progress(min(1.0, (first + step) / len(places)))
+    clear(result, covered, shown)
     return result
 
 

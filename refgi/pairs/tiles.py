@@ -26,10 +26,16 @@ ROUNDING = 32.0  # units of rounding of |d| that a cosine computed from d may be
 
 
 def receiving(covered: Array) -> Array:
-    """Return the pixels (h, w) to sum at: those with a surface; without the skip all, and others receive 0."""
+    """Return the pixels (h, w) to sum at: those with a surface; without the skip all, and `clear` follows."""
     if left_out("pairs.pixels", lambda: (covered.size - np.count_nonzero(covered), covered.size)):
         return covered
     return np.ones_like(covered)
+
+
+def clear(plane: Array, covered: Array, receiving: Array) -> None:
+    """Set pixels without surface of (3, h, w) to 0 that were summed at, where a zero normal gave them anything."""
+    if receiving is not covered:
+        plane[:, ~covered] = 0
 
 
 def block_by_block(covered: Array) -> Array:

@@ -40,7 +40,7 @@ from refgi.cluster.visibility.series import series
 from refgi.cluster.visibility.shadow import filter_channels, shadow_of
 from refgi.errors import expect
 from refgi.pairs.irradiance import Receivers, checked
-from refgi.pairs.tiles import receiving
+from refgi.pairs.tiles import clear, receiving
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage
 
@@ -106,7 +106,9 @@ def clustered_irradiance(
     expect(np.shape(facing) == np.shape(receivers.position), "facing", f"shape {np.shape(receivers.position)}",
            np.shape(facing))
     packed = checked(receivers, lights, settings.pairs, footprint)
-    parts = subsets(receiving(np.asarray(receivers.covered, np.bool_)), interleaving)
+    covered = np.asarray(receivers.covered, np.bool_)
+    shown = receiving(covered)
+    parts = subsets(shown, interleaving)
     subset = assigned_subsets(areas.of, interleaving, settings.interleaving.assignment)
     members = member_lights(packed, areas.of, len(areas.members), subset, interleaving**2)
     by_tiles = _goes_by_tiles(members, settings, visibility_of)
@@ -122,6 +124,7 @@ def clustered_irradiance(
         _add_by_lists(tiles, parts, members, _visibility(areas, maps, settings, visibility_of, rays), sums)
     result = np.zeros(np.shape(receivers.position), sums.dtype)
     scatter_pixels(sums, parts, sums.dtype.type(interleaving**2), result.reshape(3, -1))
+    clear(result, covered, shown)
     return result
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_loss
-from refgi.pairs.tiles import receiving
+from refgi.pairs.tiles import clear, receiving
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 from refgi.splat.gather.gather_sum import GatherMap, centers, disc_loss, disc_pattern, gather_discs
@@ -120,7 +120,9 @@ def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
     coarsely, disc = settings.interpolation, settings.disc
     if coarsely is None or coarsely.grid >= max(frame.height, frame.width):
         skip("gather.interpolate", "every pixel runs the sum")
-        return Gathered(gather_irradiance(receivers._replace(covered=shown), frame.rsms, disc), covered, covered)
+        total = gather_irradiance(receivers._replace(covered=shown), frame.rsms, disc)
+        clear(total, buffer.covered, shown)
+        return Gathered(total, covered, covered)
     coarse = coarse_pixels(frame.height, frame.width, coarsely.grid)
     first = np.zeros_like(buffer.covered)
     first[np.ix_(*coarse)] = True
@@ -129,6 +131,7 @@ def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
     result, interpolated = interpolate(receivers, coarse_light, coarse, limits)
     rest = receivers._replace(covered=shown & ~interpolated)
     total = result + gather_irradiance(rest, frame.rsms, disc)
+    clear(total, buffer.covered, shown)
     evaluated = np.count_nonzero(shown & first) + np.count_nonzero(rest.covered & ~first)
     return Gathered(total, int(evaluated), covered)
 

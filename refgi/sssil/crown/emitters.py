@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
-from refgi.skips import left_out
 from refgi.sssil.pyramid.view import Level
 
 Array = npt.NDArray[Any]
@@ -71,16 +70,7 @@ def pack(level: Level, phases: int, farthest: int, most_lanes: int) -> Emitters:
     return Emitters(packed, emit_from, emit_to, phases, line, pad, strip, scale)
 
 
-def reading(emitters: Emitters) -> Emitters:
-    """Return emitters of which dark ends of rows are not read; without the skip they count as emitting."""
-    if left_out("sssil.senders", lambda: _dark_ends(emitters)):
-        return emitters
-    every = np.arange(emitters.emit_to.shape[2], dtype=np.int32) * BLOCK
-    all_emit = np.ascontiguousarray(np.broadcast_to(every, emitters.emit_to.shape))
-    return emitters._replace(emit_from=all_emit, emit_to=all_emit)
-
-
-def _dark_ends(emitters: Emitters) -> tuple[int, int]:
+def dark_ends(emitters: Emitters) -> tuple[int, int]:
     """Return how many lanes of all rows lie before the first emitting block of a row or after its last."""
     first = np.maximum(emitters.emit_from[:-1, :, 0], emitters.pad)
     last = np.minimum(emitters.emit_to[:-1, :, -1], emitters.line - emitters.pad)

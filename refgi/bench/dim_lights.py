@@ -36,6 +36,7 @@ class DimLights(pydantic.BaseModel):
 
     lights: int
     carrying: int  # the fewest that carry `share`
+    count: int  # `lights.count` that draws about as many
     share: float
     times: tuple[float, ...]  # s of the sum over all lights at all pixels, a round each
     times_carrying: tuple[float, ...]  # over those alone
@@ -84,7 +85,8 @@ def dim_lights(frame: Frame, settings: Settings, rounds: int, share: float = SHA
             took.append(time.perf_counter() - started)
     difference = (without - right)[:, receivers.covered].astype(np.float64)
     mean = float(right[:, receivers.covered].mean(dtype=np.float64))
-    return DimLights(lights=len(parts), carrying=len(kept), share=share, times=tuple(times[0]),
+    return DimLights(lights=len(parts), carrying=len(kept), count=max(1, round(chosen.count * len(kept) / len(parts))),
+                     share=share, times=tuple(times[0]),
                      times_carrying=tuple(times[1]), error=float(np.sqrt((difference**2).mean())) / mean)
 
 

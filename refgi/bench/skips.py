@@ -1,32 +1,33 @@
 """What each skip saves on a scene, measured, with the proof that it changes no bit of the picture.
 
-A method renders the scene with all skips on, which counts what each has to leave out; then, in rounds, with all on and
-with each of these off in turn, so that a slow moment of the machine falls on all. Beside that stand things that could
-be left out at the cost of an error, with the setting to type, and skips that have no switch, with the reason.
+A method renders the scene with all skips on, which counts what each has to leave out, and with each of these off, which
+compares bits and loads kernels. Then come rounds: a picture with all on before each one without, so that a slow moment
+of the machine falls on both. Beside that stand things that could be left out at the cost of a difference, with the
+setting to type, and skips that have no switch, with the reason.
 """
 
 import hashlib
 import statistics
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pydantic
 
 from refgi import skips
 from refgi.bench.dim_lights import DimLights, dim_lights
-from refgi.errors import InputError, RefgiWarning, expect
+from refgi.bench.trades import Trade, changes_of, difference
+from refgi.errors import RefgiWarning, expect
 from refgi.methods import Picture, find_method, render
 from refgi.scene import Scene
-from refgi.settings import Settings, from_text
+from refgi.settings import Settings
 
-__all__ = ["MeasuredSkip", "SkipReport", "Trade", "Unmeasured", "measure_skips"]
+__all__ = ["UNMEASURED", "MeasuredSkip", "SkipReport", "Unmeasured", "measure_skips"]
 
-Array = npt.NDArray[Any]
 Tell = Callable[[str, float], None]
+Times = tuple[tuple[float, ...], tuple[float, ...]]  # s, a round each: of the plain picture, and of one right after
 
 
 class Kernel(NamedTuple):
@@ -53,14 +54,6 @@ UNMEASURED = (
            "the kernel that draws samples sorts them out"),
     Kernel(frozenset({"truth", "vpl"}), "pixels without surface", "rays start on triangles, which these have not"),
 )
-# what may be left out at the cost of an error: meaning and changes to the settings
-TRADES: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
-    "sii": (("pairs below 1 % of the brightest light's irradiance", ("reach.cut=relative", "reach.cut.share=0.01")),
-            ("three of four pixels where neighbours resemble each other", ("half_resolution=true",))),
-    "multires": (("subsplats that a target of 1 % does not ask for", ("subsplats=error", "subsplats.target=0.01")),),
-    "val": (("walls that nothing lies behind: drawn into maps after all", ("maps.occluders_alone=false",)),
-            ("63 of 64 lights at each pixel", ("interleaving.block=8",))),
-}
 
 
 class _Strict(pydantic.BaseModel):
@@ -76,23 +69,18 @@ class MeasuredSkip(_Strict):
     left_out: int
     of: int
     times: tuple[float, ...]  # s of a whole frame with all skips on, a round each
-    times_without: tuple[float, ...]  # with this one off, in the same rounds
+    times_without: tuple[float, ...]  # with this one off, right after
     same_bits: bool
 
     @property
+    def saved(self) -> tuple[float, ...]:
+        """What the skip saves in each round, s; below 0 where it costs more than it brings."""
+        return tuple(off - on for on, off in zip(self.times, self.times_without, strict=True))
+
+    @property
     def saves(self) -> float:
-        """Median over rounds of what the skip saves, s; below 0 where it costs more than it brings."""
-        return statistics.median(off - on for on, off in zip(self.times, self.times_without, strict=True))
-
-
-class Trade(_Strict):
-    """What a change of settings leaves out, or puts back, at the cost of a difference."""
-
-    meaning: str
-    changes: tuple[str, ...]  # "key=value", as --set takes them
-    times: tuple[float, ...]  # s of a whole frame as the settings are, a round each
-    times_changed: tuple[float, ...]
-    difference: float | None  # RMSE to the picture as the settings are, over its mean; None where that is black
+        """Median of what it saves, s."""
+        return statistics.median(self.saved)
 
 
 class Unmeasured(_Strict):
@@ -109,10 +97,10 @@ class SkipReport(_Strict):
     method: str
     width: int
     height: int
-    times: tuple[float, ...]  # s of a whole frame with all skips on, a round each
+    times: tuple[float, ...]  # s of every whole frame with all skips on
     skips: tuple[MeasuredSkip, ...]
     trades: tuple[Trade, ...]
-    dim_lights: DimLights | None  # None: the method sums no pixel lights
+    dim_lights: DimLights | None  # None: the method sums no pixel lights, or none can be left out
     unmeasured: tuple[Unmeasured, ...]
 
     @property
@@ -154,25 +142,26 @@ def measure_skips(
     """
     expect(rounds >= 1, "rounds", "1 or more", rounds)
     chosen = find_method(method).settings() if settings is None else settings
+    plain = _Job(scene, method, chosen, frame_options)
     with skips.count_skips() as counts:
-        first = render(scene, method, chosen, **frame_options)
+        first = plain.run()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)  # said by the first picture
-        found = {name: count for name, count in counts.items() if count.left_out > 0}
-        jobs = [_Job(scene, method, chosen, frame_options, (name,)) for name in skips.SKIPS if name in found]
         lights = dim_lights(first.frame, chosen, rounds)
-        trades = _trades(method, chosen, lights)
-        jobs += [_Job(scene, method, changed, frame_options, ()) for _, _, changed in trades]
-        pictures = [_shown(job, number / len(jobs), tell) for number, job in enumerate(jobs)]
-        on, off = _in_turn(_Job(scene, method, chosen, frame_options, ()), jobs, rounds, tell)
-    of = len(found)
+        names = [name for name in skips.SKIPS if name in counts and counts[name].left_out]
+        changes = changes_of(method, chosen, lights)
+        jobs = [*(plain._replace(off=(name,)) for name in names),
+                *(plain._replace(settings=change.settings) for change in changes)]
+        comparisons = _compared(jobs, first, tell)
+        times = _in_turn(plain, jobs, rounds, tell)
+    results = list(zip(times, comparisons, strict=True))
     return SkipReport(
-        scene=scene.name, method=method, width=first.frame.width, height=first.frame.height, times=on,
-        skips=tuple(_measured(name, found[name], on, times, _hash(picture) == _hash(first))
-                    for name, times, picture in zip((job.off[0] for job in jobs[:of]), off, pictures, strict=False)),
-        trades=tuple(Trade(meaning=meaning, changes=changes, times=on, times_changed=times,
-                           difference=_difference(picture, first))
-                     for (meaning, changes, _), times, picture in zip(trades, off[of:], pictures[of:], strict=True)),
+        scene=scene.name, method=method, width=first.frame.width, height=first.frame.height,
+        times=tuple(seconds for on, _ in times for seconds in on),
+        skips=tuple(_measured(name, counts[name], *result) for name, result in zip(names, results, strict=False)),
+        trades=tuple(Trade(meaning=change.meaning, changes=change.changes, times=on, times_changed=changed,
+                           difference=one.difference)
+                     for change, ((on, changed), one) in zip(changes, results[len(names) :], strict=True)),
         dim_lights=lights,
         unmeasured=tuple(Unmeasured(meaning=one.meaning, reason=one.reason) for one in UNMEASURED
                          if method in one.methods))
@@ -185,54 +174,45 @@ class _Job(NamedTuple):
     method: str
     settings: Settings
     options: dict[str, Any]
-    off: tuple[str, ...]  # skips
+    off: tuple[str, ...] = ()  # skips
 
     def run(self) -> Picture:
         with skips.without_skip(*self.off):
             return render(self.scene, self.method, self.settings, **self.options)
 
 
-def _trades(
-    method: str, settings: Settings, lights: DimLights | None
-) -> list[tuple[str, tuple[str, ...], Settings]]:
-    """Return meaning, changes and changed settings of what the method could leave out and does not yet."""
-    made = []
-    fewer = () if lights is None else ((f"lights: as many as carry {lights.share:.1%}, drawn anew",
-                                        (f"lights.count={lights.carrying}",)),)
-    for meaning, changes in (*fewer, *TRADES.get(method, ())):
-        try:
-            changed = from_text(settings, changes)
-        except InputError:  # does not go with the other settings
-            continue
-        if changed != settings:
-            made.append((meaning, changes, changed))
+class _Comparison(NamedTuple):
+    """A picture beside the plain one."""
+
+    same_bits: bool
+    difference: float | None
+
+
+def _compared(jobs: Sequence[_Job], plain: Picture, tell: Tell) -> list[_Comparison]:
+    bits, made = _hash(plain), []
+    for number, job in enumerate(jobs):
+        tell("comparing bits", number / len(jobs))
+        picture = job.run()
+        made.append(_Comparison(_hash(picture) == bits, difference(picture, plain)))
     return made
 
 
-def _shown(job: _Job, done: float, tell: Tell) -> Picture:
-    tell(f"comparing bits{f' without {job.off[0]}' if job.off else ''}", done)
-    return job.run()
-
-
-def _in_turn(
-    plain: _Job, jobs: list[_Job], rounds: int, tell: Tell
-) -> tuple[tuple[float, ...], list[tuple[float, ...]]]:
-    """Return the times of the plain picture, a round each, and those of every job."""
-    times: list[list[float]] = [[] for _ in range(1 + len(jobs))]
+def _in_turn(plain: _Job, jobs: Sequence[_Job], rounds: int, tell: Tell) -> list[Times]:
+    """Return for each job the times of the plain picture right before it, and its own."""
+    times: list[tuple[list[float], list[float]]] = [([], []) for _ in jobs]
     for turn in range(rounds):
-        for number, job in enumerate((plain, *jobs)):
-            tell("timing", (turn + number / len(times)) / rounds)
-            started = time.perf_counter()
-            job.run()
-            times[number].append(time.perf_counter() - started)
-    return tuple(times[0]), [tuple(one) for one in times[1:]]
+        for number, job in enumerate(jobs):
+            tell("timing", (turn + number / len(jobs)) / rounds)
+            for one, took in zip((plain, job), times[number], strict=True):
+                started = time.perf_counter()
+                one.run()
+                took.append(time.perf_counter() - started)
+    return [(tuple(before), tuple(own)) for before, own in times]
 
 
-def _measured(
-    name: str, count: skips.Count, times: tuple[float, ...], times_without: tuple[float, ...], same_bits: bool
-) -> MeasuredSkip:
-    return MeasuredSkip(name=name, **skips.SKIPS[name]._asdict(), **count._asdict(), times=times,
-                        times_without=times_without, same_bits=same_bits)
+def _measured(name: str, count: skips.Count, times: Times, one: _Comparison) -> MeasuredSkip:
+    return MeasuredSkip(name=name, **skips.SKIPS[name]._asdict(), **count._asdict(), times=times[0],
+                        times_without=times[1], same_bits=one.same_bits)
 
 
 def _hash(picture: Picture) -> bytes:
@@ -240,10 +220,3 @@ def _hash(picture: Picture) -> bytes:
     for plane in (picture.irradiance, picture.radiance):
         digest.update(np.ascontiguousarray(plane).tobytes())
     return digest.digest()
-
-
-def _difference(picture: Picture, plain: Picture) -> float | None:
-    covered = plain.frame.gbuffer.covered
-    made, right = (one.irradiance[:, covered].astype(np.float64) for one in (picture, plain))
-    mean = float(right.mean()) if right.size else 0.0
-    return float(np.sqrt(((made - right) ** 2).mean())) / mean if mean > 0 else None

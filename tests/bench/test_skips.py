@@ -9,9 +9,11 @@ import pytest
 from refgi import frame as frames
 from refgi import skips
 from refgi.bench import skips as module
-from refgi.bench.skips import TRADES, UNMEASURED, measure_skips
+from refgi.bench.skips import UNMEASURED, measure_skips
+from refgi.bench.trades import TRADES
 from refgi.errors import InputError
 from refgi.frame import Frame
+from refgi.jit import threads
 from refgi.methods import METHODS, render
 from refgi.pairs import irradiance as pairs
 from refgi.scene import load_scene
@@ -78,6 +80,13 @@ def test_a_skip_fires_and_changes_no_bit(name, case, evidence):
     evidence(f"{name} on {place}, {method}: {counts[name].left_out} of {counts[name].of} left out, the same bits")
 
 
+@pytest.fixture(autouse=True)
+def _one_thread():
+    """Pictures are small: waking other threads costs more than it brings."""
+    with threads(1):
+        yield
+
+
 @pytest.fixture(scope="module")
 def wedge():
     return load_scene(WEDGE)
@@ -111,7 +120,7 @@ def test_what_fires_is_measured_in_rounds(wedge):
     assert report.same_bits
     for skip in report.skips:
         assert skip.meaning == skips.SKIPS[skip.name].meaning
-        assert skip.times == report.times
+        assert len(skip.times) == 2
         assert len(skip.times_without) == 2
         assert min(skip.times + skip.times_without) > 0
     assert {one.reason for one in report.unmeasured} == {one.reason for one in UNMEASURED if "sii" in one.methods}
@@ -175,7 +184,7 @@ def test_time_saved_is_that_of_what_is_left_out(wedge, monkeypatch):
     monkeypatch.setattr(frames, "_tracer", slow)
     monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: now[0]))
     report = measure_skips(wedge, "gather", settings_of("gather", "disc.samples=8"), rounds=4, **OPTIONS)
-    assert report.times == (0.0,) * 4
+    assert set(report.times) == {0.0}
     assert {skip.name: skip.times_without for skip in report.skips if any(skip.times_without)} == {
         "frame.buffers": (2.0, 3.0, 4.0, 5.0)}  # the first was not timed: its bits were compared
     assert [skip.saves for skip in report.skips] == [3.5 * (skip.name == "frame.buffers") for skip in report.skips]
@@ -193,7 +202,7 @@ def test_trades_are_pictures_of_their_settings(box):
     report = measure_skips(box, "sii", settings, rounds=2, **OPTIONS)
     assert report.dim_lights.carrying < 64
     assert [trade.changes[0] for trade in report.trades] == [
-        f"lights.count={report.dim_lights.carrying}", "reach.cut=relative", "half_resolution=true"]
+        f"lights.count={report.dim_lights.count}", "reach.cut=relative", "half_resolution=true"]
     plain = render(box, "sii", settings, **OPTIONS)
     for trade in report.trades:
         changed = render(box, "sii", from_text(settings, trade.changes), **OPTIONS)

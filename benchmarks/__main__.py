@@ -3,7 +3,7 @@
 Every figure is a ratio within one run, or reported without an aim. Results: a table here, results.json in --out.
 `python -m benchmarks paper NAME --out DIR` makes a paper's figures and tables again; `python -m benchmarks mutate` puts
 faults into a copy of the sources and counts those that no test catches; `python -m benchmarks kit-score` puts bugs into
-ports and counts those that the conformance kit names.
+ports and counts those that the conformance kit names; `python -m benchmarks skips` tells what each skip saves.
 """
 
 import argparse
@@ -22,8 +22,8 @@ from benchmarks.harness import Row
 
 FOLDER = Path(__file__).parent
 COMMANDS = {"paper": "benchmarks.papers.runner", "mutate": "benchmarks.mutate.runner",
-            "kit-score": "benchmarks.kit_score"}
-NOT_TOPICS = {"__init__", "__main__", "harness", "signatures", "kit_score"}
+            "kit-score": "benchmarks.kit_score", "skips": "benchmarks.skips"}
+NOT_TOPICS = {"__init__", "__main__", "harness", "signatures", "kit_score", "skips"}
 
 
 def topics() -> list[str]:

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 SMALLER = {
     "render": ["--size", "24x18"], "compare": ["--size", "24x18", "--set", "truth.samples=48"],
     "bench": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii"],
-    "sequence": ["--size", "24x18", "--frames", "2"], "explain": ["--size", "24x18"],
+    "sequence": ["--size", "24x18", "--frames", "2"], "explain": ["--size", "24x18", "--rounds", "1"],
     "vectors": ["--case", "pairs-diffuse"],
 }
 

@@ -1,5 +1,7 @@
 """Property tests of skips by name: on unless a block switches them off, counted where a block asks for it."""
 
+import re
+from pathlib import Path
 from threading import Thread
 
 import pytest
@@ -10,6 +12,12 @@ from refgi.skips import SKIPS, Count, count_skips, left_out, without_skip
 
 def uncounted():
     raise AssertionError("counted though nobody asked")
+
+
+def test_the_page_lists_every_skip_with_its_meaning():
+    page = (Path(__file__).parents[1] / "docs" / "skips.md").read_text("utf-8")
+    listed = re.findall(r"^\| `([a-z_]+\.[a-z_]+)` \| (.*) \|$", page, re.MULTILINE)
+    assert listed[: len(SKIPS)] == [(name, skip.meaning) for name, skip in SKIPS.items()]
 
 
 def test_all_skips_are_on_and_count_nothing():

@@ -34,9 +34,9 @@ def measured_text(report: "SkipReport | None") -> str:
     """
     if report is None:
         return ""
-    whole = statistics.median(report.times)
-    head = (f"What {report.scene} does not need at {report.width} x {report.height}: a frame takes {_ms(whole)} ms, "
-            f"median of {len(report.times)}")
+    head = f"What {report.scene} does not need at {report.width} x {report.height}"
+    if report.times:
+        head += f": a frame takes {_ms(statistics.median(report.times))} ms, median of {len(report.times)}"
     parts = [f"{head}\n\n{_skips(report)}", _lights(report), _trades(report), _unmeasured(report)]
     return "".join(f"\n\n{part}" for part in parts if part)
 

@@ -67,6 +67,7 @@ def test_every_skip_has_a_case():
     assert set(CASES) == set(skips.SKIPS)
 
 
+@pytest.mark.feature("REF-19")
 @pytest.mark.parametrize(("name", "case"), [(name, case) for name, cases in CASES.items() for case in cases],
                          ids=lambda value: value if isinstance(value, str) else "-".join(value))
 def test_a_skip_fires_and_changes_no_bit(name, case, evidence):

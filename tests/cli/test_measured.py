@@ -66,6 +66,8 @@ def test_lights_trades_and_reasons_have_their_lines():
 
 def test_nothing_measured_says_nothing():
     assert measured_text(None) == ""
+    assert measured_text(report(times=())) == (
+        "\n\nWhat room does not need at 80 x 60\n\nNo skip has anything to leave out here.")
 
 
 def test_skips_are_measured_at_the_picture_s_own_size_where_asked_for():

@@ -1,17 +1,20 @@
 """Time that each skip saves: `python -m benchmarks skips SCENE ... [--size 192x144] [--rounds 9]`, as Markdown.
 
 A table a scene, with a row a skip and a column a method at its defaults; `vpl` has fewer lights, for a ray for each
-pair takes long. Exit code 1 where a skip changes a bit.
+pair takes long. Times are the processor's on one thread, which other work on the machine changes little. Exit code 1
+where a skip changes a bit.
 """
 
 import argparse
 import statistics
 import sys
+import time
 import warnings
 from collections.abc import Iterator
 
 from refgi.bench.skips import SkipReport, measure_skips
 from refgi.errors import RefgiWarning
+from refgi.jit import threads
 from refgi.methods import METHODS
 from refgi.scene import load_scene
 from refgi.settings import from_text
@@ -49,11 +52,11 @@ def main(arguments: list[str]) -> int:
         scene = load_scene(name)
         reports = []
         for method, changes in CHANGES.items():
-            with warnings.catch_warnings():
+            settings = from_text(METHODS[method].settings(), changes)
+            with warnings.catch_warnings(), threads(1):
                 warnings.simplefilter("ignore", RefgiWarning)
-                settings = from_text(METHODS[method].settings(), changes)
-                reports.append(measure_skips(scene, method, settings, rounds=options.rounds, width=width,
-                                             height=height))
+                reports.append(measure_skips(scene, method, settings, rounds=options.rounds, clock=time.process_time,
+                                             width=width, height=height))
             print(f"{scene.name}: {method} measured", file=sys.stderr, flush=True)
         same &= all(report.same_bits for report in reports)
         print(f"### {scene.name}, {options.size}\n\n{table(reports)}\n", flush=True)

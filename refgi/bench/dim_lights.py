@@ -5,7 +5,8 @@ all pixels is then timed with all lights and with those alone that carry `SHARE`
 out: lights stand for equal shares of the maps, and `lights.count` draws fewer that stand for more each.
 """
 
-import time
+from collections.abc import Callable
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,9 @@ class DimLights(pydantic.BaseModel):
     error: float  # RMSE without the others, over the mean
 
 
-def dim_lights(frame: Frame, settings: Settings, rounds: int, share: float = SHARE) -> DimLights | None:
+def dim_lights(
+    frame: Frame, settings: Settings, rounds: int, *, share: float = SHARE, clock: Callable[[], float] = perf_counter
+) -> DimLights | None:
     """Measure what leaving out the dimmest pixel lights would save and cost.
 
     Parameters
@@ -56,6 +59,8 @@ def dim_lights(frame: Frame, settings: Settings, rounds: int, share: float = SHA
         How often both sums are timed.
     share : float
         Of the light that is kept at least.
+    clock : callable
+        Says the time, s.
 
     Returns
     -------
@@ -80,9 +85,9 @@ def dim_lights(frame: Frame, settings: Settings, rounds: int, share: float = SHA
     right, without = irradiance(*every), irradiance(*some)
     for _ in range(rounds):
         for took, arguments in zip(times, (every, some), strict=True):
-            started = time.perf_counter()
+            started = clock()
             irradiance(*arguments)
-            took.append(time.perf_counter() - started)
+            took.append(clock() - started)
     difference = (without - right)[:, receivers.covered].astype(np.float64)
     mean = float(right[:, receivers.covered].mean(dtype=np.float64))
     return DimLights(lights=len(parts), carrying=len(kept), count=max(1, round(chosen.count * len(kept) / len(parts))),

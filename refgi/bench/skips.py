@@ -27,6 +27,7 @@ from refgi.settings import Settings
 __all__ = ["UNMEASURED", "MeasuredSkip", "SkipReport", "Unmeasured", "measure_skips"]
 
 Tell = Callable[[str, float], None]
+Clock = Callable[[], float]  # s
 Times = tuple[tuple[float, ...], tuple[float, ...]]  # s, a round each: of the plain picture, and of one right after
 
 
@@ -110,8 +111,8 @@ class SkipReport(_Strict):
 
 
 def measure_skips(
-    scene: Scene, method: str, settings: Settings | None = None, *, rounds: int = 3, tell: Tell = lambda *_: None,
-    **frame_options: Any,
+    scene: Scene, method: str, settings: Settings | None = None, *, rounds: int = 3,
+    clock: Clock = time.perf_counter, tell: Tell = lambda *_: None, **frame_options: Any,
 ) -> SkipReport:
     """Measure what each skip saves on a scene, and whether the picture has the same bits without it.
 
@@ -125,6 +126,8 @@ def measure_skips(
         The method's; its defaults where absent.
     rounds : int
         How often each is timed.
+    clock : callable
+        Says the time, s; `time.process_time` is that of processors alone, for machines that do other work as well.
     tell : callable
         Called with (what runs, share done).
     **frame_options : object
@@ -147,13 +150,13 @@ def measure_skips(
         first = plain.run()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)  # said by the first picture
-        lights = dim_lights(first.frame, chosen, rounds)
+        lights = dim_lights(first.frame, chosen, rounds, clock=clock)
         names = [name for name in skips.SKIPS if name in counts and counts[name].left_out]
         changes = changes_of(method, chosen, lights)
         jobs = [*(plain._replace(off=(name,)) for name in names),
                 *(plain._replace(settings=change.settings) for change in changes)]
         comparisons = _compared(jobs, first, tell)
-        times = _in_turn(plain, jobs, rounds, tell)
+        times = _in_turn(plain, jobs, rounds, clock, tell)
     results = list(zip(times, comparisons, strict=True))
     return SkipReport(
         scene=scene.name, method=method, width=first.frame.width, height=first.frame.height,
@@ -197,16 +200,16 @@ def _compared(jobs: Sequence[_Job], plain: Picture, tell: Tell) -> list[_Compari
     return made
 
 
-def _in_turn(plain: _Job, jobs: Sequence[_Job], rounds: int, tell: Tell) -> list[Times]:
+def _in_turn(plain: _Job, jobs: Sequence[_Job], rounds: int, clock: Clock, tell: Tell) -> list[Times]:
     """Return for each job the times of the plain picture right before it, and its own."""
     times: list[tuple[list[float], list[float]]] = [([], []) for _ in jobs]
     for turn in range(rounds):
         for number, job in enumerate(jobs):
             tell("timing", (turn + number / len(jobs)) / rounds)
             for one, took in zip((plain, job), times[number], strict=True):
-                started = time.perf_counter()
+                started = clock()
                 one.run()
-                took.append(time.perf_counter() - started)
+                took.append(clock() - started)
     return [(tuple(before), tuple(own)) for before, own in times]
 
 

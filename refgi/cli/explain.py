@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.measured import measured, measured_text
+from refgi.cli.measured import CLOCKS, measured, measured_text
 from refgi.cli.options import machine, shadows, speech, view
 from refgi.cli.session import DONE, FAILED, Session, table
 from refgi.cli.settings import preset
@@ -36,11 +36,13 @@ ROWS = {  # SII Table 1
 @click.option("--measure", is_flag=True, help="Time what is skipped at the picture's own size, and prove its bits.")
 @click.option("--rounds", type=click.IntRange(1, 1000), default=3, show_default=True,
               help="How often each skip is timed by --measure.")
+@click.option("--clock", type=click.Choice(list(CLOCKS)), default="wall", show_default=True,
+              help="Of --measure: the time of day, or that of processors, all threads together.")
 @speech
 @click.pass_obj
 def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
             shadows: str | None, threads: int | None, seed: int | None, measure: bool, rounds: int,
-            **options: Any) -> int:
+            clock: str, **options: Any) -> int:
     """Show what a method runs, skips and reuses, and where light goes.
 
     The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving. With
@@ -72,7 +74,7 @@ def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ..
                 animation[row] = _second_frame(scene, method, settings, frame_options, light, camera)
                 tell(method, 0.2 + 0.2 * len(animation))
         ledger = _ledger(scene, method, settings, frame_options)
-        report = measured(whole, method, settings, frame_options, rounds, tell) if measure else None
+        report = measured(whole, method, settings, frame_options, rounds, clock, tell) if measure else None
     content = {"scene": scene.name, "method": method, "settings": settings,
                "stages": [dataclasses.asdict(line) for line in summed(first)],
                "animation": {row: {line.name: line.what for line in summed(runs)} for row, runs in animation.items()},

@@ -1,6 +1,7 @@
 """What `refgi explain --measure` says: the time each skip saves, the proof, and what could be left out beside."""
 
 import statistics
+import time
 from typing import TYPE_CHECKING, Any
 
 from refgi.cli.session import Tell, table
@@ -9,14 +10,16 @@ if TYPE_CHECKING:
     from refgi.bench.skips import SkipReport
     from refgi.scene import Scene
 
+CLOCKS = {"wall": time.perf_counter, "processor": time.process_time}
+
 
 def measured(
-    scene: "Scene", method: str, settings: Any, options: dict[str, Any], rounds: int, tell: Tell
+    scene: "Scene", method: str, settings: Any, options: dict[str, Any], rounds: int, clock: str, tell: Tell
 ) -> "SkipReport":
     """Measure the skips of a method on a scene, at its own size; as `refgi.bench.skips.measure_skips`."""
     from refgi.bench.skips import measure_skips
 
-    return measure_skips(scene, method, settings, rounds=rounds, tell=tell, **options)
+    return measure_skips(scene, method, settings, rounds=rounds, clock=CLOCKS[clock], tell=tell, **options)
 
 
 def measured_text(report: "SkipReport | None") -> str:

@@ -1,5 +1,7 @@
 """Lights below a share of the sum: parts light by light, the fewest that carry a share, what the others cost."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from refgi.bench.dim_lights import brightest, dim_lights, parts_of_lights
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.methods import METHODS
-from refgi.pairs.settings import PairSettings
+from refgi.pairs.settings import DiscClamp, PairSettings
 from refgi.scene import load_scene
 from refgi.settings import from_text
 from tests.pairs import sets
@@ -44,11 +46,20 @@ def test_a_light_over_a_point_gives_it_the_inverse_square():
     np.testing.assert_allclose(parts, np.array([3.0, 2.0, 0.0]) / np.pi, rtol=ROUNDING)
 
 
+def test_each_light_is_clamped_by_its_own_disc():
+    """Closed form: head on at distance r from a disc of area A, E = Phi / (pi r^2 + A)."""
+    real, up, area = np.float32, np.array([[0.0], [1.0], [0.0]]), np.array([1.0, 5.0], np.float32)
+    lights = sets.lights(np.repeat(up, 2, axis=1), np.repeat(-up, 2, axis=1), np.full((1, 2), 2.0), real)
+    parts = parts_of_lights(sets.receivers(0 * up, up, real), lights, PairSettings(clamp=DiscClamp()), area)
+    np.testing.assert_allclose(parts, 2.0 / (np.pi + area), rtol=ROUNDING)
+
+
 def test_error_is_that_of_the_lights_left_out():
     """Independent: light by light in float64, without a clamp; the picture is smaller than a sample of one would be."""
     settings = settings_of("sii", "lights=48", "pairs.clamp=none")
     frame = Frame(load_scene("cornell_box"), **SIZE)
-    found = dim_lights(frame, settings, 2, share=0.8)
+    ticks = itertools.count()
+    found = dim_lights(frame, settings, 2, share=0.8, clock=lambda: next(ticks) ** 2.0)
     lights, buffer = choose_lights(frame, settings.lights), frame.gbuffer
     x, n = (plane[:, buffer.covered].astype(np.float64) for plane in (buffer.position, buffer.normal))
     to = lights.position[:, None].astype(np.float64) - x[:, :, None]
@@ -63,7 +74,7 @@ def test_error_is_that_of_the_lights_left_out():
     assert (found.lights, found.carrying, found.share) == (len(parts), carrying, 0.8)
     assert 1 < carrying < len(parts)
     assert found.error == pytest.approx(np.sqrt((lost**2).mean()) / light.sum(axis=2).mean(), rel=UNLIKE)
-    assert len(found.times) == len(found.times_carrying) == 2
+    assert (found.times, found.times_carrying) == ((1.0, 9.0), (5.0, 13.0))  # in turn: 1 - 0, 9 - 4, 25 - 16, 49 - 36
 
 
 def test_footprints_go_with_their_lights():

@@ -4,7 +4,7 @@ Every figure is a ratio within one run, or reported without an aim. Results: a t
 `python -m benchmarks paper NAME --out DIR` makes a paper's figures and tables again; `python -m benchmarks mutate` puts
 faults into a copy of the sources and counts those that no test catches; `python -m benchmarks kit-score` puts bugs into
 ports and counts those that the conformance kit names; `python -m benchmarks kill-batch` kills a batch at random
-moments and counts what is lost.
+moments and counts what is lost; `python -m benchmarks skips` tells what each skip saves.
 """
 
 import argparse
@@ -23,8 +23,8 @@ from benchmarks.harness import Row
 
 FOLDER = Path(__file__).parent
 COMMANDS = {"paper": "benchmarks.papers.runner", "mutate": "benchmarks.mutate.runner",
-            "kit-score": "benchmarks.kit_score", "kill-batch": "benchmarks.kill_batch"}
-NOT_TOPICS = {"__init__", "__main__", "harness", "signatures", "kit_score", "kill_batch"}
+            "kit-score": "benchmarks.kit_score", "kill-batch": "benchmarks.kill_batch", "skips": "benchmarks.skips"}
+NOT_TOPICS = {"__init__", "__main__", "harness", "signatures", "kit_score", "kill_batch", "skips"}
 
 
 def topics() -> list[str]:

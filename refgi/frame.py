@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 Shadows = Literal["map", "exact"]
 
+BUFFERS = ("gbuffer", "rsms", "tracer")  # of a frame, the dear ones
+
 
 class Frame:
     """One view of one scene under its lights.
@@ -144,6 +146,11 @@ class Frame:
         parts = [direct_irradiance(self.gbuffer, light, self._visible_from_light(index))
                  for index, light in enumerate(self.scene.lights)]
         return parts[0] if len(parts) == 1 else np.asarray(sum(parts[1:], start=parts[0]))
+
+    @property
+    def unused(self) -> list[str]:
+        """Names among `BUFFERS` of what nothing has asked for yet."""
+        return [name for name in BUFFERS if name not in vars(self)]
 
     def radiance(self, indirect: Array | None = None) -> Array:
         """Return what the camera receives: emission + albedo/pi (direct + indirect).

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from refgi.errors import InputError
 from refgi.method import Method
+from refgi.skips import left_out
 
 if TYPE_CHECKING:
     from refgi.frame import Frame, Shadows
@@ -191,7 +192,7 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
     InputError
         If scene, method or settings are not usable.
     """
-    from refgi.frame import Frame
+    from refgi.frame import BUFFERS, Frame
     from refgi.scene import load_scene
 
     known = find_method(method)
@@ -202,4 +203,8 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
         frame_options["shadows"] = usual_shadows(settings)
     frame = Frame(load_scene(scene) if isinstance(scene, str | Path) else scene, **frame_options)
     irradiance, estimate = known.compute(frame, settings)
-    return Picture(frame, irradiance, frame.radiance(irradiance), estimate)
+    picture = Picture(frame, irradiance, frame.radiance(irradiance), estimate)
+    if not left_out("frame.buffers", lambda: (len(frame.unused), len(BUFFERS))):
+        for name in frame.unused:
+            getattr(frame, name)
+    return picture

@@ -18,7 +18,7 @@ SMALLER = {
     "batch": ["--shard", "1/6"],
     "bench": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii"],
     "choose": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii,truth"],
-    "sequence": ["--size", "24x18", "--frames", "2"], "explain": ["--size", "24x18"],
+    "sequence": ["--size", "24x18", "--frames", "2"], "explain": ["--size", "24x18", "--rounds", "1"],
     "vectors": ["--case", "pairs-diffuse"],
 }
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from refgi.cli.measured import CLOCKS, measured, measured_text
 from refgi.cli.options import machine, shadows, speech, view
-from refgi.cli.session import Session, table
+from refgi.cli.session import DONE, FAILED, Session, table
 from refgi.cli.settings import preset
 
 if TYPE_CHECKING:
@@ -32,13 +33,20 @@ ROWS = {  # SII Table 1
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
 @machine
 @shadows("auto")
+@click.option("--measure", is_flag=True, help="Time what is skipped at the picture's own size, and prove its bits.")
+@click.option("--rounds", type=click.IntRange(1, 1000), default=3, show_default=True,
+              help="How often each skip is timed by --measure.")
+@click.option("--clock", type=click.Choice(list(CLOCKS)), default="wall", show_default=True,
+              help="Of --measure: the time of day, or that of processors, all threads together.")
 @speech
 @click.pass_obj
 def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
-            shadows: str | None, threads: int | None, seed: int | None, **options: Any) -> None:
+            shadows: str | None, threads: int | None, seed: int | None, measure: bool, rounds: int,
+            clock: str, **options: Any) -> int:
     """Show what a method runs, skips and reuses, and where light goes.
 
-    The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving.
+    The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving. With
+    --measure each skip is switched off at the picture's own size; the exit code is 1 where that changes a bit.
     """
     from refgi.cli.memory import require_memory
     from refgi.cli.options import on_threads
@@ -50,8 +58,10 @@ def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ..
     from refgi.errors import RefgiWarning
 
     settings = settings_for(method, pairs, seed, preset)
-    scene = _small(View(**options).load())
-    require_memory(scene, dtype, rsm_resolution, traced=method == "truth", settings={method: settings})
+    whole = View(**options).load()
+    scene = _small(whole)
+    require_memory(whole if measure else scene, dtype, rsm_resolution, traced=method == "truth",
+                   settings={method: settings})
     frame_options = {"dtype": dtype, "rsm_resolution": rsm_resolution, "shadows": shadows}
     with on_threads(threads), progress() as tell:
         warm_up([method], dtype, tell)
@@ -64,11 +74,15 @@ def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ..
                 animation[row] = _second_frame(scene, method, settings, frame_options, light, camera)
                 tell(method, 0.2 + 0.2 * len(animation))
         ledger = _ledger(scene, method, settings, frame_options)
+        report = measured(whole, method, settings, frame_options, rounds, clock, tell) if measure else None
     content = {"scene": scene.name, "method": method, "settings": settings,
                "stages": [dataclasses.asdict(line) for line in summed(first)],
                "animation": {row: {line.name: line.what for line in summed(runs)} for row, runs in animation.items()},
                "ledger": None if ledger is None else ledger_json(ledger)}
-    session.result(_text(content) + _ledger_text(ledger), content)
+    if report is not None:
+        content["measured"] = report.model_dump(mode="json")
+    session.result(_text(content) + _ledger_text(ledger) + measured_text(report), content)
+    return DONE if report is None or report.same_bits else FAILED
 
 
 command = _explain

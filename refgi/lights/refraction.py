@@ -28,6 +28,7 @@ from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.raster.visibility_buffer import rasterize
 from refgi.scene.material import SHARPEST
 from refgi.scene.model import DirectionalLight, Geometry, MaterialTable
+from refgi.skips import left_out
 from refgi.stages import skip, stage
 
 Array = npt.NDArray[Any]
@@ -130,10 +131,12 @@ def refracted(
     """
     expect(mode in get_args(Mode), "mode", "'back_face' or 'two_interface'", mode)
     expect(0 <= exponent <= SHARPEST, "exponent", f"a Phong exponent from 0 to {SHARPEST:g}", exponent)
-    if not materials.ior.any():
+    has_glass = bool(materials.ior.any())
+    if not has_glass and left_out("lights.refraction", lambda: (rsm.texels, rsm.texels)):
         skip("lights.refraction", "no material is glass")
         return rsm
-    expect(mode == "back_face" or tracer is not None, "tracer", "one for the mode 'two_interface'", None)
+    expect(mode == "back_face" or tracer is not None or not has_glass, "tracer", "one for the mode 'two_interface'",
+           None)
     return _refracted(rsm, geometry, materials, exponent, tracer if mode == "two_interface" else None, fresnel)
 
 

@@ -1,7 +1,8 @@
 """From pixel lights to irradiance at every pixel: checks, packing and the choice of kernels around Eq. 2.
 
-What the lights do not need does not run: pixels without surface are left out, a light without diffuse flux is no
-diffuse light, and without a glossy light no lobe code is compiled. The picture is the same to the bit either way.
+What the lights do not need does not run: pixels without surface are left out, lights that cannot reach a tile are
+passed over, and without a glossy light no lobe code is compiled: all skips that change no bit (`refgi.skips`). A light
+without diffuse flux is no diffuse light; among others it would move where sums over 64 lights end, and their rounding.
 """
 
 from collections.abc import Callable
@@ -12,11 +13,13 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.pairs.lobe_sum import add_lobes
-from refgi.pairs.packing import Packed, pack
+from refgi.pairs.packing import Packed, PackedLobes, pack
 from refgi.pairs.pair_sum import TILE, sum_pairs
 from refgi.pairs.settings import PairSettings, SphereClamp
 from refgi.pairs.sphere_sum import sum_spheres
-from refgi.pairs.tiles import block_by_block, put, taken
+from refgi.pairs.tile_counts import lobe_tiles, tiles_behind
+from refgi.pairs.tiles import block_by_block, clear, put, receiving, taken
+from refgi.skips import left_out
 from refgi.stages import report_progress, skip, stage
 
 if TYPE_CHECKING:
@@ -86,9 +89,17 @@ def add_lights(position: Array, normal: Array, packed: Packed, irradiance: Array
     if packed.diffuse.shape[1] > 1 and packed.spheres is not None:
         sum_spheres(position, normal, packed.diffuse, packed.spheres, None, irradiance)
     elif packed.diffuse.shape[1] > 1:
-        sum_pairs(position, normal, packed.diffuse, packed.clamp, irradiance)
+        culls = left_out("pairs.tiles", lambda: tiles_behind(position, normal, packed.diffuse))
+        sum_pairs(position, normal, packed.diffuse, packed.clamp, culls, irradiance)
     if packed.lobes is not None:
-        add_lobes(position, normal, *packed.lobes, None, None, irradiance)
+        add_lobes(position, normal, *packed.lobes, None, _listed_lobes(position, normal, packed.lobes), irradiance)
+
+
+def _listed_lobes(position: Array, normal: Array, lobes: PackedLobes) -> Array | None:
+    """Return None where the kernel finds out which lobes miss which tiles; without that skip a list of all."""
+    if left_out("pairs.lobe_tiles", lambda: lobe_tiles(position, normal, lobes)):
+        return None
+    return np.ones((-(-position.shape[1] // TILE), lobes.lights.shape[1]), np.bool_)
 
 
 def checked(
@@ -144,7 +155,8 @@ def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, A
     """
     position, covered = np.asarray(receivers.position), np.asarray(receivers.covered, np.bool_)
     normal = np.asarray(receivers.normal, position.dtype)
-    places = block_by_block(covered)
+    shown = receiving(covered)
+    places = block_by_block(shown)
     result = np.zeros(position.shape, position.dtype)
     step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
     for first in range(0, len(places), step):
@@ -154,6 +166,7 @@ def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, A
         add(points, normals, part, sums)
         put(result, part, sums)
         report_progress(min(1.0, (first + step) / len(places)))
+    clear(result, covered, shown)
     return result
 
 

@@ -14,6 +14,7 @@ from refgi.jit import kernel
 from refgi.pairs.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
 from refgi.pairs.pair_sum import Clamp
 from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, PairSettings, SphereClamp
+from refgi.skips import left_out
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
@@ -54,11 +55,19 @@ def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None,
     if isinstance(settings.clamp, SphereClamp) and footprint is not None:
         spheres = pack_spheres(settings.clamp.value, footprint, shines, dtype)
     lobes = None
+    if not glossy.any() and not left_out("pairs.lobes", lambda: (len(glossy), len(glossy))):
+        lights, glossy = with_dark_lobes(lights), np.ones_like(glossy)
     if glossy.any():
         packed = pack_lobes(lights, settings, dtype, glossy)
         lobe_clamp = pack_clamp(settings, footprint, glossy, packed.shape[1], dtype)
         lobes = PackedLobes(packed, lobe_clamp, pack_widening(lights, settings, dtype, glossy))
     return Packed(diffuse, clamp, spheres, lobes, shines, glossy)
+
+
+def with_dark_lobes(lights: "PixelLights") -> "PixelLights":
+    """Return diffuse lights as glossy ones whose lobes have no flux: what a sum over lobes adds nothing for."""
+    return lights._replace(lobe_flux=np.zeros_like(lights.flux), lobe_axis=lights.normal,
+                           lobe_exponent=np.ones_like(lights.flux[0]))
 
 
 def pack_diffuse(lights: "PixelLights", settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.tiles import bound_tile, lights_in_reach
+from refgi.pairs.tiles import bound_tile, lights_in_reach, list_all
 
 Array = npt.NDArray[Any]
 
@@ -105,7 +105,9 @@ def load_light(lights: Array, k: int) -> Any:
 
 
 @kernel(parallel=True)
-def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None, irradiance: Array) -> None:
+def sum_pairs(
+    position: Array, normal: Array, lights: Array, clamp: Clamp | None, culls: bool, irradiance: Array
+) -> None:
     """Add up E = sum over lights of (Phi / pi) g for every receiver (SII Eq. 1 and 2).
 
     Parameters
@@ -116,6 +118,8 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
         Packed lights: position, reversed normal, flux / pi. The last one is black and stands in for an odd partner.
     clamp : Clamp or None
         Clamp of near pairs; None sums the plain term.
+    culls : bool
+        Pass over lights that cannot reach a tile; without, each adds its zeros, to the same bits.
     irradiance : (3, n) ndarray
         Filled with W/m^2; without albedo/pi and visibility.
     """
@@ -130,7 +134,9 @@ def sum_pairs(position: Array, normal: Array, lights: Array, clamp: Clamp | None
         reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
         black = lights.shape[1] - 1
         for group in range(0, black, GROUP):
-            listed = lights_in_reach(lights, group, min(group + GROUP, black), low, high, reach, chosen)
+            end = min(group + GROUP, black)
+            listed = (lights_in_reach(lights, group, end, low, high, reach, chosen) if culls else
+                      list_all(group, end, chosen))
             add_listed(tile, lights, clamp, chosen, listed)
         for c in range(3):
             for i in range(size):

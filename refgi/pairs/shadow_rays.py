@@ -19,9 +19,11 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.lobes import lobe_gap, lobe_norm, lobe_power
+from refgi.pairs.packing import with_dark_lobes
 from refgi.pairs.pair_sum import pair_cosines
 from refgi.rays import STEPS, Tracer, far_offset, ray_offset
 from refgi.scene import Geometry
+from refgi.skips import left_out
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
@@ -130,6 +132,8 @@ def _add_lights(tracer: Tracer, to: RayReceivers, receivers: tuple[int, int], se
     origin, direction, contribution = (np.empty((pairs, 3), np.float32) for _ in range(3))
     reach, occluded = np.empty(pairs, np.float32), np.empty(pairs, np.bool_)
     fill_shadow_rays(to, receivers, senders, lights, tracer.grain, (origin, direction, reach, contribution))
+    if not left_out("pairs.shadow_rays", lambda: (pairs - np.count_nonzero(reach), pairs)):
+        contribution[reach == 0], reach[:] = 0, 1
     if visibility:
         tracer.fill_occluded(origin, direction, reach, occluded)
     else:
@@ -201,6 +205,9 @@ def senders_of(lights: "PixelLights") -> Senders:
     """Return pixel lights as the kernels read them."""
     arrays = (lights.position, lights.normal, lights.flux)
     position, normal, flux = (np.ascontiguousarray(array, np.float64) for array in arrays)
+    count = flux.shape[1]
+    if lights.lobe_flux is None and not left_out("pairs.lobes", lambda: (count, count)):
+        lights = with_dark_lobes(lights)
     if lights.lobe_flux is None or lights.lobe_axis is None or lights.lobe_exponent is None:
         return Senders(position, normal, flux, np.zeros((3, 0)), np.zeros((3, 0)), np.zeros(0), np.zeros(0))
     axis = np.array(lights.lobe_axis, np.float64, order="C")

@@ -17,11 +17,25 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
+from refgi.skips import left_out
 
 Array = npt.NDArray[Any]
 
 BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
 ROUNDING = 32.0  # units of rounding of |d| that a cosine computed from d may be off; about 6 are possible
+
+
+def receiving(covered: Array) -> Array:
+    """Return the pixels (h, w) to sum at: those with a surface; without the skip all, and `clear` follows."""
+    if left_out("pairs.pixels", lambda: (covered.size - np.count_nonzero(covered), covered.size)):
+        return covered
+    return np.ones_like(covered)
+
+
+def clear(plane: Array, covered: Array, receiving: Array) -> None:
+    """Set pixels without surface of (3, h, w) to 0 that were summed at, where a zero normal gave them anything."""
+    if receiving is not covered:
+        plane[:, ~covered] = 0
 
 
 def block_by_block(covered: Array) -> Array:
@@ -111,6 +125,14 @@ def lights_in_reach(lights: Array, first: int, last: int, low: Array, high: Arra
         chosen[count] = k
         count += reach[k - first]
     return count
+
+
+@kernel
+def list_all(first: int, last: int, chosen: Array) -> int:
+    """List the lights first to last - 1 in `chosen`, as `lights_in_reach` does where all may reach a tile."""
+    for k in range(first, last):
+        chosen[k - first] = k
+    return last - first
 
 
 @kernel

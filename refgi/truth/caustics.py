@@ -57,11 +57,12 @@ class Photons(NamedTuple):
 
 
 def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EXPONENT, *,
-         longest: int | None = None) -> Film | None:
+         longest: int | None = None, even_empty: bool = False) -> Film | None:
     """Prepare a film for photons, or return None for a scene without mirror or glass.
 
     `shape`: rows and columns of the picture. `least_exponent`: lobes from here on count as mirrors. `longest`: surfaces
-    that a photon meets at most, `LONGEST_CHAIN` where absent; at 2, one bounce, glass is opaque.
+    that a photon meets at most, `LONGEST_CHAIN` where absent; at 2, one bounce, glass is opaque. `even_empty`: make one
+    where there is neither, on which no photon lands.
     """
     table = material_table(scene.materials)
     mirrors = surfaces(scene)
@@ -69,7 +70,7 @@ def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EX
     mirrors.specular[table.exponent < least_exponent] = 0
     if longest == 2:
         table.ior[:] = 0
-    if not (mirrors.specular.any() or table.ior.any()):
+    if not (mirrors.specular.any() or table.ior.any() or even_empty):
         return None
     solid_angle = texel_solid_angles(camera_projection(scene.camera, shape[1], shape[0]))
     return Film(scene, shape, solid_angle, mirrors, table.ior, LONGEST_CHAIN if longest is None else longest)

@@ -17,6 +17,7 @@ from refgi.method import Method
 from refgi.pairs.shadow_rays import receivers
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene
+from refgi.skips import left_out
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.checkpoint import Checkpoint
@@ -150,9 +151,10 @@ def _photons(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> t
                 "sampled by chance, which may miss them: standard errors do not show what was never met")
         warnings.warn(RefgiWarning(f"scene {scene.name!r}: the lobes of {len(sharp)} material(s), {sharp[0]!r} first, "
                                    f"are sharp (exponent {SHARP_LOBE:g} or more) and {what}"), stacklevel=4)
-    if not sharp or not alone:
+    count = settings.photons * len(scene.lights)
+    if not alone or (not sharp and left_out("truth.photons", lambda: (count, count))):
         return None, math.inf
-    return film(scene, picture, SHARP_LOBE, longest=2), SHARP_LOBE
+    return film(scene, picture, SHARP_LOBE, longest=2, even_empty=not sharp), SHARP_LOBE
 
 
 def _warm_up(scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array], settings: TruthSettings) -> None:

@@ -238,9 +238,23 @@ def test_black_lights_change_no_bit():
     assert packed.shape == (9, 130)
     assert not packed[6:, -1].any()
     bare = np.zeros((3, 129))
-    sum_pairs(*(np.ascontiguousarray(part[:, 0]) for part in receivers[:2]), packed, None, bare)
+    sum_pairs(*(np.ascontiguousarray(part[:, 0]) for part in receivers[:2]), packed, None, True, bare)
     # the public function drops black lights, which moves the others into other groups: rounding may differ
     np.testing.assert_allclose(summed(receivers, lights._replace(flux=flux)), bare, rtol=ROUNDING[np.float64])
+
+
+@pytest.mark.parametrize("culls", [True, False])
+def test_a_light_behind_all_receivers_is_passed_over(culls):
+    """Only where it culls: what is not a number there is not even read."""
+    up = np.array([[0.0], [0.0], [1.0]])
+    lights = sets.lights(np.array([[0.0, 0.0], [0, 0], [1, -1]]), np.repeat(-up, 2, axis=1), 1.0)
+    packed = pack_diffuse(lights, PLAIN, np.float64, np.ones(2, bool))
+    packed[6:, 1] = np.nan  # of the light below the receiver
+    found = np.zeros((3, 1))
+    sum_pairs(0 * up, up, packed, None, culls, found)
+    assert np.isnan(found).all() != culls
+    if culls:
+        np.testing.assert_allclose(found, 1 / np.pi)
 
 
 def test_many_float32_lights_add_up_without_drift():

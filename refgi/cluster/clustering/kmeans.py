@@ -14,6 +14,7 @@ from refgi.cluster.clustering.rounds import LINES, TILE, Metric, Rounds, iterate
 from refgi.cluster.settings import Distance
 from refgi.errors import expect
 from refgi.jit import threads
+from refgi.skips import left_out
 from refgi.stages import skip, stage
 
 Array = npt.NDArray[Any]
@@ -179,7 +180,10 @@ def _metric(distance: Distance, weights: tuple[float, float], diagonal: float, s
         position, angle = position / diagonal, angle / math.pi
     elif distance == "squared":
         position, span = position / diagonal**2, span * span
-    return Metric(position, angle, distance == "squared", SLACK * float(position * span + angle * math.pi))
+    slack = SLACK * float(position * span + angle * math.pi)
+    if not left_out("cluster.distances", lambda: (1, 1)):
+        slack = math.inf  # no distance is so large that it rules an area light out
+    return Metric(position, angle, distance == "squared", slack)
 
 
 def mean_angle(normal: Array, clusters: Clustering) -> float:

@@ -45,6 +45,29 @@ def bound_tiles(receivers: ReceiverTiles) -> None:
             bound_tile(tile, tiles[SIZE, t], low[t], high[t])
 
 
+def members_behind(receivers: ReceiverTiles, lights: Array, start: Array) -> tuple[int, int]:
+    """Return how many pairs of tile and light of its subset are passed over for all area lights, and of how many.
+
+    `lights` (9, N + 1) as for `add_unshadowed`; `start` (M, subsets + 1) has a row for each area light.
+    """
+    reached = np.zeros(receivers.tiles.shape[1], np.int64)
+    _count_reached(receivers, lights, start, reached)
+    pairs = int(np.diff(start, axis=1).sum(axis=0)[receivers.tiles[SUBSET]].sum())
+    return pairs - int(reached.sum()), pairs
+
+
+@kernel(parallel=True)
+def _count_reached(receivers: ReceiverTiles, lights: Array, start: Array, reached: Array) -> None:
+    for t in prange(len(reached)):
+        subset = receivers.tiles[SUBSET, t]
+        reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
+        for m in range(len(start)):
+            last = start[m, subset + 1]
+            for group in range(start[m, subset], last, GROUP):
+                reached[t] += lights_in_reach(lights, group, min(group + GROUP, last), receivers.low[t],
+                                              receivers.high[t], reach, chosen)
+
+
 @kernel(parallel=True)
 def add_unshadowed(
     receivers: ReceiverTiles, lights: Array, clamp: Clamp | None, start: Array, irradiance: Array

@@ -15,7 +15,13 @@ import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.filters.prefilter import allocate_filters, build_filters
-from refgi.cluster.lighting.area_sum import ReceiverTiles, add_shadowed, add_unshadowed, bound_tiles
+from refgi.cluster.lighting.area_sum import (
+    ReceiverTiles,
+    add_shadowed,
+    add_unshadowed,
+    bound_tiles,
+    members_behind,
+)
 from refgi.cluster.lighting.interleave import (
     SUBSET,
     MemberLights,
@@ -34,6 +40,8 @@ from refgi.cluster.visibility.series import series
 from refgi.cluster.visibility.shadow import filter_channels, shadow_of
 from refgi.errors import expect
 from refgi.pairs.irradiance import Receivers, checked
+from refgi.pairs.tiles import clear, receiving
+from refgi.skips import left_out
 from refgi.stages import report_progress, stage
 
 if TYPE_CHECKING:
@@ -43,6 +51,8 @@ if TYPE_CHECKING:
     from refgi.rays import Tracer
 
 Array = npt.NDArray[Any]
+
+BEYOND_REACH = 1e15  # m: bounds of a tile that every light reaches
 
 
 @stage("cluster.irradiance")
@@ -96,18 +106,25 @@ def clustered_irradiance(
     expect(np.shape(facing) == np.shape(receivers.position), "facing", f"shape {np.shape(receivers.position)}",
            np.shape(facing))
     packed = checked(receivers, lights, settings.pairs, footprint)
-    parts = subsets(np.asarray(receivers.covered, np.bool_), interleaving)
+    covered = np.asarray(receivers.covered, np.bool_)
+    shown = receiving(covered)
+    parts = subsets(shown, interleaving)
     subset = assigned_subsets(areas.of, interleaving, settings.interleaving.assignment)
     members = member_lights(packed, areas.of, len(areas.members), subset, interleaving**2)
     by_tiles = _goes_by_tiles(members, settings, visibility_of)
-    tiles = _tiles(receivers, None if by_tiles and not _reads_facing(areas, settings) else facing, parts)
+    reads_facing = not by_tiles or _reads_facing(areas, settings) or not left_out("cluster.facing", lambda: (
+        len(parts.places), len(parts.places)))
+    tiles = _tiles(receivers, facing if reads_facing else None, parts)
     sums = np.zeros_like(tiles.position)
+    if members.packed.spheres is None and members.packed.lobes is None:
+        _cull(tiles, members)
     if by_tiles:
         _add_by_tiles(tiles, members, areas, maps, settings, sums)
     else:
         _add_by_lists(tiles, parts, members, _visibility(areas, maps, settings, visibility_of, rays), sums)
     result = np.zeros(np.shape(receivers.position), sums.dtype)
     scatter_pixels(sums, parts, sums.dtype.type(interleaving**2), result.reshape(3, -1))
+    clear(result, covered, shown)
     return result
 
 
@@ -124,6 +141,12 @@ def _tiles(receivers: Receivers, facing: Array | None, parts: Subsets) -> Receiv
     tiles = ReceiverTiles(position, normal, faces, parts.tiles, low, high)
     bound_tiles(tiles)
     return tiles
+
+
+def _cull(tiles: ReceiverTiles, members: MemberLights) -> None:
+    """Leave the bounds of tiles as they are; without the skip let every light reach all."""
+    if not left_out("pairs.tiles", lambda: members_behind(tiles, members.packed.diffuse, members.start)):
+        tiles.low[:], tiles.high[:] = -BEYOND_REACH, BEYOND_REACH
 
 
 def _goes_by_tiles(members: MemberLights, settings: "ValSettings", visibility_of: VisibilityFunction | None) -> bool:
@@ -143,7 +166,7 @@ def _reads_facing(areas: AreaLights, settings: "ValSettings") -> bool:
 def _with_lights(tiles: ReceiverTiles, start: Array) -> ReceiverTiles:
     """Leave out tiles whose subset holds none of an area light's members."""
     with_lights = np.diff(start)[tiles.tiles[SUBSET]] > 0
-    if with_lights.all():
+    if with_lights.all() or not left_out("cluster.subsets", lambda: (np.count_nonzero(~with_lights), len(with_lights))):
         return tiles
     return tiles._replace(tiles=np.compress(with_lights, tiles.tiles, axis=1), low=tiles.low[with_lights],
                           high=tiles.high[with_lights])
@@ -210,11 +233,19 @@ def _add_by_lists(
             add_unshadowed(tiles, packed.diffuse, packed.clamp, start, part)
         else:
             add_members(tiles.position, tiles.normal, parts, members, m, part)
-        places = np.flatnonzero(part.any(axis=0))
+        places = _places_with_light(part)
         if len(places):
             visible = visibility_of(m, tiles.position[:, places], tiles.facing[:, places])
             sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
         report_progress((m + 1) / len(members.start))
+
+
+def _places_with_light(part: Array) -> Array:
+    """Return the receivers that have light of one area light (3, n); without the skip all."""
+    with_light: Array = np.asarray(part.any(axis=0))
+    if left_out("cluster.receivers", lambda: (len(with_light) - np.count_nonzero(with_light), len(with_light))):
+        return np.flatnonzero(with_light)
+    return np.arange(len(with_light))
 
 
 def _visibility(

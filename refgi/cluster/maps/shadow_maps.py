@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi import skips
 from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.maps.occluders import Blockers, Ends, blockers
 from refgi.cluster.settings import ShadowMapSettings
@@ -152,7 +153,9 @@ def shadow_maps(
     expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
     extent = Extent(*geometry.bounds) if ends is None else ends.extent
     drawn, both = blockers(geometry, settings.occluders_alone, ends), settings.behind == "dual_paraboloid"
-    used = np.flatnonzero(areas.members > 0) if len(drawn.faces) else np.zeros(0, np.int64)
+    used = np.flatnonzero(areas.members > 0)
+    if not len(drawn.faces) and skips.left_out("cluster.maps", lambda: (len(used), len(used))):
+        used = used[:0]
     center = np.ascontiguousarray(map_centers(areas.center, areas.normal, extent)[used])
     frame, radius = areas.frame[used], settings.near_share * areas.radius[used]
     rays = tracer if len(drawn.faces) == len(geometry.faces) else None
@@ -162,13 +165,25 @@ def shadow_maps(
     if both:
         behind, near_behind, more = draw_maps(drawn, center, BACKWARD @ frame, radius, settings, dtype, rays)
         needed, left_out = needed | np.isfinite(near_behind), left_out + more
+    empty = np.flatnonzero(~needed)
+    if skips.left_out("cluster.maps", lambda: (len(empty), len(used)) if len(drawn.faces) else (0, 0)):
+        empty = empty[:0]
+    needed[empty] = True
     map_of = np.full(len(areas.members), -1, np.int32)
     map_of[used[needed]] = np.arange(needed.sum())
     if (map_of < 0).any():
         skip("cluster.depth_maps", f"nothing occludes {(map_of < 0).sum()} of {len(map_of)} area lights")
     maps = ShadowMaps(depth, map_of, center, frame, near, farthest(depth), farthest_corner(extent, center), behind,
                       near_behind, None if behind is None else farthest(behind), int(left_out.sum()))
+    _end_beyond_scene(maps, empty)
     return maps if needed.all() else _without(maps, needed)
+
+
+def _end_beyond_scene(maps: ShadowMaps, empty: Array) -> None:
+    """Let maps that hold nothing hold it where no receiver is: none is shadowed by them."""
+    for values in (maps.near, maps.far, maps.near_behind, maps.far_behind):
+        if values is not None:
+            values[empty] = 2.0 * maps.scene_far[empty]
 
 
 def map_centers(center: Array, normal: Array, extent: Extent) -> Array:

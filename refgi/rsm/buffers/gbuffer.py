@@ -14,6 +14,7 @@ from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
 from refgi.scene.model import Camera, Geometry, MaterialTable
+from refgi.skips import left_out
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
@@ -136,6 +137,9 @@ class GBuffer:
             expect(known, "channel", "a channel of the G-buffer", name)
         missing = [name for name in ChannelMask._fields if name in names and name not in self._channels]
         if missing:
+            unknown = [name for name in ChannelMask._fields if name not in self._channels]
+            if not left_out("rsm.channels", lambda: (len(unknown) - len(missing), len(unknown))):
+                missing = unknown
             self._channels.update(_resolve(self._geometry, self._materials, self.projection,
                                            self.visibility.triangle_id, self.dtype, tuple(missing)))  # fmt: skip
         return tuple(self._channels[n] if n in self._channels else getattr(self, n) for n in names)
@@ -160,7 +164,8 @@ class GBuffer:
         tuple of (n,) or (3, n) ndarray
             The channels, in the order asked for, with the bits that `resolve` gives.
         """
-        if MANY * len(texel) > self.visibility.triangle_id.size:
+        size = self.visibility.triangle_id.size
+        if MANY * len(texel) > size or not left_out("rsm.texels", lambda: (size - len(texel), size)):
             self.resolve(*names)
         missing = tuple(name for name in ChannelMask._fields if name in names and name not in self._channels)
         computed = {}

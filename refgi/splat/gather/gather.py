@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_loss
+from refgi.pairs.tiles import clear, receiving
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 from refgi.splat.gather.gather_sum import GatherMap, centers, disc_loss, disc_pattern, gather_discs
@@ -115,20 +116,23 @@ def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
     """
     buffer = frame.gbuffer
     receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
-    covered = int(np.count_nonzero(buffer.covered))
+    shown, covered = receiving(buffer.covered), int(np.count_nonzero(buffer.covered))
     coarsely, disc = settings.interpolation, settings.disc
     if coarsely is None or coarsely.grid >= max(frame.height, frame.width):
         skip("gather.interpolate", "every pixel runs the sum")
-        return Gathered(gather_irradiance(receivers, frame.rsms, disc), covered, covered)
+        total = gather_irradiance(receivers._replace(covered=shown), frame.rsms, disc)
+        clear(total, buffer.covered, shown)
+        return Gathered(total, covered, covered)
     coarse = coarse_pixels(frame.height, frame.width, coarsely.grid)
     first = np.zeros_like(buffer.covered)
     first[np.ix_(*coarse)] = True
-    coarse_light = gather_irradiance(receivers._replace(covered=buffer.covered & first), frame.rsms, disc)
+    coarse_light = gather_irradiance(receivers._replace(covered=shown & first), frame.rsms, disc)
     limits = SimilarityLimits(coarsely.least_cosine, coarsely.reach * frame.visible_extent.diagonal)
     result, interpolated = interpolate(receivers, coarse_light, coarse, limits)
-    rest = receivers._replace(covered=buffer.covered & ~interpolated)
+    rest = receivers._replace(covered=shown & ~interpolated)
     total = result + gather_irradiance(rest, frame.rsms, disc)
-    evaluated = np.count_nonzero(buffer.covered & first) + np.count_nonzero(rest.covered & ~first)
+    clear(total, buffer.covered, shown)
+    evaluated = np.count_nonzero(shown & first) + np.count_nonzero(rest.covered & ~first)
     return Gathered(total, int(evaluated), covered)
 
 

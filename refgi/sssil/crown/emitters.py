@@ -70,6 +70,14 @@ def pack(level: Level, phases: int, farthest: int, most_lanes: int) -> Emitters:
     return Emitters(packed, emit_from, emit_to, phases, line, pad, strip, scale)
 
 
+def dark_ends(emitters: Emitters) -> tuple[int, int]:
+    """Return how many lanes of all rows lie before the first emitting block of a row or after its last."""
+    first = np.maximum(emitters.emit_from[:-1, :, 0], emitters.pad)
+    last = np.minimum(emitters.emit_to[:-1, :, -1], emitters.line - emitters.pad)
+    total = first.size * (emitters.line - 2 * emitters.pad)
+    return total - int(np.maximum(last - first, 0).sum()), total
+
+
 def length_scale(depth: Array) -> float:
     """Return the power of two that scales the geometric middle of the depths' range to about 1.
 

@@ -2,7 +2,8 @@
 
 Threads take strips of a level so narrow that what their samples read stays in the cache of a core. Where receivers
 share samples, `add_two` reads them in place; where each has its own, they are first copied into a line. Receivers at
-either end of a strip whose samples have no radiance are skipped, which changes no bit of a sum.
+either end of a strip whose samples have no radiance are skipped, which changes no bit of a sum. A sample that is dark
+for a whole strip is not listed there; which samples are summed in twos then differs, and with it the rounding.
 """
 
 import math
@@ -13,8 +14,9 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
+from refgi.skips import left_out
 from refgi.sssil.crown.add import ROWS, TEXEL, WIDE, add_two, close_group, form_of
-from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, pack
+from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, dark_ends, pack
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.points import level_key, pixel_key, row_key, sample_points, sample_weight, shift_of, shifted
 from refgi.sssil.crown.reach import chosen_radius
@@ -70,8 +72,9 @@ def gather(
     shared = shared_offsets(sampling, index, level.number, rows, radius, columns) if samples is None else samples
     offsets, weight = _reaching(*shared, rows, columns)
     emitters = pack(senders, offsets.shape[1], farthest, WIDE)
-    paired = sampling.pattern in ("fixed", "all")
-    _gather_shared(emitters, level.position, level.normal, offsets, weight.astype(real), paired, form, factor, result)
+    paired, trims = sampling.pattern in ("fixed", "all"), left_out("sssil.senders", lambda: dark_ends(emitters))
+    _gather_shared(emitters, level.position, level.normal, offsets, weight.astype(real), paired, trims, form, factor,
+                   result)
     return result
 
 
@@ -108,8 +111,8 @@ def level_factor(index: int, settings: HssilSettings) -> float:
 
 @kernel(parallel=True)
 def _gather_shared(
-    emitters: Emitters, position: Array, normal: Array, offsets: Array, weight: Array, paired: bool, form: int,
-    factor: Any, result: Array,
+    emitters: Emitters, position: Array, normal: Array, offsets: Array, weight: Array, paired: bool, trims: bool,
+    form: int, factor: Any, result: Array,
 ) -> None:
     rows = normal.shape[1]
     packed, emit_from, emit_to = emitters.packed, emitters.emit_from, emitters.emit_to
@@ -125,8 +128,8 @@ def _gather_shared(
             for phase in range(phases):
                 _load(tile, strip, position, normal, scale, row, phase + phases * left, phases)
                 stands_for = weight[shared % weight.shape[0], phase % weight.shape[1]]
-                count = _list_emitting(offsets[shared, phase], stands_for, paired, emit_from, emit_to, row, phase,
-                                       pad + left, strip, line, starts, weights)
+                count = _list_emitting(offsets[shared, phase], stands_for, paired, trims, emit_from, emit_to, row,
+                                       phase, pad + left, strip, line, starts, weights)
                 for j in range(0, count, 2):
                     low = min(starts[1, j], starts[1, j + 1]) // BLOCK * BLOCK
                     lanes = (max(starts[2, j], starts[2, j + 1]) - low + BLOCK - 1) // BLOCK * BLOCK
@@ -165,10 +168,10 @@ def _load(
 
 @kernel
 def _list_emitting(
-    offsets: Array, weight: Array, paired: bool, emit_from: Array, emit_to: Array, row: int, phase: int, first: int,
-    lanes: int, line: int, starts: Array, weights: Array,
+    offsets: Array, weight: Array, paired: bool, trims: bool, emit_from: Array, emit_to: Array, row: int, phase: int,
+    first: int, lanes: int, line: int, starts: Array, weights: Array,
 ) -> int:
-    """List the places of a strip's samples that emit, and the lanes for which they do.
+    """List the places of a strip's samples that emit, and the lanes for which they do; all lanes unless it `trims`.
 
     In pairs where samples are paired; one without radiance stands in for a missing partner.
     """
@@ -190,6 +193,8 @@ def _list_emitting(
             low[count] = max(0, emit_from[a, of, block] - lane)
             high[count] = min(lanes, emit_to[a, of, last + np.uint64(1)] - lane)
         emits = low[count] < high[count]
+        if emits and not trims:
+            low[count], high[count] = 0, lanes
         count += 1 if emits or paired else 0
         emitting_in_pair += 1 if emits else 0
         if paired and j % 2 == 1 and emitting_in_pair == 0:

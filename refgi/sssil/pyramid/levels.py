@@ -10,6 +10,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection
+from refgi.skips import left_out
 from refgi.sssil.pyramid.closest import NO_PIXEL
 from refgi.sssil.pyramid.fill import fill_coarser_level, fill_first_level
 from refgi.sssil.pyramid.mean import average_pixels, average_texels
@@ -44,6 +45,8 @@ def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
     depth, normal, albedo, _ = buffer.resolve("depth", "normal", "albedo", "position")
     sampling = settings.sampling
     count = useful_levels((frame.height, frame.width), sampling)
+    if not left_out("sssil.levels", lambda: (sampling.levels - count, sampling.levels)):
+        count = sampling.levels
     if count < sampling.levels:
         skip("sssil.level", f"no texel of level {sampling.first_level + count} has another in its crown")
     downsample = settings.senders.downsample

@@ -10,7 +10,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
-from refgi.sssil.crown.gather import gather
+from refgi.sssil.crown.gather import _list_emitting, gather
 from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import PRESETS, HssilSettings
@@ -47,6 +47,18 @@ def test_equals_the_sum_written_as_loops(pattern, density, form):
         assert expected.max() > 0
         np.testing.assert_allclose(gather(level, index, settings), expected, rtol=0,
                                    atol=ROUNDING[np.float64] * expected.max())
+
+
+@pytest.mark.parametrize(("trims", "lanes"), [(True, [8, 24]), (False, [0, 32])])
+def test_a_sample_is_summed_for_the_lanes_that_it_emits_for(trims, lanes):
+    """Lanes 16 to 31 of one row of 64 emit; a strip of 32 has a sample 8 texels to the right, one 32 to the right."""
+    emit_from = np.array([16, 16, 16, 24, 64, 64, 64, 64, 64], np.int32).reshape(1, 1, 9).repeat(2, axis=0)
+    emit_to = np.array([0, 0, 0, 24, 32, 32, 32, 32, 32], np.int32).reshape(1, 1, 9).repeat(2, axis=0)
+    offsets, weight = np.array([[8, 0], [32, 0]], np.int32), np.ones(2)
+    starts, weights = np.empty((3, 3), np.int64), np.empty(3)
+    count = _list_emitting(offsets, weight, False, trims, emit_from, emit_to, 0, 0, 0, 32, 64, starts, weights)
+    assert count == 1  # the other one is dark for the whole strip
+    assert starts[:, 0].tolist() == [8, *lanes]
 
 
 def test_single_precision_rounds_and_no_more():

@@ -10,6 +10,7 @@ from refgi.errors import expect
 from refgi.pairs.packing import Packed
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES
+from refgi.skips import left_out
 from refgi.splat.sii.reach.bins import list_lights, of_whole_tiles, pack_solids
 from refgi.splat.sii.reach.bounds import Solids, light_solids
 from refgi.splat.sii.reach.screen_bounds import covered_pixels, screen_quads, tiles_of_pixels, tiles_of_quads
@@ -97,18 +98,25 @@ class LightLists:
         self, position: Array, normal: Array, places: Array, lights: Array, solids: Solids, nearest: bool
     ) -> Iterator[tuple[Some, Array]]:
         bound, count = self._bound, lights.shape[1]
-        if isinstance(bound, FullBound):
-            yield EVERY, np.ones((_tiles(places), count), np.bool_)
-        elif isinstance(bound, MeshBound) and not bound.inflate:
+        if isinstance(bound, MeshBound) and not bound.inflate:  # loses pixels: no other bound has its bits
             for k in range(count):
                 some = np.flatnonzero(self._drawn(solids, k).reshape(-1)[places])
                 listed = np.zeros((_tiles(some), count), np.bool_)
                 listed[:, k] = True
                 yield some, listed
-        else:
+            return
+
+        def bounded() -> Array:
             packed = pack_solids(solids, lights[3:6], hollow=self._on_screen, nearest=nearest and self._tangent)
             listed = list_lights(position, normal, packed)
-            yield EVERY, listed & self._tiles_on_screen(places, solids) if self._on_screen else listed
+            return listed & self._tiles_on_screen(places, solids) if self._on_screen else listed
+
+        def outside() -> tuple[int, int]:
+            listed = bounded()
+            return int(np.count_nonzero(~listed)), listed.size
+
+        whole = isinstance(bound, FullBound) or not left_out("sii.bounds", outside)
+        yield EVERY, np.ones((_tiles(places), count), np.bool_) if whole else bounded()
 
     def _tiles_on_screen(self, places: Array, solids: Solids) -> Array:
         assert self._projection is not None

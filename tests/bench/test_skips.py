@@ -1,0 +1,287 @@
+"""Skips: each fires on some scene and changes no bit there; what is measured of them is what there is."""
+
+import hashlib
+import importlib
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from refgi import frame as frames
+from refgi import rays, skips
+from refgi.bench.skips import UNMEASURED, measure_skips
+from refgi.bench.trades import TRADES
+from refgi.errors import InputError
+from refgi.frame import Frame
+from refgi.jit import threads
+from refgi.methods import METHODS, render
+from refgi.pairs import irradiance as pairs
+from refgi.scene import load_scene
+from refgi.settings import from_text
+
+pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")
+
+OPTIONS = {"width": 24, "height": 18, "rsm_resolution": 64}
+LARGER = {"width": 96, "height": 72, "rsm_resolution": 64}  # tiles of 16 x 16 pixels that hold one surface alone
+SPHERE, RING, BOX, WEDGE = "cornell_sphere:faces=320", "ring:faces=320", "cornell_box", "wedge"
+CUT = ("lights=64", "reach.cut=relative", "reach.cut.share=0.2")
+# of every skip: scenes, methods and settings with which it has something to leave out
+CASES = {
+    "frame.buffers": [(BOX, "gather", "disc.samples=8")],
+    "rsm.channels": [(BOX, "sii", "lights=16")],
+    "rsm.texels": [(BOX, "sii", "lights=16")],
+    "lights.refraction": [(BOX, "sii", "lights=16"), (BOX, "sii", "lights=16", "source.refraction=two_interface")],
+    "pairs.pixels": [(WEDGE, "sii", "lights=70"), (BOX, "sii", "lights=70", "pairs.clamp=sphere"),
+                     (WEDGE, "val", "lights=32", "clusters=3"), (BOX, "val", "lights=16", "pairs.clamp=sphere"),
+                     (WEDGE, "gather", "disc.samples=8"), (WEDGE, "gather", "disc.samples=8", "interpolation.grid=4")],
+    "pairs.tiles": [(SPHERE, "sii", "lights=100"), (SPHERE, "val", "lights=100", "clusters=3", "pairs.clamp=none"),
+                    (SPHERE, "multires", "lights=100")],
+    "pairs.lobes": [(BOX, method, "lights=64") for method in ("sii", "multires", "val", "vpl")],
+    "pairs.lobe_tiles": [(RING, "sii", "lights=64")],
+    "pairs.shadow_rays": [(BOX, "vpl", "lights=32"), (RING, "vpl", "lights=32")],
+    "sii.bounds": [(BOX, "sii", *CUT, f"reach.bound={bound}") for bound in ("tangent", "quad")],
+    "cluster.distances": [(BOX, "val", "lights=128", "clusters=12")],
+    "cluster.maps": [(BOX, "val", "lights=128", "maps.resolution=32"),
+                     *((WEDGE, "val", "lights=32", "clusters=3", f"visibility={kind}")
+                       for kind in ("csm", "pcss", "hard"))],
+    "cluster.subsets": [(BOX, "val", "lights=64", "clusters=8", "interleaving.block=4")],
+    "cluster.facing": [(BOX, "val", "lights=64", "clusters=4")],
+    "cluster.receivers": [(BOX, "val", "lights=32", "clusters=3", "visibility=rays_rectangle")],
+    "sssil.levels": [(BOX, "hssil", "sampling.levels=6", "sampling.radius=9")],
+    "sssil.senders": [(BOX, "hssil"), (BOX, "hssil", "sampling.pattern=fixed")],
+    "truth.photons": [(BOX, "truth", "samples=24", "photons=64")],
+}
+
+
+# of every skip: functions that see more work with it off, and what of their arguments shows that
+WORK = {
+    "frame.buffers": {"frame._tracer": None},
+    "rsm.channels": {"rsm.buffers.gbuffer._planes": lambda names, *_: len(names)},
+    "rsm.texels": {"rsm.buffers.gbuffer._planes": lambda _, shape, *__: math.prod(shape)},
+    "lights.refraction": {"lights.refraction._refracted": None},
+    "pairs.pixels": {"pairs.irradiance.taken": lambda _, places: len(places),
+                     "cluster.lighting.clustered.scatter_pixels": lambda values, *_: values.shape[1],
+                     "splat.gather.gather.gather_irradiance": lambda receivers, *_: receivers.covered.sum()},
+    "pairs.tiles": {"pairs.irradiance.sum_pairs": lambda *arguments: not arguments[4],
+                    "cluster.lighting.clustered.add_shadowed": lambda tiles, *_: tiles.high.sum(dtype=float),
+                    "cluster.lighting.clustered.add_unshadowed": lambda tiles, *_: tiles.high.sum(dtype=float)},
+    "pairs.lobes": {"pairs.irradiance.add_lobes": None,
+                    "pairs.shadow_rays.fill_shadow_rays": lambda *arguments: len(arguments[2].lobe_exponent)},
+    "pairs.lobe_tiles": {"pairs.irradiance.add_lobes": lambda *arguments: arguments[6] is not None},
+    "pairs.shadow_rays": {"rays.Tracer.fill_occluded": lambda *arguments: np.count_nonzero(arguments[3])},
+    "sii.bounds": {"splat.sii.sii.sum_pairs_in_range": lambda *arguments: np.count_nonzero(arguments[5])},
+    "cluster.distances": {"cluster.clustering.kmeans.iterate": lambda _, metric, *__: metric.slack},
+    "cluster.maps": {"cluster.lighting.clustered.add_shadowed": None},
+    "cluster.subsets": {name: lambda tiles, *_: tiles.tiles.shape[1] for name in (
+        "cluster.lighting.clustered.add_shadowed", "cluster.lighting.clustered.add_unshadowed")},
+    "cluster.facing": {"cluster.lighting.clustered.gather_pixels": None},
+    "cluster.receivers": {"cluster.reference.rays.free_share": lambda _, points, *__: points.shape[1]},
+    "sssil.levels": {"sssil.hssil.gather_level": None},
+    "sssil.senders": {"sssil.crown.gather._gather_shared": lambda *arguments: not arguments[6]},
+    "truth.photons": {"truth.passes.photon_pass": None},
+}
+
+
+def settings_of(method, *changes):
+    return from_text(METHODS[method].settings(), changes)
+
+
+def digest(scene, method, settings, options, *off):
+    with skips.without_skip(*off):
+        made = render(scene, method, settings, **options)
+    return hashlib.sha256(made.irradiance.tobytes() + made.radiance.tobytes()).hexdigest()
+
+
+def test_every_skip_has_a_case():
+    assert set(CASES) == set(WORK) == set(skips.SKIPS)
+
+
+@pytest.fixture
+def work(monkeypatch):
+    """Return a function that says how much work of a skip there was since it was last asked."""
+    total = [0.0]
+
+    def counting(function, weight):
+        def counted(*arguments, **named):
+            total[0] += 1.0 if weight is None else float(weight(*arguments))
+            return function(*arguments, **named)
+        return counted
+
+    def watch(name):
+        for target, weight in WORK[name].items():
+            place, _, attribute = target.rpartition(".")
+            owner = rays.Tracer if place == "rays.Tracer" else importlib.import_module(f"refgi.{place}")
+            monkeypatch.setattr(owner, attribute, counting(getattr(owner, attribute), weight))
+
+    def done():
+        found, total[0] = total[0], 0.0
+        return found
+
+    return SimpleNamespace(watch=watch, done=done)
+
+
+@pytest.mark.feature("REF-19")
+@pytest.mark.parametrize(("name", "case"), [(name, case) for name, cases in CASES.items() for case in cases],
+                         ids=lambda value: value if isinstance(value, str) else "-".join(value))
+def test_a_skip_fires_and_changes_no_bit(name, case, work, evidence):
+    """The work is done with the skip off, the bits are the same."""
+    place, method, *changes = case
+    scene, settings = load_scene(place), settings_of(method, *changes)
+    options = LARGER if name in ("pairs.tiles", "pairs.lobe_tiles", "sssil.senders") else OPTIONS
+    with skips.count_skips() as counts:
+        digest(scene, method, settings, options)
+    assert 0 < counts[name].left_out <= counts[name].of
+    work.watch(name)
+    made, least = digest(scene, method, settings, options), work.done()
+    assert digest(scene, method, settings, options, name) == made
+    assert work.done() > least
+    evidence(f"{name} on {place}, {method}: {counts[name].left_out} of {counts[name].of} left out, the same bits")
+
+
+@pytest.fixture(autouse=True)
+def _one_thread():
+    """Pictures are small: waking other threads costs more than it brings."""
+    with threads(1):
+        yield
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    return load_scene(WEDGE)
+
+
+@pytest.fixture(scope="module")
+def box():
+    return load_scene(BOX)
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    """A skip of pixels without surface that leaves out a row of those with one as well."""
+    careful = pairs.receiving
+
+    def receiving(covered):
+        shown = careful(covered)
+        if shown is covered:
+            shown = covered.copy()
+            shown[len(shown) // 2] = False
+        return shown
+
+    monkeypatch.setattr(pairs, "receiving", receiving)
+
+
+def test_what_fires_is_measured_in_rounds(wedge):
+    report = measure_skips(wedge, "sii", settings_of("sii", "lights=16"), rounds=2, **OPTIONS)
+    assert (report.scene, report.method, report.width, report.height) == ("wedge", "sii", 24, 18)
+    assert [skip.name for skip in report.skips] == [
+        "frame.buffers", "rsm.channels", "rsm.texels", "lights.refraction", "pairs.pixels", "pairs.lobes"]
+    assert report.same_bits
+    for skip in report.skips:
+        assert skip.meaning == skips.SKIPS[skip.name].meaning
+        assert len(skip.times) == 2
+        assert len(skip.times_without) == 2
+        assert min(skip.times + skip.times_without) > 0
+    assert {one.reason for one in report.unmeasured} == {one.reason for one in UNMEASURED if "sii" in one.methods}
+
+
+def test_counts_are_those_of_the_buffers(wedge):
+    frame = Frame(wedge, **OPTIONS)
+    report = measure_skips(wedge, "sii", settings_of("sii", "lights=16"), rounds=1, **OPTIONS)
+    found = {skip.name: (skip.left_out, skip.of) for skip in report.skips}
+    assert found["pairs.pixels"] == (int((~frame.gbuffer.covered).sum()), 24 * 18)
+    assert found["rsm.texels"][1] % 64**2 == 0
+    assert found["lights.refraction"][0] % 64**2 == 0
+    assert found["frame.buffers"] == (1, 3)  # no rays
+
+
+def test_rays_left_out_are_those_of_pairs_that_face_away():
+    scene, settings = load_scene(BOX), settings_of("vpl", "lights=32")
+    with skips.count_skips() as counts:
+        frame = render(scene, "vpl", settings, **OPTIONS).frame
+    from refgi.lights import choose_pixel_lights
+
+    lights = choose_pixel_lights(frame.rsms, count=32, pattern="halton")
+    covered = frame.gbuffer.covered
+    x, n = (plane[:, covered].astype(np.float64) for plane in (frame.gbuffer.position, frame.gbuffer.normal))
+    to = lights.position[:, None].astype(np.float64) - x[:, :, None]
+    dark = ((to * n[:, :, None]).sum(axis=0) <= 0) | ((to * lights.normal[:, None]).sum(axis=0) >= 0)
+    grazing = 0.02 * dark.size  # walls and lights in one plane: rounding decides
+    assert counts["pairs.shadow_rays"].of == dark.size
+    assert abs(counts["pairs.shadow_rays"].left_out - dark.sum()) <= grazing
+
+
+def test_tiles_left_out_have_no_light_of_theirs():
+    """No more than the pairs of tile and light of which no receiver has any light."""
+    scene, settings = load_scene(SPHERE), settings_of("sii", "lights=100", "pairs.clamp=none")
+    with skips.count_skips() as counts:
+        frame = render(scene, "sii", settings, **LARGER).frame
+    from refgi.lights.selection import choose_lights
+    from refgi.pairs.tiles import block_by_block
+
+    lights, buffer = choose_lights(frame, settings.lights), frame.gbuffer
+    places = block_by_block(buffer.covered)
+    x, n = (plane.reshape(3, -1)[:, places].astype(np.float64) for plane in (buffer.position, buffer.normal))
+    dark = 0
+    for first in range(0, len(places), 256):
+        part = slice(first, first + 256)
+        to = lights.position[:, None].astype(np.float64) - x[:, part, None]
+        facing = np.minimum((to * n[:, part, None]).sum(axis=0), -(to * lights.normal[:, None]).sum(axis=0))
+        dark += int((facing.max(axis=0) <= 1e-6).sum())
+    assert counts["pairs.tiles"].of == -(-len(places) // 256) * lights.flux.shape[1]
+    assert 0 < counts["pairs.tiles"].left_out <= dark
+
+
+def test_time_saved_is_that_of_what_is_left_out(wedge, monkeypatch):
+    """By a clock that goes on while rays are set up alone, 1 s the first time, 2 s the second, and so on."""
+    built, now = frames._tracer, [0.0, 0.0]
+
+    def slow(geometry):
+        now[:] = now[0] + now[1] + 1.0, now[1] + 1.0
+        return built(geometry)
+
+    monkeypatch.setattr(frames, "_tracer", slow)
+    report = measure_skips(wedge, "gather", settings_of("gather", "disc.samples=8"), rounds=4, clock=lambda: now[0],
+                           **OPTIONS)
+    assert set(report.times) == {0.0}
+    assert {skip.name: skip.times_without for skip in report.skips if any(skip.times_without)} == {
+        "frame.buffers": (2.0, 3.0, 4.0, 5.0)}  # the first was not timed: its bits were compared
+    assert [skip.saves for skip in report.skips] == [3.5 * (skip.name == "frame.buffers") for skip in report.skips]
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_wrong_skip_is_found(wedge):
+    report = measure_skips(wedge, "sii", settings_of("sii", "lights=16"), rounds=1, **OPTIONS)
+    assert not report.same_bits
+    assert [skip.name for skip in report.skips if not skip.same_bits] == ["pairs.pixels"]
+
+
+def test_trades_are_pictures_of_their_settings(box):
+    settings = settings_of("sii", "lights=64")
+    report = measure_skips(box, "sii", settings, rounds=2, **OPTIONS)
+    assert report.dim_lights.carrying < 64
+    assert [trade.changes[0] for trade in report.trades] == [
+        f"lights.count={report.dim_lights.count}", "reach.cut=relative", "half_resolution=true"]
+    plain = render(box, "sii", settings, **OPTIONS)
+    for trade in report.trades:
+        changed = render(box, "sii", from_text(settings, trade.changes), **OPTIONS)
+        made, right = (one.irradiance[:, plain.frame.gbuffer.covered].astype(float) for one in (changed, plain))
+        assert trade.difference == pytest.approx(np.sqrt(((made - right) ** 2).mean()) / right.mean())
+        assert len(trade.times_changed) == 2
+
+
+def test_a_trade_that_is_made_already_is_none(wedge):
+    report = measure_skips(wedge, "sii", settings_of("sii", "lights=64", "half_resolution=true"), rounds=1, **OPTIONS)
+    assert not any("half_resolution=true" in trade.changes for trade in report.trades)
+
+
+def test_trades_and_reasons_are_of_methods_and_settings_that_there_are():
+    for method, trades in TRADES.items():
+        for _, changes in trades:
+            assert settings_of(method, *changes) != METHODS[method].settings()
+    assert {name for one in UNMEASURED for name in one.methods} <= set(METHODS)
+
+
+def test_no_rounds_are_refused(wedge):
+    with pytest.raises(InputError, match="rounds: expected 1 or more, got 0"):
+        measure_skips(wedge, "sii", rounds=0, **OPTIONS)

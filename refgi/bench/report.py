@@ -7,6 +7,7 @@ from typing import Any
 
 from refgi.bench.grid import FILES, TRUTH
 from refgi.bench.results import Result, Run, SceneResult, percent, times
+from refgi.bench.split_plot import splits_of
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.compare.report import PAGE, machine, number, templates
 from refgi.image import write_text
@@ -38,7 +39,7 @@ def write_page(result: Result, folder: Path) -> None:
     from markupsafe import Markup
 
     scenes = [{"name": scene.scene, "size": f"{scene.width} x {scene.height}", "truth": scene.truth,
-               "plot": Markup(plot_of(scene)), "said": list(said_of(scene)), "failures": scene.failures,
+               "plot": Markup(plot_of(scene)), "splits": splits_of(scene.splits), "said": list(said_of(scene)), "failures": scene.failures,
                "rows": [_row(run) for run in sorted((*scene.runs, *scene.line), key=lambda one: one.seconds)]}
               for scene in result.scenes]
     names = ", ".join(scene.scene for scene in result.scenes)

@@ -10,7 +10,7 @@ Every picture is made with each of several seeds. One that draws no random numbe
 import dataclasses
 import warnings
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -114,7 +114,9 @@ class Renderer:
         return self._truths[key]
 
 
-def chain_of(renderer: Renderer, choice: Choice, seeds: int, tell: Tell = lambda *_: None) -> Chain:
+def chain_of(
+    renderer: Renderer, choice: Choice, seeds: int, tell: Tell = lambda *_: None, *, alone: bool = True
+) -> Chain:
     """Make the pictures of one method and choice of settings.
 
     Parameters
@@ -127,43 +129,53 @@ def chain_of(renderer: Renderer, choice: Choice, seeds: int, tell: Tell = lambda
         How many seeds.
     tell : callable
         Called with (approximation, share done).
+    alone : bool
+        Whether approximations are switched off alone as well.
 
     Returns
     -------
     Chain
-        Approximations that the settings do not make are left out.
+        Approximations that the settings do not make are left out, and those that `from_truth` takes in.
     """
     kept = [one for one in METHODS[choice.method].approximations if _is_made(one, choice.settings, renderer.options)]
     limits = [one for one in kept if one.shared_by(choice.settings)]
     others = [one for one in kept if one not in limits]
-    links, limited = [_of_truth(renderer, TRUTH, TRUTH, {}, seeds)], dict[str, Any]()
-    for one in limits:
-        limited |= one.shared_by(choice.settings)
-        links.append(_of_truth(renderer, one.name, one.about, limited, seeds))
     from_truth = [number for number, one in enumerate(others) if one.from_truth and one.from_truth(choice.settings)]
     stepped = others[from_truth[0] :] if from_truth else others
-    nothing = np.zeros_like(links[0].variance)
-    steps = [(one.name, one.about) for one in stepped] if from_truth else [
-        (REST, REST_ABOUT), *((one.name, one.about) for one in stepped)]
-    for number, (name, about) in enumerate(steps, start=1 if from_truth else 0):
-        tell(name, number / (2 * len(steps)))
-        links.append(Link(name, about, _pictures(renderer, choice, stepped[number:], seeds), nothing))
-    alone = {}
-    for number, one in enumerate((*limits, *stepped)):
+    links = [*_truths(renderer, limits, choice, seeds),
+             *_steps(renderer, choice, stepped, seeds, from_truth=bool(from_truth), tell=tell)]
+    without = {}
+    for number, one in enumerate((*limits, *stepped) if alone else ()):
         tell(f"without {one.name}", 0.5 + number / (2 * len(kept)))
         judge = renderer.truth(one.shared_by(choice.settings))
-        without = [] if one in limits else [one]
-        alone[one.name] = Alone(_pictures(renderer, choice, without, seeds), judge.mean, judge.variance_of_mean)
-    return Chain(tuple(links), alone, renderer.covered)
+        pictures = _pictures(renderer, choice, [] if one in limits else [one], seeds)
+        without[one.name] = Alone(pictures, judge.mean, judge.variance_of_mean)
+    return Chain(tuple(links), without, renderer.covered)
+
+
+def _truths(renderer: Renderer, limits: Sequence[Approximation], choice: Choice, seeds: int) -> Iterator[Link]:
+    """Yield the truth, then truths with one limit of the method more in each."""
+    limited: dict[str, Any] = {}
+    for name, about, more in ((TRUTH, TRUTH, NONE), *((one.name, one.about, one.shared_by(choice.settings))
+                                                      for one in limits)):
+        limited |= more
+        found = renderer.truth(limited)
+        yield Link(name, about, (found.mean,) * seeds, found.variance_of_mean)
+
+
+def _steps(
+    renderer: Renderer, choice: Choice, stepped: Sequence[Approximation], seeds: int, *, from_truth: bool, tell: Tell
+) -> Iterator[Link]:
+    """Yield the method with all approximations switched off, unless that is the truth, then with one more in each."""
+    names = [(REST, REST_ABOUT), *((one.name, one.about) for one in stepped)]
+    nothing = np.zeros((3, renderer.frame.height, renderer.frame.width))
+    for number in range(int(from_truth), len(names)):
+        tell(names[number][0], number / (2 * len(names)))
+        yield Link(*names[number], _pictures(renderer, choice, stepped[number:], seeds), nothing)
 
 
 def _is_made(one: Approximation, settings: Any, options: Mapping[str, Any]) -> bool:
     return bool(one.shared_by(settings)) or one.without(settings, options) != (settings, options)
-
-
-def _of_truth(renderer: Renderer, name: str, about: str, limits: Mapping[str, Any], seeds: int) -> Link:
-    found = renderer.truth(limits)
-    return Link(name, about, (found.mean,) * seeds, found.variance_of_mean)
 
 
 def _pictures(renderer: Renderer, choice: Choice, off: Sequence[Approximation], seeds: int) -> tuple[Array, ...]:

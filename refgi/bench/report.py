@@ -39,7 +39,8 @@ def write_page(result: Result, folder: Path) -> None:
     from markupsafe import Markup
 
     scenes = [{"name": scene.scene, "size": f"{scene.width} x {scene.height}", "truth": scene.truth,
-               "plot": Markup(plot_of(scene)), "splits": splits_of(scene.splits), "said": list(said_of(scene)), "failures": scene.failures,
+               "plot": Markup(plot_of(scene)), "splits": splits_of(scene.splits),
+               "said": list(said_of(scene)), "failures": scene.failures,
                "rows": [_row(run) for run in sorted((*scene.runs, *scene.line), key=lambda one: one.seconds)]}
               for scene in result.scenes]
     names = ", ".join(scene.scene for scene in result.scenes)

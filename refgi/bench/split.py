@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.bench.chain import Chain, Link, Renderer, Tell, chain_of
 from refgi.bench.chain import Alone as Without
+from refgi.bench.chain import Chain, Link, Renderer, Tell, chain_of
 from refgi.bench.curves import knee
 from refgi.bench.error import error_of
 from refgi.bench.grid import Choice, Grid
@@ -69,8 +69,12 @@ def with_splits(
     renderer = Renderer(scene, truth, tell, **{**dict(zip(("width", "height"), size, strict=True)), **frame_options})
     for choice, at_knee in chosen_for_split(result.runs, grid):
         name = f"split of {choice.method}: {choice.label}"
+
+        def told(what: str, done: float, name: str = name) -> None:
+            tell(f"{name}: {what}", done)
+
         try:
-            chain = chain_of(renderer, choice, seeds, lambda what, done, name=name: tell(f"{name}: {what}", done))
+            chain = chain_of(renderer, choice, seeds, told)
         except RefgiError as error:
             failures[name] = str(error)
             continue
@@ -144,7 +148,7 @@ def split_of(chain: Chain, choice: Choice, at_knee: bool = False, statement: str
     squares = sum(_mean_square(_changes(*pair, covered)) for pair in pairwise(chain.links))
     costs = [part.alone.square for part in parts if part.alone]
     noiseless = square - float(first.variance[:, covered].mean())
-    known = scale > 0 and None not in costs
+    known = scale > 0 and bool(costs) and None not in costs
     cross_alone = noiseless / scale**2 - sum(cost or 0.0 for cost in costs) if known else None
     height, width = covered.shape
     return Split(method=choice.method, changes=choice.changes, knee=at_knee, width=width, height=height,
@@ -157,8 +161,9 @@ def _part(before: Link, after: Link, whole: Array, chain: Chain, scale: float) -
     first, covered = chain.links[0], chain.covered
     truth = first.pictures[0]
     step = _changes(before, after, covered)
-    error = error_of([truth + (new.astype(np.float64) - old) for new, old in zip(after.pictures, before.pictures, strict=True)],
-                     truth, before.variance + after.variance, covered)
+    pairs = zip(after.pictures, before.pictures, strict=True)
+    error = error_of([truth + (new.astype(np.float64) - old) for new, old in pairs], truth,
+                     before.variance + after.variance, covered)
     without = chain.alone.get(after.name)
     return Part(name=after.name, about=after.about, error=figures_of(error), mean=_over(step.mean(), scale),
                 share=_over((step * whole).mean(), _mean_square(whole)),

@@ -112,7 +112,7 @@ def _panel(
 
 def _look(part: Part, names: Sequence[str]) -> dict[str, Any]:
     number = names.index(part.name)
-    return {"color": METHOD_COLOURS[number % len(METHOD_COLOURS)], "edgecolor": CARD, "linewidth": 0.8,
+    return {"facecolor": METHOD_COLOURS[number % len(METHOD_COLOURS)], "edgecolor": CARD, "linewidth": 0.8,
             "hatch": HATCHES[number // len(METHOD_COLOURS) % len(HATCHES)]}
 
 

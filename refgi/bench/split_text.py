@@ -27,8 +27,8 @@ def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
         the whole's mean square, then the whole's RMSE and change of the mean without it; over the truth's mean.
     """
     parts = [(part.name, percent(part.mean), percent(part.error.rmse), percent(part.error.spread),
-              percent(part.share), percent(part.alone and part.alone.rmse), percent(_mean_without(split, part)))
-             for part in split.parts]
+              percent(part.share), percent(part.alone.rmse if part.alone else None),
+              percent(_mean_without(split, part))) for part in split.parts]
     return [*parts, (ALL, percent(split.mean), percent(split.error.rmse), percent(split.error.spread), "100", "", "")]
 
 

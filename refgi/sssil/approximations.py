@@ -12,13 +12,9 @@ from typing import Any
 from refgi.method import Approximation
 from refgi.settings import replaced
 from refgi.sssil.crown.reach import reach
-from refgi.sssil.settings import MOST_LEVELS, MOST_SAMPLES, Bitmask, HssilSettings, Rays
+from refgi.sssil.settings import MOST_LEVELS, MOST_SAMPLES, Bitmask, HssilSettings
 
 MANY = 1024  # samples where not every texel can be one
-
-
-def _unseen(settings: HssilSettings) -> Mapping[str, Any]:
-    return {"emitters": "visible"}
 
 
 def _ignores_visibility(settings: HssilSettings) -> Mapping[str, Any]:
@@ -48,11 +44,11 @@ def _averaged(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
 
 def _whole_picture(settings: HssilSettings, options: Mapping[str, Any]) -> HssilSettings:
     """Return settings with as many levels as reach across the picture."""
-    sampling = settings.sampling
-    if sampling.radius is None:
+    sampling, radius = settings.sampling, settings.sampling.radius
+    if radius is None:
         return settings
     diagonal = math.hypot(*(-(-options[side] >> sampling.first_level) for side in ("width", "height")))
-    while reach(sampling, settings.sampling.radius) < diagonal and sampling.levels < MOST_LEVELS:
+    while reach(sampling, radius) < diagonal and sampling.levels < MOST_LEVELS:
         sampling = dataclasses.replace(sampling, levels=sampling.levels + 1)
     return dataclasses.replace(settings, sampling=sampling)
 
@@ -73,7 +69,8 @@ def _unblurred(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
 
 
 APPROXIMATIONS = (
-    Approximation("unseen senders", "only what the camera sees sends light", limit=_unseen),
+    Approximation("unseen senders", "only what the camera sees sends light",
+                  limit=lambda _: {"emitters": "visible"}),
     Approximation("visibility", "nothing blocks indirect light, or a bitmask of the screen for rays", _by_rays,
                   limit=_ignores_visibility),
     Approximation("clamp", "a sender is a disc (Eq. 4) for a point (Eq. 3), whose light has no bound", _points),

@@ -4,9 +4,14 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from refgi.lights.approximations import CLAMP, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY
+from refgi.lights.approximations import CLAMP, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY, every_light
 from refgi.method import Approximation
 from refgi.splat.sii.settings import SiiSettings
+
+
+def _sampled(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
+    reach = settings.reach if settings.reach.cut else dataclasses.replace(settings.reach, seed=0)  # draws none
+    return dataclasses.replace(settings, lights=every_light(settings.lights), reach=reach)
 
 
 def _uncut(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
@@ -18,6 +23,6 @@ def _full_resolution(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings
 
 
 APPROXIMATIONS = (
-    VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING, OPENNESS, CLAMP,
+    VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING._replace(off=_sampled), OPENNESS, CLAMP,
     Approximation("cut", "pairs whose irradiance is below a threshold are left out", _uncut),
     Approximation("upsampling", "one pixel of 2 x 2 is evaluated, the others are upsampled", _full_resolution))

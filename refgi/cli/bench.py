@@ -53,6 +53,7 @@ def _bench(
     from refgi.errors import RefgiWarning, expect
 
     expect(not (quick and grid_file), "--grid", "--quick or --grid, not both", "both")
+    expect(split or split_size is None, "--split-size", "--split beside it", "none")
     names = None if methods is None else [name.strip() for name in methods.split(",")]
     grid = chosen(read_grid(Path(grid_file)) if grid_file else built_in(quick), names)
     truth = settings_for(TRUTH, pairs)

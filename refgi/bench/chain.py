@@ -145,7 +145,8 @@ def chain_of(
     links = [*_truths(renderer, limits, choice, seeds),
              *_steps(renderer, choice, stepped, seeds, from_truth=bool(from_truth), tell=tell)]
     without = {}
-    for number, one in enumerate((*limits, *stepped) if alone else ()):
+    judged = limits if from_truth and len(stepped) == 1 else [*limits, *stepped]  # without the last one it is the truth
+    for number, one in enumerate(judged if alone else ()):
         tell(f"without {one.name}", 0.5 + number / (2 * len(kept)))
         judge = renderer.truth(one.shared_by(choice.settings))
         pictures = _pictures(renderer, choice, [] if one in limits else [one], seeds)
@@ -181,12 +182,12 @@ def _is_made(one: Approximation, settings: Any, options: Mapping[str, Any]) -> b
 def _pictures(renderer: Renderer, choice: Choice, off: Sequence[Approximation], seeds: int) -> tuple[Array, ...]:
     """Return pictures without some approximations, a seed each.
 
-    The last in the pipeline is switched off first: what stands on an earlier one is gone when that one is switched off.
+    The first in the pipeline is switched off first: what stands on it is gone with it.
     """
     made = []
     for seed in range(seeds):
         settings, options = with_seed(choice.settings, seed), renderer.options
-        for one in reversed(off):
+        for one in off:
             settings, options = one.without(settings, options)
         made.append(renderer.picture(choice.method, settings, options))
     return tuple(made)

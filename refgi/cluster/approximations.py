@@ -47,7 +47,8 @@ def _rectangle(settings: ValSettings, _: Mapping[str, Any]) -> ValSettings:
 
 
 def _finer_maps(settings: ValSettings, _: Mapping[str, Any]) -> ValSettings:
-    if not isinstance(settings.visibility, (*BY_MAPS, BackProjection)):
+    """Return settings with finer maps where kernels read them: to project all of their texels back takes too long."""
+    if not isinstance(settings.visibility, BY_MAPS):
         return settings
     resolution = min(LARGEST_MAP, FINER * settings.maps.resolution)
     return dataclasses.replace(settings, maps=dataclasses.replace(settings.maps, resolution=resolution))
@@ -78,10 +79,11 @@ APPROXIMATIONS = (
     OPENNESS, CLAMP,
     Approximation("clustering", "lights of a cluster share one visibility, by rays to all of them", _each_light),
     Approximation("rectangle", "the rectangle around a cluster for its lights, by rays", _lights_of_clusters),
-    Approximation("single view", "what blocks is what the rectangle's centre sees: one depth map", _rectangle),
-    Approximation("shadow map resolution", f"texels of the shadow maps; off: {FINER} along a side for each",
-                  _finer_maps),
+    Approximation("single view", "what blocks is what the rectangle's centre sees: texels of one depth map",
+                  _rectangle),
     Approximation("kernel", "tests of depth in one region of the map for all blockers that it holds", _all_blockers),
+    Approximation("shadow map resolution", f"texels that such tests read; off: {FINER} along a side for each",
+                  _finer_maps),
     Approximation("CSM series", "M terms and their bias for the test of depth", _tests_of_depth),
     Approximation("filter", "levels of a mip map for each texel of the region", _every_texel),
     Approximation("interleaving", "a pixel sums one light of n x n, and the blur", _all_at_each_pixel))

@@ -54,8 +54,9 @@ def _whole_picture(settings: HssilSettings, options: Mapping[str, Any]) -> Hssil
 
 
 def _full_resolution(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
-    levels = min(MOST_LEVELS, settings.sampling.levels + settings.sampling.first_level)
-    return replaced(settings, {"start": "full", "levels": levels})
+    sampling = settings.sampling
+    more = 0 if sampling.radius is None else sampling.first_level  # a radius that is not set covers the picture
+    return replaced(settings, {"start": "full", "levels": min(MOST_LEVELS, sampling.levels + more)})
 
 
 def _every_texel(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:

@@ -24,10 +24,12 @@ MADE = {
             {"lights": 32, "visibility": "none", "interleaving": 2}],
     "hssil": [{"radius": 2.0, "levels": 2, "samples": 8},
               {"visibility": "bitmask", "radius": 2.0, "levels": 2, "samples": 8}],
-    "gather": [{"interpolation.grid": 8}],
+    "gather": [{"interpolation.grid": 16, "interpolation.reach": 1.0}],
     "vpl": [{"lights": 32}, {"lights": 32, "visibility": False}],
     "truth": [{"samples": 24}, {"samples": 24, "visibility": False, "emitters": "visible"}],
 }
+# without the only one that its settings switch off a method with rays is the truth: that is not rendered
+LAST = {("vpl", 0): "light sampling", ("truth", 0): "few samples", ("truth", 1): "few samples"}
 KINDS = [(name, number) for name, several in MADE.items() for number in range(len(several))]
 
 
@@ -73,18 +75,22 @@ def test_each_changes_the_picture(renderer, name, number):
     for part, alone in chain.alone.items():
         changed = not np.array_equal(alone.pictures[0], used)
         assert changed or not np.array_equal(alone.truth, chain.links[0].pictures[0]), part
-    assert set(chain.alone) == {link.name for link in chain.links} - {TRUTH, REST}
+    steps = {link.name for link in chain.links} - {TRUTH, REST}
+    assert set(chain.alone) == steps - {LAST.get((name, number))}
     for before, after in zip(chain.links, chain.links[1:], strict=False):
         assert not np.array_equal(before.pictures[0], after.pictures[0]), after.name
 
 
 # RMSE of all switched off against the last truth, over its mean: peaks beside texels and pixels, which are points
-LIMITS = {"sii": 0.15, "multires": 0.15, "gather": 0.15, "hssil": 0.4}
+LIMITS = {"sii": 0.15, "multires": 0.15, "gather": 0.15, "hssil": 0.25}
 DARKER = 0.03  # of the mean: what lies beyond the rim of the picture or of the map's cone
 
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_with_all_of_them_off_a_method_is_the_truth_that_shares_its_limits(renderer, name, evidence):
+    if name == "hssil":  # whose senders are pixels
+        larger = {"width": 64, "height": 48, "rsm_resolution": 64}
+        renderer = Renderer(load_scene("cornell_box"), TruthSettings(samples=96), **larger)
     chain = chain_of(renderer, Choice(name, (), settings_of(name, 0)), 1, alone=False)
     names = [link.name for link in chain.links]
     at = names.index(REST)
@@ -100,9 +106,9 @@ def test_with_all_of_them_off_a_method_is_the_truth_that_shares_its_limits(rende
 @pytest.mark.parametrize("name", ["val", "vpl"])
 def test_many_lights_with_rays_converge_to_the_truth(name, evidence):
     """Where light sampling starts from the truth, all texels with a ray each are the truth but for their size."""
-    renderer = Renderer(load_scene("cornell_box"), TruthSettings(samples=384), width=16, height=12, rsm_resolution=64)
+    renderer = Renderer(load_scene("cornell_box"), TruthSettings(samples=192), width=12, height=9, rsm_resolution=48)
     settings, options = settings_of(name, 0), renderer.options
-    for one in reversed(METHODS[name].approximations):
+    for one in METHODS[name].approximations:
         settings = one.without(settings, options)[0]
     truth = renderer.truth().mean[:, renderer.covered]
     made = renderer.picture(name, settings, options)[:, renderer.covered]

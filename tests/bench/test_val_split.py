@@ -26,9 +26,9 @@ EACH = {"visibility": "rays_vpls", "clusters.count": 48, "interleaving": 1}
 LITERAL = {
     "light sampling": EACH | {"pairs.clamp": None}, "clamp": EACH, "clustering": EACH | {"clusters.count": 4},
     "rectangle": {"visibility": "rays_rectangle", "interleaving": 1},
-    "single view": {"visibility": "back_projection", "maps.resolution": 32, "interleaving": 1},
-    "shadow map resolution": {"visibility": "back_projection", "interleaving": 1},
-    "kernel": {"visibility": "pcss", "interleaving": 1},
+    "single view": {"visibility": "back_projection", "interleaving": 1},
+    "kernel": {"visibility": "pcss", "maps.resolution": 32, "interleaving": 1},
+    "shadow map resolution": {"visibility": "pcss", "interleaving": 1},
     "CSM series": {"visibility.prefilter": "brute", "interleaving": 1}, "filter": {"interleaving": 1},
     "interleaving": {}}
 # every texel a light with a ray of its own, and not clamped

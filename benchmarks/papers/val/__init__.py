@@ -91,7 +91,7 @@ FIGURES = (
               "light sampling": "pixel lights for all light", "clamp": "near ones clamped",
               "clustering": "clusters: the share of visible lights", "rectangle": "their bounding rectangle",
               "single view": "one map from its centre, projected back",
-              "shadow map resolution": "texels of twice the size", "kernel": "one mean blocker, one disc",
+              "kernel": "one mean blocker, one disc", "shadow map resolution": "texels of twice the size",
               "CSM series": "series of 4 terms", "filter": "mip levels for discs",
               "interleaving": "interleaving and blur"})),
 )

@@ -15,7 +15,9 @@ def _sampled(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
 
 
 def _uncut(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
-    return dataclasses.replace(settings, reach=dataclasses.replace(settings.reach, cut=None))
+    if settings.reach.cut is None:
+        return settings
+    return dataclasses.replace(settings, reach=dataclasses.replace(settings.reach, cut=None, seed=0))
 
 
 def _full_resolution(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:

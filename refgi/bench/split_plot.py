@@ -13,11 +13,11 @@ from refgi.compare.plot import CARD, INK, LINE, METHOD_COLOURS, figure_svg, styl
 
 HATCHES = ("", "////", "....")  # of approximations that share a colour
 LEAST = 1e-4  # a part of less than that shows in no bar
-WIDTH, HEIGHT, ROW = 11.0, 1.5, 0.36  # inches: of the plot, of what stands around the bars, and of a bar
+WIDTH, HEIGHT, ROW = 9.2, 1.5, 0.36  # inches: of the plot, of what stands around the bars, and of a bar
 HOW = ("From the truth to the method as it is used, one approximation more at a time, in the order of its pipeline. "
        "Left: what each changes of the mean. Right: its share of the mean square error, its own square and half of its "
        "cross terms with others. Both add up to the mark; what lies on the other side takes back what others did. "
-       "Beside it stands what the error would be with that approximation alone switched off.")
+       "The tables also have what the error would be with one approximation alone switched off.")
 
 
 def splits_of(splits: Sequence[Split]) -> dict[str, Any] | None:
@@ -100,6 +100,8 @@ def _panel(
 ) -> None:
     style_plot(plot)
     plot.grid(True, axis="x", color=LINE, linewidth=0.8)
+    plot.use_sticky_edges = False
+    plot.margins(x=0.06)
     plot.axvline(0, color=INK, linewidth=0.8)
     plot.tick_params(axis="y", length=0, labelsize=9)
     for row, (values, split) in enumerate(zip(rows, splits, strict=True)):

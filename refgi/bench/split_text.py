@@ -33,7 +33,7 @@ def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
 
 
 def said_of_split(split: "Split") -> str:
-    """Return what a split says: the part that the error is most of, how squares add up, and what helps most.
+    """Return what a split says: the largest share and what takes most back, how squares add up, what helps most.
 
     Parameters
     ----------
@@ -49,15 +49,17 @@ def said_of_split(split: "Split") -> str:
     if not known or split.squares is None or split.cross is None:
         return f"{split.label}: not known."
     main = max(known, key=lambda part: part.share or 0.0)
+    least = min(known, key=lambda part: part.share or 0.0)
+    back = f", of which {least.name} takes back {percent(-(least.share or 0.0))} %" if (least.share or 0.0) < 0 else ""
     text = (f"{split.label}: RMSE {percent(split.error.rmse)} %, of whose square {percent(main.share)} % is "
-            f"{main.name}. Mean squares of the parts sum to {percent(split.squares)} % of the truth's mean squared, "
+            f"{main.name}{back}. Mean squares of the parts sum to {percent(split.squares)} % of the truth's mean squared, "
             f"twice their cross terms to {percent(split.cross)} %, both together to "
             f"{percent(split.squares + split.cross)} %.")
     without = [(part.alone.rmse, part.name) for part in known if part.alone and part.alone.rmse is not None]
     if not without:
         return text
     rmse, name = min(without)
-    return f"{text} Without {name} alone RMSE would be {percent(rmse)} %."
+    return f"{text} With {name} alone switched off RMSE would be {percent(rmse)} %."
 
 
 def tables_of(splits: "Sequence[Split]") -> list[str]:

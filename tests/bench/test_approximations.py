@@ -35,7 +35,12 @@ KINDS = [(name, number) for name, several in MADE.items() for number in range(le
 
 @pytest.fixture(scope="module")
 def renderer():
-    return Renderer(load_scene("cornell_box"), TruthSettings(samples=96), **OPTIONS)
+    return Renderer(load_scene("cornell_box"), TruthSettings(samples=48), **OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def small():
+    return Renderer(load_scene("cornell_box"), TruthSettings(samples=24), width=24, height=18, rsm_resolution=32)
 
 
 def settings_of(name, number):
@@ -66,11 +71,11 @@ def test_what_is_switched_off_stays_off(name, number):
 
 
 @pytest.mark.parametrize(("name", "number"), KINDS)
-def test_each_changes_the_picture(renderer, name, number):
+def test_each_changes_the_picture(small, name, number):
     """Each approximation that settings make changes some pixel where it is switched off alone, or the truth."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)
-        chain = chain_of(renderer, Choice(name, (), settings_of(name, number)), 1)
+        chain = chain_of(small, Choice(name, (), settings_of(name, number)), 1)
     used = chain.links[-1].pictures[0]
     for part, alone in chain.alone.items():
         changed = not np.array_equal(alone.pictures[0], used)
@@ -154,3 +159,12 @@ def test_truths_have_seeds_of_their_own_and_are_traced_once(tmp_path, monkeypatc
     held = Renderer(load_scene("cornell_box"), TruthSettings(checkpoint=tmp_path), **OPTIONS)
     held.truth()
     assert asked[-1].checkpoint == tmp_path
+
+
+def test_a_method_that_declares_none_has_one_part(small, monkeypatch):
+    bare = METHODS["sii"]._replace(approximations=())
+    monkeypatch.setattr("refgi.bench.chain.METHODS", {"sii": bare})
+    chain = chain_of(small, Choice("sii", (), settings_of("sii", 0)), 1)
+    assert [link.name for link in chain.links] == [TRUTH, REST]
+    assert np.array_equal(chain.links[-1].pictures[0], small.picture("sii", settings_of("sii", 0), small.options))
+    assert chain.alone == {}

@@ -150,8 +150,7 @@ def test_words_and_tables_have_the_figures():
     assert "sum to 9.75 % of the truth's mean squared" in said
     assert "cross terms to \N{MINUS SIGN}6.5 %, both together to 3.25 %" in said
     assert said.endswith("With visibility alone switched off RMSE would be 5 %.")
-    known = split()
-    parts = tuple(part.model_copy(update={"share": share}) for part, share in zip(known.parts, (1.5, -0.5), strict=True))
+    parts = tuple(part.model_copy(update={"share": 1.5 - 2 * k}) for k, part in enumerate(split().parts))
     assert "of whose square 150 % is visibility, of which cut takes back 50 %." in said_of_split(split(parts=parts))
     lines = tables_of([split(), split(knee=True)])
     assert sum(line.startswith("| visibility |") for line in lines) == 2

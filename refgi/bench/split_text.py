@@ -50,7 +50,8 @@ def said_of_split(split: "Split") -> str:
         return f"{split.label}: not known."
     main = max(known, key=lambda part: part.share or 0.0)
     least = min(known, key=lambda part: part.share or 0.0)
-    back = f", of which {least.name} takes back {percent(-(least.share or 0.0))} %" if (least.share or 0.0) < 0 else ""
+    taken = -(least.share or 0.0)
+    back = f", of which {least.name} takes back {percent(taken)} %" if taken > 0 else ""
     text = (f"{split.label}: RMSE {percent(split.error.rmse)} %, of whose square {percent(main.share)} % is "
             f"{main.name}{back}. Mean squares of the parts sum to {percent(split.squares)} % of the truth's mean squared, "
             f"twice their cross terms to {percent(split.cross)} %, both together to "

@@ -53,8 +53,8 @@ def said_of_split(split: "Split") -> str:
     taken = -(least.share or 0.0)
     back = f", of which {least.name} takes back {percent(taken)} %" if taken > 0 else ""
     text = (f"{split.label}: RMSE {percent(split.error.rmse)} %, of whose square {percent(main.share)} % is "
-            f"{main.name}{back}. Mean squares of the parts sum to {percent(split.squares)} % of the truth's mean squared, "
-            f"twice their cross terms to {percent(split.cross)} %, both together to "
+            f"{main.name}{back}. Mean squares of the parts sum to {percent(split.squares)} % of the truth's mean "
+            f"squared, twice their cross terms to {percent(split.cross)} %, both together to "
             f"{percent(split.squares + split.cross)} %.")
     without = [(part.alone.rmse, part.name) for part in known if part.alone and part.alone.rmse is not None]
     if not without:

@@ -204,6 +204,8 @@ def _split(bench: Workbench, name: str, variants: Mapping[str, Mapping[str, Any]
     links = chain_of(renderer, Choice("hssil", (), smaller(frame)), 1, alone=False).links
     varied = {title: light_of(frame, smaller(frame, **changes)) for title, changes in variants.items()
               if title != FRAMES} | {FRAMES: expected_light(frame, smaller(frame), 19)}
-    covered = frame.gbuffer.covered
-    return Split({link.name: link.pictures[0] for link in links}, varied, covered,
-                 standard_error(renderer.truth(), covered))
+    covered, found = frame.gbuffer.covered, {link.name: link.pictures[0] for link in links}
+    made: dict[str, Array] = {}
+    for step in STEPS:  # one that a small picture does not take, such as levels, changes nothing
+        made[step] = found[step] if step in found else list(made.values())[-1]
+    return Split(made, varied, covered, standard_error(renderer.truth(), covered))

@@ -1,4 +1,4 @@
-"""`Method`: what a method's package declares of itself, so that every command can use it."""
+"""`Method`: what a method's package declares of itself, so that every command can use it; its approximations too."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -15,6 +15,30 @@ DEFAULT = "default"
 NONE: Mapping[str, Any] = MappingProxyType({})
 
 
+class Approximation(NamedTuple):
+    """What a method leaves out or does coarsely, and what switches that off.
+
+    It is switched off by other settings, by other options of the frame, or, where no settings of the method do
+    without it, by a truth that has it as well: then `limit` is not empty.
+    """
+
+    name: str  # the same in all methods that have it
+    about: str  # one line: what takes the place of what
+    off: Callable[[Any, Mapping[str, Any]], Any] | None = None  # settings without it, in a frame of some options
+    frame: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None  # options of the frame without it
+    limit: Callable[[Any], Mapping[str, Any]] | None = None  # settings of the truth that has it as well
+    from_truth: Callable[[Any], bool] | None = None  # whether pictures without it and what follows are the truth
+
+    def shared_by(self, settings: Any) -> Mapping[str, Any]:
+        """Return settings of the truth that has it as well; empty where it is switched off in the method."""
+        return NONE if self.limit is None else self.limit(settings)
+
+    def without(self, settings: Any, options: Mapping[str, Any]) -> tuple[Any, Mapping[str, Any]]:
+        """Return settings and options of the frame with it switched off; both as they are where it is off already."""
+        changed = settings if self.off is None else self.off(settings, options)
+        return changed, options if self.frame is None else self.frame(options)
+
+
 class Method(NamedTuple):
     """A method by name."""
 
@@ -28,6 +52,7 @@ class Method(NamedTuple):
     memory: Callable[[Any, tuple[int, int], int], int] | None = None  # bytes that settings add to a picture
     presets: Mapping[str, Settings] = NONE  # named settings beside the default; "paper": the values printed
     temporal: Settings | None = None  # of its temporal filter over frames, where it has one
+    approximations: tuple[Approximation, ...] = ()  # in the order of its pipeline
 
     def preset(self, name: str) -> Settings:
         """Return named settings; "default" are those of the class."""

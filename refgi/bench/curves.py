@@ -1,4 +1,4 @@
-"""Curves of error over time: what lies on the front, and the path tracer's error in equal time."""
+"""Curves of error over time: the front, a curve's knee, and the path tracer's error in equal time."""
 
 import math
 from collections.abc import Sequence
@@ -50,3 +50,29 @@ def error_in(line: Sequence[Point], seconds: float) -> float:
         return known[-1][1] * math.sqrt(known[-1][0] / seconds)
     x, y = np.log([s for s, _ in known]), np.log([e for _, e in known])
     return float(np.exp(np.interp(math.log(seconds), x, y)))
+
+
+def knee(points: Sequence[Point]) -> int | None:
+    """Return which point of a curve is its knee: that of the least error^4 x time.
+
+    Where an error is bias and noise, e^2 = b^2 + c / t, this is where the noise has come down to the bias, c / t = b^2:
+    from there on more time buys less and less.
+
+    Parameters
+    ----------
+    points : sequence of (float, float)
+        Time and error of settings of one method.
+
+    Returns
+    -------
+    int or None
+        Its place in the sequence, the first one of equals; None where no point is positive and finite.
+
+    Examples
+    --------
+    >>> knee([(t, (0.1**2 + 0.04 / t) ** 0.5) for t in (1.0, 2.0, 4.0, 8.0)])
+    2
+    """
+    costs = [e**4 * s if 0 < s < math.inf and 0 < e < math.inf else math.inf for s, e in points]
+    least = min(costs, default=math.inf)
+    return costs.index(least) if math.isfinite(least) else None

@@ -8,6 +8,7 @@ from typing import Any
 from refgi.bench.grid import FILES, TRUTH
 from refgi.bench.overview import Place, overview
 from refgi.bench.results import Result, Run, SceneResult, percent, times
+from refgi.bench.split_plot import splits_of
 from refgi.bench.views import named, provenance_of, view_of
 from refgi.compare.page.album import album
 from refgi.compare.plot import Axes, Curve, curves_plot
@@ -84,9 +85,9 @@ def _scene(scene: SceneResult, number: int, view: int | None, record: Record) ->
 
     runs = sorted(named(scene, number), key=lambda one: one[1].seconds)
     return {"name": scene.scene, "number": number, "size": f"{scene.width} x {scene.height}", "truth": scene.truth,
-            "plot": Markup(plot_of(scene, number)), "said": list(said_of(scene)), "failures": scene.failures,
-            "rows": [_row(name, run) for name, run in runs], "view": view, "provenance": list(provenance_of(record)),
-            "made": [_made(run) for _, run in runs]}
+            "plot": Markup(plot_of(scene, number)), "splits": splits_of(scene.splits), "said": list(said_of(scene)),
+            "failures": scene.failures, "rows": [_row(name, run) for name, run in runs], "view": view,
+            "provenance": list(provenance_of(record)), "made": [_made(run) for _, run in runs]}
 
 
 def _made(run: Run) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any
 import pydantic
 
 from refgi.bench.error import Error
+from refgi.bench.split_text import tables_of
 from refgi.compare.report import number
 from refgi.image import write_text
 
@@ -69,6 +70,47 @@ class Run(_Strict):
         return math.nan if value is None else value
 
 
+class Alone(_Strict):
+    """What switching one approximation off alone does, the truth's noise taken out; None where not known."""
+
+    rmse: float | None  # without it
+    square: float | None  # mean square error with it less that without: what it costs; below 0: what it saves
+    mean: float | None  # change of the mean that it makes
+
+
+class Part(_Strict):
+    """What one approximation changes in the picture of those before it, over the mean of the truth."""
+
+    name: str
+    about: str
+    error: Figures  # of the change
+    mean: float | None  # change of the mean
+    share: float | None  # of the whole's mean square error: its own square and half of what it has with others
+    alone: Alone | None = None  # None for what no approximation accounts for
+
+
+class Split(_Strict):
+    """The error of one method and setting as a sum of its approximations, over the mean of the truth."""
+
+    method: str
+    changes: tuple[str, ...]  # beside the defaults
+    knee: bool  # of the method's curve on this scene
+    width: int
+    height: int
+    truth: str  # how well it is known
+    error: Figures  # of the whole
+    mean: float | None  # change of the mean, the sum of the parts'
+    squares: float | None  # sum of the parts' mean squares
+    cross: float | None  # mean square of the whole less that sum
+    cross_alone: float | None  # mean square of the whole less what each costs alone
+    parts: tuple[Part, ...]
+
+    @property
+    def label(self) -> str:
+        """Method and settings in short."""
+        return f"{self.method}, {', '.join(self.changes) or 'default'}{' (knee)' if self.knee else ''}"
+
+
 class SceneResult(_Strict):
     """All runs on one scene."""
 
@@ -81,6 +123,7 @@ class SceneResult(_Strict):
     runs: tuple[Run, ...]
     line: tuple[Run, ...]  # the path tracer, stopped early
     failures: dict[str, str]  # what gave no picture, and why
+    splits: tuple[Split, ...] = ()
 
 
 class PathResult(_Strict):
@@ -222,6 +265,7 @@ def markdown(result: Result) -> str:
             lines.append(f"| {run.method} | {run.label} | {number(1e3 * run.seconds)} | {percent(error.rmse)} | "
                          f"{percent(error.bias)} | {percent(error.spread)} | {times(run.in_equal_time)} | "
                          f"{'yes' if run.front else ''} |")
+        lines += tables_of(scene.splits)
         lines += ["", *(f"{name} gave no picture: {why}" for name, why in scene.failures.items()), ""]
     return "\n".join(lines).rstrip() + "\n"
 

@@ -22,6 +22,10 @@ FILES = ("index.html", "results.json", "results.csv", "results.md")
 @click.option("--size", type=Size(), help="Picture size in pixels; the scenes' own where absent.")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE",
               help="A setting of the truth, such as samples=1024 or checkpoint=DIR; repeatable.")
+@click.option("--split", is_flag=True, help="Split each method's error into its approximations, at the default and at "
+                                            "the knee of its curve.")
+@click.option("--split-size", type=Size(), help="Picture size of the split; 128 pixels along the longer side at most "
+                                                "where absent.")
 @click.option("--threads", type=click.IntRange(1), help="Threads of compiled kernels; all where absent.")
 @click.option("--out", required=True, help="Folder for index.html, results.json, results.csv, results.md and pictures.")
 @writing
@@ -29,7 +33,8 @@ FILES = ("index.html", "results.json", "results.csv", "results.md")
 @click.pass_obj
 def _bench(
     session: Session, /, scenes: tuple[str, ...], methods: str | None, grid_file: str | None, quick: bool, rounds: int,
-    size: tuple[int, int] | None, pairs: tuple[str, ...], threads: int | None, out: str, parents: bool, force: bool,
+    size: tuple[int, int] | None, pairs: tuple[str, ...], split: bool, split_size: tuple[int, int] | None,
+    threads: int | None, out: str, parents: bool, force: bool,
 ) -> int:
     """Measure error over time on SCENES (cornell_box where absent).
 
@@ -41,6 +46,7 @@ def _bench(
     from refgi.bench.pictures import FOLDER, places
     from refgi.bench.report import said_of, write_page
     from refgi.bench.results import Result, markdown, write_results
+    from refgi.bench.split import with_splits
     from refgi.cli.destination import Permission, folder
     from refgi.cli.settings import settings_for
     from refgi.cli.view import View
@@ -48,6 +54,7 @@ def _bench(
     from refgi.errors import RefgiWarning, expect
 
     expect(not (quick and grid_file), "--grid", "--quick or --grid, not both", "both")
+    expect(split or split_size is None, "--split-size", "--split beside it", "none")
     names = None if methods is None else [name.strip() for name in methods.split(",")]
     grid = chosen(read_grid(Path(grid_file)) if grid_file else built_in(quick), names)
     truth = settings_for(TRUTH, pairs)
@@ -62,8 +69,11 @@ def _bench(
             def told(what: str, done: float, number: int = number, name: str = scene.name) -> None:
                 tell(f"{name} ({number + 1} of {len(loaded)}): {what}", done)
 
-            made.append(bench_scene(scene, grid, rounds=rounds, truth=truth, tell=told, place=place,
-                                    shadows="exact"))
+            one = bench_scene(scene, grid, rounds=rounds, truth=truth, tell=told, place=place, shadows="exact")
+            if split:
+                options = dict(zip(("width", "height"), split_size or (), strict=False))
+                one = with_splits(one, scene, grid, seeds=rounds, truth=truth, tell=told, shadows="exact", **options)
+            made.append(one)
             result = Result(environment=environment(), scenes=tuple(made))
             write_results(result, path)
             write_page(result, path)

@@ -8,6 +8,7 @@ shadows, PCF, PCSS and convolution shadow maps, `lighting` the picture. `adaptiv
 `reference` holds the references of these steps and the error of each.
 """
 
+from refgi.cluster.approximations import APPROXIMATIONS
 from refgi.cluster.clustering.kmeans import Clustering, cluster
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.ledger import val_ledger
@@ -35,4 +36,4 @@ __all__ = [
 METHOD = Method(
     "val", "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights", val, ValSettings,
     visibility=lambda settings: settings.visibility is not None, ledger=val_ledger, memory=extra_bytes,
-    presets=PRESETS)
+    presets=PRESETS, approximations=APPROXIMATIONS)

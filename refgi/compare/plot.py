@@ -88,6 +88,40 @@ def curves_plot(curves: Sequence[Curve], axes: Axes) -> str:
 
 
 def _svg(draw: Callable[[Any], None], axes: Axes, width: float, label: str) -> str:
+    def drawn(figure: Any) -> None:
+        plot = figure.add_subplot()
+        plot.set(xlabel=axes.x, ylabel=axes.y)
+        plot.grid(True, which="major", color=LINE, linewidth=0.8)
+        style_plot(plot)
+        draw(plot)
+
+    return figure_svg(drawn, (width, 4.3), label)
+
+
+def style_plot(plot: Any) -> None:
+    """Give the axes of a plot the look of all plots: no ground of their own, no frame above and on the right."""
+    plot.patch.set_alpha(0)
+    plot.spines[["top", "right"]].set_visible(False)
+    plot.set_axisbelow(True)
+
+
+def figure_svg(draw: Callable[[Any], None], size: tuple[float, float], label: str) -> str:
+    """Draw a figure in the page's colours.
+
+    Parameters
+    ----------
+    draw : callable
+        Called with an empty figure of Matplotlib.
+    size : tuple of 2 floats
+        Width and height, inches.
+    label : str
+        What a screen reader says.
+
+    Returns
+    -------
+    str
+        An ``<svg>`` element without references to anything outside; the same for equal input.
+    """
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
@@ -96,15 +130,9 @@ def _svg(draw: Callable[[Any], None], axes: Axes, width: float, label: str) -> s
                   "axes.labelcolor": INK, "axes.edgecolor": LINE, "xtick.color": INK, "ytick.color": INK,
                   "xtick.minor.size": 0, "ytick.minor.size": 0}
     with matplotlib.rc_context(style):
-        figure = Figure(figsize=(width, 4.3), layout="constrained")
+        figure = Figure(figsize=size, layout="constrained")
         figure.patch.set_alpha(0)
-        plot = figure.add_subplot()
-        plot.patch.set_alpha(0)
-        plot.set(xlabel=axes.x, ylabel=axes.y)
-        plot.spines[["top", "right"]].set_visible(False)
-        plot.grid(True, which="major", color=LINE, linewidth=0.8)
-        plot.set_axisbelow(True)
-        draw(plot)
+        draw(figure)
         stream = io.StringIO()
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(stream, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))

@@ -9,6 +9,7 @@ what lies between receiver and sample.
 """
 
 from refgi.method import Method
+from refgi.sssil.approximations import APPROXIMATIONS
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.hssil import hssil
 from refgi.sssil.memory import extra_bytes
@@ -53,4 +54,4 @@ __all__ = [
 METHOD = Method(
     "hssil", "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees", hssil,
     HssilSettings, visibility=lambda settings: settings.visibility is not None, memory=extra_bytes, presets=PRESETS,
-    temporal=TemporalSettings())
+    temporal=TemporalSettings(), approximations=APPROXIMATIONS)

@@ -6,6 +6,7 @@ import math
 import sys
 import time
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
-from refgi.method import Method
+from refgi.method import Approximation, Method
 from refgi.pairs.shadow_rays import receivers
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 STOPPING = {"samples", "seconds", "target_error", "checkpoint", "batch"}  # settings that change no pass
+MORE, MOST_SAMPLES = 4, 2**31  # samples for each one where few are switched off; as many as there may be
 
 def truth(frame: "Frame", settings: TruthSettings | None = None) -> Array:
     """Compute the one-bounce irradiance by path tracing.
@@ -217,5 +219,22 @@ def _fingerprint(task: Task, shape: tuple[int, ...]) -> bytes:
     return digest.digest()
 
 
+def _more_samples(settings: TruthSettings, _: Mapping[str, Any]) -> TruthSettings:
+    return dataclasses.replace(settings, samples=min(MOST_SAMPLES, MORE * settings.samples), seconds=None,
+                               target_error=None)
+
+
+def _limits(settings: TruthSettings, name: str) -> Mapping[str, Any]:
+    """Return what the truth leaves out by one of its settings."""
+    value = getattr(settings, name)
+    return {} if value == getattr(TruthSettings(), name) else {name: value}
+
+
+APPROXIMATIONS = (
+    Approximation("unseen senders", "only what the camera sees sends light", limit=lambda s: _limits(s, "emitters")),
+    Approximation("visibility", "nothing blocks indirect light", limit=lambda s: _limits(s, "visibility")),
+    Approximation("few samples", f"S samples a pixel; off: {MORE} for each", _more_samples, from_truth=lambda _: True))
+
 METHOD = Method("truth", "one-bounce path tracing with a standard error for every pixel", truth, TruthSettings,
-                visibility=lambda settings: settings.visibility, estimate=trace_truth)
+                visibility=lambda settings: settings.visibility, estimate=trace_truth,
+                approximations=APPROXIMATIONS)

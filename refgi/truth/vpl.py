@@ -4,12 +4,13 @@ E(x) = sum_i Phi_i / pi <n_i.w> <n_x.-w> / r^2 V(x, x_i), and the same with a lo
 """
 
 import dataclasses
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.method import Method
+from refgi.method import Approximation, Method
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, receivers, shadowed_sum
 from refgi.settings import Settings, setting
@@ -81,5 +82,15 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     return irradiance
 
 
+def _every_texel(settings: VplSettings, _: Mapping[str, Any]) -> VplSettings:
+    return dataclasses.replace(settings, lights=VplLights(pattern="all"))
+
+
+APPROXIMATIONS = (
+    Approximation("visibility", "nothing blocks indirect light",
+                  limit=lambda settings: {} if settings.visibility else {"visibility": False}),
+    Approximation("light sampling", "N pixel lights for all texels of the reflective shadow map", _every_texel,
+                  from_truth=lambda settings: settings.visibility))
+
 METHOD = Method("vpl", "the same pixel lights with ray-traced visibility", vpl, VplSettings,
-                visibility=lambda settings: settings.visibility)
+                visibility=lambda settings: settings.visibility, approximations=APPROXIMATIONS)

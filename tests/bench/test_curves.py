@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from refgi.bench.curves import error_in, front
+from refgi.bench.curves import error_in, front, knee
 
 
 def test_the_front_is_what_nothing_beats():
@@ -20,3 +20,19 @@ def test_a_monte_carlo_line_is_met_between_and_after_its_points():
         assert error_in(line, seconds) == pytest.approx(0.3 / math.sqrt(seconds))
     assert error_in(line, 0.99) == math.inf
     assert error_in([], 1.0) == math.inf
+
+
+def test_the_knee_is_where_noise_has_come_down_to_bias():
+    """Of e^2 = b^2 + c / t that is t = c / b^2, wherever the points begin."""
+    for bias, noise in ((0.1, 0.04), (0.3, 0.9), (0.02, 0.001)):
+        times = [noise / bias**2 * 2**k for k in range(-3, 5)]
+        points = [(t, math.sqrt(bias**2 + noise / t)) for t in times]
+        assert times[knee(points)] == pytest.approx(noise / bias**2)
+        assert times[::-1][knee(points[::-1])] == pytest.approx(noise / bias**2)
+
+
+def test_a_knee_is_one_of_the_points_that_are_known():
+    assert knee([]) is None
+    assert knee([(1, math.nan), (0, 1), (math.inf, 1), (1, math.inf), (1, 0)]) is None
+    assert knee([(1, math.nan), (2, 0.5), (3, 0.5)]) == 1
+    assert knee([(1, 0.5), (1, 0.5)]) == 0

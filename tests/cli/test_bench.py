@@ -38,6 +38,38 @@ def test_scenes_of_a_grid(tmp_path, grid):
     assert "gather comes to" in again.stdout
 
 
+def test_errors_are_split_where_asked_for(tmp_path):
+    """Of the default and of the knee, which is another, on a view of its own size; in every file."""
+    (tmp_path / "grid.toml").write_text("[gather]\nsamples = [20, 40]\n")
+    done = run("--grid", tmp_path / "grid.toml", *SMALL, "--split", "--split-size", "16x12", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    scene, = Result.model_validate_json((tmp_path / "out" / "results.json").read_text()).scenes
+    assert scene.failures == {}
+    default, knee = scene.splits
+    assert (default.method, default.changes, default.knee) == ("gather", (), False)
+    assert (knee.changes[0] in ("samples=20", "samples=40"), knee.knee) == (True, True)
+    assert (default.width, default.height, scene.width, scene.height) == (16, 12, 24, 18)
+    assert [part.name for part in knee.parts] == ["visibility", "rest", "RSM resolution", "cut", "few samples",
+                                                  "upsampling"]
+    assert sum(part.mean for part in knee.parts) == pytest.approx(knee.mean)
+    for text in (done.stdout, (tmp_path / "out" / "results.md").read_text()):
+        assert f"Error split of gather, {knee.changes[0]} (knee), 16 x 12:" in text
+    html = (tmp_path / "out" / "index.html").read_text()
+    assert "<h3>Error split</h3>" in html
+    assert html.count("<details><summary>gather") == 2
+
+
+def test_a_split_that_fails_is_told(tmp_path, grid, monkeypatch):
+    def refusing(*_arguments, **_options):
+        raise InputError("refused here")
+
+    monkeypatch.setattr("refgi.bench.split.chain_of", refusing)
+    done = run("--grid", grid, *SMALL, "--methods", "gather", "--split", "--out", tmp_path / "out")
+    assert done.exit_code == 1
+    assert "split of gather: samples=20 gave no picture: refused here" in done.stderr
+    assert "gather comes to" in done.stdout
+
+
 def test_a_choice_that_gives_no_picture_is_told(tmp_path, grid, monkeypatch):
     timed = measure._timed
 
@@ -60,6 +92,7 @@ def test_a_choice_that_gives_no_picture_is_told(tmp_path, grid, monkeypatch):
     (["--quick", "--set", "samplse=3"], "samplse"),
     (["cornel_box", "--quick"], "cornel_box"),
     (["--quick", "--rounds", "0"], "rounds"),
+    (["--quick", "--split-size", "8x6"], "--split-size: expected --split"),
 ])
 def test_wrong_use_is_one_clear_error_before_anything_runs(tmp_path, grid, monkeypatch, arguments, said):
     monkeypatch.setattr(measure, "bench_scene", lambda *_, **__: pytest.fail("ran"))

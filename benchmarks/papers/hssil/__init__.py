@@ -52,7 +52,7 @@ FIGURES = (
           "figures.",
           make=partial(
               split, scenes=(BOX, HORSE, HALL),
-              shown=("seen", "open", "discs", "levels", "closest", "reach", "samples"),
+              shown=("unseen senders", "visibility", "clamp", "levels", "downsampling", "cut", "few samples"),
               variants={
                   "as published": {}, "from full resolution on, as far": {"start": "full", "further": 1},
                   "from quarter resolution on, as far": {"start": "quarter", "further": -1},

@@ -9,8 +9,6 @@ from benchmarks.papers.hssil.subjects import (
     HORSE,
     JUDGED,
     TITLES,
-    every_pixel,
-    every_texel,
     expected_light,
     frame_of,
     light_of,
@@ -19,12 +17,15 @@ from benchmarks.papers.hssil.subjects import (
 )
 from benchmarks.papers.records import Array, Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, interleaved, mean_of
+from refgi.bench.chain import Renderer, chain_of
+from refgi.bench.grid import Choice
 from refgi.compare.maps import error_scale, luminance
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.compare.report import number
 from refgi.frame import Frame
 from refgi.settings import replaced
 from refgi.sssil import HssilSettings
+from refgi.truth import TruthSettings
 
 FREE = "none"
 NAMES: dict[str, str] = {FREE: "v = 1, as published", "bitmask": "bitmask of the screen",
@@ -122,24 +123,13 @@ def _add_pictures(gallery: Gallery, name: str, title: str, one: Judged) -> None:
     gallery.errors({f"{name}_{key}": (said, one.light[key]) for key, said in NAMES.items()}, one.exact)
 
 
-# each step from the picture before it; the first is path tracing of all light
-STEPS = {"truth": "path tracing", "seen": "only what the camera sees shines", "open": "nothing blocks (v = 1)",
-         "pixels": "a pixel is a point (Eq. 3)", "discs": "a pixel is a disc (Eq. 4)",
-         "levels": "levels, averaged", "closest": "the closest of four for their average",
-         "reach": "the paper's reach", "start": "from half resolution on",
-         "samples": "64 samples a level"}
+# each step from the picture before it, by the names of the approximations; the first is path tracing of all light
+STEPS = {"truth": "path tracing", "unseen senders": "only what the camera sees shines",
+         "visibility": "nothing blocks (v = 1)", "rest": "a pixel is a point (Eq. 3)",
+         "clamp": "a pixel is a disc (Eq. 4)", "levels": "levels, averaged",
+         "downsampling": "the closest of four for their average", "cut": "the paper's reach",
+         "upsampling": "from half resolution on", "few samples": "64 samples a level"}
 FRAMES = "the mean of 19 frames"  # the temporal filter with a = 0.9 takes away as much noise
-
-
-def chain(frame: Frame) -> dict[str, HssilSettings]:
-    """Return settings from every pixel lighting every pixel to the published ones, one thing changed at a time."""
-    published = smaller(frame)
-    discs = every_pixel(published)
-    levels = replaced(discs, {"levels": published.sampling.levels + 2, "downsample": "average"})
-    closest = replaced(levels, {"downsample": "closest"})
-    reach = every_texel(published, start="full", levels=published.sampling.levels + 1)
-    return {"pixels": replaced(discs, {"form_factor": "point"}), "discs": discs, "levels": levels,
-            "closest": closest, "reach": reach, "start": every_texel(published), "samples": published}
 
 
 class Split(NamedTuple):
@@ -188,29 +178,34 @@ def split(bench: Workbench, scenes: tuple[str, ...], shown: tuple[str, ...],
                       "root mean square, and change of the mean",
                       ("", *(f"{TITLES[name]}, RMS" for name in scenes), *(f"{TITLES[name]}, mean" for name in scenes)),
                       [*(row(STEPS[after], after) for _, after in pairwise(STEPS)),
-                       row("all together", "samples", "truth")]),
+                       row("all together", "few samples", "truth")]),
                 Table("The published picture with one thing changed: RMSE in % of the mean, against path tracing in "
                       "which only what the camera sees shines, without and with what blocks",
                       ("", *(f"{TITLES[name]}, {what}" for name in scenes for what in ("v = 1", "with v"))),
                       [(title, *(errors_of(one.variants[title], one.made[key], one.covered).rmse
-                                 for one in found.values() for key in ("open", "seen"))) for title in variants])),
+                                 for one in found.values() for key in ("visibility", "unseen senders")))
+                        for title in variants])),
         notes=(
             f"The largest step is: {'; '.join(map(largest, found))}. What the camera does not see is worth "
-            f"{each('seen')} %, v = 1 {each('open')} %: the two that the paper names. They have opposite signs.",
-            f"Pixels for surfaces cost {each('pixels')} %, discs for points {each('discs')} %, levels {each('levels')} "
-            f"%, the closest of four instead of their average {each('closest')} %, the radius {each('reach')} %, half "
-            f"resolution {each('start')} %, and 64 samples {each('samples')} %. The mean of "
+            f"{each('unseen senders')} %, v = 1 {each('visibility')} %: the two that the paper names. They have "
+            "opposite signs.",
+            f"Pixels for surfaces cost {each('rest')} %, discs for points {each('clamp')} %, levels {each('levels')} "
+            f"%, the closest of four instead of their average {each('downsampling')} %, the radius {each('cut')} %, "
+            f"half resolution {each('upsampling')} %, and 64 samples {each('few samples')} %. The mean of "
             "19 frames, which has as little noise as the temporal filter leaves, shows what remains of the last.",
-            f"Together they come to {each('samples', 'truth', 0)} % of the mean. Path tracing's own standard error, "
-            f"{', '.join(f'{one.noise:.1f}' for one in found.values())} %, is part of the first three."))
+            f"Together they come to {each('few samples', 'truth', 0)} % of the mean. Path tracing's own standard "
+            f"error, {', '.join(f'{one.noise:.1f}' for one in found.values())} %, is part of the first three."))
 
 
 def _split(bench: Workbench, name: str, variants: Mapping[str, Mapping[str, Any]]) -> Split:
     frame = frame_of(bench, name, JUDGED)
-    truth = bench.traced(frame)
-    made = {"truth": truth.mean, "seen": bench.traced(frame, emitters="visible").mean,
-            "open": bench.traced(frame, emitters="visible", visibility=False).mean}
-    made |= {key: light_of(frame, settings) for key, settings in chain(frame).items()}
+    renderer = Renderer(frame.scene, TruthSettings(samples=bench.scale.truth_samples), width=frame.width,
+                        height=frame.height, rsm_resolution=frame.rsm_resolution)
+    links = chain_of(renderer, Choice("hssil", (), smaller(frame)), 1, alone=False).links
     varied = {title: light_of(frame, smaller(frame, **changes)) for title, changes in variants.items()
               if title != FRAMES} | {FRAMES: expected_light(frame, smaller(frame), 19)}
-    return Split(made, varied, frame.gbuffer.covered, standard_error(truth, frame.gbuffer.covered))
+    covered, found = frame.gbuffer.covered, {link.name: link.pictures[0] for link in links}
+    made: dict[str, Array] = {}
+    for step in STEPS:  # one that a small picture does not take, such as levels, changes nothing
+        made[step] = found[step] if step in found else list(made.values())[-1]
+    return Split(made, varied, covered, standard_error(renderer.truth(), covered))

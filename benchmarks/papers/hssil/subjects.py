@@ -123,11 +123,6 @@ def every_texel(settings: HssilSettings, **changes: Any) -> HssilSettings:
     return replaced(settings, {"pattern": "all"} | changes)
 
 
-def every_pixel(settings: HssilSettings) -> HssilSettings:
-    """Return settings by which every pixel lights every pixel: one level of full resolution, whatever its cost."""
-    return every_texel(settings, start="full", levels=1, radius=None)
-
-
 def light_of(frame: Frame, settings: HssilSettings) -> Array:
     """Return irradiance (3, h, w); that the paper's settings do not reach across the picture is known."""
     with warnings.catch_warnings():

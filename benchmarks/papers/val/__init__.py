@@ -87,11 +87,11 @@ FIGURES = (
           "and buffers take 2 %.", make=steps),
     Entry("error", "Error, split", "Beyond the paper",
           "The paper has no such table: it shows the difference to a hard shadow for every light, in one picture.",
-          make=partial(split, shown=("rays_vpls", "pcss", "mip"), steps={
-              "lights": "pixel lights for all light, near ones clamped",
-              "rays_vpls": "clusters: the share of visible lights",
-              "rays_rectangle": "their bounding rectangle",
-              "back_projection": "one map from its centre, projected back",
-              "pcss": "one mean blocker, one disc", "csm": "series of 4 terms",
-              "mip": "mip levels for discs", "interleaved": "interleaving and blur"})),
+          make=partial(split, shown=("clustering", "kernel", "filter"), steps={
+              "light sampling": "pixel lights for all light", "clamp": "near ones clamped",
+              "clustering": "clusters: the share of visible lights", "rectangle": "their bounding rectangle",
+              "single view": "one map from its centre, projected back",
+              "kernel": "one mean blocker, one disc", "shadow map resolution": "texels of twice the size",
+              "CSM series": "series of 4 terms", "filter": "mip levels for discs",
+              "interleaving": "interleaving and blur"})),
 )

@@ -1,12 +1,13 @@
 """The error of the picture: by the number of area lights (Figure 10), and split into what each step costs."""
 
+import math
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.papers.records import Cell, Figure, Plot, Table
+from benchmarks.papers.records import Array, Cell, Figure, Plot, Table
 from benchmarks.papers.val.subjects import (
     AREA_LIGHTS,
     HORSE,
@@ -21,9 +22,14 @@ from benchmarks.papers.val.subjects import (
     shadowed,
 )
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of
-from refgi.cluster.reference.split import ErrorSplit, Step, split_error
+from refgi.bench.chain import Renderer, chain_of
+from refgi.bench.grid import Choice
+from refgi.bench.results import Part, Split
+from refgi.bench.split import split_of
 from refgi.cluster.val import val
 from refgi.compare.plot import Axes, Curve, curves_plot
+from refgi.frame import Frame
+from refgi.truth import TruthSettings
 
 SIZE = MOVING / 2  # pixels a side in units of the run's: references are slow
 
@@ -94,49 +100,76 @@ def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further
             f"{off:.1f} % (MAE) off what they come to without."))
 
 
+class Steps(NamedTuple):
+    """One scene from step to step."""
+
+    split: Split
+    pictures: dict[str, Array]  # (3, h, w) W/m^2, by step
+    frame: Frame
+
+    def of(self, name: str) -> Part:
+        """Return what a step changes."""
+        return next(part for part in self.split.parts if part.name == name)
+
+    def rmse(self, name: str) -> float:
+        """Return the root mean square of what a step changes, over the mean of the truth."""
+        return self.of(name).error.rmse or 0.0
+
+
 def split(bench: Workbench, steps: dict[str, str], shown: tuple[str, ...]) -> Figure:
     """Beyond the paper: what each of its approximations costs, scene by scene."""
     found = {name: _split(bench, name) for name in TITLES}
-    rows: list[tuple[Any, ...]] = [(title, *(100 * _step(one, step).rmse for one in found.values()),
-                                    *(100 * _step(one, step).shift for one in found.values()))
+    rows: list[tuple[Any, ...]] = [(title, *(100 * one.rmse(step) for one in found.values()),
+                                    *(100 * (one.of(step).mean or 0.0) for one in found.values()))
                                    for step, title in steps.items()]
-    rows += [("all together", *(100 * one.whole for one in found.values()),
-              *(100 * sum(step.shift for step in one.steps) for one in found.values())),
-             ("if they were independent", *(100 * one.root_of_squares for one in found.values()),
+    rows += [("all together", *(100 * whole(one.split) for one in found.values()),
+              *(100 * (one.split.mean or 0.0) for one in found.values())),
+             ("if they were independent", *(100 * independent(one.split) for one in found.values()),
               *(None for _ in found))]
-    usual, pictures = clamped(bench, scene_of(bench, HORSE)), found[HORSE].pictures
-    gallery = Gallery(frame_of(bench, HORSE, SIZE), pictures["lights"])
-    gallery.indirect("lights", "a ray to each light", "Cornell Horse", pictures["lights"])
-    gallery.errors({name: (steps[name], pictures[name]) for name in shown}, pictures["lights"])
+    horse = found[HORSE]
+    gallery = Gallery(horse.frame, horse.pictures["clamp"])
+    gallery.indirect("lights", "a ray to each light", "Cornell Horse", horse.pictures["clamp"])
+    gallery.errors({name: (steps[name], horse.pictures[name]) for name in shown}, horse.pictures["clamp"])
 
-    def each(part: Callable[[ErrorSplit], float]) -> str:
+    def each(part: Callable[[Steps], float]) -> str:
         return ", ".join(f"{100 * part(one):.1f}" for one in found.values())
 
     def largest(name: str) -> str:  # of the steps between exact shadows and the full sum
-        step = max(list(steps)[1:-1], key=lambda key: _step(found[name], key).rmse)
-        return f"{TITLES[name]} {steps[step]} ({100 * _step(found[name], step).rmse:.1f} %)"
+        step = max(list(steps)[2:-1], key=found[name].rmse)
+        return f"{TITLES[name]} {steps[step]} ({100 * found[name].rmse(step):.1f} %)"
 
     return Figure(
         facts=(f"{gallery.frame.width}² pixels", f"path tracing with {bench.scale.truth_samples} samples a pixel",
-               f"{usual.lights.count} lights", f"{AREA_LIGHTS} area lights"), pictures=gallery.pictures,
+               f"{clamped(bench, scene_of(bench, HORSE)).lights.count} lights", f"{AREA_LIGHTS} area lights"),
+        pictures=gallery.pictures,
         tables=[Table("What each approximation changes in the picture before it, in % of the mean: root mean square, "
                       "and change of the mean", ("", *(f"{title}, RMS" for title in TITLES.values()),
                                                  *(f"{title}, mean" for title in TITLES.values())), rows)],
         notes=(
             f"Of the steps between exact shadows and the full sum the largest is: {'; '.join(map(largest, found))}.",
-            "Against path tracing the pixel lights themselves are "
-            f"{each(lambda one: _step(one, 'lights').rmse)} % off, interleaving and its blur change "
-            f"{each(lambda one: one.steps[-1].rmse)} %: visibility by area lights is not what limits such a picture, "
-            "as the paper claims.",
+            f"Against path tracing the pixel lights themselves are {each(lambda one: one.rmse('light sampling'))} % "
+            f"off, of which the clamp takes back peaks of {each(lambda one: one.rmse('clamp'))} %, interleaving and "
+            f"its blur change {each(lambda one: one.rmse('interleaving'))} %: visibility by area lights is not what "
+            "limits such a picture, as the paper claims.",
             "Errors of the steps partly cancel: together they come to "
-            f"{each(lambda one: one.whole)} %, and would to {each(lambda one: one.root_of_squares)} % if they were "
-            "independent."))
+            f"{each(lambda one: whole(one.split))} %, and would to {each(lambda one: independent(one.split))} % if "
+            "they were independent."))
 
 
-def _split(bench: Workbench, name: str) -> ErrorSplit:
-    frame = frame_of(bench, name, SIZE)
-    return split_error(frame, clamped(bench, scene_of(bench, name)), bench.traced(frame).mean)
+def whole(found: Split) -> float:
+    """Return the RMSE of the picture over the mean of the truth."""
+    return found.error.rmse or 0.0
 
 
-def _step(found: ErrorSplit, name: str) -> Step:
-    return next(step for step in found.steps if step.name == name)
+def independent(found: Split) -> float:
+    """Return what `whole` would be if no step took back what others did."""
+    return math.sqrt(found.squares or 0.0)
+
+
+def _split(bench: Workbench, name: str) -> Steps:
+    scene, like = scene_of(bench, name), frame_of(bench, name, SIZE)
+    renderer = Renderer(scene, TruthSettings(samples=bench.scale.truth_samples), width=like.width, height=like.height,
+                        rsm_resolution=like.rsm_resolution)
+    choice = Choice("val", (), published(bench, scene))
+    chain = chain_of(renderer, choice, 1, alone=False)
+    return Steps(split_of(chain, choice), {link.name: link.pictures[0] for link in chain.links}, renderer.frame)

@@ -5,6 +5,7 @@
 """
 
 from refgi.method import Method
+from refgi.splat.gather.approximations import APPROXIMATIONS
 from refgi.splat.gather.gather import PRESETS, DiscSettings, GatherSettings, Interpolation, gather
 
 __all__ = [
@@ -16,4 +17,4 @@ __all__ = [
 ]
 
 METHOD = Method("gather", "Reflective Shadow Maps (2005): gathering around the projected point", gather, GatherSettings,
-                visibility=False, presets=PRESETS)
+                visibility=False, presets=PRESETS, approximations=APPROXIMATIONS)

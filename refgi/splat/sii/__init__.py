@@ -8,6 +8,7 @@ the pixels.
 """
 
 from refgi.method import Method
+from refgi.splat.sii.approximations import APPROXIMATIONS
 from refgi.splat.sii.ledger import sii_ledger
 from refgi.splat.sii.settings import (
     PRESETS,
@@ -41,4 +42,4 @@ __all__ = [
 
 METHOD = Method(
     "sii", "Splatting Indirect Illumination (2006): pixel lights shine where they are significant", sii, SiiSettings,
-    visibility=False, ledger=sii_ledger, presets=PRESETS)
+    visibility=False, ledger=sii_ledger, presets=PRESETS, approximations=APPROXIMATIONS)

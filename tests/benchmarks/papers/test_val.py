@@ -251,7 +251,7 @@ def test_what_is_no_shadow_is_nopenumbra():
 def test_the_split_ends_at_the_published_picture(figures):
     rows = table(figures["error"])
     steps = [row for name, row in rows.items() if name not in ("all together", "if they were independent")]
-    assert len(steps) == 8
+    assert len(steps) == 10
     for scene in ("Cornell Box", "Cornell Horse", "Sponza", "Metaballs"):
         squares = math.sqrt(sum(row[f"{scene}, RMS"] ** 2 for row in steps))
         assert rows["if they were independent"][f"{scene}, RMS"] == pytest.approx(squares)

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from refgi.batch.thresholds import Threshold, read_threshold
 from refgi.bench.grid import Grid, grid_of, read_tables
+from refgi.bench.grid import text_of as value_text
 from refgi.errors import InputError, expect, first_faults
 from refgi.scene import builtin_scenes
 from refgi.scene.files import text_of
@@ -87,7 +88,7 @@ def read_plan(file: Path) -> Plan:
     table, thresholds = tables.pop(BATCH), tables.pop(EXPECT, {})
     own = _validated(table, file)
     grid = grid_of(tables, file)
-    expect(bool(grid.choices), str(file), "a table of some method", "none")
+    expect(bool(grid.choices or grid.passes), str(file), "a table of some method", "none")
     scenes = _named(own.scenes, file)
     expect(isinstance(thresholds, dict), f"{file}: {EXPECT}", "a table", type(thresholds).__name__)
     methods = {choice.method for choice in grid.choices}
@@ -128,10 +129,6 @@ def _stem(scene: str) -> str:
 
 def _settings(settings: Any, table: dict[str, Any], where: str) -> Any:
     try:
-        return from_text(settings, [f"{key}={_text(value)}" for key, value in table.items()])
+        return from_text(settings, [f"{key}={value_text(value)}" for key, value in table.items()])
     except InputError as error:
         raise InputError(f"{where}: {error}", key=error.key) from error
-
-
-def _text(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,5 +1,6 @@
 """`refgi choose`: the cheapest method and settings that meet a wish on a scene."""
 
+import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -85,7 +86,7 @@ def _choose(
     if best is not None and emit is not None:
         from refgi.image import write_text
 
-        write_text(Path(emit), _plan(scene, size, best))
+        write_text(Path(emit), _plan(scene, size, best, Path(emit).parent))
     session.result(_text(chosen, wish, line), _content(chosen, wish, line))
     return DONE if best is not None else FAILED
 
@@ -109,14 +110,19 @@ def _options(best: "Probe") -> str:
     return f" --method {best.choice.method}" + "".join(f" --set {change}" for change in best.choice.changes)
 
 
-def _plan(scene: str, size: tuple[int, int] | None, best: "Probe") -> str:
-    """Return the choice as tables of a grid, with the scene it was found on."""
-    from refgi.bench.grid import toml_line
+def _plan(scene: str, size: tuple[int, int] | None, best: "Probe", folder: Path) -> str:
+    """Return the choice as a plan in a folder, with the scene it was found on; files are named from that folder."""
+    from refgi.bench.grid import TRUTH, toml_line
+    from refgi.scene import builtin_scenes
 
-    lines = ["[batch]", toml_line("scenes", [scene]), *([toml_line("size", list(size))] if size else []), "",
-             f"[{best.choice.method}]"]
-    lines += [toml_line(*change.split("=", 1)) for change in best.choice.changes]
-    return "\n".join(lines) + "\n"
+    choice = best.choice
+    named = scene if scene.partition(":")[0] in builtin_scenes() else os.path.relpath(scene, folder)
+    lines = ["[batch]", toml_line("scenes", [named]), *([toml_line("size", list(size))] if size else []), "",
+             f"[{choice.method}]"]
+    if choice.method == TRUTH:
+        passes: int = choice.settings.passes  # type: ignore[attr-defined]
+        return "\n".join([*lines, toml_line("passes", [passes])]) + "\n"
+    return "\n".join([*lines, *(toml_line(*change.split("=", 1)) for change in choice.changes)]) + "\n"
 
 
 def _content(chosen: "Chosen", wish: "Wish", line: str | None) -> dict[str, Any]:

@@ -58,6 +58,12 @@ def test_what_a_plan_need_not_say(tmp_path):
     assert plan_of(tmp_path, '[batch]\nscenes = ["cornell_box"]\n[gather]\n').size is None
 
 
+def test_a_plan_runs_something(tmp_path):
+    with pytest.raises(InputError, match="a table of some method"):
+        plan_of(tmp_path, '[batch]\nscenes = ["cornell_box"]\n')
+    assert plan_of(tmp_path, '[batch]\nscenes = ["cornell_box"]\n[truth]\npasses = [2]\n').grid.passes == (2,)
+
+
 @pytest.mark.parametrize(("change", "said"), [
     (("[batch]", "[batches]"), r"\[batch\]"),
     (("rounds = 4", "rounds = 0"), "batch.rounds"),
@@ -70,7 +76,6 @@ def test_what_a_plan_need_not_say(tmp_path):
     (("samples = 48", "samlpes = 48"), "samlpes"),
     (("weight = 0.8", "weight = 8"), "weight"),
     (("lights = [16, 64]", "ligths = 16"), "ligths"),
-    (("[sii]\nlights = [16, 64]", ""), "a table of some method"),
     (('"atrium.sii', '"atrum.sii'), "a scene of the plan"),
     (('"atrium.sii', '"atrium.val'), "a method of the plan"),
     (("sii.relmse", "sii.relmes"), "a figure at the end"),

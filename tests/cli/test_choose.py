@@ -2,14 +2,18 @@
 
 import json
 import shlex
-import tomllib
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
-from refgi.bench import choose
-from refgi.bench.grid import read_grid
+from refgi.batch.plan import read_plan
+from refgi.bench import choose, tracks
+from refgi.bench.grid import Choice
+from refgi.bench.search import Probe
+from refgi.bench.tracks import Track
 from refgi.cli.group import VerbGroup
+from refgi.truth import TruthSettings
 
 SMALL = ("cornell_box", "--size", "24x18", "--methods", "sii,truth", "--rounds", "1", "--threads", "2")
 TRUTH = ("--set", "samples=96")
@@ -21,31 +25,45 @@ def run(*arguments):
 
 def test_an_error_is_met_and_the_line_renders(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = run(*SMALL, *TRUTH, "--error", "60%", "--json", "--emit", "plan.toml")
+    done = run(*SMALL, *TRUTH, "--error", "60%", "--methods", "sii", "--json", "--emit", "plan.toml")
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     assert found["wish"] == {"error": 0.6, "seconds": None}
     assert found["best"] in found["judged"]
     assert found["best"]["error"] <= 0.6
     assert all(one["seconds"] >= found["best"]["seconds"] for one in found["judged"] if one["error"] <= 0.6 * 0.97)
-    assert {one["method"] for one in found["small"]} <= {"sii", "truth"}
+    assert {one["method"] for one in found["small"]} == {"sii"}
     assert {"stage": "pairs.lobes", "reason": "no pixel light is glossy"} in found["skips"]
     rendered = CliRunner().invoke(VerbGroup.refgi(), shlex.split(found["line"])[1:])
     assert rendered.exit_code == 0, rendered.output
-    plan = tomllib.loads((tmp_path / "plan.toml").read_text())
-    assert plan.pop("batch") == {"scenes": ["cornell_box"], "size": [24, 18]}
-    assert list(plan) == [found["best"]["method"]]
-    (tmp_path / "grid.toml").write_text((tmp_path / "plan.toml").read_text().partition("\n\n")[2])
-    (choice,) = read_grid(tmp_path / "grid.toml").choices
+    plan = read_plan(tmp_path / "plan.toml")
+    assert (plan.scenes, plan.size) == ({"cornell_box": "cornell_box"}, (24, 18))
+    (choice,) = plan.grid.choices
+    assert choice.method == found["best"]["method"] == "sii"
     assert sorted(choice.changes) == sorted(found["best"]["changes"])
 
 
-def test_a_time_is_kept():
-    done = run(*SMALL, *TRUTH, "--time", "0.5s", "--methods", "truth", "--json")
+def test_a_path_tracer_that_is_chosen_is_planned_by_its_passes(tmp_path, monkeypatch):
+    (tmp_path / "plans").mkdir()
+    room = Path(__file__).parents[2] / "docs" / "examples" / "room.json"
+    best = Probe(Choice("truth", ("samples=96",), TruthSettings(samples=96)), 1.0, 0.1)
+    monkeypatch.setattr(choose, "choose", lambda *_, **__: choose.Chosen(choose.Found(best, (best,), ()), (), "none"))
+    done = run(room, "--time", "2s", "--emit", tmp_path / "plans" / "plan.toml")
     assert done.exit_code == 0, done.output
-    best = json.loads(done.stdout)["best"]
-    assert best["seconds"] <= 0.5
-    assert best["method"] == "truth"
+    plan = read_plan(tmp_path / "plans" / "plan.toml")
+    assert (plan.grid.passes, plan.grid.choices) == ((4,), ())
+    assert Path(plan.scenes["room"]).resolve() == room.resolve()
+
+
+def test_a_time_is_kept(monkeypatch):
+    (track,) = tracks.built_in_tracks(["truth"])
+    monkeypatch.setattr(tracks, "built_in_tracks", lambda _: (Track(track.rungs[:3], track.values[:3]),))
+    done = run(*SMALL, *TRUTH, "--time", "60s", "--json")
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert found["best"]["changes"] == [f"samples={track.values[2]}"]  # nearest of what is fast enough
+    assert found["best"] in found["judged"]
+    assert found["best"]["seconds"] <= 60
 
 
 def test_what_nothing_meets_is_said():

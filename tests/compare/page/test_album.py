@@ -65,6 +65,21 @@ def test_the_script_is_told_all_planes():
     json.dumps(made.data, allow_nan=False)
 
 
+def test_pixels_that_are_not_finite_stay_so_and_stop_nothing():
+    broken = light(10)
+    broken[:, 20, 20], broken[1, 30, 30] = np.nan, np.inf
+    view = make_view(importances=(FIRST, FIRST))
+    picture = view.pictures[0]._replace(load=lambda: lit(broken))
+    made = album([view._replace(pictures=[picture, *view.pictures[1:]])])
+    described = made.data["views"][0]["pictures"][0]
+    found = numbers(made, described["irradiance"])
+    assert np.isnan(found[:, 20, 20]).all()
+    assert found[1, 30, 30] == np.inf
+    assert np.isfinite(found).sum() == found.size - 4
+    assert "radiance" not in described
+    json.dumps(made.data, allow_nan=False)
+
+
 def test_radiance_that_the_surface_does_not_explain_is_stored():
     other = light(99)
     made = album([make_view(radiance=other)])

@@ -85,6 +85,17 @@ def test_a_choice_that_gives_no_picture_is_told(tmp_path, grid, monkeypatch):
     assert "sii comes to" in done.stdout
 
 
+def test_pictures_of_others_are_spared(tmp_path, grid, monkeypatch):
+    monkeypatch.setattr(measure, "bench_scene", lambda *_, **__: pytest.fail("ran"))
+    mine = tmp_path / "out" / "pictures" / "cornell_box" / "sii-01.exr"
+    mine.parent.mkdir(parents=True)
+    mine.write_bytes(b"mine")
+    done = run("--grid", grid, *SMALL, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "sii-01.exr is there and not from refgi" in done.stderr
+    assert mine.read_bytes() == b"mine"
+
+
 @pytest.mark.parametrize(("arguments", "said"), [
     (["--grid", "GRID", "--quick"], "not both"),
     (["--grid", "none.toml"], "cannot be read"),

@@ -10,7 +10,7 @@ import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
-         "--disable-background-networking", "--disable-component-update", "--allow-file-access-from-files")
+         "--disable-background-networking", "--disable-component-update")
 BUDGET = 20_000  # ms of the page's own clock, which runs ahead where nothing is to be done
 BEFORE = """<script>
 window.faults = [];

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from refgi.compare.maps import luminance
 from refgi.compare.page.album import Judge, Picture, View, album
 from refgi.compare.page.budget import COARSEST, FIRST, SECOND, THIRD, Store
 from tests.compare.page.test_floats import unpacked
@@ -64,11 +65,39 @@ def test_the_script_is_told_all_planes():
     json.dumps(made.data, allow_nan=False)
 
 
+def test_pixels_that_are_not_finite_stay_so_and_stop_nothing():
+    broken = light(10)
+    broken[:, 20, 20], broken[1, 30, 30] = np.nan, np.inf
+    view = make_view(importances=(FIRST, FIRST))
+    picture = view.pictures[0]._replace(load=lambda: lit(broken))
+    made = album([view._replace(pictures=[picture, *view.pictures[1:]])])
+    described = made.data["views"][0]["pictures"][0]
+    found = numbers(made, described["irradiance"])
+    assert np.isnan(found[:, 20, 20]).all()
+    assert found[1, 30, 30] == np.inf
+    assert np.isfinite(found).sum() == found.size - 4
+    assert "radiance" not in described
+    json.dumps(made.data, allow_nan=False)
+
+
 def test_radiance_that_the_surface_does_not_explain_is_stored():
     other = light(99)
     made = album([make_view(radiance=other)])
     picture = made.data["views"][0]["pictures"][0]
     assert numbers(made, picture["radiance"]) == pytest.approx(other, rel=2**-11)
+
+
+def test_a_picture_is_described_by_the_reference_it_converges_to_and_its_worst_places_by_the_truth():
+    view = make_view(importances=(FIRST,))
+    picture = view.pictures[0]._replace(load=lambda: lit(0.8 * light(1)))
+    described, = album([view._replace(pictures=[picture])]).data["views"][0]["pictures"]
+    finding, = described["findings"]
+    assert finding["name"] == "too dark by 20% all over"
+    assert "against the truth without visibility: " in finding["about"]
+    assert finding["about"].endswith("named from 0.5 on")
+    error = ((0.8 * luminance(light(1)) - luminance(light(0))) * view.covered) ** 2
+    x, y, side = (described["crops"][0][key] for key in ("x", "y", "side"))
+    assert described["crops"][0]["share"] == pytest.approx(error[y:y + side, x:x + side].sum() / error.sum(), rel=1e-3)
 
 
 def test_equal_views_give_equal_albums():

@@ -40,6 +40,18 @@ def test_pictures_that_agree_are_reproduced_whatever_the_reflectance(pictures):
     assert ((surface[1] >= 0) & (surface[1] <= 1 / math.pi)).all()
 
 
+def test_emission_is_never_negative_and_reflectance_no_more_than_that_of_white():
+    """Pictures that differ by rounding alone have any slope: here 0.3 and 3 where light itself allows 0.01 at most."""
+    fit = SurfaceFit((3, 1, 1))
+    for shift in (0.0, 1e-4):
+        irradiance = np.full((3, 1, 1), 1 + shift)
+        fit.add(irradiance, np.array([0.01 + 0.3 * shift, 0.01 + 3 * shift, 5 + 3 * shift]).reshape(3, 1, 1))
+    emitted, reflectance = (part.ravel() for part in fit.solve())
+    assert (emitted >= 0).all()
+    assert reflectance == pytest.approx([0.01, 0.01, 1 / math.pi], rel=0.02)
+    assert emitted + reflectance == pytest.approx([0.01, 0.01, 5], rel=0.02)
+
+
 def test_pixels_that_are_not_finite_do_not_count():
     broken = PICTURES.copy()
     broken[0, :, 1, 2] = np.nan

@@ -25,7 +25,7 @@ from refgi.image import read_exr
 from refgi.truth.checkpoint import DIGEST, FIRST_LINE
 
 JOBS = 400
-PLAN = f"""
+PLAN = """
 [batch]
 scenes = ["cornell_box"]
 size = [24, 18]
@@ -33,8 +33,7 @@ rounds = 1
 rsm_resolution = 32
 truth.samples = 48
 [sii]
-lights = {list(range(1, JOBS + 1))}
-"""
+lights = """
 # FLIP would take most of the time, in a process of its own; who begins a job says so in a file
 LAUNCHER = """
 import sys
@@ -79,9 +78,9 @@ def main(arguments: list[str]) -> int:
     return int(tally.lost + tally.torn + tally.stray > 0 or tally.most_repeated > options.workers)
 
 
-def killed(folder: Path, times: int, workers: int, longest: float, seed: int) -> Tally:
-    """Kill a batch some times, and let it end."""
-    (folder / "plan.toml").write_text(PLAN)
+def killed(folder: Path, times: int, workers: int, longest: float, seed: int = 0, jobs: int = JOBS) -> Tally:
+    """Kill a batch of some jobs some times, and let it end."""
+    (folder / "plan.toml").write_text(f"{PLAN}{list(range(1, jobs + 1))}\n")
     (folder / "launcher.py").write_text(LAUNCHER)
     command = [sys.executable, "launcher.py", "batch", "plan.toml", "--out", "out", "--workers", str(workers), "begun"]
     quietly = {"cwd": folder, "env": {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
@@ -89,8 +88,8 @@ def killed(folder: Path, times: int, workers: int, longest: float, seed: int) ->
     moments, kept = random.Random(seed), dict[str, str]()
     finished = lost = torn = repeated = most = stray = 0
     for number in range(times):
-        if len(kept) == JOBS:
-            finished, repeated, kept = finished + JOBS, repeated + len(_begun(folder)) - JOBS, {}
+        if len(kept) == jobs:
+            finished, repeated, kept = finished + jobs, repeated + len(_begun(folder)) - jobs, {}
             shutil.rmtree(folder / "out")
             (folder / "begun").unlink()
         begun = len(_begun(folder))
@@ -106,12 +105,12 @@ def killed(folder: Path, times: int, workers: int, longest: float, seed: int) ->
         torn += sum(not _is_whole(file) for file in _files(folder))
         most = max(most, sum(name not in now for name in _begun(folder)[begun:]))
         kept = now
-        print(f"{len(kept)} of {JOBS} results, {lost} lost, {torn} torn", file=sys.stderr, flush=True)
+        print(f"{len(kept)} of {jobs} results, {lost} lost, {torn} torn", file=sys.stderr, flush=True)
     subprocess.run(command, **quietly, check=True)
     done = _results(folder)
-    lost += JOBS - len(done) + sum(done.get(name) != digest for name, digest in kept.items())
+    lost += jobs - len(done) + sum(done.get(name) != digest for name, digest in kept.items())
     torn += sum(not _is_whole(file) for file in _files(folder))
-    return Tally(times, finished + len(kept), lost, torn, repeated + len(_begun(folder)) - JOBS, most, stray)
+    return Tally(times, finished + len(kept), lost, torn, repeated + len(_begun(folder)) - jobs, most, stray)
 
 
 def _wait_for(condition: Callable[[], bool]) -> None:

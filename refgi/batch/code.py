@@ -11,7 +11,7 @@ import functools
 import hashlib
 from collections.abc import Iterator
 from importlib.metadata import entry_points
-from importlib.util import find_spec
+from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +21,7 @@ from refgi.methods import BUILT_IN, GROUP
 SHARED = ("refgi.frame:Frame", "refgi.truth:trace_truth", "refgi.bench.error:error_of", "refgi.compare.outcome:measure",
           "refgi.compare.flip:flip")
 RUNNERS = ("refgi.bench.measure", "refgi.batch.work")  # by themselves: what else they import changes no result
+BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields that hold statements
 
 
 class Import(NamedTuple):
@@ -81,7 +82,7 @@ def reached(place: str) -> frozenset[str]:
         if one in found or one.partition(".")[0] not in packages:
             continue
         found.add(one)
-        waiting += [_home(entry.module, entry.name) for entry in _source(file_of(one)).imports
+        waiting += [_home(entry.module, entry.name) for entry in _imports_of(one)
                     if entry.module.partition(".")[0] in packages]
     return frozenset(found)
 
@@ -115,12 +116,25 @@ def source_digest(text: bytes) -> str:
     str
         Hexadecimal digits.
     """
-    tree = ast.parse(text)
-    for node in ast.walk(tree):
+    return _digest(ast.parse(text))
+
+
+def _digest(tree: ast.Module) -> str:
+    """Return a digest of a syntax tree, which loses its docstrings."""
+    for node in _statements(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(
                 node, clean=False) is not None:
             node.body = node.body[1:]
     return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield a tree and all statements in it, but for those that type checkers alone see."""
+    yield node
+    typing = isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+    for block in BLOCKS[1:] if typing else BLOCKS:
+        for child in getattr(node, block, ()):
+            yield from _statements(child)
 
 
 def _home(module: str, name: str | None) -> str:
@@ -129,9 +143,8 @@ def _home(module: str, name: str | None) -> str:
         return module
     if _is_module(f"{module}.{name}"):
         return f"{module}.{name}"
-    file = file_of(module)
-    if file.name == "__init__.py":
-        for entry in _source(file).imports:
+    if file_of(module).name == "__init__.py":
+        for entry in _imports_of(module):
             if entry.bound == name and entry.module != module and _is_module(entry.module):
                 return _home(entry.module, entry.name)
     return module
@@ -139,19 +152,24 @@ def _home(module: str, name: str | None) -> str:
 
 @functools.cache
 def _source(file: Path) -> Source:
-    text = file.read_bytes()
-    return Source(source_digest(text), tuple(_imports(ast.parse(text))))
+    tree = ast.parse(file.read_bytes())
+    return Source(_digest(tree), tuple(entry for node in _statements(tree) for entry in _imports(node)))
+
+
+def _imports_of(module: str) -> list[Import]:
+    """Return what a module imports, by absolute names."""
+    file = file_of(module)
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    return [entry._replace(module=resolve_name(entry.module, package)) for entry in _source(file).imports]
 
 
 def _imports(node: ast.AST) -> Iterator[Import]:
-    if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
-        return
+    """Yield what a statement imports."""
     if isinstance(node, ast.Import):
         yield from (Import(alias.name, None, alias.asname or alias.name) for alias in node.names)
-    if isinstance(node, ast.ImportFrom) and node.level == 0:
-        yield from (Import(node.module or "", alias.name, alias.asname or alias.name) for alias in node.names)
-    for child in ast.iter_child_nodes(node):
-        yield from _imports(child)
+    if isinstance(node, ast.ImportFrom):
+        module = "." * node.level + (node.module or "")
+        yield from (Import(module, alias.name, alias.asname or alias.name) for alias in node.names)
 
 
 def _is_module(name: str) -> bool:

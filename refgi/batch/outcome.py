@@ -1,5 +1,7 @@
 """The result of one job as a file, written whole or not at all: figures where it is done, the error where it failed."""
 
+import contextlib
+import time
 from pathlib import Path
 from typing import Literal
 
@@ -8,6 +10,8 @@ import pydantic
 from refgi.batch.jobs import FORMAT, Job
 from refgi.bench.results import Run
 from refgi.image import write_text
+
+SECONDS_OF_A_LEFTOVER = 3600.0
 
 
 class View(pydantic.BaseModel):
@@ -92,3 +96,18 @@ def read_outcome(folder: Path, job: Job) -> Outcome | None:
     except (OSError, pydantic.ValidationError):
         return None
     return found if found.job == job.name and found.refgi == FORMAT else None
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files of processes that were killed: those that nobody has written to for long.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the batch.
+    """
+    for place in ("jobs", "pictures", "store"):
+        for file in (folder / place).rglob("*.part*"):
+            with contextlib.suppress(OSError):
+                if time.time() - file.stat().st_mtime > SECONDS_OF_A_LEFTOVER:
+                    file.unlink()

@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection
 
 from refgi.batch.jobs import Job
 from refgi.batch.outcome import failed, is_done, write_outcome
-from refgi.batch.shared import Common, Tell
+from refgi.batch.shared import Common, Tell, within
 from refgi.batch.work import Chunk, forget, run_chunk
 
 SECONDS_BETWEEN_LOOKS = 0.5
@@ -65,8 +65,10 @@ def run_here(chunks: Sequence[Chunk], tell: Tell, written: Written) -> None:
     written : callable
         Called after each chunk.
     """
-    for number, chunk in enumerate(chunks):
-        run_chunk(chunk, lambda what, _, number=number: tell(what, number / len(chunks)))  # type: ignore[misc]
+    total, before = sum(len(chunk.jobs) for chunk in chunks), 0
+    for chunk in chunks:
+        run_chunk(chunk, within(tell, before / total, len(chunk.jobs) / total))
+        before += len(chunk.jobs)
         written()
     forget()
 

@@ -1,7 +1,6 @@
-"""What all jobs of one frame share: scene, G-buffer, RSMs, Embree's tree and the truth.
+"""What all jobs of one frame share: scene, buffers and the truth.
 
-Buffers are computed once in a process, with all their channels; the time that took counts for each job that uses them,
-so that a job's time is that of a whole frame. Truths stay in a store that batches share: a folder for each choice of
+Truths stay in a store that batches share: a folder for each choice of
 how they are traced and by which sources, in it a checkpoint for each scene. A process that needs a truth which another
 one is tracing waits for it.
 """
@@ -11,7 +10,6 @@ import dataclasses
 import hashlib
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi import stages
+from refgi.batch.buffers import Buffers, load_kernels
 from refgi.batch.code import code_key
-from refgi.batch.digest import digest_of
 from refgi.batch.jobs import Shot, key_of_scene, reference_settings, scene_at
 from refgi.batch.outcome import View
 from refgi.bench.grid import TRUTH
@@ -33,18 +31,20 @@ from refgi.image import canonical_json, read_exr, write_exr
 from refgi.jit import most_threads
 from refgi.jit.ahead import cores
 from refgi.provenance import Record, method_record, plain, scene_record
-from refgi.scene import Scene
 from refgi.truth import TruthSettings
 
 if sys.platform != "win32":
     import fcntl
 
-BUFFERS = frozenset({"rsm.gbuffer", "rsm.reflective_shadow_map", "rays.build"})  # stages
 STOPS = ("samples", "seconds", "target_error")  # settings of the truth that no checkpoint knows
 DIGITS = 16  # of folders' names
-TINY = 8  # pixels along a side
 
 Tell = Callable[[str, float], None]
+
+
+def within(tell: Tell, first: float, length: float) -> Tell:
+    """Return what says the progress of a part, which begins at some share of the whole and has some length of it."""
+    return lambda what, share: tell(what, first + share * length)
 
 
 class Common(NamedTuple):
@@ -65,58 +65,6 @@ class Common(NamedTuple):
     def options(self) -> dict[str, Any]:
         """Of every `Frame`."""
         return {"rsm_resolution": self.rsm_resolution, "shadows": "exact"}
-
-
-class Buffer(NamedTuple):
-    """What is known of a buffer."""
-
-    stage: str
-    seconds: float  # that it took with all its channels
-    digest: str
-
-
-class Buffers(stages.Memory):
-    """Memory of a frame's buffers alone, which says what those that it gave back took and what they hold."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._begun: dict[str, float] = {}
-        self.used: list[Buffer] = []  # since `start_anew`, in order
-
-    def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
-        """Return whether a buffer is known, and the buffer."""
-        if name not in BUFFERS:
-            return False, None
-        known, kept = super().recall(name, inputs)
-        if not known:
-            self._begun[name] = time.perf_counter()
-            return False, None
-        output, buffer = kept
-        self.used.append(buffer)
-        return True, output
-
-    def keep(self, name: str, inputs: tuple[Any, ...], output: Any) -> None:
-        """Keep a buffer with all its channels and the time that they took."""
-        if name not in BUFFERS:
-            return
-        with stages.observe():  # apart from the log of the job that happens to be the first
-            content = output.recorded() if hasattr(output, "recorded") else output
-        seconds = time.perf_counter() - self._begun.pop(name)
-        buffer = Buffer(name, seconds, digest_of(content))
-        self._kept[name].append((inputs, (output, buffer)))  # all: a scene may have many lights
-        self.used.append(buffer)
-
-    def start_anew(self) -> None:
-        """Forget what was used, not what is kept."""
-        self.used = []
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """What the buffers used took, by stage, s."""
-        spent: dict[str, float] = {}
-        for buffer in self.used:
-            spent[buffer.stage] = spent.get(buffer.stage, 0.0) + buffer.seconds
-        return spent
 
 
 class Shared:
@@ -154,7 +102,7 @@ class Shared:
         """A frame with its own G-buffer and tracer, which shows all pictures; never timed."""
         if self._frame is None:
             frame = Frame(self.scene, **self._common.options)
-            _load_kernels(frame.scene)
+            load_kernels(frame.scene)
             with stages.observe(memory=self.buffers):
                 covered = frame.gbuffer.covered
                 expect(bool(covered.any()), f"scene {self.shot.name!r}: camera", "a view of some surface",
@@ -204,14 +152,6 @@ class Shared:
         if _record_in(file) != record:
             file.parent.mkdir(parents=True, exist_ok=True)
             write_exr(file, linear_planes(reference.radiance, reference.mean, reference.variance), record)
-
-
-def _load_kernels(scene: Scene) -> None:
-    """Make the smallest of buffers, so that the time of no other holds that of loading its kernels."""
-    small = Frame(scene, width=TINY, height=TINY, rsm_resolution=TINY)
-    small.gbuffer.recorded()
-    for rsm in small.rsms:
-        rsm.recorded()
 
 
 def _record_in(file: Path) -> Record | None:

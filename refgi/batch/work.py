@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 import numpy.typing as npt
 
 from refgi import stages
+from refgi.batch.buffers import BUFFERS, Buffers
 from refgi.batch.digest import hashes_of
 from refgi.batch.filtered import blended, filter_record
 from refgi.batch.jobs import Job, Shot
 from refgi.batch.outcome import Outcome, failed, is_done, write_outcome
-from refgi.batch.shared import BUFFERS, Buffers, Common, Shared, Tell
+from refgi.batch.shared import Common, Shared, Tell, within
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import Made, judged, with_seed
 from refgi.compare.outcome import UNOCCLUDED
@@ -67,10 +68,12 @@ def run_chunk(chunk: Chunk, tell: Tell = lambda *_: None) -> int:
     done = 0
     with contextlib.chdir(chunk.working_folder), threads(chunk.common.threads), warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)  # of each of many settings with each seed
-        for job in chunk.jobs:
+        for number, job in enumerate(chunk.jobs):
             if not is_done(chunk.common.folder, job):
-                tell(job.label, done / len(chunk.jobs))
-                write_outcome(chunk.common.folder, outcome_of(job, chunk.common, tell))
+                share = number / len(chunk.jobs)
+                tell(job.label, share)
+                outcome = outcome_of(job, chunk.common, within(tell, share, 0.0))
+                write_outcome(chunk.common.folder, outcome)
                 done += 1
     return done
 

@@ -151,7 +151,7 @@ def _open_jobs(request: _Request) -> "list[Job]":
 def _do(request: _Request, executor: str | None, tell: "Tell") -> int:
     """Do what is not done; return how many jobs that was."""
     from refgi.batch.cluster import SCHEME, run_on_cluster
-    from refgi.batch.outcome import outcome_file
+    from refgi.batch.outcome import outcome_file, remove_leftovers
     from refgi.batch.schedule import chunks_of, run_here, run_in_processes
     from refgi.cli.warm import warm_up
     from refgi.errors import expect
@@ -161,6 +161,7 @@ def _do(request: _Request, executor: str | None, tell: "Tell") -> int:
     if not jobs:
         return 0
     require_memory(jobs, request.common, request.workers)
+    remove_leftovers(request.common.folder)
     for job in jobs:
         outcome_file(request.common.folder, job).unlink(missing_ok=True)
     warm_up(dict.fromkeys(job.choice.method for job in jobs), "float32", tell)

@@ -9,13 +9,14 @@ from refgi.batch.code import code_key, place_of, reached, source_digest
 
 FILES = {
     "__init__.py": '"""A package."""\nfrom made_by_hand.left import METHOD\nfrom made_by_hand.right import OTHER\n',
-    "left.py": "from typing import TYPE_CHECKING\nimport math\nfrom made_by_hand.shelf import one\n"
-               "if TYPE_CHECKING:\n    from made_by_hand.unused import Kind\n"
+    "left.py": "from typing import TYPE_CHECKING\nimport math\nfrom .shelf import one\n"
+               "if TYPE_CHECKING:\n    from made_by_hand.unused import Kind\nelse:\n    import made_by_hand.otherwise\n"
                "METHOD = one\n\ndef late():\n    from made_by_hand import lately\n    return lately\n",
     "right.py": "OTHER = 2\n",
     "unused.py": "Kind = int\n",
+    "otherwise.py": "",
     "lately.py": "import refgi.errors\n",
-    "shelf/__init__.py": "from made_by_hand.shelf.first import first as one\n"
+    "shelf/__init__.py": "from .first import first as one\n"
                          "from made_by_hand.shelf.second import two\n",
     "shelf/first.py": "def first():\n    return 1\n",
     "shelf/second.py": "two = 2\n",
@@ -48,7 +49,8 @@ def key():
 
 def test_imports_are_followed_name_by_name(package):
     assert package.is_dir()
-    assert reached(PLACE) == {"made_by_hand.left", "made_by_hand.shelf.first", "made_by_hand.lately", "refgi.errors"}
+    assert reached(PLACE) == {"made_by_hand.left", "made_by_hand.shelf.first", "made_by_hand.lately",
+                              "made_by_hand.otherwise", "refgi.errors"}
 
 
 def test_the_key_changes_with_the_code_that_is_reached_and_with_nothing_else(package):

@@ -11,7 +11,6 @@ from refgi.batch.jobs import Job, Shot
 from refgi.batch.outcome import failed, is_done, read_outcome, write_outcome
 from refgi.batch.schedule import DIED, chunks_of, follow, run_in_processes, unfinished
 from refgi.batch.shared import Common
-from refgi.batch.work import Chunk
 from refgi.bench.grid import Choice
 from refgi.errors import InputError
 from refgi.splat import GatherSettings
@@ -124,7 +123,6 @@ def test_chunks_in_this_process(common, monkeypatch):
 
     monkeypatch.setattr(schedule, "run_chunk", run)
     schedule.run_here(chunks_of(BOX + HALL, common, 1), lambda *what: told.append(what), lambda: written.append(1))
-    assert told == [("box0", 0.0), ("hall0", 0.5)]
+    assert told == [("box0", 0.5 * 5 / 8), ("hall0", (5 + 0.5 * 3) / 8)]
     assert written == [1, 1]
     assert not is_done(common.folder, BOX[0])
-    assert isinstance(Chunk, type)

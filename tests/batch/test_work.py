@@ -1,14 +1,14 @@
 """Jobs done: figures are those of a bench, buffers and truths are shared, errors are results."""
 
 import contextlib
+import importlib
 import warnings
 
 import numpy as np
 import pytest
 
 from refgi import stages
-from refgi.batch import shared as shared_module
-from refgi.batch import work
+from refgi.batch import filtered, work
 from refgi.batch.jobs import jobs_of
 from refgi.batch.outcome import is_done, read_outcome
 from refgi.batch.plan import read_plan
@@ -78,9 +78,9 @@ def counted(monkeypatch):
 
 
 def test_figures_are_those_of_a_bench(tmp_path):
-    plan = planned(tmp_path)
+    plan = planned(tmp_path, PLAN.replace("[16, 64]", "16").replace("[hssil]", ""))
     jobs, common = jobs_of(plan), common_of(tmp_path, plan)
-    assert done(jobs, common) == 5
+    assert done(jobs, common) == 3
     got = result_of(common.folder, jobs, read_outcomes(common.folder, jobs)).scenes[0]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)
@@ -101,9 +101,10 @@ def test_figures_are_those_of_a_bench(tmp_path):
 
 
 def test_a_hundred_runs_of_a_scene_share_truth_and_buffers(tmp_path, monkeypatch, evidence):
-    """Judging is left out: it takes most of the time and shares nothing."""
+    """Judging and writing pictures are left out: they take most of the time and share nothing."""
     text = PLAN.replace("rounds = 2", "rounds = 1").replace("[16, 64]", str(list(range(1, 99)))).replace("[hssil]", "")
     monkeypatch.setattr(work, "judged", lambda choice, *_: run_of(choice.method, choice.changes))
+    monkeypatch.setattr(work, "write_exr", lambda *_: None)
     plan = planned(tmp_path, text)
     jobs, common = jobs_of(plan), common_of(tmp_path, plan)
     assert len(jobs) == 100
@@ -122,8 +123,8 @@ def test_another_batch_spends_nothing_on_the_truth(tmp_path, monkeypatch):
     plan = planned(tmp_path)
     jobs = jobs_of(plan)[:1]
     passes = []
-    one_pass = shared_module.traced.__globals__["trace_truth"].__globals__["accumulate"].__wrapped__.__globals__
-    monkeypatch.setitem(one_pass, "one_pass", counting(one_pass["one_pass"], passes))
+    tracing = importlib.import_module("refgi.truth.truth")
+    monkeypatch.setattr(tracing, "one_pass", counting(tracing.one_pass, passes))
     assert done(jobs, common_of(tmp_path, plan)) == 1
     assert len(passes) == 4  # two of each truth
     assert done(jobs, common_of(tmp_path, plan, "other")) == 1
@@ -235,7 +236,7 @@ def test_a_temporal_filter_goes_on_from_frame_to_frame_also_in_another_process(t
     jobs, common = jobs_of(plan), common_of(tmp_path, plan)
     way = [job for job in jobs if job.choice.method == "hssil"]
     done(way[:2], common)
-    work.blended.__globals__["_left"].clear()  # as in another process
+    filtered._left.clear()  # as in another process
     done(way[2:], common)
     scene = load_scene("cornell_box").with_camera(width=24, height=18)
     with warnings.catch_warnings():
@@ -253,7 +254,14 @@ def test_a_temporal_filter_goes_on_from_frame_to_frame_also_in_another_process(t
     assert (path.scene, path.method, path.frames) == ("cornell_box", "hssil", 3)
     assert steps[2].irradiance.any()
     assert path.flicker > path.noise > 0
-    assert path.lag is not None
+    truths = [read_exr(common.folder / f"pictures/cornell_box@{k}/truth.exr")[0] for k in range(3)]
+    right = np.array([[one[f"irradiance.{c}"] for c in "RGB"] for one in truths], float)
+    errors, light = np.array([step.irradiance for step in steps]) - right, right[:, 0] > 0
+    pairs = [(k, light[k] & light[k - 1]) for k in (1, 2)]
+    squares = np.concatenate([((errors[k] - errors[k - 1])[:, both] ** 2).ravel() for k, both in pairs])
+    mean = np.concatenate([right[k][:, both].ravel() for k, both in pairs]).mean()
+    assert path.flicker == pytest.approx(np.sqrt(squares.mean()) / mean, rel=1e-3)
+    assert path.lag is None  # the light rests
     assert isinstance(plan.truth, TruthSettings)
     done(jobs, common)
     (common.folder / "jobs" / f"{way[1].name}.json").unlink()
@@ -265,7 +273,7 @@ def test_without_the_frame_before_there_is_no_filtered_frame(tmp_path):
     plan = planned(tmp_path, PLAN.replace("rounds = 2", 'path = "way.toml"\nframes = 2\ntemporal = {}'))
     job = [job for job in jobs_of(plan) if job.choice.method == "hssil"][1]
     common = common_of(tmp_path, plan)
-    work.blended.__globals__["_left"].clear()
+    filtered._left.clear()
     done([job], common)
     assert "a picture of the frame before" in read_outcome(common.folder, job).message
 

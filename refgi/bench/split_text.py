@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
 COLUMNS = ("approximation", "mean, %", "RMS, %", "spread, %", "share, %", "RMSE without, %", "mean without, %")
 ALL = "all together"
+LEAST = 0.01  # of the mean square: what is taken back and not said
 
 
 def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
@@ -51,7 +52,7 @@ def said_of_split(split: "Split") -> str:
     main = max(known, key=lambda part: part.share or 0.0)
     least = min(known, key=lambda part: part.share or 0.0)
     taken = -(least.share or 0.0)
-    back = f", of which {least.name} takes back {percent(taken)} %" if taken > 0 else ""
+    back = f", of which {least.name} takes back {percent(taken)} %" if taken > LEAST else ""
     text = (f"{split.label}: RMSE {percent(split.error.rmse)} %, of whose square {percent(main.share)} % is "
             f"{main.name}{back}. Mean squares of the parts sum to {percent(split.squares)} % of the truth's mean "
             f"squared, twice their cross terms to {percent(split.cross)} %, both together to "

@@ -186,7 +186,8 @@ def _pictures(renderer: Renderer, choice: Choice, off: Sequence[Approximation], 
     """
     made = []
     for seed in range(seeds):
-        settings, options = with_seed(choice.settings, seed), renderer.options
+        settings: Any = with_seed(choice.settings, seed)
+        options: Mapping[str, Any] = renderer.options
         for one in off:
             settings, options = one.without(settings, options)
         made.append(renderer.picture(choice.method, settings, options))

@@ -1,6 +1,6 @@
 """Run time against error: methods over a grid of settings, and the path tracer stopped early, on one scene or several.
 
 `grid` says which settings; `measure` runs them in turn and judges them against path tracing, bias and variance apart;
-`results` has the figures as data, JSON, CSV and Markdown; `report` the page. `chain` and `split` tell what the error of a
-method is made of, by the approximations that it declares.
+`results` has the figures as data, JSON, CSV and Markdown; `report` the page. `chain` and `split` tell what the error of
+a method is made of, by the approximations that it declares.
 """

@@ -14,7 +14,7 @@ LEAST = 0.01  # of the mean square: what is taken back and not said
 
 
 def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
-    """Return a row for each part, one for the cross terms and one for the whole.
+    """Return a row for each part and one for the whole.
 
     Parameters
     ----------
@@ -25,7 +25,8 @@ def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
     -------
     list of tuple of str
         By `COLUMNS`: change of the mean, root mean square and spread over seeds of what the part changes, its share of
-        the whole's mean square, then the whole's RMSE and change of the mean without it; over the truth's mean.
+        the whole's mean square, then the whole's RMSE and change of the mean with it switched off; over the truth's
+        mean.
     """
     parts = [(part.name, percent(part.mean), percent(part.error.rmse), percent(part.error.spread),
               percent(part.share), percent(part.alone.rmse if part.alone else None),

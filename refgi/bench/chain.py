@@ -186,7 +186,7 @@ def _pictures(renderer: Renderer, choice: Choice, off: Sequence[Approximation], 
     """
     made = []
     for seed in range(seeds):
-        settings = with_seed(choice.settings, seed)
+        settings: Any = with_seed(choice.settings, seed)
         options: Mapping[str, Any] = renderer.options
         for one in off:
             settings, options = one.without(settings, options)

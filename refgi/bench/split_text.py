@@ -10,10 +10,11 @@ if TYPE_CHECKING:
 
 COLUMNS = ("approximation", "mean, %", "RMS, %", "spread, %", "share, %", "RMSE without, %", "mean without, %")
 ALL = "all together"
+LEAST = 0.01  # of the mean square: what is taken back and not said
 
 
 def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
-    """Return a row for each part, one for the cross terms and one for the whole.
+    """Return a row for each part and one for the whole.
 
     Parameters
     ----------
@@ -24,7 +25,8 @@ def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
     -------
     list of tuple of str
         By `COLUMNS`: change of the mean, root mean square and spread over seeds of what the part changes, its share of
-        the whole's mean square, then the whole's RMSE and change of the mean without it; over the truth's mean.
+        the whole's mean square, then the whole's RMSE and change of the mean with it switched off; over the truth's
+        mean.
     """
     parts = [(part.name, percent(part.mean), percent(part.error.rmse), percent(part.error.spread),
               percent(part.share), percent(part.alone.rmse if part.alone else None),
@@ -51,7 +53,7 @@ def said_of_split(split: "Split") -> str:
     main = max(known, key=lambda part: part.share or 0.0)
     least = min(known, key=lambda part: part.share or 0.0)
     taken = -(least.share or 0.0)
-    back = f", of which {least.name} takes back {percent(taken)} %" if taken > 0 else ""
+    back = f", of which {least.name} takes back {percent(taken)} %" if taken > LEAST else ""
     text = (f"{split.label}: RMSE {percent(split.error.rmse)} %, of whose square {percent(main.share)} % is "
             f"{main.name}{back}. Mean squares of the parts sum to {percent(split.squares)} % of the truth's mean "
             f"squared, twice their cross terms to {percent(split.cross)} %, both together to "

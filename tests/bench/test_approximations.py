@@ -168,3 +168,16 @@ def test_a_method_that_declares_none_has_one_part(small, monkeypatch):
     assert [link.name for link in chain.links] == [TRUTH, REST]
     assert np.array_equal(chain.links[-1].pictures[0], small.picture("sii", settings_of("sii", 0), small.options))
     assert chain.alone == {}
+
+
+def test_kinds_of_visibility_in_val_have_the_maps_of_the_method():
+    """Near distances that are best for each kind would be a step of their own: those of the series, 0.4, stay."""
+    method = METHODS["val"]
+    kinds = {}
+    for one in method.approximations[5:]:
+        off = one.off(method.settings(), OPTIONS)
+        if off.visibility != method.settings().visibility:
+            kinds[one.name] = off.visibility.name(), off.maps.near_distance or off.drawn_maps.near_distance
+    assert kinds == {"clustering": ("rays_vpls", 0.4), "rectangle": ("rays_vpls", 0.4),
+                     "single view": ("rays_rectangle", 0.4), "kernel": ("back_projection", 0.4),
+                     "CSM series": ("pcss", 0.4), "filter": ("csm", 0.4)}

@@ -3,6 +3,6 @@
 `grid` says which settings; `measure` runs them in turn and judges them against path tracing, bias and variance apart;
 `results` has the figures as data, JSON, CSV and Markdown; `pictures` writes EXR files, which `views` reads for the page
 of `report`; `overview` looks at several scenes at once, `folder` at folders of results. `choose` goes along `tracks` of
-settings by `search`, for the cheapest that meets a wish; `chain` and `split` tell what the error of a method is made of,
-by the approximations that it declares; `skips` and `trades` what a scene does not need.
+settings by `search`, for the cheapest that meets a wish; `chain` and `split` tell what the error of a method is made
+of, by the approximations that it declares; `skips` and `trades` tell what a scene does not need.
 """

@@ -23,6 +23,7 @@ from refgi.batch.jobs import Shot, key_of_scene, reference_settings, scene_at
 from refgi.batch.outcome import View
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import Reference, traced
+from refgi.bench.pictures import FOLDER, Place, Writer
 from refgi.compare.comparison import without_visibility
 from refgi.compare.pictures import linear_planes
 from refgi.errors import InputError, expect
@@ -147,11 +148,13 @@ class Shared:
 
     def _write(self, name: str, settings: TruthSettings, reference: Reference) -> None:
         """Write a reference's picture unless the same is there."""
-        file = self._common.folder / "pictures" / self.shot.name / f"{TRUTH}{'' if name == TRUTH else f'_{name}'}.exr"
+        file = self._common.folder / FOLDER / self.shot.name / f"{TRUTH}{'' if name == TRUTH else f'_{name}'}.exr"
         record = self.record(TRUTH, settings)
         if _record_in(file) != record:
             file.parent.mkdir(parents=True, exist_ok=True)
-            write_exr(file, linear_planes(reference.radiance, reference.mean, reference.variance), record)
+            planes = linear_planes(reference.radiance, reference.mean, reference.variance, reference.samples)
+            write_exr(file, planes, record)
+            Writer(Place(self._common.folder, f"{FOLDER}/{self.shot.name}"), self.scene, self.frame).write_ids()
 
 
 def _record_in(file: Path) -> Record | None:

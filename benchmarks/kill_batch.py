@@ -49,7 +49,7 @@ if __name__ == "__main__":
     from refgi.cli.group import VerbGroup
     VerbGroup.refgi().main(sys.argv[1:-1])
 """
-SECONDS_TO_END = 5.0  # for workers whose parent is gone
+SECONDS_TO_END = 60.0  # for workers whose parent is gone, which may be at importing what they need
 SECONDS_TO_BEGIN = 120.0
 
 

@@ -6,7 +6,9 @@ result. A job that ends several workers has failed.
 
 from collections.abc import Sequence
 from concurrent.futures import Future
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from refgi.batch.jobs import Job
 from refgi.batch.schedule import Written, chunks_of, fail_first, follow, unfinished
@@ -40,19 +42,19 @@ def run_on_cluster(address: str, jobs: Sequence[Job], common: Common, tell: Tell
         If dask.distributed is not installed or nobody answers at the address.
     """
     try:
-        from distributed import Client, KilledWorker
+        distributed: Any = import_module("distributed")
     except ImportError as error:
         raise InputError("--executor: expected the extra refgi[distributed], got none installed",
                          key="--executor") from error
     try:
-        client = Client(address, timeout=SECONDS_TO_ANSWER)
+        client = distributed.Client(address, timeout=SECONDS_TO_ANSWER)
     except (OSError, ValueError) as error:
         raise InputError(f"--executor: expected a scheduler at {address}, got {error}", key="--executor") from error
     with client:
         executor = client.get_executor(pure=False)
 
         def died(chunk: Chunk, error: BaseException) -> "Future[int] | None":
-            if not isinstance(error, KilledWorker):
+            if not isinstance(error, distributed.KilledWorker):
                 raise error
             left = unfinished([chunk])
             if left:

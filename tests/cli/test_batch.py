@@ -6,7 +6,7 @@ import subprocess
 import pytest
 from click.testing import CliRunner
 
-from refgi.batch import changes, work
+from refgi.batch import changes, estimate, work
 from refgi.bench import measure
 from refgi.bench.results import Result
 from refgi.cli.group import VerbGroup
@@ -92,7 +92,8 @@ def test_shards_do_all_between_them(tmp_path, plan, did):
     assert "0 done now" in run(plan, "--out", tmp_path / "out").stdout
 
 
-def test_a_dry_run_does_nothing(tmp_path, plan, did):
+def test_a_dry_run_does_nothing(tmp_path, plan, did, monkeypatch):
+    monkeypatch.setattr(estimate, "SIZES", (16, 24))
     done = run(plan, "--out", tmp_path / "out", "--dry-run", "--json")
     assert done.exit_code == 0
     said = json.loads(done.stdout)

@@ -1,5 +1,8 @@
 """`refgi info`: methods, versions, processor, threads, cache."""
 
+import contextlib
+import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +23,21 @@ def _info(session: Session, /) -> None:
 
     facts = environment()
     facts["methods"] = {name: method.summary for name, method in METHODS.items()}
-    files = [path for path in cache_root().rglob("*") if path.is_file()] if cache_root().is_dir() else []
-    facts["cache"] = {"path": str(cache_root()), "files": len(files), "bytes": sum(p.stat().st_size for p in files)}
+    sizes = list(_sizes(cache_root()))
+    facts["cache"] = {"path": str(cache_root()), "files": len(sizes), "bytes": sum(sizes)}
     facts["embree"] = _embree()
     session.result(_text(facts), facts)
 
 
 command = _info
+
+
+def _sizes(folder: Path) -> Iterator[int]:
+    """Yield the bytes of each file below a folder; other processes may write and remove files meanwhile."""
+    for path, _, names in os.walk(folder):
+        for name in names:
+            with contextlib.suppress(OSError):
+                yield Path(path, name).stat().st_size
 
 
 def _embree() -> str:

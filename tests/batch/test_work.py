@@ -162,9 +162,11 @@ def test_pictures_and_what_they_say(tmp_path):
         assert np.array_equal(planes[channel], shown)
     assert (record["method"], record["settings"]["lights.count"], record["scene"]["camera"]["width"]) == ("sii", 16, 24)
     assert sorted(file.name for file in (common.folder / "pictures/cornell_box").iterdir()) == [
-        f"sii_{jobs[0].name}.exr", "truth.exr", "truth_unoccluded.exr"]
+        "ids.exr", f"sii_{jobs[0].name}.exr", "truth.exr", "truth_unoccluded.exr"]
     truth, _ = read_exr(common.folder / "pictures/cornell_box/truth.exr")
-    assert {"variance.R", "irradiance.G", "B"} <= set(truth)
+    assert {"variance.R", "irradiance.G", "B", "samples"} <= set(truth)
+    ids, _ = read_exr(common.folder / "pictures/cornell_box/ids.exr")
+    assert np.array_equal(ids["face"], frame.gbuffer.triangle_id.astype(np.uint32))
 
 
 def test_digests_do_not_depend_on_who_made_the_buffers(tmp_path):

@@ -71,7 +71,7 @@ def test_a_batch_and_what_goes_on_where_it_was(tmp_path, plan, did):
     assert f"3 jobs: 3 done now, 0 were there, 0 without a picture -> {out}" in done.stdout
     assert did == ALL
     files = [file for file in out.rglob("*") if file.is_file()]
-    assert len(files) == 3 + 3 + 3 + 2 + 2  # tables, results, pictures, truths as pictures and in the store
+    assert len(files) == 3 + 3 + 3 + 2 + 2 + 1  # tables, results, pictures, truths as pictures and in the store, ids
     assert all(map(is_from_refgi, files))
     before = results(out)
     assert [one.label for one in before.scenes[0].runs] == ["lights=16", "lights=64", "samples=20"]

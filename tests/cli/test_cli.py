@@ -95,6 +95,15 @@ def test_scenes_as_text_and_as_json():
     assert set(listed["scenes"]) >= {"atrium", "ring", "stage"}
 
 
+def test_files_that_vanish_from_the_cache_are_not_counted(tmp_path, monkeypatch):
+    (tmp_path / "kits").mkdir()
+    (tmp_path / "kits" / "kernel").write_bytes(b"four")
+    (tmp_path / "kits" / "gone").symlink_to(tmp_path / "nowhere")  # listed, but no longer there when its size is asked
+    monkeypatch.setenv("REFGI_CACHE_DIR", str(tmp_path))
+    told = json.loads(run("info", "--json").stdout)["cache"]
+    assert (told["files"], told["bytes"]) == (1, 4)
+
+
 def test_info_tells_versions_cache_methods_and_the_way_to_embree():
     told = json.loads(run("info", "--json").stdout)
     assert told["versions"]["refgi"] == refgi.__version__

@@ -56,6 +56,7 @@ def say_done(session: Session, done: Done, form: str) -> int:
         say(str(finding))
     content = {"jobs": done.jobs, "done_now": done.begun, "failures": done.failures,
                "findings": [finding._asdict() for finding in done.findings], "out": done.out}
+    lines += [] if github else [f"refgi report {done.out} shows times, errors and pictures"]
     session.result("\n".join(lines), content)
     return FAILED if done.failures or done.findings else DONE
 

@@ -250,6 +250,7 @@ def test_a_picture_is_made_again_as_it_was(arguments, words):
     assert refused(run(*arguments), *words)
 
 
+@pytest.mark.slow
 def test_pictures_of_a_comparison_are_made_again(tmp_path):
     out = tmp_path / "out"
     result = run("cornell_box", *TINY, "--methods", "sii,vpl", "--set", "sii.lights=16", "--set", "vpl.lights=8",

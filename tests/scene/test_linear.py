@@ -105,8 +105,8 @@ def written(path: Path, content: bytes) -> Path:
     return path
 
 
-MAKERS = (own_meshes, many_objects)
-MORE = (chained_nodes, unknown_materials, flat_nodes, rootless_nodes, many_lights, many_groups, repeated_keys,
+MAKERS = (own_meshes,)
+MORE = (many_objects, chained_nodes, unknown_materials, flat_nodes, rootless_nodes, many_lights, many_groups, repeated_keys,
         missing_meshes)
 
 

@@ -13,7 +13,8 @@ from tests.form_factors import polygon_form_factor
 from tests.naive.truth import one_bounce, truncated_series
 from tests.truth.scenes import CAMERA, at, corner_room, floor, receivers_in_corner, rectangle, scene, spot_down
 
-ESTIMATORS = ["combined", pytest.param("hemisphere", marks=pytest.mark.slow), "light"]
+ESTIMATORS = ["combined", pytest.param("hemisphere", marks=pytest.mark.slow),
+              pytest.param("light", marks=pytest.mark.slow)]
 BLACK = Material("black", (0.0, 0.0, 0.0))
 BIAS = 1e-4  # of the value, beyond the standard error
 SIGMAS = 4.0  # a mean of a few dozen passes lies outside once in some 5,000 runs

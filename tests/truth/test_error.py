@@ -73,6 +73,7 @@ def per_pass(settings):
     return settings.picks_per_pass + settings.directions_per_pass
 
 
+@pytest.mark.slow
 def test_scene_means_lie_within_their_own_standard_error(frame, long_run, evidence):
     sigmas = []
     for seed in range(16):

@@ -54,7 +54,8 @@ def rms(values):
 
 
 @pytest.mark.feature("VAL-27", "REF-15")
-@pytest.mark.parametrize("name", [pytest.param("cornell_box", marks=pytest.mark.slow), "cornell_sphere:faces=80"])
+@pytest.mark.parametrize("name", [pytest.param("cornell_box", marks=pytest.mark.slow),
+                                  "cornell_sphere:faces=80"])
 def test_each_step_is_the_change_between_literal_pictures(name, evidence):
     """Oracle: from many lights to few, their clusters, rectangles, one view, one blocker, series, levels and blocks."""
     frame = Frame(load_scene(name), width=8, height=8, rsm_resolution=16, dtype=np.float64)

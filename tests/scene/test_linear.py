@@ -106,8 +106,8 @@ def written(path: Path, content: bytes) -> Path:
 
 
 MAKERS = (own_meshes,)
-MORE = (many_objects, chained_nodes, unknown_materials, flat_nodes, rootless_nodes, many_lights, many_groups, repeated_keys,
-        missing_meshes)
+MORE = (many_objects, chained_nodes, unknown_materials, flat_nodes, rootless_nodes, many_lights, many_groups,
+        repeated_keys, missing_meshes)
 
 
 @pytest.mark.parametrize("make", [*MAKERS, *(pytest.param(make, marks=pytest.mark.slow) for make in MORE)],

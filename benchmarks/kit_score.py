@@ -40,7 +40,7 @@ class Score(NamedTuple):
     number: int
     what: str
     state: str  # "found", "elsewhere", "silent", "does not build", "does not run"
-    named: bool
+    named: bool | None  # None where the list holds no words: its causes are for a reader to judge
     first: str
     causes: tuple[str, ...]
 
@@ -111,7 +111,8 @@ def _judged(port: str, number: int, bug: dict[str, Any], out: Path) -> Score:
     where = {kind_of(stage) for stage in bug["stages"]}
     state = "found" if kind_of(result.first[1]) in where else "elsewhere"
     causes = tuple(cause.cause for one in result.findings[:1] for cause in one.causes)
-    named = any(word.lower() in cause.lower() for word in bug["words"] for cause in causes)
+    found = any(word.lower() in cause.lower() for word in bug["words"] for cause in causes)
+    named = found if bug["words"] else None
     return Score(port, number, bug["what"], state, named, "/".join(result.first), causes)
 
 
@@ -169,8 +170,9 @@ def _table(scores: list[Score]) -> Table:
     for port, own in _counts(scores):
         ran = [one for one in own if not one.state.startswith("does not")]
         found = sum(one.state == "found" for one in ran)
-        named = sum(one.named for one in ran)
+        named = sum(bool(one.named) for one in ran)
         count = max(1, len(ran))
-        table.add_row(port, str(len(ran)), f"{found} ({found / count:.0%})", f"{named} ({named / count:.0%})",
+        said = "to be read" if any(one.named is None for one in ran) else f"{named} ({named / count:.0%})"
+        table.add_row(port, str(len(ran)), f"{found} ({found / count:.0%})", said,
                       str(sum(one.state == "silent" for one in ran)))
     return table

@@ -10,8 +10,7 @@ from typing import Annotated, Any, NamedTuple, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from refgi.batch.thresholds import Threshold, read_threshold
-from refgi.bench.grid import Grid, grid_of, read_tables
-from refgi.bench.grid import text_of as value_text
+from refgi.bench.grid import Grid, grid_of, read_tables, value_text
 from refgi.errors import InputError, expect, first_faults
 from refgi.scene import builtin_scenes
 from refgi.scene.files import text_of

@@ -7,7 +7,6 @@ whichever job computed them.
 
 import contextlib
 import os
-import time
 import warnings
 from typing import Any, NamedTuple
 
@@ -21,7 +20,7 @@ from refgi.batch.jobs import Job, Shot
 from refgi.batch.outcome import Outcome, failed, is_done, write_outcome
 from refgi.batch.shared import Common, Shared, Tell, within
 from refgi.bench.grid import TRUTH
-from refgi.bench.measure import Made, judged, with_seed
+from refgi.bench.measure import Made, judged, timed, with_seed
 from refgi.compare.outcome import UNOCCLUDED
 from refgi.compare.pictures import linear_planes
 from refgi.errors import RefgiError, RefgiWarning
@@ -153,23 +152,12 @@ def _timed(job: Job, settings: Any, made: Made, shared: Shared) -> None:
     frame: Frame = shared.fresh_frame()
     buffers: Buffers = shared.buffers
     buffers.start_anew()
-    with stages.observe(memory=buffers) as log:
-        started = time.perf_counter()
-        picture = METHODS[job.choice.method].function(frame, settings)
-        seconds = time.perf_counter() - started
+    run = timed(frame, job.choice.method, settings, buffers)
     if not made.times:
-        made.stages.update(_spent(log, buffers))
-    made.pictures.append(picture)
-    made.times.append(seconds + sum(buffers.seconds.values()))
-
-
-def _spent(log: stages.Log, buffers: Buffers) -> dict[str, float]:
-    """Return the seconds of outermost stages, and of buffers what they took when they were made."""
-    spent = buffers.seconds
-    for run in log.runs:
-        if run.depth == 0 and run.status == "ran":
-            spent[run.name] = spent.get(run.name, 0.0) + run.seconds
-    return spent
+        made.stages.update({name: run.stages.get(name, 0.0) + buffers.seconds.get(name, 0.0)
+                            for name in (*buffers.seconds, *run.stages)})
+    made.pictures.append(run.picture)
+    made.times.append(run.seconds + sum(buffers.seconds.values()))
 
 
 def _write(job: Job, common: Common, shared: Shared, settings: Any, irradiance: Array, frames: Array | None) -> None:

@@ -1,10 +1,8 @@
 """`choose`: the cheapest method and settings that meet a wish on a scene."""
 
-import contextlib
 import dataclasses
 import math
 import statistics
-import time
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -12,19 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi import stages
 from refgi.bench.error import error_of
 from refgi.bench.grid import TRUTH, Choice
-from refgi.bench.measure import REFERENCE_SEED, WARM_UP_SIZE, with_seed
+from refgi.bench.measure import REFERENCE_SEED, load_kernels, stopped, timed, traced, with_seed
 from refgi.bench.search import Found, for_error, for_time
 from refgi.bench.tracks import Track
 from refgi.errors import RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
-from refgi.methods import METHODS
-from refgi.provenance import estimate_record
 from refgi.scene import Scene
-from refgi.settings import Settings
-from refgi.truth import TruthSettings, trace_truth
+from refgi.truth import TruthSettings
 
 Array = npt.NDArray[Any]
 Tell = Callable[[str, float], None]
@@ -100,7 +94,9 @@ def choose(
     truth = dataclasses.replace(truth or wish.truth, seed=REFERENCE_SEED)
     tracks = [_of_truth(track, truth) if track.method == TRUTH else track for track in tracks]
     full = Pictures(scene, truth, rounds, tell, frame_options)
-    _load_kernels(scene, tracks, frame_options, tell)
+    for number, track in enumerate(tracks):
+        tell(f"loading {track.method}", number / len(tracks))
+        load_kernels(scene, track.rungs[0], frame_options)
     small = Pictures(scene, truth, SMALL_ROUNDS, tell, {**frame_options, **_small_size(full.frame)})
     if wish.error is not None:
         found = for_error(tracks, wish.error, small, full)
@@ -136,9 +132,8 @@ class Pictures:
         expect(bool(self.frame.gbuffer.covered.any()), f"scene {scene.name!r}: camera", "a view of some surface",
                "a view past all of it")
         self._size = f"{self.frame.width}x{self.frame.height}"
-        with stages.observe(progress=lambda stage, done: tell(f"truth at {self._size}: {stage}", done)):
-            self._reference = trace_truth(self.frame, truth)
-        self.truth: str = estimate_record(self._reference)["estimate"]["statement"]
+        self._reference = traced(self.frame, truth, lambda what, done: tell(f"{self._size}: {what}", done))
+        self.truth = self._reference.statement
         self._known: dict[Choice, _Run] = {}
 
     def seconds(self, choice: Choice) -> float:
@@ -165,27 +160,12 @@ class Pictures:
         return self._known[choice]
 
     def _judged(self, choice: Choice) -> "_Run":
-        runs = [self._made(choice.method, with_seed(choice.settings, seed)) for seed in self._seeds]
-        known = error_of([one.picture for one in runs], self._reference.mean, self._reference.variance_of_mean,
+        runs = [timed(Frame(self._scene, **self._options), choice.method, with_seed(choice.settings, seed))
+                for seed in self._seeds]
+        known = error_of([one.picture for one in runs], self._reference.mean, self._reference.variance,
                          self.frame.gbuffer.covered)
         error = math.sqrt(max(0.0, known.rmse**2 - known.noise**2)) if np.isfinite(known.rmse) else math.inf
         return _Run(statistics.median(one.seconds for one in runs), error, runs[0].skips)
-
-
-    def _made(self, method: str, settings: Settings) -> "_Made":
-        frame = Frame(self._scene, **self._options)
-        with stages.observe() as log:
-            started = time.perf_counter()
-            picture = METHODS[method].function(frame, settings)
-            seconds = time.perf_counter() - started
-        skips = dict.fromkeys((run.name, run.reason) for run in log.runs if run.status == "skipped")
-        return _Made(picture, seconds, tuple(skips))
-
-
-class _Made(NamedTuple):
-    picture: Array
-    seconds: float
-    skips: tuple[tuple[str, str], ...]
 
 
 class _Run(NamedTuple):
@@ -194,22 +174,11 @@ class _Run(NamedTuple):
     skips: tuple[tuple[str, str], ...]
 
 
-def _load_kernels(scene: Scene, tracks: Sequence[Track], options: dict[str, Any], tell: Tell) -> None:
-    """Compile or load what tracks need: no time that is measured later has it in it."""
-    for number, track in enumerate(tracks):
-        tell(f"loading {track.method}", number / len(tracks))
-        with warnings.catch_warnings(), contextlib.suppress(RefgiError):
-            warnings.simplefilter("ignore", RefgiWarning)
-            METHODS[track.method].function(Frame(scene, **{**options, "width": WARM_UP_SIZE, "height": WARM_UP_SIZE}),
-                                           track.rungs[0].settings)
-
-
 def _of_truth(track: Track, truth: TruthSettings) -> Track:
     """Return the path tracer's track with the reference's bounces and emitters, stopped by its samples alone."""
-    rungs = [one._replace(settings=dataclasses.replace(truth, samples=value, seconds=None, target_error=None,
-                                                       checkpoint=None))
-             for one, value in zip(track.rungs, track.values, strict=True)]
-    return Track(tuple(rungs), track.values)
+    rungs = tuple(one._replace(settings=stopped(truth, value))
+                  for one, value in zip(track.rungs, track.values, strict=True))
+    return track._replace(rungs=rungs)
 
 
 def _small_size(frame: Frame) -> dict[str, int]:

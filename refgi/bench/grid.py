@@ -177,7 +177,7 @@ def _passes(table: Mapping[str, Any], file: Path) -> tuple[int, ...]:
 
 def _combinations(table: Any, where: str) -> Iterable[tuple[str, ...]]:
     expect(isinstance(table, dict), where, "a table of settings", type(table).__name__)
-    lists = [[f"{key}={text_of(value)}" for value in (values if isinstance(values, list) else [values])]
+    lists = [[f"{key}={value_text(value)}" for value in (values if isinstance(values, list) else [values])]
              for key, values in sorted(flat(table).items())]
     return itertools.product(*lists)
 
@@ -203,7 +203,7 @@ def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return found
 
 
-def text_of(value: Any) -> str:
+def value_text(value: Any) -> str:
     """Return a value as `--set` takes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 

@@ -22,7 +22,7 @@ from refgi.bench.error import error_of
 from refgi.bench.grid import TRUTH, Choice, Grid
 from refgi.bench.pictures import TRUTH_FILES, Place, Writer
 from refgi.bench.results import Run, SceneResult, figures_of, known
-from refgi.compare.comparison import without_visibility
+from refgi.compare.comparison import WARM_UP_SIZE, without_visibility
 from refgi.compare.flip import flip
 from refgi.compare.outcome import UNOCCLUDED, measure
 from refgi.compare.pictures import linear_planes
@@ -37,7 +37,6 @@ from refgi.truth import TruthSettings, trace_truth
 Array = npt.NDArray[Any]
 Tell = Callable[[str, float], None]
 
-WARM_UP_SIZE = 96  # pixels along a side: more than the coarse grid of `gather`
 REFERENCE_SEED = 2**31  # of the truth: none of the rounds'
 
 
@@ -138,8 +137,12 @@ def _write(writer: Writer, references: Mapping[str, Reference]) -> None:
 def stop(settings: TruthSettings, passes: int) -> Choice:
     """Return the truth, stopped after some passes that no file holds already."""
     samples = passes * (settings.picks_per_pass + settings.directions_per_pass)
-    return Choice(TRUTH, (f"samples={samples}",), dataclasses.replace(
-        settings, samples=samples, seconds=None, target_error=None, checkpoint=None))
+    return Choice(TRUTH, (f"samples={samples}",), stopped(settings, samples))
+
+
+def stopped(settings: TruthSettings, samples: int) -> TruthSettings:
+    """Return settings that stop after some samples a pixel, whatever else would, and that read no file."""
+    return dataclasses.replace(settings, samples=samples, seconds=None, target_error=None, checkpoint=None)
 
 
 def _in_turn(
@@ -150,9 +153,7 @@ def _in_turn(
     failures: dict[str, str] = {}
     for number, choice in enumerate(choices):
         tell(f"warming up {choice.method}: {choice.label}", number / len(choices))
-        with _quietly():
-            METHODS[choice.method].function(Frame(scene, **{**options, "width": WARM_UP_SIZE, "height": WARM_UP_SIZE}),
-                                            choice.settings)
+        load_kernels(scene, choice, options)
     for turn in range(rounds):
         for number, choice in enumerate(choices):
             name = f"{choice.method}: {choice.label}"
@@ -160,28 +161,53 @@ def _in_turn(
                 continue
             tell(name, (turn + number / len(choices)) / rounds)
             try:
-                picture, seconds, spent = _timed(Frame(scene, **options), choice.method,
-                                                 with_seed(choice.settings, turn))
+                run = timed(Frame(scene, **options), choice.method, with_seed(choice.settings, turn))
             except RefgiError as error:
                 failures[name] = str(error)
                 made.pop(number, None)
                 continue
-            one = made.setdefault(number, Made([], [], spent))
-            one.pictures.append(picture)
-            one.times.append(seconds)
+            one = made.setdefault(number, Made([], [], run.stages))
+            one.pictures.append(run.picture)
+            one.times.append(run.seconds)
     return made, failures
 
 
-def _timed(frame: Frame, method: str, settings: Settings) -> tuple[Array, float, dict[str, float]]:
-    with stages.observe() as log:
+class Timed(NamedTuple):
+    """One picture and what it took."""
+
+    picture: Array  # (3, h, w) irradiance, W/m^2
+    seconds: float
+    log: stages.Log
+
+    @property
+    def stages(self) -> dict[str, float]:
+        """Seconds of outermost stages."""
+        spent: dict[str, float] = {}
+        for run in self.log.runs:
+            if run.depth == 0 and run.status == "ran":
+                spent[run.name] = spent.get(run.name, 0.0) + run.seconds
+        return spent
+
+    @property
+    def skips(self) -> tuple[tuple[str, str], ...]:
+        """Stages that were left out, and why, each once."""
+        return tuple(dict.fromkeys((run.name, run.reason) for run in self.log.runs if run.status == "skipped"))
+
+
+def timed(frame: Frame, method: str, settings: Settings, memory: stages.Memory | None = None) -> Timed:
+    """Run a method on a frame; what `memory` keeps is not computed again."""
+    with stages.observe(memory=memory) as log:
         started = time.perf_counter()
         picture = METHODS[method].function(frame, settings)
         seconds = time.perf_counter() - started
-    spent: dict[str, float] = {}
-    for run in log.runs:
-        if run.depth == 0 and run.status == "ran":
-            spent[run.name] = spent.get(run.name, 0.0) + run.seconds
-    return picture, seconds, spent
+    return Timed(picture, seconds, log)
+
+
+def load_kernels(scene: Scene, choice: Choice, options: Mapping[str, Any]) -> None:
+    """Run a choice on a small picture: no time that is measured later has compiling in it."""
+    with _quietly():
+        METHODS[choice.method].function(Frame(scene, **{**options, "width": WARM_UP_SIZE, "height": WARM_UP_SIZE}),
+                                        choice.settings)
 
 
 def with_seed(settings: Settings, seed: int) -> Settings:

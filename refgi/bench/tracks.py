@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from refgi.bench.grid import FILES, Choice, flat, read_tables, text_of
+from refgi.bench.grid import FILES, Choice, flat, read_tables, value_text
 from refgi.errors import InputError, expect
 from refgi.methods import find_method
 from refgi.settings import from_text
@@ -86,7 +86,7 @@ def _track(name: str, table: Mapping[str, Any]) -> Track:
     for word in WORDS:
         expect(word in table, word, "a value", "none")
     key, values = str(table["along"]), _values(table["from"], table["to"])
-    fixed = [f"{other}={text_of(value)}" for other, value in flat(table).items() if other not in WORDS]
+    fixed = [f"{other}={value_text(value)}" for other, value in flat(table).items() if other not in WORDS]
     method = find_method(name)
     changes = [(f"{key}={value}", *fixed) for value in values]
     return Track(tuple(Choice(method.name, one, from_text(method.settings(), one)) for one in changes), values)

@@ -1,6 +1,20 @@
-"""Results made by hand."""
+"""A small plan, and results made by hand."""
 
 from refgi.bench.results import Figures, PathResult, Result, Run, SceneResult
+
+PLAN = """
+[batch]
+scenes = ["cornell_box"]
+size = [24, 18]
+rounds = 2
+rsm_resolution = 32
+truth = {samples = 48}
+[truth]
+passes = [2]
+[sii]
+lights = [16, 64]
+[hssil]
+"""
 
 
 def run_of(method, changes=(), *, rmse=0.2, unoccluded=None, seconds=(1.0,), **more):

@@ -8,20 +8,8 @@ from refgi.batch.plan import read_plan
 from refgi.bench.measure import REFERENCE_SEED
 from refgi.errors import InputError
 from refgi.scene import load_scene
+from tests.batch.made import PLAN
 
-PLAN = """
-[batch]
-scenes = ["cornell_box"]
-size = [24, 18]
-rounds = 2
-rsm_resolution = 32
-truth = {samples = 48}
-[truth]
-passes = [2]
-[sii]
-lights = [16, 64]
-[hssil]
-"""
 PATH = """
 [[camera]]
 at = 0.0

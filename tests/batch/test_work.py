@@ -27,23 +27,10 @@ from refgi.scene.pathfile import read_path
 from refgi.sssil import HssilSettings
 from refgi.sssil.temporal import Sequence, TemporalSettings
 from refgi.truth import TruthSettings
+from tests.batch.made import PLAN as SMALL_PLAN
 from tests.batch.made import run_of
 
-PLAN = """
-[batch]
-scenes = ["cornell_box"]
-size = [24, 18]
-rounds = 2
-rsm_resolution = 32
-truth = {samples = 48}
-[truth]
-passes = [2]
-[sii]
-lights = [16, 64]
-[hssil]
-[vpl]
-lights = 16
-"""
+PLAN = SMALL_PLAN + "[vpl]\nlights = 16\n"
 
 
 def planned(tmp_path, text=PLAN):

@@ -116,7 +116,7 @@ def test_a_seed_reaches_every_method_that_has_one():
 
 def test_what_gives_no_picture_stops_nothing_else(box):
     grid = Grid((choice("sii", lights=32), choice("val", **{"maps.resolution": 64, "lights": 16})), ())
-    timed = measure._timed
+    timed = measure.timed
 
     def refusing(frame, method, settings):
         if method == "val":
@@ -125,7 +125,7 @@ def test_what_gives_no_picture_stops_nothing_else(box):
 
     with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)
-        patch.setattr(measure, "_timed", refusing)
+        patch.setattr(measure, "timed", refusing)
         found = bench_scene(box, grid, rounds=1, truth=TruthSettings(samples=48), **SIZE)
     assert [run.method for run in found.runs] == ["sii"]
     assert found.failures == {"val: maps.resolution=64, lights=16": "refused here"}

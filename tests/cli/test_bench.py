@@ -71,14 +71,14 @@ def test_a_split_that_fails_is_told(tmp_path, grid, monkeypatch):
 
 
 def test_a_choice_that_gives_no_picture_is_told(tmp_path, grid, monkeypatch):
-    timed = measure._timed
+    timed = measure.timed
 
     def refusing(frame, method, settings):
         if method == "gather":
             raise InputError("refused here")
         return timed(frame, method, settings)
 
-    monkeypatch.setattr(measure, "_timed", refusing)
+    monkeypatch.setattr(measure, "timed", refusing)
     done = run("--grid", grid, *SMALL, "--out", tmp_path / "out")
     assert done.exit_code == 1
     assert "gather: samples=20 gave no picture: refused here" in done.stderr

@@ -4,7 +4,8 @@ Every figure is a ratio within one run, or reported without an aim. Results: a t
 `python -m benchmarks paper NAME --out DIR` makes a paper's figures and tables again; `python -m benchmarks mutate` puts
 faults into a copy of the sources and counts those that no test catches; `python -m benchmarks kit-score` puts bugs into
 ports and counts those that the conformance kit names; `python -m benchmarks kill-batch` kills a batch at random
-moments and counts what is lost; `python -m benchmarks skips` tells what each skip saves.
+moments and counts what is lost; `python -m benchmarks skips` tells what each skip saves; `python -m benchmarks
+accuracy` makes benchmarks/results again.
 """
 
 import argparse
@@ -22,9 +23,10 @@ from rich.table import Table
 from benchmarks.harness import Row
 
 FOLDER = Path(__file__).parent
-COMMANDS = {"paper": "benchmarks.papers.runner", "mutate": "benchmarks.mutate.runner",
-            "kit-score": "benchmarks.kit_score", "kill-batch": "benchmarks.kill_batch", "skips": "benchmarks.skips"}
-NOT_TOPICS = {"__init__", "__main__", "harness", "signatures", "kit_score", "kill_batch", "skips"}
+COMMANDS = {"accuracy": "benchmarks.accuracy", "paper": "benchmarks.papers.runner",
+            "mutate": "benchmarks.mutate.runner", "kit-score": "benchmarks.kit_score",
+            "kill-batch": "benchmarks.kill_batch", "skips": "benchmarks.skips"}
+NOT_TOPICS = {"__init__", "__main__", "accuracy", "harness", "signatures", "kit_score", "kill_batch", "skips"}
 
 
 def topics() -> list[str]:

@@ -9,17 +9,18 @@ import dataclasses
 import functools
 import inspect
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, Literal, ParamSpec, TypeVar
+from typing import Any, Literal, ParamSpec, SupportsInt, TypeVar
 
 import numpy as np
 
 P = ParamSpec("P")
 R = TypeVar("R")
 Status = Literal["ran", "reused", "skipped"]
+Counted = Literal["pairs", "rays"]  # of light and receiver, before skips within a sum; traced
 
 STAGES: dict[str, Callable[..., Any]] = {}  # every stage that is imported, by name
 KEPT_RESULTS = 8  # per stage: one per light of a scene with several, without hoarding buffers
@@ -47,6 +48,7 @@ class Log:
     record: bool = False
     memory: "Memory | None" = None
     progress: Callable[[str, float], None] | None = None
+    counts: Counter[Counted] | None = None  # of what `tally` counts; None where nobody asked
     _depth: int = 0
     _open: list[str] = dataclasses.field(default_factory=list)
 
@@ -118,7 +120,8 @@ def stage(name: str, *, kept: bool = True) -> Callable[[Callable[P, R]], Callabl
 
 @contextmanager
 def observe(
-    *, record: bool = False, memory: Memory | None = None, progress: Callable[[str, float], None] | None = None
+    *, record: bool = False, memory: Memory | None = None, progress: Callable[[str, float], None] | None = None,
+    counting: bool = False,
 ) -> Iterator[Log]:
     """Log every stage that runs inside the block.
 
@@ -130,13 +133,15 @@ def observe(
         Reuse results kept there by this and earlier blocks.
     progress : callable, optional
         Called with (stage name, fraction done) as long stages advance.
+    counting : bool
+        Count pairs and rays, which takes time of its own.
 
     Yields
     ------
     Log
         Filled while the block runs.
     """
-    log = Log(record=record, memory=memory, progress=progress)
+    log = Log(record=record, memory=memory, progress=progress, counts=Counter() if counting else None)
     token = _log.set(log)
     try:
         yield log
@@ -156,6 +161,21 @@ def skip(name: str, reason: str) -> None:
     """
     if (log := _log.get()) is not None:
         log.runs.append(Run(name, "skipped", reason=reason, depth=log._depth))
+
+
+def tally(what: Counted, number: Callable[[], SupportsInt]) -> None:
+    """Add to what whoever observes counts.
+
+    Parameters
+    ----------
+    what : str
+        ``"pairs"`` of light, or other sender, and receiver that a sum is given; ``"rays"`` that are traced.
+    number : callable
+        Returns how many; called only where they are counted.
+    """
+    log = _log.get()
+    if log is not None and log.counts is not None:
+        log.counts[what] += int(number())
 
 
 def report_progress(fraction: float) -> None:

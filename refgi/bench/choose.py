@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.bench.error import error_of
 from refgi.bench.grid import TRUTH, Choice
@@ -20,7 +19,6 @@ from refgi.frame import Frame
 from refgi.scene import Scene
 from refgi.truth import TruthSettings
 
-Array = npt.NDArray[Any]
 Tell = Callable[[str, float], None]
 
 SMALL = 128  # pixels along the longer side of the small picture

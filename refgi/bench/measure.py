@@ -5,12 +5,11 @@ slow moment of the machine falls on all, and each picture counts for the spread 
 loaded, before the first round.
 """
 
-import contextlib
 import dataclasses
 import time
-import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,12 +20,13 @@ from refgi.bench.curves import error_in, front
 from refgi.bench.error import error_of
 from refgi.bench.grid import TRUTH, Choice, Grid
 from refgi.bench.pictures import TRUTH_FILES, Place, Writer
-from refgi.bench.results import Run, SceneResult, figures_of, known
-from refgi.compare.comparison import WARM_UP_SIZE, without_visibility
+from refgi.bench.results import Run, SceneResult, Work, figures_of, known
+from refgi.bench.work import first_frames, quietly, works_of
+from refgi.compare.comparison import WARM_UP_SIZE
 from refgi.compare.flip import flip
 from refgi.compare.outcome import UNOCCLUDED, measure
 from refgi.compare.pictures import linear_planes
-from refgi.errors import RefgiError, RefgiWarning, expect
+from refgi.errors import RefgiError, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS
 from refgi.provenance import Record, estimate_record, method_record, plain
@@ -38,6 +38,11 @@ Array = npt.NDArray[Any]
 Tell = Callable[[str, float], None]
 
 REFERENCE_SEED = 2**31  # of the truth: none of the rounds'
+SEEN, SEEN_UNOCCLUDED = "seen", "seen_unoccluded"  # names of references, beside those of a comparison
+LIMITS: Mapping[str, Mapping[str, Any]] = MappingProxyType({  # what the truth of each reference leaves out
+    TRUTH: {}, UNOCCLUDED: {"visibility": False}, SEEN: {"emitters": "visible"},
+    SEEN_UNOCCLUDED: {"visibility": False, "emitters": "visible"},
+})
 
 
 class Reference(NamedTuple):
@@ -57,11 +62,12 @@ class Made(NamedTuple):
     pictures: list[Array]
     times: list[float]
     stages: dict[str, float]
+    work: Work | None = None
 
 
 def bench_scene(
     scene: Scene, grid: Grid, *, rounds: int = 3, truth: TruthSettings | None = None, tell: Tell = lambda *_: None,
-    place: Place | None = None, **frame_options: Any,
+    place: Place | None = None, source: str | None = None, **frame_options: Any,
 ) -> SceneResult:
     """Run a grid on a scene.
 
@@ -79,6 +85,8 @@ def bench_scene(
         Called with (what runs, share done).
     place : Place, optional
         Where the pictures of the first seed and of the references are written; nowhere where absent.
+    source : str, optional
+        What the scene was loaded from, by which new processes load it for `SceneResult.cold`; none where absent.
     **frame_options : object
         Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
 
@@ -96,11 +104,13 @@ def bench_scene(
     covered = frame.gbuffer.covered
     expect(bool(covered.any()), f"scene {scene.name!r}: camera", "a view of some surface", "a view past all of it")
     settings = dataclasses.replace(truth or TruthSettings(), seed=REFERENCE_SEED)
-    references = {TRUTH: traced(frame, settings, tell)}
-    if not all(METHODS[choice.method].knows_visibility(choice.settings) for choice in grid.choices):
-        references[UNOCCLUDED] = traced(frame, without_visibility(settings), tell)
+    names = dict.fromkeys([TRUTH, *(name for choice in grid.choices for name in references_of(choice))])
+    references = {name: traced(frame, limited(settings, name), tell) for name in names}
     stops = [stop(settings, passes) for passes in grid.passes]
     made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, frame_options, tell)
+    size = {"width": frame.width, "height": frame.height}
+    methods = dict.fromkeys(choice.method for choice in grid.choices)
+    cold = {} if source is None else first_frames(source, list(methods), {**frame_options, **size}, tell)
     done = [(choice, made[number]) for number, choice in enumerate((*grid.choices, *stops)) if number in made]
     runs = [judged(choice, one, references, frame) for choice, one in done]
     if place is not None:
@@ -109,12 +119,28 @@ def bench_scene(
         firsts = [(choice.method, with_seed(choice.settings, 0), one.pictures[0]) for choice, one in done]
         runs = [run.model_copy(update={"picture": file})
                 for run, file in zip(runs, writer.write_runs(firsts), strict=True)]
-    methods = [run for run in runs if run.method != TRUTH]
+    others = [run for run in runs if run.method != TRUTH]
     line = [run for run in runs if run.method == TRUTH]
     return SceneResult(scene=scene.name, width=frame.width, height=frame.height, covered=int(covered.sum()),
                        mean=float(references[TRUTH].mean[:, covered].mean(dtype=np.float64)),
-                       truth=references[TRUTH].statement, runs=compared(methods, line), line=tuple(line),
-                       failures=failures)
+                       truth=references[TRUTH].statement, runs=compared(others, line), line=tuple(line),
+                       failures=failures, cold=cold)
+
+
+def references_of(choice: Choice) -> list[str]:
+    """Return by which references a choice is judged: the truth, and those that share its limits; keys of `LIMITS`."""
+    method, knows = METHODS[choice.method], METHODS[choice.method].knows_visibility(choice.settings)
+    limits = {key: value for one in method.approximations for key, value in one.shared_by(choice.settings).items()}
+    names = [TRUTH] if knows else [TRUTH, UNOCCLUDED]
+    return [*names, SEEN if knows else SEEN_UNOCCLUDED] if limits.get("emitters") == "visible" else names
+
+
+def limited(settings: TruthSettings, name: str) -> TruthSettings:
+    """Return how a reference is traced; in a file of its own, where the truth has one."""
+    held = settings.checkpoint
+    if name != TRUTH and held and not Path(held).is_dir():  # a folder has a file for each
+        held = f"{held}.{name}"
+    return dataclasses.replace(settings, **LIMITS[name], checkpoint=held)
 
 
 def traced(frame: Frame, settings: TruthSettings, tell: Tell) -> Reference:
@@ -128,9 +154,12 @@ def traced(frame: Frame, settings: TruthSettings, tell: Tell) -> Reference:
 
 
 def _write(writer: Writer, references: Mapping[str, Reference]) -> None:
-    for name, one in references.items():
+    for name, file in TRUTH_FILES.items():
+        if name not in references:
+            continue
+        one = references[name]
         planes = linear_planes(one.radiance, one.mean, one.variance, one.samples)
-        writer.write(Path(TRUTH_FILES[name]).stem, planes, one.record)
+        writer.write(Path(file).stem, planes, one.record)
     writer.write_ids()
 
 
@@ -154,6 +183,8 @@ def _in_turn(
     for number, choice in enumerate(choices):
         tell(f"warming up {choice.method}: {choice.label}", number / len(choices))
         load_kernels(scene, choice, options)
+    seeded = [choice._replace(settings=with_seed(choice.settings, 0)) for choice in choices]
+    works = works_of(scene, seeded, options, tell)
     for turn in range(rounds):
         for number, choice in enumerate(choices):
             name = f"{choice.method}: {choice.label}"
@@ -166,7 +197,7 @@ def _in_turn(
                 failures[name] = str(error)
                 made.pop(number, None)
                 continue
-            one = made.setdefault(number, Made([], [], run.stages))
+            one = made.setdefault(number, Made([], [], run.stages, works.get(number)))
             one.pictures.append(run.picture)
             one.times.append(run.seconds)
     return made, failures
@@ -205,7 +236,7 @@ def timed(frame: Frame, method: str, settings: Settings, memory: stages.Memory |
 
 def load_kernels(scene: Scene, choice: Choice, options: Mapping[str, Any]) -> None:
     """Run a choice on a small picture: no time that is measured later has compiling in it."""
-    with _quietly():
+    with quietly():
         METHODS[choice.method].function(Frame(scene, **{**options, "width": WARM_UP_SIZE, "height": WARM_UP_SIZE}),
                                         choice.settings)
 
@@ -231,16 +262,15 @@ def with_seed(settings: Settings, seed: int) -> Settings:
 
 
 def judged(choice: Choice, made: Made, references: Mapping[str, Reference], frame: Frame) -> Run:
-    """Return all figures of a choice's pictures; `references` by name, the unoccluded one where its method needs it."""
-    covered, method = frame.gbuffer.covered, METHODS[choice.method]
-    judges = [TRUTH] if method.knows_visibility(choice.settings) else [TRUTH, UNOCCLUDED]
+    """Return all figures of a choice's pictures; `references` by name, the truth among them."""
+    covered = frame.gbuffer.covered
     errors = {name: figures_of(error_of(made.pictures, references[name].mean, references[name].variance, covered))
-              for name in judges}
+              for name in references_of(choice) if name in references}
     figures = measure(made.pictures[0], references[TRUTH].mean, references[TRUTH].variance, covered).figures
     seen = flip(frame.radiance(made.pictures[0]), references[TRUTH].radiance, covered)
     return Run(method=choice.method, changes=choice.changes, settings=plain(choice.settings), times=tuple(made.times),
                stages=made.stages, errors=errors, flip=known(seen.mean), ssim=known(figures["ssim"].value),
-               relmse=known(figures["relmse"].value))
+               relmse=known(figures["relmse"].value), work=made.work)
 
 
 def compared(runs: list[Run], line: list[Run]) -> tuple[Run, ...]:
@@ -252,11 +282,3 @@ def compared(runs: list[Run], line: list[Run]) -> tuple[Run, ...]:
         ratio = run.rmse / error_in(tracer, run.seconds)
         said.append(run.model_copy(update={"front": best, "in_equal_time": ratio if ratio > 0 else None}))
     return tuple(said)
-
-
-@contextlib.contextmanager
-def _quietly() -> Iterator[None]:
-    """Leave warnings and errors to the real run, which says them."""
-    with warnings.catch_warnings(), contextlib.suppress(RefgiError):
-        warnings.simplefilter("ignore", RefgiWarning)
-        yield

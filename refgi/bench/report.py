@@ -7,7 +7,7 @@ from typing import Any
 
 from refgi.bench.grid import FILES, TRUTH
 from refgi.bench.overview import Place, overview
-from refgi.bench.results import Result, Run, SceneResult, percent, times
+from refgi.bench.results import Result, Run, SceneResult, percent, taken, times
 from refgi.bench.split_plot import splits_of
 from refgi.bench.views import named, provenance_of, view_of
 from refgi.compare.page.album import album
@@ -17,13 +17,14 @@ from refgi.image import write_text
 from refgi.provenance import Record
 
 COLUMNS = ("method", "settings", "time, ms", "RMSE, %", "95 % interval", "bias, %", "spread, %",
-           "without visibility, %", "over truth's in equal time", "FLIP", "SSIM")
+           "own limits, %", "over truth's in equal time", "FLIP", "SSIM", "pairs, M", "rays, M", "memory, MiB")
 AXES = Axes("time of a frame, ms", "RMSE of indirect irradiance, %", log_x=True, log_y=True, decimal_x=True)
 HOW = ("Each round runs every choice once on a frame of its own, buffers included, with a seed of its own; times are "
        "medians. RMSE is plain, over all pixels that show a surface. Spread is the deviation between seeds, bias what "
-       "is left without it and without the truth's own noise. Bold rows are on the front: nothing here is both faster "
-       "and nearer. Bars are 95 % intervals of the RMSE. A click on a mark or on a method's name opens the picture of "
-       "its first seed; a click on a column's name sorts by it.")
+       "is left without it and without the truth's own noise. Own limits: against the truth that leaves out what the "
+       "method cannot know. Memory is the most that arrays and objects hold above the scene. Bold rows are on the "
+       "front: nothing here is both faster and nearer. Bars are 95 % intervals of the RMSE. A click on a mark or on a "
+       "method's name opens the picture of its first seed; a click on a column's name sorts by it.")
 
 
 def write_page(result: Result, folder: Path, refresh: int | None = None) -> None:
@@ -84,10 +85,12 @@ def _scene(scene: SceneResult, number: int, view: int | None, record: Record) ->
     from markupsafe import Markup
 
     runs = sorted(named(scene, number), key=lambda one: one[1].seconds)
-    return {"name": scene.scene, "number": number, "size": f"{scene.width} x {scene.height}", "truth": scene.truth,
-            "plot": Markup(plot_of(scene, number)), "splits": splits_of(scene.splits), "said": list(said_of(scene)),
-            "failures": scene.failures, "rows": [_row(name, run) for name, run in runs], "view": view,
-            "provenance": list(provenance_of(record)), "made": [_made(run) for _, run in runs]}
+    cold = {name: f"{one:.3g} s" for name, one in scene.cold.items()}
+    return {"name": scene.scene, "number": number, "cold": cold, "size": f"{scene.width} x {scene.height}",
+            "truth": scene.truth, "plot": Markup(plot_of(scene, number)), "splits": splits_of(scene.splits),
+            "said": list(said_of(scene)), "failures": scene.failures, "view": view,
+            "rows": [_row(name, run) for name, run in runs], "provenance": list(provenance_of(record)),
+            "made": [_made(run) for _, run in runs]}
 
 
 def _made(run: Run) -> dict[str, Any]:
@@ -167,11 +170,12 @@ def _interval(run: Run) -> tuple[float, float]:
 
 
 def _row(name: str, run: Run) -> dict[str, Any]:
-    known, unoccluded = run.errors[TRUTH], run.errors.get("unoccluded")
+    known, work = run.errors[TRUTH], run.work
     interval = "" if known.low is None else f"{percent(known.low)} to {percent(known.high)}"
     cells = [(_ms(run.seconds), run.seconds), (percent(known.rmse), known.rmse), (interval, known.low),
              (percent(known.bias), known.bias), (percent(known.spread), known.spread),
-             (percent(unoccluded.rmse), unoccluded.rmse) if unoccluded else ("", None),
-             (times(run.in_equal_time), run.in_equal_time), (times(run.flip), run.flip), (times(run.ssim), run.ssim)]
+             (percent(run.own_limits), run.own_limits), (times(run.in_equal_time), run.in_equal_time),
+             (times(run.flip), run.flip), (times(run.ssim), run.ssim),
+             *zip(taken(work), (None, None, None) if work is None else work.model_dump().values(), strict=True)]
     return {"name": name, "method": run.method, "settings": run.label, "front": run.front,
             "cells": [(text, sort_key(value)) for text, value in cells]}

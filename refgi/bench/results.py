@@ -16,8 +16,10 @@ from refgi.compare.report import number
 from refgi.image import write_text
 
 FORMAT = "bench 1"
+LIMITED = ("unoccluded", "seen", "seen_unoccluded")  # truths of which nothing blocks light, whose senders are in view
 COLUMNS = ("scene", "method", "settings", "seconds", "fastest", "slowest", "rmse", "low", "high", "bias", "spread",
-           "noise", "rmse_unoccluded", "flip", "ssim", "against_truth_in_equal_time", "on_the_front", "refgi_format")
+           "noise", *(f"rmse_{name}" for name in LIMITED), "pairs", "rays", "peak_bytes", "flip", "ssim",
+           "against_truth_in_equal_time", "on_the_front", "refgi_format")
 
 
 class _Strict(pydantic.BaseModel):
@@ -35,6 +37,14 @@ class Figures(_Strict):
     noise: float | None
 
 
+class Work(_Strict):
+    """What a frame takes beside time (`refgi.bench.work`)."""
+
+    pairs: int  # of light, or other sender, and receiver that sums are given, before skips within a sum
+    rays: int  # traced
+    peak_bytes: int  # most memory of arrays and objects above that of the scene
+
+
 class Run(_Strict):
     """One method with one choice of settings on one scene."""
 
@@ -43,7 +53,8 @@ class Run(_Strict):
     settings: dict[str, Any]
     times: tuple[float, ...]  # s of whole frames with their buffers, a seed each
     stages: dict[str, float]  # s of the first of them, outermost stages
-    errors: dict[str, Figures]  # by reference: "truth", "unoccluded"
+    errors: dict[str, Figures]  # by reference: "truth" and those of `LIMITED` that share the method's limits
+    work: Work | None = None  # of the first seed
     flip: float | None = None  # of the first seed's picture
     ssim: float | None = None
     relmse: float | None = None
@@ -68,6 +79,11 @@ class Run(_Strict):
         """Plain RMSE against the truth over its mean; nan where not known."""
         value = self.errors["truth"].rmse
         return math.nan if value is None else value
+
+    @property
+    def own_limits(self) -> float | None:
+        """RMSE against the truth that shares most limits with the method; None where there is no such truth."""
+        return next((rmse_against(self, name) for name in reversed(LIMITED) if name in self.errors), None)
 
 
 class Alone(_Strict):
@@ -123,6 +139,7 @@ class SceneResult(_Strict):
     runs: tuple[Run, ...]
     line: tuple[Run, ...]  # the path tracer, stopped early
     failures: dict[str, str]  # what gave no picture, and why
+    cold: dict[str, float] = {}  # s to the first frame of a new process, by method, kernels in the cache
     splits: tuple[Split, ...] = ()
 
 
@@ -210,12 +227,18 @@ def rows_of(result: Result) -> Iterable[dict[str, Any]]:
     """
     for scene in result.scenes:
         for run in (*scene.runs, *scene.line):
-            unoccluded = run.errors.get("unoccluded")
             yield {"scene": scene.scene, "method": run.method, "settings": run.label, "seconds": run.seconds,
                    "fastest": min(run.times), "slowest": max(run.times), **run.errors["truth"].model_dump(),
-                   "rmse_unoccluded": None if unoccluded is None else unoccluded.rmse, "flip": run.flip,
-                   "ssim": run.ssim, "against_truth_in_equal_time": run.in_equal_time, "on_the_front": run.front,
+                   **{f"rmse_{name}": rmse_against(run, name) for name in LIMITED},
+                   **({} if run.work is None else run.work.model_dump()), "flip": run.flip, "ssim": run.ssim,
+                   "against_truth_in_equal_time": run.in_equal_time, "on_the_front": run.front,
                    "refgi_format": result.refgi}
+
+
+def rmse_against(run: Run, reference: str) -> float | None:
+    """Return the RMSE of a run against one of its references; None where it has no such reference."""
+    known = run.errors.get(reference)
+    return None if known is None else known.rmse
 
 
 def write_results(result: Result, folder: Path) -> None:
@@ -258,13 +281,17 @@ def markdown(result: Result) -> str:
     lines = [f"<!-- refgi {result.refgi} -->", ""]
     for scene in result.scenes:
         lines += [f"## {scene.scene}, {scene.width} x {scene.height}", "", scene.truth, "",
-                  "| method | settings | ms | RMSE % | bias % | spread % | over truth in equal time | front |",
-                  "|---|---|--:|--:|--:|--:|--:|---|"]
+                  "| method | settings | ms | RMSE % | bias % | spread % | own limits % | over truth in equal time | "
+                  "pairs, M | rays, M | MiB | front |", "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|"]
         for run in sorted((*scene.runs, *scene.line), key=lambda one: one.seconds):
             error = run.errors["truth"]
             lines.append(f"| {run.method} | {run.label} | {number(1e3 * run.seconds)} | {percent(error.rmse)} | "
-                         f"{percent(error.bias)} | {percent(error.spread)} | {times(run.in_equal_time)} | "
+                         f"{percent(error.bias)} | {percent(error.spread)} | {percent(run.own_limits)} | "
+                         f"{times(run.in_equal_time)} | {' | '.join(taken(run.work))} | "
                          f"{'yes' if run.front else ''} |")
+        if scene.cold:
+            told = (f"{name} {number(seconds)} s" for name, seconds in scene.cold.items())
+            lines += ["", f"First frame of a new process, kernels in the cache: {', '.join(told)}."]
         lines += tables_of(scene.splits)
         lines += ["", *(f"{name} gave no picture: {why}" for name, why in scene.failures.items()), ""]
     return "\n".join(lines).rstrip() + "\n"
@@ -278,3 +305,10 @@ def percent(value: float | None) -> str:
 def times(value: float | None) -> str:
     """Return a ratio; nothing where it is not known."""
     return "" if value is None else f"{value:.3g}"
+
+
+def taken(work: Work | None) -> tuple[str, str, str]:
+    """Return millions of pairs and of rays, and MiB; nothing where they were not counted."""
+    if work is None:
+        return "", "", ""
+    return number(work.pairs / 1e6), number(work.rays / 1e6), number(work.peak_bytes / 2**20)

@@ -58,7 +58,8 @@ def _bench(
     names = None if methods is None else [name.strip() for name in methods.split(",")]
     grid = chosen(read_grid(Path(grid_file)) if grid_file else built_in(quick), names)
     truth = settings_for(TRUTH, pairs)
-    loaded = [View(scene, size, None, None, None, None, ()).load() for scene in scenes or ("cornell_box",)]
+    sources = scenes or ("cornell_box",)
+    loaded = [View(source, size, None, None, None, None, ()).load() for source in sources]
     kept = (str(file.relative_to(out)) for file in Path(out, FOLDER).rglob("*.exr"))
     path = folder(out, Permission(parents, force), (*FILES, *kept))
     path.mkdir(parents=True, exist_ok=True)
@@ -69,7 +70,8 @@ def _bench(
             def told(what: str, done: float, number: int = number, name: str = scene.name) -> None:
                 tell(f"{name} ({number + 1} of {len(loaded)}): {what}", done)
 
-            one = bench_scene(scene, grid, rounds=rounds, truth=truth, tell=told, place=place, shadows="exact")
+            one = bench_scene(scene, grid, rounds=rounds, truth=truth, tell=told, place=place,
+                              source=sources[number], shadows="exact")
             if split:
                 options = dict(zip(("width", "height"), split_size or (), strict=False))
                 one = with_splits(one, scene, grid, seeds=rounds, truth=truth, tell=told, shadows="exact", **options)

@@ -20,7 +20,7 @@ from refgi.pairs.sphere_sum import sum_spheres
 from refgi.pairs.tile_counts import lobe_tiles, tiles_behind
 from refgi.pairs.tiles import block_by_block, clear, put, receiving, taken
 from refgi.skips import left_out
-from refgi.stages import report_progress, skip, stage
+from refgi.stages import report_progress, skip, stage, tally
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
@@ -86,6 +86,7 @@ def add_lights(position: Array, normal: Array, packed: Packed, irradiance: Array
 
     `irradiance` (3, n), W/m^2, holds zeros before.
     """
+    tally("pairs", lambda: position.shape[1] * packed.terms)
     if packed.diffuse.shape[1] > 1 and packed.spheres is not None:
         sum_spheres(position, normal, packed.diffuse, packed.spheres, None, irradiance)
     elif packed.diffuse.shape[1] > 1:

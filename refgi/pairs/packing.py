@@ -43,6 +43,11 @@ class Packed(NamedTuple):
     shines: Array  # (N,) bool: which lights are among the M
     glossy: Array  # (N,) bool: which are among the K
 
+    @property
+    def terms(self) -> int:
+        """What a receiver sums: diffuse lights and lobes."""
+        return int(np.count_nonzero(self.shines) + np.count_nonzero(self.glossy))
+
 
 def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None, dtype: npt.DTypeLike) -> Packed:
     """Pack the lights that have flux, each part for its kernel; `footprint` (N,) is the area each stands for, m^2."""

@@ -24,7 +24,7 @@ from refgi.pairs.pair_sum import pair_cosines
 from refgi.rays import STEPS, Tracer, far_offset, ray_offset
 from refgi.scene import Geometry
 from refgi.skips import left_out
-from refgi.stages import report_progress, stage
+from refgi.stages import report_progress, stage, tally
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
@@ -129,6 +129,7 @@ def _add_lights(tracer: Tracer, to: RayReceivers, receivers: tuple[int, int], se
                 lights: tuple[int, int], visibility: bool, total: Array) -> None:
     count = lights[1] - lights[0]
     pairs = (receivers[1] - receivers[0]) * count
+    tally("pairs", lambda: pairs)
     origin, direction, contribution = (np.empty((pairs, 3), np.float32) for _ in range(3))
     reach, occluded = np.empty(pairs, np.float32), np.empty(pairs, np.bool_)
     fill_shadow_rays(to, receivers, senders, lights, tracer.grain, (origin, direction, reach, contribution))

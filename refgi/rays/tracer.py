@@ -12,6 +12,7 @@ from refgi.rays.embree import MISS, Backend, open_backend
 from refgi.rays.offsets import GRAIN, STEPS, grain_of
 from refgi.rays.watertight import Corners, Pieces, closest_around, corners, cut
 from refgi.scene import DirectionalLight, Geometry, Light
+from refgi.stages import tally
 
 Array = npt.NDArray[Any]
 
@@ -199,6 +200,7 @@ class Tracer:
         distance : (n,) float32 ndarray
             Filled with distances, inf for a miss.
         """
+        tally("rays", lambda: np.count_nonzero(reach > 0))
         if self._backend is None:
             triangle_id[:], distance[:] = MISS, np.inf
         else:
@@ -219,6 +221,7 @@ class Tracer:
         blocked : (n,) bool ndarray
             Filled with the answers.
         """
+        tally("rays", lambda: np.count_nonzero(reach > 0))
         if self._backend is None:
             np.less_equal(reach, 0, out=blocked)
         else:

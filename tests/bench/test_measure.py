@@ -61,6 +61,27 @@ def test_errors_are_those_of_the_method_run_by_hand_with_each_seed(box, bench):
             assert list(run.errors[name].model_dump().values()) == pytest.approx(list(expected))
 
 
+def test_a_method_of_the_screen_is_judged_by_what_the_camera_sees_as_well(box):
+    """Each reference is the truth with the method's own limits, traced by hand; with rays it knows what blocks."""
+    grid = Grid((choice("hssil", samples=8), choice("hssil", samples=8, visibility="rays")), ())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)
+        found = bench_scene(box, grid, rounds=1, truth=TruthSettings(samples=96), **SIZE)
+    frame = Frame(box, **SIZE)
+    limits = {"truth": {}, "unoccluded": {"visibility": False}, "seen": {"emitters": "visible"},
+              "seen_unoccluded": {"visibility": False, "emitters": "visible"}}
+    for one, run, names in zip(grid.choices, found.runs, (("truth", "unoccluded", "seen_unoccluded"),
+                                                          ("truth", "seen")), strict=True):
+        assert list(run.errors) == list(names)
+        for name in names:
+            truth = trace_truth(frame, TruthSettings(samples=96, seed=REFERENCE_SEED, **limits[name]))
+            expected = error_of([picture_of(frame, one, 0)], truth.mean, truth.variance_of_mean, frame.gbuffer.covered)
+            assert run.errors[name].rmse == pytest.approx(expected.rmse), name
+    blind, knowing = found.runs
+    assert blind.own_limits == blind.errors["seen_unoccluded"].rmse < blind.rmse
+    assert knowing.own_limits == knowing.errors["seen"].rmse < knowing.rmse
+
+
 def test_the_path_tracer_comes_nearer_and_has_no_bias(bench):
     two, four = bench.line
     assert (two.changes, four.changes) == (("samples=48",), ("samples=96",))
@@ -100,6 +121,11 @@ def test_times_stages_and_places(bench):
         assert 0 < sum(run.stages.values()) <= run.times[0]
     assert "rsm.gbuffer" in bench.runs[0].stages
     assert any(run.front for run in bench.runs)
+    assert [run.work.pairs % bench.covered for run in bench.runs[:3]] == [0, 0, 0]
+    assert 7 < bench.runs[1].work.pairs / bench.runs[0].work.pairs < 9
+    assert bench.runs[2].work.rays > 0 == bench.runs[0].work.rays
+    assert bench.line[1].work.rays > 1.5 * bench.line[0].work.rays > 0
+    assert bench.cold == {}
     assert bench.failures == {}
     assert (bench.width, bench.height, bench.covered) == (40, 36, int(Frame(load_scene(
         "cornell_box"), **SIZE).gbuffer.covered.sum()))

@@ -42,7 +42,7 @@ from refgi.errors import expect
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.pairs.tiles import clear, receiving
 from refgi.skips import left_out
-from refgi.stages import report_progress, stage
+from refgi.stages import report_progress, stage, tally
 
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
@@ -115,6 +115,7 @@ def clustered_irradiance(
     reads_facing = not by_tiles or _reads_facing(areas, settings) or not left_out("cluster.facing", lambda: (
         len(parts.places), len(parts.places)))
     tiles = _tiles(receivers, facing if reads_facing else None, parts)
+    tally("pairs", lambda: _pairs(parts, members))
     sums = np.zeros_like(tiles.position)
     if members.packed.spheres is None and members.packed.lobes is None:
         _cull(tiles, members)
@@ -126,6 +127,12 @@ def clustered_irradiance(
     scatter_pixels(sums, parts, sums.dtype.type(interleaving**2), result.reshape(3, -1))
     clear(result, covered, shown)
     return result
+
+
+def _pairs(parts: Subsets, members: MemberLights) -> int:
+    """Return how many pairs of receiver and light of its subset there are."""
+    lights = (np.diff(members.start) + np.diff(members.lobe_start)).sum(axis=0)
+    return int((np.diff(parts.start) * lights).sum())
 
 
 def _tiles(receivers: Receivers, facing: Array | None, parts: Subsets) -> ReceiverTiles:

@@ -20,7 +20,7 @@ from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 from refgi.splat.gather.gather_sum import GatherMap, centers, disc_loss, disc_pattern, gather_discs
 from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, interpolate
-from refgi.stages import skip, stage
+from refgi.stages import skip, stage, tally
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -175,6 +175,7 @@ def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSet
 def _gather_one(points: Array, normals: Array, rsm: "Rsm", disc: DiscSettings, total: Array) -> None:
     if rsm.lobe_flux is not None:
         skip("gather.lobes", "gathering takes the diffuse part alone")
+    tally("pairs", lambda: points.shape[1] * disc.samples)
     dtype = points.dtype
     height, width = rsm.projection.height, rsm.projection.width  # of one map
     pattern = disc_pattern(disc.samples, disc.seed, "rsm_weight_squared" in disc.as_published)

@@ -18,14 +18,15 @@ from refgi.lights.settings import with_clamp
 from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.loss import warn_of_clamp
-from refgi.pairs.ranged_sum import sum_pairs_in_range, sum_weighted_pairs
+from refgi.pairs.pair_sum import TILE
+from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.splat.sii.half_resolution import half_resolution
-from refgi.splat.sii.reach.lists import LightLists, Some
+from refgi.splat.sii.reach.lists import LightLists, Some, listed_pairs
 from refgi.splat.sii.reach.reference_length import with_reference_length
 from refgi.splat.sii.reach.threshold import warn_of_cut
 from refgi.splat.sii.settings import SiiSettings
-from refgi.stages import skip, stage
+from refgi.stages import skip, stage, tally
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -169,20 +170,27 @@ def _sum_in_range(
 
     def add(here: Array, facing: Array, places: Array, sums: Array) -> None:
         if lists.diffuse is not None and packed.spheres is not None:
+            tally("pairs", lambda: here.shape[1] * np.count_nonzero(packed.shines))
             sum_spheres(here, facing, packed.diffuse, packed.spheres, lists.diffuse, sums)
         elif lists.diffuse is not None:
             run = sum_weighted_pairs if weighted else sum_pairs_in_range
             for some, listed in lists.of_diffuse(here, facing, places):
                 points, normals, found = _chosen(some, here, facing)
+                _tally(listed, LANES, found)
                 run(points, normals, packed.diffuse, packed.clamp, lists.diffuse, listed, found)
                 sums[:, some] += found
         if packed.lobes is not None:
             for some, listed in lists.of_lobes(here, facing, places):
                 points, normals, found = _chosen(some, here, facing)
+                _tally(listed, TILE, found)
                 add_lobes(points, normals, *packed.lobes, lists.lobes, listed, found)
                 sums[:, some] += found
 
     return over_receivers(receivers, packed, add)
+
+
+def _tally(listed: Array, lanes: int, found: Array) -> None:
+    tally("pairs", lambda: listed_pairs(listed, lanes, found.shape[1]))
 
 
 def _chosen(some: Some, here: Array, facing: Array) -> tuple[Array, Array, Array]:

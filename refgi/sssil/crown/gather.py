@@ -22,7 +22,7 @@ from refgi.sssil.crown.points import level_key, pixel_key, row_key, sample_point
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
-from refgi.stages import stage
+from refgi.stages import stage, tally
 
 Array = npt.NDArray[Any]
 
@@ -65,12 +65,14 @@ def gather(
         inner, crown = sampling.counts(index)
         points, weight = sample_points(inner, crown), sample_weight(radius, inner, crown)
         key = level_key(sampling.seed, level.number)
+        tally("pairs", lambda: rows * columns * (inner + crown))
         emitters = pack(senders, 1, farthest, WIDE)
         _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, sampling.density == "uniform",
                           key, weight.astype(real), form, factor, result)
         return result
     shared = shared_offsets(sampling, index, level.number, rows, radius, columns) if samples is None else samples
     offsets, weight = _reaching(*shared, rows, columns)
+    tally("pairs", lambda: rows * columns * offsets.shape[2])
     emitters = pack(senders, offsets.shape[1], farthest, WIDE)
     paired, trims = sampling.pattern in ("fixed", "all"), left_out("sssil.senders", lambda: dark_ends(emitters))
     _gather_shared(emitters, level.position, level.normal, offsets, weight.astype(real), paired, trims, form, factor,

@@ -35,7 +35,7 @@ from refgi.sssil.visibility.elevation import (
     visibility,
 )
 from refgi.sssil.visibility.slices import SliceCounts, fill_slices, slice_counts, slice_offsets
-from refgi.stages import stage
+from refgi.stages import stage, tally
 
 Array = npt.NDArray[Any]
 
@@ -83,6 +83,7 @@ def bitmask_gather(
     thickness, form = real(bitmask.thickness * diagonal * scale), form_of(settings.senders.form_factor)
     factor = real(level_factor(index, settings))
     result = np.empty_like(level.radiance)
+    tally("pairs", lambda: rows * columns * steps.slices * (steps.disc + steps.crown))
     if sampling.pattern == "pixel":
         key = level_key(sampling.seed, level.number)
         _march_pixels(packed, sending, steps, key, thickness, form, factor, result)

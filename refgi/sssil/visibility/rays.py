@@ -22,7 +22,7 @@ from refgi.sssil.crown.points import level_key, pixel_key, pixel_offset, row_key
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings, SamplingSettings
-from refgi.stages import report_progress, stage
+from refgi.stages import report_progress, stage, tally
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -86,6 +86,7 @@ def ray_gather(
     sending = surfels if senders is level else _surfels(senders, frame)
     radiance = senders.radiance.reshape(3, -1)
     total, count = np.zeros(radiance.shape), samples.weight.shape[2]
+    tally("pairs", lambda: total.shape[1] * count)
     step = max(1, batch // max(count, 1))
     rays = [np.empty((step * count, 3), np.float32) for _ in range(2)]
     transfer, reach = np.empty(step * count), np.empty(step * count, np.float32)

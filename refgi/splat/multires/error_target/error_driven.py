@@ -26,7 +26,7 @@ from refgi.splat.multires.error_target.near import near_light
 from refgi.splat.multires.error_target.trial import ExactIrradiance, Trials
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.refinement.refine import refine
-from refgi.stages import skip, stage
+from refgi.stages import skip, stage, tally
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
@@ -191,6 +191,7 @@ def error_driven(
     sampled = exact.at(samples.pixel)
     typical, mean = _mean_without_brightest(sampled), estimate_mean(samples, sampled)
     near = near_light(receivers, packed, NEAR * typical)
+    tally("pairs", lambda: near.pairs)
     top = max(1, top_level(buffer.height, buffer.width, settings.coarsest))
     trials = Trials(exact, near, surface_levels(*receivers, top))
     found, threshold, count = _search(trials, samples, mean, typical, settings.target)

@@ -26,7 +26,7 @@ from refgi.splat.multires.light_lists.tree import CellTree, cell_tree, interior_
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
-from refgi.stages import report_progress, stage
+from refgi.stages import report_progress, stage, tally
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
@@ -169,6 +169,7 @@ def _each_light(
         lists = SubsplatLists(*(part[: count - begin] for part in batch))
         refine_for_lights(cells, lights_apart, packed.clamp, packed.spheres, lobe_clamp, widening, begin, threshold,
                           lists)
+        tally("pairs", lists.entries.sum)
         for b in range(len(lists.entries)):
             found = read_leaves(cells.first, cells.roots, lists.cell[b], lists.child[b], lists.irradiance[b], chosen,
                                 values)

@@ -5,7 +5,6 @@ On graphics hardware each fragment reads 72 bits of receiver (48 position, 24 no
 of light (16 + 48 + 24 + 24), Sec. 6.
 """
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES, reached
-from refgi.splat.sii.reach.lists import LightLists, Some
+from refgi.splat.sii.reach.lists import LightLists, listed_pairs
 from refgi.splat.sii.reach.reference_length import lobe_strength, with_reference_length
 from refgi.splat.sii.settings import SiiSettings
 
@@ -98,7 +97,7 @@ def fragments(
     packed = checked(receivers, lights, settings.pairs, footprint)
     overdraw, of_light, evaluated = np.zeros(receivers.covered.shape, np.int32), np.zeros(len(packed.shines), int), 0
     if settings.reach.cut is None:
-        count = int(packed.shines.sum()) + int(packed.glossy.sum())
+        count = packed.terms
         overdraw[receivers.covered] = count
         pixels = int(np.count_nonzero(receivers.covered))
         return Fragments(overdraw, pixels * (packed.shines.astype(int) + packed.glossy), pixels * count)
@@ -115,7 +114,8 @@ def fragments(
                 _count_diffuse(points, packed.diffuse, lists.diffuse, listed, counts, total)
                 overdraw.reshape(-1)[places[some]] += total
                 of_light[packed.shines] += counts.sum(axis=0, dtype=int)
-            evaluated += _pairs(lists.of_diffuse(here, facing, places), LANES, places)
+            evaluated += sum(listed_pairs(listed, LANES, len(places[some]))
+                             for some, listed in lists.of_diffuse(here, facing, places))
         if packed.lobes is not None and lists.lobes is not None:
             for some, listed in lists.of_lobes(here, anywhere, places):
                 finer = np.repeat(listed, TILE // LANES, axis=0)[: -(-len(places[some]) // LANES)]
@@ -124,19 +124,11 @@ def fragments(
                 _count_lobes(points, packed.lobes.lights, packed.lobes.widening, lists.lobes, finer, counts, total)
                 overdraw.reshape(-1)[places[some]] += total
                 of_light[packed.glossy] += counts.sum(axis=0, dtype=int)
-            evaluated += _pairs(lists.of_lobes(here, facing, places), TILE, places)
+            evaluated += sum(listed_pairs(listed, TILE, len(places[some]))
+                             for some, listed in lists.of_lobes(here, facing, places))
 
     over_receivers(receivers, packed, add)
     return Fragments(overdraw, of_light, evaluated)
-
-
-def _pairs(lists: Iterable[tuple[Some, Array]], lanes: int, places: Array) -> int:
-    """Return how many pairs of listed light and receiver there are, in tiles of `lanes`."""
-    total = 0
-    for some, listed in lists:
-        sizes = np.minimum(lanes, len(places[some]) - lanes * np.arange(len(listed)))
-        total += int((np.count_nonzero(listed, axis=1) * sizes).sum())
-    return total
 
 
 @kernel(parallel=True)

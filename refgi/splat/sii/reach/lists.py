@@ -132,6 +132,12 @@ class LightLists:
         return covered_pixels(self._projection, solids, k, self._bound.faces, self._bound.inflate)
 
 
+def listed_pairs(listed: Array, lanes: int, receivers: int) -> int:
+    """Return how many pairs of listed light and receiver there are, in tiles of `lanes` receivers."""
+    sizes = np.minimum(lanes, receivers - lanes * np.arange(len(listed)))
+    return int((np.count_nonzero(listed, axis=1) * sizes).sum())
+
+
 def _tiles(places: Array) -> int:
     return -(-len(places) // LANES)
 

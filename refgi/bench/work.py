@@ -1,0 +1,128 @@
+"""What a picture takes beside time: pairs, rays and memory; and how long the first one of a new process takes."""
+
+import contextlib
+import json
+import subprocess
+import sys
+import time
+import tracemalloc
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+from refgi import stages
+from refgi.bench.grid import Choice
+from refgi.bench.results import Work
+from refgi.errors import RefgiError, RefgiWarning
+from refgi.frame import Frame
+from refgi.methods import METHODS
+from refgi.scene import Scene
+
+Tell = Callable[[str, float], None]
+
+FIRST_FRAME = """
+import json, sys, warnings
+warnings.simplefilter("ignore")
+from refgi.methods import render
+render(sys.argv[1], sys.argv[2], **json.loads(sys.argv[3]))
+"""
+LONGEST = 600.0  # s that a new process may take
+
+
+def works_of(scene: Scene, choices: Sequence[Choice], options: Mapping[str, Any], tell: Tell) -> dict[int, Work]:
+    """Count what each of some choices takes, by its number; those that give no picture are left out."""
+    found = {}
+    for number, choice in enumerate(choices):
+        tell(f"counting {choice.method}: {choice.label}", number / len(choices))
+        with quietly():
+            found[number] = work_of(scene, choice, options)
+    return found
+
+
+def first_frames(source: str, methods: Sequence[str], options: Mapping[str, Any], tell: Tell) -> dict[str, float]:
+    """Return `cold_seconds` of each of some methods by name; those that give no picture are left out."""
+    found = {}
+    for number, name in enumerate(methods):
+        tell(f"new process: {name}", number / len(methods))
+        with quietly():
+            found[name] = cold_seconds(source, name, options)
+    return found
+
+
+@contextlib.contextmanager
+def quietly() -> Iterator[None]:
+    """Leave warnings and errors to the real run, which says them."""
+    with warnings.catch_warnings(), contextlib.suppress(RefgiError):
+        warnings.simplefilter("ignore", RefgiWarning)
+        yield
+
+
+def work_of(scene: Scene, choice: Choice, options: Mapping[str, Any]) -> Work:
+    """Count what one frame takes, its buffers included.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; what it holds itself counts as nothing.
+    choice : Choice
+        The method and its settings.
+    options : mapping
+        Of `Frame`.
+
+    Returns
+    -------
+    Work
+        Memory is that of arrays and objects of Python; trees of Embree and what kernels hold inside are not seen.
+
+    Raises
+    ------
+    RefgiError
+        As the method.
+    """
+    running = tracemalloc.is_tracing()
+    if not running:
+        tracemalloc.start()
+    try:
+        tracemalloc.reset_peak()
+        before, _ = tracemalloc.get_traced_memory()
+        with stages.observe(counting=True) as log:
+            METHODS[choice.method].function(Frame(scene, **options), choice.settings)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        if not running:
+            tracemalloc.stop()
+    counts = log.counts or Counter()
+    return Work(pairs=counts["pairs"], rays=counts["rays"], peak_bytes=max(0, peak - before))
+
+
+def cold_seconds(source: str, method: str, options: Mapping[str, Any]) -> float:
+    """Return how long a new process takes to its first frame, s: Python, kernels from the cache, the scene, the frame.
+
+    Parameters
+    ----------
+    source : str
+        What the scene is loaded from: a name or a path.
+    method : str
+        Short name; its default settings are used.
+    options : mapping
+        Of `Frame`.
+
+    Returns
+    -------
+    float
+        Wall time.
+
+    Raises
+    ------
+    RefgiError
+        If the process gives no frame.
+    """
+    command = [sys.executable, "-c", FIRST_FRAME, source, method, json.dumps(dict(options))]
+    started = time.perf_counter()
+    try:
+        subprocess.run(command, check=True, capture_output=True, text=True, timeout=LONGEST)
+    except (subprocess.SubprocessError, OSError) as error:
+        last = (getattr(error, "stderr", None) or str(error)).strip().splitlines()[-1:]
+        raise RefgiError(f"{method}: a new process gave no frame of {source}: {''.join(last)}") from error
+    return time.perf_counter() - started

@@ -37,6 +37,11 @@ def paraboloid_ray(origin, frame, half, height, width, row, column):
     return np.asarray(origin, float), local @ frame
 
 
+def _dot(a, b):
+    """Dot products of rows, whose rounding does not depend on how many there are, as that of matrix products does."""
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+
+
 def nearest(origin, direction, vertices, faces):
     """Moller-Trumbore over all triangles.
 
@@ -46,13 +51,13 @@ def nearest(origin, direction, vertices, faces):
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     e1, e2 = b - a, c - a
     p = np.cross(direction, e2)
-    det = np.einsum("ij,ij->i", e1, p)
+    det = _dot(e1, p)
     with np.errstate(divide="ignore", invalid="ignore"):
         s = origin - a
-        u = np.einsum("ij,ij->i", s, p) / det
+        u = _dot(s, p) / det
         q = np.cross(s, e1)
-        v = q @ direction / det
-        t = np.einsum("ij,ij->i", e2, q) / det
+        v = _dot(q, np.asarray(direction)[None]) / det
+        t = _dot(e2, q) / det
         smallest = np.minimum(np.minimum(u, v), 1 - u - v)
     hit = (det != 0) & (smallest >= 0) & (t > 0)
     ts = np.where(hit, t, np.inf)

@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 # a file's tests run in one process, so that few kernels are compiled twice
-PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --durations 25 --durations-min 5
 
 .PHONY: demo test quick test-all check evidence bench mutate kit-score docs clean
 

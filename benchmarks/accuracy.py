@@ -7,6 +7,7 @@ missing.
 
 import argparse
 import math
+import re
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -21,7 +22,7 @@ from refgi.bench.split import with_splits
 from refgi.bench.split_plot import bars
 from refgi.cli.session import progress
 from refgi.compare.provenance import environment
-from refgi.compare.report import number
+from refgi.compare.report import PAGE, number
 from refgi.errors import RefgiWarning
 from refgi.image import write_text
 from refgi.scene import load_scene
@@ -30,9 +31,10 @@ from refgi.truth import TruthSettings
 DATA = Path(__file__).parents[1].parent / "shared" / "data"
 SCENES = ("cornell_box", "atrium", "cornell_horse.json", "sponza.json", "kitchen.json", "dragon_bunny.json")
 SIZE = {"width": 128, "height": 96, "shadows": "exact"}
-SPLIT_SIZE = {"width": 64, "height": 48, "shadows": "exact"}  # `val` with a ray to each light is slow
-TRUTH = TruthSettings(samples=2**31, seconds=25.0, target_error=0.005)
-SPLIT_TRUTH = TruthSettings(samples=2**31, seconds=10.0, target_error=0.005)
+ON_SCREEN = ("hssil", "gather")  # their errors depend on how many pixels there are
+SMALL = {"width": 48, "height": 36, "shadows": "exact"}  # of what is split otherwise: a ray to each light is slow
+TRUTH = TruthSettings(samples=2**31, seconds=20.0, target_error=0.007)
+SPLIT_TRUTH = TruthSettings(samples=2**31, seconds=6.0, target_error=0.01)
 ROUNDS, SPLIT_SEEDS = 3, 2
 LEVELS = (0.3, 0.1, 0.03, 0.01)
 
@@ -61,13 +63,22 @@ def cheapest(runs: Sequence[Run], level: float) -> str:
     return f"{name}, {best.label}: {number(1e3 * best.seconds)} ms"
 
 
+def extrapolated(line: Sequence[Run], level: float) -> str:
+    """Return when the path tracer comes to an error that its last stop has not, by the root of time."""
+    last = max(line, key=lambda run: run.seconds, default=None)
+    if last is None or not math.isfinite(error_of(last)):
+        return "-"
+    return f"path tracer, some {number(last.seconds * (error_of(last) / level) ** 2)} s"
+
+
 def cheapest_table(scenes: Sequence[SceneResult]) -> str:
     """Return what is cheapest at each error, among all and among the methods, as Markdown."""
     lines = ["| scene | error at most | cheapest of all | cheapest method |", "|---|--:|---|---|"]
     for scene in scenes:
         for level in LEVELS:
-            lines.append(f"| {scene.scene} | {100 * level:g} % | {cheapest((*scene.runs, *scene.line), level)} | "
-                         f"{cheapest(scene.runs, level)} |")
+            best = cheapest((*scene.runs, *scene.line), level)
+            best = extrapolated(scene.line, level) if best == "-" else best
+            lines.append(f"| {scene.scene} | {100 * level:g} % | {best} | {cheapest(scene.runs, level)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -84,6 +95,15 @@ def nearest_table(scenes: Sequence[SceneResult]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def standalone(svg: str) -> str:
+    """Return a plot of a page as a file of its own, in the page's light colours."""
+    colours = dict(reversed(re.findall(r"--(\w+): (#\w{6})", (PAGE / "style.css").read_text("utf-8"))))
+    drawn = re.sub(r"var\(--(\w+)\)", lambda found: colours[found[1]], svg)
+    names = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    look = f"background: {colours['card']}; color: {colours['ink']}; font-family: sans-serif"
+    return drawn.replace("<svg ", f'<svg {names} style="{look}" ', 1)
+
+
 def write(result: Result, folder: Path) -> None:
     """Write tables and plots of what was measured so far."""
     (folder / "plots").mkdir(parents=True, exist_ok=True)
@@ -91,17 +111,23 @@ def write(result: Result, folder: Path) -> None:
     write_text(folder / "cheapest.md", cheapest_table(result.scenes))
     write_text(folder / "nearest.md", nearest_table(result.scenes))
     for scene in result.scenes:
-        write_text(folder / "plots" / f"{scene.scene}.svg", plot_of(scene))
+        write_text(folder / "plots" / f"{scene.scene}.svg", standalone(plot_of(scene)))
         if scene.splits:
-            write_text(folder / "plots" / f"{scene.scene}_split.svg", bars(scene.splits))
-    write_text(folder / "plots" / "all.svg", str(overview([Place(one, "") for one in result.scenes])["plot"]))
+            write_text(folder / "plots" / f"{scene.scene}_split.svg", standalone(bars(scene.splits)))
+    every = overview([Place(one, "") for one in result.scenes])["plot"]
+    write_text(folder / "plots" / "all.svg", standalone(str(every)))
 
 
 def measured(source: str, grid: Grid, tell: Tell) -> SceneResult:
-    """Run the grid on one scene, then split the errors of each method's default and knee."""
+    """Run the grid on one scene, then split the error of each curve's knee."""
     scene = load_scene(source)
     found = bench_scene(scene, grid, rounds=ROUNDS, truth=TRUTH, tell=tell, source=source, **SIZE)
-    return with_splits(found, scene, grid, seeds=SPLIT_SEEDS, truth=SPLIT_TRUTH, tell=tell, **SPLIT_SIZE)
+    methods = dict.fromkeys(run.method for run in found.runs)
+    for names, size in ((ON_SCREEN, SIZE), ([name for name in methods if name not in ON_SCREEN], SMALL)):
+        part = found.model_copy(update={"runs": tuple(run for run in found.runs if run.method in names), "splits": ()})
+        split = with_splits(part, scene, grid, seeds=SPLIT_SEEDS, truth=SPLIT_TRUTH, tell=tell, defaults=False, **size)
+        found = found.model_copy(update={"splits": (*found.splits, *split.splits), "failures": split.failures})
+    return found
 
 
 def main(arguments: list[str]) -> int:

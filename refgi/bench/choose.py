@@ -11,7 +11,7 @@ import numpy as np
 
 from refgi.bench.error import error_of
 from refgi.bench.grid import TRUTH, Choice
-from refgi.bench.measure import REFERENCE_SEED, load_kernels, stopped, timed, traced, with_seed
+from refgi.bench.measure import REFERENCE_SEED, load_kernels, small_frame, stopped, timed, traced, with_seed
 from refgi.bench.search import Found, for_error, for_time
 from refgi.bench.tracks import Track
 from refgi.errors import RefgiError, RefgiWarning, expect
@@ -92,9 +92,10 @@ def choose(
     truth = dataclasses.replace(truth or wish.truth, seed=REFERENCE_SEED)
     tracks = [_of_truth(track, truth) if track.method == TRUTH else track for track in tracks]
     full = Pictures(scene, truth, rounds, tell, frame_options)
+    smallest = small_frame(scene, frame_options)
     for number, track in enumerate(tracks):
         tell(f"loading {track.method}", number / len(tracks))
-        load_kernels(scene, track.rungs[0], frame_options)
+        load_kernels(smallest, track.rungs[0])
     small = Pictures(scene, truth, SMALL_ROUNDS, tell, {**frame_options, **_small_size(full.frame)})
     if wish.error is not None:
         found = for_error(tracks, wish.error, small, full)

@@ -180,9 +180,10 @@ def _in_turn(
     """Run all choices once a round; return what they made by number, and why the others made nothing."""
     made: dict[int, Made] = {}
     failures: dict[str, str] = {}
+    small = small_frame(scene, options)
     for number, choice in enumerate(choices):
         tell(f"warming up {choice.method}: {choice.label}", number / len(choices))
-        load_kernels(scene, choice, options)
+        load_kernels(small, choice)
     seeded = [choice._replace(settings=with_seed(choice.settings, 0)) for choice in choices]
     works = works_of(scene, seeded, options, tell)
     for turn in range(rounds):
@@ -234,11 +235,15 @@ def timed(frame: Frame, method: str, settings: Settings, memory: stages.Memory |
     return Timed(picture, seconds, log)
 
 
-def load_kernels(scene: Scene, choice: Choice, options: Mapping[str, Any]) -> None:
-    """Run a choice on a small picture: no time that is measured later has compiling in it."""
+def small_frame(scene: Scene, options: Mapping[str, Any]) -> Frame:
+    """Return a frame to load kernels by."""
+    return Frame(scene, **{**options, "width": WARM_UP_SIZE, "height": WARM_UP_SIZE})
+
+
+def load_kernels(frame: Frame, choice: Choice) -> None:
+    """Run a choice on a small frame: no time that is measured later has compiling in it."""
     with quietly():
-        METHODS[choice.method].function(Frame(scene, **{**options, "width": WARM_UP_SIZE, "height": WARM_UP_SIZE}),
-                                        choice.settings)
+        METHODS[choice.method].function(frame, choice.settings)
 
 
 def with_seed(settings: Settings, seed: int) -> Settings:

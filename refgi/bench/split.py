@@ -38,7 +38,7 @@ SIDE = 128  # pixels along the longer side of the view that is split: pictures o
 
 def with_splits(
     result: SceneResult, scene: Scene, grid: Grid, *, seeds: int, truth: TruthSettings | None = None,
-    tell: Tell = lambda *_: None, **frame_options: Any,
+    tell: Tell = lambda *_: None, defaults: bool = True, **frame_options: Any,
 ) -> SceneResult:
     """Split the error of each method at its defaults and at the knee of its curve.
 
@@ -56,6 +56,8 @@ def with_splits(
         How truths are traced.
     tell : callable
         Called with (what runs, share done).
+    defaults : bool
+        Whether defaults are split as well, not the knees alone.
     **frame_options : object
         Passed to `Frame`; where width and height are absent, the longer side has `SIDE` pixels at most.
 
@@ -67,7 +69,7 @@ def with_splits(
     splits, failures = [], dict(result.failures)
     size = small_size(result.width, result.height)
     renderer = Renderer(scene, truth, tell, **{**dict(zip(("width", "height"), size, strict=True)), **frame_options})
-    for choice, at_knee in chosen_for_split(result.runs, grid):
+    for choice, at_knee in chosen_for_split(result.runs, grid, defaults=defaults):
         name = f"split of {choice.method}: {choice.label}"
 
         def told(what: str, done: float, name: str = name) -> None:
@@ -94,7 +96,7 @@ def small_size(width: int, height: int) -> tuple[int, int]:
     return max(1, round(share * width)), max(1, round(share * height))
 
 
-def chosen_for_split(runs: Sequence[Run], grid: Grid) -> list[tuple[Choice, bool]]:
+def chosen_for_split(runs: Sequence[Run], grid: Grid, *, defaults: bool = True) -> list[tuple[Choice, bool]]:
     """Return what is split: each method's default, and the choice at the knee of its curve where that is another.
 
     Parameters
@@ -103,6 +105,8 @@ def chosen_for_split(runs: Sequence[Run], grid: Grid) -> list[tuple[Choice, bool
         Of a scene.
     grid : Grid
         Their choices.
+    defaults : bool
+        Whether defaults are among them where they are no knees.
 
     Returns
     -------
@@ -116,7 +120,8 @@ def chosen_for_split(runs: Sequence[Run], grid: Grid) -> list[tuple[Choice, bool
         found = [one for one in grid.choices if at is not None and (one.method, one.changes) == (
             method, curve[at].changes)]
         default = METHODS[method].settings()
-        chosen += [(Choice(method, (), default), False)] if not found or found[0].settings != default else []
+        is_other = not found or found[0].settings != default
+        chosen += [(Choice(method, (), default), False)] if defaults and is_other else []
         chosen += [(one, True) for one in found[:1]]
     return chosen
 

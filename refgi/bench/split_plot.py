@@ -11,9 +11,10 @@ from refgi.bench.results import Part, Split
 from refgi.bench.split_text import COLUMNS, rows_of_split, said_of_split
 from refgi.compare.plot import CARD, INK, LINE, METHOD_COLOURS, figure_svg, style_plot
 
-HATCHES = ("", "////", "....")  # of approximations that share a colour
+HATCHES = ("", "////", "\\\\\\\\")  # of approximations that share a colour; dots would be a quarter of a MB each
 LEAST = 1e-4  # a part of less than that shows in no bar
-WIDTH, HEIGHT, ROW = 9.2, 1.5, 0.36  # inches: of the plot, of what stands around the bars, and of a bar
+WIDTH, HEIGHT, ROW = 9.2, 1.5, 0.45  # inches: of the plot, of what stands around the bars, and of a bar
+LEGEND_ROW = 0.18  # inches, of a name
 HOW = ("From the truth to the method as it is used, one approximation more at a time, in the order of its pipeline. "
        "Left: what each changes of the mean. Right: its share of the mean square error, its own square and half of its "
        "cross terms with others. Both add up to the mark; what lies on the other side takes back what others did. "
@@ -60,14 +61,14 @@ def bars(splits: Sequence[Split]) -> str:
         left, right = figure.subplots(1, 2, sharey=True)
         _panel(left, [[part.mean for part in split.parts] for split in splits], splits, names)
         _panel(right, [[part.share for part in split.parts] for split in splits], splits, names)
-        left.set(xlabel="change of the mean, % of the truth's", yticks=range(len(splits)),
-                 yticklabels=[split.label for split in splits])
-        right.set(xlabel="share of the mean square error, %")
+        left.set(xlabel="change of the mean, %", yticks=range(len(splits)),
+                 yticklabels=[split.label.replace(", ", "\n") for split in splits])
+        right.set(xlabel="share of the square, %")
         left.invert_yaxis()
         handles, labels = _legend(names)
         figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=9)
 
-    return figure_svg(draw, (WIDTH, HEIGHT + max(len(splits), len(names) / 2) * ROW), "Error split")
+    return figure_svg(draw, (WIDTH, HEIGHT + max(len(splits) * ROW, len(names) * LEGEND_ROW)), "Error split")
 
 
 def stacked(values: Sequence[float]) -> list[tuple[float, float]]:
@@ -103,7 +104,7 @@ def _panel(
     plot.use_sticky_edges = False
     plot.margins(x=0.06)
     plot.axvline(0, color=INK, linewidth=0.8)
-    plot.tick_params(axis="y", length=0, labelsize=9)
+    plot.tick_params(axis="y", length=0, labelsize=8)
     for row, (values, split) in enumerate(zip(rows, splits, strict=True)):
         known = [100 * (value or 0.0) for value in values]
         for part, (begin, length) in zip(split.parts, stacked(known), strict=True):

@@ -159,8 +159,8 @@ def test_words_and_tables_have_the_figures():
 
 def test_bars_have_a_row_each_and_a_legend():
     svg = bars([split(), split(method="val", knee=True)])
-    assert svg.count("sii, lights=64") == 1
-    for text in ("val, lights=64 (knee)", "visibility", "cut", "sum"):
+    assert svg.count(">lights=64") == 2
+    for text in ("sii", "val", "lights=64", "lights=64 (knee)", "visibility", "cut", "sum"):
         assert f">{text}</text>" in svg
     assert "href=\"http" not in svg
     assert bars([split()]) == bars([split()])

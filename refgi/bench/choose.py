@@ -23,7 +23,7 @@ Tell = Callable[[str, float], None]
 
 SMALL = 128  # pixels along the longer side of the small picture
 SMALL_ROUNDS = 2
-NOISE_SHARE = 0.5  # of the error wished for: the truth's standard error, which is taken out of every figure
+NOISE_SHARE = 0.3  # of the error wished for: the truth's standard error, which is taken out of every figure
 NOISE_FOR_TIME = 0.02
 TRUTH_SECONDS = 60.0  # for each of the two truths, unless it is said how they are traced
 

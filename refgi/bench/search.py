@@ -22,7 +22,8 @@ from refgi.bench.tracks import Track
 STRIDE = 4  # rungs from probe to probe: a factor of 4
 SLACK = 3.0  # a probe may take as many times as long as what meets the wish: small pictures tell times roughly
 DOUBT = 0.85  # share of the error ahead that a track is left for: slopes are measured with noise
-MARGIN = 0.97  # share of the wish to come to at full size: the truth's noise and the seeds leave as much open
+MARGIN = 0.95  # share of the wish to come to at full size: the truth's noise and the seeds leave as much open
+TIME_MARGIN = 0.9  # share of the time wished for to come to, where something does: other work takes the rest
 FURTHEST = 6  # rungs that a judged choice moves up at once
 JUDGED = 4  # tracks that are judged for a time
 
@@ -111,7 +112,7 @@ def for_time(tracks: Sequence[Track], wish: float, small: Pictures, full: Pictur
     Found
         The best of what was judged at full size.
     """
-    reached = [choice for choice in (_slowest_within(track, wish, full) for track in tracks) if choice is not None]
+    reached = _reached(tracks, TIME_MARGIN * wish, full) or _reached(tracks, wish, full)
     ranked = sorted((Probe(choice, small.seconds(choice), small.error(choice)) for choice in reached),
                     key=lambda one: one.error)
     judged = [Probe(one.choice, full.seconds(one.choice), full.error(one.choice)) for one in ranked[:JUDGED]]
@@ -191,6 +192,11 @@ class _Walk:
     def _known(self, track: Track, rung: int) -> list[tuple[int, Probe]]:
         return [(track.values[at], self.probes[choice]) for at, choice in enumerate(track.rungs[:rung + 1])
                 if choice in self.probes]
+
+
+def _reached(tracks: Sequence[Track], wish: float, full: Pictures) -> list[Choice]:
+    """Return where tracks come to within a time."""
+    return [choice for choice in (_slowest_within(track, wish, full) for track in tracks) if choice is not None]
 
 
 def _slowest_within(track: Track, wish: float, full: Pictures) -> Choice | None:

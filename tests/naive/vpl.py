@@ -11,7 +11,8 @@ from tests.naive.pair_term import contributions
 def picture(frame, lights, visibility=True, maps=None, seed=0):
     """Return the irradiance, (3, h, w), by lights that were chosen from the frame's shadow maps.
 
-    With `maps` imperfect ones of these settings stand for rays. Nothing arrives from below a face, whatever normals are interpolated; what leaves below one is blocked by it.
+    Nothing arrives from below a face, whatever normals are interpolated; what leaves below one is blocked by it. With
+    `maps`, settings of imperfect ones, those stand for rays.
     """
     buffer, geometry = frame.gbuffer, frame.scene.geometry
     pixels = np.argwhere(buffer.covered)

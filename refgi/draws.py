@@ -28,7 +28,7 @@ from refgi.sampling import hash_bits
 Array = npt.NDArray[Any]
 
 # uses; docs/conventions.md lists what each draws
-PIXEL_LIGHTS, LIGHT_PATHS, ROULETTE, RANGE, ERROR_SAMPLES, GATHERING, AREA_LIGHT_SAMPLES = range(7)
+(PIXEL_LIGHTS, LIGHT_PATHS, ROULETTE, RANGE, ERROR_SAMPLES, GATHERING, AREA_LIGHT_SAMPLES, IMPERFECT_MAPS) = range(8)
 PARTS = 1 << 24  # of one use
 
 

@@ -12,6 +12,7 @@ V visibility.
 """
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -90,9 +91,13 @@ class Senders(NamedTuple):
     lobe_norm: Array  # (n or 0,) 1/sr
 
 
+Hidden = Callable[[RayReceivers, tuple[int, int], Senders, tuple[int, int], Array, Array], None]
+
+
 @stage("pairs.shadowed_sum")
 def shadowed_sum(
-    tracer: Tracer, to: RayReceivers, lights: "PixelLights", *, visibility: bool = True, batch: int = BATCH
+    tracer: Tracer, to: RayReceivers, lights: "PixelLights", *, visibility: bool = True, batch: int = BATCH,
+    hidden: Hidden | None = None,
 ) -> Array:
     """Sum the irradiance of every pixel light at every receiver, each pair with its visibility.
 
@@ -108,6 +113,9 @@ def shadowed_sum(
         Whether to trace the rays; without, every pair counts.
     batch : int
         Pairs held at a time; changes no bit of the result.
+    hidden : callable, optional
+        Fills which pairs are blocked, in place of rays: called with the receivers, first and one past the last of them,
+        the senders, first and one past the last of those, the pairs' reach and what it fills.
 
     Returns
     -------
@@ -120,13 +128,13 @@ def shadowed_sum(
         last = min(first + step, total.shape[1])
         for light in range(0, senders.flux.shape[1], LIGHTS_AT_A_TIME):
             count = min(LIGHTS_AT_A_TIME, senders.flux.shape[1] - light)
-            _add_lights(tracer, to, (first, last), senders, (light, light + count), visibility, total)
+            _add_lights(tracer, to, (first, last), senders, (light, light + count), visibility, hidden, total)
         report_progress(last / total.shape[1])
     return total
 
 
 def _add_lights(tracer: Tracer, to: RayReceivers, receivers: tuple[int, int], senders: Senders,
-                lights: tuple[int, int], visibility: bool, total: Array) -> None:
+                lights: tuple[int, int], visibility: bool, hidden: Hidden | None, total: Array) -> None:
     count = lights[1] - lights[0]
     pairs = (receivers[1] - receivers[0]) * count
     tally("pairs", lambda: pairs)
@@ -135,7 +143,9 @@ def _add_lights(tracer: Tracer, to: RayReceivers, receivers: tuple[int, int], se
     fill_shadow_rays(to, receivers, senders, lights, tracer.grain, (origin, direction, reach, contribution))
     if not left_out("pairs.shadow_rays", lambda: (pairs - np.count_nonzero(reach), pairs)):
         contribution[reach == 0], reach[:] = 0, 1
-    if visibility:
+    if visibility and hidden is not None:
+        hidden(to, receivers, senders, lights, reach, occluded)
+    elif visibility:
         tracer.fill_occluded(origin, direction, reach, occluded)
     else:
         np.less_equal(reach, 0, out=occluded)

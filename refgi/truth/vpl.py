@@ -5,6 +5,7 @@ E(x) = sum_i Phi_i / pi <n_i.w> <n_x.-w> / r^2 V(x, x_i), and the same with a lo
 
 import dataclasses
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from refgi.method import Approximation, Method
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, receivers, shadowed_sum
 from refgi.settings import Settings, setting
+from refgi.truth.imperfect import Imperfect, fill_hidden, imperfect_maps
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -42,6 +44,7 @@ class VplSettings(Settings):
 
     lights: VplLights = setting(VplLights(), "pixel lights")
     visibility: bool = setting(True, "a shadow ray for each pair of light and receiver")
+    maps: Imperfect | None = setting(None, "maps in place of rays; none: rays")
     batch: int = setting(BATCH, "pairs held at a time: memory, never a bit of the result", least=1, most=2**30,
                          study=True)
 
@@ -52,7 +55,7 @@ class VplSettings(Settings):
 
 
 def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
-    """Sum pixel lights at every pixel, with a shadow ray for each pair.
+    """Sum pixel lights at every pixel, with a shadow ray for each pair or an imperfect shadow map for each light.
 
     Parameters
     ----------
@@ -72,13 +75,17 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     chosen = settings.lights
     lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
                                  pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
+    hidden = None
+    if settings.visibility and settings.maps is not None:
+        hidden = partial(fill_hidden, imperfect_maps(frame.scene.geometry, lights, settings.maps, chosen.seed))
     buffer = frame.gbuffer
     points = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id,
                        frame.tracer.grain)
     irradiance = np.zeros((3, frame.height, frame.width), frame.dtype)
     # SII Eq. (2), (3) with visibility V(x, x_i)
     irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(frame.tracer, points, lights,
-                                                              visibility=settings.visibility, batch=settings.batch)
+                                                              visibility=settings.visibility, batch=settings.batch,
+                                                              hidden=hidden)
     return irradiance
 
 
@@ -86,11 +93,22 @@ def _every_texel(settings: VplSettings, _: Mapping[str, Any]) -> VplSettings:
     return dataclasses.replace(settings, lights=VplLights(pattern="all"))
 
 
+def _by_rays(settings: VplSettings, _: Mapping[str, Any]) -> VplSettings:
+    return dataclasses.replace(settings, maps=None)
+
+
 APPROXIMATIONS = (
     Approximation("visibility", "nothing blocks indirect light",
                   limit=lambda settings: {} if settings.visibility else {"visibility": False}),
     Approximation("light sampling", "N pixel lights for all texels of the reflective shadow map", _every_texel,
-                  from_truth=lambda settings: settings.visibility))
+                  from_truth=lambda settings: settings.visibility),
+    Approximation("imperfect maps", "a depth map of few points for the rays of each light", _by_rays))
+
+
+def _map_bytes(settings: VplSettings, _: tuple[int, int], __: int) -> int:
+    """Return bytes of the maps of one lamp's lights."""
+    return 0 if settings.maps is None else 4 * settings.lights.count * settings.maps.resolution**2
+
 
 METHOD = Method("vpl", "the same pixel lights with ray-traced visibility", vpl, VplSettings,
-                visibility=lambda settings: settings.visibility, approximations=APPROXIMATIONS)
+                visibility=lambda settings: settings.visibility, memory=_map_bytes, approximations=APPROXIMATIONS)

@@ -25,7 +25,8 @@ MADE = {
     "hssil": [{"radius": 2.0, "levels": 2, "samples": 8},
               {"visibility": "bitmask", "radius": 2.0, "levels": 2, "samples": 8}],
     "gather": [{"interpolation.grid": 16, "interpolation.reach": 1.0}],
-    "vpl": [{"lights": 32}, {"lights": 32, "visibility": False}],
+    "vpl": [{"lights": 32}, {"lights": 32, "visibility": False},
+            {"lights": 32, "maps": "imperfect", "maps.points": 500}],
     "truth": [{"samples": 24}, {"samples": 24, "visibility": False, "emitters": "visible"}],
 }
 # without the only one that its settings switch off a method with rays is the truth: that is not rendered

@@ -3,14 +3,16 @@
 import numpy as np
 
 from refgi.pairs.settings import PairSettings
+from tests.naive import imperfect
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
 from tests.naive.pair_term import contributions
 
 
-def picture(frame, lights, visibility=True):
+def picture(frame, lights, visibility=True, maps=None, seed=0):
     """Return the irradiance, (3, h, w), by lights that were chosen from the frame's shadow maps.
 
-    Nothing arrives from below a face, whatever normals are interpolated; what leaves below one is blocked by it.
+    Nothing arrives from below a face, whatever normals are interpolated; what leaves below one is blocked by it. With
+    `maps`, settings of imperfect ones, those stand for rays.
     """
     buffer, geometry = frame.gbuffer, frame.scene.geometry
     pixels = np.argwhere(buffer.covered)
@@ -24,11 +26,22 @@ def picture(frame, lights, visibility=True):
         place = lights.position[:, i].astype(float)
         toward = place - position
         counts = ((toward * facing).sum(axis=1) > 0) & sent.any(axis=1)
-        if visibility:
+        if visibility and maps is not None:
+            counts[counts] = unmapped(corners_of(geometry), lights, i, position[counts], facing[counts], maps, seed)
+        elif visibility:
             counts &= toward @ up[i] < 0
             counts[counts] = free(corners_of(geometry), position[counts] + LIFT * facing[counts], place + LIFT * up[i])
         result[:, *at] += (sent * counts[:, None]).T
     return result
+
+
+def unmapped(corners, lights, i, points, facing, maps, seed):
+    """Return which points light i reaches by its imperfect shadow map."""
+    position, normal = lights.position[:, i].astype(float), lights.normal[:, i].astype(float)
+    depth, radius = imperfect.depth_map(corners, position, normal, i, maps.points, maps.resolution, maps.levels, seed,
+                                        maps.splat)
+    return [not imperfect.is_hidden(depth, radius, maps.bias, point, up, position, normal)
+            for point, up in zip(points, facing, strict=True)]
 
 
 def sender_faces(frame, lights):

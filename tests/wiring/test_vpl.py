@@ -13,6 +13,7 @@ from tests.wiring.cases import Case, uncovered
 SINGLE = 2e-6  # of the brightest pixel: rays and what they carry are float32, some 30 roundings of 6e-8
 COUNTS = 1e-3  # of the brightest pixel: a key that is not heeded
 BASE = {"lights": 60}
+FEW_POINTS = {"maps.points": 300, "maps.resolution": 16}  # for the twin's loops
 
 CASES = {
     "fewer lights": Case({"lights": 31}),
@@ -25,6 +26,13 @@ CASES = {
     "filtered": Case({"lights.filtered": True}),
     "not shadowed": Case({"visibility": False}),
     "not shadowed, on a smooth ball": Case({"visibility": False}, scene="smooth"),
+    "imperfect maps": Case({"maps": "imperfect"}, {"lights": 6}),
+    "imperfect maps, a seed": Case({"lights.seed": 3}, {"maps": "imperfect", **FEW_POINTS}),
+    "fewer points": Case({"maps.points": 150}, {"maps": "imperfect", "maps.resolution": 16}),
+    "a coarser map": Case({"maps.resolution": 8}, {"maps": "imperfect", "maps.points": 300}),
+    "narrower boxes": Case({"maps.splat": 0.5}, {"maps": "imperfect", **FEW_POINTS}),
+    "filled holes": Case({"maps.levels": 2}, {"maps": "imperfect", "maps.splat": 0.3, **FEW_POINTS}),
+    "another bias": Case({"maps.bias": 0.5}, {"maps": "imperfect", **FEW_POINTS}),
     "few pairs at a time": Case({"batch": 1000}, same="memory alone"),
 }
 
@@ -46,7 +54,7 @@ def test_the_twin(made, evidence):
     chosen = settings.lights
     lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
                                  pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
-    expected = twin(frame, lights, settings.visibility)
+    expected = twin(frame, lights, settings.visibility, settings.maps, chosen.seed)
     off = np.abs(picture - expected).max() / expected.max()
     evidence(f"{case.values}: off by {off:.0e} of the brightest pixel")
     assert off < SINGLE

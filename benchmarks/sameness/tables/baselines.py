@@ -28,6 +28,14 @@ VPL = Table({"lights": 96}, [
     vary("filtered", True, pattern="grid"),
     vary("visibility", False, on=("cornell_box", "stage", "ring")),
     vary("batch", 5000, same=BATCH),
+    vary("maps", "imperfect", on=("cornell_box", "stage", "ring")),
+    vary("points", 500, 3000, maps="imperfect"),
+    vary("resolution", 32, maps="imperfect"),
+    vary("splat", 0.3, maps="imperfect"),
+    vary("levels", 2, maps="imperfect"),
+    vary("bias", 0.5, maps="imperfect"),
+    vary("seed", 7, maps="imperfect"),
+    vary("batch", 5000, maps="imperfect", same=BATCH),
 ])
 
 TRUTH = Table({"samples": 24}, [

@@ -73,7 +73,7 @@ def _bench(
             one = bench_scene(scene, grid, rounds=rounds, truth=truth, tell=told, place=place,
                               source=sources[number], shadows="exact")
             if split:
-                options = dict(zip(("width", "height"), split_size or (), strict=False))
+                options: dict[str, Any] = dict(zip(("width", "height"), split_size or (), strict=False))
                 one = with_splits(one, scene, grid, seeds=rounds, truth=truth, tell=told, shadows="exact", **options)
             made.append(one)
             result = Result(environment=environment(), scenes=tuple(made))

@@ -144,12 +144,15 @@ def said_of(scene: SceneResult) -> Iterator[str]:
     best = {run.method: run for run in sorted(scene.runs, key=lambda one: -one.rmse)}
     for method, run in sorted(best.items(), key=lambda one: one[1].rmse):
         text = f"{method} comes to {percent(run.errors[TRUTH].rmse)} % in {number(1e3 * run.seconds)} ms ({run.label})"
-        ahead = [one for one in scene.runs if one.method == method and (one.in_equal_time or 0) <= 1]
+        own = [one for one in scene.runs if one.method == method]
+        ahead = [one for one in own if (one.in_equal_time or 0) <= 1]
         if not scene.line:
             yield f"{text}."
+        elif all(one.in_equal_time is None for one in own):
+            yield f"{text}; each of its settings is done before the path tracer's first picture."
         elif not ahead:
             yield f"{text}; the path tracer is nearer in the time of each of its settings."
-        elif len(ahead) == sum(one.method == method for one in scene.runs):
+        elif len(ahead) == len(own):
             yield f"{text}; no setting of it is beaten by the path tracer in equal time."
         else:
             slowest = max(ahead, key=lambda one: one.seconds)

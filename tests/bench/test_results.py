@@ -72,6 +72,8 @@ def test_what_the_curves_say():
     assert said[0].endswith("from 20 ms on the path tracer is nearer in equal time.")
     assert said[1].endswith("no setting of it is beaten by the path tracer in equal time.")
     assert said[2].endswith("the path tracer is nearer in the time of each of its settings.")
+    early = list(said_of(SCENE.model_copy(update={"runs": (run("sii", 16, 0.01, 0.5), run("sii", 64, 0.04, 0.3))})))
+    assert early[0].endswith("each of its settings is done before the path tracer's first picture.")
     assert [one[-1] for one in said_of(SCENE.model_copy(update={"line": ()}))] == ["."] * 3
 
 

@@ -17,13 +17,26 @@ def run(*arguments):
     return CliRunner().invoke(VerbGroup.refgi(), ["bench", *map(str, arguments)])
 
 
+@pytest.fixture(autouse=True)
+def new_processes(monkeypatch):
+    """What asks for first frames of new processes, seconds each: (source, methods, size)."""
+    asked = []
+
+    def first_frames(source, methods, options, _):
+        asked.append((source, methods, (options["width"], options["height"])))
+        return dict.fromkeys(methods, 1.5)
+
+    monkeypatch.setattr(measure, "first_frames", first_frames)
+    return asked
+
+
 @pytest.fixture
 def grid(tmp_path):
     (tmp_path / "grid.toml").write_text("[truth]\npasses = [2]\n[sii]\nlights = [16, 64]\n[gather]\nsamples = 20\n")
     return tmp_path / "grid.toml"
 
 
-def test_scenes_of_a_grid(tmp_path, grid):
+def test_scenes_of_a_grid(tmp_path, grid, new_processes):
     done = run("cornell_box", "cornell_sphere:faces=80", "--grid", grid, *SMALL, "--json", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
@@ -33,6 +46,8 @@ def test_scenes_of_a_grid(tmp_path, grid):
     assert [run.label for run in result.scenes[1].runs] == ["lights=16", "lights=64", "samples=20"]
     assert all((tmp_path / "out" / run.picture).is_file() for scene in result.scenes for run in scene.runs)
     assert json.loads(done.stdout)["scenes"] == result.model_dump(mode="json")["scenes"]
+    assert new_processes == [(name, ["sii", "gather"], (24, 18)) for name in ("cornell_box", "cornell_sphere:faces=80")]
+    assert [scene.cold for scene in result.scenes] == [{"sii": 1.5, "gather": 1.5}] * 2
     again = run("--grid", grid, *SMALL, "--methods", "gather", "--out", tmp_path / "out")
     assert again.exit_code == 0, again.output  # over its own files
     assert "gather comes to" in again.stdout

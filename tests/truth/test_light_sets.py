@@ -129,7 +129,7 @@ def test_sets_hold_diffuse_parts_then_lobes_in_whole_blocks():
 VARIANTS = ({"interleave": 1, "uniform_share": 1.0}, {"interleave": 4, "uniform_share": 0.1}, {"interleave": 3})
 
 
-@pytest.mark.parametrize("lights", ["spot", "several"])
+@pytest.mark.parametrize("lights", ["spot", pytest.param("several", marks=pytest.mark.slow)])
 def test_sets_and_densities_change_no_expectation(lights, evidence):
     """Against one set of even rays, the estimator without both: pixel by pixel and for the picture."""
     glossy = Material("glossy", (0.3, 0.3, 0.3), (0.3, 0.2, 0.1), 15.0)

@@ -73,7 +73,7 @@ def test_another_array_in_its_place_is_named(kit, tmp_path):
 
 
 @pytest.mark.parametrize(("cases", "least"), [
-    (("pairs-glossy", "sii-warp-a"), 60),
+    pytest.param(("pairs-glossy", "sii-warp-a"), 60, marks=pytest.mark.slow),
     pytest.param(("sii-three-lamps", "sii-warp-a", "sii-warp-b", "pairs-glossy"), 100, marks=pytest.mark.slow)])
 def test_every_likely_bug_of_the_kit_is_told_by_the_checker(kit, tmp_path, cases, least):
     """The exporter keeps a sample of elements of each; here it is put over the right arrays, as a port has it."""

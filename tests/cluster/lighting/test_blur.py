@@ -111,6 +111,7 @@ def test_without_comparisons_where_bounds_decide(real):
         assert not np.array_equal(alike[:, 57:], compared[:, 57:])
 
 
+@pytest.mark.slow
 def test_single_precision_and_threads():
     rng = np.random.default_rng(5)
     to, light = rough(rng, 50, 150), rng.random((3, 50, 150)).astype(np.float32)

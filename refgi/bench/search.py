@@ -82,7 +82,7 @@ def for_error(tracks: Sequence[Track], wish: float, small: Pictures, full: Pictu
         track = walk.starts[number][0]
         one = Probe(track.rungs[rung], seconds, full.error(track.rungs[rung]))
         judged[one.choice] = one
-        if one.error <= wish * MARGIN and (best is None or seconds < best.seconds):
+        if one.error <= wish * MARGIN:  # faster than the best so far: the queue ends before
             best = one
         following = walk.after(track, rung, one.error)
         if following is not None and track.rungs[following] not in judged:

@@ -13,6 +13,8 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from benchmarks.harness import real_scene
+from refgi.bench.error import without_noise
 from refgi.bench.grid import Grid, built_in
 from refgi.bench.measure import bench_scene
 from refgi.bench.overview import Place, overview
@@ -28,8 +30,7 @@ from refgi.image import write_text
 from refgi.scene import load_scene
 from refgi.truth import TruthSettings
 
-DATA = Path(__file__).parents[1].parent / "shared" / "data"
-SCENES = ("cornell_box", "atrium", "cornell_horse.json", "sponza.json", "kitchen.json", "dragon_bunny.json")
+BUILT_IN, REAL = ("cornell_box", "atrium"), ("cornell_horse", "sponza", "kitchen", "dragon_bunny")
 SIZE = {"width": 128, "height": 96, "shadows": "exact"}
 ON_SCREEN = ("hssil", "gather")  # their errors depend on how many pixels there are
 SMALL = {"width": 48, "height": 36, "shadows": "exact"}  # of what is split otherwise: a ray to each light is slow
@@ -44,14 +45,13 @@ Tell = Callable[[str, float], None]
 
 def present() -> list[str]:
     """Return what the scenes that are there are loaded from."""
-    paths = (DATA / name if name.endswith(".json") else Path(name) for name in SCENES)
-    return [str(path) for path in paths if path.suffix != ".json" or path.exists()]
+    return [*BUILT_IN, *(str(path) for name in REAL if (path := real_scene(name)))]
 
 
 def error_of(run: Run) -> float:
     """Return the RMSE of a run without the truth's noise, over the truth's mean."""
     known = run.errors["truth"]
-    return math.inf if known.rmse is None else math.sqrt(max(0.0, known.rmse**2 - (known.noise or 0.0) ** 2))
+    return math.inf if known.rmse is None else without_noise(known.rmse, known.noise or 0.0)
 
 
 def cheapest(runs: Sequence[Run], level: float) -> str:

@@ -8,24 +8,23 @@ more than twice the best, or, for a time, every rung that takes no longer than t
 import dataclasses
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.harness import Row
+from benchmarks.harness import Row, real_scene
 from refgi.bench.choose import Pictures, Wish, choose
 from refgi.bench.grid import Choice
 from refgi.bench.tracks import Track, built_in_tracks
 from refgi.scene import Scene, load_scene
 
-DATA = Path(__file__).parents[1].parent / "shared" / "data"
 SIZE = {"width": 160, "height": 120, "shadows": "exact"}
 OTHER_SEED, OTHER_TRUTH = 1000, 7
 ROUNDS = 3
+BUILT_IN = ("cornell_sphere", "atrium", "parallel_plates")
 PAIRS = (
     ("cornell_sphere", Wish(error=0.2)), ("atrium", Wish(error=0.5)), ("atrium", Wish(seconds=0.1)),
-    ("parallel_plates", Wish(seconds=0.05)), ("cornell_horse.json", Wish(error=0.1)), ("teapot.json", Wish(error=0.3)),
-    ("kitchen.json", Wish(seconds=0.2)), ("sponza.json", Wish(error=0.6)), ("buddha.json", Wish(error=0.2)),
-    ("flying_bunnies.json", Wish(error=0.3)),
+    ("parallel_plates", Wish(seconds=0.05)), ("cornell_horse", Wish(error=0.1)), ("teapot", Wish(error=0.3)),
+    ("kitchen", Wish(seconds=0.2)), ("sponza", Wish(error=0.6)), ("buddha", Wish(error=0.2)),
+    ("flying_bunnies", Wish(error=0.3)),
 )
 
 
@@ -40,10 +39,10 @@ class Outcome(NamedTuple):
 def rows(quick: bool) -> Iterator[Row]:
     found = []
     for name, wish in PAIRS[:3] if quick else PAIRS:
-        file = DATA / name
-        if name.endswith(".json") and not file.exists():
+        source = name if name in BUILT_IN else real_scene(name)
+        if source is None:
             continue
-        found.append(one := _outcome(load_scene(file if name.endswith(".json") else name), wish))
+        found.append(one := _outcome(load_scene(source), wish))
         asked = f"{100 * wish.error:g} %" if wish.error else f"{1e3 * (wish.seconds or 0):g} ms"
         yield Row(f"{name}, {asked}: what is kept over the wish", one.kept, "x", "<= 1")
         yield Row(f"{name}, {asked}: cost over the best", one.over_best, "x", "<= 2",

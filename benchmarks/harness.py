@@ -1,9 +1,19 @@
 """How benchmarks measure: interleaved runs, medians, and ratios within one process."""
 
+import os
 import statistics
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
+
+DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
+
+
+def real_scene(name: str) -> Path | None:
+    """Return the file of a scene of REFGI_DATA, the folder of real scenes; none where there is no such file."""
+    path = DATA / f"{name}.json"
+    return path if path.is_file() else None
 
 
 class Row(NamedTuple):

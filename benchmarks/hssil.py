@@ -5,15 +5,13 @@ machine, for the whole indirect pass: from the G-buffer and direct light to irra
 The game's levels are not published: a built-in hall stands in, or the atrium of REFGI_DATA where that names its folder.
 """
 
-import os
 import warnings
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.harness import Row, ratio, seconds
+from benchmarks.harness import Row, ratio, real_scene, seconds
 from refgi import Frame, load_scene
 from refgi.errors import RefgiWarning
 from refgi.frame import compose
@@ -24,7 +22,6 @@ from refgi.sssil.hssil import hssil
 from refgi.sssil.settings import PRESETS
 from refgi.stages import observe
 
-DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 STAND_INS = {"sponza": "atrium:faces=262000", "cornell_horse": "cornell_sphere:faces=17000"}
 PAPER = {  # start, levels, samples: total ms on both cards, Fig. 6
     ("quarter", 4, 64): (13.9, 4.6), ("quarter", 4, 256): (33.6, 11.2), ("half", 4, 256): (110.6, 32.6),
@@ -45,8 +42,7 @@ def rows(quick: bool) -> Iterator[Row]:
 
 
 def _scene(name: str) -> Scene:
-    path = DATA / f"{name}.json"
-    return load_scene(path if path.is_file() else STAND_INS[name])
+    return load_scene(real_scene(name) or STAND_INS[name])
 
 
 def _seen(name: str, width: int, height: int) -> Frame:

@@ -5,14 +5,12 @@ REFGI_DATA names their folder, built-in ones of as many faces elsewhere.
 """
 
 import dataclasses
-import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.harness import Row, ratio, seconds
+from benchmarks.harness import Row, ratio, real_scene, seconds
 from refgi import Frame, load_scene
 from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import Scene
@@ -25,7 +23,6 @@ from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 
-DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 STAND_INS = {"dragon_bunny": "atrium:faces=405000", "flying_bunnies": "atrium:faces=417000,seed=2",
              "sponza": "atrium:faces=262000", "cornell_horse": "cornell_sphere:faces=17000"}
 PAPER = {"dragon_bunny": 21, "flying_bunnies": 25}  # frames a second at 1024^2, Table 2
@@ -45,8 +42,7 @@ def rows(quick: bool) -> Iterator[Row]:
 
 
 def _scene(name: str) -> Scene:
-    path = DATA / f"{name}.json"
-    return load_scene(path if path.is_file() else STAND_INS[name])
+    return load_scene(real_scene(name) or STAND_INS[name])
 
 
 def _frames(name: str, size: int, repeats: int, paper: int) -> Iterator[Row]:

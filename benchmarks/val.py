@@ -6,14 +6,12 @@ REFGI_DATA names their folder, built-in ones of as many faces elsewhere.
 """
 
 import dataclasses
-import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.harness import Row, seconds
+from benchmarks.harness import Row, real_scene, seconds
 from refgi import Frame, load_scene
 from refgi.cluster import ValSettings, val
 from refgi.scene import Scene
@@ -21,7 +19,6 @@ from refgi.settings import of
 from refgi.stages import observe
 from refgi.truth.vpl import VplSettings, vpl
 
-DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 STAND_INS = {"cornell_horse": "cornell_sphere:faces=17000", "sponza": "atrium:faces=262000",
              "kitchen": "atrium:faces=100000,seed=3"}
 PAPER = {"cornell_horse": 19.7, "sponza": 13.4}  # frames a second, Table 1
@@ -45,8 +42,7 @@ def rows(quick: bool) -> Iterator[Row]:
 
 
 def _scene(name: str) -> Scene:
-    path = DATA / f"{name}.json"
-    return load_scene(path if path.is_file() else STAND_INS[name])
+    return load_scene(real_scene(name) or STAND_INS[name])
 
 
 def _frames(name: str, size: int, repeats: int, paper: float) -> Iterator[Row]:

@@ -39,6 +39,15 @@ class Approximation(NamedTuple):
         return changed, options if self.frame is None else self.frame(options)
 
 
+class Extent(NamedTuple):
+    """What the memory of a picture depends on, beside settings."""
+
+    size: tuple[int, int]  # width and height, pixels
+    float_bytes: int = 4  # or 8
+    maps: int = 1  # of all lamps
+    texels: int = 512**2  # of a map
+
+
 class Method(NamedTuple):
     """A method by name."""
 
@@ -49,7 +58,7 @@ class Method(NamedTuple):
     visibility: bool | Callable[[Any], bool]  # whether it knows what blocks indirect light; may depend on settings
     ledger: Callable[[Any, Any], Any] | None = None  # accounts for the power of the lights
     estimate: Callable[[Any, Any], Any] | None = None  # gives the picture with its own error
-    memory: Callable[[Any, tuple[int, int], int], int] | None = None  # bytes that settings add to a picture
+    memory: Callable[[Any, Extent], int] | None = None  # bytes that settings add to a picture
     presets: Mapping[str, Settings] = NONE  # named settings beside the default; "paper": the values printed
     temporal: Settings | None = None  # of its temporal filter over frames, where it has one
     approximations: tuple[Approximation, ...] = ()  # in the order of its pipeline
@@ -74,6 +83,6 @@ class Method(NamedTuple):
         estimate = self.estimate(frame, settings)
         return estimate.mean.astype(frame.dtype), estimate
 
-    def extra_bytes(self, settings: Any, size: tuple[int, int], float_bytes: int) -> int:
-        """Return what settings add to the memory of a picture of some width and height and floats of 4 or 8 bytes."""
-        return self.memory(settings, size, float_bytes) if self.memory is not None else 0
+    def extra_bytes(self, settings: Any, extent: Extent) -> int:
+        """Return what settings add to the memory of a picture."""
+        return self.memory(settings, extent) if self.memory is not None else 0

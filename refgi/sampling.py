@@ -18,6 +18,8 @@ from refgi.jit import kernel
 Array = npt.NDArray[Any]
 
 ONE_ULP_BELOW_1 = 1.0 - 2.0**-53
+# steps of a sequence of low discrepancy on the square (Roberts 2018): 1 / g and 1 / g^2 where g^3 = g + 1
+FIRST_STEP, SECOND_STEP = 0.7548776662466927, 0.5698402909980532
 
 
 def halton(count: int, bases: Sequence[int] = (2, 3), shift: Sequence[float] | None = None, start: int = 0) -> Array:

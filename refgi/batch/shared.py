@@ -24,7 +24,7 @@ from refgi.batch.outcome import View
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import Reference, traced
 from refgi.bench.pictures import FOLDER, Place, Writer
-from refgi.compare.comparison import without_visibility
+from refgi.compare.comparison import WITHOUT_VISIBILITY, limited
 from refgi.compare.pictures import linear_planes
 from refgi.errors import InputError, expect
 from refgi.frame import Frame
@@ -120,7 +120,7 @@ class Shared:
         """Return the truth or the one in which nothing blocks indirect light; its picture is written."""
         if name not in self.references:
             settings = reference_settings(self._common.truth, self.shot)
-            settings = settings if name == TRUTH else without_visibility(settings)
+            settings = settings if name == TRUTH else limited(settings, name, WITHOUT_VISIBILITY)
             self.references[name] = self._traced(settings)
             self._write(name, settings, self.references[name])
         return self.references[name]

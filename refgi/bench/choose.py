@@ -7,9 +7,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from refgi.bench.error import error_of
+from refgi.bench.error import error_of, without_noise
 from refgi.bench.grid import TRUTH, Choice
 from refgi.bench.measure import REFERENCE_SEED, load_kernels, small_frame, stopped, timed, traced, with_seed
 from refgi.bench.search import Found, for_error, for_time
@@ -163,8 +161,8 @@ class Pictures:
                 for seed in self._seeds]
         known = error_of([one.picture for one in runs], self._reference.mean, self._reference.variance,
                          self.frame.gbuffer.covered)
-        error = math.sqrt(max(0.0, known.rmse**2 - known.noise**2)) if np.isfinite(known.rmse) else math.inf
-        return _Run(statistics.median(one.seconds for one in runs), error, runs[0].skips)
+        return _Run(statistics.median(one.seconds for one in runs), without_noise(known.rmse, known.noise),
+                    runs[0].skips)
 
 
 class _Run(NamedTuple):

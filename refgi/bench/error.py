@@ -31,6 +31,11 @@ class Error(NamedTuple):
     noise: float  # rmse of a perfect picture: the reference's own standard error
 
 
+def without_noise(rmse: float, noise: float) -> float:
+    """Return an RMSE without the reference's own standard error; infinite where no RMSE is known."""
+    return math.sqrt(max(0.0, rmse**2 - noise**2)) if math.isfinite(rmse) else math.inf
+
+
 def error_of(pictures: Sequence[Array], reference: Array, variance: Array, covered: Array) -> Error:
     """Judge pictures of several seeds by a reference.
 

@@ -22,7 +22,7 @@ from refgi.bench.grid import TRUTH, Choice, Grid
 from refgi.bench.pictures import TRUTH_FILES, Place, Writer
 from refgi.bench.results import Run, SceneResult, Work, figures_of, known
 from refgi.bench.work import first_frames, quietly, works_of
-from refgi.compare.comparison import WARM_UP_SIZE
+from refgi.compare.comparison import WARM_UP_SIZE, WITHOUT_VISIBILITY, limited
 from refgi.compare.flip import flip
 from refgi.compare.outcome import UNOCCLUDED, measure
 from refgi.compare.pictures import linear_planes
@@ -39,9 +39,9 @@ Tell = Callable[[str, float], None]
 
 REFERENCE_SEED = 2**31  # of the truth: none of the rounds'
 SEEN, SEEN_UNOCCLUDED = "seen", "seen_unoccluded"  # names of references, beside those of a comparison
-LIMITS: Mapping[str, Mapping[str, Any]] = MappingProxyType({  # what the truth of each reference leaves out
-    TRUTH: {}, UNOCCLUDED: {"visibility": False}, SEEN: {"emitters": "visible"},
-    SEEN_UNOCCLUDED: {"visibility": False, "emitters": "visible"},
+LIMITS: Mapping[str, Mapping[str, Any]] = MappingProxyType({  # what each further reference leaves out
+    UNOCCLUDED: WITHOUT_VISIBILITY, SEEN: {"emitters": "visible"},
+    SEEN_UNOCCLUDED: {**WITHOUT_VISIBILITY, "emitters": "visible"},
 })
 
 
@@ -104,8 +104,9 @@ def bench_scene(
     covered = frame.gbuffer.covered
     expect(bool(covered.any()), f"scene {scene.name!r}: camera", "a view of some surface", "a view past all of it")
     settings = dataclasses.replace(truth or TruthSettings(), seed=REFERENCE_SEED)
-    names = dict.fromkeys([TRUTH, *(name for choice in grid.choices for name in references_of(choice))])
-    references = {name: traced(frame, limited(settings, name), tell) for name in names}
+    names = {name: None for choice in grid.choices for name in references_of(choice) if name != TRUTH}
+    references = {TRUTH: traced(frame, settings, tell)}
+    references |= {name: traced(frame, limited(settings, name, LIMITS[name]), tell) for name in names}
     stops = [stop(settings, passes) for passes in grid.passes]
     made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, frame_options, tell)
     size = {"width": frame.width, "height": frame.height}
@@ -129,18 +130,11 @@ def bench_scene(
 
 def references_of(choice: Choice) -> list[str]:
     """Return by which references a choice is judged: the truth, and those that share its limits; keys of `LIMITS`."""
-    method, knows = METHODS[choice.method], METHODS[choice.method].knows_visibility(choice.settings)
+    method = METHODS[choice.method]
+    knows = method.knows_visibility(choice.settings)
     limits = {key: value for one in method.approximations for key, value in one.shared_by(choice.settings).items()}
     names = [TRUTH] if knows else [TRUTH, UNOCCLUDED]
     return [*names, SEEN if knows else SEEN_UNOCCLUDED] if limits.get("emitters") == "visible" else names
-
-
-def limited(settings: TruthSettings, name: str) -> TruthSettings:
-    """Return how a reference is traced; in a file of its own, where the truth has one."""
-    held = settings.checkpoint
-    if name != TRUTH and held and not Path(held).is_dir():  # a folder has a file for each
-        held = f"{held}.{name}"
-    return dataclasses.replace(settings, **LIMITS[name], checkpoint=held)
 
 
 def traced(frame: Frame, settings: TruthSettings, tell: Tell) -> Reference:

@@ -9,7 +9,8 @@ import tracemalloc
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar
 
 from refgi import stages
 from refgi.bench.grid import Choice
@@ -20,6 +21,8 @@ from refgi.methods import METHODS
 from refgi.scene import Scene
 
 Tell = Callable[[str, float], None]
+Key = TypeVar("Key")
+Figure = TypeVar("Figure")
 
 FIRST_FRAME = """
 import json, sys, warnings
@@ -32,21 +35,23 @@ LONGEST = 600.0  # s that a new process may take
 
 def works_of(scene: Scene, choices: Sequence[Choice], options: Mapping[str, Any], tell: Tell) -> dict[int, Work]:
     """Count what each of some choices takes, by its number; those that give no picture are left out."""
-    found = {}
-    for number, choice in enumerate(choices):
-        tell(f"counting {choice.method}: {choice.label}", number / len(choices))
-        with quietly():
-            found[number] = work_of(scene, choice, options)
-    return found
+    return _of_each({number: (f"counting {choice.method}: {choice.label}", partial(work_of, scene, choice, options))
+                     for number, choice in enumerate(choices)}, tell)
 
 
 def first_frames(source: str, methods: Sequence[str], options: Mapping[str, Any], tell: Tell) -> dict[str, float]:
     """Return `cold_seconds` of each of some methods by name; those that give no picture are left out."""
+    return _of_each({name: (f"new process: {name}", partial(cold_seconds, source, name, options)) for name in methods},
+                    tell)
+
+
+def _of_each(asked: Mapping[Key, tuple[str, Callable[[], Figure]]], tell: Tell) -> dict[Key, Figure]:
+    """Return what each gives that is asked, told before; without those that fail."""
     found = {}
-    for number, name in enumerate(methods):
-        tell(f"new process: {name}", number / len(methods))
+    for number, (key, (what, made)) in enumerate(asked.items()):
+        tell(what, number / len(asked))
         with quietly():
-            found[name] = cold_seconds(source, name, options)
+            found[key] = made()
     return found
 
 

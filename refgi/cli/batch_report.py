@@ -167,16 +167,18 @@ def memory_needed(jobs: "Sequence[Job]", common: "Common", workers: int) -> int:
         Bytes: the most that a job takes, in every process.
     """
     from refgi.batch.jobs import scene_at
-    from refgi.cli.memory import needed_bytes
+    from refgi.cli.memory import map_count, needed_bytes
+    from refgi.method import Extent
     from refgi.methods import find_method
 
     most = 0
     for first in {job.shot.scene: job for job in jobs}.values():  # frames of a path differ little
         scene = scene_at(first.shot)
         size = scene.camera.width, scene.camera.height
+        extent = Extent(size, maps=map_count(scene), texels=common.rsm_resolution**2)
         own = needed_bytes(scene, *size, rsm_resolution=common.rsm_resolution, traced=True,
                            compared=2 + max(len(job.seeds) for job in jobs))
-        extra = max(find_method(job.choice.method).extra_bytes(job.choice.settings, size, 4)
+        extra = max(find_method(job.choice.method).extra_bytes(job.choice.settings, extent)
                     for job in jobs if job.shot.scene == first.shot.scene)
         most = max(most, own + extra)
     return most * workers

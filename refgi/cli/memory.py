@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from refgi.errors import InputError
+from refgi.method import Extent
 from refgi.methods import find_method
 from refgi.scene import PointLight, Scene
 
@@ -42,9 +43,13 @@ def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4,
         Bytes, rather too many than too few.
     """
     pixel = PIXEL_FLOATS * float_bytes + traced * TRUTH_PIXEL_BYTES + compared * COMPARED_PIXEL_BYTES
-    maps = sum(6 if isinstance(light, PointLight) else 1 for light in scene.lights)
-    texels = maps * rsm_resolution**2 * TEXEL_FLOATS * float_bytes
+    texels = map_count(scene) * rsm_resolution**2 * TEXEL_FLOATS * float_bytes
     return width * height * pixel + texels + scene.face_count * FACE_BYTES
+
+
+def map_count(scene: Scene) -> int:
+    """Return how many shadow maps the lamps of a scene have: a point light has one for each face of a cube."""
+    return sum(6 if isinstance(light, PointLight) else 1 for light in scene.lights)
 
 
 def available_bytes() -> int | None:
@@ -87,8 +92,8 @@ def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: boo
     float_bytes = 8 if dtype == "float64" else 4
     needed = needed_bytes(scene, width, height, float_bytes=float_bytes, rsm_resolution=rsm_resolution, traced=traced,
                           compared=compared)
-    extra = {name: find_method(name).extra_bytes(own, (width, height), float_bytes)
-             for name, own in (settings or {}).items()}
+    extent = Extent((width, height), float_bytes, map_count(scene), rsm_resolution**2)
+    extra = {name: find_method(name).extra_bytes(own, extent) for name, own in (settings or {}).items()}
     most = max(extra, key=extra.__getitem__, default="")
     added, available = extra.get(most, 0), available_bytes()
     if available is not None and needed + added > available:

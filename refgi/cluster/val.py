@@ -15,6 +15,7 @@ from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
 from refgi.lights.selection import choose_lights, footprints, light_areas
 from refgi.lights.settings import MapLights, with_clamp
+from refgi.method import Extent
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
 from refgi.rsm import facing_normals
@@ -179,23 +180,22 @@ def face_normals(frame: "Frame") -> Array:
     return facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)
 
 
-def extra_bytes(settings: ValSettings, size: tuple[int, int], float_bytes: int) -> int:
+def extra_bytes(settings: ValSettings, extent: Extent) -> int:
     """Estimate the memory that area lights add to a picture: shadow maps, and these filtered.
 
     Parameters
     ----------
     settings : ValSettings
         How many area lights, and what their maps are.
-    size : tuple of 2 ints
-        Width and height of the picture, pixels.
-    float_bytes : int
-        4 or 8.
+    extent : Extent
+        Of the picture.
 
     Returns
     -------
     int
         Bytes, rather too many than too few.
     """
+    size, float_bytes = extent.size, extent.float_bytes
     texels, count = settings.maps.resolution**2, _most_maps(settings)
     sides = 2 if settings.maps.behind == "dual_paraboloid" else 1
     depth = 2 * count * sides * texels * float_bytes  # twice: maps on which there is nothing are dropped by a copy

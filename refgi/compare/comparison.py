@@ -14,6 +14,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, float], None]
 
+WITHOUT_VISIBILITY: Mapping[str, Any] = MappingProxyType({"visibility": False})  # nothing blocks indirect light
 WARM_UP_SIZE = 96  # pixels along a side: more than the coarse grid of `gather`, whose interpolation then runs as well
 
 
@@ -93,7 +95,7 @@ def compare(
         require_folder(Path(out))
     references = {TRUTH: runner.reference(TRUTH, settings[TRUTH])}
     if not all(METHODS[name].knows_visibility(settings[name]) for name in names):
-        references[UNOCCLUDED] = runner.reference(UNOCCLUDED, without_visibility(settings[TRUTH]))
+        references[UNOCCLUDED] = runner.reference(UNOCCLUDED, limited(settings[TRUTH], UNOCCLUDED, WITHOUT_VISIBILITY))
     results, failures = {}, {}
     for name in names:
         try:
@@ -205,13 +207,17 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
     return settings
 
 
-def without_visibility(settings: Any) -> Any:
-    """Return how the truth is traced in which nothing blocks indirect light.
+def limited(settings: Any, name: str, limits: Mapping[str, Any]) -> Any:
+    """Return how a truth is traced that shares limits of a method.
 
     Parameters
     ----------
     settings : TruthSettings
         Of the truth itself.
+    name : str
+        What it is called.
+    limits : mapping of str to object
+        Settings that differ, such as `WITHOUT_VISIBILITY`.
 
     Returns
     -------
@@ -220,8 +226,8 @@ def without_visibility(settings: Any) -> Any:
     """
     checkpoint = settings.checkpoint
     if checkpoint and not Path(checkpoint).is_dir():  # a folder has a file for each
-        checkpoint = f"{checkpoint}.{UNOCCLUDED}"
-    return dataclasses.replace(settings, visibility=False, checkpoint=checkpoint)
+        checkpoint = f"{checkpoint}.{name}"
+    return dataclasses.replace(settings, **limits, checkpoint=checkpoint)
 
 
 def require_folder(folder: Path) -> None:

@@ -5,6 +5,7 @@ Mip levels of the buffers add a third to them (Sec. 4).
 
 import math
 
+from refgi.method import Extent
 from refgi.sssil.crown.pattern import PHASES
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.settings import Bitmask, HssilSettings, Rays
@@ -59,23 +60,22 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
     return sum(texels) * (floats * float_bytes + PIXEL_BYTES) + senders
 
 
-def extra_bytes(settings: HssilSettings, size: tuple[int, int], float_bytes: int) -> int:
+def extra_bytes(settings: HssilSettings, extent: Extent) -> int:
     """Estimate the memory that levels, samples and further cameras add to a picture.
 
     Parameters
     ----------
     settings : HssilSettings
         First level, number of levels, pattern, cameras.
-    size : tuple of 2 ints
-        Width and height of the picture, pixels.
-    float_bytes : int
-        4 or 8.
+    extent : Extent
+        Of the picture.
 
     Returns
     -------
     int
         Bytes, rather too many than too few.
     """
+    size, float_bytes = extent.size, extent.float_bytes
     pixels = size[0] * size[1]
     columns, rows = (-(-side >> settings.sampling.first_level) for side in size)
     radius = chosen_radius((rows, columns), settings.sampling)

@@ -22,11 +22,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.draws import IMPERFECT_MAPS, draw_bits
+from refgi.draws import IMPERFECT_MAPS, draws
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers, Senders
 from refgi.radiometry import orthonormal_basis
+from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.scene import Geometry
 from refgi.settings import Settings, setting
 from refgi.stages import stage
@@ -41,7 +42,6 @@ GRAZING = 0.05  # least cosine at a receiver that the bias grows with
 NEAR = 0.1  # share of a distance by which others may be farther and still be of one surface
 FINEST, COARSEST = 2, 12  # log2 of a map's texels along a side
 MOST_POINTS = 1 << 22
-FIRST_STEP, SECOND_STEP = 0.7548776662466927, 0.5698402909980532  # 1 / g and 1 / g^2, g^3 = g + 1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,7 +97,8 @@ def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfec
     Point k lies in the k-th of n equal shares of the area, in the order of the faces, and within its face where a
     sequence of low discrepancy has its k-th point (Roberts 2018), all shifted at random for each light; the paper draws
     points independently. A point nearer than its radius is left out: what it stands for reaches around the light.
-    Points reach both sides of faces, as surfaces do.
+    Points reach both sides of faces, as surfaces do. Boxes by angle, the bias by slope and what counts as near
+    (`HORIZON`, `GRAZING`, `NEAR`) are this module's own: the paper leaves them open.
     """
     corners = np.ascontiguousarray(geometry.vertices[geometry.faces], np.float64)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -109,7 +110,8 @@ def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfec
     radius = math.sqrt(total / (math.pi * settings.points))
     if total > 0:
         position, normal = (np.ascontiguousarray(one.T, np.float64) for one in (lights.position, lights.normal))
-        _draw_maps(position, normal, corners, facing, upto, settings.points, seed, radius, settings.splat,
+        shifts = np.stack([draws(seed, IMPERFECT_MAPS, 3, part=i) for i in range(count)]) if count else np.empty((0, 3))
+        _draw_maps(position, normal, corners, facing, upto, settings.points, shifts, radius, settings.splat,
                    settings.levels, depth)
     return ImperfectDepth(depth, radius, settings.bias)
 
@@ -122,17 +124,16 @@ def fill_hidden(maps: ImperfectDepth, to: RayReceivers, receivers: tuple[int, in
 
 
 @kernel(parallel=True)
-def _draw_maps(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, points: int, seed: int,
+def _draw_maps(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, points: int, shifts: Array,
                radius: float, splat: float, levels: int, depth: Array) -> None:
     for i in prange(depth.shape[0]):
-        stream = IMPERFECT_MAPS + 256 * i
-        shift = _unit(seed, stream, 0), _unit(seed, stream, 1), _unit(seed, stream, 2)
-        _draw_points(position[i], normal[i], corners, facing, upto, points, shift, radius, splat, depth[i])
-        _fill_holes(depth[i], levels)
+        _draw_points(position[i], normal[i], corners, facing, upto, points, shifts[i], radius, splat, depth[i])
+        if levels:
+            _fill_holes(depth[i], levels)
 
 
 @kernel
-def _draw_points(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, points: int, shift: Any,
+def _draw_points(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, points: int, shift: Array,
                  radius: float, splat: float, depth: Array) -> None:
     frame = np.empty((3, 3))
     _fill_frame(normal, frame)
@@ -148,11 +149,6 @@ def _draw_points(position: Array, normal: Array, corners: Array, facing: Array, 
         if z > HORIZON * distance and distance > radius:
             wide = splat * radius * math.sqrt(abs(across) / distance)
             _splat(x / (distance + z), y / (distance + z), distance, wide, depth)
-
-
-@kernel
-def _unit(seed: int, stream: int, index: int) -> Any:
-    return np.float64(draw_bits(seed, stream, index) >> np.uint32(8)) * 2.0**-24
 
 
 @kernel

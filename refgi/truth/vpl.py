@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from refgi.method import Approximation, Method
+from refgi.method import Approximation, Extent, Method
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, receivers, shadowed_sum
 from refgi.settings import Settings, setting
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[Any]
 
+FLOAT32 = 4  # bytes
 MOST_LIGHTS = 1 << 24  # a map: every texel of one of 4096 x 4096
 Pattern = Literal["grid", "halton", "all", "random"]
 
@@ -43,7 +44,7 @@ class VplSettings(Settings):
     """Which pixel lights `vpl` uses, and whether they are shadowed."""
 
     lights: VplLights = setting(VplLights(), "pixel lights")
-    visibility: bool = setting(True, "a shadow ray for each pair of light and receiver")
+    visibility: bool = setting(True, "a shadow ray for each pair of light and receiver, or a map for each light")
     maps: Imperfect | None = setting(None, "maps in place of rays; none: rays")
     batch: int = setting(BATCH, "pairs held at a time: memory, never a bit of the result", least=1, most=2**30,
                          study=True)
@@ -105,10 +106,13 @@ APPROXIMATIONS = (
     Approximation("imperfect maps", "a depth map of few points for the rays of each light", _by_rays))
 
 
-def _map_bytes(settings: VplSettings, _: tuple[int, int], __: int) -> int:
-    """Return bytes of the maps of one lamp's lights."""
-    return 0 if settings.maps is None else 4 * settings.lights.count * settings.maps.resolution**2
+def _map_bytes(settings: VplSettings, extent: Extent) -> int:
+    """Return bytes of the maps of all lights."""
+    if settings.maps is None or not settings.visibility:
+        return 0
+    of_map = extent.texels if settings.lights.pattern == "all" else min(settings.lights.count, extent.texels)
+    return FLOAT32 * extent.maps * of_map * settings.maps.resolution**2
 
 
-METHOD = Method("vpl", "the same pixel lights with ray-traced visibility", vpl, VplSettings,
+METHOD = Method("vpl", "the same pixel lights with visibility by rays or imperfect shadow maps", vpl, VplSettings,
                 visibility=lambda settings: settings.visibility, memory=_map_bytes, approximations=APPROXIMATIONS)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.accuracy import LEVELS, SCENES, cheapest_table, error_of, nearest_table
+from benchmarks.accuracy import BUILT_IN, LEVELS, REAL, cheapest_table, error_of, nearest_table
 from refgi.bench.folder import read_result
 from refgi.bench.results import Figures, Run
 
@@ -53,11 +53,11 @@ def test_what_the_path_tracer_has_not_come_to_is_told_by_the_root_of_time(held):
 def test_the_tables_are_those_of_the_results(held):
     assert (HELD / "cheapest.md").read_text() == cheapest_table(held.scenes)
     assert (HELD / "nearest.md").read_text() == nearest_table(held.scenes)
-    assert len(cheapest_table(held.scenes).splitlines()) == 2 + len(SCENES) * len(LEVELS)
+    assert len(cheapest_table(held.scenes).splitlines()) == 2 + len((*BUILT_IN, *REAL)) * len(LEVELS)
 
 
 def test_each_curve_has_ten_settings_and_its_knee_is_split(held):
-    assert [scene.scene for scene in held.scenes] == [Path(name).stem for name in SCENES]
+    assert [scene.scene for scene in held.scenes] == [*BUILT_IN, *REAL]
     for scene in held.scenes:
         counts = Counter(one.method for one in scene.runs)
         assert min(counts.values()) >= 10, scene.scene

@@ -220,9 +220,9 @@ def test_a_camera_that_sees_nothing_is_named():
 
 
 def test_an_interrupted_truth_can_go_on_and_the_second_keeps_its_own_file():
-    settings = module.without_visibility(TruthSettings(checkpoint="sums.npz"))
+    settings = module.limited(TruthSettings(checkpoint="sums.npz"), "unoccluded", module.WITHOUT_VISIBILITY)
     assert (settings.visibility, settings.checkpoint) == (False, "sums.npz.unoccluded")
-    assert module.without_visibility(TruthSettings()).checkpoint is None
+    assert module.limited(TruthSettings(), "unoccluded", module.WITHOUT_VISIBILITY).checkpoint is None
 
 
 def test_a_second_comparison_traces_no_truth_that_a_folder_holds(box, tmp_path, monkeypatch):

@@ -7,6 +7,7 @@ import pytest
 
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
+from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
@@ -146,10 +147,10 @@ def test_a_scene_without_light_is_dark():
 
 def test_memory_is_counted():
     method = find_method("hssil")
-    plain = method.extra_bytes(SMALL, (1024, 1024), 4)
-    assert method.extra_bytes(changed(start="full"), (1024, 1024), 4) > 2 * plain
-    assert method.extra_bytes(changed(cameras=2), (1024, 1024), 4) > plain
-    assert method.extra_bytes(changed(visibility="rays"), (1024, 1024), 4) > plain
+    plain = method.extra_bytes(SMALL, Extent((1024, 1024)))
+    assert method.extra_bytes(changed(start="full"), Extent((1024, 1024))) > 2 * plain
+    assert method.extra_bytes(changed(cameras=2), Extent((1024, 1024))) > plain
+    assert method.extra_bytes(changed(visibility="rays"), Extent((1024, 1024))) > plain
 
 
 @pytest.mark.parametrize(("samples", "least"), [
@@ -158,18 +159,18 @@ def test_memory_is_counted():
 ], ids=str)
 def test_samples_of_rows_are_counted(samples, least):
     count = find_method("hssil").extra_bytes
-    few, many = (count(changed(start="full", pattern="row", **how), (1024, 1024), 4) for how in ({}, samples))
+    few, many = (count(changed(start="full", pattern="row", **how), Extent((1024, 1024))) for how in ({}, samples))
     assert many - few > 1024 * least
 
 
 def test_rows_of_thin_pictures_are_counted():
     """Senders have darkness around each row: a picture of one column takes far more than its pixels."""
     count = find_method("hssil").extra_bytes
-    assert count(SMALL, (1, 65536), 4) > 65536 // 2 * 9 * 32 * 4
+    assert count(SMALL, Extent((1, 65536))) > 65536 // 2 * 9 * 32 * 4
 
 
 def test_all_texels_of_a_huge_radius_are_those_of_the_picture():
     small = frame(width=12, height=9)
     near, far = (of(HssilSettings, pattern="all", start="full", levels=1, radius=radius) for radius in (10.0, 65536.0))
     np.testing.assert_array_equal(hssil(small, far), hssil(small, near))
-    assert find_method("hssil").extra_bytes(far, (12, 9), 4) < 1 << 20
+    assert find_method("hssil").extra_bytes(far, Extent((12, 9))) < 1 << 20

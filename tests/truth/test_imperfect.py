@@ -11,6 +11,8 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
+from refgi.method import Extent
+from refgi.methods import find_method
 from refgi.pairs.shadow_rays import fill_shadow_rays, receivers, senders_of
 from refgi.scene import Geometry, load_scene
 from refgi.settings import of
@@ -121,6 +123,18 @@ def test_the_picture_lies_between_those_with_rays_and_without(frame):
         assert np.array_equal(mapped, vpl(frame, of(VplSettings, lights=200, maps="imperfect")))
     few = vpl(frame, of(VplSettings, lights=200, maps="imperfect", batch=3000))
     assert np.array_equal(mapped, few)
+
+
+def test_memory_of_the_maps_is_counted():
+    """Closed form: float32 texels of a map for each light of each lamp, no more of them than texels."""
+    def counted(**how):
+        return find_method("vpl").extra_bytes(of(VplSettings, **how), Extent((64, 48), maps=6, texels=32**2))
+
+    assert counted(maps="imperfect", resolution=16, lights=100) == 6 * 100 * 16 * 16 * 4
+    assert counted(maps="imperfect", resolution=16, pattern="all") == 6 * 32 * 32 * 16 * 16 * 4
+    assert counted(maps="imperfect", resolution=16, lights=2000) == 6 * 32 * 32 * 16 * 16 * 4
+    assert counted(lights=100) == 0
+    assert counted(visibility=False, maps="imperfect") == 0
 
 
 def test_settings_are_checked():

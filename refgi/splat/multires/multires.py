@@ -8,6 +8,7 @@ import numpy.typing as npt
 from refgi.cluster.val import extra_bytes as bytes_of_shadows
 from refgi.lights.footprints import demo_footprints
 from refgi.lights.selection import choose_lights, drawn_from_maps, footprints
+from refgi.method import Extent
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
 from refgi.splat.multires.error_target.error_driven import error_driven
@@ -174,21 +175,19 @@ def _halved(irradiance: Array, fine: Array, covered: Array) -> Array:
     return halved
 
 
-def extra_bytes(settings: MultiresSettings, size: tuple[int, int], float_bytes: int) -> int:
+def extra_bytes(settings: MultiresSettings, extent: Extent) -> int:
     """Estimate the memory that shadows add to a picture.
 
     Parameters
     ----------
     settings : MultiresSettings
         Whether there are shadows, and of what.
-    size : tuple of 2 ints
-        Width and height of the picture, pixels.
-    float_bytes : int
-        4 or 8.
+    extent : Extent
+        Of the picture.
 
     Returns
     -------
     int
         Bytes, rather too many than too few: as if every pixel were a subsplat.
     """
-    return 0 if settings.shadows is None else bytes_of_shadows(settings.shadows, size, float_bytes)
+    return 0 if settings.shadows is None else bytes_of_shadows(settings.shadows, extent)

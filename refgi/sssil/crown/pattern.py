@@ -21,9 +21,8 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
+from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.sssil.crown.points import (
-    FIRST_STEP,
-    SECOND_STEP,
     distance,
     key_shift,
     known_radius,

@@ -14,13 +14,11 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
-from refgi.sampling import hash_bits
+from refgi.sampling import FIRST_STEP, SECOND_STEP, hash_bits
 from refgi.sssil.settings import SamplingSettings
 
 Array = npt.NDArray[Any]
 
-# shares of the turn of a two-dimensional Kronecker sequence: 1 / g and 1 / g^2 where g^3 = g + 1
-FIRST_STEP, SECOND_STEP = 0.7548776662466927, 0.5698402909980532
 TO_UNIT = 2.0**-32
 
 

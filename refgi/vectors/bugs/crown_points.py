@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from refgi.sssil.crown.points import FIRST_STEP, SECOND_STEP
+from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.vectors.spec import Array, Arrays, Bug
 
 TURN = 2.0 * math.pi

@@ -8,17 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.settings import replaced
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.crown.pattern import PHASES, tile_offsets
-from refgi.sssil.crown.points import (
-    FIRST_STEP,
-    SECOND_STEP,
-    key_shift,
-    level_key,
-    sample_points,
-    tile_shifts,
-)
+from refgi.sssil.crown.points import key_shift, level_key, sample_points, tile_shifts
 from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.vectors.bugs.crown_gather import EQ4, SENDER, gather_bugs
 from refgi.vectors.bugs.crown_points import sequence_bugs

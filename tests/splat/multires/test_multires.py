@@ -11,6 +11,7 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
+from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.settings import changed, leaves, of, replaced
@@ -282,11 +283,11 @@ def test_settings_are_checked(key, change):
 
 def test_shadows_say_what_they_take():
     """Property: memory as of `val` with the same maps, and rays where their kind traces any."""
-    method, size = find_method("multires"), (640, 480)
+    method, extent = find_method("multires"), Extent((640, 480))
     shadowed = of(MultiresSettings, visibility="val", maps=512, shadow="pcss", clusters=7)
     same = of(ValSettings, lights=256, pattern="grid", maps=512, visibility="pcss", clusters=7)
-    assert method.extra_bytes(shadowed, size, 4) == extra_bytes(same, size, 4) > 0
-    assert method.extra_bytes(MultiresSettings(), size, 4) == 0
+    assert method.extra_bytes(shadowed, extent) == extra_bytes(same, extent) > 0
+    assert method.extra_bytes(MultiresSettings(), extent) == 0
     assert not shadowed.traces_rays
     for change in ({"shadow": "rays_vpls"}, {"maps.renderer": "rays"}, {"behind": "raytrace"}):
         assert of(MultiresSettings, visibility="val", **change).traces_rays

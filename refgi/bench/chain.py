@@ -22,9 +22,11 @@ from refgi.bench.grid import TRUTH, Choice
 from refgi.bench.measure import REFERENCE_SEED, with_seed
 from refgi.errors import RefgiWarning, expect
 from refgi.frame import Frame
-from refgi.method import NONE, Approximation
+from refgi.method import NONE, Approximation, Method
 from refgi.methods import METHODS
+from refgi.provenance.frames import StillFrames
 from refgi.scene import Scene
+from refgi.sssil.temporal import still_frame
 from refgi.truth import TruthResult, TruthSettings, trace_truth
 
 Array = npt.NDArray[Any]
@@ -70,12 +72,15 @@ class Renderer:
         How truths are traced; each has a seed of its own, so that their noise is not alike.
     tell : callable
         Called with (what runs, share done).
+    still : StillFrames, optional
+        Frames of the resting scene that a method with a temporal filter blends: "still" among the options.
     **options : object
         Of `Frame`.
     """
 
     def __init__(
-        self, scene: Scene, truth: TruthSettings | None = None, tell: Tell = lambda *_: None, **options: Any
+        self, scene: Scene, truth: TruthSettings | None = None, tell: Tell = lambda *_: None, *,
+        still: StillFrames | None = None, **options: Any
     ) -> None:
         self.frame = Frame(scene, **options)
         self.options = {**options, "width": self.frame.width, "height": self.frame.height,
@@ -85,6 +90,8 @@ class Renderer:
                "a view past all of it")
         self._scene, self._tell, self._settings = scene, tell, truth or TruthSettings()
         self._frames = {_key(self.options): self.frame}
+        if still is not None:
+            self.options["still"] = still
         self._pictures: dict[Any, Array] = {}
         self._truths: dict[Any, TruthResult] = {}
 
@@ -92,13 +99,20 @@ class Renderer:
         """Return the irradiance of a method, (3, h, w), W/m^2."""
         key = method, settings, _key(options)
         if key not in self._pictures:
-            if _key(options) not in self._frames:
-                self._frames[_key(options)] = Frame(self._scene, **options)
-            frame = self._frames[_key(options)]
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RefgiWarning)  # of light that the settings lose: it is measured here
-                self._pictures[key] = METHODS[method].function(frame, settings)
+                self._pictures[key] = self._made(METHODS[method], settings, dict(options))
         return self._pictures[key]
+
+    def _made(self, method: Method, settings: Any, options: dict[str, Any]) -> Array:
+        still = options.pop("still", None)
+        if still is not None and method.temporal is not None:
+            with stages.observe(memory=stages.Memory()):  # its frames share their buffers
+                return still_frame(self._scene, settings, still.temporal, still.frames, method=method.function,
+                                   **options).irradiance
+        if _key(options) not in self._frames:
+            self._frames[_key(options)] = Frame(self._scene, **options)
+        return method.function(self._frames[_key(options)], settings)
 
     def truth(self, limits: Mapping[str, Any] = NONE) -> TruthResult:
         """Return the truth that some settings of it limit."""
@@ -184,9 +198,10 @@ def _pictures(renderer: Renderer, choice: Choice, off: Sequence[Approximation], 
 
     The first in the pipeline is switched off first: what stands on it is gone with it.
     """
-    made = []
+    made, still = [], renderer.options.get("still")
     for seed in range(seeds):
-        settings: Any = with_seed(choice.settings, seed)
+        first = seed * (1 if still is None else still.frames)  # each frame of a resting scene has the next seed
+        settings: Any = with_seed(choice.settings, first)
         options: Mapping[str, Any] = renderer.options
         for one in off:
             settings, options = one.without(settings, options)

@@ -28,6 +28,7 @@ from refgi.bench.results import Alone, Part, Run, SceneResult, Split, figures_of
 from refgi.errors import RefgiError
 from refgi.methods import METHODS
 from refgi.provenance import estimate_record
+from refgi.provenance.frames import StillFrames
 from refgi.scene import Scene
 from refgi.truth import TruthSettings
 
@@ -38,7 +39,7 @@ SIDE = 128  # pixels along the longer side of the view that is split: pictures o
 
 def with_splits(
     result: SceneResult, scene: Scene, grid: Grid, *, seeds: int, truth: TruthSettings | None = None,
-    tell: Tell = lambda *_: None, defaults: bool = True, **frame_options: Any,
+    tell: Tell = lambda *_: None, defaults: bool = True, still: StillFrames | None = None, **frame_options: Any,
 ) -> SceneResult:
     """Split the error of each method at its defaults and at the knee of its curve.
 
@@ -58,6 +59,8 @@ def with_splits(
         Called with (what runs, share done).
     defaults : bool
         Whether defaults are split as well, not the knees alone.
+    still : StillFrames, optional
+        Frames of the resting scene that methods with a temporal filter blend.
     **frame_options : object
         Passed to `Frame`; where width and height are absent, the longer side has `SIDE` pixels at most.
 
@@ -67,8 +70,8 @@ def with_splits(
         With splits, by method in the order of the runs; what could not be split is among the failures.
     """
     splits, failures = [], dict(result.failures)
-    size = small_size(result.width, result.height)
-    renderer = Renderer(scene, truth, tell, **{**dict(zip(("width", "height"), size, strict=True)), **frame_options})
+    size = dict(zip(("width", "height"), small_size(result.width, result.height), strict=True))
+    renderer = Renderer(scene, truth, tell, still=still, **{**size, **frame_options})
     for choice, at_knee in chosen_for_split(result.runs, grid, defaults=defaults):
         name = f"split of {choice.method}: {choice.label}"
 

@@ -26,6 +26,8 @@ FILES = ("index.html", "results.json", "results.csv", "results.md")
                                             "the knee of its curve.")
 @click.option("--split-size", type=Size(), help="Picture size of the split; 128 pixels along the longer side at most "
                                                 "where absent.")
+@click.option("--split-frames", type=click.IntRange(2, 1000), help="Frames of the resting scene that the split blends, "
+                                                                   "of methods with a temporal filter.")
 @click.option("--threads", type=click.IntRange(1), help="Threads of compiled kernels; all where absent.")
 @click.option("--out", required=True, help="Folder for index.html, results.json, results.csv, results.md and pictures.")
 @writing
@@ -34,7 +36,7 @@ FILES = ("index.html", "results.json", "results.csv", "results.md")
 def _bench(
     session: Session, /, scenes: tuple[str, ...], methods: str | None, grid_file: str | None, quick: bool, rounds: int,
     size: tuple[int, int] | None, pairs: tuple[str, ...], split: bool, split_size: tuple[int, int] | None,
-    threads: int | None, out: str, parents: bool, force: bool,
+    split_frames: int | None, threads: int | None, out: str, parents: bool, force: bool,
 ) -> int:
     """Measure error over time on SCENES (cornell_box where absent).
 
@@ -48,15 +50,17 @@ def _bench(
     from refgi.bench.results import Result, markdown, write_results
     from refgi.bench.split import with_splits
     from refgi.cli.destination import Permission, folder
-    from refgi.cli.settings import settings_for
+    from refgi.cli.settings import settings_for, still_frames
     from refgi.cli.view import View
     from refgi.compare.provenance import environment
     from refgi.errors import RefgiWarning, expect
 
     expect(not (quick and grid_file), "--grid", "--quick or --grid, not both", "both")
-    expect(split or split_size is None, "--split-size", "--split beside it", "none")
+    for option, given in (("--split-size", split_size), ("--split-frames", split_frames)):
+        expect(split or given is None, option, "--split beside it", "none")
     names = None if methods is None else [name.strip() for name in methods.split(",")]
     grid = chosen(read_grid(Path(grid_file)) if grid_file else built_in(quick), names)
+    still = still_frames({one.method for one in grid.choices}, split_frames, ())
     truth = settings_for(TRUTH, pairs)
     sources = scenes or ("cornell_box",)
     loaded = [View(source, size, None, None, None, None, ()).load() for source in sources]
@@ -74,7 +78,8 @@ def _bench(
                               source=sources[number], shadows="exact")
             if split:
                 options: dict[str, Any] = dict(zip(("width", "height"), split_size or (), strict=False))
-                one = with_splits(one, scene, grid, seeds=rounds, truth=truth, tell=told, shadows="exact", **options)
+                one = with_splits(one, scene, grid, seeds=rounds, truth=truth, tell=told, still=still,
+                                  shadows="exact", **options)
             made.append(one)
             result = Result(environment=environment(), scenes=tuple(made))
             write_results(result, path)

@@ -69,6 +69,11 @@ def _unblurred(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
     return dataclasses.replace(settings, blur=None)
 
 
+def _single_frame(options: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return options of a frame that is not the last of several."""
+    return {key: value for key, value in options.items() if key != "still"}
+
+
 APPROXIMATIONS = (
     Approximation("unseen senders", "only what the camera sees sends light",
                   limit=lambda _: {"emitters": "visible"}),
@@ -80,4 +85,5 @@ APPROXIMATIONS = (
     Approximation("cut", "crowns end before the picture does", _whole_picture),
     Approximation("upsampling", "the first level is half or a quarter of the resolution", _full_resolution),
     Approximation("few samples", "S samples a level for all its texels", _every_texel),
-    Approximation("blur", "the mean over texels of the same surface", _unblurred))
+    Approximation("blur", "the mean over texels of the same surface", _unblurred),
+    Approximation("temporal", "the frames before are blended in; here of a resting scene", frame=_single_frame))

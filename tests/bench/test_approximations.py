@@ -8,13 +8,17 @@ import pytest
 from refgi.bench.chain import REST, Renderer, chain_of
 from refgi.bench.grid import TRUTH, Choice
 from refgi.bench.measure import REFERENCE_SEED
+from refgi.bench.split import split_of
 from refgi.errors import RefgiWarning
 from refgi.methods import METHODS
+from refgi.provenance.frames import StillFrames
 from refgi.scene import load_scene
-from refgi.settings import of
+from refgi.settings import of, replaced
+from refgi.sssil.temporal import TemporalSettings
 from refgi.truth import TruthSettings
 
 OPTIONS = {"width": 32, "height": 24, "rsm_resolution": 64}
+STILL = StillFrames(6, TemporalSettings(weight=0.75))
 # settings with which every approximation of a method is made; of several kinds, where one excludes another
 MADE = {
     "sii": [{"lights": 64, "cut": "relative", "half_resolution": True, "openness.flux": "scale"}],
@@ -41,7 +45,8 @@ def renderer():
 
 @pytest.fixture(scope="module")
 def small():
-    return Renderer(load_scene("cornell_box"), TruthSettings(samples=24), width=24, height=18, rsm_resolution=32)
+    return Renderer(load_scene("cornell_box"), TruthSettings(samples=24), still=STILL, width=24, height=18,
+                    rsm_resolution=32)
 
 
 def settings_of(name, number):
@@ -50,6 +55,7 @@ def settings_of(name, number):
 
 def test_every_method_declares_its_own_once():
     assert set(MADE) == set(METHODS)
+    frames = {**OPTIONS, "still": STILL}
     for name, method in METHODS.items():
         declared = [one.name for one in method.approximations]
         assert declared, name
@@ -58,7 +64,7 @@ def test_every_method_declares_its_own_once():
         made = {one.name for number in range(len(MADE[name])) for one in method.approximations
                 if one.shared_by(settings_of(name, number))
                 or one.without(settings_of(name, number), OPTIONS)[0] != settings_of(name, number)
-                or one.without(settings_of(name, number), OPTIONS)[1] != OPTIONS}
+                or one.without(settings_of(name, number), frames)[1] != frames}
         assert made == set(declared)
 
 
@@ -141,6 +147,31 @@ def test_steps_switch_on_what_they_say(renderer):
             assert np.array_equal(link.pictures[seed], expected), (link.name, seed)
     assert chain.links[2].pictures[0] is chain.links[2].pictures[1]  # without random numbers it is made once
     assert not np.array_equal(*chain.links[-1].pictures)
+
+
+def test_frames_of_a_resting_scene_are_the_last_part(evidence):
+    """Each seed has frames of its own; the k-th counts as much as those before at first, then the share 1 - a."""
+    renderer = Renderer(load_scene("cornell_box"), TruthSettings(samples=24), still=STILL, **OPTIONS)
+    settings, seeds = settings_of("hssil", 0), 3
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RefgiWarning)  # short reach
+        chain = chain_of(renderer, Choice("hssil", (), settings), seeds)
+        frames = [METHODS["hssil"].function(renderer.frame, replaced(settings, {"seed": k})).astype(np.float64)
+                  for k in range(seeds * STILL.frames)]
+    assert chain.links[-1].name == "temporal"
+    for seed in range(seeds):
+        first, *others = frames[seed * STILL.frames : (seed + 1) * STILL.frames]
+        blend = first
+        for k, other in enumerate(others, 1):
+            share = min(STILL.temporal.weight, k / (k + 1))
+            blend = share * blend + (1 - share) * other
+        np.testing.assert_array_equal(chain.links[-2].pictures[seed], first)
+        np.testing.assert_array_equal(chain.alone["temporal"].pictures[seed], first)
+        np.testing.assert_allclose(chain.links[-1].pictures[seed], blend, atol=2e-6 * blend.mean(), rtol=0)
+    split = split_of(chain, Choice("hssil", (), settings))
+    evidence(f"hssil: RMSE {split.error.rmse:.3f} with {STILL.frames} frames, {split.parts[-1].alone.rmse:.3f} of one")
+    assert split.error.rmse < split.parts[-1].alone.rmse
+    assert split.parts[-1].share < 0  # takes back noise of few samples
 
 
 def test_truths_have_seeds_of_their_own_and_are_traced_once(tmp_path, monkeypatch):

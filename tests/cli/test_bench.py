@@ -74,6 +74,15 @@ def test_errors_are_split_where_asked_for(tmp_path):
     assert html.count("<details><summary>gather") == 2
 
 
+def test_a_split_of_blended_frames_has_a_temporal_part(tmp_path):
+    (tmp_path / "grid.toml").write_text("[hssil]\nlevels = [2]\n[gather]\nsamples = [20]\n")
+    done = run("--grid", tmp_path / "grid.toml", *SMALL, "--split", "--split-frames", "3", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    scene, = Result.model_validate_json((tmp_path / "out" / "results.json").read_text()).scenes
+    last = {split.method: split.parts[-1].name for split in scene.splits}
+    assert last == {"hssil": "temporal", "gather": "upsampling"}
+
+
 def test_a_split_that_fails_is_told(tmp_path, grid, monkeypatch):
     def refusing(*_arguments, **_options):
         raise InputError("refused here")

@@ -9,6 +9,7 @@ import dataclasses
 import functools
 import inspect
 import time
+import weakref
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ import numpy as np
 P = ParamSpec("P")
 R = TypeVar("R")
 Status = Literal["ran", "reused", "skipped"]
-Counted = Literal["pairs", "rays"]  # of light and receiver, before skips within a sum; traced
+Counted = Literal["pairs", "rays", "bytes"]  # of light and receiver, before skips within a sum; traced; of arrays made
 
 STAGES: dict[str, Callable[..., Any]] = {}  # every stage that is imported, by name
 KEPT_RESULTS = 8  # per stage: one per light of a scene with several, without hoarding buffers
@@ -51,6 +52,7 @@ class Log:
     counts: Counter[Counted] | None = None  # of what `tally` counts; None where nobody asked
     _depth: int = 0
     _open: list[str] = dataclasses.field(default_factory=list)
+    _made: dict[int, weakref.ref[Any]] = dataclasses.field(default_factory=dict)  # arrays whose bytes are counted
 
     def seconds(self, name: str) -> float:
         """Return the total time of all runs of the stage `name`, s."""
@@ -134,7 +136,7 @@ def observe(
     progress : callable, optional
         Called with (stage name, fraction done) as long stages advance.
     counting : bool
-        Count pairs and rays, which takes time of its own.
+        Count pairs, rays and bytes of the arrays that stages make, which takes time of its own.
 
     Yields
     ------
@@ -213,6 +215,8 @@ def _observed(
         seconds = time.perf_counter() - started
         log._depth -= 1
         log._open.pop()
+    if log.counts is not None:
+        log.counts["bytes"] += _bytes_made(output, log._made)
     if log.progress is not None:
         log.progress(name, 1.0)
     run = Run(name, "ran", seconds, log._depth)
@@ -222,6 +226,25 @@ def _observed(
     if memory is not None:
         memory.keep(name, inputs, output)
     return output
+
+
+def _bytes_made(value: Any, known: dict[int, weakref.ref[Any]]) -> int:
+    """Return bytes of the arrays of a value that are not known yet: a stage within another has made them already."""
+    if isinstance(value, np.ndarray):
+        while isinstance(value.base, np.ndarray):
+            value = value.base
+        held = known.get(id(value))
+        if held is not None and held() is value:
+            return 0
+        known[id(value)] = weakref.ref(value)
+        return int(value.nbytes)
+    if isinstance(value, Mapping):
+        value = value.values()
+    elif dataclasses.is_dataclass(value):
+        value = [getattr(value, field.name) for field in dataclasses.fields(value)]
+    elif not isinstance(value, list | tuple):
+        return 0
+    return sum(_bytes_made(one, known) for one in value)
 
 
 def _inputs(function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:

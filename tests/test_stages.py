@@ -1,6 +1,7 @@
 """Property tests of @stage: a stage is its function; observed, it is logged, reused and skipped with reasons."""
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -148,6 +149,37 @@ def test_a_stage_that_is_not_kept_runs_again():
     with stages.observe(memory=stages.Memory()) as log:
         assert fresh(1) == fresh(1) == 2
     assert log.status("test.fresh") == ["ran", "ran"]
+
+
+class Made(NamedTuple):
+    """What a stage may return."""
+
+    here: np.ndarray
+    there: dict[str, np.ndarray]
+
+
+def test_bytes_are_those_of_the_arrays_that_stages_make_each_once():
+    """Closed form: a stage within another, views, lists, and what a memory gives back again count nothing more."""
+    @stages.stage("test.inner_array")
+    def inner(count):
+        return np.zeros(count, np.float32)
+
+    @stages.stage("test.outer_arrays")
+    def outer(count):
+        held = inner(count)
+        return Made(held[: count // 2], {"own": np.zeros((3, count), np.float64)}), [held.reshape(2, -1)], "text"
+
+    with stages.observe(counting=True) as log:
+        outer(100)
+    assert log.counts["bytes"] == 100 * 4 + 300 * 8
+    with stages.observe(counting=True, memory=stages.Memory()) as log:
+        kept = [outer(100), outer(100), outer(10)]
+    assert log.counts["bytes"] == (100 + 10) * (4 + 3 * 8)
+    assert len(kept) == 3
+    with stages.observe(counting=True) as log:
+        for _ in range(5):
+            inner(1000)  # one after the other at the same address, as may be
+    assert log.counts["bytes"] == 5 * 4000
 
 
 def test_an_error_leaves_the_log_usable():

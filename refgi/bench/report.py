@@ -17,14 +17,16 @@ from refgi.image import write_text
 from refgi.provenance import Record
 
 COLUMNS = ("method", "settings", "time, ms", "RMSE, %", "95 % interval", "bias, %", "spread, %",
-           "own limits, %", "over truth's in equal time", "FLIP", "SSIM", "pairs, M", "rays, M", "memory, MiB")
+           "own limits, %", "over truth's in equal time", "FLIP", "SSIM", "pairs, M", "rays, M", "stages, MiB",
+           "memory, MiB")
 AXES = Axes("time of a frame, ms", "RMSE of indirect irradiance, %", log_x=True, log_y=True, decimal_x=True)
 HOW = ("Each round runs every choice once on a frame of its own, buffers included, with a seed of its own; times are "
        "medians. RMSE is plain, over all pixels that show a surface. Spread is the deviation between seeds, bias what "
        "is left without it and without the truth's own noise. Own limits: against the truth that leaves out what the "
-       "method cannot know. Memory is the most that arrays and objects hold above the scene. Bold rows are on the "
-       "front: nothing here is both faster and nearer. Bars are 95 % intervals of the RMSE. A click on a mark or on a "
-       "method's name opens the picture of its first seed; a click on a column's name sorts by it.")
+       "method cannot know. Stages is what the arrays hold that stages make, memory the most that arrays and objects "
+       "hold above the scene. Bold rows are on the front: nothing here is both faster and nearer. Bars are 95 % "
+       "intervals of the RMSE. A click on a mark or on a method's name opens the picture of its first seed; a click on "
+       "a column's name sorts by it.")
 
 
 def write_page(result: Result, folder: Path, refresh: int | None = None) -> None:
@@ -173,12 +175,12 @@ def _interval(run: Run) -> tuple[float, float]:
 
 
 def _row(name: str, run: Run) -> dict[str, Any]:
-    known, work = run.errors[TRUTH], run.work
+    known = run.errors[TRUTH]
     interval = "" if known.low is None else f"{percent(known.low)} to {percent(known.high)}"
     cells = [(_ms(run.seconds), run.seconds), (percent(known.rmse), known.rmse), (interval, known.low),
              (percent(known.bias), known.bias), (percent(known.spread), known.spread),
              (percent(run.own_limits), run.own_limits), (times(run.in_equal_time), run.in_equal_time),
              (times(run.flip), run.flip), (times(run.ssim), run.ssim),
-             *zip(taken(work), (None, None, None) if work is None else work.model_dump().values(), strict=True)]
+             *taken(run.work)]
     return {"name": name, "method": run.method, "settings": run.label, "front": run.front,
             "cells": [(text, sort_key(value)) for text, value in cells]}

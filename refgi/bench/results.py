@@ -18,7 +18,7 @@ from refgi.image import write_text
 FORMAT = "bench 1"
 LIMITED = ("unoccluded", "seen", "seen_unoccluded")  # truths of which nothing blocks light, whose senders are in view
 COLUMNS = ("scene", "method", "settings", "seconds", "fastest", "slowest", "rmse", "low", "high", "bias", "spread",
-           "noise", *(f"rmse_{name}" for name in LIMITED), "pairs", "rays", "peak_bytes", "flip", "ssim",
+           "noise", *(f"rmse_{name}" for name in LIMITED), "pairs", "rays", "bytes", "peak_bytes", "flip", "ssim",
            "against_truth_in_equal_time", "on_the_front", "refgi_format")
 
 
@@ -42,6 +42,7 @@ class Work(_Strict):
 
     pairs: int  # of light, or other sender, and receiver that sums are given, before skips within a sum
     rays: int  # traced
+    bytes: int | None = None  # of the arrays that stages make, each once
     peak_bytes: int  # most memory of arrays and objects above that of the scene
 
 
@@ -282,12 +283,13 @@ def markdown(result: Result) -> str:
     for scene in result.scenes:
         lines += [f"## {scene.scene}, {scene.width} x {scene.height}", "", scene.truth, "",
                   "| method | settings | ms | RMSE % | bias % | spread % | own limits % | over truth in equal time | "
-                  "pairs, M | rays, M | MiB | front |", "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|"]
+                  "pairs, M | rays, M | stages, MiB | peak, MiB | front |",
+                  "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|"]
         for run in sorted((*scene.runs, *scene.line), key=lambda one: one.seconds):
             error = run.errors["truth"]
             lines.append(f"| {run.method} | {run.label} | {number(1e3 * run.seconds)} | {percent(error.rmse)} | "
                          f"{percent(error.bias)} | {percent(error.spread)} | {percent(run.own_limits)} | "
-                         f"{times(run.in_equal_time)} | {' | '.join(taken(run.work))} | "
+                         f"{times(run.in_equal_time)} | {' | '.join(text for text, _ in taken(run.work))} | "
                          f"{'yes' if run.front else ''} |")
         if scene.cold:
             told = (f"{name} {number(seconds)} s" for name, seconds in scene.cold.items())
@@ -307,8 +309,8 @@ def times(value: float | None) -> str:
     return "" if value is None else f"{value:.3g}"
 
 
-def taken(work: Work | None) -> tuple[str, str, str]:
-    """Return millions of pairs and of rays, and MiB; nothing where they were not counted."""
-    if work is None:
-        return "", "", ""
-    return number(work.pairs / 1e6), number(work.rays / 1e6), number(work.peak_bytes / 2**20)
+def taken(work: Work | None) -> tuple[tuple[str, int | None], ...]:
+    """Return millions of pairs and of rays, MiB that stages make and at the peak, each with the number it is of."""
+    known = [None] * 4 if work is None else [work.pairs, work.rays, work.bytes, work.peak_bytes]
+    return tuple(("" if value is None else number(value / unit), value)
+                 for value, unit in zip(known, (1e6, 1e6, 2**20, 2**20), strict=True))

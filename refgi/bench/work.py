@@ -1,4 +1,4 @@
-"""What a picture takes beside time: pairs, rays and memory; and how long the first one of a new process takes."""
+"""What a picture takes beside time: pairs, rays, bytes, memory; and how long the first one of a new process takes."""
 
 import contextlib
 import json
@@ -98,7 +98,7 @@ def work_of(scene: Scene, choice: Choice, options: Mapping[str, Any]) -> Work:
         if not running:
             tracemalloc.stop()
     counts = log.counts or Counter()
-    return Work(pairs=counts["pairs"], rays=counts["rays"], peak_bytes=max(0, peak - before))
+    return Work(pairs=counts["pairs"], rays=counts["rays"], bytes=counts["bytes"], peak_bytes=max(0, peak - before))
 
 
 def cold_seconds(source: str, method: str, options: Mapping[str, Any]) -> float:

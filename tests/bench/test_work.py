@@ -136,6 +136,17 @@ def test_each_pass_more_takes_as_many_rays(box):
     assert few.pairs == 0
 
 
+def test_bytes_of_stages_grow_with_the_pixels(box):
+    """Each pixel has at least its id, position and normal, 28 bytes, and no more than some planes beside them.
+
+    A texel of a shadow map has its id and depth, 8 bytes: the rest is known where lights are drawn alone.
+    """
+    small, large = (taken(box, "sii", f"lights={LIGHTS}", width=side, height=side).bytes for side in (64, 128))
+    assert 28 <= (large - small) / (128**2 - 64**2) < 200
+    more = taken(box, "sii", f"lights={LIGHTS}", width=64, height=64, rsm_resolution=128).bytes
+    assert 8 <= (more - small) / (128**2 - 64**2) < 28
+
+
 def test_memory_holds_the_frame_s_buffers_and_not_the_scene(box):
     small, large = (taken(box, "sii", f"lights={LIGHTS}", width=size, height=size) for size in (128, 256))
     held = 256 * 256 * (3 + 3 + 3) * 4  # position, normal, irradiance

@@ -23,12 +23,14 @@ from rich.table import Table
 
 from refgi.testing import kit_folder
 from refgi.vectors.check import ALL_WITHIN, Asked, Kit, check_output
+from refgi.vectors.search import searched
 from refgi.vectors.spec import kind_of
 
 ROOT = Path(__file__).parents[1]
 BUGS = Path(__file__).with_name("kit_bugs")
-SOURCES = {"c": ROOT / "examples" / "ports" / "c", "c_fresh": ROOT / "examples" / "ports" / "c",
-           "glsl": ROOT / "examples" / "ports" / "glsl", "naive": ROOT / "tests"}
+PORTS = ROOT / "examples" / "ports"
+SOURCES = {"c": PORTS / "c", "c_fresh": PORTS / "c", "c_blind": PORTS / "c", "glsl": PORTS / "glsl",
+           "naive": ROOT / "tests"}
 LONGEST = 300.0  # s for one run of a port
 AIMS = {"found": 1.0, "named": 0.8}
 
@@ -53,6 +55,8 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--every", type=int, default=1, help="score each so many-th bug alone")
     parser.add_argument("--first", type=int, default=0, help="and begin with that one")
+    parser.add_argument("--search", type=float, default=0.0, metavar="SECONDS",
+                        help="search refgi's source for the change where fewer than three causes are known")
     parser.add_argument("--bugs", type=lambda text: {int(one) for one in text.split(",")}, help="score these alone")
     options = parser.parse_args(arguments)
     console, scores = Console(), []
@@ -65,7 +69,8 @@ def main(arguments: list[str]) -> int:
             if state:
                 console.print(f"{port}: left out, {state}")
                 continue
-            for score in pool.map(lambda one, port=port, right=right: _score(port, right, *one), bugs):
+            for score in pool.map(lambda one, port=port, right=right: _score(
+                    port, right, *one, seconds=options.search), bugs):
                 scores.append(score)
                 if score.state != "found" or not score.named:
                     console.print(f"{port} {score.number}: {score.state}, first {score.first or 'none'}; {score.what}; "
@@ -86,7 +91,7 @@ def _without_bugs(port: str, source: Path, out: Path) -> str:
     return "" if result.exit_code == ALL_WITHIN else f"it is wrong without a bug: {result.first}"
 
 
-def _score(port: str, right: Path, number: int, bug: dict[str, Any]) -> Score:
+def _score(port: str, right: Path, number: int, bug: dict[str, Any], *, seconds: float = 0.0) -> Score:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         source = _copied(right, folder)
@@ -101,11 +106,14 @@ def _score(port: str, right: Path, number: int, bug: dict[str, Any]) -> Score:
         said = _run(port, source, folder / "out", _cases_with(bug["stages"]))
         if said:  # a crash is seen without a checker
             return Score(port, number, bug["what"], "does not run", False, said, ())
-        return _judged(port, number, bug, folder / "out")
+        return _judged(port, number, bug, folder / "out", seconds)
 
 
-def _judged(port: str, number: int, bug: dict[str, Any], out: Path) -> Score:
-    result = check_output(Kit(kit_folder()), out, Asked())
+def _judged(port: str, number: int, bug: dict[str, Any], out: Path, seconds: float) -> Score:
+    kit = Kit(kit_folder())
+    result = check_output(kit, out, Asked())
+    if seconds:
+        result = searched(kit, out, Asked(), result, seconds=seconds)
     if result.first is None:
         return Score(port, number, bug["what"], "silent", False, "", ())
     where = {kind_of(stage) for stage in bug["stages"]}
@@ -142,7 +150,7 @@ def _run(port: str, source: Path, out: Path, cases: Iterable[str] = ()) -> str:
     kit = str(kit_folder())
     out.mkdir(exist_ok=True)
     in_c = [str(source / "port"), kit, str(out), *cases]
-    commands = {"c": in_c, "c_fresh": in_c,
+    commands = {"c": in_c, "c_fresh": in_c, "c_blind": in_c,
                 "glsl": [sys.executable, str(source / "run.py"), kit, str(out), *cases],
                 "naive": [sys.executable, "-m", "tests.vectors.naive_run", kit, str(out), *cases]}
     return _said(commands[port], source.parent if port == "naive" else source)

@@ -43,11 +43,13 @@ def _export(session: Session, /, kit: str, out: str, case: str | None) -> None:
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only cases whose id begins so; repeatable.")
 @click.option("--tier", "tiers", multiple=True, metavar="[STAGE=]TIER",
               help="T0 equal, T1 float32 rounding, T2 storage in half floats, T2B in 8 bits; repeatable.")
+@click.option("--search", "seconds", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
+              help="Try single changes of refgi's own source on the first wrong stage, for so long.")
 @click.option("--json", "json_file", metavar="FILE", help="Write the verdicts as JSON.")
 @click.option("--html", "html_file", metavar="FILE", help="Write a page with the arrays side by side.")
 def _check(
     kit: str, output: str, chained: bool, stages: tuple[str, ...], cases: tuple[str, ...], tiers: tuple[str, ...],
-    json_file: str | None, html_file: str | None,
+    seconds: float | None, json_file: str | None, html_file: str | None,
 ) -> int:
     """Judge the arrays in OUTPUT by KIT: the first wrong stage, its worst element, likely causes.
 
@@ -61,6 +63,11 @@ def _check(
     try:
         opened = Kit(Path(kit))
         result = check_output(opened, Path(output), asked)
+        if seconds is not None:
+            from refgi.vectors.search import searched
+
+            with progress() as tell:
+                result = searched(opened, Path(output), asked, result, seconds=seconds, tell=tell)
         if json_file is not None:
             from refgi.image.whole import write_text
             from refgi.vectors.manifest import text_of

@@ -67,9 +67,31 @@ def explain(
                    *_taken_for(difference, others)]
         found = [Cause(cause=cause, share=share) for cause, predicted in guesses
                  if (share := explained(difference, predicted)) >= EXPLAINED]
-        found = found or [*_order(difference), *_slight(difference)]
+        found = found or [*_at_one_place(difference, factors)] or [*_order(difference), *_slight(difference)]
     unique = {cause.cause: cause for cause in sorted(found, key=lambda one: -round(one.share, 2))}
     return list(unique.values())
+
+
+def _at_one_place(difference: Difference, factors: Mapping[str, float]) -> Iterator[Cause]:
+    """Yield what explains a difference that lies in one channel, component or other place of an axis alone."""
+    at, names = np.argwhere(difference.out), axes_of(difference.entry.axes)
+    if len(names) != difference.out.ndim:
+        return
+    for axis, name in enumerate(names):
+        size, indices = difference.out.shape[axis], np.unique(at[:, axis])
+        if size < 2 or len(indices) > 1 or len(at) < FEWEST:
+            continue
+        index = int(indices[0])
+        expected, got, out, limit = (np.take(one, index, axis) for one in difference[2:])
+        rest = ", ".join(names[:axis] + names[axis + 1 :])
+        entry = difference.entry.model_copy(update={"axes": rest})
+        part = Difference(difference.name, entry, expected, got, out, limit)
+        guesses = [*_factors(part, factors), *_coded(part)]
+        others = [(f"it holds {name} {k}", np.take(difference.expected, k, axis)) for k in range(size) if k != index]
+        taken = [one for one in others if explained(part, one[1]) >= EXPLAINED]
+        for cause, predicted in [*guesses, *(taken if len(taken) == 1 else [])]:  # several: they are alike
+            if (share := explained(part, predicted)) >= EXPLAINED:
+                yield Cause(cause=f"at {name} {index} alone: {cause}", share=share)
 
 
 def told_at_once(difference: Difference) -> list[Cause]:

@@ -4,6 +4,7 @@ A port writes what a stage writes to `OUTPUT/<case>/<array>.npy`. Isolated, it h
 chained, from its own outputs, and the bounds are those of a chain.
 """
 
+import itertools
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -190,6 +191,41 @@ def stage_of_array(kit: Kit, case: str, name: str, got: Array, tier: str = "T1")
                         arrays=(judged.verdict,), causes=tuple(causes[:CAUSES]))
 
 
+def _ratios(kit: Kit, case: CaseManifest) -> dict[str, float]:
+    """Return what an element comes to where a channel of a colour that is given takes the place of another."""
+    found: dict[str, float] = {}
+    for name in case.given:
+        if case.arrays[name].axes == "rgb" and case.arrays[name].shape == (3,):
+            colour = dict(zip(("red", "green", "blue"), kit.array(case, name).astype(float), strict=True))
+            found |= {f"{name}, {a}/{b}": x / y for (a, x), (b, y) in itertools.permutations(colour.items(), 2)
+                      if x and y}
+    return found
+
+
+def differences_of(
+    kit: Kit, case: CaseManifest, step: StageEntry, output: Path, asked: Asked
+) -> dict[str, Difference]:
+    """Return what is out of the arrays that a port has of one stage, by name.
+
+    Raises
+    ------
+    DamagedError
+        If one cannot be read.
+    """
+    files = {name: file for name in step.writes if (file := find_array(output, case.id, name)) is not None}
+    arrays = {name: read_array(file) for name, file in files.items()}
+    judged = {name: _judged(kit, case, name, arrays, asked.tier_of(step.name), asked) for name in arrays}
+    return _differing(kit, case, judged, arrays)
+
+
+def _differing(
+    kit: Kit, case: CaseManifest, judged: Mapping[str, Judged], arrays: Mapping[str, Array]
+) -> dict[str, Difference]:
+    return {name: Difference(name, case.arrays[name], kit.array(case, name), arrays[name], one.out, one.limit)
+            for name, one in judged.items() if one.verdict.verdict == "out" and one.out is not None
+            and one.limit is not None}
+
+
 def _judged(
     kit: Kit, case: CaseManifest, name: str, arrays: Mapping[str, Array], tier: str, asked: Asked
 ) -> Judged:
@@ -226,9 +262,7 @@ def _causes(
     kit: Kit, case: CaseManifest, step: StageEntry, judged: Mapping[str, Judged], arrays: Mapping[str, Array]
 ) -> list[Cause]:
     """Return the causes that explain a stage's difference: the stage's own likely bugs first, then any array's."""
-    differing = {name: Difference(name, case.arrays[name], kit.array(case, name), arrays[name], one.out, one.limit)
-                 for name, one in judged.items() if one.verdict.verdict == "out" and one.out is not None
-                 and one.limit is not None}
+    differing = _differing(kit, case, judged, arrays)
     shapes = {name: array.shape for name, array in arrays.items()}
     found, bugs = [], kit.bugs(case)
     for bug in bugs.of(step.name):
@@ -241,8 +275,9 @@ def _causes(
         share = 1.0 if other_shape and not differing else share
         if share >= EXPLAINED:
             found.append(Cause(cause=bug.cause, share=share, paper=bug.paper))
+    factors = {**case.factors, **_ratios(kit, case)} if differing else {}
     for one in differing.values():
-        found += explain(one, case.factors, {name: kit.array(case, name) for name in case.arrays
+        found += explain(one, factors, {name: kit.array(case, name) for name in case.arrays
                                               if case.arrays[name].shape == one.expected.shape})
     if not found and not differing:
         found = [Cause(cause="no known cause fits this shape", share=0.0)]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from refgi.vectors.kit import Asked
 from tests.vectors.port import Port
 
 
@@ -53,6 +54,9 @@ BUGS = [
     ("lights.map", lambda a: np.where(a == 0, 2, a), "every 0 is 2"),
     ("gbuffer.depth", lambda a: np.where(np.isinf(a), 0, a), "0 in place of infinity"),
     ("lights.lobe_exponent", lambda a: a[::-1], "lights are in reverse order"),
+    ("rsm0.flux", lambda a: np.stack([a[0], 1.7 * a[1], a[2]]), "at rgb 1 alone: every element is 1.7 times"),
+    ("rsm0.position", lambda a: a[[0, 1, 1]], "at xyz 2 alone: it holds xyz 1"),
+    ("gbuffer.albedo", lambda a: np.stack([a[0], a[1], srgb(a[2])]), "at rgb 2 alone: encoded as sRGB"),
 ]
 
 
@@ -64,6 +68,16 @@ def test_a_bug_is_named(kit, tmp_path, array, bug, said):
     assert array in {one.name for one in port.first().arrays if one.verdict == "out"}
     causes = [one.cause for one in port.first().causes]
     assert any(said in one for one in causes), causes
+
+
+def test_the_power_of_another_channel_is_named(kit, tmp_path):
+    port = Port(kit, "sii-warp-a", tmp_path)
+    case = next(one for one in kit.cases(Asked(cases=("sii-warp-a",))) if one.id == "sii-warp-a")
+    red, green, _ = kit.array(case, "light0.intensity")
+    assert abs(red / green - 1) > 0.05
+    port.write("rsm0.flux", port.arrays["rsm0.flux"] * np.array([1, red / green, 1])[:, None, None])
+    causes = [one.cause for one in port.first().causes]
+    assert "at rgb 1 alone: every element is light0.intensity, red/green times what it should be" in causes
 
 
 def test_another_array_in_its_place_is_named(kit, tmp_path):

@@ -1,0 +1,149 @@
+"""The search for a cause among single changes of refgi's source: ports with bugs that no likely bug is."""
+
+import ast
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from refgi.cli.group import VerbGroup
+from refgi.errors import RefgiError
+from refgi.vectors.check import Asked, check_output
+from refgi.vectors.kit import Kit
+from refgi.vectors.manifest import Result
+from refgi.vectors.search import searched
+from refgi.vectors.search.edits import edits_of
+from refgi.vectors.spec import stored
+
+FUNCTION = '''
+def area(values, i, scale, *, offset=1):
+    """Say nothing."""
+    total = 0.0
+    for k in range(1, i):
+        total += math.sin(values[k, 0]) * scale - offset
+        if total > 2.5 and scale < 1.0:
+            continue
+    return max(total, -values.low) if offset else box["row"] + box["column"] ** 2
+'''
+
+
+def changed():
+    """Return the texts of a function with each change, and whether it is one of names."""
+    tree = ast.parse(FUNCTION)
+    before = ast.dump(tree)
+    found = {}
+    for edit in edits_of(tree.body[0]):
+        edit.put()
+        compile(tree, "area.py", "exec")
+        found[ast.unparse(tree.body[0])] = edit.is_name
+        edit.take_back()
+        assert ast.dump(tree) == before
+    return found
+
+
+@pytest.mark.parametrize(("old", "new", "is_name"), [
+    ("* scale - offset", "* scale + offset", False), ("* scale - offset", "/ scale - offset", False),
+    ("math.sin(values[k, 0]) * scale", "math.sin(values[k, 0])", False), ("math.sin", "math.cos", False),
+    ("values[k, 0]", "values[0, k]", False), ("values[k, 0]", "values[k + 1, 0]", False),
+    ("values[k, 0]", "values[k, 1]", False), ("range(1, i)", "range(0, i)", False),
+    ("range(1, i)", "range(1, i - 1)", False),
+    ("total > 2.5", "total < 2.5", False), ("total > 2.5", "total > 5.0", False), (" and ", " or ", False),
+    ("total += ", "total = ", False), ("continue", "pass", False), ("max(", "min(", False),
+    ("max(total, -values.low)", "max(total, values.low)", False), ("max(total, -values.low)", "total", False),
+    ("['row'] + box", "['row'] - box", False), ("['column'] ** 2", "['column']", False),
+    ("total > 2.5 and scale", "total > 2.5 and k", True), ("* scale -", "* i -", True),
+    ("['row']", "['column']", True)])
+def test_changes_are_those_that_people_make(old, new, is_name):
+    plain = ast.unparse(ast.parse(FUNCTION).body[0])
+    assert old in plain
+    assert changed().get(plain.replace(old, new, 1)) is is_name
+
+
+def test_docstrings_annotations_and_names_of_functions_stay():
+    assert all('"""Say nothing."""' in text and "def area(values, i, scale, *, offset=1)" in text for text in changed())
+
+
+def test_what_is_told_is_short_and_says_both():
+    said = [edit.said for edit in edits_of(ast.parse(FUNCTION).body[0])]
+    assert "`range(1, i - 1)` for `range(1, i)`" in " ".join(said)
+    assert max(map(len, said)) < 320
+
+
+def samples(kit, sign):
+    """Return the samples of a level in NumPy, from a kit's inputs: crown points turned by each texel's own angle.
+
+    HSSIL Sec. 3.2: r (1 + u) from the receiver, 2 pi r l over N and pi r^2 texels each. `sign` is of the second row of
+    the rotation: 1 is right.
+    """
+    case = next(one for one in kit.cases(Asked(cases=("hssil-default",))) if one.id == "hssil-default")
+    points, shifts = (kit.array(case, f"samples3.{name}").astype(float) for name in ("points", "shifts"))
+    facts = case.facts["samples3"]
+    u = (points[:, 0] + shifts[..., :1]) % 1
+    turn = 2 * math.pi * shifts[..., 1:]
+    length = facts["radius"] * (1 + u)
+    x = length * (points[:, 1] * np.cos(turn) - points[:, 2] * np.sin(turn))
+    y = length * (sign * points[:, 1] * np.sin(turn) + points[:, 2] * np.cos(turn))
+    weight = 2 * math.pi * facts["radius"] * length / facts["crown"]
+    return {"samples3.offsets": np.floor(np.stack([x, y], -1) + 0.5).astype(int), "samples3.weight": weight}
+
+
+def written(folder, arrays):
+    (folder / "hssil-default").mkdir(parents=True)
+    for name, array in arrays.items():
+        np.save(folder / "hssil-default" / f"{name}.npy", stored(array))
+    return folder
+
+
+def test_a_wrong_sign_that_is_no_likely_bug_is_named(kit, tmp_path, evidence):
+    output = written(tmp_path / "wrong", samples(kit, -1))
+    result = check_output(kit, output, Asked())
+    assert result.first == ("hssil-default", "samples3")
+    assert not any(cause.explained for cause in result.findings[0].causes)
+    told = []
+    found = searched(kit, output, Asked(), result, tell=lambda what, done: told.append((what, done)))
+    first, *_ = found.findings[0].causes
+    evidence(f"found: {first.cause}")
+    assert "sine" in first.cause
+    assert "sssil/crown/points.py" in first.cause
+    assert first.explained == 1
+    assert told[0][0].startswith("samples: ")
+    assert 0 <= told[-1][1] <= 1
+    assert found.model_copy(update={"findings": result.findings}) == result  # nothing else is touched
+
+
+def test_it_is_asked_for_on_the_command_line(kit, tmp_path):
+    output = written(tmp_path / "wrong", samples(kit, -1))
+    arguments = ["vectors", "check", str(kit.folder), str(output), "--case", "hssil-default"]
+    without = CliRunner().invoke(VerbGroup.refgi(), arguments)
+    assert without.exit_code == 1
+    assert "points.py" not in without.stdout
+    done = CliRunner().invoke(VerbGroup.refgi(), [*arguments, "--search", "60", "--json", str(tmp_path / "found.json")])
+    assert done.exit_code == 1, done.output
+    assert "as if refgi's sssil/crown/points.py" in " ".join(done.stdout.split())
+    found = Result.model_validate_json((tmp_path / "found.json").read_text())
+    assert "points.py" in found.findings[0].causes[0].cause
+
+
+def test_nothing_is_searched_where_nothing_is_wrong(kit, tmp_path):
+    output = written(tmp_path / "right", samples(kit, 1))
+    result = check_output(kit, output, Asked())
+    assert result.first is None
+    assert searched(kit, output, Asked(), result) is result
+
+
+def test_what_nothing_explains_stays_without_a_cause(kit, tmp_path):
+    made = samples(kit, 1)
+    made["samples3.weight"] = made["samples3.weight"] * np.random.default_rng(0).uniform(0.5, 2, (4, 4, 12))
+    output = written(tmp_path / "noise", made)
+    result = check_output(kit, output, Asked())
+    assert searched(kit, output, Asked(), result, seconds=5.0) == result
+
+
+def test_a_search_that_fails_says_why(kit, tmp_path, monkeypatch):
+    output = written(tmp_path / "wrong", samples(kit, -1))
+    result = check_output(kit, output, Asked())
+    gone = Kit(kit.folder)
+    monkeypatch.setattr(gone, "folder", tmp_path / "gone")
+    with pytest.raises(RefgiError, match=r"search: the process ended with nothing: .*gone"):
+        searched(gone, output, Asked(), result)

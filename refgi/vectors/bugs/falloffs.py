@@ -41,6 +41,10 @@ FALLOFFS: Mapping[str, Falloff] = MappingProxyType({
         clamped(t) * (6 * clamped(t) - 15) + 10)),
     "the falloff runs the wrong way: 1 minus what it should be, dark within and bright beyond the cone": _of_t(
         lambda t: 1 - smoothstep(clamped(t))),
+    "the falloff is twice as steep: a factor 2 of the difference of the cones' cosines is missing": _of_t(
+        lambda t: smoothstep(clamped(2 * t))),
+    "the falloff is half as steep: the difference of the cones' cosines counts twice": _of_t(
+        lambda t: smoothstep(clamped(t / 2))),
     "outside the cone the falloff is not clamped to 0: t below 0": _of_t(lambda t: smoothstep(np.minimum(t, 1))),
     "inside the inner cone the falloff is not clamped to 1: t above 1": _of_t(lambda t: smoothstep(np.maximum(t, 0))),
     "the falloff is not clamped at all: t below 0 and above 1": _of_t(smoothstep),

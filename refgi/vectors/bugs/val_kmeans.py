@@ -69,6 +69,7 @@ METRICS: Mapping[str, Metric] = {
     "the angle's complement: asin for acos": Metric(turned=lambda along, across: np.arctan2(along, across)),
     "half of 1 - cosine in place of the angle over pi": Metric(
         turned=lambda along, across: np.pi * (1 - along) / 2 + 0 * across),
+    "1 - cosine in place of the angle": Metric(turned=lambda along, across: 1 - along + 0 * across),
     "places do not count: normals alone": Metric(weights=lambda wx, wa: (0.0, wa)),  # noqa: ARG005
     "the weight of places w_x is missing: it counts as 1": Metric(weights=lambda wx, wa: (1.0, wa)),  # noqa: ARG005
     "the weight of angles w_a is missing: it counts as 1": Metric(weights=lambda wx, wa: (wx, 1.0)),  # noqa: ARG005

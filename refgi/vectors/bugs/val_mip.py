@@ -1,6 +1,7 @@
 """Mip levels of the basis as a port gets them wrong (VAL Sec. 6)."""
 
 from collections.abc import Callable, Mapping
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from refgi.vectors.spec import Array, Arrays, Bug, Run
 
 MEANS = "means of texels 2 i and 2 i + 1; of an odd side the last counts twice"
+FOUR = ("upper left", "upper right", "lower left", "lower right")
 Half = Callable[[Array], Array]
 
 
@@ -49,11 +51,9 @@ HALVES: Mapping[str, Half] = {
     "two of four texels: the diagonal": _of(lambda a, b, c, d: (a + d) / 2),  # noqa: ARG005
     "three of four texels: the lower right is missing, divided by 4": _of(lambda a, b, c, d: (a + b + c) / 4),  # noqa: ARG005
     "three of four texels: the lower right is missing, divided by 3": _of(lambda a, b, c, d: (a + b + c) / 3),  # noqa: ARG005
-    "the upper left texel counts twice: for the lower right": _of(lambda a, b, c, d: (2 * a + b + c) / 4),  # noqa: ARG005
-    "the upper right texel counts twice: for the lower left": _of(lambda a, b, c, d: (a + 2 * b + d) / 4),  # noqa: ARG005
-    "the lower left texel counts twice: for the upper right": _of(lambda a, b, c, d: (a + 2 * c + d) / 4),  # noqa: ARG005
-    "the upper left texel counts twice: for the lower left": _of(lambda a, b, c, d: (2 * a + b + d) / 4),  # noqa: ARG005
-    "the upper left texel counts twice: for the upper right": _of(lambda a, b, c, d: (2 * a + c + d) / 4),  # noqa: ARG005
+    **{f"the {FOUR[twice]} texel counts twice: for the {FOUR[never]}, which is left out": _of(
+        lambda *four, twice=twice, never=never: (sum(four) + four[twice] - four[never]) / 4)
+       for twice, never in permutations(range(4), 2)},
     "half of the sum of four texels: divided by 2": _of(lambda a, b, c, d: (a + b + c + d) / 2),
     "divided by 3 in place of 4": _of(lambda a, b, c, d: (a + b + c + d) / 3),
     "divided by 8 in place of 4": _of(lambda a, b, c, d: (a + b + c + d) / 8),

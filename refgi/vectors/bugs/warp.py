@@ -1,6 +1,7 @@
 """What ports get wrong in the hierarchical warp (SII Sec. 3.5, Eq. 4 to 6): its literal form, point by point."""
 
 from collections.abc import Callable, Iterator
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from refgi.lights.importance import border
 from refgi.lights.warp import Warp
 from refgi.vectors.bugs.points import below_1
+from refgi.vectors.bugs.val_mip import FOUR
 from refgi.vectors.recipe import reading
 from refgi.vectors.spec import Array, Arrays, Bug, Run
 
@@ -69,6 +71,9 @@ def warp_bugs(name: str, maps: int, warp: Warp, run: Run) -> Iterator[Bug]:
             ("columns are chosen by the row of cells that was not chosen", {"row_of": 2})):
         if "row_of" not in knobs or a:
             yield Bug(cause, literal(**knobs), EQ)
+    for twice, never in permutations(range(4), 2):
+        yield Bug(f"the {FOUR[twice]} quarter counts twice in the sum of the mip, the {FOUR[never]} one never",
+                  literal(joined=f"{twice}{never}"), EQ)
     yield from _renormalised(name, run)
     yield Bug("nothing is warped: points stay and weights are 1", literal(Warp(warp.method, 0)), EQ)
     if levels:
@@ -243,7 +248,9 @@ def _mip(plane: Array, depth: int, joined: str) -> list[Array]:
     join: dict[str, Callable[..., Array]] = {
         "": lambda a, b, c, d: (a + b) + (c + d), "upper": lambda a, b, c, d: np.maximum(a, b) + (c + d),
         "lower": lambda a, b, c, d: (a + b) + np.maximum(c, d), "one": lambda a, *_: a,
-        "max": lambda *four: np.max(four, axis=0), "three": lambda a, b, c, _d: a + b + c}
+        "max": lambda *four: np.max(four, axis=0), "three": lambda a, b, c, _d: a + b + c,
+        **{f"{twice}{never}": lambda *four, twice=twice, never=never: sum(four) + four[twice] - four[never]
+           for twice, never in permutations(range(4), 2)}}
     levels = [finest]
     for _ in range(depth):
         below = levels[0]

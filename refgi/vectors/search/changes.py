@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from refgi.errors import RefgiError
 from refgi.vectors.findings import CAUSES
@@ -58,18 +59,21 @@ def searched(
     task = {"kit": str(kit.folder), "output": str(output), "chained": asked.chained, "tiers": dict(asked.tiers),
             "wrong": _of_few_cases(wrong), "seconds": seconds}
     found = [CommonCause(cause=f"{one['said']}, as if refgi's {one['file']}:{one['line']} were changed so in "
-                               f"{one['function']}", explained=len(wrong), tried=len(wrong))
+                               f"{one['function']}", explained=one["explained"], tried=one["tried"])
              for one in _run(task, first, tell)]
     causes = (*known, *found[: CAUSES - len(known)]) or first.causes
     return result.model_copy(update={"findings": (first.model_copy(update={"causes": causes}), *result.findings[1:])})
 
 
 def _of_few_cases(wrong: list[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return one stage of each of the first cases."""
-    return [*{case: (case, stage) for case, stage in reversed(wrong)}.values()][::-1][:MOST_CASES]
+    """Return the first stage of each of the first cases."""
+    firsts: dict[str, str] = {}
+    for case, stage in wrong:
+        firsts.setdefault(case, stage)
+    return list(firsts.items())[:MOST_CASES]
 
 
-def _run(task: dict[str, object], first: Finding, tell: Tell) -> list[dict[str, object]]:
+def _run(task: dict[str, object], first: Finding, tell: Tell) -> list[dict[str, Any]]:
     """Run the task in a process in which kernels are plain Python."""
     command = [sys.executable, "-m", "refgi.vectors.search.trial"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

@@ -12,7 +12,7 @@ COMPARED = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 EQUAL = (ast.Eq, ast.NotEq)
 FAMILIES = (("cos", "sin", "tan"), ("arccos", "arcsin"), ("acos", "asin"), ("min", "max"), ("minimum", "maximum"),
             ("fmin", "fmax"), ("floor", "ceil", "rint", "trunc"), ("argmin", "argmax"), ("any", "all"),
-            ("sum", "mean", "max"), ("sqrt", "square"), ("zeros", "ones"), ("cosine_of", "sine_of"))
+            ("sum", "mean", "max"), ("sqrt", "square"), ("zeros", "ones"))
 ALIKE = {name: tuple(dict.fromkeys(one for family in FAMILIES if name in family for one in family if one != name))
          for name in {name for family in FAMILIES for name in family}}
 MODULES = ("np", "math", "numba")  # whose functions are no attributes of variables
@@ -219,10 +219,8 @@ def _statements(node: ast.stmt) -> Iterator[ast.AST]:
         yield ast.If(ast.UnaryOp(ast.Not(), node.test), node.body, node.orelse)
         for always in (True, False):
             yield ast.If(ast.Constant(always), node.body, node.orelse)
-    elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Subscript | ast.Name):
-        if isinstance(node.targets[0], ast.Subscript):
-            yield ast.Pass()
-    elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+    elif (isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Subscript)) or (
+            isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)):
         yield ast.Pass()
 
 

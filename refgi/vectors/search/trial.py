@@ -5,6 +5,7 @@ Reads a `Task` as JSON from its input, tells its progress and writes what it fou
 
 import ast
 import gc
+import hashlib
 import json
 import random
 import resource
@@ -14,6 +15,7 @@ import time
 import types
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -62,7 +64,16 @@ class Found(NamedTuple):
     function: str
     file: str
     line: int
-    share: float
+    explained: int  # cases
+    tried: int
+    share: float  # of the elements that differ in them, the mean
+
+
+class Outcome(NamedTuple):
+    """What a change leads to."""
+
+    share: float  # of the differing elements that it explains; 0 where it does not run
+    digest: bytes  # of its arrays
 
 
 class TooSlowError(Exception):
@@ -83,7 +94,7 @@ def main() -> int:
 
 
 def search(task: Task, tell: Callable[[float, int], None]) -> list[Found]:
-    """Return the changes that explain all wrong cases of a task, those that explain most first.
+    """Return the changes that explain the first wrong case of a task, those that explain most cases first.
 
     Parameters
     ----------
@@ -98,18 +109,17 @@ def search(task: Task, tell: Callable[[float, int], None]) -> list[Found]:
         One of those that give the same arrays: the first in the order of `edits_of`.
     """
     kit, asked = Kit(Path(task.kit)), Asked(chained=task.chained, tiers=task.tiers)
-    kept: list[tuple[Change, float]] | None = None
-    for case, stage in map(tuple, task.wrong):
-        trial = Trial(kit, asked, Path(task.output), case, stage)
-        if not trial.usable:
-            continue
-        if kept is None:
-            kept = list(_explaining(trial, trial.changes(), task.seconds, tell))[:MOST_KEPT]
-        else:
-            again = [(change, min(share, trial.share(change))) for change, share in kept]
-            kept = [(change, share) for change, share in again if share >= EXPLAINED] or kept
-    best = sorted(kept or [], key=lambda one: -round(one[1], 2))
-    return [Found(change.edit.said, change.function, change.file, change.edit.line, share) for change, share in best]
+    trials = [Trial(kit, asked, Path(task.output), case, stage) for case, stage in task.wrong]
+    trials = [trial for trial in trials if trial.usable]
+    if not trials:
+        return []
+    found = []
+    for change, share in islice(_explaining(trials[0], trials[0].changes(), task.seconds, tell), MOST_KEPT):
+        shares = [share, *(trial.tried(change).share for trial in trials[1:])]
+        right = [one for one in shares if one >= EXPLAINED]
+        found.append(Found(change.edit.said, change.function, change.file, change.edit.line, len(right), len(shares),
+                           sum(right) / len(right)))
+    return sorted(found, key=lambda one: (-one.explained, -round(one.share, 2)))
 
 
 def _explaining(
@@ -123,10 +133,10 @@ def _explaining(
             break
         if number % 50 == 0:
             tell(max(number / len(changes), spent / seconds), number)
-        share = trial.share(change)
-        if share >= EXPLAINED and trial.last not in known:
-            known.add(trial.last)
-            yield change, share
+        outcome = trial.tried(change)
+        if outcome.share >= EXPLAINED and outcome.digest not in known:
+            known.add(outcome.digest)
+            yield change, outcome.share
 
 
 class Trial:
@@ -154,7 +164,6 @@ class Trial:
         self._known = {name: kit.array(manifest, name) for name in manifest.arrays}
         for array in self._known.values():
             array.setflags(write=False)
-        self.last = ""  # of the arrays of the run before
         self._seconds = LEAST_SECONDS
         self._reached: dict[types.CodeType, set[int]] = {}  # and the lines that ran
         self.usable = bool(self._wrong) and self._is_right()
@@ -192,20 +201,20 @@ class Trial:
         random.Random(0).shuffle(found)
         return sorted(found, key=lambda one: (one.file.startswith("vectors"), one.edit.is_name))
 
-    def share(self, change: Change) -> float:
-        """Return the share of the differing elements that a change explains; 0 where it does not run."""
+    def tried(self, change: Change) -> Outcome:
+        """Run the stage with a change."""
         try:
             with self._put(change), _limited(self._seconds):
                 made = outputs_of(self._stage, self._known, np.float64)
         except Exception:  # whatever a change leads to
-            return 0.0
+            return Outcome(0.0, b"")
         shares = [explained(one, made[name]) if made[name].shape == one.expected.shape else 0.0
                   for name, one in self._wrong.items()]
         for name in made.keys() - self._wrong.keys():  # arrays that the port has right
             same = made[name].shape == self._known[name].shape
             shares.append(float((distance(made[name], self._known[name]) <= self._limits[name]).mean()) if same else 0)
-        self.last = repr([array.tobytes() for _, array in sorted(made.items())])
-        return min(shares)
+        digest = hashlib.sha256(b"".join(array.tobytes() for _, array in sorted(made.items()))).digest()
+        return Outcome(min(shares), digest)
 
     @contextmanager
     def _put(self, change: Change) -> Iterator[None]:

@@ -5,13 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from refgi.cluster import PRESETS, ValSettings, val
+from refgi.cluster import PRESETS, ValSettings, extra_bytes, val
 from refgi.cluster.settings import GeometryBlur
 from refgi.cluster.val import cluster_lights
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights.selection import choose_lights
+from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
@@ -188,6 +189,19 @@ def test_what_is_ignored_near_a_cluster_follows_the_kind_of_shadow(ball):
             np.testing.assert_array_equal(drawn[kind], given)
     assert not np.array_equal(drawn["csm"], drawn["pcss"])
     assert small({"visibility": "none"}).drawn_maps.near_share == shares["csm"]
+
+
+def test_memory_of_maps_is_counted():
+    """Closed form: depths twice; where they are filtered, basis, basis-z, means and depth of as many as are at once."""
+    def counted(**how):
+        with threads(1):  # one map is filtered while another one is read from
+            return extra_bytes(of(ValSettings, lights=64, clusters=6, maps=32, **how), Extent((1, 1)))
+
+    hard = counted(visibility="hard")
+    assert hard == pytest.approx(2 * 6 * 32**2 * 4, rel=0.01)
+    assert counted(visibility="csm", terms=4, prefilter="brute") - hard == 2 * 32**2 * (4 * 4 + 2) * 4
+    assert counted(visibility="csm", terms=4) - hard == 2 * 32**2 * (1 + (2 * 8 + 3) // 3) * 4  # levels above alone
+    assert counted(visibility="none") < hard
 
 
 def test_the_preset_of_the_paper_has_the_printed_values(ball):

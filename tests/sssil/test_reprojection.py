@@ -133,8 +133,9 @@ def test_another_normal_is_another_surface(degrees, passes):  # arccos 0.95 is 1
     assert (weight == passes).all()
 
 
-def test_points_behind_beside_and_nowhere_find_nothing():
-    there, position = wall(dtype=np.float32)
+@pytest.mark.parametrize("distance", [2.0, 1.0])
+def test_points_behind_beside_and_nowhere_find_nothing(distance):
+    there, position = wall(distance=distance, dtype=np.float32)
     far = position.copy()
     far[0] += 5
     behind = -position

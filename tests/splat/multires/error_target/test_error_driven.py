@@ -241,12 +241,15 @@ def test_residuals_are_those_of_the_interpolated_normals():
 
 
 @pytest.mark.parametrize("clamp", [{}, {"clamp": "distance", "clamp_value": 0.05}])
-def test_near_light_is_what_exceeds_the_bound(clamp):
+@pytest.mark.parametrize("facing", ["down", "anywhere"])
+def test_near_light_is_what_exceeds_the_bound(clamp, facing):
     """Analytic: sum of (Phi / pi) max(0, g - b) over all pairs."""
     rng = np.random.default_rng(5)
     position, normal = plane(23, 37)
     at = rng.uniform((0, 0.01, 0), (3.7, 0.3, 2.3), (64, 3)).T
-    lights = PixelLights(at, np.tile([[0.0], [-1.0], [0.0]], 64), rng.uniform(0.1, 1, (3, 64)), *(None,) * 3, 64)
+    axis = np.tile([[0.0], [-1.0], [0.0]], 64) if facing == "down" else rng.normal(size=(3, 64))
+    axis /= np.linalg.norm(axis, axis=0)
+    lights = PixelLights(at, axis, rng.uniform(0.1, 1, (3, 64)), *(None,) * 3, 64)
     covered = rng.random((23, 37)) < 0.9
     most, settings = 2.0, unclamped(**clamp)
     receivers = Receivers(position, normal, covered)
@@ -255,12 +258,31 @@ def test_near_light_is_what_exceeds_the_bound(clamp):
     away = at.astype(np.float32).astype(float)[:, None, None] - position[..., None]
     square = (away**2).sum(axis=0)
     clamped_square = np.maximum(square, 0.05**2) if clamp else square
-    term = np.maximum(away[1], 0) ** 2 / (square * clamped_square)
+    leaving = -(away * axis.astype(np.float32)[:, None, None]).sum(axis=0)
+    term = np.maximum(away[1], 0) * np.maximum(leaving, 0) / (square * clamped_square)
     bound = most * math.pi / lights.flux.max(axis=0)
     excess = (lights.flux[:, None, None] / math.pi * np.maximum(0, term - bound)).sum(axis=-1) * covered
     assert excess.max() > 10 * most
     np.testing.assert_allclose(got, excess, rtol=ROUNDING, atol=ROUNDING * most)
     assert 0 < near.pairs < 64 * covered.sum()
+
+
+def test_cells_are_split_where_normals_or_light_promise_too_much():
+    """Literal: the brightest of nine cells times the normals' error, and the surplus, a quarter of the neighbours'."""
+    rng = np.random.default_rng(3)
+    known = rng.random((9, 11)) < 0.8
+    light = rng.uniform(0, 2, (3, 9, 11)).astype(np.float32)
+    surplus, error = (rng.uniform(0, 1, (9, 11)).astype(np.float32) ** 6 for _ in range(2))
+    split, pixels = np.zeros((9, 11), bool), 4.0
+    most = 1.0
+    trial_module._mark_split(known, light, surplus, error, pixels, most, split)
+    for i, j in np.ndindex(9, 11):
+        around = np.s_[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
+        brightest = (light[:, *around].astype(float) ** 2).sum(axis=0).max()
+        from_beside = 0.25 * surplus[around].astype(float).max()
+        promised = brightest * float(error[i, j]) + pixels * max(float(surplus[i, j]), from_beside)
+        assert split[i, j] == (known[i, j] and promised > most), (i, j)
+    assert 0.2 < split[known].mean() < 0.8
 
 
 def test_samples_stand_for_all_covered_pixels_and_bound_the_error():

@@ -78,6 +78,13 @@ def test_what_is_switched_off_stays_off(name, number):
 
 
 @pytest.mark.parametrize(("name", "number"), KINDS)
+def test_the_truth_leaves_visibility_out_where_the_method_does(name, number):
+    method, settings = METHODS[name], settings_of(name, number)
+    limits = {key: value for one in method.approximations for key, value in one.shared_by(settings).items()}
+    assert limits.get("visibility", True) is method.knows_visibility(settings)
+
+
+@pytest.mark.parametrize(("name", "number"), KINDS)
 def test_each_changes_the_picture(small, name, number):
     """Each approximation that settings make changes some pixel where it is switched off alone, or the truth."""
     with warnings.catch_warnings():

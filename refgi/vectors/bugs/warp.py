@@ -127,12 +127,14 @@ def _face_bugs(literal: Any) -> Iterator[Bug]:
 
 def literal_warp(
     points: Array, importance: Array, maps: int, warp: Warp, *, face_weight: str = "", face_place: str = "",
-    face_chosen: str = "", face_stretched: str = "", face_map: str = "", power: float = 1.0, **bugs: Any,
+    face_chosen: str = "", face_stretched: str = "", face_map: str = "", power: float = 1.0, joined: str = "",
+    **bugs: Any,
 ) -> tuple[Array, Array]:
     """Return warped points and their weights, with bugs, point by point."""
     importance = importance**power
     maps = 1 if face_map == "whole" else maps
     faces = np.split(importance, maps)
+    mips = [_mip(face, joined) for face in faces]
     sums = np.array([face.sum() for face in faces])
     sums = np.ones(maps) if face_chosen == "even" or not sums.any() else sums
     sums = np.where(np.arange(maps) == (maps - 1 if face_chosen == "no last" else 0), 0, sums) if face_chosen in (
@@ -149,7 +151,7 @@ def literal_warp(
             weights[k] = {"share": 1 / share, "none": 1.0, "density": maps * share,
                           "multiplied": maps / share}.get(face_weight, 1 / (maps * share))
         read = {"first": 0, "next": (face + 1) % maps}.get(face_map, face)
-        x, y, own = _warp_one(u, v, faces[read], warp, **bugs)
+        x, y, own = _warp_one(u, v, faces[read], mips[read], warp, **bugs)
         place = {"lost": 0, "reversed": maps - 1 - face}.get(face_place, face)
         warped[k] = x, (place + y) / (1 if face_place in ("lost", "undivided") else maps)
         weights[k] *= own
@@ -157,14 +159,13 @@ def literal_warp(
 
 
 def _warp_one(
-    x: float, y: float, plane: Array, warp: Warp, *, joined: str = "", doubled: bool = True, from_level: int = 0,
+    x: float, y: float, plane: Array, sums: list[Array], warp: Warp, *, doubled: bool = True, from_level: int = 0,
     read: int = 0, loops: int = 0, within: str = "", even: bool = False, powers: bool = False, axes: str = "both",
     columns_first: bool = False, weighed: str = "", row_of: int | None = None, turned: str = "", **halving: Any,
 ) -> tuple[float, float, float]:
     rows, columns = plane.shape
-    depth = (max(rows, columns) - 1).bit_length()
+    depth = len(sums) - 1
     levels = min(warp.levels, depth)
-    sums = _mip(plane, depth, joined)
     i, j, factors = 0, 0, []
     for level in range(from_level, levels + loops):
         at = min(max(level + 1 + read, 1), depth)
@@ -237,9 +238,10 @@ def _at(sums: Array, i: int, j: int) -> float:
     return float(sums[i, j]) if i < len(sums) and j < len(sums) else 0.0
 
 
-def _mip(plane: Array, depth: int, joined: str) -> list[Array]:
-    """Return sums of cells of levels 0 to `depth`, or what a port may hold in their place."""
+def _mip(plane: Array, joined: str) -> list[Array]:
+    """Return sums of cells, the coarsest level first, or what a port may hold in their place."""
     rows, columns = plane.shape
+    depth = (max(rows, columns) - 1).bit_length()
     finest = np.zeros((1 << depth, 1 << depth))
     for i, j in np.ndindex(finest.shape):
         row, column = border(i, depth, rows), border(j, depth, columns)

@@ -11,7 +11,7 @@ from refgi.cli.group import VerbGroup
 from refgi.errors import RefgiError
 from refgi.vectors.check import Asked, check_output
 from refgi.vectors.kit import Kit
-from refgi.vectors.manifest import Result
+from refgi.vectors.manifest import CommonCause, Result
 from refgi.vectors.search import searched
 from refgi.vectors.search.edits import edits_of
 from refgi.vectors.spec import stored
@@ -123,6 +123,22 @@ def test_it_is_asked_for_on_the_command_line(kit, tmp_path):
     assert "as if refgi's sssil/crown/points.py" in " ".join(done.stdout.split())
     found = Result.model_validate_json((tmp_path / "found.json").read_text())
     assert "points.py" in found.findings[0].causes[0].cause
+
+
+def test_known_causes_come_first_and_time_ends_a_search(kit, tmp_path):
+    output = written(tmp_path / "wrong", samples(kit, -1))
+    result = check_output(kit, output, Asked())
+    known = CommonCause(cause="known", explained=1, tried=1)
+
+    def having(count):
+        finding = result.findings[0].model_copy(update={"causes": count * (known,)})
+        return result.model_copy(update={"findings": (finding,)})
+
+    first, second, *_ = searched(kit, output, Asked(), having(1)).findings[0].causes
+    assert first == known
+    assert "points.py" in second.cause
+    assert searched(kit, output, Asked(), having(3)) == having(3)
+    assert searched(kit, output, Asked(), result, seconds=1e-9) == result
 
 
 def test_nothing_is_searched_where_nothing_is_wrong(kit, tmp_path):

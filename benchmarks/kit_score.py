@@ -150,10 +150,9 @@ def _run(port: str, source: Path, out: Path, cases: Iterable[str] = ()) -> str:
     kit = str(kit_folder())
     out.mkdir(exist_ok=True)
     in_c = [str(source / "port"), kit, str(out), *cases]
-    commands = {"c": in_c, "c_fresh": in_c, "c_blind": in_c,
-                "glsl": [sys.executable, str(source / "run.py"), kit, str(out), *cases],
+    commands = {"glsl": [sys.executable, str(source / "run.py"), kit, str(out), *cases],
                 "naive": [sys.executable, "-m", "tests.vectors.naive_run", kit, str(out), *cases]}
-    return _said(commands[port], source.parent if port == "naive" else source)
+    return _said(commands.get(port, in_c), source.parent if port == "naive" else source)
 
 
 def _said(command: list[str], folder: Path) -> str:

@@ -109,7 +109,10 @@ def test_a_wrong_sign_that_is_no_likely_bug_is_named(kit, tmp_path, evidence):
     assert first.explained == 1
     assert told[0][0].startswith("samples: ")
     assert 0 <= told[-1][1] <= 1
-    assert found.model_copy(update={"findings": result.findings}) == result  # nothing else is touched
+    own = {one.causes[0].cause for one in found.stages if (one.case, one.stage) == result.first}
+    assert own == {first.cause}  # the page and the table tell it too
+    others = [one for one in found.stages if (one.case, one.stage) != result.first]
+    assert others == [one for one in result.stages if (one.case, one.stage) != result.first]
 
 
 def test_it_is_asked_for_on_the_command_line(kit, tmp_path):

@@ -11,7 +11,7 @@ from typing import Any
 from refgi.errors import RefgiError
 from refgi.vectors.findings import CAUSES
 from refgi.vectors.kit import Asked, Kit
-from refgi.vectors.manifest import CommonCause, Finding, Result
+from refgi.vectors.manifest import Cause, CommonCause, Finding, Result, StageVerdict
 from refgi.vectors.spec import kind_of
 
 MOST_CASES = 3  # that a change must explain
@@ -58,11 +58,21 @@ def searched(
         return result
     task = {"kit": str(kit.folder), "output": str(output), "chained": asked.chained, "tiers": dict(asked.tiers),
             "wrong": _of_few_cases(wrong), "seconds": seconds}
-    found = [CommonCause(cause=f"{one['said']}, as if refgi's {one['file']}:{one['line']} were changed so in "
-                               f"{one['function']}", explained=one["explained"], tried=one["tried"])
-             for one in _run(task, first, tell)]
-    causes = (*known, *found[: CAUSES - len(known)]) or first.causes
-    return result.model_copy(update={"findings": (first.model_copy(update={"causes": causes}), *result.findings[1:])})
+    found = [(f"{one['said']}, as if refgi's {one['file']}:{one['line']} were changed so in {one['function']}", one)
+             for one in _run(task, first, tell)[: CAUSES - len(known)]]
+    if not found:
+        return result
+    common = [CommonCause(cause=said, explained=one["explained"], tried=one["tried"]) for said, one in found]
+    own = [Cause(cause=said, share=one["share"]) for said, one in found]
+    stages = (_told(one, own) if (one.case, one.stage) == first.first else one for one in result.stages)
+    finding = first.model_copy(update={"causes": (*known, *common)})
+    return result.model_copy(update={"findings": (finding, *result.findings[1:]), "stages": tuple(stages)})
+
+
+def _told(verdict: StageVerdict, found: list[Cause]) -> StageVerdict:
+    """Return a verdict with more causes, in place of remarks that explain nothing."""
+    known = [one for one in verdict.causes if one.share > 0]
+    return verdict.model_copy(update={"causes": tuple([*known, *found][:CAUSES])})
 
 
 def _of_few_cases(wrong: list[tuple[str, str]]) -> list[tuple[str, str]]:

@@ -18,6 +18,9 @@ ALIKE = {name: tuple(dict.fromkeys(one for family in FAMILIES if name in family 
 MODULES = ("np", "math", "numba")  # whose functions are no attributes of variables
 LONGEST = 72  # characters of an expression that is told
 FUNCTIONS = (ast.FunctionDef, ast.Lambda)
+NOT_RUN: dict[type[ast.AST], tuple[str, ...]] = {  # fields of a node that a call of the function does not run
+    ast.FunctionDef: ("args", "returns", "decorator_list", "type_params"), ast.Lambda: ("args",),
+    ast.AnnAssign: ("annotation",)}
 
 
 class Holder(NamedTuple):
@@ -111,18 +114,17 @@ def _text(node: ast.AST) -> str:
 def _below(node: ast.AST) -> Iterator[tuple[ast.AST, Holder]]:
     """Yield every expression and statement of a function, and which field of what holds it."""
     for field, value in ast.iter_fields(node):
-        if field in ("annotation", "returns", "decorator_list", "args", "type_params") and isinstance(node, FUNCTIONS):
+        if field in NOT_RUN.get(type(node), ()):
             continue
         for place, child in enumerate(value) if isinstance(value, list) else [(None, value)]:
             if not isinstance(child, ast.AST) or isinstance(child, ast.expr_context | ast.arguments | ast.FunctionDef):
                 continue
             if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant):
                 continue  # a docstring
-            if not (isinstance(node, ast.AnnAssign) and field == "annotation"):
-                if isinstance(child, ast.expr | ast.stmt):
-                    yield child, Holder(node, field, place)
-                if not isinstance(child, ast.Lambda):
-                    yield from _below(child)
+            if isinstance(child, ast.expr | ast.stmt):
+                yield child, Holder(node, field, place)
+            if not isinstance(child, ast.Lambda):
+                yield from _below(child)
 
 
 def _others(node: ast.AST, parent: ast.AST) -> Iterator[ast.AST]:

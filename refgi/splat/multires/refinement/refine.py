@@ -203,6 +203,7 @@ def _count_of_block(cells: CellStates, i: int, j: int) -> int:
     covered = cells.covered
     y, x = min(2 * i + 1, covered.shape[0] - 1), min(2 * j + 1, covered.shape[1] - 1)
     below, right = y > 2 * i, x > 2 * j
+    # a number first: as plain Python a sum of truth values would be one itself
     pixels = int(covered[2 * i, 2 * j]) + (covered[2 * i, x] & right) + (covered[y, 2 * j] & below)
     pixels += covered[y, x] & below & right
     state = cells.state[i * cells.sizes[1, COLUMNS] + j]

@@ -1,0 +1,91 @@
+"""Attack kernels, pictures, rays, files and processes: `python -m benchmarks stability [--part NAME ...] --out DIR`.
+
+Each row of the table is a promise: the worst figure found beside its limit, where the limit comes from, and one line
+that makes the worst case again. Finished tasks stand in DIR/tasks and are not run again while the sources are the same.
+The whole table goes to DIR/stability.json and DIR/table.md; `--page docs/precision.md` puts it into the page. Exit
+code 1 where a row keeps its limit not.
+"""
+
+import argparse
+import hashlib
+import importlib
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmarks.stability.tasks import Task
+from refgi.compare.provenance import environment
+from refgi.stress.rows import Row, Stability, markdown, read_rows, write_rows
+
+PARTS = ("kernels", "pictures", "rays", "files", "faults", "kills", "sameness")
+ROOT = Path(__file__).parents[2]
+BEGIN, END = "<!-- table -->", "<!-- end of table -->"
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks stability", description=__doc__)
+    parser.add_argument("--part", action="append", choices=PARTS, help="repeatable; all where absent")
+    parser.add_argument("--short", action="store_true", help="fewer cases: under a minute in all")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--page", type=Path, help="page whose table is made anew")
+    options = parser.parse_args(arguments)
+    result = Stability(environment=environment(),
+                       rows=tuple(run_parts(options.part or PARTS, options.out, short=options.short)))
+    write_rows(result, options.out / "stability.json")
+    (options.out / "table.md").write_text(markdown(result.rows))
+    if options.page:
+        options.page.write_text(with_table(options.page.read_text(), markdown(result.rows)))
+    for row in result.failed:
+        print(f"FAIL {row.part}: {row.property}, {row.subject} {row.scene}: {row.figure:.3g} {row.unit} > "
+              f"{row.limit:.3g}\n  {row.reproduce}")
+    print(f"{len(result.rows)} rows, {len(result.failed)} failed: {options.out / 'table.md'}")
+    return int(bool(result.failed))
+
+
+def tasks_of(part: str, *, short: bool) -> list[Task]:
+    """Return the tasks of a part; none where it is not there."""
+    tasks: list[Task] = importlib.import_module(f"benchmarks.stability.{part}").tasks(short)
+    return tasks
+
+
+def run_parts(parts: Iterable[str], folder: Path, *, short: bool) -> Iterable[Row]:
+    """Yield the rows of some parts; those of finished tasks are read from `folder`."""
+    console = Console(stderr=True)
+    digest = sources_digest()
+    for part in parts:
+        tasks = tasks_of(part, short=short)
+        for number, task in enumerate(tasks, 1):
+            kept = folder / "tasks" / digest / ("short" if short else "full") / part / f"{task.name}.json"
+            if not kept.exists():
+                begin = time.perf_counter()
+                console.print(f"{part} {number}/{len(tasks)}: {task.name}", highlight=False)
+                rows = tuple(task.run(lambda text: console.print(f"  {text}", highlight=False)))
+                spent = time.perf_counter() - begin
+                rows = tuple(row.model_copy(update={"seconds": round(spent / len(rows), 3)}) for row in rows)
+                kept.parent.mkdir(parents=True, exist_ok=True)
+                write_rows(Stability(environment={}, rows=rows), kept)
+            yield from read_rows(kept).rows
+
+
+def sources_digest() -> str:
+    """Return a digest of all that a figure may depend on: the package and these benchmarks."""
+    digest = hashlib.sha256()
+    for file in sorted([*ROOT.glob("refgi/**/*.py"), *ROOT.glob("benchmarks/stability/*.py")]):
+        digest.update(f"{file.relative_to(ROOT)}\0".encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def with_table(page: str, table: str) -> str:
+    """Return a page with its table made anew, between its marks."""
+    head, _, rest = page.partition(BEGIN)
+    _, mark, tail = rest.partition(END)
+    if not mark:
+        raise ValueError(f"expected {BEGIN} and {END} in the page")
+    return f"{head}{BEGIN}\n{table}{END}{tail}"
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

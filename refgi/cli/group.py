@@ -18,8 +18,8 @@ from refgi import __version__
 from refgi.cli.session import DONE, FAILED, INTERRUPTED, USAGE, Fault, Session
 from refgi.errors import InputError, RefgiError
 
-VERBS = ("scenes", "render", "sequence", "compare", "bench", "batch", "choose", "report", "vectors", "check", "explain",
-         "settings", "warm", "info")
+VERBS = ("scenes", "render", "sequence", "compare", "bench", "batch", "choose", "report", "vectors", "check", "stress",
+         "explain", "settings", "warm", "info")
 HELP = """Indirect light by four published methods on the CPU, judged by path tracing.
 
 SCENE is a built-in name such as cornell_box (see `refgi scenes`), a scene file (.json), or a mesh (.glb, .gltf, .obj,

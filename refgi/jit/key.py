@@ -22,6 +22,9 @@ import numpy as np
 
 LIBRARIES = sys.stdlib_module_names | {"llvmlite", "numba", "numpy"}  # known by their versions
 COMPILERS = ("dispatch.py", "bands.py")  # of this package
+# of the environment, where it is set: what Numba compiles for and how
+TARGET = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE", "NUMBA_OPT",
+          "NUMBA_SLP_VECTORIZE")
 OVERLOADS = "__overloads__"  # attribute of a function that stands for others, by argument types
 EXACT = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
 
@@ -49,9 +52,10 @@ def code_key(function: Callable[..., Any]) -> str:
 def _platform() -> str:
     features = llvmlite.binding.get_host_cpu_features().flatten()
     bounds = os.environ.get("NUMBA_BOUNDSCHECK", "")
+    target = "".join(f" {name}={os.environ[name]}" for name in TARGET if os.environ.get(name))
     ours = hashlib.sha256(b"".join(Path(__file__).with_name(name).read_bytes() for name in COMPILERS))
     return (f"{sys.version_info[:2]} {numba.__version__} {llvmlite.__version__} {np.__version__} {features} {bounds} "
-            f"{ours.hexdigest()}")
+            f"{ours.hexdigest()}{target}")
 
 
 def _function(function: Callable[..., Any], known: set[int]) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """Promises of numerical stability and what was found of them: one row a promise, as data, table and schema."""
 
+import builtins
 import json
 import math
 from collections.abc import Iterable, Sequence
@@ -12,7 +13,7 @@ from refgi.image import write_text
 
 __all__ = ["FORMAT", "Row", "Stability", "markdown", "read_rows", "schema_text", "write_rows"]
 
-FORMAT = "stability 1"
+FORMAT: Literal["stability 1"] = "stability 1"
 COLUMNS = ("property", "of", "scene", "where it holds", "worst", "limit", "where the limit comes from", "cases")
 
 Kind = Literal["exact", "derived", "observed x 2", "statistics"]
@@ -32,7 +33,7 @@ class Row(_Strict):
     domain: str  # inputs for which it is promised
     figure: float  # the worst found; NaN or above the limit fails
     unit: str
-    limit: float
+    limit: float  # infinity where none is known yet
     kind: Kind  # of the limit
     source: str  # what the limit is derived from, or what it was observed on
     cases: int
@@ -41,22 +42,27 @@ class Row(_Strict):
     detail: str = ""
     seconds: float = 0.0
 
-    @property
+    @builtins.property
     def passed(self) -> bool:
         """Whether the worst that was found keeps the limit."""
         return self.figure <= self.limit
 
-    @property
+    @builtins.property
     def key(self) -> tuple[str, str, str, str]:
         """What tells it from other rows."""
         return self.part, self.property, self.subject, self.scene
 
     @pydantic.field_validator("figure", mode="before")
     @classmethod
-    def _read_none(cls, value: Any) -> Any:
+    def _read_figure(cls, value: Any) -> Any:
         return math.nan if value is None else value
 
-    @pydantic.field_serializer("figure", when_used="json")
+    @pydantic.field_validator("limit", mode="before")
+    @classmethod
+    def _read_limit(cls, value: Any) -> Any:
+        return math.inf if value is None else value
+
+    @pydantic.field_serializer("figure", "limit", when_used="json")
     def _write_none(self, value: float) -> float | None:
         return value if math.isfinite(value) else None  # JSON has neither NaN nor infinity
 

@@ -102,18 +102,20 @@ def occluders(geometry: Geometry, ends: Ends | None = None, touching: bool = Fal
     -------
     (m,) bool ndarray
         False for triangles on or outside of the convex hull: a segment between two points meets them only
-        where one of its ends lies in their plane, to 1e-6 of the extent's diagonal. Triangles without area are False.
+        where one of its ends lies in their plane, to 1e-6 of the extent's diagonal. Triangles without area are False,
+        and all are where there is no point.
     """
     faces = np.ascontiguousarray(geometry.faces)
     border = np.zeros(len(faces), np.bool_)
-    if len(faces):
-        used, extent = ends or everywhere(geometry)
-        tolerance = TOLERANCE * extent.diagonal * (-1.0 if touching else 1.0)
-        vertices = np.ascontiguousarray(geometry.vertices, np.float64)
-        sketch = _extreme(np.ascontiguousarray(used[:: 1 + len(used) // SKETCHED]))
-        _on_border(vertices, faces, sketch, tolerance, border)
-        doubtful = np.flatnonzero(border)
-        _confirm(vertices, np.ascontiguousarray(faces[doubtful]), used, tolerance, doubtful, border)
+    used, extent = ends or everywhere(geometry)
+    if not len(used):  # nothing is seen and nothing shines: no two points, so nothing lies between
+        return border
+    tolerance = TOLERANCE * extent.diagonal * (-1.0 if touching else 1.0)
+    vertices = np.ascontiguousarray(geometry.vertices, np.float64)
+    sketch = _extreme(np.ascontiguousarray(used[:: 1 + len(used) // SKETCHED]))
+    _on_border(vertices, faces, sketch, tolerance, border)
+    doubtful = np.flatnonzero(border)
+    _confirm(vertices, np.ascontiguousarray(faces[doubtful]), used, tolerance, doubtful, border)
     return np.logical_not(border)
 
 

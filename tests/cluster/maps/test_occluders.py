@@ -83,6 +83,13 @@ def test_flat_and_degenerate_scenes():
     assert not occluders(geometry(np.zeros((0, 3)), np.zeros((0, 3), int))).any()
 
 
+def test_where_nothing_is_seen_and_nothing_shines_nothing_blocks():
+    room = geometry([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    nowhere = Ends(np.zeros((0, 3)), Extent(np.zeros(3), np.zeros(3)))
+    assert not occluders(room, nowhere).any()
+    assert len(blockers(room, alone=True, ends=nowhere).faces) == 0
+
+
 def test_the_hull_decides_as_all_points_do(monkeypatch):
     ball = load_scene("integrating_sphere:faces=2000").geometry
     radius = np.random.default_rng(1).choice([1, 0.999], len(ball.vertices))  # dents that a sketch does not show

@@ -1,0 +1,44 @@
+"""Write anew the worst that is observed where numbers round: `python -m benchmarks.stability.observe [SCENE ...]`.
+
+Limits of "observed x 2" rest on it. Run it after a change that makes rounding smaller, never to make a failure pass.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+from benchmarks.harness import real_scene
+from refgi import load_scene
+from refgi.methods import BUILT_IN
+from refgi.stress.changes import CHANGES
+from refgi.stress.promises import FILE
+from refgi.stress.run import stress
+
+SIZE = 64
+SCENES = ("cornell_box", "cornell_sphere:faces=1000", "stage", "ring:faces=3000",
+          "glass_ball:faces=3000", "metaballs", "integrating_sphere:faces=1000", "parallel_plates", "wedge")
+REAL = ("cornell_horse", "dragon_bunny")
+SAID = "nine built-in and two real scenes, 64 x 64"
+
+
+def main(names: list[str]) -> int:
+    rounded = [change.name for change in CHANGES if change.promise == "rounding" and change.name != "hidden plane"]
+    worst: dict[str, dict[str, tuple[float, str]]] = {}
+    real = [str(file) for name in REAL if (file := real_scene(name)) is not None]
+    for name in names or (*SCENES, *real):
+        scene = load_scene(name)
+        for found in stress(scene, list(BUILT_IN), width=SIZE, height=SIZE, changes=rounded, source=name):
+            row = found.row
+            if row.kind == "observed x 2":
+                known = worst.setdefault(row.subject, {})
+                known[row.property] = max(known.get(row.property, (0.0, "")), (row.figure, scene.name))
+        print(f"{Path(name).stem} done", flush=True)
+        said = SAID if not names and len(real) == len(REAL) else ", ".join(names or SCENES)
+        digits = {subject: {change: [float(f"{figure:.2g}"), where] for change, (figure, where) in rows.items()}
+                  for subject, rows in worst.items()}
+        FILE.write_text(json.dumps({"scenes": said, "worst": digits}, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

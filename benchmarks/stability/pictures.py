@@ -1,0 +1,105 @@
+"""Pictures: what `refgi stress` promises, on built-in scenes, and scenes that nobody would build."""
+
+import math
+import time
+import traceback
+import warnings
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.stability.hostile import Hostile, hostile, shrunk
+from benchmarks.stability.tasks import Task, Tell
+from refgi import load_scene
+from refgi.errors import InputError, RefgiWarning
+from refgi.methods import BUILT_IN, render
+from refgi.stress.promises import settings_of
+from refgi.stress.rows import Row
+from refgi.stress.run import PART, stress
+
+SIZE, SHORT_SIZE = 64, 24
+SCENES = ("cornell_box", "stage", "ring:faces=3000", "glass_ball:faces=3000", "metaballs", "integrating_sphere:faces=1000")
+SHORT_METHODS = ("sii", "multires", "hssil", "gather")
+# a few lights each: what breaks on a strange scene breaks with few
+FEW = {"sii": ("lights=64",), "multires": ("lights=64",), "val": ("lights=64", "clusters=4", "maps=16"),
+       "vpl": ("lights=64",), "truth": ("samples=8",)}
+MAP = 32  # texels of a lamp's map
+HOSTILE, SHORT_HOSTILE = 700, 6
+SLOWEST = 10.0  # s of a processor, a picture
+THREE = "no number that is no light, no exception but InputError, no warning of Python, within 10 s"
+
+
+def tasks(short: bool) -> list[Task]:
+    """Return the tasks: each scene's changes, and hostile scenes by method."""
+    scenes = SCENES[:1] if short else SCENES
+    methods = SHORT_METHODS if short else tuple(BUILT_IN)
+    size = SHORT_SIZE if short else SIZE
+    changed = [Task(f"changes-{name.partition(':')[0]}", lambda tell, name=name: _changed(name, methods, size, tell))
+               for name in scenes]
+    count = SHORT_HOSTILE if short else HOSTILE
+    return [*changed, *(Task(f"hostile-{name}", lambda tell, name=name: [hostile_row(name, range(count), tell)])
+                        for name in methods)]
+
+
+def worst_of_scenes(rows: Sequence[Row]) -> Iterator[Row]:
+    """Yield one row a promise: the one nearest to its limit over scenes, with all their cases."""
+    found: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        found.setdefault((row.property, row.subject), []).append(row)
+    for alike in found.values():
+        worst = max(alike, key=lambda row: (not row.passed, row.figure / row.limit if row.limit else row.figure))
+        scenes = f"{len(alike)} scenes; worst {worst.scene}" if len(alike) > 1 else worst.scene
+        yield worst.model_copy(update={"cases": sum(row.cases for row in alike), "scene": scenes,
+                                       "seconds": math.fsum(row.seconds for row in alike)})
+
+
+def _changed(name: str, methods: Sequence[str], size: int, tell: Tell) -> list[Row]:
+    scene = load_scene(name)
+    return [found.row for found in stress(scene, methods, width=size, height=size, source=name)]
+
+
+def hostile_row(method: str, seeds: Sequence[int], tell: Tell) -> Row:
+    """Return how many hostile scenes break a method."""
+    broken: list[tuple[int, str]] = []
+    for seed in seeds:
+        why = fault_of(hostile(seed), method)
+        if why:
+            broken.append((seed, why))
+            tell(f"{method}, seed {seed}: {why}")
+    worst = ""
+    if broken:
+        smallest = shrunk(hostile(broken[0][0]), lambda one: bool(fault_of(one, method)))
+        worst = f"{broken[0][1]}; smallest scene: {smallest.written()}"
+    return Row(part=PART, property="hostile scenes", subject=method, domain="needles, soups, lamps and cameras in walls, "
+               "1e-8 to 1e8 m, exponents to 1e20, 1 to 17 pixels", figure=len(broken), unit="scenes", limit=0,
+               kind="exact", source=THREE, cases=len(seeds), seed=broken[0][0] if broken else None,
+               reproduce=f"python -m benchmarks.stability.pictures {method} {broken[0][0] if broken else 0}", detail=worst)
+
+
+def fault_of(scene: Hostile, method: str) -> str:
+    """Return what breaks when a method renders a scene; nothing where it is refused or rendered well."""
+    begin = time.process_time()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.simplefilter("ignore", RefgiWarning)
+            light: Any = render(scene.scene(), method, settings_of(method, FEW.get(method, ())),
+                                rsm_resolution=MAP).irradiance
+    except InputError:
+        return ""
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        return f"{type(error).__name__}: {error} ({where.name}, line {where.lineno})"
+    if not np.isfinite(light).all() or (light < 0).any():
+        return f"{np.count_nonzero(~np.isfinite(light))} numbers not finite, {np.count_nonzero(light < 0)} below 0"
+    spent = time.process_time() - begin
+    return f"{spent:.0f} s" if spent > SLOWEST else ""
+
+
+if __name__ == "__main__":
+    import sys
+
+    asked_method, asked_seed = sys.argv[1], int(sys.argv[2])
+    print(hostile(asked_seed).written())
+    print(fault_of(hostile(asked_seed), asked_method) or "nothing breaks")

@@ -1,0 +1,100 @@
+"""Two pictures of the same scene, one of them after a change, and how far apart they are."""
+
+import math
+import warnings
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from refgi.errors import RefgiWarning
+from refgi.scene import Scene
+from refgi.scene.values import Array
+from refgi.settings import Settings
+from refgi.stress.changes import Changed
+
+__all__ = ["Seen", "bits_apart", "estimates_apart", "rmse_apart", "same_surface", "see", "unsound"]
+
+NEAR = 1e-4  # share of the depth within which two pixels show the same place
+ALIKE = 1e-5  # difference of albedo
+
+
+class Seen(NamedTuple):
+    """A picture with what its judges need."""
+
+    light: Array  # (3, h, w) indirect irradiance, W/m^2, of the frame's type
+    depth: Array  # (h, w) m; inf without surface
+    albedo: Array  # (3, h, w)
+    estimate: Any  # of a method that states its own error
+    warned: tuple[str, ...]  # warnings that are not refgi's own, as text
+
+
+def see(scene: Scene, method: str, settings: Settings, options: dict[str, Any]) -> Seen:
+    """Render a scene and keep what comparisons need.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    method : str
+        Short name of the method.
+    settings : Settings
+        The method's.
+    options : dict
+        Of the frame.
+
+    Returns
+    -------
+    Seen
+        Warnings of refgi are left out.
+    """
+    from refgi.methods import render
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        picture = render(scene, method, settings, **options)
+        buffer = picture.frame.gbuffer
+        seen = Seen(picture.irradiance, buffer.depth, buffer.albedo, picture.estimate, ())
+    other = tuple(f"{one.category.__name__}: {one.message}" for one in caught
+                  if not issubclass(one.category, RefgiWarning))
+    return seen._replace(warned=other)
+
+
+def unsound(light: Array) -> int:
+    """Return how many pixels hold NaN, an infinity or a negative number."""
+    return int(np.count_nonzero(~(np.isfinite(light) & (light >= 0)).all(axis=0)))
+
+
+def same_surface(before: Seen, after: Seen, changed: Changed) -> Array:
+    """Return which pixels of the part show the same place in both pictures, (h, w)."""
+    depth, albedo = before.depth[changed.part], before.albedo[:, *changed.part]
+    other = changed.back(after.depth, light=False) / changed.length
+    colour = changed.back(after.albedo, light=False)
+    with np.errstate(invalid="ignore"):
+        near = (depth == other) | (np.abs(depth - other) <= NEAR * np.minimum(depth, other))
+    return np.asarray(near & (np.abs(albedo - colour).max(axis=0) <= ALIKE))
+
+
+def bits_apart(before: Seen, after: Seen, changed: Changed) -> int:
+    """Return how many pixels of the part differ by a bit."""
+    return int(np.count_nonzero((before.light[:, *changed.part] != changed.back(after.light)).any(axis=0)))
+
+
+def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:
+    """Return the RMSE over all pixels that show the same place, over the mean of the picture before."""
+    first = before.light[:, *changed.part].astype(np.float64)
+    apart = changed.back(after.light.astype(np.float64)) - first
+    kept = same_surface(before, after, changed)
+    mean = float(first.mean())
+    if not kept.any() or not apart[:, kept].any():
+        return 0.0
+    return math.sqrt(float((apart[:, kept] ** 2).mean())) / mean if mean > 0 else math.inf
+
+
+def estimates_apart(before: Seen, after: Seen, changed: Changed) -> tuple[float, float]:
+    """Return the largest |t| of the picture means of two estimates over channels, and its degrees of freedom."""
+    first, second = before.estimate, after.estimate
+    apart = np.abs(first.picture_mean - second.picture_mean / changed.flux)
+    variance = first.picture_variance + second.picture_variance / changed.flux**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.where(apart > 0, apart / np.sqrt(variance), 0.0)
+    return float(t.max()), float(first.degrees_of_freedom + second.degrees_of_freedom)

@@ -1,0 +1,217 @@
+"""A scene rendered by each method as it is and after each change: the rows of what was promised and found."""
+
+import math
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from refgi.errors import InputError, RefgiWarning, expect
+from refgi.jit import threads
+from refgi.scene import Scene
+from refgi.scene.values import Array
+from refgi.stress.changes import CHANGES, Change, Changed, NotPromisedError
+from refgi.stress.energy import largest_bounce
+from refgi.stress.judge import Seen, bits_apart, estimates_apart, rmse_apart, same_surface, see, unsound
+from refgi.stress.promises import FEW, UNBOUNDED, UNLIKELY, Asked, asked, settings_of, surfaces
+from refgi.stress.rows import Row
+
+__all__ = ["Found", "Shown", "stress"]
+
+Tell = Callable[[str, float], None]
+PART, SURFACES = "pictures", "visible surfaces"
+SIGMAS = 4.0  # of an estimate, that it may lie above what light can bring
+
+
+class Shown(NamedTuple):
+    """What a person sees of a row: the same pixels before and after, W/m^2."""
+
+    before: Array  # (3, h, w)
+    after: Array
+
+
+class Found(NamedTuple):
+    """A row, and its pictures where it has some."""
+
+    row: Row
+    shown: Shown | None = None
+
+
+class Silence(NamedTuple):
+    """What a method was not asked, and why."""
+
+    method: str
+    change: str
+    why: str
+
+
+def stress(
+    scene: Scene, methods: Sequence[str], *, width: int, height: int, changes: Sequence[str] | None = None,
+    source: str = "", tell: Tell = lambda *_: None, silent: Callable[[Silence], None] = lambda _: None,
+) -> Iterator[Found]:
+    """Attack a scene: render it by methods after changes of which the outcome is known.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    methods : sequence of str
+        Short names.
+    width, height : int
+        Picture size, pixels.
+    changes : sequence of str, optional
+        Names of `CHANGES`; all where absent.
+    source : str
+        What names the scene on the command line, for reproductions.
+    tell : callable
+        Called with (what runs, share done).
+    silent : callable
+        Called with what a method is not asked.
+
+    Yields
+    ------
+    Found
+        A row a promise.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or the scene cannot be rendered as it is.
+    """
+    known = {change.name: change for change in CHANGES}
+    for name in changes or ():
+        expect(name in known, "change", f"one of {', '.join(known)}", name)
+    chosen = [known[name] for name in changes] if changes else list(CHANGES)
+    size = {"width": width, "height": height}
+    applied = {}
+    for change in chosen:
+        try:
+            applied[change.name] = change.apply(scene, width, height)
+        except NotPromisedError as why:
+            silent(Silence("every method", change.name, str(why)))
+    for number, method in enumerate(methods):
+        one = _Method(scene, method, size, source or scene.name, silent)
+        done: list[Change] = [change for change in chosen if change.name in applied]
+        for count, change in enumerate(done):
+            tell(f"{method}: {change.name}", (number + count / len(done)) / len(methods))
+            yield from one.after(change, applied[change.name], whole=number == 0)
+        if changes is None:
+            yield from one.as_it_is()
+
+
+class _Method:
+    """One method on one scene; its pictures before are kept."""
+
+    def __init__(self, scene: Scene, method: str, size: dict[str, int], source: str,
+                 silent: Callable[[Silence], None]) -> None:
+        self._scene, self._method, self._size, self._source, self._silent = scene, method, size, source, silent
+        self._before: dict[Any, Seen] = {}
+        self._pictures = self._unsound = 0
+        self._warned: list[str] = []
+        self._begin = time.perf_counter()
+
+    def after(self, change: Change, changed: Changed, *, whole: bool) -> Iterator[Found]:
+        """Yield the row of one change, and that of the surfaces it shows with the first method."""
+        try:
+            how = asked(self._method, change, self._scene)
+        except NotPromisedError as why:
+            self._silent(Silence(self._method, change.name, str(why)))
+            return
+        before = self._see(how)
+        try:
+            after = self._see(how, changed)
+        except InputError as error:
+            yield Found(self._row(change.name, how, math.nan, "", f"{change.about}: {error}"))
+            return
+        if whole:
+            yield Found(self._surfaces(change, before, after, changed))
+        figure, unit = _figure(how, before, after, changed)
+        limit = how.limit
+        if how.promise == "estimate":
+            figure, degrees = estimates_apart(before, after, changed)
+            limit = float(student.isf(UNLIKELY / 6, degrees))  # either side of three channels
+        shown = Shown(before.light[:, *changed.part], changed.back(after.light))
+        yield Found(self._row(change.name, how._replace(limit=limit), figure, unit, change.about), shown)
+
+    def as_it_is(self) -> Iterator[Found]:
+        """Yield rows of the scene as it is: the same bits again and on one thread, sound numbers, energy."""
+        few = FEW.get(self._method, ())
+        how = Asked("bits", few, source="each element is owned by one iteration and summed in a fixed order")
+        before = self._see(how)
+        for name in ("again", "one thread"):
+            with threads(1 if name == "one thread" else None):
+                after = self._render(self._scene, how, {})
+            apart = bits_apart(before, after, Changed(self._scene))
+            yield Found(self._row(name, how, apart, "pixels", "the same picture twice"))
+        sound = how._replace(source="light is a finite number, 0 or more")
+        yield Found(self._row("sound numbers", sound, self._unsound, "pixels", f"{self._pictures} pictures",
+                              cases=self._pictures))
+        quiet = how._replace(source="a fault of the program, not of the scene")
+        yield Found(self._row("no warning of Python", quiet, len(self._warned), "warnings", "; ".join(self._warned[:2]),
+                              cases=self._pictures))
+        yield from self._energy(before)
+
+    def _energy(self, before: Seen) -> Iterator[Found]:
+        if self._method in UNBOUNDED:
+            self._silent(Silence(self._method, "energy", UNBOUNDED[self._method]))
+            return
+        from refgi.frame import Frame
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RefgiWarning)
+            bound = largest_bounce(Frame(self._scene, width=self._size["width"], height=self._size["height"]))
+        if bound is None:
+            self._silent(Silence(self._method, "energy", "a lobe or glass may send all light one way"))
+            return
+        light = before.light.astype(float)
+        if before.estimate is not None:
+            light = light - SIGMAS * before.estimate.standard_error
+        most = light.reshape(3, -1).max(axis=1)
+        share = float(np.max(np.divide(most, bound, out=np.where(most > 0, np.inf, 0.0), where=bound > 0)))
+        how = Asked("rounding", FEW.get(self._method, ()), limit=1.0, kind="derived",
+                    source="a hemisphere filled with the brightest diffuse radiance")
+        yield Found(self._row("energy", how, share, "of the bound", "largest radiosity of what is lit"))
+
+    def _surfaces(self, change: Change, before: Seen, after: Seen, changed: Changed) -> Row:
+        same = same_surface(before, after, changed)
+        share = 1 - float(same.mean())
+        row = self._row(change.name, surfaces(change), share, "of pixels", "pixels that show another place")
+        return row.model_copy(update={"subject": SURFACES})
+
+    def _see(self, how: Asked, changed: Changed | None = None) -> Seen:
+        if changed is not None:
+            return self._render(changed.scene, how, dict(changed.options))
+        key = how.settings, tuple(how.options.items())
+        if key not in self._before:
+            self._before[key] = self._render(self._scene, how, {})
+        return self._before[key]
+
+    def _render(self, scene: Scene, how: Asked, options: dict[str, Any]) -> Seen:
+        settings = settings_of(self._method, how.settings)
+        seen = see(scene, self._method, settings, {**self._size, **how.options, **options})
+        self._pictures += 1
+        self._unsound += unsound(seen.light)
+        self._warned += seen.warned
+        return seen
+
+    def _row(self, name: str, how: Asked, figure: float, unit: str, detail: str, cases: int = 1) -> Row:
+        spent, self._begin = time.perf_counter() - self._begin, time.perf_counter()
+        width, height = self._size["width"], self._size["height"]
+        only = f" --change '{name}'" if any(change.name == name for change in CHANGES) else ""
+        return Row(part=PART, property=name, subject=self._method, scene=self._scene.name,
+                   domain=f"{width} x {height}{', ' if how.settings else ''}{' '.join(how.settings)}",
+                   figure=figure, unit=unit, limit=how.limit, kind=how.kind, source=how.source, cases=cases,
+                   reproduce=f"refgi stress {self._source} --methods {self._method}{only} --size {width}x{height} "
+                             "--out out", detail=detail, seconds=round(spent, 3))
+
+
+def _figure(how: Asked, before: Seen, after: Seen, changed: Changed) -> tuple[float, str]:
+    if how.promise == "bits":
+        return bits_apart(before, after, changed), "pixels"
+    if how.promise == "rounding":
+        return rmse_apart(before, after, changed), "of the mean"
+    return 0.0, "standard errors"
+

@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # a file's tests run in one process, so that few kernels are compiled twice
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --durations 25 --durations-min 5
 
-.PHONY: demo test quick test-all check evidence bench mutate kit-score docs clean
+.PHONY: demo test quick test-all check evidence bench stress mutate kit-score docs clean
 
 demo: $(VENV)/run.stamp
 	$(BIN)/refgi compare cornell_box --methods sii,multires,val,hssil --out out/
@@ -34,6 +34,9 @@ evidence: $(VENV)/dev.stamp
 
 bench: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks --out out/bench
+
+stress: $(VENV)/dev.stamp
+	$(BIN)/python -m benchmarks stability --out out/stability --page docs/precision.md
 
 mutate: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks mutate --out out/mutate

@@ -19,6 +19,7 @@ SMALLER = {
     "bench": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii"],
     "choose": ["--size", "24x18", "--rounds", "1", "--set", "samples=48", "--methods", "sii,truth"],
     "sequence": ["--size", "24x18", "--frames", "2"], "explain": ["--size", "24x18", "--rounds", "1"],
+    "stress": ["--size", "24x18", "--methods", "hssil", "--change", "mirrored"],
     "vectors": ["--case", "pairs-diffuse"],
 }
 

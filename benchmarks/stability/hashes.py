@@ -1,6 +1,7 @@
-"""Print a hash of each stage's result, for comparisons of processes: `python -m benchmarks.stability.hashes METHOD ...`.
+"""Print a hash of each stage's result, for comparisons of processes.
 
-The threads, the compiler's target and the folder of compiled kernels are those of the environment.
+`python -m benchmarks.stability.hashes METHOD[,KEY=VALUE] ...`; the threads, the compiler's target and the folder of
+compiled kernels are those of the environment.
 """
 
 import json

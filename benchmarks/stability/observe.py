@@ -1,4 +1,4 @@
-"""Write anew the worst that is observed where numbers round: `python -m benchmarks.stability.observe [SCENE ...]`.
+"""Write anew the worst that is observed where numbers round: `python -m benchmarks.stability.observe [CHANGE ...]`.
 
 Limits of "observed x 2" rest on it. Run it after a change that makes rounding smaller, never to make a failure pass.
 """
@@ -6,6 +6,7 @@ Limits of "observed x 2" rest on it. Run it after a change that makes rounding s
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from benchmarks.harness import real_scene
 from refgi import load_scene
@@ -21,19 +22,25 @@ REAL = ("cornell_horse", "dragon_bunny")
 SAID = "nine built-in and two real scenes, 64 x 64"
 
 
-def main(names: list[str]) -> int:
-    rounded = [change.name for change in CHANGES if change.promise == "rounding" and change.name != "hidden plane"]
-    worst: dict[str, dict[str, tuple[float, str]]] = {}
+def main(asked: list[str]) -> int:
+    rounded = [change.name for change in CHANGES
+               if change.promise in ("rounding", "mean") and change.name != "hidden plane"]
+    rounded = asked or rounded
+    worst: dict[str, dict[str, Any]] = json.loads(FILE.read_text())["worst"] if asked else {}
+    for known in worst.values():
+        for name in asked:
+            known.pop(name, None)
     real = [str(file) for name in REAL if (file := real_scene(name)) is not None]
-    for name in names or (*SCENES, *real):
+    for name in (*SCENES, *real):
         scene = load_scene(name)
         for found in stress(scene, list(BUILT_IN), width=SIZE, height=SIZE, changes=rounded, source=name):
             row = found.row
             if row.kind == "observed x 2":
                 known = worst.setdefault(row.subject, {})
-                known[row.property] = max(known.get(row.property, (0.0, "")), (row.figure, scene.name))
+                before = known.get(row.property, (0.0, ""))
+                known[row.property] = (row.figure, scene.name) if row.figure > before[0] else before
         print(f"{Path(name).stem} done", flush=True)
-        said = SAID if not names and len(real) == len(REAL) else ", ".join(names or SCENES)
+        said = SAID if len(real) == len(REAL) else ", ".join(SCENES)
         digits = {subject: {change: [float(f"{figure:.2g}"), where] for change, (figure, where) in rows.items()}
                   for subject, rows in worst.items()}
         FILE.write_text(json.dumps({"scenes": said, "worst": digits}, indent=1) + "\n")

@@ -1,10 +1,10 @@
 """Pictures: what `refgi stress` promises, on built-in scenes, and scenes that nobody would build."""
 
-import math
+import sys
 import time
 import traceback
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,8 @@ from refgi.stress.rows import Row
 from refgi.stress.run import PART, stress
 
 SIZE, SHORT_SIZE = 64, 24
-SCENES = ("cornell_box", "stage", "ring:faces=3000", "glass_ball:faces=3000", "metaballs", "integrating_sphere:faces=1000")
+SCENES = ("cornell_box", "stage", "ring:faces=3000", "glass_ball:faces=3000", "metaballs",
+          "integrating_sphere:faces=1000")
 SHORT_METHODS = ("sii", "multires", "hssil", "gather")
 # a few lights each: what breaks on a strange scene breaks with few
 FEW = {"sii": ("lights=64",), "multires": ("lights=64",), "val": ("lights=64", "clusters=4", "maps=16"),
@@ -27,7 +28,9 @@ FEW = {"sii": ("lights=64",), "multires": ("lights=64",), "val": ("lights=64", "
 MAP = 32  # texels of a lamp's map
 HOSTILE, SHORT_HOSTILE = 700, 6
 SLOWEST = 10.0  # s of a processor, a picture
-THREE = "no number that is no light, no exception but InputError, no warning of Python, within 10 s"
+DOMAIN = ("needles, soups, fans, lamps and cameras in walls, 1e-8 to 1e8 m, exponents to 1e20, 1 to 17 pixels "
+          "along a side")
+SOUND = "no number that is no light, no exception but InputError, no warning of Python, within 10 s"
 
 
 def tasks(short: bool) -> list[Task]:
@@ -35,26 +38,14 @@ def tasks(short: bool) -> list[Task]:
     scenes = SCENES[:1] if short else SCENES
     methods = SHORT_METHODS if short else tuple(BUILT_IN)
     size = SHORT_SIZE if short else SIZE
-    changed = [Task(f"changes-{name.partition(':')[0]}", lambda tell, name=name: _changed(name, methods, size, tell))
+    changed = [Task(f"changes-{name.partition(':')[0]}", lambda _, name=name: _changed(name, methods, size))
                for name in scenes]
     count = SHORT_HOSTILE if short else HOSTILE
     return [*changed, *(Task(f"hostile-{name}", lambda tell, name=name: [hostile_row(name, range(count), tell)])
                         for name in methods)]
 
 
-def worst_of_scenes(rows: Sequence[Row]) -> Iterator[Row]:
-    """Yield one row a promise: the one nearest to its limit over scenes, with all their cases."""
-    found: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        found.setdefault((row.property, row.subject), []).append(row)
-    for alike in found.values():
-        worst = max(alike, key=lambda row: (not row.passed, row.figure / row.limit if row.limit else row.figure))
-        scenes = f"{len(alike)} scenes; worst {worst.scene}" if len(alike) > 1 else worst.scene
-        yield worst.model_copy(update={"cases": sum(row.cases for row in alike), "scene": scenes,
-                                       "seconds": math.fsum(row.seconds for row in alike)})
-
-
-def _changed(name: str, methods: Sequence[str], size: int, tell: Tell) -> list[Row]:
+def _changed(name: str, methods: Sequence[str], size: int) -> list[Row]:
     scene = load_scene(name)
     return [found.row for found in stress(scene, methods, width=size, height=size, source=name)]
 
@@ -71,10 +62,10 @@ def hostile_row(method: str, seeds: Sequence[int], tell: Tell) -> Row:
     if broken:
         smallest = shrunk(hostile(broken[0][0]), lambda one: bool(fault_of(one, method)))
         worst = f"{broken[0][1]}; smallest scene: {smallest.written()}"
-    return Row(part=PART, property="hostile scenes", subject=method, domain="needles, soups, lamps and cameras in walls, "
-               "1e-8 to 1e8 m, exponents to 1e20, 1 to 17 pixels", figure=len(broken), unit="scenes", limit=0,
-               kind="exact", source=THREE, cases=len(seeds), seed=broken[0][0] if broken else None,
-               reproduce=f"python -m benchmarks.stability.pictures {method} {broken[0][0] if broken else 0}", detail=worst)
+    seed = broken[0][0] if broken else None
+    return Row(part=PART, property="hostile scenes", subject=method, domain=DOMAIN, figure=len(broken), unit="scenes",
+               limit=0, kind="exact", source=SOUND, cases=len(seeds), seed=seed, detail=worst,
+               reproduce=f"python -m benchmarks.stability.pictures {method} {seed or 0}")
 
 
 def fault_of(scene: Hostile, method: str) -> str:
@@ -98,8 +89,6 @@ def fault_of(scene: Hostile, method: str) -> str:
 
 
 if __name__ == "__main__":
-    import sys
-
     asked_method, asked_seed = sys.argv[1], int(sys.argv[2])
     print(hostile(asked_seed).written())
     print(fault_of(hostile(asked_seed), asked_method) or "nothing breaks")

@@ -18,7 +18,7 @@ from rich.console import Console
 
 from benchmarks.stability.tasks import Task
 from refgi.compare.provenance import environment
-from refgi.stress.rows import Row, Stability, markdown, read_rows, write_rows
+from refgi.stress.rows import Row, Stability, markdown, over_scenes, read_rows, write_rows
 
 PARTS = ("kernels", "pictures", "rays", "files", "faults", "kills", "sameness")
 ROOT = Path(__file__).parents[2]
@@ -35,9 +35,9 @@ def main(arguments: list[str]) -> int:
     result = Stability(environment=environment(),
                        rows=tuple(run_parts(options.part or PARTS, options.out, short=options.short)))
     write_rows(result, options.out / "stability.json")
-    (options.out / "table.md").write_text(markdown(result.rows))
+    (options.out / "table.md").write_text(markdown(over_scenes(result.rows)))
     if options.page:
-        options.page.write_text(with_table(options.page.read_text(), markdown(result.rows)))
+        options.page.write_text(with_table(options.page.read_text(), markdown(over_scenes(result.rows))))
     for row in result.failed:
         print(f"FAIL {row.part}: {row.property}, {row.subject} {row.scene}: {row.figure:.3g} {row.unit} > "
               f"{row.limit:.3g}\n  {row.reproduce}")

@@ -19,7 +19,7 @@ from refgi.scene.values import BRIGHTEST, LARGEST, Array, Vector
 __all__ = ["CHANGES", "Change", "Changed", "NotPromisedError"]
 
 Map = Callable[[Array], Array]  # (n, 3) to (n, 3)
-Promise = Literal["bits", "rounding", "estimate"]
+Promise = Literal["bits", "rounding", "estimate", "mean"]
 FAR = (1e6, -1e6, 1e6)  # m
 ASIDE = (0.3713, 0.1237, -0.2719)  # shares of the diagonal: no multiple of any grid
 ANGLE = 0.7  # rad
@@ -233,6 +233,10 @@ def _cropped(scene: Scene, width: int, height: int) -> Changed:
                    part=(middle[0], middle[1]))
 
 
+def _doubled_resolution(scene: Scene, width: int, height: int) -> Changed:
+    return Changed(scene, {"width": 2 * width, "height": 2 * height})
+
+
 QUARTER = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 CHANGES: tuple[Change, ...] = (
     *(_flux(power) for power in (27, -27, 60, -60)),
@@ -250,6 +254,8 @@ CHANGES: tuple[Change, ...] = (
     Change("hidden plane", "a plane up to 2,000 diagonals wide that nothing sees and no lamp reaches", "rounding",
            _hidden_plane),
     Change("cropped", "the middle half of the picture alone", "rounding", _cropped),
+    Change("resolution x 2", "twice the width and height; the pictures' means are compared", "mean",
+           _doubled_resolution),
     Change("float64", "float64 for float32", "rounding",
            lambda scene, _, __: Changed(scene, {"dtype": np.dtype(np.float64)})),
 )

@@ -12,7 +12,7 @@ from refgi.scene.values import Array
 from refgi.settings import Settings
 from refgi.stress.changes import Changed
 
-__all__ = ["Seen", "bits_apart", "estimates_apart", "rmse_apart", "same_surface", "see", "unsound"]
+__all__ = ["Seen", "bits_apart", "estimates_apart", "means_apart", "rmse_apart", "same_surface", "see", "unsound"]
 
 NEAR = 1e-4  # share of the depth within which two pixels show the same place
 ALIKE = 1e-5  # difference of albedo
@@ -88,6 +88,15 @@ def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:
     if not kept.any() or not apart[:, kept].any():
         return 0.0
     return math.sqrt(float((apart[:, kept] ** 2).mean())) / mean if mean > 0 else math.inf
+
+
+def means_apart(before: Seen, after: Seen, changed: Changed) -> float:
+    """Return how far the means over pixels with a surface are apart, over that before; pictures of any size."""
+    first, second = (seen.light[:, np.isfinite(seen.depth)].astype(np.float64) for seen in (before, after))
+    if not first.any() and not second.any():
+        return 0.0
+    mean = float(first.mean()) if first.size else 0.0
+    return abs(float(second.mean()) / changed.flux / mean - 1) if mean > 0 and second.size else math.inf
 
 
 def estimates_apart(before: Seen, after: Seen, changed: Changed) -> tuple[float, float]:

@@ -1,7 +1,6 @@
 """The page of `refgi stress`: the table of promises, and pictures of the worst row of each method."""
 
 import base64
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from refgi.compare.report import PAGE, machine, number, script, sort_key, templa
 from refgi.image import write_text
 from refgi.image.png import png_bytes
 from refgi.scene.values import Array
-from refgi.stress.rows import Row, Stability
+from refgi.stress.rows import Row, Stability, strain
 from refgi.stress.run import Found, Silence
 
 __all__ = ["markdown_summary", "write_page"]
@@ -46,6 +45,7 @@ def write_page(result: Stability, found: Sequence[Found], silent: Sequence[Silen
         title=f"What is promised of {title}", lead="", facts=[f"{len(result.rows)} promises"],
         verdict=markdown_summary(result),
         failures=[(row.subject, f"{row.property}: {_figure(row)}, limit {row.limit:.3g}") for row in result.failed],
+        methods=list(dict.fromkeys(row.subject for row in result.rows)), matrix=_matrix(result.rows),
         columns=COLUMNS, rows=[_cells(row) for row in result.rows], shown=[_shown(one) for one in _worst(found)],
         silent=[(f"{one.method}: {one.change}", one.why) for one in silent],
         versions=result.environment["versions"], machine=machine(result.environment))
@@ -77,21 +77,23 @@ def _figure(row: Row) -> str:
 
 def _cells(row: Row) -> dict[str, Any]:
     return {"of": row.subject, "property": row.property, "passed": row.passed, "figure": _figure(row),
-            "sort": sort_key(_strain(row)), "limit": number(row.limit), "source": f"{row.kind}: {row.source}",
+            "short": number(row.figure),
+            "sort": sort_key(strain(row)), "limit": number(row.limit), "source": f"{row.kind}: {row.source}",
             "detail": row.detail}
 
 
-def _strain(row: Row) -> float:
-    """Return the figure over its limit; infinity for any figure beside a limit of 0."""
-    if not math.isfinite(row.figure):
-        return math.inf
-    return row.figure / row.limit if row.limit > 0 else (math.inf if row.figure > 0 else 0.0)
+def _matrix(rows: Sequence[Row]) -> list[tuple[str, list[dict[str, Any] | None]]]:
+    """Return for each property the cells of all subjects; none where one was not asked."""
+    subjects = dict.fromkeys(row.subject for row in rows)
+    known = {(row.property, row.subject): _cells(row) for row in rows}
+    return [(name, [known.get((name, subject)) for subject in subjects])
+            for name in dict.fromkeys(row.property for row in rows)]
 
 
 def _worst(found: Sequence[Found]) -> list[Found]:
     """Return broken rows that have pictures, and of each method the one nearest to its limit."""
     seen = [one for one in found if one.shown is not None]
-    nearest = {one.row.subject: one for one in sorted(seen, key=lambda one: _strain(one.row))}
+    nearest = {one.row.subject: one for one in sorted(seen, key=lambda one: strain(one.row))}
     return [one for one in seen if not one.row.passed or nearest[one.row.subject] is one]
 
 

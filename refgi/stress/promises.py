@@ -95,7 +95,7 @@ def asked(method: str, change: Change, scene: Scene) -> Asked:
     if change.name == "hidden plane":
         return Asked("rounding", few, limit=LEAST, kind="derived", source="no light comes from it, none goes to it")
     limit, source = _observed(method, change.name)
-    rounded = Asked("rounding", few, NONE, limit, "observed x 2", source)
+    rounded = Asked("mean" if change.promise == "mean" else "rounding", few, NONE, limit, "observed x 2", source)
     # ranges of normals are those of x, y and z
     if change.name in DRAWN_ANEW or (method, change.name) == ("multires", "turned"):
         return rounded._replace(settings=EVERY.get(method, few), options=SMALL_MAP)

@@ -3,7 +3,7 @@
 import builtins
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,7 +11,7 @@ import pydantic
 
 from refgi.image import write_text
 
-__all__ = ["FORMAT", "Row", "Stability", "markdown", "read_rows", "schema_text", "write_rows"]
+__all__ = ["FORMAT", "Row", "Stability", "markdown", "over_scenes", "read_rows", "schema_text", "strain", "write_rows"]
 
 FORMAT: Literal["stability 1"] = "stability 1"
 COLUMNS = ("property", "of", "scene", "where it holds", "worst", "limit", "where the limit comes from", "cases")
@@ -70,7 +70,7 @@ class Row(_Strict):
 class Stability(_Strict):
     """The rows of a run and where it was made."""
 
-    format: Literal["stability 1"] = FORMAT
+    refgi: Literal["stability 1"] = FORMAT
     environment: dict[str, Any]
     rows: tuple[Row, ...]
 
@@ -142,6 +142,42 @@ def schema_text() -> str:
     return json.dumps(Stability.model_json_schema(), indent=1) + "\n"
 
 
-def worst_of(figures: Sequence[float]) -> int:
-    """Return the index of the largest figure, of the first NaN where there is one."""
-    return max(range(len(figures)), key=lambda k: (math.isnan(figures[k]), figures[k]))
+def strain(row: Row) -> float:
+    """Return a figure over its limit; infinity for what is no number, and for any figure beside a limit of 0.
+
+    Parameters
+    ----------
+    row : Row
+        A promise.
+
+    Returns
+    -------
+    float
+        Over 1 where it is broken.
+    """
+    if not math.isfinite(row.figure):
+        return math.inf
+    return row.figure / row.limit if row.limit > 0 else (math.inf if row.figure > 0 else 0.0)
+
+
+def over_scenes(rows: Iterable[Row]) -> Iterator[Row]:
+    """Join the rows of one promise on several scenes.
+
+    Parameters
+    ----------
+    rows : iterable of Row
+        Of any scenes.
+
+    Yields
+    ------
+    Row
+        The one nearest to its limit, with the cases of all.
+    """
+    found: dict[tuple[str, str, str], list[Row]] = {}
+    for row in rows:
+        found.setdefault((row.part, row.property, row.subject), []).append(row)
+    for alike in found.values():
+        worst = max(alike, key=strain)
+        scene = f"{len(alike)} scenes; worst {worst.scene}" if len(alike) > 1 and worst.scene else worst.scene
+        yield worst.model_copy(update={"cases": sum(row.cases for row in alike), "scene": scene,
+                                       "seconds": math.fsum(row.seconds for row in alike)})

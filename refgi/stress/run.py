@@ -15,7 +15,7 @@ from refgi.scene import Scene
 from refgi.scene.values import Array
 from refgi.stress.changes import CHANGES, Change, Changed, NotPromisedError
 from refgi.stress.energy import largest_bounce
-from refgi.stress.judge import Seen, bits_apart, estimates_apart, rmse_apart, same_surface, see, unsound
+from refgi.stress.judge import Seen, bits_apart, estimates_apart, means_apart, rmse_apart, same_surface, see, unsound
 from refgi.stress.promises import FEW, UNBOUNDED, UNLIKELY, Asked, asked, settings_of, surfaces
 from refgi.stress.rows import Row
 
@@ -126,14 +126,14 @@ class _Method:
         except InputError as error:
             yield Found(self._row(change.name, how, math.nan, "", f"{change.about}: {error}"))
             return
-        if whole:
+        if whole and how.promise != "mean":
             yield Found(self._surfaces(change, before, after, changed))
         figure, unit = _figure(how, before, after, changed)
         limit = how.limit
         if how.promise == "estimate":
             figure, degrees = estimates_apart(before, after, changed)
             limit = float(student.isf(UNLIKELY / 6, degrees))  # either side of three channels
-        shown = Shown(before.light[:, *changed.part], changed.back(after.light))
+        shown = None if how.promise == "mean" else Shown(before.light[:, *changed.part], changed.back(after.light))
         yield Found(self._row(change.name, how._replace(limit=limit), figure, unit, change.about), shown)
 
     def as_it_is(self) -> Iterator[Found]:
@@ -213,5 +213,7 @@ def _figure(how: Asked, before: Seen, after: Seen, changed: Changed) -> tuple[fl
         return bits_apart(before, after, changed), "pixels"
     if how.promise == "rounding":
         return rmse_apart(before, after, changed), "of the mean"
+    if how.promise == "mean":
+        return means_apart(before, after, changed), "of the mean"
     return 0.0, "standard errors"
 

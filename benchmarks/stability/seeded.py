@@ -1,8 +1,8 @@
 """Put faults of precision into a copy of the sources and count those that a row of the stability run shows.
 
-`python -m benchmarks.stability.seeded [--first N] [--every N] [--form short|full] --out DIR`. The faults, one line each,
-stand in precision_faults.toml, written by someone who had not seen the run. Each is tried part by part until a row
-fails that does not fail without it. What was found stands in DIR/seeded.json; an interrupted run goes on where it was.
+`python -m benchmarks.stability.seeded [--first N] [--every N] [--form short|full] --out DIR`. The faults, one line
+each, stand in precision_faults.toml, written by someone who had not seen the run. Each is tried part by part until a
+row fails that does not fail without it. What was found stands in DIR/seeded.json; an interrupted run goes on.
 """
 
 import argparse

@@ -125,3 +125,9 @@ def pixel_surface(depth: float, facing: float, pixel_area: float) -> float:
     z = depth if covered else 0.0
     # Eq. (2)
     return float(z * z * pixel_area / max(facing, GRAZING))
+
+
+@kernel
+def three(vector: Array) -> tuple[float, float, float]:
+    """Return a vector as numbers, which stores to arrays cannot change."""
+    return vector[0], vector[1], vector[2]

@@ -62,7 +62,8 @@ def _copy_pixels(picture: Picture, view: View, i: int, side: int, place: Array, 
     depth, normal, to_position, to_normal = picture.depth, picture.normal, drawn.position, drawn.normal
     (ax, ay, az), (dx, dy, dz), (fx, fy, fz) = three(view.across), three(view.down), three(view.ahead)
     bits, height, width = drawn.number, view.height, view.width
-    for j in range(place.size):
+    whole = _copy_of_four(picture, view, i, place, closest, drawn) if side == 2 and 2 * i + 1 < height else 0
+    for j in range(whole, place.size):
         if place[j] < 0:
             _copy(closest, i, j, i, j, drawn)
             continue
@@ -74,6 +75,40 @@ def _copy_pixels(picture: Picture, view: View, i: int, side: int, place: Array, 
         for axis in range(3):
             to_normal[axis, i, j] = normal[axis, row, column]
         drawn.pixel[i, j] = row * width + column
+
+
+@kernel
+def _copy_of_four(picture: Picture, view: View, i: int, place: Array, closest: Level, drawn: Level) -> int:
+    """Copy those of texels that cover 2 x 2 pixels, as `_copy_pixels` does, and return how many there are.
+
+    All four are read and one is kept: loads are contiguous in SIMD lanes.
+    """
+    (ax, ay, az), (dx, dy, dz), (fx, fy, fz) = three(view.across), three(view.down), three(view.ahead)
+    depth, normal, position, pixel = picture.depth, picture.normal, drawn.position, drawn.pixel
+    to_normal, first, second, row = drawn.normal, closest.position, closest.normal, np.uint64(i)
+    above, height, width, one = np.uint64(2 * i), view.height, view.width, np.uint64(1)
+    below, whole = above + one, width // 2
+    for j in range(np.uint64(whole)):
+        left, kept = j + j, place[j]
+        right, drawn_one, is_lower, is_right = left + one, kept >= 0, kept >= 2, (kept & 1) == 1
+        a, b, c, d = depth[above, left], depth[above, right], depth[below, left], depth[below, right]
+        z = np.float64((d if is_right else c) if is_lower else (b if is_right else a))
+        at_row, at_column = 2 * i + (1 if is_lower else 0), np.int64(left) + (1 if is_right else 0)
+        x, y = centre(at_column, width), centre(at_row, height)
+        rx, ry, rz = (fx + y * dx) + x * ax, (fy + y * dy) + x * ay, (fz + y * dz) + x * az
+        position[0, row, j] = z * rx if drawn_one else np.float64(first[0, row, j])
+        position[1, row, j] = z * ry if drawn_one else np.float64(first[1, row, j])
+        position[2, row, j] = z * rz if drawn_one else np.float64(first[2, row, j])
+        pixel[row, j] = at_row * width + at_column if drawn_one else closest.pixel[row, j]
+    for axis in range(3):
+        for j in range(np.uint64(whole)):
+            left, kept = j + j, place[j]
+            right = left + one
+            a, b = normal[axis, above, left], normal[axis, above, right]
+            c, d = normal[axis, below, left], normal[axis, below, right]
+            upper, lower = b if (kept & 1) == 1 else a, d if (kept & 1) == 1 else c
+            to_normal[axis, row, j] = (lower if kept >= 2 else upper) if kept >= 0 else second[axis, row, j]
+    return whole
 
 
 @kernel

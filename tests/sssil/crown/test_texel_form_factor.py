@@ -58,6 +58,28 @@ def test_few_samples_are_unbiased(evidence):
     evidence(f"{SAMPLES} samples over every texel: {', '.join(found)}")
 
 
+@pytest.mark.feature("HSS-04")
+@pytest.mark.parametrize("share", [0.25, 1.0])
+def test_a_disc_of_a_share_is_as_dark_as_that(share, evidence):
+    """Analytic and statistical: uniform samples, whose expectation is Eq. 4 with the disc of a share for each texel."""
+    level, middle = plane_below()
+    disc, crown = math.pi * RADIUS**2 / round(SAMPLES / 3), 3 * math.pi * RADIUS**2 / SAMPLES
+    expected = 0.0
+    for i in range(-SIDE // 2, SIDE // 2 + 1):
+        for j in range(-SIDE // 2, SIDE // 2 + 1):
+            if 0 < math.hypot(i, j) < 2 * RADIUS:
+                square = SPACING**2 * (i * i + j * j) + HEIGHT**2
+                one = HEIGHT / math.sqrt(square) * SPACING**2 / math.pi
+                covered = share * (disc if math.hypot(i, j) < RADIUS else crown)
+                expected += math.pi * HEIGHT / math.sqrt(square) * one / (square + covered * one)
+    drawn = [gather(level, 0, of(HssilSettings, samples=SAMPLES, radius=RADIUS, levels=1, pattern="pixel",
+                                 density="uniform", disc_share=share, seed=seed))[0, *middle] for seed in range(4 * SEEDS)]
+    error = np.std(drawn, ddof=1) / math.sqrt(4 * SEEDS)
+    assert abs(np.mean(drawn) - expected) < 4 * error
+    assert expected + 4 * error < texel_sum("texel")
+    evidence(f"a disc of {share} of all: {np.mean(drawn) / expected:.3f} +- {error / expected:.3f} of the sum over texels")
+
+
 def test_every_texel_is_the_sum_of_eq_4():
     """Where each sample stands for one texel both forms are Eq. 4, and the sum by hand."""
     level, middle = plane_below()

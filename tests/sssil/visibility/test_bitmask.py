@@ -63,8 +63,10 @@ def twin(level, settings, offsets_of, thickness=DIAGONAL * SETTINGS.visibility.t
 
     if thickness is None:
         flat = lambda row, column: [sample for samples in around(row, column) for sample in samples]  # noqa: E731
-        return naive.light(level._asdict(), flat, settings.senders.form_factor)
-    return naive.masked_light(level._asdict(), around, thickness, settings.senders.form_factor)
+        return naive.light(level._asdict(), flat, settings.senders.form_factor,
+                           share=settings.senders.disc_share)
+    return naive.masked_light(level._asdict(), around, thickness, settings.senders.form_factor,
+                              share=settings.senders.disc_share)
 
 
 def shared(level, index, settings):

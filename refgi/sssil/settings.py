@@ -98,7 +98,7 @@ class SenderSettings(Settings):
     downsample: Downsample = setting("resampled", "downsampling from level to level")
     form_factor: FormFactor = setting("disc", "form factor of a sample: Eq. 4 for what it stands for (disc) or "
                                       "its texel (texel), or Eq. 3 (point)", study=True)
-    disc_share: float = setting(0.25, "share of the texels that a sample stands for which its disc covers, at least one; "
+    disc_share: float = setting(0.25, "share of what a sample stands for that its disc covers, at least one texel; "
                                 "1: all, as Eq. 4", least=0.0, most=1.0, study=True)
     only_level: int | None = setting(None, "the one level that sends light, 0: the first; none: all", least=0,
                                      most=MOST_LEVELS - 1, study=True)

@@ -77,7 +77,7 @@ def search(delta, d, near, printed):
 def farthest(delta, d, r):
     """Tangent of the widest direction in which a point at distance r has the light behind it, as the receiver sees.
 
-    A receiver at d on the axis: the point (r sin, r cos) lies on the line from (0, d) to the light's edge (Delta / 2, 0).
+    A receiver at d on the axis: the point (r sin, r cos) is on the line from (0, d) to the light's edge (Delta / 2, 0).
     """
     if r >= d:
         return 0.0

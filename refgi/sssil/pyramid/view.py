@@ -110,7 +110,7 @@ def view_of(projection: Projection, as_published: frozenset[str] = frozenset()) 
 
 
 @kernel
-def centre(index: int, count: int) -> float:
+def centre(index: Any, count: int) -> float:
     """Return a pixel's centre between the picture's edges, -1 to 1; the mirrored pixel has exactly its negative."""
     return float((2 * index + 1 - count) / count)
 

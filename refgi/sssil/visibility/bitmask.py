@@ -134,8 +134,8 @@ def _march_phase(packed: Array, sending: Array, row: Any, phase: int, phases: in
         ox, oy = np.int64(offsets[j, 0]), np.int64(offsets[j, 1])
         of = (phase + ox) % phases
         by = (phase + ox - of) // phases  # lanes to the right
-        low, high = max(0, -by), min(receivers, (columns - of + phases - 1) // phases - by)
-        size = high - low
+        low: Any = max(0, -by)
+        size = min(receivers, (columns - of + phases - 1) // phases - by) - low
         if row + oy < 0 or row + oy >= rows or size <= 0 or (ox == 0 and oy == 0):
             continue
         sender, first, second = sending[row + oy], np.uint64(phase * lanes + low), np.uint64(of * lanes + low + by)

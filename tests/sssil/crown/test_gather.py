@@ -58,7 +58,8 @@ def test_a_sample_is_summed_for_the_lanes_that_it_emits_for(trims, lanes):
     emit_to = np.array([0, 0, 0, 24, 32, 32, 32, 32, 32], np.int32).reshape(1, 1, 9).repeat(2, axis=0)
     offsets, weight = np.array([[8, 0], [32, 0]], np.int32), np.ones(2)
     starts, weights = np.empty((3, 3), np.int64), np.empty((2, 3))
-    count = _list_emitting(offsets, 8.0 * weight, False, trims, DISC, 0.5, emit_from, emit_to, 0, 0, 0, 32, 64, starts, weights)
+    count = _list_emitting(offsets, 8.0 * weight, False, trims, DISC, 0.5, emit_from, emit_to, 0, 0, 0, 32, 64, starts,
+                           weights)
     assert count == 1  # the other one is dark for the whole strip
     assert starts[:, 0].tolist() == [8, *lanes]
     assert weights[:, 0].tolist() == [8.0, 4.0]  # texels that it stands for, and those of its disc

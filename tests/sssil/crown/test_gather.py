@@ -51,6 +51,20 @@ def test_equals_the_sum_written_as_loops(pattern, density, form, share):
                                    atol=ROUNDING[np.float64] * expected.max())
 
 
+@pytest.mark.parametrize("pattern", ["interleaved", "pixel"])
+def test_a_sample_of_less_than_a_texel_has_no_larger_disc(pattern):
+    """Oracle: so many samples that near ones stand for less than a texel, whose disc covers all of it."""
+    level = random_level((7, 11))
+    settings = replaced(SETTINGS, {"pattern": pattern, "samples": 150, "disc_share": 0.25})
+    weight = samples_at(settings.sampling, 0, 1, 3, 5)[1]
+    assert (weight < 1).sum() > 50
+    assert (weight > 1).any()
+    expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
+                              lambda row, column: samples_at(settings.sampling, 0, 1, row, column), "disc", 0.25)
+    np.testing.assert_allclose(gather(level, 0, settings), expected, rtol=0,
+                               atol=ROUNDING[np.float64] * expected.max())
+
+
 @pytest.mark.parametrize(("trims", "lanes"), [(True, [8, 24]), (False, [0, 32])])
 def test_a_sample_is_summed_for_the_lanes_that_it_emits_for(trims, lanes):
     """Lanes 16 to 31 of one row of 64 emit; a strip of 32 has a sample 8 texels to the right, one 32 to the right."""

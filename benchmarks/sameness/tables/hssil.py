@@ -35,6 +35,7 @@ TABLE = Table({"radius": 3.0, "levels": 3, "samples": 16, "downsample": "closest
     vary("seed", 7, **SLICED),
     vary("seed", 7, pattern="pixel", **SLICED),
     vary("seed", 7, **TRACED),
+    vary("downsample", "closest", same="what the cases start from"),
     vary("downsample", "average", "closest_average", "resampled"),
     vary("downsample", "resampled", **SLICED),
     vary("downsample", "resampled", **TRACED),

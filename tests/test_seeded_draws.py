@@ -239,14 +239,19 @@ def test_fixed_samples_are_mirror_images(seed):
     assert sorted(map(tuple, samples_at(settings.sampling, 0, 1, 0, 0)[0].tolist())) == sorted(pairs + middles)
 
 
+@pytest.mark.parametrize("pattern", ["row", "interleaved"])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_slices_of_the_bitmask(seed):
+def test_slices_of_the_bitmask(seed, pattern):
     settings = of(HssilSettings, radius=8.0, samples=16, inner_samples=4, visibility="bitmask", density="uniform",
-                  seed=seed)
+                  seed=seed, pattern=pattern, tile=2)
     steps = slice_counts(settings.sampling, settings.visibility, 0, 8.0)
     offsets, _ = slice_offsets(settings.sampling, steps, 1, 4)
-    for row in range(4):
-        s, t = pair_of(row_key(level_key(seed, 1), row))
+    assert offsets.shape[:2] == ((4, 1) if pattern == "row" else (2, 2))
+    for row, column in np.ndindex(offsets.shape[:2]):
+        s, t = pair_of(row_key(level_key(seed, 1), row) if pattern == "row" else level_key(seed, 1))
+        if pattern == "interleaved":
+            n = 2 * row + column
+            s, t = (s + n * 0.5698402909980532) % 1, (t + n * 0.7548776662466927) % 1
         for k in range(steps.slices):
             angle, shift = 2 * math.pi * (k + s) / steps.slices, (t + 0.6180339887498949 * k) % 1
             lengths = [8.0 * (j + shift) / steps.occluders for j in range(steps.occluders)]
@@ -254,7 +259,7 @@ def test_slices_of_the_bitmask(seed):
             lengths += [8.0 * math.sqrt(1 + 3 * (j + shift) / steps.crown) for j in range(steps.crown)]
             expected = [[math.floor(far * math.sin(angle) + 0.5), math.floor(far * math.cos(angle) + 0.5)]
                         for far in sorted(lengths)]
-            assert offsets[row, k].tolist() == expected
+            assert offsets[row, column, k].tolist() == expected
 
 
 def test_openness_of_a_point_by_its_rays():

@@ -128,6 +128,9 @@ class Pcss(Settings):
     """Percentage closer soft shadows: blocker search, then percentage closer filtering, texel by texel."""
 
     cone: bool = setting(True, "blockers lie within the cone from the receiver to the light", study=True)
+    blocker_depth: Literal["distance", "axial"] = setting(
+        "distance", "depth of blockers that sizes filters: distance from the centre, or along the axis to the receiver",
+        study=True)
     constant_bias: ConstantBias | None = setting(
         None, "compare with the receiver's biased distance; none: with its tangent plane", study=True)
 

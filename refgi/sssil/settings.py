@@ -88,15 +88,18 @@ class SenderSettings(Settings):
 
     A coarse texel takes position, normal and radiance of the "closest" of four, the "average" of all, or position and
     normal of the closest and the average radiance; "resampled", it sends the flux of all from one, drawn in
-    proportion to flux, and receives as the closest. A sample's form factor is that of a "disc" as large as all
-    texels that it stands for (Eq. 4), of the disc of its own "texel", times their number, or of a "point" (Eq. 3).
+    proportion to flux, and receives as the closest. A sample's form factor is that of a "disc" as large as
+    `disc_share` of the texels that it stands for, but at least one (Eq. 4 where it is all), of the disc of its own
+    "texel", or of a "point" (Eq. 3), times what of them is not in the disc.
     """
 
     PRINCIPAL = "downsample"
 
-    downsample: Downsample = setting("closest", "downsampling from level to level")
-    form_factor: FormFactor = setting("disc", "form factor of a sample: Eq. 4 for all that it stands for (disc) "
-                                      "or its texel (texel), or Eq. 3 (point)", study=True)
+    downsample: Downsample = setting("resampled", "downsampling from level to level")
+    form_factor: FormFactor = setting("disc", "form factor of a sample: Eq. 4 for what it stands for (disc) or "
+                                      "its texel (texel), or Eq. 3 (point)", study=True)
+    disc_share: float = setting(0.25, "share of what a sample stands for that its disc covers, at least one texel; "
+                                "1: all, as Eq. 4", least=0.0, most=1.0, study=True)
     only_level: int | None = setting(None, "the one level that sends light, 0: the first; none: all", least=0,
                                      most=MOST_LEVELS - 1, study=True)
 
@@ -207,7 +210,7 @@ PRESETS: Mapping[str, HssilSettings] = {
     # Fig. 6: half resolution, 4 levels, 64 samples, r = 20; Sec. 4: the closest of four texels; Eq. 4; v = 1
     "paper": HssilSettings(
         SamplingSettings(samples=64, radius=20.0, levels=4, start="half", pattern="row", density="uniform"),
-        SenderSettings(downsample="closest", form_factor="disc"), None, Bilateral(), None),
+        SenderSettings(downsample="closest", form_factor="disc", disc_share=1.0), None, Bilateral(), None),
 }
 
 

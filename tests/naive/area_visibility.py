@@ -74,6 +74,25 @@ def search(delta, d, near, printed):
     return min(delta / (2 * d), STEEPEST) if "val_search_solid_angle" in printed else cone(delta, d, near)
 
 
+def farthest(delta, d, r):
+    """Tangent of the widest direction in which a point at distance r has the light behind it, as the receiver sees.
+
+    A receiver at d on the axis: the point (r sin, r cos) is on the line from (0, d) to the light's edge (Delta / 2, 0).
+    """
+    if r >= d:
+        return 0.0
+    def beside(a):
+        return r * math.sin(a) > delta / 2 * (1 - r * math.cos(a) / d)
+    steps = [math.radians(80) * k / 2000 for k in range(2001)]
+    first = next((k for k, a in enumerate(steps) if beside(a)), None)
+    if not first:
+        return 0.0 if first == 0 else STEEPEST
+    low, high = steps[first - 1], steps[first]
+    for _ in range(60):
+        low, high = (low, (low + high) / 2) if beside((low + high) / 2) else ((low + high) / 2, high)
+    return math.tan(low)
+
+
 def penumbra(delta, d, z, printed):
     """Return the tangent of the final filter."""
     return (printed_angle if "val_alpha" in printed else cone)(delta, d, z)
@@ -270,11 +289,15 @@ def pcss_share(seen, pcss, chain_end, delta, local, normal, printed):
         along = pcss.constant_bias.value / scale.slope
         limit = d * 2**-along if scale.logarithmic else d - along
     hides = seen.depth < limit * (1 - SLACK)
-    blockers = hides & in_disc(n, *region(local, search(delta, d, seen.near, printed), printed))
+    axial, solid_angle = pcss.blocker_depth == "axial", "val_search_solid_angle" in printed
+    wide = farthest(delta, d, seen.near) if axial and not solid_angle else search(delta, d, seen.near, printed)
+    blockers = hides & in_disc(n, *region(local, wide, printed))
     blockers &= in_cone(seen, local, delta) if pcss.cone else True
     if not blockers.any():
         return 1.0
-    z_avg = min(max(seen.depth[blockers].mean(), seen.near), d)
+    depth, least = (seen.depth * (texels(n)[3] @ local) / d, seen.near * math.cos(math.radians(80))) if axial else (
+        seen.depth, seen.near)
+    z_avg = min(max(depth[blockers].mean(), least), d)
     return 1 - hides[in_disc(n, *region(local, penumbra(delta, d, z_avg, printed), printed))].mean()
 
 

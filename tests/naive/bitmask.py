@@ -11,8 +11,8 @@ import numpy as np
 SECTORS = 32
 
 
-def transfer(level, receiver, sender, weight, form="disc", senders=None):
-    """What the sender's radiance is multiplied by: Eq. 4 with its pi, by the disc of all texels or of one, or Eq. 3."""
+def transfer(level, receiver, sender, weight, form="disc", senders=None, share=1.0):
+    """What the sender's radiance is multiplied by: Eq. 4 with its pi, by discs of a share of the texels, or Eq. 3."""
     senders = level if senders is None else senders
     d = senders["position"][:, *sender] - level["position"][:, *receiver]
     distance = math.sqrt(d @ d)
@@ -23,24 +23,22 @@ def transfer(level, receiver, sender, weight, form="disc", senders=None):
     area = senders["area"][sender] * weight
     if form == "point":
         return cos_i * cos_j * area / distance**2
-    square_radius = cos_j * area / math.pi
-    if form == "texel":
-        of_one = cos_j * senders["area"][sender] / math.pi
-        return math.pi * cos_i * weight * of_one / (distance**2 + of_one)
-    return math.pi * cos_i * square_radius / (distance**2 + square_radius)
+    texels = 1.0 if form == "texel" else share * weight if share * weight > 1 else min(weight, 1.0)
+    square_radius = cos_j * senders["area"][sender] * texels / math.pi
+    return math.pi * cos_i * square_radius / (distance**2 + square_radius) * weight / texels
 
 
-def light(level, around, form="disc", see=None):
+def light(level, around, form="disc", see=None, share=1.0):
     """The unoccluded sum, or one with a visibility: `around(row, column)` yields (ox, oy, weight)."""
     result = np.zeros(level["position"].shape)
     for receiver in np.ndindex(level["area"].shape):
         for ox, oy, weight in around(*receiver):
             sender = receiver[0] + oy, receiver[1] + ox
-            if inside(level, sender) and sender != receiver:
-                worth = transfer(level, receiver, sender, weight, form)
+            if inside(level, sender) and sender != receiver and weight > 0:
+                worth = transfer(level, receiver, sender, weight, form, share=share)
                 if worth > 0:
-                    share = see(receiver, sender) if see else 1.0
-                    result[:, *receiver] += share * worth * level["radiance"][:, *sender]
+                    seen = see(receiver, sender) if see else 1.0
+                    result[:, *receiver] += seen * worth * level["radiance"][:, *sender]
     return result
 
 
@@ -50,7 +48,7 @@ def inside(level, texel):
     return 0 <= texel[0] < h and 0 <= texel[1] < w and level["position"][:, *texel].any()
 
 
-def masked_light(level, around, thickness, form="disc", senders=None):
+def masked_light(level, around, thickness, form="disc", senders=None, share=1.0):
     """The sum past the bitmask: `around(row, column)` yields slices, lists of (ox, oy, weight), nearest first.
 
     `senders` is the level as senders and occluders, where those are others.
@@ -60,11 +58,11 @@ def masked_light(level, around, thickness, form="disc", senders=None):
     for receiver in np.ndindex(level["area"].shape):
         if inside(level, receiver):
             for samples in around(*receiver):
-                result[:, *receiver] += one_slice(level, senders, receiver, samples, thickness, form)
+                result[:, *receiver] += one_slice(level, senders, receiver, samples, thickness, form, share)
     return result
 
 
-def one_slice(level, senders, receiver, samples, thickness, form):
+def one_slice(level, senders, receiver, samples, thickness, form, share):
     """What one slice sends to a receiver."""
     sum_, blocked, highest = np.zeros(3), set(), 0.0
     for ox, oy, weight in samples:
@@ -76,7 +74,9 @@ def one_slice(level, senders, receiver, samples, thickness, form):
         front = height(here, normal, there)
         back = height(here, normal, there + thickness * there / math.sqrt(there @ there))
         seen = 1.0 if front >= highest else free_share(blocked, front)
-        sum_ += seen * transfer(level, receiver, sender, weight, form, senders) * senders["radiance"][:, *sender]
+        if weight > 0:
+            light = transfer(level, receiver, sender, weight, form, senders, share)
+            sum_ += seen * light * senders["radiance"][:, *sender]
         highest = max(highest, front)
         blocked |= {k for k in range(SECTORS) if back < middle(k) <= front}
     return sum_

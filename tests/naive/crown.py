@@ -8,8 +8,8 @@ import math
 import numpy as np
 
 
-def pair(p, n, p_j, n_j, ds, form):
-    """What radiance of one sample is multiplied by (Eq. 3 and 4)."""
+def pair(p, n, p_j, n_j, ds, form, covered=1.0):
+    """What radiance of one sample is multiplied by (Eq. 3 and 4); the disc covers a part of its surface ds."""
     d = [b - a for a, b in zip(p, p_j, strict=True)]
     r = math.sqrt(sum(x * x for x in d))
     if r == 0.0:
@@ -18,12 +18,15 @@ def pair(p, n, p_j, n_j, ds, form):
     cos_j = max(0.0, -sum(a * b for a, b in zip(n_j, d, strict=True)) / r)
     if form == "point":
         return cos_i * cos_j * ds / r**2
-    square = cos_j * ds / math.pi
-    return math.pi * cos_i * square / (r**2 + square) if square > 0 else 0.0
+    square = cos_j * covered * ds / math.pi
+    return math.pi * cos_i * square / (r**2 + square) / covered if square > 0 else 0.0
 
 
-def gathered(level, samples_at, form):
-    """Irradiance (3, h, w) of every texel; samples_at(row, column) gives (ox, oy) of samples and the texels of each."""
+def gathered(level, samples_at, form, share=1.0):
+    """Irradiance (3, h, w) of every texel; samples_at(row, column) gives (ox, oy) of samples and the texels of each.
+
+    A disc covers a share of them, but at least one where there is one.
+    """
     position, normal, radiance, area = (np.asarray(a, np.float64) for a in level)
     rows, columns = area.shape
     result = np.zeros((3, rows, columns))
@@ -33,7 +36,7 @@ def gathered(level, samples_at, form):
                 a, b = row + int(oy), column + int(ox)
                 if 0 <= a < rows and 0 <= b < columns and (a, b) != (row, column):
                     worth = pair(position[:, row, column], normal[:, row, column], position[:, a, b], normal[:, a, b],
-                                 area[a, b] * weight, form)
+                                 area[a, b] * weight, form, max(share, min(1.0, 1.0 / weight)))
                     result[:, row, column] += worth * radiance[:, a, b]
     return result
 

@@ -129,6 +129,9 @@ def slices(sampling, bitmask, radius, index, number, row, column):
     level, fixed = level_key(sampling.seed, number), sampling.pattern == "fixed"
     key = level if fixed else row_key(level, row)
     turn, shift = shifts(pixel_key(key, column) if sampling.pattern == "pixel" else key)
+    if sampling.pattern == "interleaved":
+        n = sampling.tile * (row % sampling.tile) + column % sampling.tile
+        turn, shift = ((a + n * by) % 1 for a, by in zip(shifts(level), (1 / G**2, 1 / G), strict=True))
     found = []
     for k in range(count):
         part = (shift + (k // 2 if fixed else k) * GOLDEN) % 1

@@ -140,10 +140,11 @@ def weighted(offsets, inner, r):
             for i, (ox, oy) in enumerate(offsets)]
 
 
-def received(x, y, w, form, disc_pi=False):
+def received(x, y, w, form, disc_pi=False, share=1.0):
     """Return what a texel x receives of a sample y that stands for w texels.
 
-    Eq. 4 with the disc of all w ("disc"), w times that of one ("texel"), or Eq. 3 ("point").
+    Eq. 4 with the disc of a share of all w, at least one ("disc"), or of one ("texel"), as often as that makes w; or
+    Eq. 3 ("point"). Where w is less than one the disc is no larger.
     """
     d = y["place"] - x["place"]
     r2 = d @ d
@@ -154,14 +155,12 @@ def received(x, y, w, form, disc_pi=False):
     ds = y["area"] * w
     if form == "point":
         return y["radiance"] * cos_x * cos_y * ds / r2
-    disc = cos_y * ds / math.pi  # R^2
-    if form == "texel":
-        disc = cos_y * y["area"] / math.pi
-        return w * (1 if disc_pi else math.pi) * y["radiance"] * cos_x * disc / (r2 + disc)
-    return (1 if disc_pi else math.pi) * y["radiance"] * cos_x * disc / (r2 + disc)
+    covered = 1.0 if form == "texel" or share * w < 1 <= w else w if w < 1 else share * w
+    disc = cos_y * y["area"] * covered / math.pi  # R^2
+    return w / covered * (1 if disc_pi else math.pi) * y["radiance"] * cos_x * disc / (r2 + disc)
 
 
-def gathered(texels, offsets_at, form, disc_pi=False, see=None, senders=None):
+def gathered(texels, offsets_at, form, disc_pi=False, see=None, senders=None, share=1.0):
     """Return the irradiance of each texel of a level, (3, h, w); what is off the picture or empty gives nothing.
 
     `see(receiver, sender)` is the visibility of two texels, where there is one; `senders` are the texels as senders,
@@ -175,7 +174,7 @@ def gathered(texels, offsets_at, form, disc_pi=False, see=None, senders=None):
             for ox, oy, w in offsets_at(row, column) if texels[row][column] is not None else ():
                 i, j = row + oy, column + ox
                 if (ox, oy) != (0, 0) and 0 <= i < height and 0 <= j < width and senders[i][j] is not None:
-                    arriving = received(texels[row][column], senders[i][j], w, form, disc_pi)
+                    arriving = received(texels[row][column], senders[i][j], w, form, disc_pi, share)
                     if arriving.any():
                         light[:, row, column] += arriving * (see(texels[row][column], senders[i][j]) if see else 1.0)
     return light
@@ -201,7 +200,7 @@ def seen(texels):
 
 
 def hssil(texels, *, first, count, offsets, mode="closest", form="disc", kind="bilateral", sigma=0.02, power=8.0,
-          only=None, disc_pi=False, level_factor=False, seed=0):
+          only=None, disc_pi=False, level_factor=False, seed=0, share=1.0):
     """Return the irradiance of a picture: gather at each level, coarsest first, carry up, add (Sec. 3.2).
 
     `offsets(index, level, row, column)` lists (ox, oy, w); level 0 is full resolution, `first` the level of index 0.
@@ -215,7 +214,7 @@ def hssil(texels, *, first, count, offsets, mode="closest", form="disc", kind="b
         added = np.zeros((3, len(here), len(here[0])))
         if only in (None, index):
             added = gathered(here, lambda *at, i=index: offsets(i, first + i, *at), form, disc_pi,
-                             senders=senders[index])
+                             senders=senders[index], share=share)
         added *= 4.0**index if level_factor else 1.0
         if light is not None:
             added += upsampled(light, levels[index + 1], here, 2, *filtering)

@@ -94,10 +94,11 @@ def gathered(frame, texels, index, settings, radius, senders):
     sampling, kind = settings.sampling, settings.visibility
     number, shape = sampling.first_level + index, (len(texels), len(texels[0]))
     form, disc_pi = settings.senders.form_factor, "hss_disc_pi" in settings.as_published
+    share = settings.senders.disc_share
     if isinstance(kind, Bitmask):
         light = bitmask.masked_light(
             as_arrays(texels), lambda *at: crown_points.slices(sampling, kind, radius, index, number, *at),
-            kind.thickness * diagonal(frame), form, as_arrays(senders))
+            kind.thickness * diagonal(frame), form, as_arrays(senders), share)
         return light / math.pi if disc_pi and form != "point" else light
 
     def around(row, column):
@@ -106,7 +107,7 @@ def gathered(frame, texels, index, settings, radius, senders):
         return crown_points.samples(sampling, radius, index, number, row, column)
 
     see = sight(frame, texels, senders) if isinstance(kind, Rays) else None
-    return hssil.gathered(texels, around, form, disc_pi, see, senders)
+    return hssil.gathered(texels, around, form, disc_pi, see, senders, share)
 
 
 def diagonal(frame):

@@ -6,6 +6,8 @@ A map is n rows of n radial depths (inf: nothing seen) around the origin, +z for
 
 import math
 
+from tests.naive.area_visibility import farthest
+
 CAP = math.radians(80)
 NOTHING = 0.02
 SLACK = 1e-3
@@ -123,8 +125,11 @@ def series_shadow(depth, point, delta, far, terms, bias=None, kind="log_map"):
     return min(max(value, 0.0), 1.0), mean
 
 
-def step_shadow(depth, point, normal, delta, cone=True, receiver_plane=True):
-    """(V, z_avg) by the step: each texel against the receiver's plane, blockers within the cone to the light."""
+def step_shadow(depth, point, normal, delta, cone=True, receiver_plane=True, axial=False):
+    """(V, z_avg) by the step: each texel against the receiver's plane, blockers within the cone to the light.
+
+    `axial`: z_avg is the mean depth along the axis to the receiver, and the search as wide as any blocker asks for.
+    """
     x, y, z = point
     d = math.sqrt(x * x + y * y + z * z)
     near, n = map_near(depth), len(depth)
@@ -147,11 +152,17 @@ def step_shadow(depth, point, normal, delta, cone=True, receiver_plane=True):
         half_diagonal = stored * math.sqrt(2) * (2 / n) / (1 + s * s + t * t)
         return along < d and offset - half_diagonal <= delta / 2 * (1 - along / d)
 
-    blockers = [texel for texel in texels_in(n, *cone_disc(x, y, z, search_angle(delta, d, near)))
+    def stored(texel):
+        w, far = direction(*place(n, *texel)), depth[texel[0]][texel[1]]
+        return far * (w[0] * x + w[1] * y + w[2] * z) / d if axial else far
+
+    wide = math.atan(farthest(delta, d, near)) if axial else search_angle(delta, d, near)
+    blockers = [texel for texel in texels_in(n, *cone_disc(x, y, z, wide))
                 if hides(texel) and (not cone or in_cone(texel))]
     if not blockers:
         return 1.0, None
-    mean = min(max(sum(depth[i][j] for i, j in blockers) / len(blockers), near), d)
+    least = near * math.cos(CAP) if axial else near
+    mean = min(max(sum(stored(texel) for texel in blockers) / len(blockers), least), d)
     texels = texels_in(n, *cone_disc(x, y, z, search_angle(delta, d, mean)))
     return 1 - sum(hides(texel) for texel in texels) / len(texels), mean
 

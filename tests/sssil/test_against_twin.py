@@ -41,7 +41,7 @@ def twin(frame, settings):
                        mode=senders.downsample, form=senders.form_factor, kind=upsampling.name(),
                        only=senders.only_level, **weights,
                        disc_pi="hss_disc_pi" in printed, level_factor="hss_level_factor" in printed,
-                       seed=sampling.seed)
+                       seed=sampling.seed, share=senders.disc_share)
 
 
 def samples(settings):
@@ -66,6 +66,7 @@ SETTINGS = {
     "averages": of(HssilSettings, levels=3, radius=2.0, pattern="all", start="full", downsample="average"),
     "closest places, average light": of(HssilSettings, levels=3, radius=2.0, downsample="closest_average"),
     "the closest": of(HssilSettings, levels=3, radius=2.0, downsample="closest"),
+    "the disc of all": of(HssilSettings, levels=3, radius=2.0, disc_share=1.0),
     "points": of(HssilSettings, levels=3, radius=2.0, form_factor="point"),
     "bilinear": of(HssilSettings, levels=3, radius=2.0, upsampling="bilinear"),
     "nearest": of(HssilSettings, levels=3, radius=2.0, upsampling="nearest"),

@@ -14,7 +14,8 @@ NAN = float("nan")
 @pytest.mark.parametrize(("key", "value"), [
     ("radius", 0.5), ("radius", NAN), ("radius", 1e9), ("levels", 0), ("levels", 17), ("samples", 0), ("samples", 2.5),
     ("inner_samples", -1), ("start", "eighth"), ("pattern", "spiral"), ("seed", -1), ("downsample", "nearest"),
-    ("form_factor", "sphere"), ("only_level", 4), ("only_level", -1), ("upsampling", "cubic"), ("depth_sigma", 0.0),
+    ("form_factor", "sphere"), ("disc_share", -0.1), ("disc_share", 1.1),
+    ("only_level", 4), ("only_level", -1), ("upsampling", "cubic"), ("depth_sigma", 0.0),
     ("depth_sigma", NAN), ("normal_power", -1.0), ("visibility", "maybe"), ("slices", 0), ("slices", 257),
     ("thickness", -0.1), ("thickness", NAN), ("cameras", -1), ("cameras", 17), ("views", ("left",)),
     ("depth_tolerance", 1.5), ("normal_cosine", -2.0), ("as_published", {"hss_everything"}),
@@ -48,8 +49,9 @@ def test_a_page_shows_few_keys_and_says_what_each_is(kind):
 
 
 def test_the_papers_values_are_the_defaults_but_for_noise():
-    """The paper says neither where samples lie nor who shares them; it blurs no level."""
-    changed = {"sampling.pattern": "interleaved", "sampling.density": "inverse_distance", "blur": GeometryBlur()}
+    """The paper says neither where samples lie nor who shares them; it blurs no level, and draws no sender."""
+    changed = {"sampling.pattern": "interleaved", "sampling.density": "inverse_distance", "blur": GeometryBlur(),
+               "senders.downsample": "resampled", "senders.disc_share": 0.25}
     assert PRESETS["paper"] != HssilSettings()
     assert replaced(PRESETS["paper"], changed) == HssilSettings()
 

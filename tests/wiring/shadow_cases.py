@@ -69,6 +69,8 @@ def shadow_cases(kind):
         "8 and 16 bits": Case({f"{kind}.quantisation": "published"}, {"clusters.count": 5, "maps.near_distance": 0.6}),
         "8 and 16 bits, exact means": few({f"{kind}.quantisation": "published"}, {f"{kind}.prefilter": "brute"}),
         "blockers beside the cone": few({f"{kind}.cone": False}, pcss),
+        "blockers' depth along the axis": few({f"{kind}.blocker_depth": "axial"}, pcss),
+        "depth along the axis beside the cone": few({f"{kind}.blocker_depth": "axial"}, pcss | {f"{kind}.cone": False}),
         "a constant bias": few({bias: "constant_bias"}, pcss),
         "a larger constant bias": few({f"{bias}.value": 0.1}, pcss | {bias: "constant_bias"}),
         "a constant bias in metres": few({f"{bias}.scale": "map"}, pcss | {bias: "constant_bias",

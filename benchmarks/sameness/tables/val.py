@@ -55,6 +55,7 @@ VISIBILITY = [
     vary("quantisation", "published", prefilter="brute"),
     vary("receiver_plane", False, visibility="step"),
     vary("cone", False, visibility="step"),
+    vary("blocker_depth", "axial", visibility="step"),
     *(vary("as_published", "val_alpha", "val_alpha_over_pi", "val_search_solid_angle", prefilter=how)
       for how in ("mip", "brute")),
     vary("as_published", "val_alpha", "val_search_solid_angle", visibility="step"),

@@ -51,6 +51,24 @@ def solid_angle_tangent(delta: Any, d: Any) -> Any:
 
 
 @kernel
+def farthest_tangent(delta: Any, d: Any, r: Any) -> Any:
+    """Return tan(theta) of the directions in which a point at the distance r may lie before the light, <= tan(80 deg).
+
+    It does where r sin(theta) <= (Delta / 2)(1 - r cos(theta) / d), that is theta <= arcsin(Delta cos(phi) / 2 r) - phi
+    with tan(phi) = Delta / 2 d; in all directions where r <= (Delta / 2) cos(phi). 0 for r >= d.
+    """
+    zero, one, cap = type(d)(0.0), type(d)(1.0), type(d)(STEEPEST)
+    phi = delta / (type(d)(2.0) * d)
+    sine = delta / (type(d)(2.0) * r * math.sqrt(one + phi * phi))
+    if r >= d or sine >= one:
+        return zero if r >= d else cap
+    outer = sine / math.sqrt(one - sine * sine)
+    below = one + outer * phi
+    tangent = (outer - phi) / below
+    return tangent if tangent < cap else cap
+
+
+@kernel
 def disc(x: Any, y: Any, z: Any, d: Any, tangent: Any) -> tuple[Any, Any, Any]:
     """Return centre s, t and radius, in [-1, 1] units, of the disc that a cone around the receiver is on the map.
 

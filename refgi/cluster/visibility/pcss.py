@@ -39,6 +39,9 @@ from refgi.jit import kernel
 Array = npt.NDArray[Any]
 
 
+LEAST_COSINE = math.cos(math.radians(80.0))  # of a direction that is searched
+
+
 class BlockerTest(NamedTuple):
     """Which texels count as blockers."""
 
@@ -103,11 +106,12 @@ def find_blockers(shadow: PcssShadow, facing: Array, size: int, pending: Array, 
         x, y, z, d, extent = rows[X, i], rows[Y, i], rows[Z, i], rows[D, i], rows[EXTENT, i]
         _, blocked, total = count_blockers(
             shadow.depth, shadow.test, (rows[S, i], rows[T, i], rows[RADIUS, i]), (x, y, z, d),
-            to_map_frame(constants, facing, i), extent, True)
+            to_map_frame(constants, facing, i), extent, True, sizing.axial)
         pending[i] = blocked > 0
         if blocked == 0:
             continue
-        mean = min(max(total / rows.dtype.type(blocked), near), d)  # Sec. 4.1: z_avg
+        least = near * rows.dtype.type(LEAST_COSINE) if sizing.axial else near
+        mean = min(max(total / rows.dtype.type(blocked), least), d)  # Sec. 4.1: z_avg
         rows[DEPTH, i] = mean
         # Sec. 4.2: alpha = arctan(p cos(beta) / d)
         tangent = published_tangent(extent, d, mean) if sizing.alpha else cone_tangent(extent, d, mean)
@@ -127,7 +131,7 @@ def filter_texels(
         count, blocked, _ = count_blockers(
             shadow.depth, shadow.test, (rows[S, i], rows[T, i], rows[RADIUS, i]),
             (rows[X, i], rows[Y, i], rows[Z, i], rows[D, i]), to_map_frame(shadow.constants, facing, i),
-            rows[EXTENT, i], False)
+            rows[EXTENT, i], False, False)
         visible[i] = real(1.0) - real(blocked) / real(max(count, 1))
 
 
@@ -144,9 +148,11 @@ def to_map_frame(constants: Array, vectors: Array, i: int) -> tuple[Any, Any, An
 
 @kernel
 def count_blockers(
-    depth: Array, test: BlockerTest, where: Any, receiver: Any, normal: Any, extent: Any, search: bool
+    depth: Array, test: BlockerTest, where: Any, receiver: Any, normal: Any, extent: Any, search: bool, axial: bool
 ) -> tuple[int, int, Any]:
     """Return how many texels a disc has, how many of them hide a receiver, and the sum of the depths of those, m.
+
+    Depths are distances, or, if `axial`, those along the axis to the receiver.
 
     `where` is (s, t, radius) in [-1, 1] units, `receiver` (x, y, z, d) and `normal` in the map's frame; the cone counts
     in the `search` alone. Texels have their centre in the disc, at least the nearest one, and within the hemisphere.
@@ -155,17 +161,19 @@ def count_blockers(
     n = depth.shape[0]
     first, last = _texels(cs, radius, n)
     top, bottom = _texels(ct, radius, n)
-    found = _scan(depth, test, (first, last, top, bottom), (cs, ct, radius * radius), receiver, normal, extent, search)
+    found = _scan(depth, test, (first, last, top, bottom), (cs, ct, radius * radius), receiver, normal, extent, search,
+                  axial)
     if found[0] > 0:
         return found
     column, row = _nearest(cs, n), _nearest(ct, n)
     everywhere = (cs, ct, type(radius)(np.inf))
-    return _scan(depth, test, (column, column, row, row), everywhere, receiver, normal, extent, search)
+    return _scan(depth, test, (column, column, row, row), everywhere, receiver, normal, extent, search, axial)
 
 
 @kernel
 def _scan(
-    depth: Array, test: BlockerTest, box: Any, around: Any, receiver: Any, normal: Any, extent: Any, search: bool
+    depth: Array, test: BlockerTest, box: Any, around: Any, receiver: Any, normal: Any, extent: Any, search: bool,
+    axial: bool,
 ) -> tuple[int, int, Any]:
     real = depth.dtype.type
     one, two, half, n = real(1.0), real(2.0), real(0.5), depth.shape[0]
@@ -190,8 +198,15 @@ def _scan(
             ):
                 continue
             blocked += 1
-            total += z
+            total += z * _axial_share(w, receiver) if axial else z
     return count, blocked, total
+
+
+@kernel
+def _axial_share(w: Any, receiver: Any) -> Any:
+    """Return the cosine between a texel's direction and that to the receiver."""
+    x, y, depth, d = receiver
+    return (x * w[0] + y * w[1] + depth * w[2]) / d
 
 
 @kernel

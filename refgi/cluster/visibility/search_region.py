@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from refgi.cluster.filters.depth_scale import DepthScale, depth_scale
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
-from refgi.cluster.settings import DepthScaleName, ValSettings
+from refgi.cluster.settings import DepthScaleName, Pcss, ValSettings
 from refgi.cluster.visibility.kernel_size import (
     cone_tangent,
     disc,
+    farthest_tangent,
     published_square,
     solid_angle_tangent,
 )
@@ -50,6 +51,7 @@ class FilterSizing(NamedTuple):
     alpha_over_pi: bool  # squares of side alpha / pi
     solid_angle: bool  # the search of blockers half-way
     foreshortened: bool  # the light's size as the receiver sees it
+    axial: bool  # depths are those along the axis to the receiver, not distances
 
 
 def filter_sizing(settings: ValSettings) -> FilterSizing:
@@ -58,16 +60,17 @@ def filter_sizing(settings: ValSettings) -> FilterSizing:
     Parameters
     ----------
     settings : ValSettings
-        `as_published` and `area.foreshortened` count.
+        `as_published`, `area.foreshortened` and the `blocker_depth` count.
 
     Returns
     -------
     FilterSizing
         One flag each.
     """
-    published = settings.as_published
+    published, kind = settings.as_published, settings.visibility
     return FilterSizing("val_alpha" in published, "val_alpha_over_pi" in published,
-                   "val_search_solid_angle" in published, settings.area.foreshortened)
+                        "val_search_solid_angle" in published, settings.area.foreshortened,
+                        isinstance(kind, Pcss) and kind.blocker_depth == "axial")
 
 
 def light_constants(
@@ -157,7 +160,10 @@ def find_search_regions(
         z = z if ahead else one
         extent = delta * math.sqrt(z / d) if sizing.foreshortened else delta
         rows[X, i], rows[Y, i], rows[Z, i], rows[D, i], rows[EXTENT, i] = x, y, z, d, extent
-        rows[RADIUS, i] = solid_angle_tangent(extent, d) if sizing.solid_angle else cone_tangent(extent, d, near)
+        if sizing.solid_angle:
+            rows[RADIUS, i] = solid_angle_tangent(extent, d)
+        else:
+            rows[RADIUS, i] = farthest_tangent(extent, d, near) if sizing.axial else cone_tangent(extent, d, near)
     place_filters(sizing.alpha_over_pi, size, rows)
     return count_true(pending, size)
 

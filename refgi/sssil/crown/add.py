@@ -26,19 +26,27 @@ X, Y, Z, NX, NY, NZ, R, G, B = (np.uint64(k * WIDE) for k in range(9))
 
 
 @kernel
-def form_factor(c: Any, s: Any, texel: Any, square: Any, form: int) -> Any:
-    """Return c s / (r^4 + s r) (Eq. 4, DISC), c s / (r^4 + t r) (TEXEL) or c s / r^4 (Eq. 3, POINT).
+def form_factor(c: Any, s: Any, disc: Any, square: Any) -> Any:
+    """Return c s / (r^4 + d r): Eq. 4 where the disc d is all that the sample stands for, Eq. 3 where it is 0.
 
-    That is cos(theta) R^2 / (r^2 + R^2), without pi. `s` is of all texels that the sample stands for, `texel` t of one
-    of them, `square` r^2. 0 where c or s is 0, and where receiver and sample coincide.
+    That is cos(theta) R^2 / (r^2 + D^2), without pi. `s` is r R^2 of all texels that the sample stands for, `disc` d of
+    those that its disc covers, `square` r^2. 0 where c or s is 0, and where receiver and sample coincide.
     """
     least = type(c)(LEAST)
-    # Eq. (3): cos(theta) cos(theta') ds / r^2
-    below = square * square
-    if form != POINT:
-        # Eq. (4): cos(theta) R^2 / (r^2 + R^2)
-        below = below + (s if form == DISC else texel) * math.sqrt(square)
+    # Eq. (4): cos(theta) R^2 / (r^2 + R^2); Eq. (3): cos(theta) cos(theta') ds / r^2
+    below = square * square + disc * math.sqrt(square)
     return c * s / (below if below > least else least)
+
+
+@kernel
+def disc_texels(weight: float, form: int, share: float) -> float:
+    """Return how many texels the disc of a sample covers that stands for `weight`: a share, but no less than a texel.
+
+    One (TEXEL) or none (POINT) by other form factors. A sample that stands for less than a texel has all of that.
+    """
+    if form == DISC:
+        return max(share * weight, min(1.0, weight))
+    return 1.0 if form == TEXEL else 0.0
 
 
 def form_of(name: str) -> int:
@@ -48,8 +56,8 @@ def form_of(name: str) -> int:
 
 @kernel
 def term(px: Any, py: Any, pz: Any, nx: Any, ny: Any, nz: Any, qx: Any, qy: Any, qz: Any, mx: Any, my: Any, mz: Any,
-         weight: Any, form: int) -> Any:
-    """Return the form factor of one receiver and one sample that stands for `weight` texels.
+         weight: Any, disc: Any) -> Any:
+    """Return the form factor of one receiver and one sample that stands for `weight` texels, its disc for `disc`.
 
     p, n: position and normal of the receiver; q, m: position of the sample, and its reversed normal times area / pi.
     """
@@ -60,13 +68,13 @@ def term(px: Any, py: Any, pz: Any, nx: Any, ny: Any, nz: Any, qx: Any, qy: Any,
     s = mx * dx + my * dy + mz * dz
     c = c if c > zero else zero
     texel = s if s > zero else zero
-    return form_factor(c, texel * weight, texel, square, form)
+    return form_factor(c, texel * weight, texel * disc, square)
 
 
 @kernel
 def add_two(
-    tile: Array, low: int, lanes: int, packed: Array, step: int, first: int, first_weight: Any, second: int,
-    second_weight: Any, form: int,
+    tile: Array, low: int, lanes: int, packed: Array, step: int, first: int, first_weight: Any, first_disc: Any,
+    second: int, second_weight: Any, second_disc: Any,
 ) -> None:
     """Add the light of two samples to each receiver of a tile; the two contributions are added to each other first.
 
@@ -82,9 +90,9 @@ def add_two(
     for i in range(np.uint64(low), np.uint64(low + lanes)):
         px, py, pz, nx, ny, nz = tile[X + i], tile[Y + i], tile[Z + i], tile[NX + i], tile[NY + i], tile[NZ + i]
         g = term(px, py, pz, nx, ny, nz, packed[a + i], packed[a1 + i], packed[a2 + i], packed[a3 + i], packed[a4 + i],
-                 packed[a5 + i], first_weight, form)
+                 packed[a5 + i], first_weight, first_disc)
         h = term(px, py, pz, nx, ny, nz, packed[b + i], packed[b1 + i], packed[b2 + i], packed[b3 + i], packed[b4 + i],
-                 packed[b5 + i], second_weight, form)
+                 packed[b5 + i], second_weight, second_disc)
         # Eq. (1)
         tile[R + i] = tile[R + i] + (g * packed[a6 + i] + h * packed[b6 + i])
         tile[G + i] = tile[G + i] + (g * packed[a7 + i] + h * packed[b7 + i])

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
 from refgi.skips import left_out
-from refgi.sssil.crown.add import ROWS, TEXEL, WIDE, add_two, close_group, form_of
+from refgi.sssil.crown.add import DISC, ROWS, TEXEL, WIDE, add_two, close_group, disc_texels, form_of
 from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, dark_ends, pack
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.points import level_key, pixel_key, row_key, sample_points, sample_weight, shift_of, shifted
@@ -59,7 +59,8 @@ def gather(
     sampling, senders = settings.sampling, level if senders is None else senders
     radius = chosen_radius((rows << index, columns << index), sampling)
     real = level.position.dtype.type
-    form, factor = form_of(settings.senders.form_factor), real(math.pi * level_factor(index, settings))
+    form, share = form_of(settings.senders.form_factor), settings.senders.disc_share
+    factor = real(math.pi * level_factor(index, settings))
     farthest, result = math.ceil(2 * radius), plane(level.radiance.shape, level.radiance.dtype)
     if samples is None and sampling.pattern == "pixel":
         inner, crown = sampling.counts(index)
@@ -68,15 +69,14 @@ def gather(
         tally("pairs", lambda: rows * columns * (inner + crown))
         emitters = pack(senders, 1, farthest, WIDE)
         _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, sampling.density == "uniform",
-                          key, weight.astype(real), form, factor, result)
+                          key, weight, form, share, factor, result)
         return result
     shared = shared_offsets(sampling, index, level.number, rows, radius, columns) if samples is None else samples
     offsets, weight = _reaching(*shared, rows, columns)
     tally("pairs", lambda: rows * columns * offsets.shape[2])
     emitters = pack(senders, offsets.shape[1], farthest, WIDE)
     paired, trims = sampling.pattern in ("fixed", "all"), left_out("sssil.senders", lambda: dark_ends(emitters))
-    _gather_shared(emitters, level.position, level.normal, offsets, weight.astype(real), paired, trims, form, factor,
-                   result)
+    _gather_shared(emitters, level.position, level.normal, offsets, weight, paired, trims, form, share, factor, result)
     return result
 
 
@@ -114,7 +114,7 @@ def level_factor(index: int, settings: HssilSettings) -> float:
 @kernel(parallel=True)
 def _gather_shared(
     emitters: Emitters, position: Array, normal: Array, offsets: Array, weight: Array, paired: bool, trims: bool,
-    form: int, factor: Any, result: Array,
+    form: int, share: float, factor: Any, result: Array,
 ) -> None:
     rows = normal.shape[1]
     packed, emit_from, emit_to = emitters.packed, emitters.emit_from, emitters.emit_to
@@ -124,19 +124,19 @@ def _gather_shared(
     for task in prange(strips * bands):
         left, top = np.int64(task) // bands * strip, np.int64(task) % bands * BAND
         tile = np.empty(ROWS * WIDE, packed.dtype)
-        starts, weights = np.empty((3, weight.shape[2] + 1), np.int64), np.empty(weight.shape[2] + 1, packed.dtype)
+        starts, weights = np.empty((3, weight.shape[2] + 1), np.int64), np.empty((2, weight.shape[2] + 1), packed.dtype)
         for row in range(top, min(rows, top + BAND)):
             shared = row % offsets.shape[0]
             for phase in range(phases):
                 _load(tile, strip, position, normal, scale, row, phase + phases * left, phases)
                 stands_for = weight[shared % weight.shape[0], phase % weight.shape[1]]
-                count = _list_emitting(offsets[shared, phase], stands_for, paired, trims, emit_from, emit_to, row,
-                                       phase, pad + left, strip, line, starts, weights)
+                count = _list_emitting(offsets[shared, phase], stands_for, paired, trims, form, share, emit_from,
+                                       emit_to, row, phase, pad + left, strip, line, starts, weights)
                 for j in range(0, count, 2):
                     low = min(starts[1, j], starts[1, j + 1]) // BLOCK * BLOCK
                     lanes = (max(starts[2, j], starts[2, j + 1]) - low + BLOCK - 1) // BLOCK * BLOCK
-                    add_two(tile, low, lanes, packed, phases * line, starts[0, j], weights[j], starts[0, j + 1],
-                            weights[j + 1], form)
+                    add_two(tile, low, lanes, packed, phases * line, starts[0, j], weights[0, j], weights[1, j],
+                            starts[0, j + 1], weights[0, j + 1], weights[1, j + 1])
                     if (j + 2) % GROUP == 0:
                         close_group(tile, strip)
                 close_group(tile, strip)
@@ -170,12 +170,13 @@ def _load(
 
 @kernel
 def _list_emitting(
-    offsets: Array, weight: Array, paired: bool, trims: bool, emit_from: Array, emit_to: Array, row: int, phase: int,
-    first: int, lanes: int, line: int, starts: Array, weights: Array,
+    offsets: Array, weight: Array, paired: bool, trims: bool, form: int, share: float, emit_from: Array,
+    emit_to: Array, row: int, phase: int, first: int, lanes: int, line: int, starts: Array, weights: Array,
 ) -> int:
     """List the places of a strip's samples that emit, and the lanes for which they do; all lanes unless it `trims`.
 
-    In pairs where samples are paired; one without radiance stands in for a missing partner.
+    In pairs where samples are paired; one without radiance stands in for a missing partner. `weights` gets the texels
+    that samples stand for, and those of their discs.
     """
     rows, phases = emit_to.shape[0] - 1, emit_to.shape[1]
     black = rows * PLANES * phases * line
@@ -187,7 +188,8 @@ def _list_emitting(
     for j in range(weight.size):
         a, column = row + np.int64(offsets[j, 1]), phase + np.int64(offsets[j, 0])
         of, lane = column & (phases - 1), first + (column >> power)
-        start[count], low[count], high[count], weights[count] = black, lanes, 0, weight[j]
+        start[count], low[count], high[count] = black, lanes, 0
+        weights[0, count], weights[1, count] = weight[j], disc_texels(weight[j], form, share)
         inside = 0 <= a < rows and lane >= 0 and lane + lanes <= line
         if inside and not (offsets[j, 0] == 0 and offsets[j, 1] == 0):
             start[count] = (a * PLANES * phases + of) * line + lane
@@ -202,7 +204,7 @@ def _list_emitting(
         if paired and j % 2 == 1 and emitting_in_pair == 0:
             count -= 2
         emitting_in_pair = emitting_in_pair if j % 2 == 0 else 0
-    start[count], low[count], high[count], weights[count] = black, lanes, 0, weight.dtype.type(0.0)
+    start[count], low[count], high[count], weights[0, count], weights[1, count] = black, lanes, 0, 0.0, 0.0
     return count
 
 
@@ -219,7 +221,7 @@ def _store(tile: Array, lanes: int, factor: Any, row: int, column: int, phases: 
 @kernel(parallel=True)
 def _gather_per_pixel(
     emitters: Emitters, position: Array, normal: Array, points: Array, inner: int, radius: float, uniform: bool,
-    key: Any, weight: Array, form: int, factor: Any, result: Array,
+    key: Any, weight: Array, form: int, share: float, factor: Any, result: Array,
 ) -> None:
     rows = normal.shape[1]
     packed, line, pad, strip = emitters.packed, emitters.line, emitters.pad, emitters.strip
@@ -228,7 +230,7 @@ def _gather_per_pixel(
     for task in prange(strips * bands):
         left, top = np.int64(task) // bands * strip, np.int64(task) % bands * BAND
         tile, shifts = np.empty(ROWS * WIDE, packed.dtype), np.empty((3, WIDE))
-        lines = np.empty(2 * PLANES * WIDE, packed.dtype)
+        lines, real = np.empty(2 * PLANES * WIDE, packed.dtype), packed.dtype.type
         for row in range(top, min(rows, top + BAND)):
             first = row * PLANES * line + pad + left
             _load(tile, strip, position, normal, scale, row, left, 1)
@@ -236,12 +238,12 @@ def _gather_per_pixel(
                 shifts[0, i], shifts[1, i], shifts[2, i] = shift_of(pixel_key(row_key(key, row), left + i), 0)
             for j in range(0, weight.size, 2):
                 k = min(j + 1, weight.size - 1)
-                _expand(packed, line, first, row, rows, points, j, inner, radius, uniform, form, shifts, strip, lines,
-                        0)
-                _expand(packed, line, first, row, rows, points, k, inner, radius, uniform, form, shifts, strip, lines,
-                        PLANES * WIDE)
-                second = weight[k] if k > j else weight.dtype.type(0.0)
-                add_two(tile, 0, strip, lines, WIDE, 0, weight[j], PLANES * WIDE, second, form)
+                one = _expand(packed, line, first, row, rows, points, weight[j], j, inner, radius, uniform, form, share,
+                              shifts, strip, lines, 0)
+                two = _expand(packed, line, first, row, rows, points, weight[k], k, inner, radius, uniform, form, share,
+                              shifts, strip, lines, PLANES * WIDE)
+                second = real(weight[k] if k > j else 0.0)
+                add_two(tile, 0, strip, lines, WIDE, 0, real(weight[j]), one, PLANES * WIDE, second, two)
                 if (j + 2) % GROUP == 0:
                     close_group(tile, strip)
             close_group(tile, strip)
@@ -250,22 +252,26 @@ def _gather_per_pixel(
 
 @kernel
 def _expand(
-    packed: Array, line: int, first: int, row: int, rows: int, points: Array, j: int, inner: int, radius: float,
-    uniform: bool, form: int, shifts: Array, lanes: int, lines: Array, to: int,
-) -> None:
+    packed: Array, line: int, first: int, row: int, rows: int, points: Array, weight: float, j: int, inner: int,
+    radius: float, uniform: bool, form: int, share: float, shifts: Array, lanes: int, lines: Array, to: int,
+) -> Any:
     """Copy the texels of one sample of each receiver of a strip into a line, with their relative weight.
 
-    Areas are those of all texels that a sample stands for; the disc of a texel alone keeps its area, and sends more.
+    Areas are those of the sample's disc over the texels returned; what the sample stands for besides is radiance.
     """
-    weighted = 6 if form == TEXEL else 3
-    within = 0.0 if j < inner else 1.0
+    real, within = packed.dtype.type, 0.0 if j < inner else 1.0
     for i in range(np.uint64(lanes)):
         ox, oy, relative = shifted(points, j, within, radius, uniform, shifts[0, i], shifts[1, i], shifts[2, i])
+        stands_for = weight * relative
+        # for the disc of all this is 1, to the bit
+        covered = disc_texels(stands_for, form, share) / stands_for if form == DISC and stands_for > 0.0 else 1.0
+        area, radiance = relative * covered, 1.0 / covered
+        if form == TEXEL:
+            area, radiance = 1.0, relative
         lane = first % line + np.int64(i) + ox
         inside = 0 <= row + oy < rows and 0 <= lane < line and not (ox == 0 and oy == 0)
         texel = np.uint64((row + oy) * PLANES * line + lane if inside else rows * PLANES * line)
         for c in range(PLANES):
-            lines[np.uint64(to + c * WIDE) + i] = packed[texel + np.uint64(c * line)]
-        for c in range(weighted, weighted + 3):
-            plane_of_texel = np.uint64(to + c * WIDE) + i
-            lines[plane_of_texel] = lines[plane_of_texel] * packed.dtype.type(relative)
+            by = 1.0 if c < 3 else (area if c < 6 else radiance)
+            lines[np.uint64(to + c * WIDE) + i] = packed[texel + np.uint64(c * line)] * real(by)
+    return real(weight if form == DISC else (1.0 if form == TEXEL else 0.0))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sssil.pyramid.closest import choose_pixels, choose_texels
-from refgi.sssil.pyramid.view import Level, Picture, View, centre, pixel_surface
+from refgi.sssil.pyramid.view import Level, Picture, View, centre, pixel_surface, three
 
 Array = npt.NDArray[Any]
 
@@ -65,7 +65,7 @@ def _locate(view: View, i: int, row: Array, column: Array, level: Level) -> None
     """Find the positions of texels and the surface areas that they stand for."""
     height, width, side = view.height, view.width, 1 << level.number
     depth, normal, position, area = level.depth, level.normal, level.position, level.area
-    (ax, ay, az), (dx, dy, dz), (fx, fy, fz) = _three(view.across), _three(view.down), _three(view.ahead)
+    (ax, ay, az), (dx, dy, dz), (fx, fy, fz) = three(view.across), three(view.down), three(view.ahead)
     rows, pixel_area, at = min(side, height - i * side), view.pixel_area, np.uint64(i)
     for j in range(np.uint64(area.shape[1])):
         x, y = centre(column[j], width), centre(row[j], height)
@@ -79,12 +79,6 @@ def _locate(view: View, i: int, row: Array, column: Array, level: Level) -> None
         area[at, j] = rows * side * pixel_surface(z, facing, pixel_area)
     last = area.shape[1] - 1
     area[i, last] = area[i, last] / side * (width - last * side)
-
-
-@kernel
-def _three(vector: Array) -> tuple[float, float, float]:
-    """Return a vector as numbers, which stores to arrays cannot change."""
-    return vector[0], vector[1], vector[2]
 
 
 @kernel(parallel=True)

@@ -110,7 +110,7 @@ def view_of(projection: Projection, as_published: frozenset[str] = frozenset()) 
 
 
 @kernel
-def centre(index: int, count: int) -> float:
+def centre(index: Any, count: int) -> float:
     """Return a pixel's centre between the picture's edges, -1 to 1; the mirrored pixel has exactly its negative."""
     return float((2 * index + 1 - count) / count)
 
@@ -125,3 +125,9 @@ def pixel_surface(depth: float, facing: float, pixel_area: float) -> float:
     z = depth if covered else 0.0
     # Eq. (2)
     return float(z * z * pixel_area / max(facing, GRAZING))
+
+
+@kernel
+def three(vector: Array) -> tuple[float, float, float]:
+    """Return a vector as numbers, which stores to arrays cannot change."""
+    return vector[0], vector[1], vector[2]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.sssil.crown.add import form_factor, form_of
+from refgi.sssil.crown.add import disc_texels, form_factor, form_of
 from refgi.sssil.crown.emitters import length_scale
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.points import level_key, pixel_key, row_key
@@ -34,7 +34,7 @@ from refgi.sssil.visibility.elevation import (
     sector_mask,
     visibility,
 )
-from refgi.sssil.visibility.slices import SliceCounts, fill_slices, slice_counts, slice_offsets
+from refgi.sssil.visibility.slices import SliceCounts, fill_slices, slice_counts, slice_offsets, turn_of
 from refgi.stages import stage, tally
 
 Array = npt.NDArray[Any]
@@ -78,64 +78,76 @@ def bitmask_gather(
     steps = slice_counts(sampling, bitmask, index, chosen_radius((rows << index, columns << index), sampling))
     real = level.position.dtype.type
     scale = length_scale(level.depth)
-    packed = _packed(level, scale)
-    sending = packed if senders is None or senders is level else _packed(senders, scale)
+    phases = sampling.tile if sampling.pattern == "interleaved" else 1
+    packed = _packed(level, scale, phases)
+    sending = packed if senders is None or senders is level else _packed(senders, scale, phases)
     thickness, form = real(bitmask.thickness * diagonal * scale), form_of(settings.senders.form_factor)
+    share = settings.senders.disc_share
     factor = real(level_factor(index, settings))
     result = np.empty_like(level.radiance)
     tally("pairs", lambda: rows * columns * steps.slices * (steps.disc + steps.crown))
     if sampling.pattern == "pixel":
         key = level_key(sampling.seed, level.number)
-        _march_pixels(packed, sending, steps, key, thickness, form, factor, result)
+        _march_pixels(packed, sending, steps, key, thickness, form, share, factor, result)
     else:
         offsets, weight = slice_offsets(sampling, steps, level.number, rows)
-        _march_rows(packed, sending, offsets, weight.astype(real), thickness, form, factor, result)
+        _march_rows(packed, sending, offsets, weight, thickness, form, share, factor, result)
     return result
 
 
-def _packed(level: Level, scale: float) -> Array:
-    """Return the texels of a level with lengths times a scale, (rows, PLANES, columns)."""
-    packed = np.empty((level.shape[0], PLANES, level.shape[1]), level.position.dtype)
-    pack(level.position, level.normal, level.radiance, level.area, level.position.dtype.type(scale), packed)
+def _packed(level: Level, scale: float, phases: int) -> Array:
+    """Return the texels of a level with lengths times a scale, (rows, PLANES, columns): of one phase, then the next.
+
+    Column x is of the phase x mod `phases`, each of which has as many places.
+    """
+    packed = np.zeros((level.shape[0], PLANES, phases * -(-level.shape[1] // phases)), level.position.dtype)
+    pack(level.position, level.normal, level.radiance, level.area, level.position.dtype.type(scale), phases, packed)
     return packed
 
 
 @kernel(parallel=True)
-def _march_rows(packed: Array, sending: Array, offsets: Array, weight: Array, thickness: Any, form: int, factor: Any,
-                result: Array) -> None:
+def _march_rows(packed: Array, sending: Array, offsets: Array, weight: Array, thickness: Any, form: int, share: float,
+                factor: Any, result: Array) -> None:
     for prow in prange(packed.shape[0]):
         row = np.int64(prow)
         lines, mask = np.zeros((SCRATCH, packed.shape[2]), packed.dtype), np.zeros(packed.shape[2], np.uint32)
-        shared = min(row, offsets.shape[0] - 1)
-        for k in range(offsets.shape[1]):
-            _march_row(packed, sending, row, offsets[shared, k], weight[shared, k], thickness, form, lines, mask, k % 2)
-            if k % 2 == 1 or k + 1 == offsets.shape[1]:
+        shared = row % offsets.shape[0]
+        for k in range(offsets.shape[2]):
+            mask[:] = np.uint32(0)
+            lines[HIGHEST, :] = packed.dtype.type(0.0)
+            for phase in range(offsets.shape[1]):
+                _march_phase(packed, sending, row, phase, offsets.shape[1], result.shape[2], offsets[shared, phase, k],
+                             weight[shared, phase, k], thickness, form, share, lines, mask, k % 2)
+            if k % 2 == 1 or k + 1 == offsets.shape[2]:
                 _join(lines)
-        _store(packed, row, lines, factor, result)
+        _store(packed, row, offsets.shape[1], lines, factor, result)
 
 
 @kernel
-def _march_row(packed: Array, sending: Array, row: Any, offsets: Array, weight: Array, thickness: Any, form: int,
-               lines: Array, mask: Array, half: int) -> None:
-    """March one slice for a row of receivers, which are the SIMD lanes."""
-    rows, columns = packed.shape[0], packed.shape[2]
-    receiver, part = packed[row], np.uint64(PART + 3 * half)
-    mask[:] = np.uint32(0)
-    lines[HIGHEST, :] = packed.dtype.type(0.0)
+def _march_phase(packed: Array, sending: Array, row: Any, phase: int, phases: int, columns: int, offsets: Array,
+                 weight: Array, thickness: Any, form: int, share: float, lines: Array, mask: Array, half: int) -> None:
+    """March one slice for the receivers of a row and phase, which are the SIMD lanes."""
+    rows, lanes = packed.shape[0], packed.shape[2] // phases
+    receiver, part, real = packed[row], np.uint64(PART + 3 * half), packed.dtype.type
+    receivers = (columns - phase + phases - 1) // phases
     for j in range(offsets.shape[0]):
         ox, oy = np.int64(offsets[j, 0]), np.int64(offsets[j, 1])
-        size = columns - abs(ox)
+        of = (phase + ox) % phases
+        by = (phase + ox - of) // phases  # lanes to the right
+        low: Any = max(0, -by)
+        size = min(receivers, (columns - of + phases - 1) // phases - by) - low
         if row + oy < 0 or row + oy >= rows or size <= 0 or (ox == 0 and oy == 0):
             continue
-        sender, first, second = sending[row + oy], np.uint64((abs(ox) - ox) // 2), np.uint64((abs(ox) + ox) // 2)
+        sender, first, second = sending[row + oy], np.uint64(phase * lanes + low), np.uint64(of * lanes + low + by)
         if weight[j] > 0.0:
-            _add_sample(receiver, first, sender, second, np.uint64(size), weight[j], form, thickness, lines, mask, part)
+            _add_sample(receiver, first, sender, second, np.uint64(size), real(weight[j]),
+                        real(disc_texels(weight[j], form, share)), thickness, lines, mask, part)
         else:
             _add_occluder(receiver, first, sender, second, np.uint64(size), thickness, lines, mask)
 
 
 @kernel
-def _add_sample(receiver: Array, first: Any, sender: Array, second: Any, size: Any, weight: Any, form: int,
+def _add_sample(receiver: Array, first: Any, sender: Array, second: Any, size: Any, weight: Any, disc: Any,
            thickness: Any, lines: Array, mask: Array, part: Any) -> None:
     """Add the light of one sample to each receiver of a row, and its occlusion to the masks."""
     for i in range(size):
@@ -143,7 +155,7 @@ def _add_sample(receiver: Array, first: Any, sender: Array, second: Any, size: A
         dx, dy, dz, c = direction(receiver, p, sender, q)
         square = dx * dx + dy * dy + dz * dz
         front, back = heights(receiver, p, sender, q, dx, dy, dz, c, thickness)
-        g = visibility(front, lines[HIGHEST, p], mask[p]) * _transfer(sender, q, dx, dy, dz, c, square, weight, form)
+        g = visibility(front, lines[HIGHEST, p], mask[p]) * _transfer(sender, q, dx, dy, dz, c, square, weight, disc)
         lines[part, p] = lines[part, p] + g * sender[L, q]
         lines[part + np.uint64(1), p] = lines[part + np.uint64(1), p] + g * sender[L + 1, q]
         lines[part + np.uint64(2), p] = lines[part + np.uint64(2), p] + g * sender[L + 2, q]
@@ -165,14 +177,14 @@ def _add_occluder(receiver: Array, first: Any, sender: Array, second: Any, size:
 
 @kernel
 def _transfer(sender: Array, q: Any, dx: Any, dy: Any, dz: Any, c: Any, square: Any, weight: Any,
-              form: int) -> Any:
-    """Return pi times the form factor of Eq. 4 or, by `form`, of Eq. 3."""
+              disc: Any) -> Any:
+    """Return pi times the form factor of a sample that stands for `weight` texels, its disc for `disc`."""
     real = type(dx)
     zero = real(0.0)
     s = -(sender[N, q] * dx + sender[N + 1, q] * dy + sender[N + 2, q] * dz)
     s = s if s > zero else zero
-    return form_factor(real(math.pi) * (c if c > zero else zero), s * (sender[AREA, q] * weight), s * sender[AREA, q],
-                       square, form)
+    return form_factor(real(math.pi) * (c if c > zero else zero), s * (sender[AREA, q] * weight),
+                       s * (sender[AREA, q] * disc), square)
 
 
 @kernel
@@ -185,16 +197,18 @@ def _join(lines: Array) -> None:
 
 
 @kernel
-def _store(packed: Array, row: Any, lines: Array, factor: Any, result: Array) -> None:
-    zero = packed.dtype.type(0.0)
+def _store(packed: Array, row: Any, phases: int, lines: Array, factor: Any, result: Array) -> None:
+    zero, lanes = packed.dtype.type(0.0), packed.shape[2] // phases
     for c in range(3):
-        for i in range(np.uint64(packed.shape[2])):
-            result[c, row, i] = factor * lines[TOTAL + c, i] if packed[row, INVERSE, i] > zero else zero
+        for phase in range(phases):
+            for lane in range(np.uint64((result.shape[2] - phase + phases - 1) // phases)):
+                i, column = np.uint64(phase * lanes) + lane, np.uint64(phase) + np.uint64(phases) * lane
+                result[c, row, column] = factor * lines[TOTAL + c, i] if packed[row, INVERSE, i] > zero else zero
 
 
 @kernel(parallel=True)
-def _march_pixels(packed: Array, sending: Array, steps: SliceCounts, key: Any, thickness: Any, form: int, factor: Any,
-                  result: Array) -> None:
+def _march_pixels(packed: Array, sending: Array, steps: SliceCounts, key: Any, thickness: Any, form: int, share: float,
+                  factor: Any, result: Array) -> None:
     for prow in prange(packed.shape[0]):
         row = np.int64(prow)
         count = steps.disc + steps.crown + steps.occluders
@@ -202,25 +216,27 @@ def _march_pixels(packed: Array, sending: Array, steps: SliceCounts, key: Any, t
         weight = np.empty((steps.slices, count))
         lines, mask = np.zeros((SCRATCH, packed.shape[2]), packed.dtype), np.zeros(packed.shape[2], np.uint32)
         for column in range(packed.shape[2]):
-            fill_slices(steps, pixel_key(row_key(key, row), column), False, length, offsets, weight)
+            turn, shift = turn_of(pixel_key(row_key(key, row), column))
+            fill_slices(steps, turn, shift, False, length, offsets, weight)
             for k in range(steps.slices):
-                _march_pixel(packed, sending, row, column, offsets[k], weight[k], thickness, form, lines, mask)
+                _march_pixel(packed, sending, row, column, offsets[k], weight[k], thickness, form, share, lines, mask)
         _join(lines)
-        _store(packed, row, lines, factor, result)
+        _store(packed, row, 1, lines, factor, result)
 
 
 @kernel
 def _march_pixel(packed: Array, sending: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any,
-                 form: int, lines: Array, mask: Array) -> None:
+                 form: int, share: float, lines: Array, mask: Array) -> None:
     rows, columns = packed.shape[0], packed.shape[2]
     receiver, part, one, p = packed[row], np.uint64(PART), np.uint64(1), np.uint64(column)
+    real = packed.dtype.type
     mask[p], lines[HIGHEST, p] = np.uint32(0), packed.dtype.type(0.0)
     for j in range(offsets.shape[0]):
         a, b = row + np.int64(offsets[j, 1]), column + np.int64(offsets[j, 0])
         if a < 0 or a >= rows or b < 0 or b >= columns or (a == row and b == column):
             continue
         if weight[j] > 0.0:
-            stands_for = packed.dtype.type(weight[j])
-            _add_sample(receiver, p, sending[a], np.uint64(b), one, stands_for, form, thickness, lines, mask, part)
+            disc = real(disc_texels(weight[j], form, share))
+            _add_sample(receiver, p, sending[a], np.uint64(b), one, real(weight[j]), disc, thickness, lines, mask, part)
         else:
             _add_occluder(receiver, p, sending[a], np.uint64(b), one, thickness, lines, mask)

@@ -30,23 +30,26 @@ X, N, L, AREA, INVERSE, LENGTH, FACING, PLANES = 0, 3, 6, 9, 10, 11, 12, 13
 
 
 @kernel(parallel=True)
-def pack(position: Array, normal: Array, radiance: Array, area: Array, scale: Any, packed: Array) -> None:
-    """Write the planes of a level row by row; `INVERSE` is 0 where there is no surface."""
+def pack(
+    position: Array, normal: Array, radiance: Array, area: Array, scale: Any, phases: int, packed: Array
+) -> None:
+    """Write the planes of a level row by row, columns by their phase; `INVERSE` is 0 where there is no surface."""
     zero, one, over_pi = scale - scale, scale / scale, scale * scale / type(scale)(math.pi)
+    lanes = packed.shape[2] // phases
     for row in prange(area.shape[0]):
         for column in range(area.shape[1]):
-            square, along = zero, zero
+            square, along, at = zero, zero, column % phases * lanes + column // phases
             for c in range(3):
-                packed[row, X + c, column] = position[c, row, column] * scale
-                packed[row, N + c, column] = normal[c, row, column]
-                packed[row, L + c, column] = radiance[c, row, column]
-                square += packed[row, X + c, column] * packed[row, X + c, column]
-                along -= packed[row, X + c, column] * normal[c, row, column]
-            packed[row, AREA, column] = area[row, column] * over_pi
+                packed[row, X + c, at] = position[c, row, column] * scale
+                packed[row, N + c, at] = normal[c, row, column]
+                packed[row, L + c, at] = radiance[c, row, column]
+                square += packed[row, X + c, at] * packed[row, X + c, at]
+                along -= packed[row, X + c, at] * normal[c, row, column]
+            packed[row, AREA, at] = area[row, column] * over_pi
             length = math.sqrt(square)
-            packed[row, LENGTH, column] = length
-            packed[row, INVERSE, column] = one / length if square > zero else zero
-            packed[row, FACING, column] = along * packed[row, INVERSE, column]
+            packed[row, LENGTH, at] = length
+            packed[row, INVERSE, at] = one / length if square > zero else zero
+            packed[row, FACING, at] = along * packed[row, INVERSE, at]
 
 
 @kernel

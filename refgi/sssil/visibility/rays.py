@@ -15,7 +15,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import receivers
 from refgi.rays import far_offset
-from refgi.sssil.crown.add import form_factor, form_of
+from refgi.sssil.crown.add import disc_texels, form_factor, form_of
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.points import level_key, pixel_key, pixel_offset, row_key, sample_points, sample_weight
@@ -91,12 +91,12 @@ def ray_gather(
     rays = [np.empty((step * count, 3), np.float32) for _ in range(2)]
     transfer, reach = np.empty(step * count), np.empty(step * count, np.float32)
     sender, blocked = np.empty(step * count, np.int64), np.empty(step * count, np.bool_)
-    form = form_of(settings.senders.form_factor)
+    form, share = form_of(settings.senders.form_factor), settings.senders.disc_share
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])
         size = (last - first) * count
-        _write_rays(surfels, sending, samples, level.shape, first, last, form, rays[0], rays[1], reach, transfer,
-                    sender)
+        _write_rays(surfels, sending, samples, level.shape, first, last, form, share, rays[0], rays[1], reach,
+                    transfer, sender)
         frame.tracer.fill_occluded(rays[0][:size], rays[1][:size], reach[:size], blocked[:size])
         add_unoccluded(radiance, first, last, count, blocked, transfer, sender, total)
         report_progress(last / total.shape[1])
@@ -130,20 +130,20 @@ def _samples(level: Level, index: int, sampling: SamplingSettings) -> SampleOffs
 @kernel(parallel=True)
 def _write_rays(
     surfels: Surfels, senders: Surfels, samples: SampleOffsets, shape: tuple[int, int], first: int, last: int,
-    form: int, origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array,
+    form: int, share: float, origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array,
 ) -> None:
     """Write ray and transfer of each pair of receivers first to last and their samples."""
     count = samples.weight.shape[2]
     for i in prange(last - first):
         ray = np.int64(i) * count
-        _write_ray(surfels, senders, samples, shape, first + np.int64(i), ray, form, origins, directions, reach,
-                   transfer, sender)
+        _write_ray(surfels, senders, samples, shape, first + np.int64(i), ray, form, share, origins, directions,
+                   reach, transfer, sender)
 
 
 @kernel
 def _write_ray(
     surfels: Surfels, senders: Surfels, samples: SampleOffsets, shape: tuple[int, int], receiver: Any, ray: Any,
-    form: int, origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array,
+    form: int, share: float, origins: Array, directions: Array, reach: Array, transfer: Array, sender: Array,
 ) -> None:
     row, column = receiver // shape[1], receiver % shape[1]
     key = pixel_key(row_key(samples.key, row), column)
@@ -162,7 +162,8 @@ def _write_ray(
         if 0 <= a < shape[0] and 0 <= b < shape[1] and not (ox == 0 and oy == 0):
             other = a * shape[1] + b
             sender[ray + j] = other
-            transfer[ray + j] = _transfer(surfels, senders, receiver, other, stands_for, form)
+            disc = disc_texels(stands_for, form, share)
+            transfer[ray + j] = _transfer(surfels, senders, receiver, other, stands_for, disc)
             reach[ray + j] = 1.0 if transfer[ray + j] > 0.0 else 0.0
             far = far_offset(senders.origin[0, other] - surfels.origin[0, receiver],
                              senders.origin[1, other] - surfels.origin[1, receiver],
@@ -174,7 +175,7 @@ def _write_ray(
 
 
 @kernel
-def _transfer(surfels: Surfels, senders: Surfels, i: int, j: int, weight: float, form: int) -> Any:
+def _transfer(surfels: Surfels, senders: Surfels, i: int, j: int, weight: float, disc: float) -> Any:
     """Return pi times the form factor of a pair; 0 where either end lies behind the plane of the other's triangle."""
     square, c, s, above, before = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(3):
@@ -186,8 +187,8 @@ def _transfer(surfels: Surfels, senders: Surfels, i: int, j: int, weight: float,
         before -= senders.facing[k, j] * d
     if c <= 0.0 or s <= 0.0 or above <= 0.0 or before <= 0.0:
         return 0.0
-    every, texel = s * (senders.area[j] * weight / math.pi), s * (senders.area[j] / math.pi)
-    return form_factor(math.pi * c, every, texel, square, form)
+    every, of_disc = s * (senders.area[j] * weight / math.pi), s * (senders.area[j] * disc / math.pi)
+    return form_factor(math.pi * c, every, of_disc, square)
 
 
 @kernel(parallel=True)

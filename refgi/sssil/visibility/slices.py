@@ -2,6 +2,9 @@
 
 A slice holds the samples of its share of crown and disc, and occluders: samples of weight 0 that only occlude. Offsets
 are whole texels (ox, oy) as in `crown.pattern`, nearest first.
+
+With interleaved samples each texel of a tile turns its slices and shifts the samples along them by another point of one
+sequence of low discrepancy; with other patterns all receivers of a row share both.
 """
 
 import math
@@ -11,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.sampling import hash_bits
+from refgi.sampling import FIRST_STEP, SECOND_STEP, hash_bits
 from refgi.sssil.crown.points import distance, level_key, relative_weight, row_key
 from refgi.sssil.settings import Bitmask, SamplingSettings
 
@@ -64,12 +67,12 @@ def slice_counts(sampling: SamplingSettings, bitmask: Bitmask, index: int, radiu
 
 
 def slice_offsets(sampling: SamplingSettings, steps: SliceCounts, number: int, rows: int) -> tuple[Array, Array]:
-    """Return the samples that a row of receivers shares, slice by slice.
+    """Return the samples that receivers share, slice by slice.
 
     Parameters
     ----------
     sampling : SamplingSettings
-        Pattern and seed; with all but "fixed" each row has samples of its own.
+        Pattern and seed; by "interleaved" each texel of a tile has samples of its own, by others each row.
     steps : Steps
         Of `steps_of`.
     number : int
@@ -79,35 +82,47 @@ def slice_offsets(sampling: SamplingSettings, steps: SliceCounts, number: int, r
 
     Returns
     -------
-    offsets : (rows, slices, n, 2) ndarray of int32
-        Texels (ox, oy), nearest first; one row for all with "fixed", where each slice with an even index is followed
-        by its mirror image, an odd last one is vertical.
-    weight : (rows, slices, n) ndarray of float64
+    offsets : (m, P, slices, n, 2) ndarray of int32
+        Texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P], nearest first: (tile, tile, ...) with
+        "interleaved", (1, 1, ...) with "fixed", where each slice with an even index is followed by its mirror image,
+        an odd last one is vertical, else (rows, 1, ...).
+    weight : (m, P, slices, n) ndarray of float64
         Texels of the level that each sample stands for; 0 for a blocker.
     """
-    fixed = sampling.pattern == "fixed"
-    shape = (1 if fixed else rows, steps.slices, steps.per_slice)
-    offsets, weight = np.empty((*shape, 2), np.int32), np.empty(shape)
-    _fill_rows(steps, level_key(sampling.seed, number), fixed, offsets, weight)
+    fixed, tiled, key = sampling.pattern == "fixed", sampling.pattern == "interleaved", level_key(sampling.seed, number)
+    tile = (sampling.tile, sampling.tile) if tiled else (1 if fixed else rows, 1)
+    offsets = np.empty((*tile, steps.slices, steps.per_slice, 2), np.int32)
+    weight = np.empty(offsets.shape[:-1])
+    _fill_tile(steps, key, fixed, tiled, offsets, weight)
     return offsets, weight
 
 
 @kernel(parallel=True)
-def _fill_rows(steps: SliceCounts, key: Any, fixed: bool, offsets: Array, weight: Array) -> None:
+def _fill_tile(steps: SliceCounts, key: Any, fixed: bool, tiled: bool, offsets: Array, weight: Array) -> None:
     for row in prange(offsets.shape[0]):
-        here = key if fixed else row_key(key, np.int64(row))
-        length = np.empty(offsets.shape[2])
-        fill_slices(steps, here, fixed, length, offsets[row], weight[row])
+        length = np.empty(offsets.shape[3])
+        for column in range(offsets.shape[1]):
+            turn, shift = turn_of(key if fixed or tiled else row_key(key, np.int64(row)))
+            if tiled:
+                n = np.int64(row) * offsets.shape[1] + column
+                turn, shift = (turn + n * SECOND_STEP) % 1.0, (shift + n * FIRST_STEP) % 1.0
+            fill_slices(steps, turn, shift, fixed, length, offsets[row, column], weight[row, column])
 
 
 @kernel
-def fill_slices(steps: SliceCounts, key: Any, mirrored: bool, length: Array, offsets: Array, weight: Array) -> None:
+def turn_of(key: Any) -> Any:
+    """Return the turn of slices, a share of the angle between two, and the shift of samples along them by a key."""
+    return hash_bits(key) * TO_UNIT, hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT
+
+
+@kernel
+def fill_slices(
+    steps: SliceCounts, turn: float, shift: float, mirrored: bool, length: Array, offsets: Array, weight: Array
+) -> None:
     """Write the samples around one receiver: `offsets` (slices, n, 2) and `weight` (slices, n).
 
-    `key` draws the turn of the slices and the shift of samples along them; `mirrored`: slices come in pairs of mirror
-    images; `length` (n,) is scratch.
+    `turn` and `shift` are of `turn_of`; `mirrored`: slices come in pairs of mirror images; `length` (n,) is scratch.
     """
-    turn, shift = hash_bits(key) * TO_UNIT, hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT
     pairs = steps.slices // 2
     for k in range(steps.slices):
         part = (shift + (k // 2 if mirrored else k) * GOLDEN) % 1.0

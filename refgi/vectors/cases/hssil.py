@@ -21,13 +21,14 @@ from refgi.vectors.stages.temporal import add_temporal
 AWAY = SpotLight((0.5, 1.5, 0.625), (0.3, 1.0, 0.2), 0.3, 0.6, (4.0, 2.6, 1.3))  # shines into the void
 NARROW = math.radians(38)  # the room fills the picture: points enter at its edges
 BOX = slice(16, 20)  # vertices of the lid in the room
+CLOSEST = of(HssilSettings, downsample="closest", disc_share=1.0)  # what the stages here are of
 SETTINGS = {
-    "hssil-default": of(HssilSettings, samples=12, radius=2.0, seed=3),
+    "hssil-default": replaced(CLOSEST, {"samples": 12, "radius": 2.0, "seed": 3}),
     "hssil-paper": replaced(PRESETS["paper"], {"sampling.samples": 12, "sampling.radius": 2.0}),
-    "hssil-odd": of(HssilSettings, samples=9, radius=None, levels=5, start="full", seed=1, size=3,
-                    plane_tolerance=0.1, cosine=0.5),
-    "hssil-pole": of(HssilSettings, samples=8, radius=2.0, levels=2, seed=5),
-    "hssil-dark": of(HssilSettings, samples=8, radius=2.0, levels=2, start="quarter"),
+    "hssil-odd": replaced(CLOSEST, {"samples": 9, "radius": None, "levels": 5, "start": "full", "seed": 1,
+                                    "blur.size": 3, "plane_tolerance": 0.1, "cosine": 0.5}),
+    "hssil-pole": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 5}),
+    "hssil-dark": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "start": "quarter"}),
 }
 VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-default": (room(SPOT, BULB), (40, 28), "map"),
@@ -89,7 +90,7 @@ def frames_of(id: str) -> list[Scene]:
 
 def sequence(id: str, scenes: list[Scene], *temporal: Any) -> Sequence:
     """Return the frames of the production method in double precision."""
-    settings = of(HssilSettings, samples=8, radius=3.0, levels=3, seed=7)
+    settings = replaced(CLOSEST, {"samples": 8, "radius": 3.0, "levels": 3, "seed": 7})
     width, height = TEMPORAL_SIZE
     return Sequence(scenes, settings, *(temporal or (TEMPORAL[id],)), width=width, height=height, dtype=np.float64)
 

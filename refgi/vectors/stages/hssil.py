@@ -15,7 +15,7 @@ from refgi.vectors.stages.upsampling import add_blur, add_light
 def add_hssil(recipe: Recipe, scene: Scene, size: tuple[int, int], settings: HssilSettings) -> str:
     """Add all stages from G-buffer and direct light to the picture's irradiance; return its name.
 
-    `settings`: the closest senders, samples shared by tiles or rows, no visibility, one camera.
+    `settings`: the closest senders, whole discs, samples shared by tiles or rows, no visibility, one camera.
     """
     sampling, shape = settings.sampling, (size[1], size[0])
     first, count = sampling.first_level, useful_levels(shape, sampling)

@@ -40,7 +40,7 @@ from tests.naive import soft_shadow as naive
 ROUNDING = 1e-10  # float64 sums over discs of some hundred texels, in another order
 PLATES = [(-0.6, -0.1, -0.3, 0.3, 1.0), (0.1, 0.6, -0.3, 0.3, 1.0)]
 FAR = 6.4
-AS_WRITTEN = FilterSizing(False, False, False, False)
+AS_WRITTEN = FilterSizing(False, False, False, False, False)
 OVERSHOOT = 0.092  # of the series with four terms
 RINGS = 1.4  # times the overshoot: what one depth alone cannot make
 SAME = 0.01  # of V: a texel of 256 in a disc

@@ -11,6 +11,7 @@ from refgi.cluster.visibility.kernel_size import (
     STEEPEST,
     cone_tangent,
     disc,
+    farthest_tangent,
     published_square,
     published_tangent,
     solid_angle_tangent,
@@ -40,6 +41,23 @@ def test_cone_is_a_disc(theta, a):
         np.outer([0.8, -0.6, 0.0], np.cos(phi)) + np.outer(right, np.sin(phi)))
     s, t = rim[0] / (1 + rim[2]), rim[1] / (1 + rim[2])
     assert np.abs(np.hypot(s - found[0], t - found[1]) - found[2]).max() < 1e-13 * max(1, found[2])
+
+
+@pytest.mark.feature("VAL-14")
+@pytest.mark.parametrize(("delta", "d", "r"), [(1.0, 4.0, 0.6), (1.0, 4.0, 2.0), (3.0, 2.0, 1.7), (0.1, 5.0, 4.9)])
+def test_the_farthest_blocker_lies_on_the_line_to_the_lights_edge(delta, d, r):
+    """The light ends at (delta / 2, 0), the receiver is at (0, d), the blocker at (r sin, r cos)."""
+    theta = math.atan(farthest_tangent(delta, d, r))
+    x, z = r * math.sin(theta), r * math.cos(theta)
+    assert x == pytest.approx(delta / 2 * (1 - z / d), rel=1e-12)
+    assert theta > math.atan(cone_tangent(delta, d, r))
+
+
+def test_blockers_nearer_than_half_the_light_lie_anywhere():
+    assert farthest_tangent(1.0, 4.0, 0.36) == STEEPEST
+    assert farthest_tangent(1.0, 4.0, 0.49) == STEEPEST
+    assert farthest_tangent(1.0, 4.0, 4.0) == 0.0
+    assert farthest_tangent(1.0, 4.0, 5.0) == 0.0
 
 
 @pytest.mark.feature("VAL-15")

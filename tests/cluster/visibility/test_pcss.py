@@ -1,5 +1,7 @@
 """Percentage closer soft shadows: against plain loops, against area sampling, and the depth test they need."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -44,9 +46,10 @@ def shadow(areas, maps, points, normals, **settings):
 
 
 @pytest.mark.feature("VAL-12")
+@pytest.mark.parametrize("axial", [True, False])
 @pytest.mark.parametrize("plane", [True, False])
 @pytest.mark.parametrize("cone", [True, False])
-def test_pcss_is_its_literal_twin(plane, cone):
+def test_pcss_is_its_literal_twin(plane, cone, axial):
     slope = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
     depth = map_of_plates(24, PLATES, 2.8, slope)
     points, normals = on_plane(3.0, 2.2, 7)
@@ -54,9 +57,10 @@ def test_pcss_is_its_literal_twin(plane, cone):
     normals[:] = -slope[:, None]
     for delta in (0.3, 1.2):
         areas, maps = lit_by(depth, delta, FAR)
-        kind = {"visibility": "pcss", "cone": cone, "constant_bias": None if plane else ConstantBias()}
+        kind = {"visibility": "pcss", "cone": cone, "constant_bias": None if plane else ConstantBias(),
+                "blocker_depth": "axial" if axial else "distance"}
         got = shadow(areas, maps, points, normals, **kind)
-        expected = [naive.step_shadow(depth.tolist(), p, -slope, delta, cone, plane)[0] for p in points.T]
+        expected = [naive.step_shadow(depth.tolist(), p, -slope, delta, cone, plane, axial)[0] for p in points.T]
         assert np.abs(got - expected).max() < ROUNDING
         assert np.array_equal(
             got, shadow(areas, maps, points, -normals, **kind))
@@ -144,6 +148,30 @@ def test_blockers_near_the_light_escape_the_published_search(evidence):
     assert not found["radial"]
     evidence(f"hidden {1 - truth:.3f}; at z = 0.2 the searches cover " + ", ".join(
         f"{covers[name]:.3f} ({name}: {'found' if found[name] else 'missed'})" for name in covers))
+
+
+@pytest.mark.feature("VAL-14")
+def test_filters_by_axial_depth_find_blockers_near_the_light(evidence):
+    """The same half plane: its axial depth is 0.2 in every direction, the cone's half-angle there 67.2 degrees.
+
+    On the map that cone is a disc of radius rho = tan(33.6 deg), and the edge x = 1.5 z, a great circle, the circle
+    of radius sqrt(13) / 3 about s = -2 / 3; what lies in the disc but beyond that circle hides.
+    """
+    plates = [(0.3, 60.0, -60.0, 60.0, 0.2)]
+    point, normal = np.array([[0.0], [0.0], [4.0]]), np.array([[0.0], [0.0], [-1.0]])
+    areas, maps = lit_by(map_of_plates(512, plates, 4.0), 1.0, 8.0)
+    tangent = 0.5 * (1 - 0.2 / 4) / 0.2
+    rho, wide, apart = math.tan(math.atan(tangent) / 2), math.sqrt(13) / 3, 2 / 3
+    one, other = ((a * a + apart**2 - b * b) / (2 * apart * a) for a, b in ((rho, wide), (wide, rho)))
+    lens = (rho**2 * (math.acos(one) - one * math.sqrt(1 - one**2))
+            + wide**2 * (math.acos(other) - other * math.sqrt(1 - other**2)))
+    hidden = 1 - lens / (math.pi * rho**2)
+    for cone in (True, False):
+        kind = {"visibility": "pcss", "cone": cone}
+        found = 1 - shadow(areas, maps, point, normal, blocker_depth="axial", **kind)[0]
+        assert found == pytest.approx(hidden, abs=2e-3)  # a row of 512 texels
+        assert shadow(areas, maps, point, normal, blocker_depth="distance", **kind)[0] == 1
+    evidence(f"hidden 0.184, by axial depth {found:.3f}, by distances 0; {hidden:.3f} of the cone's disc")
 
 
 @pytest.mark.feature("VAL-14")

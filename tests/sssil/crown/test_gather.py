@@ -10,6 +10,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
+from refgi.sssil.crown.add import DISC
 from refgi.sssil.crown.gather import _list_emitting, gather
 from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.pyramid.view import Level
@@ -33,20 +34,35 @@ def random_level(shape, dtype=np.float64, seed=0, background=0.2, number=1):
     return Level(number, *(np.ascontiguousarray(plane, dtype) for plane in planes), pixel)
 
 
-@pytest.mark.parametrize("form", ["disc", "point"])
+@pytest.mark.parametrize(("form", "share"), [("disc", 1.0), ("disc", 0.25), ("disc", 0.0), ("point", 0.25)])
 @pytest.mark.parametrize("density", ["inverse_distance", "uniform"])
 @pytest.mark.parametrize("pattern", ["interleaved", "row", "fixed", "all", "pixel"])
-def test_equals_the_sum_written_as_loops(pattern, density, form):
+def test_equals_the_sum_written_as_loops(pattern, density, form, share):
     """Oracle: every pattern and form, float64, first level and a later one, odd sizes."""
     for shape, index in (((7, 11), 0), ((9, 6), 1)):
         level = random_level(shape, seed=index)
-        settings = replaced(SETTINGS, {"pattern": pattern, "density": density, "form_factor": form})
+        settings = replaced(SETTINGS, {"pattern": pattern, "density": density, "form_factor": form,
+                                       "disc_share": share})
         expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
                                   lambda row, column, s=settings, i=index: samples_at(s.sampling, i, 1, row, column),
-                                  form)
+                                  form, share)
         assert expected.max() > 0
         np.testing.assert_allclose(gather(level, index, settings), expected, rtol=0,
                                    atol=ROUNDING[np.float64] * expected.max())
+
+
+@pytest.mark.parametrize("pattern", ["interleaved", "pixel"])
+def test_a_sample_of_less_than_a_texel_has_no_larger_disc(pattern):
+    """Oracle: so many samples that near ones stand for less than a texel, whose disc covers all of it."""
+    level = random_level((7, 11))
+    settings = replaced(SETTINGS, {"pattern": pattern, "samples": 150, "disc_share": 0.25})
+    weight = samples_at(settings.sampling, 0, 1, 3, 5)[1]
+    assert (weight < 1).sum() > 50
+    assert (weight > 1).any()
+    expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
+                              lambda row, column: samples_at(settings.sampling, 0, 1, row, column), "disc", 0.25)
+    np.testing.assert_allclose(gather(level, 0, settings), expected, rtol=0,
+                               atol=ROUNDING[np.float64] * expected.max())
 
 
 @pytest.mark.parametrize(("trims", "lanes"), [(True, [8, 24]), (False, [0, 32])])
@@ -55,10 +71,12 @@ def test_a_sample_is_summed_for_the_lanes_that_it_emits_for(trims, lanes):
     emit_from = np.array([16, 16, 16, 24, 64, 64, 64, 64, 64], np.int32).reshape(1, 1, 9).repeat(2, axis=0)
     emit_to = np.array([0, 0, 0, 24, 32, 32, 32, 32, 32], np.int32).reshape(1, 1, 9).repeat(2, axis=0)
     offsets, weight = np.array([[8, 0], [32, 0]], np.int32), np.ones(2)
-    starts, weights = np.empty((3, 3), np.int64), np.empty(3)
-    count = _list_emitting(offsets, weight, False, trims, emit_from, emit_to, 0, 0, 0, 32, 64, starts, weights)
+    starts, weights = np.empty((3, 3), np.int64), np.empty((2, 3))
+    count = _list_emitting(offsets, 8.0 * weight, False, trims, DISC, 0.5, emit_from, emit_to, 0, 0, 0, 32, 64, starts,
+                           weights)
     assert count == 1  # the other one is dark for the whole strip
     assert starts[:, 0].tolist() == [8, *lanes]
+    assert weights[:, 0].tolist() == [8.0, 4.0]  # texels that it stands for, and those of its disc
 
 
 def test_single_precision_rounds_and_no_more():
@@ -67,7 +85,7 @@ def test_single_precision_rounds_and_no_more():
     level.radiance[:, :, 100:500] = 0
     settings = replaced(SETTINGS, {"samples": 4})
     expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
-                              lambda row, column: samples_at(settings.sampling, 0, 1, row, column), "disc")
+                              lambda row, column: samples_at(settings.sampling, 0, 1, row, column), "disc", 0.25)
     found = gather(level, 0, settings)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING[np.float32] * expected.max())

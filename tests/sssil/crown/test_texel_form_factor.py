@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from refgi.settings import of
+from refgi.settings import of, replaced
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
@@ -56,6 +56,29 @@ def test_few_samples_are_unbiased(evidence):
     assert noise["disc"] < noise["texel"]
     found = (f"{form} {means[form] / expected:.3f} +- {noise[form] / expected:.2f}" for form in means)
     evidence(f"{SAMPLES} samples over every texel: {', '.join(found)}")
+
+
+@pytest.mark.feature("HSS-04")
+@pytest.mark.parametrize("share", [0.25, 1.0])
+def test_a_disc_of_a_share_is_as_dark_as_that(share, evidence):
+    """Analytic and statistical: uniform samples, whose expectation is Eq. 4 with the disc of a share for each texel."""
+    level, middle = plane_below()
+    disc, crown = math.pi * RADIUS**2 / round(SAMPLES / 3), 3 * math.pi * RADIUS**2 / SAMPLES
+    expected = 0.0
+    for i in range(-SIDE // 2, SIDE // 2 + 1):
+        for j in range(-SIDE // 2, SIDE // 2 + 1):
+            if 0 < math.hypot(i, j) < 2 * RADIUS:
+                square = SPACING**2 * (i * i + j * j) + HEIGHT**2
+                one = HEIGHT / math.sqrt(square) * SPACING**2 / math.pi
+                covered = share * (disc if math.hypot(i, j) < RADIUS else crown)
+                expected += math.pi * HEIGHT / math.sqrt(square) * one / (square + covered * one)
+    settings = of(HssilSettings, samples=SAMPLES, radius=RADIUS, levels=1, pattern="pixel", density="uniform",
+                  disc_share=share)
+    drawn = [gather(level, 0, replaced(settings, {"seed": seed}))[0, *middle] for seed in range(4 * SEEDS)]
+    error = np.std(drawn, ddof=1) / math.sqrt(4 * SEEDS)
+    assert abs(np.mean(drawn) - expected) < 4 * error
+    assert expected + 4 * error < texel_sum("texel")
+    evidence(f"a disc of {share} of all: {np.mean(drawn) / expected:.3f} +- {error / expected:.3f} of its sum by hand")
 
 
 def test_every_texel_is_the_sum_of_eq_4():

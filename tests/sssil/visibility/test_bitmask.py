@@ -11,7 +11,7 @@ from refgi.sssil.crown.points import level_key, pixel_key, row_key
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.slices import fill_slices, slice_counts, slice_offsets
+from refgi.sssil.visibility.slices import fill_slices, slice_counts, slice_offsets, turn_of
 from tests.naive import bitmask as naive
 
 SETTINGS = of(HssilSettings, radius=4, levels=1, samples=24, slices=5, start="full", thickness=0.1)
@@ -63,14 +63,20 @@ def twin(level, settings, offsets_of, thickness=DIAGONAL * SETTINGS.visibility.t
 
     if thickness is None:
         flat = lambda row, column: [sample for samples in around(row, column) for sample in samples]  # noqa: E731
-        return naive.light(level._asdict(), flat, settings.senders.form_factor)
-    return naive.masked_light(level._asdict(), around, thickness, settings.senders.form_factor)
+        return naive.light(level._asdict(), flat, settings.senders.form_factor,
+                           share=settings.senders.disc_share)
+    return naive.masked_light(level._asdict(), around, thickness, settings.senders.form_factor,
+                              share=settings.senders.disc_share)
 
 
 def shared(level, index, settings):
     steps = slice_counts(settings.sampling, settings.visibility, index, settings.sampling.radius)
     offsets, weight = slice_offsets(settings.sampling, steps, level.number, level.shape[0])
-    return lambda row, _: (offsets[min(row, len(offsets) - 1)], weight[min(row, len(offsets) - 1)])
+
+    def of(row, column):
+        return tuple(a[row % a.shape[0], column % a.shape[1]] for a in (offsets, weight))
+
+    return of
 
 
 def own(level, index, settings):
@@ -79,14 +85,14 @@ def own(level, index, settings):
 
     def of(row, column):
         key = pixel_key(row_key(level_key(settings.sampling.seed, level.number), row), column)
-        fill_slices(steps, key, False, np.empty(steps.per_slice), offsets, weight)
+        fill_slices(steps, *turn_of(key), False, np.empty(steps.per_slice), offsets, weight)
         return offsets, weight
 
     return of
 
 
 PLATE = ((-0.6, -0.2, 2.0), (0.5, 0.9, 2.2))
-CASES = [("row", "disc", 0), ("fixed", "point", 1), ("pixel", "disc", 1)]
+CASES = [("interleaved", "disc", 0), ("row", "disc", 0), ("fixed", "point", 1), ("pixel", "disc", 1)]
 
 
 @pytest.mark.parametrize(("pattern", "form", "index"), CASES)
@@ -108,7 +114,7 @@ def test_float32_is_float64_rounded_but_for_ties():
 
 
 @pytest.mark.feature("HSS-17")
-@pytest.mark.parametrize("pattern", ["row", "fixed"])
+@pytest.mark.parametrize("pattern", ["interleaved", "row", "fixed"])
 def test_surfaces_of_no_thickness_block_nothing(pattern, evidence):
     settings = replaced(SETTINGS, {"pattern": pattern, "thickness": 0.0})
     level = seen(plate=PLATE)
@@ -177,7 +183,7 @@ def test_mirror_images_to_the_bit():
         np.testing.assert_array_equal(got, got[:, :, ::-1])
 
 
-@pytest.mark.parametrize("pattern", ["row", "pixel"])
+@pytest.mark.parametrize("pattern", ["interleaved", "row", "pixel"])
 def test_same_bits_for_any_number_of_threads(pattern):
     level = seen(9, 21, PLATE, np.float32)
     settings = replaced(SETTINGS, {"pattern": pattern})
@@ -192,7 +198,7 @@ def test_same_bits_for_any_number_of_threads(pattern):
 def test_small_pictures_and_background(shape):
     level = seen(*shape, dtype=np.float32)
     for one in (level, without(level, np.ones(shape, bool))):
-        for pattern in ("row", "pixel"):
+        for pattern in ("interleaved", "row", "pixel"):
             got = bitmask_gather(one, 0, replaced(SETTINGS, {"pattern": pattern}), DIAGONAL)
             assert got.shape == (3, *shape)
             assert np.isfinite(got).all()

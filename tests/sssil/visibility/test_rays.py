@@ -50,7 +50,8 @@ def around(level, index, settings):
 
 def twin(level, settings, frame=None):
     if frame is None:
-        return naive.light(level._asdict(), around(level, 0, settings), settings.senders.form_factor)
+        return naive.light(level._asdict(), around(level, 0, settings), settings.senders.form_factor,
+                           share=settings.senders.disc_share)
     geometry, eye = frame.scene.geometry, np.asarray(frame.scene.camera.eye)
     corners = geometry.vertices[geometry.faces]
 
@@ -58,7 +59,8 @@ def twin(level, settings, frame=None):
         ends = (level.position[:, *texel] + eye for texel in (receiver, sender))
         return float(not naive.blocked_by_triangles(corners, *ends, MARGIN))
 
-    return naive.light(level._asdict(), around(level, 0, settings), settings.senders.form_factor, see)
+    return naive.light(level._asdict(), around(level, 0, settings), settings.senders.form_factor, see,
+                       settings.senders.disc_share)
 
 
 @pytest.mark.feature("REF-02")

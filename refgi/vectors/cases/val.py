@@ -5,9 +5,9 @@ from typing import Any
 
 from refgi.cluster.settings import ValSettings
 from refgi.draws import PIXEL_LIGHTS, draws
-from refgi.scene import Camera, Scene
+from refgi.scene import Camera, Scene, SpotLight
 from refgi.settings import of
-from refgi.vectors.cases.scenes import BULB, SPOT, far_away, room
+from refgi.vectors.cases.scenes import BULB, SPOT, far_away, kerbs, room
 from refgi.vectors.cases.sii import add_lit
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
@@ -43,6 +43,7 @@ class Setup:
 
 CLOSE = Camera((1.0, 1.05, 0.95), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(65))  # rolled, fills the picture
 ABOVE = Camera((0.2, 2.5, 0.1), (0.15, 0.0, 0.1), (0.0, 0.0, -1.0), math.radians(34))  # sees no wall
+FLOOR_LAMP = SpotLight((0.3, 1.6, 0.35), (-0.2, -1.0, -0.25), 0.2, 0.42, (4.0, 2.6, 1.3))
 
 SETUPS = {setup.id: setup for setup in (
     Setup("val-csm", "convolution shadow maps by the defaults, maps of an odd side; two lamps, a cluster of one light, "
@@ -58,6 +59,8 @@ SETUPS = {setup.id: setup for setup in (
     Setup("val-interleaved", "blocks of 3 x 3 pixels in a picture of odd size, PCF, blur with every subset; 4 m from "
           "the origin, pixels without surface, a ball", far_away(room(SPOT, BULB, matte=True, smooth=True), 4.0),
           (20, 14), 16, 36, clusters=5, interleaving=3, visibility="pcf", blur_extent=0.3),
+    Setup("val-rim", "kerbs beside the lights, down to their plane: maps with geometry at the rim of the disc",
+          kerbs(FLOOR_LAMP, camera=CLOSE), (15, 11), 9, 12, clusters=3, interleaving=1),
 )}
 FULL_SETUPS = {setup.id: setup for setup in (
     Setup("val-published", "the printed forms: raw distances, squares of alpha / pi, the search by solid angle; blocks "

@@ -140,36 +140,20 @@ def _draw_maps(position: Array, normal: Array, corners: Array, facing: Array, up
 @kernel
 def _draw_points(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, points: int, shift: Array,
                  radius: float, splat: float, depth: Array) -> None:
-    frame, point = np.empty((3, 3)), np.empty(3)
+    frame = np.empty((3, 3))
     fill_frame(normal, frame)
     for k in range(points):
-        f = place_point(k, points, corners, upto, shift, point)
-        splat_point(point, facing[f], position, frame, radius, splat, depth)
-
-
-@kernel
-def place_point(k: int, points: int, corners: Array, upto: Array, shift: Array, point: Array) -> int:
-    """Fill a map's point k of so many, world space, and return its face."""
-    f = min(np.searchsorted(upto, (k + shift[0]) / points * upto[-1], side="right"), len(upto) - 1)
-    a, b = math.sqrt((shift[1] + k * FIRST_STEP) % 1.0), (shift[2] + k * SECOND_STEP) % 1.0
-    for c in range(3):
-        point[c] = (1 - a) * corners[f, 0, c] + a * (1 - b) * corners[f, 1, c] + a * b * corners[f, 2, c]
-    return int(f)
-
-
-@kernel
-def splat_point(point: Array, facing: Array, position: Array, frame: Array, radius: float, splat: float,
-                depth: Array) -> None:
-    """Lower what a point, on a face of some normal, covers on the map of a light with a frame (3, 3)."""
-    x, y, z, across = 0.0, 0.0, 0.0, 0.0
-    for c in range(3):
-        d = point[c] - position[c]
-        x, y, z = x + d * frame[0, c], y + d * frame[1, c], z + d * frame[2, c]
-        across += d * facing[c]
-    distance = math.sqrt(x * x + y * y + z * z)
-    if z > HORIZON * distance and distance > radius:
-        wide = splat * radius * math.sqrt(abs(across) / distance)
-        _splat(x / (distance + z), y / (distance + z), distance, wide, depth)
+        f = min(np.searchsorted(upto, (k + shift[0]) / points * upto[-1], side="right"), len(upto) - 1)
+        a, b = math.sqrt((shift[1] + k * FIRST_STEP) % 1.0), (shift[2] + k * SECOND_STEP) % 1.0
+        x, y, z, across = 0.0, 0.0, 0.0, 0.0
+        for c in range(3):
+            d = ((1 - a) * corners[f, 0, c] + a * (1 - b) * corners[f, 1, c] + a * b * corners[f, 2, c]) - position[c]
+            x, y, z = x + d * frame[0, c], y + d * frame[1, c], z + d * frame[2, c]
+            across += d * facing[f, c]
+        distance = math.sqrt(x * x + y * y + z * z)
+        if z > HORIZON * distance and distance > radius:
+            wide = splat * radius * math.sqrt(abs(across) / distance)
+            splat_box(x / (distance + z), y / (distance + z), distance, wide, depth)
 
 
 @kernel
@@ -181,7 +165,7 @@ def fill_frame(normal: Array, frame: Array) -> None:
 
 
 @kernel
-def _splat(s: float, t: float, distance: float, wide: float, depth: Array) -> None:
+def splat_box(s: float, t: float, distance: float, wide: float, depth: Array) -> None:
     """Lower the texels whose centres a point's box holds to its distance, or the one that holds the point."""
     side = depth.shape[0]
     half = 0.25 * side * (1 + s * s + t * t) * wide / distance

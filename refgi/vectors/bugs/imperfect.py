@@ -42,7 +42,7 @@ def literal_points(
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
         shares = [1 - u - v, u, v]
     place = sum(share[..., None] * corners[face, j] for j, share in enumerate(shares))
-    return {PLANES[0]: np.asarray(place), PLANES[1]: face.astype(np.int32), PLANES[2]: np.full(1, radius(total / count))}
+    return dict(zip(PLANES, (np.asarray(place), face.astype(np.int32), np.full(1, radius(total / count))), strict=True))
 
 
 def point_bugs(count: int) -> tuple[Bug, ...]:
@@ -110,7 +110,7 @@ def literal_maps(
 
 
 def _within(at: Array, reach: Array, side: int, centre: float, small: bool) -> Array:
-    """Return which texels of a side boxes cover, (point, texel); where they cover none, the one that holds the point."""
+    """Return which texels of a side boxes cover, (point, texel); where none, the one that holds the point."""
     texel = np.arange(side)
     covered = np.abs(texel + centre - at[:, None]) <= reach[:, None]
     low, high = np.ceil(at - reach - centre), np.floor(at + reach - centre)

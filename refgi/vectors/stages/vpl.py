@@ -94,7 +94,7 @@ class _Rays:
         facing = np.ascontiguousarray(np.asarray(arrays[FACING], np.float32).reshape(3, -1)[:, to.pixel])
         position, normal = (np.asarray(arrays[name], np.float64) for name in LIGHTS)
         sent = PixelLights(position + lift * normal, normal, np.ones_like(normal), None, None, None, normal.shape[1])
-        senders = self.senders = senders_of(sent)  # lobes do not count: where they fade out is no question of visibility
+        senders = self.senders = senders_of(sent)  # where lobes fade out is no question of visibility
         self.to = to._replace(facing=facing, origin=(to.origin + np.float32(lift) * facing).astype(np.float32))
         self.count, self.shape = senders.flux.shape[1], np.asarray(arrays[RECEIVERS[2]]).shape
         pairs = len(to.pixel) * self.count

@@ -10,14 +10,15 @@ import numpy as np
 
 from refgi.draws import IMPERFECT_MAPS, draws
 from refgi.jit import kernel
+from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.scene import Geometry, Scene
 from refgi.truth.imperfect import (
+    HORIZON,
     Imperfect,
     areas_of,
     fill_frame,
     fill_holes,
-    place_point,
-    splat_point,
+    splat_box,
 )
 from refgi.vectors.bugs.imperfect import filled_bugs, map_bugs, point_bugs
 from refgi.vectors.recipe import Recipe
@@ -74,8 +75,14 @@ def _add_points(recipe: Recipe, scene: Scene, points: int) -> None:
 
 @kernel
 def _place(corners: Array, upto: Array, shift: Array, place: Array, face: Array) -> None:
-    for k in range(len(place)):
-        face[k] = place_point(k, len(place), corners, upto, shift, place[k])
+    """Fill one light's points and their faces; the method draws each as soon as it is found."""
+    count = len(place)
+    for k in range(count):
+        f = min(np.searchsorted(upto, (k + shift[0]) / count * upto[-1], side="right"), len(upto) - 1)
+        a, b = math.sqrt((shift[1] + k * FIRST_STEP) % 1.0), (shift[2] + k * SECOND_STEP) % 1.0
+        face[k] = f
+        for c in range(3):
+            place[k, c] = (1 - a) * corners[f, 0, c] + a * (1 - b) * corners[f, 1, c] + a * b * corners[f, 2, c]
 
 
 def _add_frames(recipe: Recipe) -> None:
@@ -95,7 +102,7 @@ def _add_frames(recipe: Recipe) -> None:
                paper="Duff et al. 2017", exact=(LIGHTS[1],), bugs=(
                    Bug("frames are transposed", by(lambda a: a.transpose(0, 2, 1)), "rows are the axes"),
                    Bug("right and down are exchanged", by(lambda a: a[:, [1, 0, 2]]), ""),
-                   Bug("the map looks into the surface", by(lambda a: a * ((1,), (1,), (-1,))), "forward is the normal"),
+                   Bug("the map looks into the surface", by(lambda a: a * ((1,), (1,), (-1,))), "forward: normal"),
                    Bug("down points up", by(lambda a: a * ((1,), (-1,), (1,))), "right-handed"),
                    Bug("right points left", by(lambda a: a * ((-1,), (1,), (1,))), "right-handed")))
 
@@ -125,7 +132,12 @@ def _add_depth(recipe: Recipe, scene: Scene, settings: Imperfect) -> None:
 def _splat_all(place: Array, facing: Array, position: Array, frame: Array, radius: float, splat: float,
                depth: Array) -> None:
     for k in range(len(place)):
-        splat_point(place[k], facing[k], position, frame, radius, splat, depth)
+        d = place[k] - position
+        x, y, z = (d * frame[0]).sum(), (d * frame[1]).sum(), (d * frame[2]).sum()
+        distance = math.sqrt(x * x + y * y + z * z)
+        if z > HORIZON * distance and distance > radius:
+            wide = splat * radius * math.sqrt(abs((d * facing[k]).sum()) / distance)
+            splat_box(x / (distance + z), y / (distance + z), distance, wide, depth)
 
 
 def _add_filled(recipe: Recipe, levels: int) -> str:

@@ -8,7 +8,7 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.rsm.raster.projection import camera_projection
-from refgi.sssil.crown.pattern import shared_offsets
+from refgi.sssil.crown.pattern import samples_at, shared_offsets
 from refgi.sssil.hssil import hssil
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.bugs import bilateral, blur, crown_gather, crown_points, crown_sample, nearest_texels
@@ -75,9 +75,14 @@ def test_samples_are_those_of_the_method(name):
     case, known, _ = made(name)
     sampling = cases.SETTINGS[name].sampling
     for index in range(case.facts["hssil"]["levels"]):
-        rows = known[f"level{index}.depth"].shape[0]
-        offsets, weight = shared_offsets(sampling, index, sampling.first_level + index, rows,
-                                         case.facts[f"samples{index}"]["radius"])
+        rows, columns = known[f"level{index}.depth"].shape
+        number, radius = sampling.first_level + index, case.facts[f"samples{index}"]["radius"]
+        if sampling.pattern == "pixel":
+            each = [[samples_at(sampling, index, number, i, j, radius) for j in range(columns)] for i in range(rows)]
+            offsets, weight = (np.array([[one[k] for one in row] for row in each]) for k in (0, 1))
+            weight = weight if sampling.density != "uniform" else weight[:1, :1]
+        else:
+            offsets, weight = shared_offsets(sampling, index, number, rows, radius)
         np.testing.assert_array_equal(known[f"samples{index}.offsets"], offsets)
         np.testing.assert_allclose(known[f"samples{index}.weight"], weight, atol=1e-6 * weight.max())
 

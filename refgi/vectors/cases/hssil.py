@@ -28,6 +28,11 @@ SETTINGS = {
                     plane_tolerance=0.1, cosine=0.5),
     "hssil-pole": of(HssilSettings, samples=8, radius=2.0, levels=2, seed=5),
     "hssil-dark": of(HssilSettings, samples=8, radius=2.0, levels=2, start="quarter"),
+    "hssil-average": of(HssilSettings, samples=7, radius=2.0, levels=3, seed=6, downsample="average", pattern="pixel",
+                        density="uniform"),
+    "hssil-radiance": of(HssilSettings, samples=10, radius=2.5, levels=3, seed=2, downsample="closest_average",
+                         pattern="fixed"),
+    "hssil-all": of(HssilSettings, radius=2.0, levels=3, pattern="all"),
 }
 VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-default": (room(SPOT, BULB), (40, 28), "map"),
@@ -35,6 +40,9 @@ VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-odd": (room(SPOT, matte=True), (13, 11), "exact"),
     "hssil-pole": (room(DOWN, camera=POLE), (21, 14), "exact"),
     "hssil-dark": (room(AWAY, matte=True), (18, 13), "exact"),
+    "hssil-average": (room(SPOT, BULB), (27, 19), "exact"),
+    "hssil-radiance": (room(SPOT, BULB, matte=True, smooth=True), (30, 21), "exact"),
+    "hssil-all": (room(BULB, matte=True), (18, 14), "exact"),
 }
 TEMPORAL = {
     "hssil-temporal": of(TemporalSettings),
@@ -112,5 +120,9 @@ QUICK = {
 }
 FULL: dict[str, Any] = {
     "hssil-dark": _quick("hssil-dark", "no direct light: all is 0"),
+    "hssil-average": _quick("hssil-average", "levels of means by area; each texel has samples of its own"),
+    "hssil-radiance": _quick("hssil-radiance", "the closest texels with the mean radiance of all; one mirror-symmetric "
+                             "set of samples, no blur"),
+    "hssil-all": _quick("hssil-all", "every texel of disc and crown is a sample, no blur"),
     "hssil-moving": lambda: coherent("hssil-moving", "a surface that moves by itself before a camera that moves too"),
 }

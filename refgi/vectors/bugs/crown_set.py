@@ -63,7 +63,7 @@ def mirrored_bugs(name: str, counts: tuple[int, int], radius: float, density: st
         "offsets are cut off downwards, not rounded": {"rounding": "floor"},
         "each sample stands for one texel: the weight is 1": {"weigh": lambda far, count, near: 1 + 0 * far},  # noqa: ARG005
         "weights lack a factor 2: only half of the points were drawn": {
-            "weigh": lambda far, count, near: alike(far, count, near) / 2 if density == "uniform" else (  # noqa: ARG005
+            "weigh": lambda far, count, near: alike(far, count, near) / 2 if density == "uniform" else (
                 math.pi * radius * far / max(count, 1))},
     }
     ways = dict(ways) if density == "uniform" else {

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.pairs.settings import PairSettings
 from refgi.splat import multires
 from refgi.splat.multires.subsplats.upsample import black_level, filled_cells
 from refgi.vectors.bugs.upsample import tent
@@ -15,6 +16,8 @@ from refgi.vectors.stages.lights import pixel_lights_of
 from refgi.vectors.stages.multires_list import subsplats_of
 from tests.naive import multires as twin
 from tests.naive import per_light, refinement, upsample
+from tests.naive.crossings import LIFT, corners_of, face_normals, free
+from tests.naive.pair_term import contributions
 from tests.vectors.splat_ports import LARGEST_MASK, expect_within, made, masked_shares, stages_of
 
 PLANS = QUICK_PLANS | FULL_PLANS
@@ -139,8 +142,49 @@ def points(id):
     return dict(zip(("multires.point", "multires.normal"), np.array(places).transpose(1, 2, 0), strict=True))
 
 
+def facing(id):
+    """Faces of the triangles that representative pixels see."""
+    known = made(id)[1]
+    triangle = known["gbuffer.triangle_id"].reshape(-1)[known["multires.pixel"]]
+    return {"multires.facing": face_normals(PLANS[id]().scene.geometry, triangle, known["multires.normal"].T).T}
+
+
+def visible(id):
+    """Lights lie on triangles as well: what leaves below one is blocked by it."""
+    known, geometry = made(id)[1], PLANS[id]().scene.geometry
+    place, normal, up = (known[f"multires.{key}"].T.astype(float) for key in ("point", "normal", "facing"))
+    lights = pixel_lights_of(known, np.float64)
+    seen = np.zeros((lights.flux.shape[1], len(place)), bool)
+    for k in range(len(seen)):
+        triangle = known[f"rsm{known['lights.map'][k]}.triangle_id"].reshape(-1)[known["lights.texel"][k]]
+        leaving = lights.normal[:, k]
+        side = face_normals(geometry, np.array([triangle]), leaving[None])[0]
+        toward = lights.position[:, k] - place
+        counts = ((toward * up).sum(axis=1) > 0) & ((toward * normal).sum(axis=1) > 0)
+        counts &= (toward @ leaving < 0) & (toward @ side < 0)
+        counts[counts] = free(corners_of(geometry), place[counts] + LIFT * up[counts],
+                              lights.position[:, k] + LIFT * side)
+        seen[k] = counts
+    return {"multires.visible": seen}
+
+
+def seen_irradiance(id):
+    known = made(id)[1]
+    place, normal = (known[f"multires.{key}"].T.astype(float) for key in ("point", "normal"))
+    each = contributions(place, normal, pixel_lights_of(known, np.float64), PairSettings(clamp=None))
+    return {"multires.irradiance": (each * known["multires.visible"][..., None]).sum(axis=0).T}
+
+
+def halved(id):
+    case, known = made(id)
+    light, fine, shown = known[case.stages[-1].reads[0]], known["gbuffer.triangle_id"] >= 0, known["picture.covered"]
+    return {"multires.halved": twin.halved(light.astype(float), fine, shown)}
+
+
 def irradiance(id):
     settings, known, _, _ = of(id)
+    if settings.shadow_rays is not None:
+        return seen_irradiance(id)
     sources = twin.lights_of(pixel_lights_of(known, np.float64), known.get("lights.area"), settings.effective_pairs)
     places = zip(*(known[name].astype(np.float64).T for name in ("multires.point", "multires.normal")), strict=True)
     return {"multires.irradiance": np.array([sum((light(place) for light in sources), np.zeros(3))
@@ -177,7 +221,8 @@ def detail(id):
 
 PORT = {"depth_ranges": lambda id: ranges(id, "depth"), "normal_ranges": lambda id: ranges(id, "normal"),
         "slopes": slopes, "curvatures": curvatures, "discontinuities": marks, "states": states, "subsplats": listed,
-        "points": points, "irradiance": irradiance, "detail": detail}
+        "points": points, "facing": facing, "visible": visible, "irradiance": irradiance, "detail": detail,
+        "halved": halved}
 
 
 @pytest.mark.parametrize("id", PLANS)

@@ -25,10 +25,11 @@ def settings_of(plan: Plan) -> MultiresSettings:
 def multiresolution(id: str, plan: Plan) -> Case:
     """Return `multires` as planned: buffers, lights, refinement, light, picture."""
     recipe, settings, lamps = Recipe(id, "multires", plan.what), settings_of(plan), len(plan.scene.lights)
-    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, pattern="grid")
+    columns, rows = (side * (2 if settings.supersampled else 1) for side in plan.size)
+    add_lit(recipe, plan.scene, (columns, rows), plan.maps, (plan.lights,) * lamps, pattern="grid")
     if settings.effective_pairs.needs_footprints:
         add_footprints(recipe, lamps)
-    add_multires(recipe, settings, *plan.size)
+    add_multires(recipe, settings, plan.scene, (columns, rows))
     return recipe.case()
 
 
@@ -78,6 +79,10 @@ FULL_PLANS: Plans = {
         room(SPOT, smooth=True), (45, 31), 12, 16, {
             "curvature": "rate", "normal": None, "upsampling": "naive_bilinear", "depth.measure": "demo",
             "depth.threshold": 0.2, "curvature.threshold": 2.0}),
+    "multires-rays": lambda: Plan("a shadow ray from each subsplat to each light", room(SPOT, DOWN), (37, 27), 13, 16,
+                                  {"visibility": "rays", "clamp": "none"}),
+    "multires-double": lambda: Plan("rendered at twice the width and height, as the paper's pictures", pole(SUN, SPOT),
+                                    (21, 15), 16, 25, {"supersampled": True}),
 }
 
 

@@ -37,7 +37,8 @@ def _add_level(recipe: Recipe, view: Projection, index: int, first: int, whole: 
 
     def made_of(level: Level, arrays: Arrays) -> dict[str, Array]:
         made = {f"level{index}.{key}": getattr(level, key) for key in keys}
-        return made if whole else made | {f"level{index}.count": counted(arrays, index, 1 << first if index == 0 else 2)}
+        side = 1 << first if index == 0 else 2
+        return made if whole else made | {f"level{index}.count": counted(arrays, index, side)}
 
     def run(arrays: Arrays, real: Any) -> Arrays:
         if index == 0:
@@ -47,7 +48,7 @@ def _add_level(recipe: Recipe, view: Projection, index: int, first: int, whole: 
         return made_of(next_level(fine, shape, downsample, weight), arrays)
 
     bugs = averaged_bugs(view, index, number) if whole else counted_bugs(view, index, number)
-    parts = f"the {1 << first} x {1 << first} pixels" if index == 0 else "the four finer texels, or those that there are"
+    parts = f"the {1 << first} x {1 << first} pixels" if index == 0 else "four finer texels, or those that there are"
     what = f"means of {parts} by area, areas added, normals of unit length again" if whole else \
         f"the nearest of {parts}, with the mean radiance of all pixels that show a surface"
     recipe.add(f"level{index}", what, run, reads, own, paper=MEANS,

@@ -88,8 +88,8 @@ def first_level_of(arrays: Arrays, view: Projection, first: int, real: Any, down
 
 
 def level_specs(index: int, view: Projection) -> dict[str, Spec]:
-    sheet, empty = "row, column", "; 0 without surface"
     """Return what the planes of a level are."""
+    sheet, empty = "row, column", "; 0 without surface"
     specs = {
         "position": Spec(f"xyz, {sheet}", "m", f"surface point, from the eye{empty}", "axes of the world"),
         "depth": Spec(sheet, "m", "depth along the view direction; inf without surface"),

@@ -88,15 +88,15 @@ def add_binary(recipe: Recipe, name: str, texels: int) -> None:
                 pcf_tile(shadow, points, facing, len(covered), covered.copy(), made[k].reshape(-1), None)
         return {f"{name}.share": made}
 
-    dual, share = BEHIND in recipe.specs, f"{name}.share"
+    share, second = f"{name}.share", (BEHIND,) if BEHIND in recipe.specs else ()
     bugs = _binary_bugs(run, name, texels)
-    if dual:
+    if second:
         bugs = (*(Bug(one.cause, of_both(one.run, share), one.paper) for one in bugs), *second_map_bugs(run, share))
     recipe.facts[f"{name}.test"] = {"side of the kernel, texels": texels, "slack, of the distance": 1e-3,
                                     "of lights without extent, texels": 1}
     recipe.add(name, "V by one depth test, of area lights without extent; 1 elsewhere" if name == "hard" else
                f"V: share of {texels} x {texels} texels that do not hide the pixel; of one for lights without extent",
-               of_both(run, share) if dual else run, (*PIXELS, FACING, "maps.depth", *LIGHT, *((BEHIND,) if dual else ())),
+               of_both(run, share) if second else run, (*PIXELS, FACING, "maps.depth", *LIGHT, *second),
                {share: share_spec()}, paper="VAL-03; A.6 P4: receiver's plane, E-VAL-14", bugs=bugs)
 
 

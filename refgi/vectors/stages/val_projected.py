@@ -91,7 +91,7 @@ def add_back_projection(recipe: Recipe) -> None:
                    Bug("both sides are exchanged", reading(run, **{side: lambda a: a[::-1]}), "along the axes"),
                    Bug("the rectangle's axes are exchanged", reading(run, areas__axes=lambda a: a[:, ::-1]), ""),
                    Bug("the rectangle is a point: a hard shadow", reading(run, **{side: np.zeros_like}), "a rectangle"),
-                   Bug("V is the hidden share", writing(run, visibility__share=lambda a: 1 - a), "1 - hidden / counted"),
+                   Bug("V is the hidden share", writing(run, visibility__share=lambda a: 1 - a), "V = 1 - hidden"),
                    Bug("V of one test: hidden or not", writing(run, visibility__share=np.floor), "a share"),
                    Bug("the nearest texel's depth for all of a map", reading(run, **{depth: _nearest}), "own depth")))
 

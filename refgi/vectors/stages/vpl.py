@@ -34,13 +34,21 @@ LEAK = 0.05  # m: a lift through which light leaks
 
 def add_vpl(recipe: Recipe, scene: Scene, settings: VplSettings) -> None:
     """Add the visibility of every pixel light from every pixel, by rays or by maps, and the sum of the visible ones."""
-    recipe.facts["vpl"] = {"largest_lift_of_ray_ends": LIFT}
     recipe.factors["number of lights"] = float(recipe.expected()["lights.flux"].shape[1])
-    _add_facing(recipe, scene)
     if settings.maps is None:
-        _add_visible(recipe, scene)
-    else:
-        _add_looked_up(recipe, scene, settings.maps, add_maps(recipe, scene, settings.maps, settings.lights.seed))
+        add_at_receivers(recipe, scene)
+        return
+    recipe.facts["vpl"] = {"largest_lift_of_ray_ends": LIFT}
+    _add_facing(recipe, scene)
+    _add_looked_up(recipe, scene, settings.maps, add_maps(recipe, scene, settings.maps, settings.lights.seed))
+    _add_sum(recipe)
+
+
+def add_at_receivers(recipe: Recipe, scene: Scene) -> None:
+    """Add faces, visibility by rays and the sum of the visible lights at pixels, or at what is in their place."""
+    recipe.facts["vpl"] = {"largest_lift_of_ray_ends": LIFT}
+    _add_facing(recipe, scene)
+    _add_visible(recipe, scene)
     _add_sum(recipe)
 
 

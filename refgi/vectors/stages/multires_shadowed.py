@@ -33,7 +33,7 @@ def add_shadowed_irradiance(recipe: Recipe, scene: Scene) -> None:
     vpl.add_at_receivers(inner, scene)
     recipe.facts["vpl"] = inner.facts["vpl"]
     for step in inner.stages:
-        name = {vpl.FACING: "multires.facing", vpl.VISIBLE: "multires.visible"}.get(step.writes[0], "multires.irradiance")
+        name = {vpl.FACING: "multires.facing", vpl.VISIBLE: "multires.visible"}.get(step.writes[0], LIGHT)
         _add_at_subsplats(recipe, step, name, inner.specs[step.writes[0]])
 
 

@@ -9,9 +9,10 @@ import dataclasses
 from refgi.frame import Frame
 from refgi.scene import Scene
 from refgi.splat.multires.refinement.grid import top_level
-from refgi.splat.multires.settings import ByGeometry, MultiresSettings
+from refgi.splat.multires.settings import ByGeometry, ByIrradiance, MultiresSettings
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.stages.multires_light import add_detail, add_irradiance, add_points
+from refgi.vectors.stages.multires_lights import add_lists
 from refgi.vectors.stages.multires_list import add_states, add_subsplats
 from refgi.vectors.stages.multires_ranges import add_curvatures, add_discontinuities, add_ranges, add_slopes
 from refgi.vectors.stages.multires_shadowed import add_halved, add_shadowed_irradiance
@@ -21,19 +22,23 @@ from refgi.vectors.stages.multires_upsample import add_upsampling
 def add_multires(recipe: Recipe, settings: MultiresSettings, scene: Scene, size: tuple[int, int]) -> None:
     """Add all stages after the G-buffer, which has `size` columns and rows, and the pixel lights.
 
-    Subsplats are refined by geometry. Where the picture is half as large, the last stage makes it so.
+    Subsplats are refined by geometry or by each light. Where the picture is half as large, the last stage makes it so.
     """
-    subsplats = settings.subsplats
+    subsplats, (width, height) = settings.subsplats, size
+    printed = "ams_filter_all" in settings.as_published, "ams_all_corners" not in settings.as_published
+    if isinstance(subsplats, ByIrradiance):
+        if subsplats.criteria is not None or subsplats.representative != "pixel" or subsplats.form == "brightest":
+            raise ValueError(f"{recipe.id}: lists of each light start from the coarsest cells, at representative pixels")
+        add_lists(recipe, subsplats, settings.effective_pairs, size, *printed)
+        return
     assert isinstance(subsplats, ByGeometry)
-    width, height = size
     top = add_refinement(recipe, subsplats, width, height)
     add_points(recipe, subsplats.representative, top)
     if settings.shadow_rays is None:
         add_irradiance(recipe, settings.effective_pairs)
     else:
         add_shadowed_irradiance(recipe, scene)
-    add_upsampling(recipe, subsplats.upsampling, top, "ams_filter_all" in settings.as_published,
-                   "ams_all_corners" not in settings.as_published)
+    add_upsampling(recipe, subsplats.upsampling, top, *printed)
     if settings.detail > 0:
         add_detail(recipe, settings.detail)
     if settings.supersampled:

@@ -19,8 +19,8 @@ AT_WALL = Camera((0.2, 1.4, 0.8), (0.1, 1.4, -1.0), (0.0, 1.0, 0.0), math.radian
 
 def settings_of(plan: Plan) -> MultiresSettings:
     """Return the settings of a plan, whose lights lie on a grid; few cells on the coarsest level."""
-    return of(MultiresSettings, **{"lights": plan.lights * len(plan.scene.lights), **({} if "subsplats" in plan.choices else {"coarsest": 5}),
-                                 **plan.choices})
+    coarsest = {} if "subsplats" in plan.choices else {"coarsest": 5}
+    return of(MultiresSettings, **{"lights": plan.lights * len(plan.scene.lights), **coarsest, **plan.choices})
 
 
 def multiresolution(id: str, plan: Plan) -> Case:
@@ -81,7 +81,8 @@ FULL_PLANS: Plans = {
             "curvature": "rate", "normal": None, "upsampling": "naive_bilinear", "depth.measure": "demo",
             "depth.threshold": 0.2, "curvature.threshold": 2.0}),
     "multires-lights": lambda: Plan("lists of each light's own, split where its irradiance changes", room(SPOT, DOWN),
-                                    (29, 22), 12, 4, {"subsplats": ByIrradiance(coarsest=5, threshold=0.15), "clamp": "none"}),
+                                    (29, 22), 12, 4, {"subsplats": ByIrradiance(coarsest=5, threshold=0.15),
+                                                      "clamp": "none"}),
     "multires-rays": lambda: Plan("a shadow ray from each subsplat to each light", room(SPOT, DOWN), (37, 27), 13, 16,
                                   {"visibility": "rays", "clamp": "none"}),
     "multires-double": lambda: Plan("rendered at twice the width and height, as the paper's pictures", pole(SUN, SPOT),

@@ -22,13 +22,13 @@ from refgi.vectors.stages.multires_upsample import add_upsampling
 def add_multires(recipe: Recipe, settings: MultiresSettings, scene: Scene, size: tuple[int, int]) -> None:
     """Add all stages after the G-buffer, which has `size` columns and rows, and the pixel lights.
 
-    Subsplats are refined by geometry or by each light. Where the picture is half as large, the last stage makes it so.
+    Subsplats are refined by geometry or by each light. Where the picture is half as large, the last stage halves it.
     """
     subsplats, (width, height) = settings.subsplats, size
     printed = "ams_filter_all" in settings.as_published, "ams_all_corners" not in settings.as_published
     if isinstance(subsplats, ByIrradiance):
-        if subsplats.criteria is not None or subsplats.representative != "pixel" or subsplats.form == "brightest":
-            raise ValueError(f"{recipe.id}: lists of each light start from the coarsest cells, at representative pixels")
+        if (subsplats.criteria, subsplats.representative) != (None, "pixel") or subsplats.form == "brightest":
+            raise ValueError(f"{recipe.id}: lists of each light begin with the coarsest cells, at one pixel each")
         add_lists(recipe, subsplats, settings.effective_pairs, size, *printed)
         return
     assert isinstance(subsplats, ByGeometry)

@@ -4,6 +4,7 @@ Every cell of every level has a representative pixel, and each light's irradianc
 more than its lists come to. Lists follow each other light by light, coarsest level first, row by row.
 """
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -198,7 +199,7 @@ def _add_picture(recipe: Recipe, settings: ByIrradiance, top: int, filter_all: b
     def run(arrays: Arrays, real: Any, kept: slice = slice(None), how: str = settings.upsampling,
             every: bool = filter_all) -> Arrays:
         covered, first, total = covered_of(arrays), np.asarray(arrays[FIRST]), None
-        for begin, end in list(zip(first[:-1], first[1:], strict=True))[kept]:
+        for begin, end in list(itertools.pairwise(first))[kept]:
             own = {one: np.asarray(arrays[one])[begin:end] for one in SUBSPLATS[:3]}
             values = np.ascontiguousarray(arrays[LIGHT][:, begin:end], real)
             made = upsample(values, subsplats_of({**own, IDS: arrays[IDS]}, top), covered, how,  # type: ignore[arg-type]

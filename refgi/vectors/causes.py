@@ -191,7 +191,7 @@ def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
         yield ("the bytes lie in Fortran order, the first axis fastest, under a header that says C order",
                expected.ravel(order="F").reshape(expected.shape))
         yield ("the header says Fortran order, the bytes lie in C order",
-               expected.reshape(expected.shape, order="F"))
+               expected.ravel().reshape(expected.shape, order="F"))
     if len(names) != expected.ndim:
         return
     for axis, name in enumerate(names):

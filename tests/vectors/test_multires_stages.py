@@ -3,6 +3,7 @@
 No twin covers the order of the list, which means nothing to the paper: the twin's list is sorted here.
 """
 
+import itertools
 from functools import cache
 
 import numpy as np
@@ -286,7 +287,7 @@ def lists(id):
 def summed(id):
     _, known, view, top = of(id)
     total, first = np.zeros((3, *view.covered.shape)), known["multires.first"]
-    for begin, end in zip(first[:-1], first[1:], strict=True):
+    for begin, end in itertools.pairwise(first):
         cells = zip(*(known[name][begin:end].tolist() for name in SUBSPLATS), strict=True)
         values = known["multires.irradiance"][:, begin:end].astype(float).T
         for (i, j), value in upsample.tent(dict(zip(cells, values, strict=True)), view.covered, top).items():

@@ -19,7 +19,7 @@ Change = Callable[[Array], Array]
 
 def corners_of(arrays: Arrays) -> Array:
     """Return the corners of faces, (F, 3, 3)."""
-    return np.asarray(arrays["scene.vertices"], np.float64)[np.asarray(arrays["scene.faces"])]
+    return np.asarray(np.asarray(arrays["scene.vertices"], np.float64)[np.asarray(arrays["scene.faces"])])
 
 
 def literal_points(
@@ -161,8 +161,7 @@ def literal_filled(
     fine = depth if len(depth) > 1 else np.repeat(np.repeat(depth, 2, 0), 2, 1)
     side = len(fine) // 2
     four = fine.reshape(side, 2, side, 2).transpose(0, 2, 1, 3).reshape(side, side, 4)
-    coarse = {"mean": lambda: _mean_near(four, np.ones(4), near), "least": lambda: four.min(axis=2),
-              "corner": lambda: four[..., 0]}[pulled]()
+    coarse = {"mean": _mean_near(four, np.ones(4), near), "least": four.min(axis=2), "corner": four[..., 0]}[pulled]
     coarse = literal_filled(coarse, levels - 1, near=near, pulled=pulled, weights=weights, over=over, push=push,
                             outwards=outwards)
     i = np.arange(2 * side)
@@ -179,7 +178,8 @@ def _mean_near(values: Array, weights: Array, near: float) -> Array:
     with np.errstate(invalid="ignore"):
         share = np.where(np.isfinite(values) & (values <= (1 + near) * least), weights, 0)
     total = (share * np.where(np.isfinite(values), values, 0)).sum(axis=2)
-    return np.divide(total, share.sum(axis=2), out=np.full(total.shape, np.inf), where=share.sum(axis=2) > 0)
+    mean = np.divide(total, share.sum(axis=2), out=np.full(total.shape, np.inf), where=share.sum(axis=2) > 0)
+    return np.asarray(mean)
 
 
 def filled_bugs(levels: int) -> tuple[Bug, ...]:

@@ -205,6 +205,6 @@ def _wrong_share(share: Array, how: str) -> Array:
     part = {"rest": half / (1 - 2 * half), "whole": 2 * half}.get(how)
     if part is None:
         return np.asarray({"times": 1 / share, "below": 1 - share}[how])
-    return np.where(share < 0.5, part, 1 - part)
+    return np.asarray(np.where(share < 0.5, part, 1 - part))
 
 

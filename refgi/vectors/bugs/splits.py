@@ -59,7 +59,7 @@ def splits(
 
 def _largest(samples: Array, visited: Array) -> Array:
     """Return the largest channel of the samples that each light has taken."""
-    return np.where(visited[:, None], samples, 0).max(axis=(1, 2, 3), initial=0)
+    return np.asarray(np.where(visited[:, None], samples, 0).max(axis=(1, 2, 3), initial=0))
 
 
 def split_bugs(names: tuple[str, ...], levels: Callable[[Arrays], tuple[Levels, Levels]], settings: Any) -> list[Bug]:

@@ -57,7 +57,7 @@ def _add_representatives(recipe: Recipe, top: int, size: tuple[int, int]) -> Non
         def altered(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
             covered, made = covered_of(arrays), {}
             for level, name in enumerate(names):
-                places = np.full(level_shape(*covered.shape, level), -1, np.int32)
+                places = np.full(level_shape(covered.shape[0], covered.shape[1], level), -1, np.int32)
                 for i, j in np.ndindex(*places.shape):
                     places[i, j] = _representative(covered, level, (i, j), half, nearest)
                 made[name] = places
@@ -82,7 +82,7 @@ def _representative(covered: Array, level: int, cell: tuple[int, int], half: flo
                    for begin, size in zip((top, left), covered.shape, strict=True))
     if covered[row, column]:
         return int(row * covered.shape[1] + column)
-    inside = np.argwhere(covered[top : top + side, left : left + side]) + (top, left)
+    inside = np.argwhere(covered[top : top + side, left : left + side]) + np.array([top, left])
     if not len(inside):
         return -1
     off = ((inside - (row, column)) ** 2).sum(axis=1) if nearest else np.zeros(len(inside))
@@ -151,13 +151,14 @@ def _add_leaves(recipe: Recipe, top: int) -> None:
     def run(arrays: Arrays, real: Any, empty: bool = False, fine_first: bool = False) -> Arrays:
         there = [np.asarray(arrays[name]) >= 0 for name in _names("representative", top)]
         samples = [np.asarray(arrays[name], real) for name in _names("sample", top)]
-        split = [None, *(np.asarray(arrays[name]) for name in _names("split", top, 1))]
+        split = [np.zeros((len(samples[0]), *there[0].shape), bool),
+                 *(np.asarray(arrays[name]) for name in _names("split", top, 1))]
         cells: list[tuple[int, int, int]] = []
         values, first = [], [0]
         for k in range(len(samples[0])):
             for level in range(top + 1) if fine_first else range(top, -1, -1):
                 above = np.ones(there[level].shape, bool) if level == top else _down(split[level + 1][k], there[level])
-                leaf = above & (there[level] | empty) & (~split[level][k] if level else True)
+                leaf = above & (there[level] | empty) & ~split[level][k]
                 cells += [(level, int(i), int(j)) for i, j in np.argwhere(leaf)]
                 values.append(samples[level][k][:, leaf])
             first.append(len(cells))

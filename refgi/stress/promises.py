@@ -28,7 +28,7 @@ SURFACES = "visible surfaces"
 FEW = {"vpl": ("lights=192",), "truth": ("samples=128",)}  # as many as time allows
 # every texel of a small map a light, every texel of a level a sample, every pixel a subsplat: nothing is drawn
 EVERY = {"sii": ("pattern=all",), "multires": ("pattern=all", "coarsest=65536"), "vpl": ("pattern=all",),
-         "hssil": ("sampling.pattern=all",)}
+         "hssil": ("sampling.pattern=all", "downsample=closest", "disc_share=1")}
 SMALL_MAP: Mapping[str, Any] = MappingProxyType({"rsm_resolution": 16})
 DRAWN_ANEW = ("mirrored", "two lamps of half")  # changes after which other lights or samples are drawn
 SAMPLED_ANEW = ("quarter turn", "turned", "mirrored", "two lamps of half")  # changes after which paths go elsewhere

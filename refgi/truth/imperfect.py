@@ -100,10 +100,7 @@ def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfec
     Points reach both sides of faces, as surfaces do. Boxes by angle, the bias by slope and what counts as near
     (`HORIZON`, `GRAZING`, `NEAR`) are this module's own: the paper leaves them open.
     """
-    corners = np.ascontiguousarray(geometry.vertices[geometry.faces], np.float64)
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    twice = np.linalg.norm(across, axis=1, keepdims=True)
-    facing, upto = np.divide(across, twice, out=np.zeros_like(across), where=twice > 0), np.cumsum(0.5 * twice)
+    corners, facing, upto = areas_of(geometry)
     total = float(upto[-1]) if len(upto) else 0.0
     count = lights.flux.shape[1]
     depth = np.full((count, settings.resolution, settings.resolution), np.inf, np.float32)
@@ -114,6 +111,14 @@ def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfec
         _draw_maps(position, normal, corners, facing, upto, settings.points, shifts, radius, settings.splat,
                    settings.levels, depth)
     return ImperfectDepth(depth, radius, settings.bias)
+
+
+def areas_of(geometry: Geometry) -> tuple[Array, Array, Array]:
+    """Return the corners (F, 3, 3) of faces, their unit normals (F, 3) and the sums (F,) of areas up to each, m^2."""
+    corners = np.ascontiguousarray(geometry.vertices[geometry.faces], np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(across, axis=1, keepdims=True)
+    return corners, np.divide(across, twice, out=np.zeros_like(across), where=twice > 0), np.cumsum(0.5 * twice)
 
 
 def fill_hidden(maps: ImperfectDepth, to: RayReceivers, receivers: tuple[int, int], senders: Senders,
@@ -129,14 +134,14 @@ def _draw_maps(position: Array, normal: Array, corners: Array, facing: Array, up
     for i in prange(depth.shape[0]):
         _draw_points(position[i], normal[i], corners, facing, upto, points, shifts[i], radius, splat, depth[i])
         if levels:
-            _fill_holes(depth[i], levels)
+            fill_holes(depth[i], levels)
 
 
 @kernel
 def _draw_points(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, points: int, shift: Array,
                  radius: float, splat: float, depth: Array) -> None:
     frame = np.empty((3, 3))
-    _fill_frame(normal, frame)
+    fill_frame(normal, frame)
     for k in range(points):
         f = min(np.searchsorted(upto, (k + shift[0]) / points * upto[-1], side="right"), len(upto) - 1)
         a, b = math.sqrt((shift[1] + k * FIRST_STEP) % 1.0), (shift[2] + k * SECOND_STEP) % 1.0
@@ -148,11 +153,11 @@ def _draw_points(position: Array, normal: Array, corners: Array, facing: Array, 
         distance = math.sqrt(x * x + y * y + z * z)
         if z > HORIZON * distance and distance > radius:
             wide = splat * radius * math.sqrt(abs(across) / distance)
-            _splat(x / (distance + z), y / (distance + z), distance, wide, depth)
+            splat_box(x / (distance + z), y / (distance + z), distance, wide, depth)
 
 
 @kernel
-def _fill_frame(normal: Array, frame: Array) -> None:
+def fill_frame(normal: Array, frame: Array) -> None:
     """Fill the rows of a frame whose last one is a unit normal."""
     frame[0, 0], frame[0, 1], frame[0, 2], frame[1, 0], frame[1, 1], frame[1, 2] = orthonormal_basis(
         normal[0], normal[1], normal[2])
@@ -160,7 +165,7 @@ def _fill_frame(normal: Array, frame: Array) -> None:
 
 
 @kernel
-def _splat(s: float, t: float, distance: float, wide: float, depth: Array) -> None:
+def splat_box(s: float, t: float, distance: float, wide: float, depth: Array) -> None:
     """Lower the texels whose centres a point's box holds to its distance, or the one that holds the point."""
     side = depth.shape[0]
     half = 0.25 * side * (1 + s * s + t * t) * wide / distance
@@ -177,7 +182,8 @@ def _splat(s: float, t: float, distance: float, wide: float, depth: Array) -> No
 
 
 @kernel
-def _fill_holes(depth: Array, levels: int) -> None:
+def fill_holes(depth: Array, levels: int) -> None:
+    """Pull and push one map in place."""
     side = depth.shape[0]
     pyramid = np.empty((levels + 1, side, side), np.float32)
     pyramid[0] = depth

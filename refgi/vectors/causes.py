@@ -187,6 +187,11 @@ def _missing(factor: str | None) -> str:
 def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
     expected = difference.expected
     names = axes_of(difference.entry.axes)
+    if expected.ndim > 2:  # of two axes the words below say more
+        yield ("the bytes lie in Fortran order, the first axis fastest, under a header that says C order",
+               expected.ravel(order="F").reshape(expected.shape))
+        yield ("the header says Fortran order, the bytes lie in C order",
+               expected.ravel().reshape(expected.shape, order="F"))
     if len(names) != expected.ndim:
         return
     for axis, name in enumerate(names):

@@ -36,7 +36,8 @@ def test_json_says_what_is_not_asked(tmp_path):
                tmp_path / "out")
     content = json.loads(done.stdout)
     assert content["rows"] == []
-    assert content["silent"] == [{"method": "hssil", "change": "cropped", "why": "it looks at the picture around a pixel"}]
+    assert content["silent"] == [{"method": "hssil", "change": "cropped",
+                                  "why": "it looks at the picture around a pixel"}]
 
 
 def test_a_broken_promise_is_an_exit_code(tmp_path, monkeypatch):

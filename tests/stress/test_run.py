@@ -100,7 +100,7 @@ def test_made_energy(box, faulty):
     assert broken(box) == {"energy"}
 
 
-def test_truth_after_a_turn_is_judged_by_its_errors(box, faulty):
+def test_truth_after_a_turn_is_judged_by_its_errors(box):
     turns = ["quarter turn", "two lamps of half"]
     assert broken(box, turns, "truth") == set()
     render, count = refgi.methods.render, [0]

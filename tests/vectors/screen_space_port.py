@@ -13,6 +13,7 @@ import numpy as np
 from refgi.scene import Geometry
 from refgi.vectors.cases.hssil import SETTINGS, TEMPORAL
 from tests.naive import crossings, crown, crown_points, direct, level_blur, reprojection, temporal, upsampling
+from tests.naive import hssil as whole
 from tests.naive import view_pyramid as pyramid
 
 PLANES = {"p": "position", "n": "normal", "L": "radiance"}
@@ -20,7 +21,8 @@ PLANES = {"p": "position", "n": "normal", "L": "radiance"}
 
 def outputs(case, stage, arrays):
     kind = re.sub(r"\d", "", stage.name)
-    make = {"shadow": shadows, "direct": irradiance, "level": level, "shifts of samples": shifts, "samples": samples,
+    make = {"shadow": shadows, "direct": irradiance, "level": level, "shifts of samples": shifts,
+            "points of samples": shared_points, "samples": samples,
             "gather": gathered, "blur": blurred, "light": upsampled, "picture": upsampled, "motion": motion,
             "reprojected": reprojected, "entering": entering, "clamp": clamped, "temporal": blended}.get(kind)
     if make is None:
@@ -76,15 +78,61 @@ def irradiance(case, arrays, _):
 def level(case, arrays, index):
     first, camera = case.facts["hssil"]["first level"], case.facts["camera"]
     height, width = camera["rows"], camera["columns"]
+    mode = SETTINGS[case.id].senders.downsample
+    if mode == "average" and index > 0:
+        return {key: array for key, array in arrays_of(averages(texels(arrays, index - 1, width)), index,
+                                                       width).items() if not key.endswith("pixel")}
     if index == 0:
         picture = {"depth": arrays["gbuffer.depth"], "axes": arrays["camera.frame"][0],
                    "f_h": 2 * math.atan(arrays["camera.half"][0]), "f_v": 2 * math.atan(arrays["camera.half"][1]),
                    **{key: np.moveaxis(arrays[name], 0, -1) for key, name in (
                        ("normal", "gbuffer.normal"), ("albedo", "gbuffer.albedo"), ("direct", "direct.irradiance"))}}
-        made = pyramid.levels(picture, first, 1)[0]
+        made = pyramid.levels(picture, first if mode == "closest" else 0, 1)[0]
+        if mode != "closest":
+            return from_pixels(made, first, width, mode)
     else:
         made = pyramid.closest_level(texels(arrays, index - 1, width), height, width, first + index, 2)
-    return arrays_of(made, index, width)
+    made = arrays_of(made, index, width)
+    if mode == "closest_average":
+        light, count = (arrays[f"level{index - 1}.{key}"] for key in ("radiance", "count"))
+        made |= mean_radiance(light, count, index, made[f"level{index}.radiance"].shape[1:])
+    return made
+
+
+def mean_radiance(light, count, index, shape):
+    """Return radiance as the mean over the pixels of four texels, and how many these are."""
+    total, pixels_ = np.zeros((3, *shape)), np.zeros(shape, int)
+    for i, j in np.ndindex(*count.shape):
+        total[:, i // 2, j // 2] += count[i, j] * light[:, i, j]
+        pixels_[i // 2, j // 2] += count[i, j]
+    return {f"level{index}.radiance": total / np.maximum(pixels_, 1), f"level{index}.count": pixels_}
+
+
+def from_pixels(rows, first, width, mode):
+    """Return the first level of means, from pixels as texels."""
+    height = len(rows)
+    if mode == "average":
+        made = rows
+        for _ in range(first):
+            made = averages(made)
+        return {key: array for key, array in arrays_of(made, 0, width).items() if not key.endswith("pixel")}
+    made, light = arrays_of(rows, 0, width), arrays_of(rows, 0, width)["level0.radiance"]
+    count, closest = np.isfinite(made["level0.depth"]).astype(int), rows
+    for level_ in range(1, first + 1):
+        closest = pyramid.closest_level(closest, height, width, level_, 2)
+        made = arrays_of(closest, 0, width)
+        found = mean_radiance(light, count, 0, made["level0.radiance"].shape[1:])
+        light, count = found["level0.radiance"], found["level0.count"]
+    return made | {"level0.radiance": light, "level0.count": count}
+
+
+def averages(rows):
+    """Return the twin's means of four texels; areas of 0 weigh nothing."""
+    names = {"p": "place", "z": "depth", "n": "normal", "L": "radiance", "A": "area"}
+    below = [[texel and {other: texel[key] for key, other in names.items()} | {"pixel": (0, 0)} for texel in row]
+             for row in rows]
+    return [[texel and {key: texel[other] for key, other in names.items()} | {"seen": 1, "pixel": (0, 0)}
+             for texel in row] for row in whole.averages(below)]
 
 
 def texels(arrays, index, width):
@@ -131,9 +179,37 @@ def shifts(case, arrays, index):
             f"samples{index}.shifts": np.array(shift)}
 
 
+def shared_points(case, arrays, index):  # noqa: ARG001 facts alone
+    facts = case.facts[f"samples{index}"]
+    count = [*range(facts["disc"]), *range(facts["crown"])]
+    turns = [2 * math.pi * ((0.5 + j / crown_points.G**2) % 1) for j in count]
+    return {f"samples{index}.points": np.array([((0.5 + j / crown_points.G) % 1, math.cos(turn), math.sin(turn))
+                                               for j, turn in zip(count, turns, strict=True)])}
+
+
+def shared_by_all(case, index):
+    """Return the samples of sets that all receivers share, in the kit's order."""
+    sampling, facts = SETTINGS[case.id].sampling, case.facts[f"samples{index}"]
+    if sampling.pattern == "all":
+        high = 2 * facts["radius"]
+        far = 2 * math.ceil(high) + 1  # a picture in which all of them lie
+        found = [(ox, oy, 1.0) for ox, oy, _ in crown_points.every_texel(facts["radius"], index, (far, far))]
+        pairs = [(sign * ox, oy, w) for ox, oy, w in found if ox > 0 for sign in (1, -1)]
+        return np.array(pairs + [one for one in found if one[0] == 0], float)
+    disc = facts["disc"]
+    found = crown_points.samples(sampling, facts["radius"], index, sampling.first_level + index, 0, 0)
+    parts = [found[:disc], found[disc:]]
+    return np.array([one for part in parts for one in part[: len(part) // 2 * 2]]
+                    + [part[-1] for part in parts if len(part) % 2])
+
+
 def samples(case, arrays, index):  # noqa: ARG001
     """Return the samples of the whole twin, which draws its shifts by its own hash."""
     sampling, facts = SETTINGS[case.id].sampling, case.facts[f"samples{index}"]
+    if sampling.pattern in ("fixed", "all"):
+        found = shared_by_all(case, index)
+        return {f"samples{index}.offsets": found[None, None, :, :2].astype(int),
+                f"samples{index}.weight": found[None, None, :, 2]}
     rows, columns = facts["tile"]
     found = np.array([[crown_points.samples(sampling, facts["radius"], index, sampling.first_level + index, row, column)
                        for column in range(columns)] for row in range(rows)])
@@ -167,7 +243,7 @@ def upsampled(case, arrays, index):
     factor = 2 ** case.facts["hssil"]["first level"] if index < 0 else 2
     light = upsampling.bilateral(arrays[coarse], arrays[f"{below}.depth"], arrays[f"{below}.normal"],
                                  arrays[f"{here}.depth"], arrays[f"{here}.normal"], factor, facts["depth_sigma"],
-                                 facts["normal_power"])
+                                 facts["normal_power"], SETTINGS[case.id].senders.downsample != "average")
     own = [one for kind in ("blur", "gather") if (one := f"{kind}{index}.irradiance") in arrays]
     return {f"{name}.irradiance": light + (arrays[own[0]] if own else 0)}
 

@@ -34,6 +34,8 @@ BUGS = [
     ("rsm0.position", lambda a: a * np.array([1, 1, -1])[:, None, None], "z is mirrored"),
     ("rsm0.position", lambda a: np.stack([a[0], -a[2], a[1]]), "y and z are exchanged"),
     ("rsm0.flux", lambda a: np.moveaxis(a, 0, -1).reshape(a.shape), "beside each other"),
+    ("rsm0.flux", lambda a: a.ravel(order="F").reshape(a.shape), "in Fortran order, the first axis fastest"),
+    ("rsm0.flux", lambda a: a.ravel().reshape(a.shape, order="F"), "the header says Fortran order"),
     ("gbuffer.albedo", srgb, "encoded as sRGB"),
     ("gbuffer.albedo", lambda a: a ** (1 / 2.2), "gamma of 1/2.2"),
     ("rsm0.normal", lambda a: (a + 1) / 2, "packed as"),

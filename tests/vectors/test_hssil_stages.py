@@ -8,10 +8,19 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.rsm.raster.projection import camera_projection
-from refgi.sssil.crown.pattern import shared_offsets
+from refgi.sssil.crown.pattern import samples_at, shared_offsets
 from refgi.sssil.hssil import hssil
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
-from refgi.vectors.bugs import bilateral, blur, crown_gather, crown_points, crown_sample, nearest_texels
+from refgi.vectors.bugs import (
+    averaged,
+    bilateral,
+    blur,
+    crown_gather,
+    crown_points,
+    crown_sample,
+    crown_set,
+    nearest_texels,
+)
 from refgi.vectors.cases import hssil as cases
 from refgi.vectors.spec import expected_of
 from refgi.vectors.stages import levels, reprojection
@@ -75,9 +84,14 @@ def test_samples_are_those_of_the_method(name):
     case, known, _ = made(name)
     sampling = cases.SETTINGS[name].sampling
     for index in range(case.facts["hssil"]["levels"]):
-        rows = known[f"level{index}.depth"].shape[0]
-        offsets, weight = shared_offsets(sampling, index, sampling.first_level + index, rows,
-                                         case.facts[f"samples{index}"]["radius"])
+        rows, columns = known[f"level{index}.depth"].shape
+        number, radius = sampling.first_level + index, case.facts[f"samples{index}"]["radius"]
+        if sampling.pattern == "pixel":
+            each = [[samples_at(sampling, index, number, i, j, radius) for j in range(columns)] for i in range(rows)]
+            offsets, weight = (np.array([[one[k] for one in row] for row in each]) for k in (0, 1))
+            weight = weight if sampling.density != "uniform" else weight[:1, :1]
+        else:
+            offsets, weight = shared_offsets(sampling, index, number, rows, radius)
         np.testing.assert_array_equal(known[f"samples{index}.offsets"], offsets)
         np.testing.assert_allclose(known[f"samples{index}.weight"], weight, atol=1e-6 * weight.max())
 
@@ -135,6 +149,30 @@ def test_literal_forms_without_a_bug_are_the_stages(name):
             coarse, *guides = step.reads[:5]
             light = bilateral.bilateral(exact, coarse, tuple(guides[:2]), tuple(guides[2:]), settings.upsampling)
             same(light + (exact[step.reads[5]] if len(step.reads) > 5 else 0), known[step.writes[0]])
+
+
+@pytest.mark.parametrize("name", ["hssil-average", "hssil-radiance", "hssil-all"])
+def test_literal_means_and_sets_without_a_bug_are_the_stages(name):
+    case, known, _ = made(name)
+    exact = {key: array.astype(float) if array.dtype.kind == "f" else array for key, array in known.items()}
+    view, sampling = camera_projection(case.scene.camera, *cases.VIEWS[name][1]), cases.SETTINGS[name].sampling
+    first, mode = sampling.first_level, cases.SETTINGS[name].senders.downsample
+    for index in range(case.facts["hssil"]["levels"]):
+        side, facts = (1 << first) if index == 0 else 2, case.facts[f"samples{index}"]
+        if mode == "average":
+            found = averaged.averaged(averaged.finer(exact, view, index), side)
+        else:
+            found = averaged.counted_level(exact, view, index, first + index) if mode == "closest_average" else {}
+        for key, array in found.items():
+            same(array, known[f"level{index}.{key}"])
+        if sampling.pattern == "fixed":
+            offsets, weight = crown_set.mirrored_set(exact[f"samples{index}.shift"], (facts["disc"], facts["crown"]),
+                                                     facts["radius"], sampling.density)
+            np.testing.assert_array_equal(offsets[None, None], known[f"samples{index}.offsets"])
+            same(weight[None, None], known[f"samples{index}.weight"])
+        if sampling.pattern == "all":
+            found = crown_set.every(facts["radius"] if index else 0.0, 2 * facts["radius"])
+            np.testing.assert_array_equal(found[None, None], known[f"samples{index}.offsets"])
 
 
 @pytest.mark.parametrize("name", cases.TEMPORAL)

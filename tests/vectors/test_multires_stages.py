@@ -3,10 +3,14 @@
 No twin covers the order of the list, which means nothing to the paper: the twin's list is sorted here.
 """
 
+import itertools
+from functools import cache
+
 import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.pairs.settings import PairSettings
 from refgi.splat import multires
 from refgi.splat.multires.subsplats.upsample import black_level, filled_cells
 from refgi.vectors.bugs.upsample import tent
@@ -15,6 +19,8 @@ from refgi.vectors.stages.lights import pixel_lights_of
 from refgi.vectors.stages.multires_list import subsplats_of
 from tests.naive import multires as twin
 from tests.naive import per_light, refinement, upsample
+from tests.naive.crossings import LIFT, corners_of, face_normals, free
+from tests.naive.pair_term import contributions
 from tests.vectors.splat_ports import LARGEST_MASK, expect_within, made, masked_shares, stages_of
 
 PLANS = QUICK_PLANS | FULL_PLANS
@@ -139,8 +145,49 @@ def points(id):
     return dict(zip(("multires.point", "multires.normal"), np.array(places).transpose(1, 2, 0), strict=True))
 
 
+def facing(id):
+    """Faces of the triangles that representative pixels see."""
+    known = made(id)[1]
+    triangle = known["gbuffer.triangle_id"].reshape(-1)[known["multires.pixel"]]
+    return {"multires.facing": face_normals(PLANS[id]().scene.geometry, triangle, known["multires.normal"].T).T}
+
+
+def visible(id):
+    """Lights lie on triangles as well: what leaves below one is blocked by it."""
+    known, geometry = made(id)[1], PLANS[id]().scene.geometry
+    place, normal, up = (known[f"multires.{key}"].T.astype(float) for key in ("point", "normal", "facing"))
+    lights = pixel_lights_of(known, np.float64)
+    seen = np.zeros((lights.flux.shape[1], len(place)), bool)
+    for k in range(len(seen)):
+        triangle = known[f"rsm{known['lights.map'][k]}.triangle_id"].reshape(-1)[known["lights.texel"][k]]
+        leaving = lights.normal[:, k]
+        side = face_normals(geometry, np.array([triangle]), leaving[None])[0]
+        toward = lights.position[:, k] - place
+        counts = ((toward * up).sum(axis=1) > 0) & ((toward * normal).sum(axis=1) > 0)
+        counts &= (toward @ leaving < 0) & (toward @ side < 0)
+        counts[counts] = free(corners_of(geometry), place[counts] + LIFT * up[counts],
+                              lights.position[:, k] + LIFT * side)
+        seen[k] = counts
+    return {"multires.visible": seen}
+
+
+def seen_irradiance(id):
+    known = made(id)[1]
+    place, normal = (known[f"multires.{key}"].T.astype(float) for key in ("point", "normal"))
+    each = contributions(place, normal, pixel_lights_of(known, np.float64), PairSettings(clamp=None))
+    return {"multires.irradiance": (each * known["multires.visible"][..., None]).sum(axis=0).T}
+
+
+def halved(id):
+    case, known = made(id)
+    light, fine, shown = known[case.stages[-1].reads[0]], known["gbuffer.triangle_id"] >= 0, known["picture.covered"]
+    return {"multires.halved": twin.halved(light.astype(float), fine, shown)}
+
+
 def irradiance(id):
     settings, known, _, _ = of(id)
+    if settings.shadow_rays is not None:
+        return seen_irradiance(id)
     sources = twin.lights_of(pixel_lights_of(known, np.float64), known.get("lights.area"), settings.effective_pairs)
     places = zip(*(known[name].astype(np.float64).T for name in ("multires.point", "multires.normal")), strict=True)
     return {"multires.irradiance": np.array([sum((light(place) for light in sources), np.zeros(3))
@@ -175,9 +222,84 @@ def detail(id):
     return {"multires.detailed": np.where(view.covered, known["multires.upsampled.0"] * factor, 0)}
 
 
-PORT = {"depth_ranges": lambda id: ranges(id, "depth"), "normal_ranges": lambda id: ranges(id, "normal"),
+def every_cell(shape, top):
+    return [[(i, j) for i in range(rows) for j in range(columns)]
+            for rows, columns in (refinement.grid(shape, level) for level in range(top + 1))]
+
+
+def places(id):
+    _, _, view, top = of(id)
+    made_here, width = {}, view.covered.shape[1]
+    for level, cells in enumerate(every_cell(view.covered.shape, top)):
+        found = [per_light.representative(view.covered, level, *cell) for cell in cells]
+        made_here[f"multires.representative.{level}"] = np.array(
+            [-1 if at is None else at[0] * width + at[1] for at in found]).reshape(
+                refinement.grid(view.covered.shape, level))
+    return made_here
+
+
+def samples(id):
+    settings, known, view, top = of(id)
+    sources = twin.lights_of(pixel_lights_of(known, np.float64), known.get("lights.area"), settings.effective_pairs)
+    made_here, width = {}, view.covered.shape[1]
+    for level in range(top + 1):
+        places_ = known[f"multires.representative.{level}"]
+        out = np.zeros((len(sources), 3, *places_.shape))
+        for (i, j), pixel in np.ndenumerate(places_):
+            if pixel >= 0:
+                at = divmod(int(pixel), width)
+                out[:, :, i, j] = [light((view.position[:, *at], view.normal[:, *at])) for light in sources]
+        made_here[f"multires.sample.{level}"] = out
+    return made_here
+
+
+@cache
+def lists_of(id):
+    """Return the twin's lists, {cell: irradiance} of each light, from its light at pixels."""
+    settings, known, view, top = of(id)
+    chosen, light = settings.subsplats, known["multires.sample.0"].astype(float)
+    return [per_light.subsplats(view.covered, lambda at, k=k: light[k][:, *at], top, chosen.finest,
+                                lambda largest: chosen.threshold * largest) for k in range(len(light))]
+
+
+def splits(id):
+    _, _, view, top = of(id)
+    made_here = {}
+    for level in range(1, top + 1):
+        rows, columns = refinement.grid(view.covered.shape, level)
+        out = np.zeros((len(lists_of(id)), rows, columns), bool)
+        for k, cells in enumerate(lists_of(id)):
+            for below, i, j in cells:
+                if below < level:
+                    out[k, i >> (level - below), j >> (level - below)] = True
+        made_here[f"multires.split.{level}"] = out
+    return made_here
+
+
+def lists(id):
+    cells = [sorted(one.items(), key=lambda item: (-item[0][0], *item[0][1:])) for one in lists_of(id)]
+    flat = [item for one in cells for item in one]
+    columns = np.array([cell for cell, _ in flat]).T
+    return {"multires.first": np.cumsum([0, *map(len, cells)]), **dict(zip(SUBSPLATS, columns, strict=True)),
+            "multires.irradiance": np.array([value for _, value in flat]).T}
+
+
+def summed(id):
+    _, known, view, top = of(id)
+    total, first = np.zeros((3, *view.covered.shape)), known["multires.first"]
+    for begin, end in itertools.pairwise(first):
+        cells = zip(*(known[name][begin:end].tolist() for name in SUBSPLATS), strict=True)
+        values = known["multires.irradiance"][:, begin:end].astype(float).T
+        for (i, j), value in upsample.tent(dict(zip(cells, values, strict=True)), view.covered, top).items():
+            total[:, i, j] += value
+    return {"multires.upsampled.0": total}
+
+
+PORT = {"representatives": places, "samples": samples, "splits": splits, "lists": lists, "sum": summed,
+        "depth_ranges": lambda id: ranges(id, "depth"), "normal_ranges": lambda id: ranges(id, "normal"),
         "slopes": slopes, "curvatures": curvatures, "discontinuities": marks, "states": states, "subsplats": listed,
-        "points": points, "irradiance": irradiance, "detail": detail}
+        "points": points, "facing": facing, "visible": visible, "irradiance": irradiance, "detail": detail,
+        "halved": halved}
 
 
 @pytest.mark.parametrize("id", PLANS)
@@ -196,7 +318,7 @@ def test_rounding_decides_few_elements(id):
 @pytest.mark.parametrize("id", PLANS)
 def test_the_tent_that_bugs_are_put_into_has_none_of_its_own(id):
     settings, known, view, top = of(id)
-    if settings.subsplats.upsampling != "tent":
+    if settings.subsplats.upsampling != "tent" or "multires.first" in known:  # of all lights at once
         return
     subsplats, light = subsplats_of(known, top), known["multires.irradiance"].astype(np.float64)
     for level, filled in enumerate(filled_cells(view.covered, top)):

@@ -1,10 +1,11 @@
 """The literal twins of clustered visibility as a port: each stage from the arrays that a kit holds."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 
-from refgi.cluster.settings import Csm, Pcf
+from refgi.cluster.settings import BackProjection, Csm, Pcf
 from refgi.vectors.stages.lights import pixel_lights_of
 from tests.naive import area_visibility as soft
 from tests.naive import filters, interleaving, kmeans
@@ -138,6 +139,14 @@ class Port:
                 for center, frame, ball in views]
         return {"maps.depth": np.where((self["areas.members"] > 0)[:, None, None], made, np.inf)}
 
+    def maps_depth_behind(self):
+        """Right and forward turned round."""
+        blockers, turned = self.corners()[self["maps.blocks"]], np.array([[-1], [1], [-1]])
+        views = zip(self["maps.center"], self["areas.frame"] * turned, self["maps.ball"], strict=True)
+        made = [soft.draw(blockers, center, frame, self.settings.maps.resolution, ball, 0.0).depth
+                for center, frame, ball in views]
+        return {"maps.behind": np.where((self["areas.members"] > 0)[:, None, None], made, np.inf)}
+
     def maps_range(self):
         depth = self["maps.depth"]
         return {"maps.near": depth.min(axis=(1, 2)),
@@ -175,10 +184,19 @@ class Port:
         terms = self.settings.visibility.terms
         made = [np.moveaxis(filters.planes(t, terms), 2, 0) if t.any() else np.zeros((4 * terms + 1, *t.shape))
                 for t in self["maps.t"]]
-        return {"basis.0": np.array(made)}
+        return {"basis.0": np.array([self.kept(np.moveaxis(one, 0, 2)) for one in made]).transpose(0, 3, 1, 2)}
+
+    def kept(self, planes):
+        """Return channels as they are stored: in 8 and 16 bits where that is asked for; 0 on empty maps."""
+        rounds = self.settings.visibility.quantisation == "published" and planes.any()
+        return soft.rounded_channels(planes) if rounds else planes
 
     def mip(self):
-        levels = [filters.mip_levels(np.moveaxis(one, 0, 2)) for one in self["basis.0"]]
+        levels = []
+        for one in self["basis.0"]:
+            levels.append([np.moveaxis(one, 0, 2)])
+            while len(levels[-1][-1]) > 1:
+                levels[-1].append(self.kept(filters.mip_levels(levels[-1][-1])[1]))
         return {f"basis.{level}": np.array([np.moveaxis(one[level], 2, 0) for one in levels])
                 for level in range(1, len(levels[0]))}
 
@@ -271,6 +289,8 @@ class Port:
 
     def visibility(self):
         kind = self.settings.visibility
+        if isinstance(kind, BackProjection):
+            return {"visibility.share": self.projected()}
         if isinstance(kind, Pcf) or not self["areas.delta"].any():
             return {"visibility.share": self.binary(kind.texels if isinstance(kind, Pcf) else 1, everywhere=True)}
         made = self["hard.share"].copy() if "hard.share" in self.known else self.planes(fill=1.0)
@@ -288,15 +308,31 @@ class Port:
     def hard(self):
         return {"hard.share": self.binary(1, everywhere=False)}
 
-    def binary(self, texels, everywhere):
+    def projected(self):
         made = self.planes(fill=1.0)
         for k in self.used():
-            size = self["areas.delta"][k]
-            for at in self.pixels if everywhere or size == 0 else ():
-                local = self.local(k, at)
-                if local[2] > 0:
-                    normal = self["areas.frame"][k] @ self["gbuffer.facing"][:, *at]
-                    made[k, *at] = soft.pcf_share(self.seen(k), local, normal, texels if size > 0 else 1)
+            area = SimpleNamespace(center=self["clusters.center"][:, k], **{
+                key: self[f"areas.{key}"][:, k] for key in ("offset", "side")})
+            axes = np.array([*self["areas.axes"][k], self["clusters.normal"][:, k]])
+            for at in self.pixels:
+                if self.local(k, at)[2] > 0:
+                    made[k, *at] = soft.back_projected(self.seen(k), area, axes, self["gbuffer.position"][:, *at],
+                                                       self["gbuffer.facing"][:, *at])
+        return made
+
+    def binary(self, texels, everywhere):
+        made = self.planes(fill=1.0)
+        ahead = [("maps.depth", np.eye(3))]
+        for name, turned in [*ahead, ("maps.behind", np.diag([-1, 1, -1]))] if "maps.behind" in self.known else ahead:
+            for k in np.flatnonzero(np.isfinite(self[name]).any(axis=(1, 2))):
+                size, frame = self["areas.delta"][k], turned @ self["areas.frame"][k]
+                seen = soft.Seen(self["maps.center"][k], frame, self[name][k], 0.0)
+                for at in self.pixels if everywhere or size == 0 else ():
+                    local = turned @ self.local(k, at)
+                    if local[2] > 0:
+                        share = soft.pcf_share(seen, local, frame @ self["gbuffer.facing"][:, *at],
+                                               texels if size > 0 else 1)
+                        made[k, *at] = min(made[k, *at], share)
         return made
 
     # Sec. 4 and 6, light

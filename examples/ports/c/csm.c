@@ -221,10 +221,14 @@ void penumbra_stage(Case *c) {
 
 void csm_visibility_stage(Case *c) {
     const Array *shaded = get(c, "penumbra.shaded"), *means = get(c, "penumbra.means");
-    const float *depth = get(c, "penumbra.t")->f, *hard = get(c, "hard.share")->f;
+    const float *depth = get(c, "penumbra.t")->f, *hard = has(c, "hard.share") ? get(c, "hard.share")->f : NULL;
     float *share = make(c, "visibility.share")->f, gain = (float)json_number(json_at(fact(c, "csm"), "gain"), 1);
     int plane = shaded->size / shaded->shape[0];
     for (int k = 0; k < shaded->size; k++) {
+        if (!shaded->i[k] && !hard) { /* every light has an extent */
+            share[k] = 1.0f;
+            continue;
+        }
         float f = shaded->i[k] ? 0.5f + test(c, means, k, plane, 0, depth[k] - get(c, "series.bias")->f[1]) : 1.0f;
         share[k] = shaded->i[k] ? clampf(gain * f, 0.0f, 1.0f) : hard[k];
     }

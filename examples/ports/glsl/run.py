@@ -89,6 +89,8 @@ def runner_of(stage: dict, method: str, facts: dict) -> Callable[[Gpu, Arrays, s
     name, written = (re.sub(r"\d", "", text) for text in (stage["name"], stage["writes"][0]))
     if (name == "sum" and method == "val") or (name == "visibility" and "csm" not in facts):
         return None  # of other inputs, by the same name
+    if name in ("basis", "mip") and "basis.stored" in facts:
+        return None  # in 8 and 16 bits
     return STAGES.get((name, written))
 
 

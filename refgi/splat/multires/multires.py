@@ -54,7 +54,7 @@ def multires(frame: "Frame", settings: MultiresSettings) -> Array:
     if not settings.supersampled:
         return _irradiance(frame, frame.gbuffer, lights, footprint, settings)
     double = _doubled(frame)  # Sec. 4: rendered at 2048^2 for 1024^2
-    return _halved(_irradiance(frame, double, lights, footprint, settings), double.covered, frame.gbuffer.covered)
+    return halved(_irradiance(frame, double, lights, footprint, settings), double.covered, frame.gbuffer.covered)
 
 
 def _irradiance(
@@ -160,7 +160,7 @@ def _doubled(frame: "Frame") -> "GBuffer":
     return gbuffer(scene.geometry, frame.materials, scene.camera, 2 * frame.width, 2 * frame.height, frame.dtype)
 
 
-def _halved(irradiance: Array, fine: Array, covered: Array) -> Array:
+def halved(irradiance: Array, fine: Array, covered: Array) -> Array:
     """Return means over those of four finer pixels that show a surface, at pixels that do."""
     height, width = covered.shape
     four = (3, height, 2, width, 2)

@@ -115,10 +115,11 @@ def shared_offsets(
     inner, crown = sampling.counts(index)
     if sampling.pattern == "all":
         within = (rows, columns) if columns is not None else None
-        every = _every_texel(0.0 if index == 0 else radius, 2.0 * radius, within)
+        every = every_texel(0.0 if index == 0 else radius, 2.0 * radius, within)
         return every[None, None], np.ones((1, 1, len(every)))
     if sampling.pattern == "fixed":
-        mirrored, weight = _mirrored(sampling, radius, inner, crown, number)
+        shift = key_shift(level_key(sampling.seed, number))
+        mirrored, weight = mirrored_offsets(inner, crown, shift, radius, sampling.density)
         return mirrored[None, None], weight[None, None]
     tile = (rows, PHASES) if sampling.pattern == "row" else (sampling.tile, sampling.tile)
     shifts = tile_shifts(key_shift(level_key(sampling.seed, number)), tile, crown)
@@ -207,7 +208,7 @@ def _fill_tile(
                 relative_here[j % relative.shape[2]] = weight
 
 
-def _every_texel(low: float, high: float, within: tuple[int, int] | None) -> Array:
+def every_texel(low: float, high: float, within: tuple[int, int] | None = None) -> Array:
     """Return each texel at a distance of [low, high) but the middle: mirror images adjacent, ox = 0 last."""
     reach = math.ceil(high)
     down, right = (reach, reach) if within is None else (min(reach, size - 1) for size in within)
@@ -220,11 +221,14 @@ def _every_texel(low: float, high: float, within: tuple[int, int] | None) -> Arr
     return np.concatenate([both, np.stack([ox[middle], oy[middle]], axis=1)]).astype(np.int32)
 
 
-def _mirrored(sampling: SamplingSettings, radius: float, inner: int, crown: int, number: int) -> tuple[Array, Array]:
-    """Return a mirror-symmetric set and its weights: half of the points on the right, an odd one above or below."""
-    key = level_key(sampling.seed, number)
-    shift = key_shift(key)
-    weight, uniform = sample_weight(radius, inner, crown), sampling.density == "uniform"
+def mirrored_offsets(
+    inner: int, crown: int, shift: Array, radius: float, density: Density
+) -> tuple[Array, Array]:
+    """Return a mirror-symmetric set and its weights: half of the points on the right, an odd one above or below.
+
+    `shift` (2,): added to the points' u and v, modulo 1. Pairs come first, odd ones last.
+    """
+    weight, uniform = sample_weight(radius, inner, crown), density == "uniform"
     pairs, middles = [], []
     for first, count, near in ((0, inner, 0.0), (inner, crown, 1.0)):
         half = np.arange((count + 1) // 2)

@@ -176,13 +176,20 @@ def levels(
     return tuple(levels_made)
 
 
-def next_level(fine: Level, shape: tuple[int, int]) -> Level:
-    """Return the level of the closest of each four texels of a finer one, as `levels` makes it.
+def next_level(
+    fine: Level, shape: tuple[int, int], downsample: str = "closest", weight: Array | None = None
+) -> Level:
+    """Return the level of each four texels of a finer one, as `levels` makes it.
 
-    `shape`: height and width of the picture.
+    `shape`: height and width of the picture. `weight` (h, w): pixels with a surface of the finer texels, where light
+    alone is averaged.
     """
     coarse = _empty_level(fine.number + 1, shape, fine.depth.dtype)
     fill_coarser_level(fine, *shape, coarse)
+    if downsample == "average":
+        average_texels(fine, fine.area, True, coarse, coarse.area)
+    elif weight is not None:
+        average_texels(fine, weight, False, coarse, plane(coarse.shape, coarse.area.dtype))
     return coarse
 
 

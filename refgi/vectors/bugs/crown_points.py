@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from refgi.sampling import FIRST_STEP, SECOND_STEP
-from refgi.vectors.spec import Array, Arrays, Bug
+from refgi.vectors.spec import Array, Arrays, Bug, Run
 
 TURN = 2.0 * math.pi
 SEQUENCE, SKIPPED = "(1/2 + j step) mod 1", "n crown points further on"
@@ -99,3 +99,14 @@ def sequence_bugs(name: str, inner: int, crown: int, tile: tuple[int, int]) -> l
         bugs.append(bug("a row of the tile has as many texels as a column: rows in place of columns", None, {
             "number": lambda i, j: i * tile[0] + j}, "row by row"))
     return bugs
+
+
+def point_bugs(name: str, inner: int, crown: int) -> list[Bug]:
+    """Return the bugs of the sequence where every texel has a random shift of its own."""
+    def points_of(run: Run) -> Run:
+        start = {f"{name}.shift": np.zeros(2)}
+        return lambda arrays, real: {f"{name}.points": run({**arrays, **start}, real)[f"{name}.points"]}
+
+    blind = "shift", "texels of the tile", "the tile's", "u and v begin", "count as skipped"
+    return [Bug(one.cause, points_of(one.run), one.paper) for one in sequence_bugs(name, inner, crown, (1, 1))
+            if not any(word in one.cause for word in blind)]

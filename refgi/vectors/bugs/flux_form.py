@@ -1,5 +1,8 @@
 """Flux that a map's texels reflect, as a port finds it, with knobs for bugs (SII Sec. 3.1; docs/radiometry)."""
 
+import functools
+from typing import Any
+
 import numpy as np
 
 from refgi.scene import DirectionalLight, SpotLight
@@ -74,12 +77,22 @@ def _spot(
     pieces: tuple[slice, slice],
 ) -> Array:
     (x0, y0), (x1, y1) = low, high
-    flat = [one.reshape(-1) for one in (x0, x1, y0, y1)]
-    hard = cone[0] == cone[1]
+    edges = np.stack([one.reshape(-1) for one in (x0, x1, y0, y1)])
+    kept = tuple((piece.start, piece.stop) for piece in pieces)
+    return _integrals(edges.tobytes(), cone, falloff, power, kept).reshape(x0.shape)
+
+
+@functools.lru_cache(maxsize=64)  # most bugs leave a map's cone as it is
+def _integrals(
+    edges: bytes, cone: tuple[float, float], falloff: Falloff, power: float, pieces: tuple[tuple[Any, Any], ...]
+) -> Array:
+    x0, x1, y0, y1 = np.frombuffer(edges).reshape(4, -1)
+    inner = cone[0] * (1 - 1e-12) if cone[0] == cone[1] else cone[0]
     with np.errstate(all="ignore"):
-        made = spot_integrals((flat[0], flat[1]), (flat[2], flat[3]), (cone[0] * (1 - 1e-12) if hard else cone[0],
-                              cone[1]), falloff=falloff, power=power, columns=pieces[0], rows=pieces[1])
-    return np.asarray(made.reshape(x0.shape))
+        made = spot_integrals((x0, x1), (y0, y1), (inner, cone[1]), falloff=falloff, power=power,
+                              columns=slice(*pieces[0]), rows=slice(*pieces[1]))
+    made.flags.writeable = False
+    return made
 
 
 def _strength(arrays: Arrays, lamp: tuple[str, Light], how: str, outer: float) -> Array:

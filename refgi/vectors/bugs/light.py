@@ -19,16 +19,25 @@ LEVELS = "HSS Sec. 3.2: sums of disjoint crowns"
 
 def upsampling_bugs(
     name: str, coarse: str, below: tuple[str, ...], here: tuple[str, ...], weights: Bilateral, added: str | None,
+    centred: bool = False,
 ) -> list[Bug]:
-    """Return the bugs of upsampling `coarse` to `name`, to which `added` is added if there is any."""
+    """Return the bugs of upsampling `coarse` to `name`, to which `added` is added if there is any.
+
+    `centred`: depths of texels are means, which lie at their centres.
+    """
+    base: dict[str, Any] = {"corner": (0.0, 0.0)} if centred else {}
+
     def bug(cause: str, paper: str, **knobs: Any) -> Bug:
         def wrong(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
-            made = bilateral(arrays, coarse, below, here, weights, **knobs)
+            made = bilateral(arrays, coarse, below, here, weights, **base | knobs)
             return {name: made + arrays[added] if added else made}
 
         return Bug(cause, wrong, paper)
 
-    return [*_place_bugs(bug), *_axis_bugs(bug), *_weight_bugs(bug), *(_exponent_bugs(bug) if added else [])]
+    at_corner = [bug("a texel's depth is taken for that of its nearest pixel, at a corner, not for the mean", BILATERAL,
+                     corner=(1.0, 1.0))] if centred else []
+    return [*_place_bugs(bug), *_axis_bugs(bug), *_weight_bugs(bug), *(_exponent_bugs(bug) if added else []),
+            *at_corner]
 
 
 def _place_bugs(bug: Callable[..., Bug]) -> list[Bug]:

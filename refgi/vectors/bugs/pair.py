@@ -13,6 +13,11 @@ from refgi.vectors.stages.lights import pixel_lights_of
 
 RECEIVERS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
 EQ2 = "SII Eq. 2 and 3; unit directions and r^2 (E-SII-02)"
+SHARES = {"rest": "K, the share of a lobe above the surface, holds a part of its integral over the rest, not over the "
+                  "whole: the remainder divides",
+          "whole": "K, the share of a lobe above the surface, lacks a half: 1 - I in place of 1 - I/2",
+          "below": "lobes are normalised over their share below the surface: 1 - K in place of K",
+          "times": "lobes are multiplied by K, their share above the surface, not divided by it"}
 CLAMPED, DISC = "<a.b> = max(0, a.b)", "r^2 + A/pi"
 
 
@@ -77,6 +82,7 @@ def pair_bugs(run: Run, clamped: bool, glossy: bool, own: bool = False) -> tuple
             Bug("a half is missing in 1 - |r - w|^2 / 2: lobes are too narrow", literal(lobe_narrow=True), "SII Eq. 3"),
             Bug("lobes reach below the light's horizon", literal(horizon=False), "SII Eq. 3"),
             Bug("lobes are normalised by (P + 2) / 2 pi", literal(norm="cosine"), "E-SII-03: (P + 1) / 2 pi K"),
+            *(Bug(cause, literal(norm=how), "E-SII-03: (P + 1) / 2 pi K") for how, cause in SHARES.items()),
             Bug("the direction is turned round in lobes", literal(lobe_turned=True), "SII Eq. 3: towards receivers"),
             Bug("the light's cosine counts for lobes too", literal(lobe_cosine=True), "SII Eq. 3"),
         ]
@@ -151,7 +157,8 @@ def literal_pairs(
             shape_of = cosine ** (lobe_power[0] * exponent + lobe_power[1]) * (peak[None] if own else peak[:, None])
         shape_of = np.where(np.isfinite(shape_of) & ((sent > 0) | (not horizon)), shape_of, 0)
         shape_of = shape_of * (np.maximum(0, sent) if lobe_cosine else 1)
-        total = total + lobe * (shape_of * (received if lobe_arrives else fall))
+        with np.errstate(all="ignore"):  # shares of a wrong sign
+            total = total + lobe * (shape_of * (received if lobe_arrives else fall))
     total = {"max": lambda: total.max(axis=1, initial=0), "last": lambda: total[:, -1:].sum(axis=1),
              "sum": lambda: total.sum(axis=1)}[joined]()
     return np.asarray(np.where(covered, total, 0).reshape(3, *shape))
@@ -182,10 +189,22 @@ def _norms(lights: PixelLights, norm: str) -> Array:
     assert lights.lobe_exponent is not None
     if norm == "none":
         return np.ones(lights.position.shape[1], lights.position.dtype)
-    more = {"full": 1, "cosine": 2, "short": 0}.get(norm)
-    if more is not None:
-        return (lights.lobe_exponent + more) / (2 * np.pi)
+    whole = (lights.lobe_exponent + {"cosine": 2, "short": 0}.get(norm, 1)) / (2 * np.pi)
+    if norm in ("full", "cosine", "short"):
+        return whole
     cosine = np.clip((lights.normal * lights.lobe_axis).sum(axis=0), -1, 1)
-    return np.array([lobe_norm(c, p) for c, p in zip(cosine, lights.lobe_exponent, strict=True)], np.float64)
+    exact = np.array([lobe_norm(c, p) for c, p in zip(cosine, lights.lobe_exponent, strict=True)], np.float64)
+    with np.errstate(all="ignore"):
+        share = whole / exact
+        return exact if norm == "exact" else np.asarray(np.nan_to_num(whole / _wrong_share(share, norm)))
+
+
+def _wrong_share(share: Array, how: str) -> Array:
+    """Return K with a bug: the part of the half below the surface, I/2, is 1 - K, or K of axes below."""
+    half = np.minimum(share, 1 - share)
+    part = {"rest": half / (1 - 2 * half), "whole": 2 * half}.get(how)
+    if part is None:
+        return np.asarray({"times": 1 / share, "below": 1 - share}[how])
+    return np.asarray(np.where(share < 0.5, part, 1 - part))
 
 

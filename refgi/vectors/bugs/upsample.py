@@ -66,6 +66,12 @@ def _coarse_bugs(literal: Callable[..., Run]) -> Iterator[Bug]:
             ("the coarser light is shifted by one cell to the left and up", {"shift": -1}),
             ("rows and columns of the coarser level are exchanged", {"turned": True}),
             ("the cell of the coarser level is found without halving its row and column", {"halved": False}),
+            ("rows of the coarser level lie half as many cells apart as this level has columns, rounded down",
+             {"stride": lambda own, _: own[1] // 2}),
+            ("rows of the coarser level lie as many cells apart as this level has columns",
+             {"stride": lambda own, _: own[1]}),
+            ("rows of the coarser level lie as many cells apart as it has rows, not columns",
+             {"stride": lambda _, coarse: coarse[0]}),
             ("light spreads into cells without surface", {"spread": True}),
             ("the coarser light counts as known everywhere", {"known": True})):
         yield Bug(cause, literal(**knobs), MASK if "known" in knobs else "cell i lies in cell i / 2")
@@ -94,7 +100,7 @@ def tent(
     spread: bool = False, plane: Callable[[int, int], float] | None = None, divided: Any = None,
     left_out: tuple[tuple[int | None, int | None], ...] = (), counted: str = "", in_place: bool = False,
     passes: int = 1, own: bool = True, coarse_light: bool = True, turned: bool = False, halved: bool = True,
-    known: bool = False,
+    known: bool = False, stride: Callable[[tuple[int, ...], tuple[int, ...]], int] | None = None,
 ) -> tuple[Array, Array]:
     """Return a level of the masked tent filter and its mask, with bugs, in float64."""
     leaf = leaf & own
@@ -102,6 +108,9 @@ def tent(
     i, j = (j, i) if turned else (i, j)
     row, column = (np.clip((index + shift) // (2 if halved else 1), 0, size - 1)
                    for index, size in ((i, coarse[1].shape[0]), (j, coarse[1].shape[1])))
+    if stride is not None:  # row * stride + column of a flat array
+        flat = row * stride(filled.shape, coarse[1].shape) + column
+        row, column = np.divmod(np.minimum(flat, coarse[1].size - 1), coarse[1].shape[1])
     from_coarse = (coarse[1][row, column] | known) & (filled | spread) & coarse_light
     mask = from_coarse | leaf
     texels = np.where(leaf, layer, coarse[0][:, row, column].astype(np.float64)) * mask

@@ -87,6 +87,8 @@ def depth_bugs(csm: Csm) -> tuple[Bug, ...]:
             "shrink": lambda q, n: 1 / q},  # noqa: ARG005
         "texels beyond the disc by (s, t) (2 - r) / r: folded, not mirrored by 1 / r": {
             "shrink": lambda q, n: (2 - np.sqrt(q)) / np.sqrt(q)},  # noqa: ARG005
+        "texels beyond the disc repeat its rim (clamped to the edge): the hemisphere is not mirrored": {
+            "shrink": lambda q, n: (1 - INSIDE / n) / np.sqrt(q)},
         "half a texel is left out where texels beyond the disc are mirrored": {"half": 0.0},
     } if csm.prefilter == "mip" else {}
     return tuple(Bug(cause, depths_by(csm, **how), MIRROR if cause in mirrors else "E-VAL-05")

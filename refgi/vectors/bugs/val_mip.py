@@ -74,12 +74,15 @@ HALVES: Mapping[str, Half] = {
 }
 
 
-def mip_bugs(names: list[str]) -> tuple[Bug, ...]:
-    """Return likely bugs of the levels of these names."""
-    return (*(Bug(cause, levels_by(names, half), MEANS) for cause, half in HALVES.items()),
-            Bug("all levels are made of level 0's upper left texels", _of_level_0(names), "of the level before"),
+def mip_bugs(names: list[str], kept: Half = np.asarray) -> tuple[Bug, ...]:
+    """Return likely bugs of the levels of these names; `kept`: how a level is stored."""
+    def stored(half: Half) -> Half:
+        return lambda level: kept(half(level))
+
+    return (*(Bug(cause, levels_by(names, stored(half)), MEANS) for cause, half in HALVES.items()),
+            Bug("all levels are made of level 0's upper left texels", _of_level_0(names, kept), "of the level before"),
             Bug("the coarsest level is not written: one too few", levels_by(
-                names, mean_of_four, last=False), "down to one texel"))
+                names, stored(mean_of_four), last=False), "down to one texel"))
 
 
 def levels_by(names: list[str], half: Half, last: bool = True) -> Run:
@@ -93,10 +96,10 @@ def levels_by(names: list[str], half: Half, last: bool = True) -> Run:
     return run
 
 
-def _of_level_0(names: list[str]) -> Run:
+def _of_level_0(names: list[str], kept: Half) -> Run:
     def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
         made, side = {}, arrays["basis.0"].shape[2]
-        whole = mean_of_four(np.asarray(arrays["basis.0"], np.float64))
+        whole = kept(mean_of_four(np.asarray(arrays["basis.0"], np.float64)))
         for name in names:
             side = (side + 1) // 2
             made[name] = whole[:, :, :side, :side]

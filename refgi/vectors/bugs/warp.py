@@ -68,7 +68,11 @@ def warp_bugs(name: str, maps: int, warp: Warp, run: Run) -> Iterator[Bug]:
             ("importance is squared", {"power": 2.0}), ("the root of importance", {"power": 0.5}),
             ("the lower half's row of cells is always taken for columns", {"row_of": 1}),
             ("the upper half's row of cells is always taken for columns", {"row_of": 0}),
-            ("columns are chosen by the row of cells that was not chosen", {"row_of": 2})):
+            ("columns are chosen by the row of cells that was not chosen", {"row_of": 2}),
+            ("rows are halved by the sums of columns: left and right in place of top and bottom", {"crossed": "rows"}),
+            ("columns are halved by the sums of rows: top and bottom in place of left and right",
+             {"crossed": "columns"}),
+            ("rows are halved by the sums of columns and columns by those of rows", {"crossed": "both"})):
         if "row_of" not in knobs or a:
             yield Bug(cause, literal(**knobs), EQ)
     for twice, never in permutations(range(4), 2):
@@ -161,7 +165,8 @@ def literal_warp(
 def _warp_one(
     x: float, y: float, plane: Array, sums: list[Array], warp: Warp, *, doubled: bool = True, from_level: int = 0,
     read: int = 0, loops: int = 0, within: str = "", even: bool = False, powers: bool = False, axes: str = "both",
-    columns_first: bool = False, weighed: str = "", row_of: int | None = None, turned: str = "", **halving: Any,
+    columns_first: bool = False, weighed: str = "", row_of: int | None = None, turned: str = "",
+    crossed: str = "", **halving: Any,
 ) -> tuple[float, float, float]:
     rows, columns = plane.shape
     depth = len(sums) - 1
@@ -170,18 +175,20 @@ def _warp_one(
     for level in range(from_level, levels + loops):
         at = min(max(level + 1 + read, 1), depth)
         cell = [[_at(sums[at], 2 * i + a, 2 * j + b) for b in (0, 1)] for a in (0, 1)]
+        cells = {axis: [list(one) for one in zip(*cell, strict=True)] if crossed in ("both", name) else cell
+                 for axis, name in enumerate(("rows", "columns"))}
         shares = [0.5 if even else _even(size, level, index) for size, index in ((rows, i), (columns, j))]
         down = across = 0
         for axis in (1, 0) if columns_first else (0, 1):
             if axis == 0 and axes != "columns":
-                tops = [sum(cell[half]) for half in (0, 1)] if not columns_first or warp.method == "B" else [
-                    cell[half][across] for half in (0, 1)]
+                tops = [sum(cells[0][half]) for half in (0, 1)] if not columns_first or warp.method == "B" else [
+                    cells[0][half][across] for half in (0, 1)]
                 down, y, factor = _halve(y, tops, shares[0], turned in ("both", "rows"), weighed, **halving)
                 factors.append(("rows", factor))
             if axis == 1 and axes != "rows":
                 row = down if row_of is None else (row_of, 1 - down)[row_of == 2]
                 whole = warp.method == "B" or columns_first
-                sides = [cell[0][half] + cell[1][half] if whole else cell[row][half] for half in (0, 1)]
+                sides = [cells[1][0][half] + cells[1][1][half] if whole else cells[1][row][half] for half in (0, 1)]
                 across, x, factor = _halve(x, sides, shares[1], turned in ("both", "columns"), weighed, **halving)
                 factors.append(("columns", factor))
         i, j = (2 * i + down, 2 * j + across) if doubled else (i + down, j + across)

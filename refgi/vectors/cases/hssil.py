@@ -29,6 +29,11 @@ SETTINGS = {
                                     "blur.size": 3, "plane_tolerance": 0.1, "cosine": 0.5}),
     "hssil-pole": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 5}),
     "hssil-dark": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "start": "quarter"}),
+    "hssil-average": replaced(CLOSEST, {"samples": 7, "radius": 2.0, "levels": 3, "seed": 6, "downsample": "average",
+                                        "pattern": "pixel", "density": "uniform"}),
+    "hssil-radiance": replaced(CLOSEST, {"samples": 10, "radius": 2.5, "levels": 3, "seed": 2,
+                                         "downsample": "closest_average", "pattern": "fixed"}),
+    "hssil-all": replaced(CLOSEST, {"radius": 2.0, "levels": 3, "pattern": "all"}),
 }
 VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-default": (room(SPOT, BULB), (40, 28), "map"),
@@ -36,6 +41,9 @@ VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-odd": (room(SPOT, matte=True), (13, 11), "exact"),
     "hssil-pole": (room(DOWN, camera=POLE), (21, 14), "exact"),
     "hssil-dark": (room(AWAY, matte=True), (18, 13), "exact"),
+    "hssil-average": (room(SPOT, BULB), (27, 19), "exact"),
+    "hssil-radiance": (room(SPOT, BULB, matte=True, smooth=True), (30, 21), "exact"),
+    "hssil-all": (room(BULB, matte=True), (18, 14), "exact"),
 }
 TEMPORAL = {
     "hssil-temporal": of(TemporalSettings),
@@ -101,7 +109,8 @@ def _quick(id: str, what: str) -> Any:
 
 QUICK = {
     "hssil-default": _quick("hssil-default", "interleaved samples, two lamps, 4 levels from half resolution, void "
-                            "around the room"),
+                            "around the room; the nearest senders and whole discs, where the method's default draws "
+                            "senders and lets discs cover a quarter"),
     "hssil-paper": _quick("hssil-paper", "the paper's settings: rows share samples, uniform density, no blur"),
     "hssil-odd": _quick("hssil-odd", "13 x 11 pixels from full resolution down to one texel"),
     "hssil-pole": _quick("hssil-pole", "a camera that looks straight down: surfaces of one depth; a lamp above a "
@@ -113,5 +122,9 @@ QUICK = {
 }
 FULL: dict[str, Any] = {
     "hssil-dark": _quick("hssil-dark", "no direct light: all is 0"),
+    "hssil-average": _quick("hssil-average", "levels of means by area; each texel has samples of its own"),
+    "hssil-radiance": _quick("hssil-radiance", "the closest texels with the mean radiance of all; one mirror-symmetric "
+                             "set of samples, no blur"),
+    "hssil-all": _quick("hssil-all", "every texel of disc and crown is a sample, no blur"),
     "hssil-moving": lambda: coherent("hssil-moving", "a surface that moves by itself before a camera that moves too"),
 }

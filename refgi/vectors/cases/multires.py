@@ -5,7 +5,7 @@ from typing import Any
 
 from refgi.scene import Camera, Scene, merge
 from refgi.settings import of
-from refgi.splat.multires.settings import MultiresSettings
+from refgi.splat.multires.settings import ByIrradiance, MultiresSettings
 from refgi.vectors.cases.plan import Plan, Plans, cases_of
 from refgi.vectors.cases.scenes import AWAY, DOWN, FLOOR, SPOT, SUN, WALL, quad, room, stored_scene
 from refgi.vectors.cases.sii import add_lit
@@ -19,16 +19,18 @@ AT_WALL = Camera((0.2, 1.4, 0.8), (0.1, 1.4, -1.0), (0.0, 1.0, 0.0), math.radian
 
 def settings_of(plan: Plan) -> MultiresSettings:
     """Return the settings of a plan, whose lights lie on a grid; few cells on the coarsest level."""
-    return of(MultiresSettings, **{"lights": plan.lights * len(plan.scene.lights), "coarsest": 5, **plan.choices})
+    coarsest = {} if "subsplats" in plan.choices else {"coarsest": 5}
+    return of(MultiresSettings, **{"lights": plan.lights * len(plan.scene.lights), **coarsest, **plan.choices})
 
 
 def multiresolution(id: str, plan: Plan) -> Case:
     """Return `multires` as planned: buffers, lights, refinement, light, picture."""
     recipe, settings, lamps = Recipe(id, "multires", plan.what), settings_of(plan), len(plan.scene.lights)
-    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, pattern="grid")
+    columns, rows = (side * (2 if settings.supersampled else 1) for side in plan.size)
+    add_lit(recipe, plan.scene, (columns, rows), plan.maps, (plan.lights,) * lamps, pattern="grid")
     if settings.effective_pairs.needs_footprints:
         add_footprints(recipe, lamps)
-    add_multires(recipe, settings, *plan.size)
+    add_multires(recipe, settings, plan.scene, (columns, rows))
     return recipe.case()
 
 
@@ -78,6 +80,13 @@ FULL_PLANS: Plans = {
         room(SPOT, smooth=True), (45, 31), 12, 16, {
             "curvature": "rate", "normal": None, "upsampling": "naive_bilinear", "depth.measure": "demo",
             "depth.threshold": 0.2, "curvature.threshold": 2.0}),
+    "multires-lights": lambda: Plan("lists of each light's own, split where its irradiance changes", room(SPOT, DOWN),
+                                    (29, 22), 12, 4, {"subsplats": ByIrradiance(coarsest=5, threshold=0.15),
+                                                      "clamp": "none"}),
+    "multires-rays": lambda: Plan("a shadow ray from each subsplat to each light", room(SPOT, DOWN), (37, 27), 13, 16,
+                                  {"visibility": "rays", "clamp": "none"}),
+    "multires-double": lambda: Plan("rendered at twice the width and height, as the paper's pictures", pole(SUN, SPOT),
+                                    (21, 15), 16, 25, {"supersampled": True}),
 }
 
 

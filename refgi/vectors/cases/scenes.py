@@ -50,6 +50,28 @@ def room(*lights: Any, matte: bool = False, smooth: bool = False, camera: Camera
     return stored_scene(Scene("kit room", geometry, materials, camera, lights))
 
 
+def kerbs(*lights: Any, camera: Camera = VIEW) -> Scene:
+    """Return a floor before a wall with four slanted kerbs on it: seen from the floor they reach down to its plane."""
+    geometry, materials = merge([quad(*sides) for sides in (
+        ((-1, 0, 1), (2, 0, 0), (0, 0, -2), FLOOR),
+        ((-1, 0, -1), (2, 0, 0), (0, 2, 0), SIDE),
+        ((-0.7, 0, 0.55), (0.05, 0, -1.15), (-0.03, 0.17, 0), FLOOR),
+        ((-0.6, 0.02, -0.62), (1.1, 0, 0.08), (0, 0.14, -0.04), SIDE),
+        ((0.52, 0.01, -0.5), (-0.06, 0, 1), (0.03, 0.12, 0), FLOOR),
+        ((0.4, 0, 0.6), (-1, 0, 0.05), (0, 0.15, 0.03), SIDE))], smooth=False)
+    return stored_scene(Scene("kit kerbs", geometry, materials, camera, lights))
+
+
+def stacked(*lights: Any, camera: Camera = VIEW) -> Scene:
+    """Return a floor, a wall, a slanted table top and a slab below it: lights on the top have a surface behind them."""
+    geometry, materials = merge([quad(*sides) for sides in (
+        ((-1, 0, 1), (2, 0, 0), (0, 0, -2), FLOOR),
+        ((-1, 0, -1), (2, 0, 0), (0, 2, 0), SIDE),
+        ((-0.35, 0.7, 0.3), (0.7, 0.06, 0.05), (0.02, 0.04, -0.65), FLOOR),
+        ((-0.25, 0.42, 0.1), (0.4, -0.05, 0.04), (0.05, 0.03, -0.35), SIDE))], smooth=False)
+    return stored_scene(Scene("kit stack", geometry, materials, camera, lights))
+
+
 def far_away(scene: Scene, offset: float) -> Scene:
     """Return a scene moved along x, m, with all that it holds in float32."""
     move = (offset, 0.0, 0.0)

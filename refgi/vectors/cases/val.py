@@ -5,9 +5,9 @@ from typing import Any
 
 from refgi.cluster.settings import ValSettings
 from refgi.draws import PIXEL_LIGHTS, draws
-from refgi.scene import Camera, Scene
+from refgi.scene import Camera, Scene, SpotLight
 from refgi.settings import of
-from refgi.vectors.cases.scenes import BULB, SPOT, far_away, room
+from refgi.vectors.cases.scenes import BULB, SPOT, far_away, kerbs, room, stacked
 from refgi.vectors.cases.sii import add_lit
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
@@ -43,6 +43,8 @@ class Setup:
 
 CLOSE = Camera((1.0, 1.05, 0.95), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(65))  # rolled, fills the picture
 ABOVE = Camera((0.2, 2.5, 0.1), (0.15, 0.0, 0.1), (0.0, 0.0, -1.0), math.radians(34))  # sees no wall
+BESIDE = Camera((1.5, 0.8, 1.6), (-0.1, 0.3, -0.3), (0.1, 1.0, 0.0), math.radians(50))  # sees what is below the table
+FLOOR_LAMP = SpotLight((0.3, 1.6, 0.35), (-0.2, -1.0, -0.25), 0.2, 0.42, (4.0, 2.6, 1.3))
 
 SETUPS = {setup.id: setup for setup in (
     Setup("val-csm", "convolution shadow maps by the defaults, maps of an odd side; two lamps, a cluster of one light, "
@@ -58,6 +60,8 @@ SETUPS = {setup.id: setup for setup in (
     Setup("val-interleaved", "blocks of 3 x 3 pixels in a picture of odd size, PCF, blur with every subset; 4 m from "
           "the origin, pixels without surface, a ball", far_away(room(SPOT, BULB, matte=True, smooth=True), 4.0),
           (20, 14), 16, 36, clusters=5, interleaving=3, visibility="pcf", blur_extent=0.3),
+    Setup("val-rim", "kerbs beside the lights, down to their plane: maps with geometry at the rim of the disc",
+          kerbs(FLOOR_LAMP, camera=CLOSE), (15, 11), 9, 12, clusters=3, interleaving=1),
 )}
 FULL_SETUPS = {setup.id: setup for setup in (
     Setup("val-published", "the printed forms: raw distances, squares of alpha / pi, the search by solid angle; blocks "
@@ -68,6 +72,14 @@ FULL_SETUPS = {setup.id: setup for setup in (
           "damped terms, V doubled and cut, depths up to the scene's end", room(SPOT, smooth=True), (17, 13),
           13, 40, clusters=4, interleaving=1, axes="pca", area_extent="longer", unbiased_area=True, foreshortened=True,
           terms=6, attenuation=1.0, rescale="scale2", depth_scale="scene", distance="squared"),
+    Setup("val-bytes", "basis in 8 bits and half floats, as in the published textures",
+          room(SPOT, matte=True, camera=CLOSE), (17, 13), 13, 24, clusters=4, interleaving=1,
+          quantisation="published"),
+    Setup("val-dual", "a second map behind each area light, PCF of 3 x 3 texels; a slab below the table that is lit",
+          stacked(SPOT, BULB, camera=BESIDE), (20, 14), 13, 24, clusters=4, interleaving=1, visibility="pcf", texels=3,
+          behind="dual_paraboloid"),
+    Setup("val-projected", "texels of the map projected back onto the rectangle", kerbs(FLOOR_LAMP, camera=CLOSE),
+          (15, 11), 13, 18, clusters=3, interleaving=1, visibility="back_projection"),
 )}
 QUICK = {id: setup.case for id, setup in SETUPS.items()}
 FULL = {id: setup.case for id, setup in FULL_SETUPS.items()}

@@ -1,6 +1,8 @@
 """Pixel lights with visibility, from the buffers to the sum."""
 
 from refgi.draws import PIXEL_LIGHTS, draws
+from refgi.settings import of
+from refgi.truth.vpl import VplSettings
 from refgi.vectors.cases.plan import Plan, Plans, cases_of
 from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, room
 from refgi.vectors.cases.sii import add_lit
@@ -10,11 +12,11 @@ from refgi.vectors.stages.vpl import add_vpl
 
 
 def shadowed(id: str, plan: Plan) -> Case:
-    """Return `vpl` as planned: buffers, lights, visibility, sum."""
+    """Return `vpl` as planned: buffers, lights, visibility by rays or maps, sum."""
     recipe = Recipe(id, "vpl", plan.what)
     lamps = len(plan.scene.lights)
     add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, shifts=default_shifts(lamps))
-    add_vpl(recipe, plan.scene)
+    add_vpl(recipe, plan.scene, of(VplSettings, **plan.choices))
     return recipe.case()
 
 
@@ -33,9 +35,16 @@ QUICK_PLANS: Plans = {
     "vpl-no-flux": lambda: Plan("a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True),
                                 (12, 9),
                                 7, 5),
+    "vpl-maps": lambda: Plan("a map of 96 points for each light; holes pulled and pushed over two levels",
+                             room(SPOT, matte=True), (16, 12), 13, 12, {
+                                 "maps": "imperfect", "maps.points": 96, "maps.resolution": 16, "maps.splat": 0.6,
+                                 "maps.levels": 2, "maps.bias": 1.0}),
 }
 FULL_PLANS: Plans = {
     "vpl-large": lambda: Plan("48 x 36 pixels, 2 x 64 lights", room(SPOT, DOWN), (48, 36), 23, 64),
+    "vpl-maps-bare": lambda: Plan("maps of 512 points for lights of two lamps, boxes as wide as discs, no filled holes",
+                                  room(SPOT, SUN, smooth=True), (26, 20), 13, 12, {
+                                      "maps": "imperfect", "maps.points": 512, "maps.resolution": 32}),
 }
 
 

@@ -12,28 +12,49 @@ from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.settings import replaced
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.crown.pattern import PHASES, tile_offsets
-from refgi.sssil.crown.points import key_shift, level_key, sample_points, tile_shifts
+from refgi.sssil.crown.points import key_shift, level_key, pixel_key, row_key, sample_points, tile_shifts
 from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.vectors.bugs.crown_gather import EQ4, SENDER, gather_bugs
-from refgi.vectors.bugs.crown_points import sequence_bugs
+from refgi.vectors.bugs.crown_points import point_bugs, sequence_bugs
 from refgi.vectors.bugs.crown_sample import CROWN, sample_bugs
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Arrays, Spec
+from refgi.vectors.spec import Array, Arrays, Spec
+from refgi.vectors.stages.crown_sets import add_every_texel, add_mirrored
 from refgi.vectors.stages.levels import level_names, level_of
 
+BELOW_1 = 1.0 - 2.0**-24
+POINTS = Spec("sample, (u, cos 2 pi v, sin 2 pi v)", "1", "points that all texels share")
 
-def add_samples(recipe: Recipe, sampling: SamplingSettings, index: int, rows: int, radius: float) -> None:
-    """Add shifts, offsets and weights of the samples of a level with a number of rows; patterns with tiles alone."""
+
+def add_samples(
+    recipe: Recipe, sampling: SamplingSettings, index: int, shape: tuple[int, int], radius: float
+) -> None:
+    """Add shifts, offsets and weights of the samples of a level with some rows and columns."""
     inner, crown = sampling.counts(index)
-    tile = (rows, PHASES) if sampling.pattern == "row" else (sampling.tile, sampling.tile)
-    name = f"samples{index}"
-    shift, points, shifts = f"{name}.shift", f"{name}.points", f"{name}.shifts"
-    start = key_shift(level_key(sampling.seed, sampling.first_level + index))
-    recipe.give(shift, np.minimum(start, 1.0 - 2.0**-24), Spec("uv", "1", "random numbers: shift of the tile's first "
-                                                               "texel"))
+    name, one = f"samples{index}", (1, 1)
+    tile = {"row": (shape[0], PHASES), "interleaved": (sampling.tile, sampling.tile), "pixel": shape}.get(
+        sampling.pattern, one)
+    points, shifts = f"{name}.points", f"{name}.shifts"
     recipe.facts[name] = {"disc": inner, "crown": crown, "radius": radius, "tile": list(tile),
                           "pattern": sampling.pattern, "density": sampling.density, "steps": [FIRST_STEP, SECOND_STEP]}
-    _add_shifts(recipe, name, (inner, crown), tile)
+    if sampling.pattern == "all":
+        add_every_texel(recipe, index, radius, _specs(name))
+        return
+    key = level_key(sampling.seed, sampling.first_level + index)
+    if sampling.pattern == "pixel":
+        own = np.array([[key_shift(pixel_key(row_key(key, row), column)) for column in range(shape[1])]
+                        for row in range(shape[0])])
+        recipe.give(shifts, np.minimum(own, BELOW_1), Spec("row, column, uv", "1", "random numbers: what each texel "
+                                                          "adds to u and v, modulo 1"))
+        _add_points(recipe, name, inner, crown)
+    else:
+        recipe.give(f"{name}.shift", np.minimum(key_shift(key), BELOW_1), Spec(
+            "uv", "1", "random numbers: shift of the tile's first texel" if tile != one else "random numbers: shift of "
+            "all points"))
+        if sampling.pattern == "fixed":
+            add_mirrored(recipe, index, (inner, crown), (radius, sampling.density), _specs(name))
+            return
+        _add_shifts(recipe, name, (inner, crown), tile)
 
     def run(arrays: Arrays, real: Any) -> Arrays:
         offsets, weight = tile_offsets(np.ascontiguousarray(arrays[points], real), inner,
@@ -41,12 +62,15 @@ def add_samples(recipe: Recipe, sampling: SamplingSettings, index: int, rows: in
         return {f"{name}.offsets": offsets, f"{name}.weight": weight}
 
     recipe.add(name, "texels around a receiver that are its samples, and how many texels each stands for", run,
-               (points, shifts), {
-                   f"{name}.offsets": Spec("row modulo tile, column modulo tile, sample, (right, down)", "1",
-                                           "texels from the receiver to the sample, the disc's first", tier="T0"),
-                   f"{name}.weight": Spec("row modulo tile, column modulo tile, sample; 1: all alike", "1",
-                                          "texels of this level that a sample stands for", paper="E-HSS-06"),
-               }, paper=CROWN, bugs=tuple(sample_bugs(name, inner, radius, sampling.density)))
+               (points, shifts), _specs(name), paper=CROWN,
+               bugs=tuple(sample_bugs(name, inner, radius, sampling.density)))
+
+
+def _specs(name: str) -> dict[str, Spec]:
+    return {f"{name}.offsets": Spec("row modulo tile, column modulo tile, sample, (right, down)", "1",
+                                    "texels from the receiver to the sample, the disc's first", tier="T0"),
+            f"{name}.weight": Spec("row modulo tile, column modulo tile, sample; 1: all alike", "1",
+                                   "texels of this level that a sample stands for", paper="E-HSS-06")}
 
 
 def add_gather(recipe: Recipe, settings: HssilSettings, index: int) -> None:
@@ -57,7 +81,7 @@ def add_gather(recipe: Recipe, settings: HssilSettings, index: int) -> None:
     plain = replaced(settings, {"sampling.pattern": "interleaved"})
 
     def run(arrays: Arrays, real: Any) -> Arrays:
-        chosen = np.ascontiguousarray(arrays[samples[0]], np.int32), np.ascontiguousarray(arrays[samples[1]], real)
+        chosen = _in_phases(np.asarray(arrays[samples[0]], np.int32), np.asarray(arrays[samples[1]], real))
         return {name: gather(level_of(arrays, index, number, real), index, plain, samples=chosen)}
 
     bugs = gather_bugs(index, *settings.sampling.counts(index))
@@ -68,18 +92,32 @@ def add_gather(recipe: Recipe, settings: HssilSettings, index: int) -> None:
                               EQ4)}, paper=f"HSS Eq. 1; {EQ4}", exact=(planes[0],), bugs=tuple(bugs))
 
 
+def _in_phases(offsets: Array, weight: Array) -> tuple[Array, Array]:
+    """Return samples by column modulo a power of two, as the kernel takes them; where each texel has its own."""
+    more = (1 << (offsets.shape[1] - 1).bit_length()) - offsets.shape[1]
+    wide = [np.pad(one, [(0, 0), (0, more if one.shape[1] > 1 else 0), *[(0, 0)] * (one.ndim - 2)])
+            for one in (offsets, weight)]
+    return np.ascontiguousarray(wide[0]), np.ascontiguousarray(wide[1])
+
+
+def _add_points(recipe: Recipe, name: str, inner: int, crown: int) -> None:
+    recipe.add(f"points of {name}", "points of the sequence, j steps from 1/2, the disc's then the crown's; modulo 1, "
+               "in double precision", lambda arrays, real: {f"{name}.points": sample_points(inner, crown)},  # noqa: ARG005
+               (), {f"{name}.points": POINTS}, paper=CROWN, bugs=tuple(point_bugs(name, inner, crown)))
+
+
 def _add_shifts(recipe: Recipe, name: str, counts: tuple[int, int], tile: tuple[int, int]) -> None:
     inner, crown = counts
 
     def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 one precision: double
         start = np.asarray(arrays[f"{name}.shift"], np.float64)
         return {f"{name}.points": sample_points(inner, crown),
-                f"{name}.shifts": np.minimum(tile_shifts(start, tile, crown), 1.0 - 2.0**-24)}
+                f"{name}.shifts": np.minimum(tile_shifts(start, tile, crown), BELOW_1)}
 
     recipe.add(f"shifts of {name}", "points of the sequence, j steps from 1/2, the disc's then the crown's; texel n of "
                "the tile, row by row, is shifted by n times the crown's number of steps more; all modulo 1, in double "
                "precision", run, (f"{name}.shift",), {
-                   f"{name}.points": Spec("sample, (u, cos 2 pi v, sin 2 pi v)", "1", "points that all texels share"),
+                   f"{name}.points": POINTS,
                    f"{name}.shifts": Spec("row of the tile, column of the tile, uv", "1",
                                           "what each texel of a tile adds to u and v, modulo 1"),
                }, paper=CROWN, exact=(f"{name}.shift",), bugs=tuple(sequence_bugs(name, inner, crown, tile)))

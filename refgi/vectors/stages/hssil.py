@@ -11,22 +11,24 @@ from refgi.vectors.stages.crown import add_gather, add_samples
 from refgi.vectors.stages.levels import add_levels
 from refgi.vectors.stages.upsampling import add_blur, add_light
 
+SHARED_BY_ALL = ("fixed", "all")  # patterns that leave nothing to blur
+
 
 def add_hssil(recipe: Recipe, scene: Scene, size: tuple[int, int], settings: HssilSettings) -> str:
     """Add all stages from G-buffer and direct light to the picture's irradiance; return its name.
 
-    `settings`: the closest senders, whole discs, samples shared by tiles or rows, no visibility, one camera.
+    `settings`: senders are the receivers, whole discs, no visibility, one camera.
     """
     sampling, shape = settings.sampling, (size[1], size[0])
     first, count = sampling.first_level, useful_levels(shape, sampling)
     radius = chosen_radius(level_shape(shape, first), sampling)
-    add_levels(recipe, camera_projection(scene.camera, *size), first, count)
+    add_levels(recipe, camera_projection(scene.camera, *size), first, count, settings.senders.downsample)
     light = ""
     for index in reversed(range(count)):
-        add_samples(recipe, sampling, index, level_shape(shape, first + index)[0], radius)
+        add_samples(recipe, sampling, index, level_shape(shape, first + index), radius)
         add_gather(recipe, settings, index)
         own = f"gather{index}.irradiance"
-        if settings.blur is not None:
+        if settings.blur is not None and sampling.pattern not in SHARED_BY_ALL:
             add_blur(recipe, settings.blur, index, first + index)
             own = f"blur{index}.irradiance"
         light = add_light(recipe, settings, index, own, light) if light else own

@@ -16,12 +16,22 @@ from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import VECTOR
 
+PICTURE = ("gbuffer.depth", "gbuffer.normal", "gbuffer.albedo", "direct.irradiance", "camera.frame", "camera.half")
 
-def add_levels(recipe: Recipe, view: Projection, first: int, count: int) -> None:
-    """Add `count` levels of the closest texels, from level `first` on, with positions, normals, radiance and areas."""
-    _add_first(recipe, view, first)
-    for index in range(1, count):
-        _add_coarser(recipe, view, first, index)
+
+def add_levels(recipe: Recipe, view: Projection, first: int, count: int, downsample: str = "closest") -> None:
+    """Add `count` levels, from level `first` on, with positions, normals, radiance and areas.
+
+    Texels are the closest of finer ones, or means of them all or of their radiance alone.
+    """
+    if downsample == "closest":
+        _add_first(recipe, view, first)
+        for index in range(1, count):
+            _add_coarser(recipe, view, first, index)
+        return
+    from refgi.vectors.stages.averaged_levels import add_averaged
+
+    add_averaged(recipe, view, (first, count), downsample == "average")
 
 
 def level_of(arrays: Arrays, index: int, number: int, real: Any) -> Level:
@@ -39,13 +49,8 @@ def level_names(index: int, *keys: str) -> tuple[str, ...]:
 
 
 def _add_first(recipe: Recipe, view: Projection, first: int) -> None:
-    reads = ("gbuffer.depth", "gbuffer.normal", "gbuffer.albedo", "direct.irradiance", "camera.frame", "camera.half")
-
     def run(arrays: Arrays, real: Any, downsample: str = "closest") -> Arrays:
-        projection = view._replace(frame=np.asarray(arrays[reads[4]], np.float64),
-                                   half=np.asarray(arrays[reads[5]], np.float64))
-        depth, normal, albedo, light = (np.ascontiguousarray(arrays[name], real) for name in reads[:4])
-        return _named(0, levels(depth, normal, albedo, light, projection, first, 1, downsample)[0])
+        return _named(0, first_level_of(arrays, view, first, real, downsample))
 
     several = (
         Bug("positions, normals and radiance are means", lambda a, r: run(a, r, "average"), CLOSEST),
@@ -53,8 +58,8 @@ def _add_first(recipe: Recipe, view: Projection, first: int) -> None:
     ) if first else ()
     cut = any(size % (1 << first) for size in (view.height, view.width))
     recipe.add("level0", f"nearest surface to each texel of {1 << first} x {1 << first} pixels, what it reflects and "
-               "the surface that the texel stands for", run, reads, _specs(0, view), paper=f"{CLOSEST}; {EQ2}",
-               exact=(reads[0],), bugs=(*several, *first_level_bugs(view, first, cut)))
+               "the surface that the texel stands for", run, PICTURE, level_specs(0, view), paper=f"{CLOSEST}; {EQ2}",
+               exact=(PICTURE[0],), bugs=(*several, *first_level_bugs(view, first, cut)))
 
 
 def _add_coarser(recipe: Recipe, view: Projection, first: int, index: int) -> None:
@@ -67,14 +72,23 @@ def _add_coarser(recipe: Recipe, view: Projection, first: int, index: int) -> No
     cut = shape[0] % (1 << number) > 0, shape[1] % (1 << number) > 0
     bugs = coarser_level_bugs(index, number, shape, cut)
     recipe.add(f"level{index}", "the nearest of four texels of the finer level, or of the two or one that there are",
-               run, fine, _specs(index, view), paper=f"{CLOSEST}; {EQ2}", exact=(fine[1],), bugs=tuple(bugs))
+               run, fine, level_specs(index, view), paper=f"{CLOSEST}; {EQ2}", exact=(fine[1],), bugs=tuple(bugs))
 
 
 def _named(index: int, level: Level) -> dict[str, Array]:
     return {f"level{index}.{key}": getattr(level, key) for key in PLANES}
 
 
-def _specs(index: int, view: Projection) -> dict[str, Spec]:
+def first_level_of(arrays: Arrays, view: Projection, first: int, real: Any, downsample: str) -> Level:
+    """Return the first level of a picture among arrays."""
+    projection = view._replace(frame=np.asarray(arrays[PICTURE[4]], np.float64),
+                               half=np.asarray(arrays[PICTURE[5]], np.float64))
+    depth, normal, albedo, light = (np.ascontiguousarray(arrays[name], real) for name in PICTURE[:4])
+    return levels(depth, normal, albedo, light, projection, first, 1, downsample)[0]
+
+
+def level_specs(index: int, view: Projection) -> dict[str, Spec]:
+    """Return what the planes of a level are."""
     sheet, empty = "row, column", "; 0 without surface"
     specs = {
         "position": Spec(f"xyz, {sheet}", "m", f"surface point, from the eye{empty}", "axes of the world"),

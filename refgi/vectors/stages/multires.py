@@ -6,26 +6,44 @@
 
 import dataclasses
 
+from refgi.frame import Frame
+from refgi.scene import Scene
 from refgi.splat.multires.refinement.grid import top_level
-from refgi.splat.multires.settings import ByGeometry, MultiresSettings
+from refgi.splat.multires.settings import ByGeometry, ByIrradiance, MultiresSettings
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.stages.multires_light import add_detail, add_irradiance, add_points
+from refgi.vectors.stages.multires_lights import add_lists
 from refgi.vectors.stages.multires_list import add_states, add_subsplats
 from refgi.vectors.stages.multires_ranges import add_curvatures, add_discontinuities, add_ranges, add_slopes
+from refgi.vectors.stages.multires_shadowed import add_halved, add_shadowed_irradiance
 from refgi.vectors.stages.multires_upsample import add_upsampling
 
 
-def add_multires(recipe: Recipe, settings: MultiresSettings, width: int, height: int) -> None:
-    """Add all stages after the G-buffer and the pixel lights; subsplats are refined by geometry."""
-    subsplats = settings.subsplats
+def add_multires(recipe: Recipe, settings: MultiresSettings, scene: Scene, size: tuple[int, int]) -> None:
+    """Add all stages after the G-buffer, which has `size` columns and rows, and the pixel lights.
+
+    Subsplats are refined by geometry or by each light. Where the picture is half as large, the last stage halves it.
+    """
+    subsplats, (width, height) = settings.subsplats, size
+    printed = "ams_filter_all" in settings.as_published, "ams_all_corners" not in settings.as_published
+    if isinstance(subsplats, ByIrradiance):
+        if (subsplats.criteria, subsplats.representative) != (None, "pixel") or subsplats.form == "brightest":
+            raise ValueError(f"{recipe.id}: lists of each light begin with the coarsest cells, at one pixel each")
+        add_lists(recipe, subsplats, settings.effective_pairs, size, *printed)
+        return
     assert isinstance(subsplats, ByGeometry)
     top = add_refinement(recipe, subsplats, width, height)
     add_points(recipe, subsplats.representative, top)
-    add_irradiance(recipe, settings.effective_pairs)
-    add_upsampling(recipe, subsplats.upsampling, top, "ams_filter_all" in settings.as_published,
-                   "ams_all_corners" not in settings.as_published)
+    if settings.shadow_rays is None:
+        add_irradiance(recipe, settings.effective_pairs)
+    else:
+        add_shadowed_irradiance(recipe, scene)
+    add_upsampling(recipe, subsplats.upsampling, top, *printed)
     if settings.detail > 0:
         add_detail(recipe, settings.detail)
+    if settings.supersampled:
+        frame = Frame(scene, width=width // 2, height=height // 2)
+        add_halved(recipe, frame.gbuffer.covered, recipe.stages[-1].writes[0])
 
 
 def add_refinement(recipe: Recipe, settings: ByGeometry, width: int, height: int) -> int:

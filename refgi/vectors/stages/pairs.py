@@ -98,14 +98,14 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
     recipe.give("gbuffer.normal", normal[:, None], Spec("xyz, row, receiver", VECTOR, "their normals", "world"))
     recipe.give("gbuffer.triangle_id", np.zeros((1, count), np.int32),
                 Spec("row, receiver", "1", "0: all are surfaces", tier="T0"))
-    names, glossy = light_names(recipe), "lights.lobe_flux" in lights
+    names, glossy, bare = light_names(recipe), "lights.lobe_flux" in lights, of(PairSettings, clamp="none")
 
     def run(arrays: Arrays, real: Any) -> Arrays:
         made = np.zeros((3, 1, count), real)
         for k in range(count):
             one = {name: arrays[name][..., k : k + 1] for name in names}
             here = receivers_of({name: arrays[name][..., k : k + 1] for name in RECEIVERS}, real)
-            made[..., k : k + 1] = irradiance(here, pixel_lights_of(one, real), of(PairSettings, clamp="none"))
+            made[..., k : k + 1] = irradiance(here, pixel_lights_of(one, real), bare)
         return {"pairs.irradiance": made}
 
     recipe.add("pairs", "irradiance of light k at receiver k", run, (*RECEIVERS, *names), {

@@ -50,8 +50,11 @@ def add_light(recipe: Recipe, settings: HssilSettings, index: int, added: str, c
 
     weights = settings.upsampling
     assert isinstance(weights, Bilateral)
-    recipe.facts["upsampling"] = {"depth_sigma": weights.depth_sigma, "normal_power": weights.normal_power}
-    bugs = upsampling_bugs(name, coarse, below, here, weights, added if adds else None)
+    recipe.facts["upsampling"] = {"depth_sigma": weights.depth_sigma, "normal_power": weights.normal_power,
+                                  "depth_of_a_texel": "mean, at its centre" if settings.senders.downsample == "average"
+                                  else "nearest, at its corner along the slope"}
+    bugs = upsampling_bugs(name, coarse, below, here, weights, added if adds else None,
+                           settings.senders.downsample == "average")
     bugs += sum_bugs(recipe, run, index, name, coarse, added) if adds else []
     recipe.add(name.split(".")[0], "light of the coarser levels at this level's texels, and this level's own" if adds
                else "light of all levels at the pixels", run, (coarse, *below, *here, *((added,) if adds else ())), {

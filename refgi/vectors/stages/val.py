@@ -13,7 +13,7 @@ from refgi.cluster.lighting.interleave import (
     scatter_pixels,
     subsets,
 )
-from refgi.cluster.settings import BoxBlur, Csm, GeometryBlur, Pcf, Pcss, ValSettings
+from refgi.cluster.settings import BackProjection, BoxBlur, Csm, GeometryBlur, Hard, Pcf, Pcss, ValSettings
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.rsm import facing_normals
 from refgi.scene import Scene
@@ -31,6 +31,7 @@ from refgi.vectors.stages.val_clusters import add_extents, add_kmeans, clusters_
 from refgi.vectors.stages.val_csm import add_csm
 from refgi.vectors.stages.val_maps import add_maps
 from refgi.vectors.stages.val_pcss import add_binary, add_pcss
+from refgi.vectors.stages.val_projected import add_back_projection
 from refgi.vectors.stages.val_search import FACING, add_search
 
 BLUR = "VAL Sec. 6, E-VAL-13; docs/methods/val"
@@ -72,9 +73,14 @@ def _add_facing(recipe: Recipe, scene: Scene) -> None:
 def add_visibility(recipe: Recipe, settings: ValSettings, delta: Array) -> None:
     """Add V of each area light at each pixel; those of size `delta` (M,) 0 have hard shadows."""
     kind = settings.visibility
-    if isinstance(kind, Pcf) or not delta.any():
+    if isinstance(kind, BackProjection):
+        add_back_projection(recipe)
+        return
+    if isinstance(kind, Pcf | Hard) or not delta.any():
         add_binary(recipe, "visibility", kind.texels if isinstance(kind, Pcf) else 1)
         return
+    if settings.maps.behind != "visible":
+        raise ValueError(f"{recipe.id}: a second map: by depth tests of a square alone")
     if (delta == 0).any():
         add_binary(recipe, "hard", 1)
     add_search(recipe, settings)

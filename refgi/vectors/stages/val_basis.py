@@ -3,6 +3,8 @@
 A texel's channels are sin(c_k t) for all k, cos(c_k t), t sin(c_k t), t cos(c_k t), then t, its depth.
 """
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,8 +17,9 @@ from refgi.cluster.filters.prefilter import LEVEL_SHIFT
 from refgi.cluster.filters.pyramid import Mip, level_offsets, mip_of, mips
 from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.series import frequencies
-from refgi.vectors.bugs.val_depth import basis_bugs, depth_bugs
-from refgi.vectors.bugs.val_mip import mip_bugs
+from refgi.vectors.bugs.val_bytes import in_bytes, rounding_bugs
+from refgi.vectors.bugs.val_depth import basis_bugs, basis_by, depth_bugs
+from refgi.vectors.bugs.val_mip import levels_by, mean_of_four, mip_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.val_maps import SHEET
@@ -32,7 +35,7 @@ def add_basis(recipe: Recipe, csm: Csm) -> None:
     _add_series_depths(recipe, csm)
     _add_level_0(recipe, csm)
     if csm.prefilter == "mip":
-        _add_levels(recipe, csm.terms)
+        _add_levels(recipe, csm)
 
 
 def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
@@ -63,12 +66,15 @@ def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
 
 
 def _add_level_0(recipe: Recipe, csm: Csm) -> None:
+    quantised = csm.quantisation == "published"
+    kept = stored_by(csm)
+
     def run(arrays: Arrays, real: Any) -> Arrays:
         t = np.ascontiguousarray(arrays["maps.t"], real)
         made = np.zeros((len(t), 4 * csm.terms + 1, *t.shape[1:]), real)
         for k in np.flatnonzero(t.any(axis=(1, 2))):
             parts = [np.zeros((*t.shape[1:], 2 * csm.terms + extra), real) for extra in (0, 1)]
-            fill_basis(t[k], csm.terms, False, *parts)
+            fill_basis(t[k], csm.terms, quantised, *parts)
             made[k] = np.moveaxis(np.concatenate(parts, axis=2), 2, 0)
         return {"basis.0": made}
 
@@ -79,26 +85,34 @@ def _add_level_0(recipe: Recipe, csm: Csm) -> None:
             by = t[:, None] if weigh else 1
             made = np.concatenate([sine, cosine, by * sine, by * cosine, t[:, None]], axis=1)
             made[~np.asarray(t.any(axis=(1, 2)))] = 0
-            return {"basis.0": made}
+            return {"basis.0": kept(made)}
 
         return altered
 
     k, right = np.arange(1, csm.terms + 1), frequencies(csm.terms)
-    recipe.add("basis", "sines and cosines of each texel's depth, and the same times the depth", run, ("maps.t",), {
+    bugs = (
+        Bug("c_k = k pi", literal(k * np.pi), "c_k = (2k - 1) pi"),
+        Bug("even multiples of pi: c_k = 2 k pi", literal(2 * k * np.pi), "c_k = (2k - 1) pi"),
+        Bug("c_k = (2k + 1) pi", literal(right + 2 * np.pi), "k from 1 on"),
+        Bug("sines and cosines of the second half are not weighed by the depth", literal(right, weigh=False),
+            "E-VAL-02"),
+        Bug("sines and cosines are exchanged, also those times the depth",
+            writing(run, basis__0=_exchanged), "E-VAL-02"),
+        Bug("sines and cosines alternate (interleaved), also those times the depth",
+            writing(run, basis__0=_in_turns), "order of channels"),
+        Bug("the mean depth itself is left out",
+            writing(run, basis__0=lambda a: np.concatenate([a[:, :-1], 0 * a[:, -1:]], axis=1)), "E-VAL-02: Z"),
+        *basis_bugs(run, csm.terms))
+    if quantised:
+        bugs = (*(Bug(one.cause, writing(one.run, basis__0=kept), one.paper) for one in bugs),
+                *rounding_bugs(basis_by(lambda k: (2 * k - 1) * np.pi, csm.terms), "basis.0", csm.terms))
+        recipe.facts["basis.stored"] = {"sines and cosines": "8 bits: floor((x + 1) 127.5 + 0.5001) / 127.5 - 1",
+                                        "times the depth, and the depth": "half floats"}
+    recipe.add("basis", "sines and cosines of each texel's depth, and the same times the depth" + (
+        ", in 8 and 16 bits" if quantised else ""), run, ("maps.t",), {
         "basis.0": Spec(CHANNELS, "1", "S_1.., C_1.., t S_1.., t C_1.., t; 0 on empty maps", paper="E-VAL-02")},
-        paper="VAL Sec. 4.1, E-VAL-02", exact=("maps.t",), variants=(literal(right),), bugs=(
-            Bug("c_k = k pi", literal(k * np.pi), "c_k = (2k - 1) pi"),
-            Bug("even multiples of pi: c_k = 2 k pi", literal(2 * k * np.pi), "c_k = (2k - 1) pi"),
-            Bug("c_k = (2k + 1) pi", literal(right + 2 * np.pi), "k from 1 on"),
-            Bug("sines and cosines of the second half are not weighed by the depth", literal(right, weigh=False),
-                "E-VAL-02"),
-            Bug("sines and cosines are exchanged, also those times the depth",
-                writing(run, basis__0=_exchanged), "E-VAL-02"),
-            Bug("sines and cosines alternate (interleaved), also those times the depth",
-                writing(run, basis__0=_in_turns), "order of channels"),
-            Bug("the mean depth itself is left out",
-                writing(run, basis__0=lambda a: np.concatenate([a[:, :-1], 0 * a[:, -1:]], axis=1)), "E-VAL-02: Z"),
-            *basis_bugs(run, csm.terms)))
+        paper="VAL Sec. 4.1, E-VAL-02" + (", 6" if quantised else ""), exact=("maps.t",), variants=(literal(right),),
+        bugs=bugs)
 
 
 def _exchanged(basis: Array) -> Array:
@@ -116,7 +130,13 @@ def level_names(recipe: Recipe) -> tuple[str, ...]:
     return tuple(name for name in recipe.specs if name.startswith("basis."))
 
 
-def _add_levels(recipe: Recipe, terms: int) -> None:
+def stored_by(csm: Csm) -> Callable[[Array], Array]:
+    """Return how a basis is kept: as it is, or in 8 and 16 bits."""
+    return partial(in_bytes, terms=csm.terms) if csm.quantisation == "published" else np.asarray
+
+
+def _add_levels(recipe: Recipe, csm: Csm) -> None:
+    terms, kept = csm.terms, stored_by(csm)
     side = recipe.facts["maps"]["texels a side"]
     sides = [side]
     while sides[-1] > 1:
@@ -126,14 +146,14 @@ def _add_levels(recipe: Recipe, terms: int) -> None:
     def run(arrays: Arrays, real: Any) -> Arrays:
         level, made = np.ascontiguousarray(arrays["basis.0"], real), {}
         for name in names:
-            level = made[name] = _halved(level, terms)
+            level = made[name] = kept(_halved(level, terms))
         return made
 
     def chained(half: Any) -> Any:
         def altered(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
             level, made = arrays["basis.0"], {}
             for name in names:
-                level = made[name] = half(level)
+                level = made[name] = kept(half(level))
             return made
 
         return altered
@@ -151,7 +171,20 @@ def _add_levels(recipe: Recipe, terms: int) -> None:
                    Bug("the depth is that of the nearest texel, not the mean",
                        chained(lambda a: np.concatenate([_mean_of_four(a, "edge")[:, :-1], _least_of_four(a)], 1)),
                        "E-VAL-02: Z = w * z"),
-                   *mip_bugs(names)))
+                   *mip_bugs(names, kept), *(_unrounded(names, terms) if csm.quantisation == "published" else ())))
+
+
+def _unrounded(names: list[str], terms: int) -> tuple[Bug, ...]:
+    """Return likely bugs of levels in 8 and 16 bits."""
+    def once(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 levels of means that are rounded last
+        level, made = arrays["basis.0"], {}
+        for name in names:
+            level = _mean_of_four(level, "edge")
+            made[name] = in_bytes(level, terms)
+        return made
+
+    return (Bug("levels are not rounded to 8 and 16 bits", levels_by(names, mean_of_four), "VAL Sec. 6"),
+            Bug("levels are made of unrounded ones and rounded when they are stored", once, "of the level before"))
 
 
 def _halved(level: Array, terms: int) -> Array:
@@ -193,13 +226,14 @@ def filters_of(arrays: Arrays, csm: Csm, k: int, real: Any, boxes: bool) -> Any:
     levels = [np.asarray(arrays[name][k], real) for name in sorted(
         (name for name in arrays if name.startswith("basis.")), key=lambda name: int(name[6:]))]
     n, basis = levels[0].shape[1], 2 * csm.terms
+    quantised = csm.quantisation == "published"
     if csm.prefilter == "brute":
         brute: Brute = brutes(n, csm.terms, real, box=boxes)
         brute.depth[:], brute.basis[:] = levels[0][-1], np.moveaxis(levels[0][:basis], 0, 2)
         brute.basis_z[:] = np.moveaxis(levels[0][basis:], 0, 2)
         return brute
-    mip: Mip = mip_of(mips(1, n, csm.terms, real, shift=LEVEL_SHIFT), 0)
-    mip.depth[:] = levels[0][-1]
+    mip: Mip = mip_of(mips(1, n, csm.terms, real, shift=LEVEL_SHIFT, quantised=quantised), 0)
+    mip.depth[:] = arrays["maps.t"][k] if quantised else levels[0][-1]  # of which the kernel makes the basis
     first = level_offsets(n)[0]
     for start, level in zip(first[1:], levels[1:], strict=True):
         texels = slice(start, start + level[0].size)

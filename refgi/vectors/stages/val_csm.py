@@ -77,7 +77,7 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
 
 
 def _add_means(recipe: Recipe, settings: ValSettings, csm: Csm, name: str, flag: str, channels: int) -> None:
-    levels = level_names(recipe)
+    levels = level_names(recipe) + (("maps.t",) if csm.quantisation == "published" else ())
     boxes = "val_alpha_over_pi" in settings.as_published
 
     def run(arrays: Arrays, real: Any, kind: Csm = csm) -> Arrays:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from refgi.cluster.maps.occluders import ends_of, occluders, selected_blockers
-from refgi.cluster.maps.shadow_maps import ShadowMaps, draw_maps, farthest, farthest_corner, map_centers
+from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps, draw_maps, farthest, farthest_corner, map_centers
 from refgi.cluster.settings import ValSettings
 from refgi.scene import Geometry
 from refgi.settings import replaced
@@ -28,6 +28,8 @@ def add_maps(recipe: Recipe, settings: ValSettings) -> None:
     _add_views(recipe, settings)
     _add_blockers(recipe, settings)
     _add_depth(recipe, settings)
+    if settings.maps.behind == "dual_paraboloid":
+        _add_depth(recipe, settings, behind=True)
 
     def run(arrays: Arrays, real: Any) -> Arrays:
         depth = np.ascontiguousarray(arrays["maps.depth"], real)
@@ -89,36 +91,39 @@ def _add_blockers(recipe: Recipe, settings: ValSettings) -> None:
                    Bug("triangles on the hull block too", lambda a, r: run(a, r, touching=True), "")))
 
 
-def _add_depth(recipe: Recipe, settings: ValSettings) -> None:
-    chosen = settings.drawn_maps
+def _add_depth(recipe: Recipe, settings: ValSettings, behind: bool = False) -> None:
+    """Add the maps, or those of the hemispheres behind."""
+    chosen, name = settings.drawn_maps, "maps.behind" if behind else "maps.depth"
+    axes, key = (BACKWARD if behind else np.eye(3)), name.replace(".", "__")
 
     def run(arrays: Arrays, real: Any, **how: Any) -> Arrays:
         blockers = selected_blockers(_geometry(arrays), np.asarray(arrays["maps.blocks"]))
         center, frame, ball = (np.ascontiguousarray(arrays[name], np.float64) for name in (*VIEW, "maps.ball"))
-        depth = draw_maps(blockers, center, frame, ball, replaced(chosen, how), real, None)[0]
+        depth = draw_maps(blockers, center, axes @ frame, ball, replaced(chosen, how), real, None)[0]
         depth[np.asarray(arrays["areas.members"]) == 0] = np.inf
-        return {"maps.depth": depth}
+        return {name: depth}
 
     def moved(arrays: Arrays, real: Any) -> Arrays:
         frame, step = arrays["areas.frame"], 2 / chosen.resolution
         turned = frame[:, 2] - step * (frame[:, 0] + frame[:, 1])  # texel centres at 0 near the axis
         return run({**arrays, "areas.frame": np.stack([frame[:, 0], frame[:, 1], turned], axis=1)}, real)
 
-    recipe.add("maps.depth", "distance from each map's centre to the nearest blocker", run,
+    recipe.add("maps.depth_behind" if behind else "maps.depth", "distance from each map's centre to the nearest "
+               "blocker" + (" behind the light: right and forward are turned round" if behind else ""), run,
                (*SCENE, "maps.blocks", *VIEW, "maps.ball", "areas.members"),
-               {"maps.depth": Spec(SHEET, "m", "distance along the texel's direction (2s, 2t, 1 - q) / (1 + q), "
+               {name: Spec(SHEET, "m", "distance along the texel's direction (2s, 2t, 1 - q) / (1 + q), "
                                    "q = s^2 + t^2; inf without blocker, outside the disc, without lights",
                                    paper="VAL Sec. 4.2, E-VAL-06")},
                paper="VAL Sec. 4.2, E-VAL-06, E-VAL-12", exact=("scene.vertices", *VIEW), bugs=(
-                   Bug("rows run upwards", writing(run, maps__depth=lambda a: a[:, ::-1]), "right, down, forward"),
-                   Bug("rows and columns are exchanged", writing(run, maps__depth=lambda a: a.swapaxes(1, 2)), ""),
+                   Bug("rows run upwards", writing(run, **{key: lambda a: a[:, ::-1]}), "right, down, forward"),
+                   Bug("rows and columns are exchanged", writing(run, **{key: lambda a: a.swapaxes(1, 2)}), ""),
                    Bug("texel centres lie at 0 instead of 1/2", moved, "centres at + 1/2"),
-                   Bug("depth along the axis, not distance", writing(run, maps__depth=_axial), "E-VAL-06"),
-                   Bug("directions are linear in the angle", writing(run, maps__depth=_equiangular),
+                   Bug("depth along the axis, not distance", writing(run, **{key: _axial}), "E-VAL-06"),
+                   Bug("directions are linear in the angle", writing(run, **{key: _equiangular}),
                        "s = x / (1 + z), VAL-11"),
                    Bug("surfaces near the centre block", reading(run, maps__ball=np.zeros_like), "E-VAL-12"),
-                   Bug("triangles are left out whole where they reach into the ball",
-                       lambda a, r: run(a, r, near_geometry="planes"), "E-VAL-12"),
+                   *(() if behind else (Bug("triangles are left out whole where they reach into the ball",
+                                            lambda a, r: run(a, r, near_geometry="planes"), "E-VAL-12"),)),
                    Bug("the map of a cluster behind its plane", reading(run, areas__frame=lambda a: a * (
                        (-1,), (1,), (-1,))), "forward is the normal")))
 

@@ -16,6 +16,7 @@ from refgi.vectors.bugs.val_pcf import pcf_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run
 from refgi.vectors.stages.val_maps import shadow_maps_of
+from refgi.vectors.stages.val_projected import BEHIND, of_both, second_map_bugs
 from refgi.vectors.stages.val_search import (
     FACING,
     LIGHT,
@@ -87,12 +88,16 @@ def add_binary(recipe: Recipe, name: str, texels: int) -> None:
                 pcf_tile(shadow, points, facing, len(covered), covered.copy(), made[k].reshape(-1), None)
         return {f"{name}.share": made}
 
+    share, second = f"{name}.share", (BEHIND,) if BEHIND in recipe.specs else ()
+    bugs = _binary_bugs(run, name, texels)
+    if second:
+        bugs = (*(Bug(one.cause, of_both(one.run, share), one.paper) for one in bugs), *second_map_bugs(run, share))
     recipe.facts[f"{name}.test"] = {"side of the kernel, texels": texels, "slack, of the distance": 1e-3,
                                     "of lights without extent, texels": 1}
     recipe.add(name, "V by one depth test, of area lights without extent; 1 elsewhere" if name == "hard" else
                f"V: share of {texels} x {texels} texels that do not hide the pixel; of one for lights without extent",
-               run, (*PIXELS, FACING, "maps.depth", *LIGHT), {f"{name}.share": share_spec()},
-               paper="VAL-03; A.6 P4: receiver's plane, E-VAL-14", bugs=_binary_bugs(run, name, texels))
+               of_both(run, share) if second else run, (*PIXELS, FACING, "maps.depth", *LIGHT, *second),
+               {share: share_spec()}, paper="VAL-03; A.6 P4: receiver's plane, E-VAL-14", bugs=bugs)
 
 
 def _blocker_bugs(run: Any, settings: ValSettings, pcss: Pcss) -> tuple[Bug, ...]:

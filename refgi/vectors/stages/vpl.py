@@ -12,25 +12,41 @@ from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.shadow_rays import RayReceivers, add_unoccluded, fill_shadow_rays, receivers, senders_of
 from refgi.rays import Tracer
 from refgi.scene import Geometry, Scene
+from refgi.truth.imperfect import Imperfect, ImperfectDepth, fill_hidden
+from refgi.truth.vpl import VplSettings
+from refgi.vectors.bugs.imperfect_lookup import hidden_bugs, literal_hidden
 from refgi.vectors.bugs.pair import EQ2, RECEIVERS, pair_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
+from refgi.vectors.stages.vpl_maps import add_maps
 
 GEOMETRY = ("scene.vertices", "scene.faces")
 LIGHTS = ("lights.position", "lights.normal")
 FACING, VISIBLE, LIGHT = "vpl.facing", "vpl.visible", "vpl.irradiance"
+RADIUS = "vpl.point_radius"
 LIFT = 1e-3  # m: ports lift the ends of their rays off the surfaces by up to that; what it decides is masked
 # what shows only where surfaces block the light, or never in these cases
 SHADOWED = ("clamped", "absolute", "at least", "largest light", "first half", "horizon")
 LEAK = 0.05  # m: a lift through which light leaks
 
 
-def add_vpl(recipe: Recipe, scene: Scene) -> None:
-    """Add the visibility of every pixel light from every pixel, and the sum of the visible ones."""
-    recipe.facts["vpl"] = {"largest_lift_of_ray_ends": LIFT}
+def add_vpl(recipe: Recipe, scene: Scene, settings: VplSettings) -> None:
+    """Add the visibility of every pixel light from every pixel, by rays or by maps, and the sum of the visible ones."""
     recipe.factors["number of lights"] = float(recipe.expected()["lights.flux"].shape[1])
+    if settings.maps is None:
+        add_at_receivers(recipe, scene)
+        return
+    recipe.facts["vpl"] = {"largest_lift_of_ray_ends": LIFT}
+    _add_facing(recipe, scene)
+    _add_looked_up(recipe, scene, settings.maps, add_maps(recipe, scene, settings.maps, settings.lights.seed))
+    _add_sum(recipe)
+
+
+def add_at_receivers(recipe: Recipe, scene: Scene) -> None:
+    """Add faces, visibility by rays and the sum of the visible lights at pixels, or at what is in their place."""
+    recipe.facts["vpl"] = {"largest_lift_of_ray_ends": LIFT}
     _add_facing(recipe, scene)
     _add_visible(recipe, scene)
     _add_sum(recipe)
@@ -86,7 +102,7 @@ class _Rays:
         facing = np.ascontiguousarray(np.asarray(arrays[FACING], np.float32).reshape(3, -1)[:, to.pixel])
         position, normal = (np.asarray(arrays[name], np.float64) for name in LIGHTS)
         sent = PixelLights(position + lift * normal, normal, np.ones_like(normal), None, None, None, normal.shape[1])
-        senders = senders_of(sent)  # lobes do not count: where they fade out is no question of visibility
+        senders = self.senders = senders_of(sent)  # where lobes fade out is no question of visibility
         self.to = to._replace(facing=facing, origin=(to.origin + np.float32(lift) * facing).astype(np.float32))
         self.count, self.shape = senders.flux.shape[1], np.asarray(arrays[RECEIVERS[2]]).shape
         pairs = len(to.pixel) * self.count
@@ -100,8 +116,12 @@ class _Rays:
         blocked = np.ones(len(reach), np.bool_)
         self.tracer.fill_occluded(self.origin if origin is None else origin,
                                   self.direction if direction is None else direction, reach, blocked)
+        return self.placed(~blocked.reshape(len(self.to.pixel), self.count))
+
+    def placed(self, seen: Array) -> Array:
+        """Return what pairs (pixel with a surface, light) see as (light, row, column)."""
         whole = np.zeros((self.count, self.shape[0] * self.shape[1]), np.bool_)
-        whole[:, self.to.pixel] = ~blocked.reshape(len(self.to.pixel), self.count).T
+        whole[:, self.to.pixel] = seen.T
         return whole.reshape(self.count, *self.shape)
 
 
@@ -146,10 +166,42 @@ def _add_visible(recipe: Recipe, scene: Scene) -> None:
                    Bug("rays end halfway", traced(lambda rays: rays.visible(0.5 * rays.reach)), "V")))
 
 
+def _add_looked_up(recipe: Recipe, scene: Scene, settings: Imperfect, maps: str) -> None:
+    def seen(rays: _Rays, hidden: Array) -> Arrays:
+        return {VISIBLE: rays.placed(~hidden.reshape(len(rays.to.pixel), rays.count))}
+
+    def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 one precision: double
+        rays = _Rays(arrays, scene)
+        depth, hidden = np.ascontiguousarray(arrays[maps], np.float64), np.zeros(len(rays.reach), np.bool_)
+        found = ImperfectDepth(depth, float(arrays[RADIUS][0]), settings.bias)
+        fill_hidden(found, rays.to, (0, len(rays.to.pixel)), rays.senders, (0, rays.count), rays.reach, hidden)
+        return seen(rays, hidden)
+
+    def by(how: dict[str, Any]) -> Run:
+        def altered(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+            rays, knobs = _Rays(arrays, scene), {"bias": settings.bias} | how
+            hidden = literal_hidden(np.asarray(arrays["vpl.frame"], np.float64), np.asarray(arrays[maps], np.float64),
+                                    float(arrays[RADIUS][0]), points=np.asarray(rays.to.position, np.float64),
+                                    facing=np.asarray(rays.to.facing, np.float64),
+                                    position=np.asarray(arrays[LIGHTS[0]], np.float64), **knobs)
+            return seen(rays, hidden | (rays.reach.reshape(hidden.shape) <= 0))
+
+        return altered
+
+    recipe.add("vpl.visible", "whether each pixel is no farther from each pixel light than the light's map says, by "
+               "more than the bias", run,
+               (*GEOMETRY, *RECEIVERS, FACING, *LIGHTS, "vpl.frame", maps, RADIUS), {VISIBLE: Spec(
+                   "light, row, column", "1", "true where the normals of light and pixel and the pixel's face look at "
+                   "the other and the texel does not hide the pixel", tier="T0")},
+               paper="Ritschel et al. 2008, Sec. 3", exact=(maps,), bugs=(
+                   *hidden_bugs(by, settings.bias),
+                   Bug("visibility is inverted", writing(run, vpl__visible=np.logical_not), "V = 1: nothing between"),
+                   Bug("lights are in reverse order", writing(run, vpl__visible=lambda a: a[::-1]),
+                       "light, row, column")))
+
+
 def _sends(rays: _Rays) -> Array:
-    whole = np.zeros((rays.count, rays.shape[0] * rays.shape[1]), np.bool_)
-    whole[:, rays.to.pixel] = rays.reach.reshape(len(rays.to.pixel), rays.count).T > 0
-    return whole.reshape(rays.count, *rays.shape)
+    return rays.placed(rays.reach.reshape(len(rays.to.pixel), rays.count) > 0)
 
 
 def _add_sum(recipe: Recipe) -> None:

@@ -17,7 +17,7 @@ from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.settings import changed, leaves, of, replaced
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
 from refgi.splat.multires import ByError
-from refgi.splat.multires.multires import _halved, light_areas
+from refgi.splat.multires.multires import halved, light_areas
 from refgi.splat.multires.refinement.grid import representatives
 from refgi.splat.multires.settings import PRESETS
 from refgi.stages import observe
@@ -160,7 +160,7 @@ def test_slivers_between_doubled_pixels_take_the_light_around():
     covered, fine = np.ones((1, 3), bool), np.ones((2, 6), bool)
     fine[:, 2:4] = False
     light = np.where(fine, np.array([1.0, 1, 9, 9, 3, 3]), 0)[None].repeat(3, axis=0)
-    np.testing.assert_array_equal(_halved(light, fine, covered), [[[1, 2, 3]]] * 3)
+    np.testing.assert_array_equal(halved(light, fine, covered), [[[1, 2, 3]]] * 3)
 
 
 @pytest.mark.parametrize(("change", "clamp"), [

@@ -60,12 +60,36 @@ def see(scene: Scene, method: str, settings: Settings, options: dict[str, Any]) 
 
 
 def unsound(light: Array) -> int:
-    """Return how many pixels hold NaN, an infinity or a negative number."""
+    """Return how many pixels hold NaN, an infinity or a negative number.
+
+    Parameters
+    ----------
+    light : (3, h, w) ndarray
+        Irradiance, W/m^2.
+
+    Returns
+    -------
+    int
+        0 where all is light.
+    """
     return int(np.count_nonzero(~(np.isfinite(light) & (light >= 0)).all(axis=0)))
 
 
 def same_surface(before: Seen, after: Seen, changed: Changed) -> Array:
-    """Return which pixels of the part show the same place in both pictures, (h, w)."""
+    """Return which pixels of the part show the same place in both pictures, (h, w).
+
+    Parameters
+    ----------
+    before, after : Seen
+        The pictures.
+    changed : Changed
+        What was done between them.
+
+    Returns
+    -------
+    (h, w) ndarray of bool
+        Depths within 1e-4 of each other, and the same albedo.
+    """
     depth, albedo = before.depth[changed.part], before.albedo[:, *changed.part]
     other = changed.back(after.depth, light=False) / changed.length
     colour = changed.back(after.albedo, light=False)
@@ -75,12 +99,38 @@ def same_surface(before: Seen, after: Seen, changed: Changed) -> Array:
 
 
 def bits_apart(before: Seen, after: Seen, changed: Changed) -> int:
-    """Return how many pixels of the part differ by a bit."""
+    """Return how many pixels of the part differ by a bit.
+
+    Parameters
+    ----------
+    before, after : Seen
+        The pictures.
+    changed : Changed
+        What was done between them.
+
+    Returns
+    -------
+    int
+        Pixels.
+    """
     return int(np.count_nonzero((before.light[:, *changed.part] != changed.back(after.light)).any(axis=0)))
 
 
 def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:
-    """Return the RMSE over all pixels that show the same place, over the mean of the picture before."""
+    """Return the RMSE over all pixels that show the same place, over the mean of the picture before.
+
+    Parameters
+    ----------
+    before, after : Seen
+        The pictures.
+    changed : Changed
+        What was done between them.
+
+    Returns
+    -------
+    float
+        1; infinity where the picture before is black and that after is not.
+    """
     first = before.light[:, *changed.part].astype(np.float64)
     apart = changed.back(after.light.astype(np.float64)) - first
     kept = same_surface(before, after, changed)
@@ -91,7 +141,20 @@ def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:
 
 
 def means_apart(before: Seen, after: Seen, changed: Changed) -> float:
-    """Return how far the means over pixels with a surface are apart, over that before; pictures of any size."""
+    """Return how far the means over pixels with a surface are apart, over that before; pictures of any size.
+
+    Parameters
+    ----------
+    before, after : Seen
+        The pictures.
+    changed : Changed
+        What was done between them.
+
+    Returns
+    -------
+    float
+        1; infinity where only one of the two is black.
+    """
     first, second = (seen.light[:, np.isfinite(seen.depth)].astype(np.float64) for seen in (before, after))
     if not first.any() and not second.any():
         return 0.0
@@ -100,7 +163,20 @@ def means_apart(before: Seen, after: Seen, changed: Changed) -> float:
 
 
 def estimates_apart(before: Seen, after: Seen, changed: Changed) -> tuple[float, float]:
-    """Return the largest |t| of the picture means of two estimates over channels, and its degrees of freedom."""
+    """Return the largest |t| of the picture means of two estimates over channels, and its degrees of freedom.
+
+    Parameters
+    ----------
+    before, after : Seen
+        The pictures.
+    changed : Changed
+        What was done between them.
+
+    Returns
+    -------
+    tuple of 2 floats
+        |t| and degrees of freedom.
+    """
     first, second = before.estimate, after.estimate
     apart = np.abs(first.picture_mean - second.picture_mean / changed.flux)
     variance = first.picture_variance + second.picture_variance / changed.flux**2

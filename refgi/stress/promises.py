@@ -17,7 +17,7 @@ from refgi.settings import Settings, from_text
 from refgi.stress.changes import Change, NotPromisedError, Promise
 from refgi.stress.rows import Kind
 
-__all__ = ["FEW", "UNBOUNDED", "UNLIKELY", "Asked", "asked", "settings_of", "surfaces"]
+__all__ = ["FEW", "SURFACES", "UNBOUNDED", "UNLIKELY", "Asked", "asked", "settings_of", "surfaces"]
 
 NONE: Mapping[str, Any] = MappingProxyType({})
 FILE = Path(__file__).parent / "files" / "observed.json"
@@ -117,7 +117,18 @@ def _other_maps(change: str, scene: Scene) -> str:
 
 
 def surfaces(change: Change) -> Asked:
-    """Return what is promised of the surfaces that pixels show after a change."""
+    """Return what is promised of the surfaces that pixels show after a change.
+
+    Parameters
+    ----------
+    change : Change
+        The change.
+
+    Returns
+    -------
+    Asked
+        Promise and limit.
+    """
     if change.promise == "bits" or change.name in ("hidden plane", "two lamps of half"):
         return Asked("bits", source="no place is rounded")
     limit, source = _observed(SURFACES, change.name)
@@ -125,7 +136,20 @@ def surfaces(change: Change) -> Asked:
 
 
 def settings_of(method: str, pairs: tuple[str, ...]) -> Settings:
-    """Return a method's settings with some changed."""
+    """Return a method's settings with some changed.
+
+    Parameters
+    ----------
+    method : str
+        Short name of the method.
+    pairs : tuple of str
+        Such as ``lights=64``.
+
+    Returns
+    -------
+    Settings
+        The method's.
+    """
     from refgi.methods import find_method
 
     settings: Settings = from_text(find_method(method).settings(), pairs)

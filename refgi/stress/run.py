@@ -16,13 +16,13 @@ from refgi.scene.values import Array
 from refgi.stress.changes import CHANGES, Change, Changed, NotPromisedError
 from refgi.stress.energy import largest_bounce
 from refgi.stress.judge import Seen, bits_apart, estimates_apart, means_apart, rmse_apart, same_surface, see, unsound
-from refgi.stress.promises import FEW, UNBOUNDED, UNLIKELY, Asked, asked, settings_of, surfaces
+from refgi.stress.promises import FEW, SURFACES, UNBOUNDED, UNLIKELY, Asked, asked, settings_of, surfaces
 from refgi.stress.rows import Row
 
 __all__ = ["Found", "Shown", "stress"]
 
 Tell = Callable[[str, float], None]
-PART, SURFACES = "pictures", "visible surfaces"
+PART = "pictures"
 SIGMAS = 4.0  # of an estimate, that it may lie above what light can bring
 
 

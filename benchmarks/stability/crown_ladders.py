@@ -1,0 +1,104 @@
+"""Ladders of the crown (hssil): the form factors of Eq. 3 and 4, and the surface that a pixel shows (Eq. 2).
+
+Formulas are those of docs/methods/hssil.md: with R^2 the projected area over pi of what a sample stands for,
+cos(theta) R^2 / (r^2 + R^2) (Eq. 4), the same with the texel's own R^2 below the bar, and cos(theta) R^2 / r^2 (Eq. 3).
+"""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.stability.inputs import BLOCK, around, directions, sizes, some
+from benchmarks.stability.ladder import Ladder
+from benchmarks.stability.maths import dot
+from benchmarks.stability.pair_ladders import filled
+from refgi.jit import kernel
+from refgi.sssil.crown.add import DISC, POINT, TEXEL, term
+from refgi.sssil.pyramid.view import GRAZING, pixel_surface
+
+Array = npt.NDArray[Any]
+NEAREST, FARTHEST = 1e-7, 1e9  # m
+DOMAIN = "r 1e-7 .. 1e9 m, areas 1e-6 .. 10 r^2, 1 .. 10 texels a sample"
+
+
+@kernel
+def _points(x: Array, out: Array) -> None:
+    for i in range(x.shape[1]):
+        out[0, i] = term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i], x[9, i],
+                         x[10, i], x[11, i], x[12, i], POINT)
+
+
+@kernel
+def _texels(x: Array, out: Array) -> None:
+    for i in range(x.shape[1]):
+        out[0, i] = term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i], x[9, i],
+                         x[10, i], x[11, i], x[12, i], TEXEL)
+
+
+@kernel
+def _discs(x: Array, out: Array) -> None:
+    for i in range(x.shape[1]):
+        out[0, i] = term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i], x[9, i],
+                         x[10, i], x[11, i], x[12, i], DISC)
+
+
+@kernel
+def _surfaces(x: Array, out: Array) -> None:
+    for i in range(x.shape[1]):
+        out[0, i] = pixel_surface(x[0, i], x[1, i], x[2, i])
+
+
+def draw(rng: np.random.Generator, real: Any) -> Array:
+    """Return receiver (position, normal), sample (position, reversed normal times area / pi) and its texels."""
+    w, r = directions(rng), sizes(rng, NEAREST, FARTHEST)
+    # places around the origin as far off as the pair is wide; some receivers at the origin, some samples upon them
+    start = r * directions(rng) * rng.choice([0.0, 1.0], BLOCK)
+    facing, area = around(rng, w, real), r * r * sizes(rng, 1e-6, 10.0)
+    end = np.where(rng.random(BLOCK) < 0.02, start, start + r * w)
+    return np.concatenate([start, around(rng, w, real), end, facing * area / np.pi,
+                           np.ceil(sizes(rng, 1.0, 10.0))[None]])
+
+
+def form(which: int, clamps: bool, m: Any, x: Any) -> Any:
+    d = [b - a for a, b in zip(x[:3], x[6:9], strict=True)]
+    square = dot(d, d)
+    square = np.where(square > 0, square, 1)
+    r = m.sqrt(square)
+    cosine, radius = dot(x[3:6], d) / r, dot(x[9:12], d) / r  # cos(theta), R^2 of one texel
+    if clamps:
+        cosine, radius = np.maximum(cosine, 0), np.maximum(radius, 0)
+    shown = radius * x[12]
+    spread = np.maximum({POINT: 0 * shown, TEXEL: radius, DISC: shown}[which], 0)
+    return [cosine * shown / (square + spread)]
+
+
+def underflow(m: Any, x: Any, real: Any) -> Any:
+    """Return what a product c s below the smallest normal number may lose: its rounding, divided by r^4."""
+    d = [b - a for a, b in zip(x[:3], x[6:9], strict=True)]
+    square = dot(d, d)
+    lost = 8 * m.number(np.float64(np.finfo(real).smallest_subnormal))
+    return np.where(square > 0, lost / np.where(square > 0, square * square, 1), 0)
+
+
+def draw_surfaces(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    facing = np.maximum(sizes(rng, 1e-9, 1.0), 1.01 * GRAZING)
+    return np.stack([sizes(rng, 1e-15, 1e9), some(rng, facing, 1.0), sizes(rng, 1e-12, 10.0)])
+
+
+def surface(m: Any, x: Any) -> Any:  # noqa: ARG001
+    return [x[0] * x[0] * x[2] / x[1]]
+
+
+def _ladder(name: str, which: int, run: Any) -> Ladder:
+    return Ladder(f"crown.{name}", DOMAIN, draw, filled(run), partial(form, which, True), 14.0,
+                  source="14 roundings, each at most one ULP: r^4 by 6, c and s by 3 each that count once, 2 products",
+                  smooth=partial(form, which, False), floor=underflow, extended=2_000_000)
+
+
+LADDERS = (
+    _ladder("point", POINT, _points), _ladder("texel", TEXEL, _texels), _ladder("disc", DISC, _discs),
+    Ladder("crown.area", "depth 1e-15 .. 1e9 m, facing 1 .. what counts as grazing", draw_surfaces, filled(_surfaces),
+           surface, reals=("float64",)),
+)

@@ -44,6 +44,7 @@ class Ladder(NamedTuple):
     smooth: Formula | None = None  # the formula without its clamps, for the condition
     unit: Literal["last place", "one", "float32"] = "last place"  # ULP of the answer, of 1, of the answer in float32
     conditioned: bool = True  # False: the error itself is promised
+    scale: Callable[[Maths, Sequence[Any], Any], Any] | None = None  # unit of its own, in place of `unit`
     floor: Callable[[Maths, Sequence[Any], Any], Any] | None = None  # what rounding to subnormal numbers may take
     reals: tuple[str, ...] = ("float32", "float64")
     extended: int = 1_000_000  # cases in longdouble, 0: the formula loses digits in it
@@ -128,6 +129,8 @@ def errors(ladder: Ladder, maths: Maths, real: str, x: Array, got: Array) -> tup
         error = np.stack([_extended(abs(maths.number(g) - e)) for g, e in zip(got, exact, strict=True)])
         if ladder.floor is not None:
             error = np.maximum(error - _extended(ladder.floor(maths, numbers, REAL[real])), 0)
+    if ladder.scale is not None:
+        return error, np.broadcast_to(_extended(ladder.scale(maths, numbers, REAL[real])), error.shape)
     if ladder.unit == "one":
         return error, np.full_like(error, spacing(np.ones(1), REAL[real])[0])
     of = np.float32 if ladder.unit == "float32" else REAL[real]
@@ -156,8 +159,8 @@ def _extended(values: Any) -> Array:
     """Return numbers of either kind as longdouble; of those with more digits what float64 holds, twice over."""
     if getattr(values, "dtype", None) == object:
         high = values.astype(np.float64)
-        rest = np.array([float(v - h) if np.isfinite(h) else 0.0 for v, h in zip(values, high, strict=True)])
-        return np.asarray(high.astype(np.longdouble) + rest)
+        rest = [float(v - h) if np.isfinite(h) else 0.0 for v, h in zip(values.ravel(), high.ravel(), strict=True)]
+        return np.asarray(high.astype(np.longdouble) + np.reshape(rest, high.shape))
     return np.asarray(values, np.longdouble)
 
 
@@ -170,7 +173,7 @@ def rows(ladder: Ladder, short: bool) -> Iterable[Row]:
         found = [measure(ladder, maths, real, seed, count)
                  for maths, seed, count in ((EXTENDED, SEED, extended), (DIGITS, SEED + 1, exact)) if count]
         worst = found[int(np.argmax([np.inf if np.isnan(w.figure) else w.figure for w in found]))]
-        unit = {"last place": "ULP", "one": "ULP of 1", "float32": "ULP of float32"}[ladder.unit]
+        unit = "of the unit" if ladder.scale else {"last place": "ULP", "one": "ULP of 1", "float32": "ULP of float32"}[ladder.unit]
         yield Row(part="kernels", property=f"{real} kernel against its formula", subject=ladder.name,
                   domain=ladder.domain, figure=worst.figure, unit=f"{unit} x condition" if ladder.conditioned else unit,
                   limit=ladder.limit, kind=ladder.kind, source=ladder.source, cases=sum(w.cases for w in found),

@@ -29,6 +29,7 @@ from refgi.rsm.raster.projection import (
 
 Array = npt.NDArray[Any]
 HEIGHT, WIDTH, HALF, FACE = 600, 800, (0.8, 0.6), 1024
+MAP = "4 ULP of one input or of the answer, beyond 4 ULP of the map's size"
 # forward and up of the faces of a cube: docs/conventions.md
 FACES = (((1, 0, 0), (0, 1, 0)), ((-1, 0, 0), (0, 1, 0)), ((0, 1, 0), (0, 0, 1)), ((0, -1, 0), (0, 0, -1)),
          ((0, 0, 1), (0, 1, 0)), ((0, 0, -1), (0, 1, 0)))
@@ -99,7 +100,7 @@ def point(kind: int, m: Any, x: Any) -> Any:
     u, v, z = dot(p, x[6:9]), dot(p, x[9:12]), dot(p, x[12:15])
     half, depth, scale = HALF, z, z
     if kind == PARABOLOID:
-        half, depth = (1.0, 1.0), m.sqrt(dot(p, p))
+        half, depth = (1.0, 1.0), m.sqrt(u * u + v * v + z * z)
         scale = depth + z
     halves = [m.number(np.float64(h)) for h in half]
     return [(u / scale / halves[0] + 1) / 2 * WIDTH, (v / scale / halves[1] + 1) / 2 * HEIGHT, depth]
@@ -160,15 +161,32 @@ def volume(m: Any, x: Any) -> Any:  # noqa: ARG001
     return [dot(x[3:6], cross(a, b))]
 
 
+def products(m: Any, x: Any, real: Any) -> Any:
+    """Return half an ULP of the six products of a volume, all taken as positive."""
+    a, b = ([abs(p - o) for p, o in zip(x[k : k + 3], x[:3], strict=True)] for k in (6, 9))
+    d = [abs(c) for c in x[3:6]]
+    total = sum(d[i] * (a[j] * b[k] + a[k] * b[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)))
+    return total * m.number(np.float64(np.finfo(real).eps / 2))
+
+
+def of_the_map(m: Any, x: Any, real: Any) -> Any:
+    """Return 4 ULP of the map's size for columns and rows: they count from its edge, images from its middle."""
+    eps = 4 * float(np.finfo(real).eps)
+    return np.stack([0 * x[0] + m.number(np.float64(size * eps)) for size in (WIDTH, HEIGHT, 0)])
+
+
 LADDERS = (
     Ladder("map.perspective", "1e-6 .. 1e6 m away, origins to 100 times as far off", partial(draw_points, PERSPECTIVE),
-           partial(points, PERSPECTIVE), partial(point, PERSPECTIVE), reals=("float64",), lowest=-1e-3),
+           partial(points, PERSPECTIVE), partial(point, PERSPECTIVE), source=MAP, floor=of_the_map,
+           reals=("float64",), lowest=-1e-3),
     Ladder("map.paraboloid", "1e-6 .. 1e6 m away, to 0.999 of the rim", partial(draw_points, PARABOLOID),
-           partial(points, PARABOLOID), partial(point, PARABOLOID), reals=("float64",), lowest=-1e-3),
+           partial(points, PARABOLOID), partial(point, PARABOLOID), source=MAP, floor=of_the_map,
+           reals=("float64",), lowest=-1e-3),
     Ladder("map.cube", "1e-6 .. 1e6 m away, 1e-9 of the edges and farther", draw_cube, cubes, cube,
            reals=("float64",), lowest=-1e-3),
     Ladder("map.paraboloid_ray", "the unit disc, to the rim", draw_image, filled(_rays, 3), paraboloid_ray, 6.0,
            source="6 roundings, each at most one ULP", lowest=-1.0),
-    Ladder("map.barycentric", "edges 1e-12 .. 1e6 m, needles, rays upon edges", draw_edges, filled(_volumes), volume,
-           reals=("float64",), lowest=-np.inf),
+    Ladder("map.barycentric", "edges 1e-12 .. 1e6 m, needles, rays upon edges", draw_edges, filled(_volumes), volume, 7.0,
+           source="7 roundings of half an ULP of the six products (the unit)", scale=products, conditioned=False,
+           reals=("float64",), lowest=-np.inf, extended=4_000_000),
 )

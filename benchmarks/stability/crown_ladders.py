@@ -94,7 +94,7 @@ def surface(m: Any, x: Any) -> Any:  # noqa: ARG001
 def _ladder(name: str, which: int, run: Any) -> Ladder:
     return Ladder(f"crown.{name}", DOMAIN, draw, filled(run), partial(form, which, True), 14.0,
                   source="14 roundings, each at most one ULP: r^4 by 6, c and s by 3 each that count once, 2 products",
-                  smooth=partial(form, which, False), floor=underflow, extended=2_000_000)
+                  smooth=partial(form, which, False), floor=underflow, extended=2_000_000, brief=3 * BLOCK)
 
 
 LADDERS = (

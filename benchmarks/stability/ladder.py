@@ -49,6 +49,7 @@ class Ladder(NamedTuple):
     reals: tuple[str, ...] = ("float32", "float64")
     extended: int = 1_000_000  # cases in longdouble, 0: the formula loses digits in it
     exact: int = 10_000  # with 50 digits
+    brief: int = 100_000  # most in longdouble in the short form, where 200 have 50 digits
     fixed: tuple[int, ...] = ()  # inputs that are settings, not measured: the condition leaves them alone
     lowest: float = 0.0  # no output is below it
 
@@ -166,7 +167,7 @@ def _extended(values: Any) -> Array:
 
 def rows(ladder: Ladder, short: bool) -> Iterable[Row]:
     """Yield a row for each type, and one that counts what is no number."""
-    extended = min(ladder.extended, 100_000) if short else ladder.extended
+    extended = min(ladder.extended, ladder.brief) if short else ladder.extended
     exact = min(ladder.exact, 200) if short else ladder.exact
     bad, first_bad, cases = 0, (SEED, 0), 0
     for real in ladder.reals:

@@ -242,7 +242,7 @@ LADDERS = (
            conditioned=False, extended=400_000, exact=2000),
     Ladder("val.z_avg", "two depths of any share, d 0 .. 1, 4 terms", draw_means, penumbras, penumbra, 16.0,
            source="that of val.step, over the blocked share, which the condition knows",
-           smooth=penumbra_whole, unit="one", extended=200_000, exact=1000),
+           smooth=penumbra_whole, unit="one", extended=200_000, exact=1000, brief=BLOCK),
     Ladder("val.scale", "distances 1e-9 .. 1e9 m, ratios 1.05 .. 2^20", draw_scales, to_series, scale,
            extended=2_000_000),
     Ladder("val.scale_straight", "distances 1e-9 .. 1e9 m", draw_straight, to_series_straight, scale_straight,

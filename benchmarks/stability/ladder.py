@@ -27,6 +27,7 @@ Formula = Callable[[Maths, Sequence[Any]], Sequence[Any]]
 SEED = 17
 THREADS = 2
 FIRST = 256  # cases whose condition is found first
+UNITS = {"last place": "ULP", "one": "ULP of 1", "float32": "ULP of float32"}
 REAL = {"float32": np.float32, "float64": np.float64}
 
 
@@ -101,10 +102,10 @@ def worst_of_block(ladder: Ladder, maths: Maths, real: str, x: Array, got: Array
     """Return figure, place, error in ULP and condition of the worst of some cases."""
     error, unit = errors(ladder, maths, real, x, got)
     with np.errstate(invalid="ignore"):
-        ulp = np.where(error > 0, error / unit, 0.0)  # (outputs, n)
+        ulp = np.where(error == 0, 0.0, error / unit)  # (outputs, n); NaN stays
     order = np.argsort(np.where(np.isnan(ulp), np.inf, ulp).max(axis=0))[::-1]
-    if not ladder.conditioned:
-        where = int(order[0])
+    if not ladder.conditioned or np.isnan(ulp).any():
+        where = int(np.argmax(np.isnan(ulp).any(axis=0))) if np.isnan(ulp).any() else int(order[0])
         return float(ulp[:, where].max()), where, float(ulp[:, where].max()), 1.0
     worst = (0.0, int(order[0]), 0.0, 1.0)
     for first, last in pairwise((0, FIRST, len(order))):
@@ -174,7 +175,7 @@ def rows(ladder: Ladder, short: bool) -> Iterable[Row]:
         found = [measure(ladder, maths, real, seed, count)
                  for maths, seed, count in ((EXTENDED, SEED, extended), (DIGITS, SEED + 1, exact)) if count]
         worst = found[int(np.argmax([np.inf if np.isnan(w.figure) else w.figure for w in found]))]
-        unit = "of the unit" if ladder.scale else {"last place": "ULP", "one": "ULP of 1", "float32": "ULP of float32"}[ladder.unit]
+        unit = "of the unit" if ladder.scale else UNITS[ladder.unit]
         yield Row(part="kernels", property=f"{real} kernel against its formula", subject=ladder.name,
                   domain=ladder.domain, figure=worst.figure, unit=f"{unit} x condition" if ladder.conditioned else unit,
                   limit=ladder.limit, kind=ladder.kind, source=ladder.source, cases=sum(w.cases for w in found),

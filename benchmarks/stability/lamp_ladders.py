@@ -69,7 +69,7 @@ def draw_edges(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return np.stack([span * rng.uniform(-0.1, 1.1, BLOCK), np.where(rng.random(BLOCK) < 0.02, 0.0, span)])
 
 
-def edge(m: Any, x: Any) -> Any:
+def edge(m: Any, x: Any) -> Any:  # noqa: ARG001
     """A span of 0 is a step; what is at its edge counts as inside."""
     wide = np.where(x[1] > 0, x[1], 1)
     t = np.minimum(np.maximum(np.where(x[1] > 0, x[0] / wide, np.where(x[0] >= 0, 1, 0)), 0), 1)
@@ -175,8 +175,8 @@ LADDERS = (
            falloffs(np.inf), falloff, 8.0, source="8 ULP, as the kernel promises, without a condition",
            conditioned=False, reals=("float64",), extended=0, fixed=(OUTER, INNER)),
     Ladder("spot.falloff32", "half-angles 1e-6 rad .. 90 degrees, to 5e-15 of the edge", draw_falloffs,
-           falloffs(FOR_FLOAT32), falloff, 8.0, source="8 ULP of float32, as the kernel promises, without a condition", unit="float32",
-           conditioned=False, reals=("float64",), extended=0, fixed=(OUTER, INNER)),
+           falloffs(FOR_FLOAT32), falloff, 8.0, source="8 ULP of float32, as the kernel promises, without a condition",
+           unit="float32", conditioned=False, reals=("float64",), extended=0, fixed=(OUTER, INNER)),
     Ladder("solid_angle.perspective", "corners 1e-12 .. 1e6", draw_corners, filled(_perspective_corners),
            perspective_corner, lowest=-np.inf),
     Ladder("solid_angle.paraboloid", "corners 1e-9 .. 1", draw_disc, filled(_paraboloid_corners), paraboloid_corner,

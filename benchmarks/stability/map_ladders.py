@@ -186,7 +186,7 @@ LADDERS = (
            reals=("float64",), lowest=-1e-3, brief=3 * BLOCK),
     Ladder("map.paraboloid_ray", "the unit disc, to the rim", draw_image, filled(_rays, 3), paraboloid_ray, 6.0,
            source="6 roundings, each at most one ULP", lowest=-1.0),
-    Ladder("map.barycentric", "edges 1e-12 .. 1e6 m, needles, rays upon edges", draw_edges, filled(_volumes), volume, 7.0,
-           source="7 roundings of half an ULP of the six products (the unit)", scale=products, conditioned=False,
+    Ladder("map.barycentric", "edges 1e-12 .. 1e6 m, needles, rays upon edges", draw_edges, filled(_volumes), volume,
+           7.0, source="7 roundings of half an ULP of the six products (the unit)", scale=products, conditioned=False,
            reals=("float64",), lowest=-np.inf, extended=4_000_000),
 )

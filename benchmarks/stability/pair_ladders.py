@@ -96,23 +96,23 @@ def _parts(x: Any) -> Any:
     return np.where(square > 0, square, 1), dot(d, x[3:6]), dot(d, x[6:9])
 
 
-def term(m: Any, x: Any) -> Any:
+def term(m: Any, x: Any) -> Any:  # noqa: ARG001
     square, light, receiver = _parts(x)
     return [np.maximum(light, 0) * np.maximum(receiver, 0) / (square * square)]
 
 
-def term_unclamped(m: Any, x: Any) -> Any:
+def term_unclamped(m: Any, x: Any) -> Any:  # noqa: ARG001
     square, light, receiver = _parts(x)
     return [light * receiver / (square * square)]
 
 
-def clamped(m: Any, x: Any) -> Any:
+def clamped(m: Any, x: Any) -> Any:  # noqa: ARG001
     square, light, receiver = _parts(x)
     below = square * (np.maximum(square, x[9]) + x[10])
     return [np.minimum(np.maximum(light, 0) * np.maximum(receiver, 0) / below, x[11])]
 
 
-def clamped_smooth(m: Any, x: Any) -> Any:
+def clamped_smooth(m: Any, x: Any) -> Any:  # noqa: ARG001
     square, light, receiver = _parts(x)
     return [light * receiver / (square * (np.maximum(square, x[9]) + x[10]))]
 
@@ -147,7 +147,7 @@ def flushed(m: Any, x: Any, real: Any) -> Any:
     return np.where(power(m, x)[0] < 2 * m.number(np.float64(tiny)), tiny, 0.0)
 
 
-def draw_norms(rng: np.random.Generator, real: Any) -> Array:
+def draw_norms(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     """Return cosines from 1 down to where 1e-11 of the lobe is left above the surface, and exponents."""
     exponent = some(rng, sizes(rng, 1e-3, 1e4), 0.0)
     near = np.exp(rng.uniform(np.log(1e-9), 0, BLOCK)) * rng.choice([-1.0, 1.0], BLOCK)
@@ -158,13 +158,13 @@ def draw_norms(rng: np.random.Generator, real: Any) -> Array:
 
 
 def norm(m: Any, x: Any) -> Any:
-    """(P + 1) / (2 pi K), K = 1 - I / 2 with I the regularised incomplete beta function of sin^2, (P + 1) / 2 and 1/2."""
+    """(P + 1) / (2 pi K), K = 1 - I / 2; I the regularised incomplete beta function of sin^2, (P + 1) / 2 and 1/2."""
     half = m.beta(np.maximum(1 - x[0] * x[0], 0), (x[1] + 1) / 2) / 2
     fraction = np.where(x[0] >= 0, 1 - half, half)
     return [np.where(fraction > LEAST_FRACTION, (x[1] + 1) / (2 * m.pi * fraction), 0 * x[0])]
 
 
-def draw_offsets(rng: np.random.Generator, real: Any) -> Array:
+def draw_offsets(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     sign = rng.choice([-1.0, 1.0], (3, BLOCK))
     return np.stack([*(some(rng, sizes(rng, 1e-30, 1e30) * s, 0.0) for s in sign), sizes(rng, 1e-30, 1e30)])
 

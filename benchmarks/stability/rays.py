@@ -1,8 +1,8 @@
 """Part `rays`: rays inside closed meshes that must hit, rays off their faces that must not, by both ways to Embree.
 
 The bare path (`fill_closest`, `fill_occluded`) is what estimators use; the checked one (`closest`, `occluded`) decides
-in float64 whatever the bare path lets through. A mesh is measured in sizes from 1e-6 to 1e8 m. Rays come in chunks, each
-of one size, so that case `i` of a seed is the same in every run.
+in float64 whatever the bare path lets through. A mesh is measured in sizes from 1e-6 to 1e8 m. Rays come in chunks,
+each of one size, so that case `i` of a seed is the same in every run.
 
 A bounce ray that slips through a closed surface loses the radiance it should have found, a shadow ray adds light that
 is not there; which rays slip has nothing to do with their radiance, so the bare path's share of misses is the relative
@@ -159,7 +159,8 @@ def rows(mesh: str, way: str, kind: str, total: int) -> Iterable[Row]:
     text = {"random": "random rays from inside", "aimed": "rays from inside at vertices and edges",
             "leaving": "rays off faces, 1e-6 above them and more", "between": "segments between inner sides"}[kind]
 
-    def row(prop: str, figure: float, limit: float, unit: str, how: tuple[Any, str], case: int, detail: str = "") -> Row:
+    def row(prop: str, figure: float, limit: float, unit: str, how: tuple[Any, str], case: int,
+            detail: str = "") -> Row:
         return Row(part="rays", property=prop, subject=f"Embree by {way}", scene=mesh,
                    domain=f"{text}; sizes 1e-6 .. 1e8 m", figure=figure, unit=unit, limit=limit, kind=how[0],
                    source=how[1], cases=found.rays, seed=SEED, detail=detail,

@@ -1,8 +1,8 @@
 """Ladders of val: basis and series of convolution shadow maps, mean depth of blockers, depth scale, filter widths.
 
 Formulas are those of docs/methods/val_visibility.md: f = 1/2 + sum_k w_k sin(c_k (z - d)), w_k = 2 / c_k,
-c_k = (2 k - 1) pi; z_avg = (Z / 2 - sum_k w_k (cos(c_k d) SZ_k - sin(c_k d) CZ_k)) / (1 - V); and the disc of a cone on a
-stereographic map. Depths of the series are numbers of [0, 1], so its units are those of 1.
+c_k = (2 k - 1) pi; z_avg = (Z / 2 - sum_k w_k (cos(c_k d) SZ_k - sin(c_k d) CZ_k)) / (1 - V); and the disc of a cone
+on a stereographic map. Depths of the series are numbers of [0, 1], so its units are those of 1.
 """
 
 import math

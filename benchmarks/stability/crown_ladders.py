@@ -4,19 +4,22 @@ Formulas are those of docs/methods/hssil.md: with R^2 the projected area over pi
 cos(theta) R^2 / (r^2 + R^2) (Eq. 4), the same with the texel's own R^2 below the bar, and cos(theta) R^2 / r^2 (Eq. 3).
 """
 
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.stability.inputs import BLOCK, around, directions, sizes, some
-from benchmarks.stability.ladder import Ladder
+from benchmarks.stability.inputs import BLOCK, around, block_of, directions, sizes, some
+from benchmarks.stability.ladder import SEED, Ladder
 from benchmarks.stability.maths import dot
 from benchmarks.stability.pair_ladders import filled
 from refgi.jit import kernel
 from refgi.sssil.crown.add import DISC, POINT, TEXEL, term
+from refgi.sssil.crown.emitters import length_scale
 from refgi.sssil.pyramid.view import GRAZING, pixel_surface
+from refgi.stress.rows import Row
 
 Array = npt.NDArray[Any]
 NEAREST, FARTHEST = 1e-7, 1e9  # m
@@ -97,6 +100,33 @@ def _ladder(name: str, which: int, run: Any) -> Ladder:
                   smooth=partial(form, which, False), floor=underflow, extended=2_000_000, brief=3 * BLOCK)
 
 
+def unit_rows(short: bool) -> Iterable[Row]:
+    """Yield what makes any scene one of lengths around 1: the unit of a level, and that it changes no bit."""
+    changed, off, cases = 0, 0.0, 0
+    for block in range(1 if short else 20):
+        rng = block_of(SEED, block)
+        w, r = directions(rng), sizes(rng, 0.1, 10.0)
+        x = np.concatenate([-0.25 * r * w, around(rng, w, np.float32), 0.75 * r * w, around(rng, w, np.float32) * r * r,
+                            np.ceil(sizes(rng, 1.0, 10.0))[None]]).astype(np.float32)
+        plain = [run(x) for run in FORMS]
+        for power in (-12, -1, 5, 12):
+            moved = x.copy()
+            moved[:3], moved[6:9], moved[9:12] = (x[a:b] * np.float32(2.0 ** (n * power))
+                                                  for a, b, n in ((0, 3, 1), (6, 9, 1), (9, 12, 2)))
+            changed += sum(int((run(moved) != one).sum()) for run, one in zip(FORMS, plain, strict=True))
+            cases += 3 * BLOCK
+        for depth in np.exp(rng.uniform(np.log(1e-30), np.log(1e30), (200, 2))):
+            off = max(off, abs(np.log2(length_scale(depth[None])) + np.log2(depth).mean()))
+    line = f"python -m benchmarks stability --part kernels{' --short' if short else ''} --out out"
+    yield Row(part="kernels", property="lengths x 2^k, areas x 4^k, to the bit", subject="crown.unit",
+              domain="r 0.1 .. 10 m, k -12 .. 12", figure=changed, unit="answers", limit=0, kind="exact",
+              source="powers of 2 are exact where nothing leaves the range", cases=cases, seed=SEED, reproduce=line)
+    yield Row(part="kernels", property="middle of the depths in the level's unit", subject="crown.unit",
+              domain="depths 1e-30 .. 1e30 m", figure=off, unit="octaves off 1", limit=0.5 + 1e-9, kind="derived",
+              source="the unit is the nearest power of 2", cases=200 * cases // (12 * BLOCK), seed=SEED, reproduce=line)
+
+
+FORMS = tuple(filled(fill) for fill in (_points, _texels, _discs))
 LADDERS = (
     _ladder("point", POINT, _points), _ladder("texel", TEXEL, _texels), _ladder("disc", DISC, _discs),
     Ladder("crown.area", "depth 1e-15 .. 1e9 m, facing 1 .. what counts as grazing", draw_surfaces, filled(_surfaces),

@@ -141,13 +141,14 @@ def draw_exponents(rng: np.random.Generator, real: Any) -> Array:
     most = float(np.finfo(real).maxexp)
     x = rng.uniform(2 - most, most - 1e-3, BLOCK)
     kind = rng.integers(0, 4, BLOCK)
-    return np.select([kind == 0, kind == 1], [np.round(x), x * np.exp(rng.uniform(-80, 0, BLOCK))], x)[None]
+    return np.select([kind == 0, kind == 1], [np.floor(x), x * np.exp(rng.uniform(-80, 0, BLOCK))], x)[None]
 
 
 def draw_positive(rng: np.random.Generator, real: Any) -> Array:
     x = np.abs(any_size(rng, real))
     near = 1 + np.exp(rng.uniform(-36, -1, BLOCK)) * rng.choice([-1, 1], BLOCK)
-    return np.where(rng.random(BLOCK) < 0.3, near, np.maximum(x, float(np.finfo(real).smallest_subnormal)))[None]
+    near = np.where(rng.random(BLOCK) < 0.3, rng.uniform(0.7, 1.42, BLOCK), near)  # all of the polynomial's range
+    return np.where(rng.random(BLOCK) < 0.4, near, np.maximum(x, float(np.finfo(real).smallest_subnormal)))[None]
 
 
 def draw_above_minus_one(rng: np.random.Generator, real: Any) -> Array:
@@ -185,7 +186,7 @@ def power(m: Maths, x: Any) -> Any:
 def _ladder(name: str, draw: Any, fill: Any, formula: Any, limit: float, reals: tuple[str, ...]) -> Ladder:
     return Ladder(name, "all sizes, subnormal numbers and numbers next to 1 among them", draw, filled(fill), formula,
                   limit, source="the promise of refgi/elementary, without a condition", conditioned=False, reals=reals,
-                  extended=0, lowest=-np.inf)
+                  extended=0, brief_exact=2000, lowest=-np.inf)
 
 
 BOTH = ("float32", "float64")

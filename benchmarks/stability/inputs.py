@@ -58,7 +58,7 @@ def across(rng: np.random.Generator, w: Array) -> Array:
 
 
 def around(rng: np.random.Generator, w: Array, real: Any) -> Array:
-    """Return unit vectors by their place beside `w`: any, along, one ULP off, near, opposite, grazing on either side."""
+    """Return unit vectors by their place beside `w`: any, along, one ULP off, near, opposite, grazing either way."""
     count = w.shape[1]
     any_way, side = directions(rng, count), across(rng, w)
     tilt = np.exp(rng.uniform(np.log(1e-8), 0, count)) * rng.choice([-1.0, 1.0], count)

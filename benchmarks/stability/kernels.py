@@ -38,6 +38,7 @@ def tasks(short: bool) -> list[Task]:
         return lambda _: elementary_range.rows(name, short)
 
     return [*(Task(name, measured(ladder)) for name, ladder in ladders().items()),
+            Task("crown.unit", lambda _: crown_ladders.unit_rows(short)),
             *(Task(f"{name}{ALL}", whole(name)) for name in elementary_range.FILL)]
 
 

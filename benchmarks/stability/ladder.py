@@ -50,7 +50,8 @@ class Ladder(NamedTuple):
     reals: tuple[str, ...] = ("float32", "float64")
     extended: int = 1_000_000  # cases in longdouble, 0: the formula loses digits in it
     exact: int = 10_000  # with 50 digits
-    brief: int = 100_000  # most in longdouble in the short form, where 200 have 50 digits
+    brief: int = 100_000  # most in longdouble in the short form
+    brief_exact: int = 200  # with 50 digits in the short form
     fixed: tuple[int, ...] = ()  # inputs that are settings, not measured: the condition leaves them alone
     lowest: float = 0.0  # no output is below it
 
@@ -159,7 +160,7 @@ def conditions(ladder: Ladder, maths: Maths, real: str, x: Array, unit: Array) -
 
 def _extended(values: Any) -> Array:
     """Return numbers of either kind as longdouble; of those with more digits what float64 holds, twice over."""
-    if getattr(values, "dtype", None) == object:
+    if getattr(values, "dtype", None) == np.dtype(object):
         high = values.astype(np.float64)
         rest = [float(v - h) if np.isfinite(h) else 0.0 for v, h in zip(values.ravel(), high.ravel(), strict=True)]
         return np.asarray(high.astype(np.longdouble) + np.reshape(rest, high.shape))
@@ -169,7 +170,7 @@ def _extended(values: Any) -> Array:
 def rows(ladder: Ladder, short: bool) -> Iterable[Row]:
     """Yield a row for each type, and one that counts what is no number."""
     extended = min(ladder.extended, ladder.brief) if short else ladder.extended
-    exact = min(ladder.exact, 200) if short else ladder.exact
+    exact = min(ladder.exact, ladder.brief_exact) if short else ladder.exact
     bad, first_bad, cases = 0, (SEED, 0), 0
     for real in ladder.reals:
         found = [measure(ladder, maths, real, seed, count)

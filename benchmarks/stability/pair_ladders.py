@@ -183,7 +183,7 @@ LADDERS = (
            filled(_clamped), clamped, 16.0, source=f"{ROUNDINGS}, 2 more of the clamp", smooth=clamped_smooth,
            extended=4_000_000),
     Ladder("lobe.gap", "r 1e-15 .. 1e9 m, any direction, 1 ULP off, opposite", draw_gaps, filled(_gaps), gap, 12.0,
-           source="6.5 roundings of the unit vector and 5 of its square, each at most one ULP", extended=4_000_000),
+           source="6.5 roundings of the unit vector and 5 of its square, each at most one ULP", extended=2_000_000),
     Ladder("lobe.power", "P 0 .. 1e8 (float64: 1e20), gap 0 .. 2", draw_powers, filled(_powers), power, floor=flushed,
            extended=4_000_000),
     Ladder("lobe.norm", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(_norms), norm,

@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from benchmarks.stability import again, elementary_range, kernels
+from benchmarks.stability import again, crown_ladders, elementary_range, kernels
 from benchmarks.stability import ladder as ladders
 from benchmarks.stability.inputs import BLOCK, any_size, around, block_of, directions, sizes
 from benchmarks.stability.kernels import tasks
@@ -232,9 +232,21 @@ def test_all_of_float32_catches_a_fault_in_one_pattern(name):
     assert elementary_range.whole_range(name, 1 << 16).cases >= 1 << 15
 
 
+def test_a_unit_that_is_no_power_of_two_shows(monkeypatch):
+    assert all(row.passed for row in crown_ladders.unit_rows(short=True))
+    first = crown_ladders.FORMS[0]
+    monkeypatch.setattr(crown_ladders, "FORMS", (lambda x: first(x * x.dtype.type(1.1)),))
+    monkeypatch.setattr(crown_ladders, "length_scale", lambda depth: 1 / depth.min())
+    found = list(crown_ladders.unit_rows(short=True))
+    assert found[0].passed  # any factor before a power of 2
+    assert not found[1].passed
+    monkeypatch.setattr(crown_ladders, "FORMS", (lambda x: first(x + x.dtype.type(1e-5)),))
+    assert not next(iter(crown_ladders.unit_rows(short=True))).passed
+
+
 def test_tasks_are_of_one_name_each_and_rows_tell_how_to_see_them():
     names = [task.name for task in tasks(short=True)]
-    assert len(set(names)) == len(names) == len(KNOWN) + 3
+    assert len(set(names)) == len(names) == len(KNOWN) + 4
     assert {"eq2.term", "crown.disc", "val.z_avg", "spot.falloff", "exp2.all"} <= set(names)
     found = list(rows(KNOWN["eq2.term"]._replace(extended=CASES, exact=20), True))
     assert all(row.passed for row in found)

@@ -18,11 +18,12 @@ from benchmarks.stability.pair_ladders import filled
 from refgi.jit import kernel
 from refgi.sssil.crown.add import DISC, POINT, TEXEL, term
 from refgi.sssil.crown.emitters import length_scale
-from refgi.sssil.pyramid.view import GRAZING, pixel_surface
+from refgi.sssil.pyramid.view import pixel_surface
 from refgi.stress.rows import Row
 
 Array = npt.NDArray[Any]
 NEAREST, FARTHEST = 1e-7, 1e9  # m
+LEAST_FACING = 1.01e-6  # less is the rounding of a float32 normal
 DOMAIN = "r 1e-7 .. 1e9 m, areas 1e-6 .. 10 r^2, 1 .. 10 texels a sample"
 
 
@@ -86,7 +87,7 @@ def underflow(m: Any, x: Any, real: Any) -> Any:
 
 
 def draw_surfaces(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
-    facing = np.maximum(sizes(rng, 1e-9, 1.0), 1.01 * GRAZING)
+    facing = np.maximum(sizes(rng, 1e-9, 1.0), LEAST_FACING)
     return np.stack([sizes(rng, 1e-15, 1e9), some(rng, facing, 1.0), sizes(rng, 1e-12, 10.0)])
 
 
@@ -129,6 +130,6 @@ def unit_rows(short: bool) -> Iterable[Row]:
 FORMS = tuple(filled(fill) for fill in (_points, _texels, _discs))
 LADDERS = (
     _ladder("point", POINT, _points), _ladder("texel", TEXEL, _texels), _ladder("disc", DISC, _discs),
-    Ladder("crown.area", "depth 1e-15 .. 1e9 m, facing 1 .. what counts as grazing", draw_surfaces, filled(_surfaces),
+    Ladder("crown.area", "depth 1e-15 .. 1e9 m, facing 1e-6 .. 1", draw_surfaces, filled(_surfaces),
            surface, reals=("float64",)),
 )

@@ -188,8 +188,8 @@ LADDERS = (
            extended=4_000_000),
     Ladder("lobe.norm", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(_norms), norm,
            reals=("float32",), extended=0, exact=2000),
-    Ladder("lobe.norm64", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(_norms), norm, 700.0,
-           "observed x 2", "350 ULP of a continued fraction of sqrt(P) steps", conditioned=False, reals=("float64",),
+    Ladder("lobe.norm64", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(_norms), norm, 5300.0,
+           "observed x 2", "2615 ULP: a continued fraction of sqrt(P) steps", conditioned=False, reals=("float64",),
            extended=0, exact=2000),
     Ladder("ray.offset", "coordinates 0, 1e-30 .. 1e30 m", draw_offsets, filled(_offsets, 2), offset),
 )

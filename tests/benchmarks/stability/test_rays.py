@@ -132,4 +132,5 @@ def test_chunks_do_not_depend_on_how_many_are_asked():
 def test_each_mesh_and_door_has_its_tasks():
     names = [task.name for task in rays.tasks(short=False)]
     assert len(names) == len(set(names)) == 22
-    assert sum(rays.COUNTS["random", way][0] for way in rays.DOORS) * len(MESHES) > 100_000_000
+    counted = rays.COUNTS["random", "address"][0]
+    assert 2 * counted + counted // rays.SLOWER["random"] > 100_000_000

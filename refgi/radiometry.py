@@ -289,11 +289,11 @@ def lobe_fraction(cos_theta: Any, exponent: Any) -> Any:
     if x < (a + 1.0) / (a + 2.5):
         # x^a (1-x)^(1/2) / (a B(a, 1/2)), the power through log1p because x may be just below 1
         lead = math.exp(a * math.log1p(-c * c)) * c * _gamma_step(a) / (a * math.sqrt(math.pi))
-        above = 1.0 - 0.5 * lead * _beta_fraction(x, a, 0.5)
-    else:
-        lead = math.exp(a * math.log1p(-c * c)) * c * _gamma_step(a) * 2.0 / math.sqrt(math.pi) if c < 1.0 else 0.0
-        above = 0.5 + 0.5 * lead * _beta_fraction(c * c, 0.5, a)
-    return real(above if cos_theta >= 0 else 1.0 - above)
+        part = 0.5 * lead * _beta_fraction(x, a, 0.5)  # as small as it is: 1 less the rest would lose its digits
+        return real(1.0 - part if cos_theta >= 0 else part)
+    lead = math.exp(a * math.log1p(-c * c)) * c * _gamma_step(a) * 2.0 / math.sqrt(math.pi) if c < 1.0 else 0.0
+    half = 0.5 * lead * _beta_fraction(c * c, 0.5, a)
+    return real(0.5 + half if cos_theta >= 0 else 0.5 - half)
 
 
 @kernel

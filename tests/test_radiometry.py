@@ -24,6 +24,7 @@ from tests.naive import radiometry as naive
 ROUNDING = {np.float32: 1e-6, np.float64: 1e-14}  # a dozen operations on numbers near 1
 QUADRATURE = 1e-9  # the twins' quadrature, converged
 LOBE = 1e-13  # continued fraction to 3e-16, times a handful of operations
+SMALL_PART = 1e-11  # of itself: a continued fraction of up to 100 steps of 3e-16, an exponential of -25; scipy's alike
 
 
 def rectangle(corner, x0, x1, y0, y1):
@@ -155,3 +156,16 @@ def test_kernels_keep_float32(name):
     function(*arguments)
     types = {str(s.return_type) for s in function.nopython_signatures if "float64" not in str(s.args)}
     assert all("float64" not in kind for kind in types)
+
+
+def test_a_small_part_of_a_lobe_above_the_surface_keeps_its_digits(evidence):
+    """Lobes that point into the surface: K is half of the incomplete beta function, down to 1e-11."""
+    assert lobe_fraction(-1 + 2.0**-40, 1.0) == pytest.approx(2.0**-41, rel=1e-14)  # (1 + cos th) / 2
+    worst = 0.0
+    for exponent in np.geomspace(1e-2, 1e4, 40):
+        for cosine in np.linspace(0.1, 6.0, 20) / math.sqrt(exponent + 37):
+            expected = 0.5 * betainc((exponent + 1) / 2, 0.5, (1 - cosine) * (1 + cosine))
+            if expected > 1e-11:
+                worst = max(worst, abs(lobe_fraction(-float(cosine), exponent) / expected - 1))
+    assert worst < SMALL_PART
+    evidence(f"parts down to 1e-11 of a lobe off by {worst:.1e} of themselves at most")

@@ -4,7 +4,8 @@ A ray aimed exactly at a vertex can pass Embree's float32 test of every triangle
 asking again with the ray shifted sideways by many float32 steps: if that misses as well, the miss stands. Else the
 triangles around what the shifted ray hit are tested against the ray itself, in float64, by signed volumes of
 (direction, edge) computed in one order per edge, so that two triangles always agree on which side of their common edge
-a ray passes (Woop, Benthin & Wald 2013) and no ray passes between them.
+a ray passes (Woop, Benthin & Wald 2013) and no ray passes between them. A volume within its rounding counts as 0: the
+ray meets that edge, and at a vertex all of them.
 
 Huge triangles are subdivided for Embree alone: float32 tests are off by a share of a triangle's size.
 
@@ -24,6 +25,7 @@ from refgi.jit import kernel
 
 Array = npt.NDArray[Any]
 REACH = 0.4
+ROUNDING = 8 * 2.0**-53  # of the products of a signed volume: 7 roundings of half a unit
 
 
 class Corners(NamedTuple):
@@ -69,12 +71,18 @@ def closest_around(tables: Corners, triangle: int, origin: Array, direction: Arr
 
 @kernel
 def _side(vertices: Array, i: int, j: int, origin: Array, direction: Array) -> Any:
-    """Return the signed volume of direction and edge i-j, exactly negated for j-i."""
+    """Return the signed volume of direction and edge i-j, exactly negated for j-i; 0 where rounding may have made it.
+
+    Else a ray through a vertex might pass every edge there on its outer side, each by its own rounding.
+    """
     low, high = min(i, j), max(i, j)
     ax, ay, az = vertices[low, 0] - origin[0], vertices[low, 1] - origin[1], vertices[low, 2] - origin[2]
     bx, by, bz = vertices[high, 0] - origin[0], vertices[high, 1] - origin[1], vertices[high, 2] - origin[2]
     volume = (direction[0] * (ay * bz - az * by) + direction[1] * (az * bx - ax * bz)
               + direction[2] * (ax * by - ay * bx))
+    products = (abs(direction[0]) * (abs(ay * bz) + abs(az * by)) + abs(direction[1]) * (abs(az * bx) + abs(ax * bz))
+                + abs(direction[2]) * (abs(ax * by) + abs(ay * bx)))
+    volume = volume if abs(volume) > ROUNDING * products else 0.0
     return volume if i < j else -volume
 
 

@@ -185,3 +185,22 @@ def test_first_use_by_many_threads_at_once():
         assert len({id(future.result()) for future in futures}) == 1
     distance = tracer.closest(origins, directions).distance
     assert np.abs(distance - 1).max() < 0.01  # the sphere's chords
+
+
+@pytest.mark.usefixtures("backend")
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e8])
+def test_a_ray_at_the_tip_of_a_spike_meets_it(size, evidence):
+    """Rounding may put a ray through a vertex on the outer side of each of the three edges there."""
+    ball = icosphere(3)
+    centres = ball.vertices[ball.faces].mean(axis=1)
+    tips = len(ball.vertices) + np.arange(len(ball.faces))
+    places = np.concatenate([0.4 * ball.vertices, centres / np.linalg.norm(centres, axis=1, keepdims=True)])
+    sides = [np.stack([ball.faces[:, a], ball.faces[:, b], tips], axis=1) for a, b in ((0, 1), (1, 2), (2, 0))]
+    rotation = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+    tracer = Tracer(geometry(size * places @ rotation.T, np.concatenate(sides)))
+    targets = (size * places @ rotation.T)[tips].astype(np.float32)
+    hits = tracer.closest(np.zeros_like(targets), targets)
+    assert (hits.triangle_id % len(tips) == np.arange(len(tips))).all()
+    np.testing.assert_allclose(hits.distance, 1, rtol=1e-5)
+    assert tracer.occluded(np.zeros_like(targets), targets).all()
+    evidence(f"size {size:g} m: {len(tips)} rays meet the tips they aim at")

@@ -1,0 +1,31 @@
+"""Show one case again: `python -m benchmarks.stability.again PART NAME SEED CASE`.
+
+Prints inputs, answer, reference and error; the lines of the table end in such a command.
+"""
+
+import importlib
+import sys
+
+USAGE = "usage: python -m benchmarks.stability.again kernels|rays NAME SEED CASE"
+
+
+def main(arguments: list[str]) -> int:
+    try:
+        part, name, seed, case = arguments
+        numbers = int(seed), int(case)
+    except ValueError:
+        print(USAGE, file=sys.stderr)
+        return 2
+    if part not in ("kernels", "rays"):
+        print(USAGE, file=sys.stderr)
+        return 2
+    try:
+        print(importlib.import_module(f"benchmarks.stability.{part}").again(name, *numbers))
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

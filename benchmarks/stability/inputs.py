@@ -1,0 +1,75 @@
+"""Hostile numbers and vectors: coincident, one unit in the last place apart, grazing, opposite, subnormal, needles.
+
+Everything is drawn from a generator of its block, so that case `i` of seed `s` is the same in every run (`block_of`).
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+
+BLOCK = 1 << 14  # cases drawn at once
+SMALL = (1e-7, 1e-1)  # of a length: components that are tiny, angles that graze
+
+
+def block_of(seed: int, block: int) -> np.random.Generator:
+    """Return the generator of the cases BLOCK block to BLOCK (block + 1) - 1 of a seed."""
+    return np.random.default_rng((seed, block))
+
+
+def sizes(rng: np.random.Generator, low: float, high: float, count: int = BLOCK) -> Array:
+    """Return numbers from `low` to `high`, even in their logarithm; a tenth lie at the ends, a tenth on powers of 2."""
+    values = np.exp(rng.uniform(np.log(low), np.log(high), count))
+    kind = rng.integers(0, 20, count)
+    values = np.where(kind == 0, low, np.where(kind == 1, high, values))
+    powers = np.clip(2.0 ** np.round(np.log2(values)), low, high)
+    return np.where((kind == 2) | (kind == 3), powers, values)
+
+
+def any_size(rng: np.random.Generator, real: Any, count: int = BLOCK) -> Array:
+    """Return numbers of either sign over all that a type can hold: 0, subnormal, 1e-30 to 1e30, the largest."""
+    info = np.finfo(real)
+    span = np.log2(float(info.smallest_subnormal)), np.log2(float(info.max))
+    values = np.exp2(rng.uniform(span[0], span[1] - 1e-6, count)) * rng.choice([-1.0, 1.0], count)
+    odd = np.array([0.0, -0.0, float(info.smallest_subnormal), float(info.tiny), float(info.max), 1e-30, 1e30, 1.0])
+    return np.where(rng.random(count) < 0.1, rng.choice(odd, count), values)
+
+
+def directions(rng: np.random.Generator, count: int = BLOCK) -> Array:
+    """Return unit vectors (3, count): random, along axes and diagonals, and with one or two tiny components."""
+    v = rng.normal(size=(3, count))
+    kind = rng.integers(0, 8, count)
+    axis = np.eye(3)[rng.integers(0, 3, count)].T * rng.choice([-1.0, 1.0], count)
+    tiny = np.exp(rng.uniform(*np.log(SMALL), (3, count))) * rng.choice([-1.0, 1.0], (3, count))
+    needle = np.where(axis == 0, tiny, axis)
+    flat = np.where(axis == 0, v, tiny)
+    v = np.where(kind == 0, axis, np.where(kind == 1, needle, np.where(kind == 2, flat, v)))
+    v = np.where(kind == 3, rng.choice([-1.0, 1.0], (3, count)), v)
+    return np.asarray(v / np.sqrt((v * v).sum(axis=0)))
+
+
+def across(rng: np.random.Generator, w: Array) -> Array:
+    """Return unit vectors at right angles to `w`, to float64 rounding."""
+    other = rng.normal(size=w.shape)
+    other -= (other * w).sum(axis=0) * w
+    return np.asarray(other / np.sqrt((other * other).sum(axis=0)))
+
+
+def around(rng: np.random.Generator, w: Array, real: Any) -> Array:
+    """Return unit vectors by their place beside `w`: any, along, one ULP off, near, opposite, grazing either way."""
+    count = w.shape[1]
+    any_way, side = directions(rng, count), across(rng, w)
+    tilt = np.exp(rng.uniform(np.log(1e-8), 0, count)) * rng.choice([-1.0, 1.0], count)
+    near, grazing = w * np.cos(tilt) + side * np.sin(tilt), side * np.cos(tilt) + w * np.sin(tilt)
+    one_off = w * (1 + rng.integers(-1, 2, w.shape) * float(np.finfo(real).eps))
+    kind = rng.integers(0, 8, count)
+    chosen = np.select([kind == 0, kind == 1, kind == 2, kind == 3, kind == 4, kind == 5],
+                       [w, one_off, near, -near, grazing, side], any_way)
+    return np.asarray(chosen)
+
+
+def some(rng: np.random.Generator, values: Array, other: Any, share: float = 0.02) -> Array:
+    """Return values of which some are replaced in all their components by another, such as 0."""
+    return np.where(rng.random(values.shape[-1]) < share, other, values)

@@ -1,0 +1,191 @@
+"""Ladders of lamps: the edge and falloff of spots, solid angles of texels.
+
+Formulas are those of docs/radiometry.md and of `SpotLight`: t = (cos a - cos outer) / (cos inner - cos outer) in
+[0, 1], t t (3 - 2 t); a rectangle at z = 1 spans F11 - F01 - F10 + F00, F = atan(x y / sqrt(1 + x^2 + y^2)).
+"""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.stability.inputs import BLOCK, across, directions, sizes
+from benchmarks.stability.ladder import Ladder
+from benchmarks.stability.maths import dot
+from benchmarks.stability.pair_ladders import filled
+from refgi.jit import kernel
+from refgi.radiometry import (
+    FOR_FLOAT32,
+    corner_solid_angle_paraboloid,
+    corner_solid_angle_perspective,
+    orthonormal_basis,
+    smooth_edge,
+    spot_falloff,
+)
+from refgi.rsm.buffers.solid_angle import texel_solid_angles_at
+from refgi.rsm.raster.projection import Projection
+from refgi.scene.light import cone_row
+
+Array = npt.NDArray[Any]
+CONES = 32  # distinct ones in a block: each takes 60 digits to make
+LARGEST_MAP = 16384  # texels along a side
+OUTER, INNER = 6, 7  # rows of the drawn half-angles
+
+
+@kernel
+def _edges(x: Array, out: Array) -> None:
+    for i in range(x.shape[1]):
+        out[0, i] = smooth_edge(x[0, i], x[1, i])
+
+
+@kernel
+def _shares(x: Array, cones: Array, plain: float, out: Array) -> None:
+    for i in range(x.shape[1]):
+        out[0, i] = spot_falloff((x[0, i], x[1, i], x[2, i]), (x[3, i], x[4, i], x[5, i]), cones[i], plain)
+
+
+@kernel
+def _perspective_corners(x: Array, out: Array) -> None:
+    for i in range(x.shape[1]):
+        out[0, i] = corner_solid_angle_perspective(x[0, i], x[1, i])
+
+
+@kernel
+def _paraboloid_corners(x: Array, out: Array) -> None:
+    for i in range(x.shape[1]):
+        out[0, i] = corner_solid_angle_paraboloid(x[0, i], x[1, i])
+
+
+@kernel
+def _bases(x: Array, out: Array) -> None:
+    for i in range(x.shape[1]):
+        (out[0, i], out[1, i], out[2, i], out[3, i], out[4, i],
+         out[5, i]) = orthonormal_basis(x[0, i], x[1, i], x[2, i])
+
+
+def draw_edges(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    span = sizes(rng, 1e-15, 1.0)
+    return np.stack([span * rng.uniform(-0.1, 1.1, BLOCK), np.where(rng.random(BLOCK) < 0.02, 0.0, span)])
+
+
+def edge(m: Any, x: Any) -> Any:  # noqa: ARG001
+    """A span of 0 is a step; what is at its edge counts as inside."""
+    wide = np.where(x[1] > 0, x[1], 1)
+    t = np.minimum(np.maximum(np.where(x[1] > 0, x[0] / wide, np.where(x[0] >= 0, 1, 0)), 0), 1)
+    return [t * t * (3 - 2 * t)]
+
+
+def draw_falloffs(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    """Return directions near and in the soft edge of spots of 1e-6 rad to 90 degrees, any length, axis of any length.
+
+    The drawn angle between both is exact in none of them; the formula takes the vectors as they are.
+    """
+    of = np.arange(BLOCK) % CONES
+    outer = np.exp(rng.uniform(np.log(1e-6), np.log(1.57), CONES))
+    inner = outer * np.where(rng.random(CONES) < 0.7, 1 - np.exp(rng.uniform(np.log(1e-6), 0, CONES)), 0.0)
+    axis = directions(rng)
+    angle = inner[of] + (outer - inner)[of] * rng.uniform(-0.05, 1.05, BLOCK)
+    angle = np.where(rng.random(BLOCK) < 0.3, outer[of] * (1 - np.exp(rng.uniform(-33, 0, BLOCK))), angle)
+    d = axis * np.cos(angle) + across(rng, axis) * np.sin(angle)
+    return np.concatenate([d * sizes(rng, 1e-6, 1e6), axis * sizes(rng, 1e-3, 1e3), outer[of][None], inner[of][None]])
+
+
+@cache
+def _cone(inner: float, outer: float) -> Array:
+    return cone_row(inner, outer)
+
+
+def falloffs(plain: float) -> Any:
+    """Return the kernel for float64 (`plain` inf) or for float32 pictures."""
+    def run(x: Array) -> Array:
+        out = np.empty((1, x.shape[1]))
+        _shares(x, np.array([_cone(float(inner), float(outer)) for outer, inner in x[[OUTER, INNER]].T]), plain, out)
+        return out
+
+    return run
+
+
+def falloff(m: Any, x: Any) -> Any:
+    d, axis = x[:3], x[3:6]
+    cosine = dot(d, axis) / m.sqrt(dot(d, d) * dot(axis, axis))
+    edge_of = m.cos(x[OUTER])
+    t = np.minimum(np.maximum((cosine - edge_of) / (m.cos(x[INNER]) - edge_of), 0), 1)
+    return [t * t * (3 - 2 * t)]
+
+
+def draw_corners(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    return sizes(rng, 1e-12, 1e6, 2 * BLOCK).reshape(2, BLOCK) * rng.choice([-1.0, 1.0], (2, BLOCK))
+
+
+def perspective_corner(m: Any, x: Any) -> Any:
+    return [m.atan(x[0] * x[1] / m.sqrt(1 + x[0] * x[0] + x[1] * x[1]))]
+
+
+def draw_disc(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    return sizes(rng, 1e-9, 1.0, 2 * BLOCK).reshape(2, BLOCK) * rng.choice([-1.0, 1.0], (2, BLOCK))
+
+
+def paraboloid_corner(m: Any, x: Any) -> Any:
+    """The integral of 4 / (1 + u^2 + v^2)^2 over the rectangle from 0 to (u, v)."""
+    su, sv = (m.sqrt(1 + c * c) for c in x)
+    return [2 * (x[1] / sv * m.atan(x[0] / sv) + x[0] / su * m.atan(x[1] / su))]
+
+
+def draw_texels(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    """Return half extents, texels along a side, row and column."""
+    n = np.ceil(sizes(rng, 1.0, LARGEST_MAP))
+    places = np.minimum(np.floor(rng.random((2, BLOCK)) * n), n - 1)
+    return np.stack([sizes(rng, 1e-6, 3.0), n, *places])
+
+
+def texels(x: Array) -> Array:
+    out = np.empty((1, x.shape[1]))
+    for i, (half, n, row, column) in enumerate(x.T):
+        size = int(n)
+        maps = Projection(0, size, size, np.zeros((1, 3)), np.eye(3)[None], np.array([half, half]), np.inf)
+        out[0, i] = texel_solid_angles_at(maps, np.array([int(row) * size + int(column)]))[0]
+    return out
+
+
+def texel(m: Any, x: Any) -> Any:
+    half, n = x[0], x[1]
+    (y0, y1), (x0, x1) = (((2 * k / n - 1) * half, (2 * (k + 1) / n - 1) * half) for k in (x[2], x[3]))
+    corners = [perspective_corner(m, corner)[0] for corner in ((x1, y1), (x0, y1), (x1, y0), (x0, y0))]
+    return [corners[0] - corners[1] - corners[2] + corners[3]]
+
+
+def draw_normals(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    return directions(rng) + 0.0  # no -0: the seam lies there
+
+
+def basis(m: Any, x: Any) -> Any:
+    """Duff et al. 2017: the seam lies at z = 0, where the sign is that of the zero."""
+    nx, ny, nz = x
+    sign = np.where(nz < 0, -1, 1) + 0 * m.number(np.ones(1))
+    a = -1 / (sign + nz)
+    b = nx * ny * a
+    return [1 + sign * nx * nx * a, sign * b, -sign * nx, b, sign + ny * ny * a, -ny]
+
+
+LADDERS = (
+    Ladder("spot.edge", "span 1e-15 .. 1 and 0, t -0.1 .. 1.1", draw_edges, filled(_edges), edge, 7.0,
+           source="7 roundings: t thrice, two products, 3 - 2 t"),
+    Ladder("spot.falloff", "half-angles 1e-6 rad .. 90 degrees, to 5e-15 of the edge", draw_falloffs,
+           falloffs(np.inf), falloff, 8.0, source="8 ULP, as the kernel promises, without a condition",
+           conditioned=False, reals=("float64",), extended=0, fixed=(OUTER, INNER),
+           brief_exact=2000),
+    Ladder("spot.falloff32", "half-angles 1e-6 rad .. 90 degrees, to 5e-15 of the edge", draw_falloffs,
+           falloffs(FOR_FLOAT32), falloff, 8.0, source="8 ULP of float32, as the kernel promises, without a condition",
+           unit="float32", conditioned=False, reals=("float64",), extended=0, fixed=(OUTER, INNER),
+           brief_exact=2000),
+    Ladder("solid_angle.perspective", "corners 1e-12 .. 1e6", draw_corners, filled(_perspective_corners),
+           perspective_corner, lowest=-np.inf),
+    Ladder("solid_angle.paraboloid", "corners 1e-9 .. 1", draw_disc, filled(_paraboloid_corners), paraboloid_corner,
+           9.0, source="9 roundings, each at most one ULP", lowest=-np.inf),
+    Ladder("solid_angle.texel", "1 .. 16384 texels a side, half extents 1e-6 .. 3", draw_texels, texels, texel, 9.0,
+           source="four corners off by 2.2e-16 each, over the texel at the rim, 1.6e-9 sr: 5.5e-7", unit="float32",
+           conditioned=False, reals=("float64",), extended=0, exact=10_000),
+    Ladder("frame.basis", "unit normals, along axes, flat, needles", draw_normals, filled(_bases, 6), basis, 4.0,
+           unit="one", lowest=-np.inf),
+)

@@ -12,7 +12,7 @@ from refgi.errors import InputError, RefgiWarning
 from refgi.scene import load_scene
 from tests.scene.samples import FACES, SCENE, glb_bytes, gltf_tree, ply_bytes, write_scene
 
-MUTATIONS = 400  # per format
+MUTATIONS = 800  # per format; few of a scene file are still sound
 OBJ = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nusemtl a\nf 1//1 2//1 3//1 4//1\nf -4 -3 -2\n"
 MTL = b"newmtl a\nKd 0.1 0.2 0.3\nKs 0.1 0.1 0.1\nNs 10\nKe 0 0 1\n"
 SEEDS = {"scene.json": json.dumps(SCENE).encode(), "square.glb": glb_bytes(), "square.ply": ply_bytes(),

@@ -44,7 +44,7 @@ class Host:
         self._process.stdout.close()
 
     def run(self, arguments: Sequence[str], folder: Path, *, end: signal.Signals | None = None, after: float = 0.0,
-            limits: Mapping[str, int] | None = None, user: int | None = None) -> tuple[int, str]:
+            limits: Mapping[str, int] | None = None, said: str = "said") -> tuple[int, str]:
         """Run a command, and send it a signal some seconds after it has begun to heed signals.
 
         Returns
@@ -54,9 +54,8 @@ class Host:
         said : str
             On stdout and stderr.
         """
-        said = folder.with_name(f"{folder.name}.said")
-        asked = {"arguments": list(arguments), "folder": str(folder), "said": str(said), "limits": dict(limits or {}),
-                 "user": user}
+        place = folder.with_name(f"{folder.name}.{said}")
+        asked = {"arguments": list(arguments), "folder": str(folder), "said": str(place), "limits": dict(limits or {})}
         process = int(self._ask(json.dumps(asked)))
         if end is not None:
             _wait_for_handler(process)
@@ -64,7 +63,13 @@ class Host:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, end)
         code = int(self._ask(""))
-        return code, said.read_text(errors="replace")
+        return code, place.read_text(errors="replace")
+
+    def address_space(self) -> int:
+        """Return the bytes that a fork has from its start."""
+        self._ask("")
+        pages = int(Path(f"/proc/{self._process.pid}/statm").read_text().split()[0])
+        return pages * resource.getpagesize()
 
     def _ask(self, line: str) -> str:
         assert self._process.stdin is not None
@@ -98,6 +103,9 @@ def serve() -> None:
     import refgi.truth  # noqa: F401
 
     for line in _lines():
+        if not line.strip():  # asked whether it is ready
+            print(flush=True)
+            continue
         asked = json.loads(line)
         process = os.fork()
         if not process:
@@ -125,10 +133,6 @@ def _become(asked: dict[str, Any]) -> None:
         if name == "RLIMIT_FSIZE":
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as an error of the write, not a signal
         resource.setrlimit(getattr(resource, name), (most, most))
-    if asked["user"] is not None:
-        os.setgroups([])
-        os.setgid(asked["user"])
-        os.setuid(asked["user"])
     code = 1
     try:
         VerbGroup.refgi().main(asked["arguments"])

@@ -12,6 +12,7 @@ from pathlib import Path
 from benchmarks.stability.file_child import SECONDS, Breach
 
 ROOT = Path(__file__).parents[2]
+CHILD = ["-m", "benchmarks.stability.file_child"]
 MOST_DEATHS = 200  # of one range of numbers: something else is wrong then
 
 
@@ -45,7 +46,7 @@ def _share(name: str, seed: str, numbers: range) -> list[Breach]:
     first, deaths = numbers.start, 0
     while first < numbers.stop:
         with tempfile.TemporaryDirectory(prefix="refgi-files-") as folder:
-            command = [sys.executable, "-m", "benchmarks.stability.file_child", name, folder, seed, str(first),
+            command = [sys.executable, *CHILD, name, folder, seed, str(first),
                        str(numbers.stop)]
             child = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
             progress = Path(folder) / "number"

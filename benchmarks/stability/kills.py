@@ -99,12 +99,13 @@ def asked(name: str, number: signal.Signals, times: int, seed: int, folder: Path
             with_old_files(name, stand, host)
             moment = moments.uniform(0, seconds)
             code, said = host.run(victim.arguments, stand.folder, end=number, after=moment)
-            is_done = set(stand.digests()) >= set(whole)
+            torn = stand.torn()
+            is_done = not torn and stand.digests() == whole
             heeded = code == code_promised and f"refgi: {word}" in said.splitlines() and "Traceback" not in said
             if not (heeded or (is_done and code in (0, -number))):
                 faults.append(f"{turn}, after {moment:.3f} s: exit {code}: {said[-300:]}")
             faults += [f"{turn}, after {moment:.3f} s: left {part}" for part in stand.parts()]
-            faults += [f"{turn}, after {moment:.3f} s: torn {file}" for file in stand.torn()]
+            faults += [f"{turn}, after {moment:.3f} s: torn {file}" for file in torn]
     return faults
 
 

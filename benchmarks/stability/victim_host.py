@@ -5,6 +5,7 @@ for what it says, and environment; it answers with the process's number, and whe
 """
 
 import contextlib
+import importlib
 import json
 import os
 import resource
@@ -18,6 +19,9 @@ from typing import Any, Self
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120.0  # s
+MODULES = ["refgi.cli.render", "refgi.cli.sequence", "refgi.cli.compare", "refgi.cli.job", "refgi.cli.memory",
+           "refgi.cli.warm", "refgi.cli.frame_files", "refgi.compare", "refgi.methods", "refgi.truth.truth",
+           "refgi.splat.sii", "refgi.rays", "refgi.scene.builtin", "refgi.provenance.frames", "pydantic", "OpenEXR"]
 
 
 class Host:
@@ -93,15 +97,17 @@ def _wait_for_handler(process: int) -> None:
         time.sleep(0.001)
 
 
+def command(arguments: Sequence[str]) -> None:
+    """Run refgi."""
+    from refgi.cli.group import VerbGroup
+
+    VerbGroup.refgi().main(list(arguments))
+
+
 def serve() -> None:
     """Run what is asked for until nothing more is."""
-    import refgi.cli.compare
-    import refgi.cli.render
-    import refgi.cli.sequence
-    import refgi.compare
-    import refgi.methods
-    import refgi.truth  # noqa: F401
-
+    for module in MODULES:
+        importlib.import_module(module)
     for line in _lines():
         if not line.strip():  # asked whether it is ready
             print(flush=True)
@@ -123,8 +129,6 @@ def _lines() -> Iterator[str]:
 
 def _become(asked: dict[str, Any]) -> None:
     """Be the command, and end."""
-    from refgi.cli.group import VerbGroup
-
     said = os.open(asked["said"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
     os.dup2(said, 1)
     os.dup2(said, 2)
@@ -135,7 +139,7 @@ def _become(asked: dict[str, Any]) -> None:
         resource.setrlimit(getattr(resource, name), (most, most))
     code = 1
     try:
-        VerbGroup.refgi().main(asked["arguments"])
+        command(asked["arguments"])
     except SystemExit as end:
         code = int(end.code or 0)
     except BaseException:
@@ -149,5 +153,5 @@ def _become(asked: dict[str, Any]) -> None:
 
 
 if __name__ == "__main__":
-    exec(sys.argv[1])
+    exec(sys.argv[1])  # may put others in the place of `command` and `MODULES`
     serve()

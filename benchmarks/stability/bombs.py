@@ -165,9 +165,11 @@ BOMBS: dict[str, dict[str, Make]] = {
     "exr": {f"{name}{' tiled' * tiled}": _bytes(lambda w=window, t=tiled, c=channels: exr_bytes(
                 w, tiled=t, channels=c))
             for tiled in (False, True) for name, window, channels in (
-                ("wide", (0, 0, HUGE - 1, 0), 3), ("high", (0, 0, 0, HUGE - 1), 3), ("all", (0, 0, HUGE - 1, HUGE - 1), 3),
+                ("wide", (0, 0, HUGE - 1, 0), 3), ("high", (0, 0, 0, HUGE - 1), 3),
+                ("all", (0, 0, HUGE - 1, HUGE - 1), 3),
                 ("everywhere", (-HUGE, -HUGE, HUGE, HUGE), 3), ("large", (0, 0, 99_999, 99_999), 3),
-                ("half", (0, 0, 9_999, 9_999), 3), ("inside out", (9, 9, 0, 0), 3), ("channels", (0, 0, 999, 999), 3000))},
+                ("half", (0, 0, 9_999, 9_999), 3), ("inside out", (9, 9, 0, 0), 3),
+                ("channels", (0, 0, 999, 999), 3000))},
     "scene": SHARED | {
         "instances": _scene(objects=[*SCENE["objects"]] * 20_000),
         "instances of much": _sheet_in_many_places,

@@ -43,8 +43,8 @@ def damaged(short: bool, tell: Tell, before: str = "") -> Iterable[Row]:
             taken, first = 1.0, str(error)
     tell(f"{taken} of {times} taken for a kernel {first}")
     yield Row(part="faults", property="a damaged kernel is compiled anew", subject="kernel cache",
-              domain="a bit, a cut or zeros anywhere, machine code included", figure=float(taken), unit="taken", limit=0,
-              kind="exact", source="SHA-256 at its end", cases=times, seed=seed, detail=str(first),
+              domain="a bit, a cut or zeros anywhere, machine code included", figure=float(taken), unit="taken",
+              limit=0, kind="exact", source="SHA-256 at its end", cases=times, seed=seed, detail=str(first),
               reproduce=f"python -m benchmarks.stability.cache_child damage {times} {seed}")
 
 

@@ -32,7 +32,8 @@ def tasks(short: bool) -> list[Task]:
     names = ["render"] if short else list(VICTIMS)
     found = [Task("cache", partial(damaged, short)), Task("starts", partial(cold_starts, short))]
     for name in names:
-        found += [Task(f"disk-{name}", partial(_disk, name, short)), Task(f"memory-{name}", partial(_memory, name, short))]
+        found += [Task(f"disk-{name}", partial(_disk, name, short)),
+                  Task(f"memory-{name}", partial(_memory, name, short))]
         if not short:
             found += [Task(f"closed-{name}", partial(_closed, name)), Task(f"writers-{name}", partial(_writers, name))]
     return found

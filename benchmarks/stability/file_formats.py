@@ -70,7 +70,6 @@ class Format(NamedTuple):
     file: str  # that is mutated
     seeds: Callable[[], list[bytes]]
     read: Callable[[Path], Any]  # what a user's file goes through; of the mutated file
-    beside: dict[str, bytes] = {}
     named: str = ""  # of which file an error may speak, too: that which names the mutated one
 
 

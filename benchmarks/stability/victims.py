@@ -31,15 +31,15 @@ class Victim(NamedTuple):
 
     arguments: list[str]  # run in the folder that holds `out`
     resumes: bool = False  # so that what a kill leaves is what the next run begins with
-    before: list[str] = []  # the command whose files it overwrites
+    before: tuple[str, ...] = ()  # the command whose files it overwrites
     patch: str = ""  # Python of its host
 
 
 VICTIMS: dict[str, Victim] = {
     "render": Victim(["render", *SMALL, "--set", "lights=64", "--out", "out"],
-                     before=["render", *SMALL, "--set", "lights=16", "--out", "out"]),
+                     before=("render", *SMALL, "--set", "lights=16", "--out", "out")),
     "compare": Victim(["compare", *SMALL, "--methods", "sii", "--set", "truth.samples=48", "--out", "out"],
-                      before=["compare", *SMALL, "--methods", "sii", "--set", "truth.samples=24", "--out", "out"],
+                      before=("compare", *SMALL, "--methods", "sii", "--set", "truth.samples=24", "--out", "out"),
                       patch="import sys; sys.modules['flip_evaluator'] = None"),  # a process of its own, and slow
     "sequence": Victim(["sequence", *SMALL, "way.toml", "--frames", str(FRAMES), "--method", "sii", "--temporal",
                         "weight=0.5", "--resume", "--out", "out"], resumes=True),

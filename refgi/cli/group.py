@@ -164,7 +164,7 @@ class VerbGroup(click.Group):
 
 @contextlib.contextmanager
 def _heeding_sigterm() -> Iterator[None]:
-    """Raise `Terminated` where SIGTERM comes, so that unfinished files are removed; in a process's main thread alone."""
+    """Raise `Terminated` where SIGTERM comes, so that unfinished files are removed; only a main thread can."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -15,5 +15,6 @@ from refgi.image.whole import (
 
 __all__ = [
     "MARK", "NOT_FINITE", "canonical_json", "is_dead", "is_from_refgi", "is_text", "png_bytes", "read_exr",
-    "read_png_attributes", "temporary_name", "tone_map", "whole_file", "write_encoded", "write_exr", "write_png", "write_text",
+    "read_png_attributes", "temporary_name", "tone_map", "whole_file", "write_encoded", "write_exr", "write_png",
+    "write_text",
 ]

@@ -128,7 +128,7 @@ def _file_without_name() -> BinaryIO:
     """Return an empty file, in memory where the platform can: a full disk is no reason not to read."""
     if hasattr(os, "memfd_create"):
         return os.fdopen(os.memfd_create("complaints"), "w+b")
-    return tempfile.TemporaryFile()  # type: ignore[return-value]
+    return tempfile.TemporaryFile()
 
 
 def _planes(channels: Mapping[str, Array]) -> Channels:

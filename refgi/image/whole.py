@@ -125,7 +125,7 @@ def _machine() -> str:
     seen = [platform.node()]
     for place in ("/proc/sys/kernel/random/boot_id", "/proc/self/ns/pid"):
         with contextlib.suppress(OSError):
-            seen.append(os.readlink(place) if place.endswith("pid") else Path(place).read_text())
+            seen.append(str(Path(place).readlink()) if place.endswith("pid") else Path(place).read_text())
     return hashlib.sha256("\n".join(seen).encode()).hexdigest()[:8]
 
 

@@ -89,7 +89,7 @@ def write(path):
 
 @pytest.fixture(autouse=True)
 def _fake(monkeypatch):
-    monkeypatch.setitem(VICTIMS, "fake", Victim(["work"], patch=COMMAND, before=["old"]))
+    monkeypatch.setitem(VICTIMS, "fake", Victim(["work"], patch=COMMAND, before=("old",)))
     monkeypatch.setattr("benchmarks.stability.victims.digest", lambda file: file.read_text())
 
 

@@ -21,7 +21,8 @@ ROOT = Path(__file__).parents[2]
 PATIENCE = 120.0  # s
 MODULES = ["refgi.cli.render", "refgi.cli.sequence", "refgi.cli.compare", "refgi.cli.job", "refgi.cli.memory",
            "refgi.cli.warm", "refgi.cli.frame_files", "refgi.compare", "refgi.methods", "refgi.truth.truth",
-           "refgi.splat.sii", "refgi.rays", "refgi.scene.builtin", "refgi.provenance.frames", "pydantic", "OpenEXR"]
+           "refgi.splat.sii", "refgi.rays", "refgi.scene.builtin", "refgi.provenance.frames", "pydantic", "OpenEXR",
+           "scipy.spatial", "scipy.optimize", "scipy.ndimage", "scipy.stats", "trimesh"]
 
 
 class Host:

@@ -18,6 +18,7 @@ from typing import Any, NoReturn
 import click
 
 from refgi import __version__
+from refgi.cli.room import require_room
 from refgi.cli.session import DONE, FAILED, INTERRUPTED, TERMINATED, USAGE, Fault, Session
 from refgi.errors import InputError, RefgiError
 
@@ -128,6 +129,7 @@ class VerbGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the verb, and the nearest one for the message where there is none of that name."""
+        require_room(args[0])
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:

@@ -19,7 +19,7 @@ from benchmarks.stability.faults import (
     writers_faults,
 )
 from benchmarks.stability.victims import VICTIMS, Victim
-from refgi.errors import RefgiWarning
+from refgi.errors import InputError, RefgiWarning
 from refgi.jit import cache
 
 # writes 100 kB, and takes 64 MB for it
@@ -141,6 +141,21 @@ def test_a_full_disk_leaves_nothing_in_the_cache(tmp_path, monkeypatch):
         warnings.simplefilter("error")
         kept.save_overload(None, Compiled())
     assert [file.name for file in tmp_path.iterdir()] == ["a.kernel"]
+
+
+@pytest.mark.parametrize(("left", "loaded", "verb", "refused"), [
+    (599, False, "render", True), (600, False, "render", False), (63, True, "compare", True),
+    (64, True, "compare", False), (None, False, "render", False), (1, False, "scenes", False), (-5, True, "warm", True)])
+def test_a_limit_of_memory_is_told_before_libraries_are_loaded(monkeypatch, left, loaded, verb, refused):
+    from refgi.cli import room
+
+    monkeypatch.setattr(room, "_left", lambda: left if left is None else left << 20)
+    monkeypatch.setattr(room.sys, "modules", {"scipy.spatial": None} if loaded else {})
+    if refused:
+        with pytest.raises(InputError, match=f"leaves {max(0, left)} MiB, {verb} needs"):
+            room.require_room(verb)
+    else:
+        room.require_room(verb)
 
 
 def test_every_command_has_its_faults():

@@ -137,6 +137,34 @@ def test_a_damaged_picture_of_another_program_is_refused_and_nothing_printed(tmp
     assert capfd.readouterr() == ("", "")
 
 
+def test_a_picture_of_which_its_library_complains_is_refused(tmp_path, monkeypatch):
+    """Whatever is printed while pixels are read is damage, even where no exception comes of it."""
+    import OpenEXR
+
+    class Complaining(OpenEXR.File):
+        def channels(self):
+            os.write(2, b"cannot decode row 3\n")
+            return super().channels()
+
+    (tmp_path / "a.exr").write_bytes(FORMATS["exr"].seeds()[1])
+    read_exr(tmp_path / "a.exr")
+    monkeypatch.setattr(OpenEXR, "File", Complaining)
+    with pytest.raises(InputError, match=r"a\.exr: not a readable EXR: cannot decode row 3"):
+        read_exr(tmp_path / "a.exr")
+
+
+def test_memory_is_what_a_limit_leaves(monkeypatch):
+    import resource
+
+    from refgi.scene.mesh import physical_memory
+
+    present = physical_memory()
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (12345, 12345))
+    assert physical_memory() == 12345.0
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    assert physical_memory() >= present > 12345
+
+
 def test_stderr_is_what_it_was_after_a_picture_is_read(tmp_path, capfd):
     (tmp_path / "a.exr").write_bytes(FORMATS["exr"].seeds()[0])
     read_exr(tmp_path / "a.exr")

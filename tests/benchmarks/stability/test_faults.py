@@ -145,7 +145,8 @@ def test_a_full_disk_leaves_nothing_in_the_cache(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("left", "loaded", "verb", "refused"), [
     (599, False, "render", True), (600, False, "render", False), (63, True, "compare", True),
-    (64, True, "compare", False), (None, False, "render", False), (1, False, "scenes", False), (-5, True, "warm", True)])
+    (64, True, "compare", False), (None, False, "render", False), (1, False, "scenes", False),
+    (-5, True, "warm", True)])
 def test_a_limit_of_memory_is_told_before_libraries_are_loaded(monkeypatch, left, loaded, verb, refused):
     from refgi.cli import room
 

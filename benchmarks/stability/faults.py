@@ -148,8 +148,7 @@ def _memory(name: str, short: bool, tell: Tell) -> Iterable[Row]:
         faults = memory_faults(name, MEMORY_MIB[short], Path(folder))
     steps = MEMORY_MIB[short]
     yield _row("little memory: done, or one clear line; no file torn or unfinished", name,
-               f"RLIMIT_AS {steps[0]} to {steps[-1]} MiB above the imported program and its libraries", faults, len(steps),
-               tell)
+               f"RLIMIT_AS {steps[0]} to {steps[-1]} MiB above program and libraries", faults, len(steps), tell)
 
 
 def _writers(name: str, tell: Tell) -> Iterable[Row]:

@@ -102,14 +102,14 @@ def killed(folder: Path, times: int, workers: int, longest: float, seed: int = 0
         stray += not _ended(process.pid)
         now = _results(folder)
         lost += sum(now.get(name) != digest for name, digest in kept.items())
-        torn += sum(not _is_whole(file) for file in _files(folder))
+        torn += sum(not is_whole(file) for file in _files(folder))
         most = max(most, sum(name not in now for name in _begun(folder)[begun:]))
         kept = now
         print(f"{len(kept)} of {jobs} results, {lost} lost, {torn} torn", file=sys.stderr, flush=True)
     subprocess.run(command, **quietly, check=True)
     done = _results(folder)
     lost += jobs - len(done) + sum(done.get(name) != digest for name, digest in kept.items())
-    torn += sum(not _is_whole(file) for file in _files(folder))
+    torn += sum(not is_whole(file) for file in _files(folder))
     return Tally(times, finished + len(kept), lost, torn, repeated + len(_begun(folder)) - jobs, most, stray)
 
 
@@ -134,12 +134,17 @@ def _files(folder: Path) -> list[Path]:
     return [file for file in (folder / "out").rglob("*") if file.is_file() and ".part" not in file.name]
 
 
-def _is_whole(file: Path) -> bool:
+def is_whole(file: Path) -> bool:
+    """Return whether a file of refgi has all that was written to it."""
     try:
         if file.suffix == ".json":
             json.loads(file.read_text())
         elif file.suffix == ".exr":
             read_exr(file)
+        elif file.suffix == ".png":
+            return file.read_bytes()[-8:-4] == b"IEND"
+        elif file.suffix == ".html":
+            return file.read_text().rstrip().endswith("</html>")
         elif file.suffix == ".truth":
             content = file.read_bytes().removeprefix(FIRST_LINE)
             digest = hashlib.sha256(content[:DIGEST] + content[2 * DIGEST:]).digest()

@@ -6,10 +6,15 @@ that says how many.
 """
 
 import contextlib
+import re
 from collections.abc import Iterator, Sequence
 
 MOST_FAULTS = 20  # reported of one file; a generated file can have as many as it has keys
 LONGEST_VALUE = 400  # characters of a value in an error
+LONGEST_MESSAGE = 2000  # bytes of an error in UTF-8, with all of a file's faults
+ROOM_FOR_REST = 40  # bytes of it for "... and so many more"
+# what ends a line beside \n, commands a terminal, or cannot be written in UTF-8
+UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 class RefgiError(Exception):
@@ -22,7 +27,7 @@ class InputError(RefgiError, ValueError):
     Parameters
     ----------
     message : str
-        What, where and why.
+        What, where and why; characters that cannot be printed are kept as escapes, and 2,000 bytes in all.
     key : str, optional
         The setting, option or key of a file that is to blame, for programs that read errors.
     file : str, optional
@@ -30,7 +35,7 @@ class InputError(RefgiError, ValueError):
     """
 
     def __init__(self, message: str = "", *, key: str | None = None, file: str | None = None) -> None:
-        super().__init__(message)
+        super().__init__(_cut(printable(message), LONGEST_MESSAGE))
         self.key, self.file = key, file
 
 
@@ -53,7 +58,8 @@ def expect(condition: bool, parameter: str, expected: str, got: object) -> None:
         The value; only the start of a long value is shown.
     """
     if not condition:
-        raise InputError(f"{parameter}: expected {expected}, got {shortened(repr(got))}", key=parameter)
+        text = f"{parameter}: expected {expected}, got {shortened(repr(got))}"
+        raise InputError(text.replace("\n", "\\n"), key=parameter)  # one fault, one line
 
 
 @contextlib.contextmanager
@@ -87,14 +93,42 @@ def shortened(text: str, most: int = LONGEST_VALUE) -> str:
     Returns
     -------
     str
-        The same, or its start and three dots.
+        On one line: the same, or its start and three dots.
 
     Examples
     --------
     >>> shortened("abcdefgh", 6)
     'abc...'
     """
+    text = printable(text[: most + 1]).replace("\n", "\\n")
     return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def printable(text: str) -> str:
+    r"""Return a text that any terminal shows and any file takes.
+
+    Parameters
+    ----------
+    text : str
+        Any.
+
+    Returns
+    -------
+    str
+        With escapes for control characters, ends of line but ``\n``, and halves of surrogate pairs.
+
+    Examples
+    --------
+    >>> printable("a\x1b[0m\ud800")
+    'a\\x1b[0m\\ud800'
+    """
+    return UNPRINTABLE.sub(lambda found: ascii(found[0])[1:-1], text)
+
+
+def _cut(text: str, most: int) -> str:
+    """Return a text of at most so many bytes in UTF-8."""
+    content = text.encode()
+    return text if len(content) <= most else content[: most - 3].decode(errors="ignore") + "..."
 
 
 def first_faults(faults: Sequence[str], separator: str = "\n") -> str:
@@ -110,12 +144,20 @@ def first_faults(faults: Sequence[str], separator: str = "\n") -> str:
     Returns
     -------
     str
-        At most `MOST_FAULTS` of them, and the count of the others.
+        At most `MOST_FAULTS` of them and of `LONGEST_MESSAGE`, and the count of the others.
 
     Examples
     --------
     >>> first_faults(["fault"] * 200_000).splitlines()[-1]
     '... and 199,980 more'
     """
-    more = len(faults) - MOST_FAULTS
-    return separator.join([*faults[:MOST_FAULTS], *([f"... and {more:,} more"] if more > 0 else [])])
+    said: list[str] = []
+    left = LONGEST_MESSAGE - ROOM_FOR_REST
+    for fault in faults[:MOST_FAULTS]:
+        text = _cut(printable(fault), LONGEST_MESSAGE - ROOM_FOR_REST)
+        left -= len((separator + text).encode())
+        if said and left < 0:
+            break
+        said.append(text)
+    more = len(faults) - len(said)
+    return separator.join([*said, *([f"... and {more:,} more"] if more > 0 else [])])

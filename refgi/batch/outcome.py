@@ -9,7 +9,7 @@ import pydantic
 
 from refgi.batch.jobs import FORMAT, Job
 from refgi.bench.results import Run
-from refgi.image import write_text
+from refgi.image import is_dead, write_text
 
 SECONDS_OF_A_LEFTOVER = 3600.0
 
@@ -99,7 +99,7 @@ def read_outcome(folder: Path, job: Job) -> Outcome | None:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of processes that were killed: those that nobody has written to for long.
+    """Remove temporary files of processes that were killed: their writer is dead, or has not written for long.
 
     Parameters
     ----------
@@ -109,5 +109,5 @@ def remove_leftovers(folder: Path) -> None:
     for place in ("jobs", "pictures", "store"):
         for file in (folder / place).rglob("*.part*"):
             with contextlib.suppress(OSError):
-                if time.time() - file.stat().st_mtime > SECONDS_OF_A_LEFTOVER:
+                if is_dead(file.name) or time.time() - file.stat().st_mtime > SECONDS_OF_A_LEFTOVER:
                     file.unlink()

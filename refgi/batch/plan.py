@@ -4,6 +4,7 @@
 (`refgi.bench.grid`). Files are named from the plan's folder.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -11,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from refgi.batch.thresholds import Threshold, read_threshold
 from refgi.bench.grid import Grid, grid_of, read_tables, value_text
-from refgi.errors import InputError, expect, first_faults
+from refgi.errors import InputError, expect, first_faults, shortened
 from refgi.scene import builtin_scenes
 from refgi.scene.files import text_of
 from refgi.settings import from_text
@@ -104,9 +105,13 @@ def _validated(table: Any, file: Path) -> BatchTable:
     try:
         return BatchTable.model_validate(table)
     except ValidationError as error:
-        faults = [f"{file}: {'.'.join([BATCH, *map(str, detail['loc'])])}: {detail['msg'].lower()}"
+        faults = [f"{file}: {_key(detail['loc'])}: {detail['msg'].lower()}"
                   for detail in error.errors(include_url=False)]
         raise InputError(first_faults(faults), file=str(file), key=BATCH) from error
+
+
+def _key(place: Sequence[str | int]) -> str:
+    return ".".join([BATCH, *(shortened(str(part), 80) for part in place)])
 
 
 def _named(scenes: list[str] | dict[str, str], file: Path) -> dict[str, str]:

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from refgi.errors import InputError, expect
+from refgi.errors import InputError, expect, first_faults
 from refgi.methods import find_method
+from refgi.scene.files import read_bytes
 from refgi.settings import Settings, from_text
 
 FILES = Path(__file__).with_name("files")
@@ -95,10 +96,11 @@ def read_tables(file: Path) -> dict[str, Any]:
         If the file cannot be read.
     """
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return tomllib.loads(read_bytes(file).decode())
+    except InputError as error:
+        error.file = str(file)
+        raise
+    except (ValueError, RecursionError) as error:  # a number of 5,000 digits is no TOMLDecodeError
         raise InputError(f"{file}: no TOML: {error}", file=str(file)) from error
 
 
@@ -135,7 +137,7 @@ def grid_of(tables: Mapping[str, Any], file: Path) -> Grid:
                 except InputError as error:
                     faults.append(f"{file}: {name}: {error}")
     if faults:
-        raise InputError("\n".join(dict.fromkeys(faults)), file=str(file))
+        raise InputError(first_faults(list(dict.fromkeys(faults))), file=str(file))
     return Grid(tuple(choices.values()), passes)
 
 

@@ -166,12 +166,15 @@ def _do(request: _Request, executor: str | None, tell: "Tell") -> int:
         outcome_file(request.common.folder, job).unlink(missing_ok=True)
     warm_up(dict.fromkeys(job.choice.method for job in jobs), "float32", tell)
     written = _from_time_to_time(request)
-    if executor is not None:
-        run_on_cluster(executor.removeprefix(SCHEME), jobs, request.common, tell, written)
-    elif request.workers == 1:
-        run_here(chunks_of(jobs, request.common, 1), tell, written)
-    else:
-        run_in_processes(chunks_of(jobs, request.common, request.workers), request.workers, tell, written)
+    try:
+        if executor is not None:
+            run_on_cluster(executor.removeprefix(SCHEME), jobs, request.common, tell, written)
+        elif request.workers == 1:
+            run_here(chunks_of(jobs, request.common, 1), tell, written)
+        else:
+            run_in_processes(chunks_of(jobs, request.common, request.workers), request.workers, tell, written)
+    finally:
+        remove_leftovers(request.common.folder)  # workers end at once where this process is interrupted
     return len(jobs)
 
 

@@ -3,10 +3,13 @@
 An exception that ended a run, as exit code, message, file and key.
 """
 
+import contextlib
 import difflib
 import importlib
 import os
+import signal
 import sys
+import threading
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
@@ -15,7 +18,8 @@ from typing import Any, NoReturn
 import click
 
 from refgi import __version__
-from refgi.cli.session import DONE, FAILED, INTERRUPTED, USAGE, Fault, Session
+from refgi.cli.room import require_room
+from refgi.cli.session import DONE, FAILED, INTERRUPTED, TERMINATED, USAGE, Fault, Session
 from refgi.errors import InputError, RefgiError
 
 VERBS = ("scenes", "render", "sequence", "compare", "bench", "batch", "choose", "report", "vectors", "check", "stress",
@@ -25,8 +29,12 @@ HELP = """Indirect light by four published methods on the CPU, judged by path tr
 SCENE is a built-in name such as cornell_box (see `refgi scenes`), a scene file (.json), or a mesh (.glb, .gltf, .obj,
 .ply) with camera and light options. Results go to stdout, everything else to stderr.
 
-Exit codes: 0 done, 1 a check failed, 2 usage or input error, 130 interrupted.
+Exit codes: 0 done, 1 a check failed, 2 usage or input error, 130 interrupted, 143 terminated.
 """
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, by which systems ask a program to end: cleaned up after like an interrupt from the keyboard."""
 
 
 def fault_of(error: BaseException, *, debug: bool = False) -> Fault:
@@ -44,6 +52,8 @@ def fault_of(error: BaseException, *, debug: bool = False) -> Fault:
     Fault
         One line of message, or one for each fault of a file.
     """
+    if isinstance(error, Terminated):
+        return Fault(TERMINATED, "terminated")
     if isinstance(error, click.exceptions.Abort | KeyboardInterrupt):
         return Fault(INTERRUPTED, "interrupted")
     if isinstance(error, click.UsageError):
@@ -119,6 +129,7 @@ class VerbGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the verb, and the nearest one for the message where there is none of that name."""
+        require_room(args[0])
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
@@ -143,7 +154,7 @@ class VerbGroup(click.Group):
         args = sys.argv[1:] if args is None else list(args)
         session = Session(debug=bool(os.environ.get("REFGI_DEBUG")), as_json="--json" in args)  # usage errors as well
         extra |= {"standalone_mode": False, "obj": session}
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _heeding_sigterm():
             warnings.simplefilter("default")
             warnings.showwarning = session.warn
             try:
@@ -151,6 +162,24 @@ class VerbGroup(click.Group):
             except BaseException as error:
                 code = _explained(error, session)
         sys.exit(code if isinstance(code, int) else DONE)
+
+
+@contextlib.contextmanager
+def _heeding_sigterm() -> Iterator[None]:
+    """Raise `Terminated` where SIGTERM comes, so that unfinished files are removed; only a main thread can."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _terminate(*_: object) -> NoReturn:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once: what is cleaned up now is cleaned up whole
+    raise Terminated
 
 
 def _explained(error: BaseException, session: Session) -> int:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import click
 
-DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
+DONE, FAILED, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 PERCENTAGE = re.compile(r"\d+(?= %)")
 SECONDS_BETWEEN_LINES = 3.0
 

@@ -10,9 +10,12 @@ import contextlib
 import hashlib
 import io
 import json
-from collections.abc import Mapping
+import os
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +26,8 @@ from refgi.image.whole import MARK, canonical_json, is_text, whole_file
 Array = npt.NDArray[Any]
 Channels = dict[str, Array]
 
+LONGEST_COMPLAINT = 1000  # bytes
+_STDERR = threading.Lock()  # one process has one stderr
 DIGEST = "sha256"  # reserved key of the attribute: over the other keys and all planes
 
 
@@ -84,14 +89,46 @@ def read_exr(path: str | Path) -> tuple[Channels, dict[str, Any]]:
     expect(path.is_file(), "path", "a file", str(path))
     import OpenEXR
 
-    try:  # it prints what it finds damaged, where somebody may want to read JSON
-        with contextlib.redirect_stdout(io.StringIO()), OpenEXR.File(str(path), separate_channels=True) as file:
+    try:
+        with _complaints() as complaints, OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: np.ascontiguousarray(channel.pixels) for name, channel in file.channels().items()}
             text = file.header().get(MARK)
+        if complaints:  # rows that cannot be decoded stay black, and nothing is raised
+            raise ValueError(complaints[0])
     except Exception as error:  # OpenEXR raises RuntimeError, but also IndexError or TypeError on damaged headers
         raise InputError(f"{path}: not a readable EXR: {error}") from error
     expect(bool(channels), str(path), "an EXR with whole pixel data", "none: cut short or damaged")
     return channels, _verified(text, channels, path)
+
+
+@contextlib.contextmanager
+def _complaints() -> Iterator[list[str]]:
+    """Gather what OpenEXR prints of damage, where somebody may want to read JSON or one line of error.
+
+    It prints to the process's own stderr, which therefore leads elsewhere for the time of the block.
+    """
+    said: list[str] = []
+    with _STDERR, _file_without_name() as file, contextlib.redirect_stdout(io.StringIO()):
+        try:
+            kept = os.dup(2)
+        except OSError:  # closed: nothing is printed
+            yield said
+            return
+        os.dup2(file.fileno(), 2)
+        try:
+            yield said
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            file.seek(0)
+            said += file.read(LONGEST_COMPLAINT).decode(errors="replace").splitlines()[:1]
+
+
+def _file_without_name() -> BinaryIO:
+    """Return an empty file, in memory where the platform can: a full disk is no reason not to read."""
+    if hasattr(os, "memfd_create"):
+        return os.fdopen(os.memfd_create("complaints"), "w+b")
+    return tempfile.TemporaryFile()
 
 
 def _planes(channels: Mapping[str, Array]) -> Channels:

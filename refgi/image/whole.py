@@ -5,10 +5,14 @@ has a `generator` of that name, a checkpoint of the truth begins with it.
 """
 
 import contextlib
+import hashlib
 import json
 import os
+import platform
+import re
 import secrets
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +21,7 @@ from refgi.errors import InputError
 LONGEST_STEM = 48  # characters of a file's name that its temporary name keeps
 MARK = "refgi"
 START_OF_PAGE = 4096  # bytes that hold a page's head
+TEMPORARY = re.compile(r"\.(?P<machine>[0-9a-f]{8})-(?P<process>[0-9]+)-[0-9a-f]{8}\.part(\.[^.]*)?$")
 GENERATOR = f'<meta name="generator" content="{MARK}'
 
 
@@ -41,8 +46,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         If the file cannot be written.
     """
     path = Path(path)
-    stem = path.stem[:LONGEST_STEM]  # a name as long as the file system allows leaves no room for more
-    temporary = path.with_name(f".{stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    temporary = temporary_name(path)
     try:
         yield temporary
         with temporary.open("rb+") as stream:
@@ -54,6 +58,75 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def temporary_name(path: Path) -> Path:
+    """Return a new name for a file that is not whole yet; it tells who writes it.
+
+    Parameters
+    ----------
+    path : Path
+        What the file will be called. Files of killed processes are removed from its folder, once a process.
+
+    Returns
+    -------
+    Path
+        In the same folder.
+    """
+    remove_dead(path.parent)
+    stem = path.stem[:LONGEST_STEM]  # a name as long as the file system allows leaves no room for more
+    return path.with_name(f".{stem}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.part{path.suffix}")
+
+
+def is_dead(name: str) -> bool:
+    """Return whether a temporary file's writer has ended without removing it.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+
+    Returns
+    -------
+    bool
+        False where that cannot be told: for files of another machine, or of no `temporary_name`.
+    """
+    found = TEMPORARY.search(name)
+    if found is None or found["machine"] != _machine() or os.name == "nt":  # where signal 0 would end a process
+        return False
+    try:
+        os.kill(int(found["process"]), 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
+
+
+@cache
+def remove_dead(folder: Path) -> None:
+    """Remove temporary files of ended processes from a folder, when it is first written to.
+
+    Parameters
+    ----------
+    folder : Path
+        It may be missing.
+    """
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if is_dead(entry.name):
+                with contextlib.suppress(OSError):
+                    Path(entry.path).unlink()
+
+
+@cache
+def _machine() -> str:
+    """Return a mark of this machine since it was started, and of the processes that this one can see."""
+    seen = [platform.node()]
+    for place in ("/proc/sys/kernel/random/boot_id", "/proc/self/ns/pid"):
+        with contextlib.suppress(OSError):
+            seen.append(str(Path(place).readlink()) if place.endswith("pid") else Path(place).read_text())
+    return hashlib.sha256("\n".join(seen).encode()).hexdigest()[:8]
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -1,11 +1,12 @@
 """Keep compiled kernels on disk, where every copy of the same code finds them.
 
 One file holds one specialisation of one kernel. Its name says the kernel, the key of its code (`refgi.jit.key`) and a
-hash of the argument types, and nothing about where the sources lie or when they were written. A file that cannot be
-read counts as absent and is written anew.
+hash of the argument types, and nothing about where the sources lie or when they were written. A file ends with
+the SHA-256 of what comes before; one that is damaged, even inside machine code, counts as absent and is written anew.
 """
 
 import atexit
+import contextlib
 import hashlib
 import os
 import pickle
@@ -24,6 +25,8 @@ from numba.core.compiler import CompileResult
 
 from refgi.errors import RefgiWarning
 from refgi.jit.key import code_key
+
+DIGEST = 32  # bytes of SHA-256
 
 serialize: Any = untyped_serialize
 sigutils: Any = untyped_sigutils
@@ -73,7 +76,7 @@ class KernelCache:
         path = self.path(signature)
         target.refresh()
         try:
-            return CompileResult._rebuild(target, *pickle.loads(path.read_bytes()))
+            return CompileResult._rebuild(target, *pickle.loads(_verified(path.read_bytes())))
         except FileNotFoundError:
             return None
         except Exception:  # damaged, or written by what this program no longer understands
@@ -85,13 +88,29 @@ class KernelCache:
         if compiled.library.has_dynamic_globals:
             return
         path = self.path(signature)
+        content = serialize.dumps(compiled._reduce())
+        temporary = None
         try:
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".", delete=False) as file:
-                file.write(serialize.dumps(compiled._reduce()))
-            Path(file.name).replace(path)
+                temporary = Path(file.name)
+                file.write(content + hashlib.sha256(content).digest())
+            temporary.replace(path)
+            temporary = None
         except OSError as error:
             warnings.warn(RefgiWarning(f"{path}: a compiled kernel cannot be kept ({error.strerror or error})"),
                           stacklevel=2)
+        finally:
+            if temporary is not None:
+                with contextlib.suppress(OSError):
+                    temporary.unlink(missing_ok=True)
+
+
+def _verified(content: bytes) -> memoryview:
+    """Return a file's content; a flipped bit of machine code would compute something else and say nothing of it."""
+    entry = memoryview(content)[:-DIGEST]
+    if hashlib.sha256(entry).digest() != content[-DIGEST:]:
+        raise ValueError("damaged")
+    return entry
 
 
 def _type(kind: Any) -> Iterator[str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from refgi.errors import InputError
+from refgi.scene.mesh import physical_memory
 from refgi.scene.model import Camera, Light, Mesh
 from refgi.scene.source import record_file
 
@@ -34,7 +35,7 @@ def read_bytes(path: Path) -> bytes:
             raise InputError(f"{path}: no such file{_near(path)}")
         if not path.is_file():
             raise InputError(f"{path}: expected a regular file")
-        content = path.read_bytes()
+        content = _content(path)
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -43,6 +44,16 @@ def read_bytes(path: Path) -> bytes:
         raise InputError(f"{path}: the file is empty")
     record_file(path, content)
     return content
+
+
+def _content(path: Path) -> bytes:
+    size = path.stat().st_size
+    try:
+        if size > physical_memory():
+            raise MemoryError
+        return path.read_bytes()
+    except MemoryError as error:
+        raise InputError(f"{path}: expected a file that fits in memory, got {size:,} bytes") from error
 
 
 def is_there(path: Path) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from refgi.errors import InputError, RefgiWarning, blame, first_faults
+from refgi.errors import InputError, RefgiWarning, blame, first_faults, shortened
 from refgi.scene.builtin import SCENES, build_named
 from refgi.scene.files import did_you_mean, is_there, text_of
 from refgi.scene.model import Array, Camera, Geometry, Light, Scene, SpotLight, Vector, merge
@@ -112,8 +112,11 @@ def load_scene(
     >>> load_scene("cornell_box").face_count
     30
     """
-    with reading() as files:
-        scene = _found(source, camera, lights)
+    try:
+        with reading() as files:
+            scene = _found(source, camera, lights)
+    except MemoryError as error:
+        raise InputError(f"{shortened(str(source))}: does not fit in memory", file=str(source)) from error
     return dataclasses.replace(scene, source=source_of(str(source), files))
 
 
@@ -154,12 +157,15 @@ def _from_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
     geometry, materials = merge(meshes, smooth=True)
     warn_of_unit(geometry, str(path))
     lacking = []
-    if camera is None:
-        camera = found.cameras[0] if found.cameras else default_camera(geometry)
-        lacking += [] if found.cameras else ["camera"]
-    if lights is None:
-        lights = found.lights or (default_light(geometry),)
-        lacking += [] if found.lights else ["light"]
+    try:
+        if camera is None:
+            camera = found.cameras[0] if found.cameras else default_camera(geometry)
+            lacking += [] if found.cameras else ["camera"]
+        if lights is None:
+            lights = found.lights or (default_light(geometry),)
+            lacking += [] if found.lights else ["light"]
+    except InputError as error:
+        raise InputError(f"{path}: placed to fit the mesh: {error}") from error
     if lacking:
         text = f"{path}: the file has no {' and no '.join(lacking)}; one was placed to fit the mesh"
         warnings.warn(RefgiWarning(text), stacklevel=5)

@@ -167,8 +167,12 @@ def expect_memory(vertices: int, faces: int, where: str) -> None:
 
 
 def physical_memory() -> float:
-    """Return the machine's memory in bytes, infinity where the platform does not say."""
+    """Return the memory that this process may have at most, in bytes; infinity where the platform does not say."""
     try:
-        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, OSError, ValueError):
+        import resource
+
+        present = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+        allowed = resource.getrlimit(resource.RLIMIT_AS)[0]
+    except (AttributeError, ImportError, OSError, ValueError):
         return float("inf")
+    return present if allowed == resource.RLIM_INFINITY else min(present, float(allowed))

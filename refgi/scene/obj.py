@@ -135,8 +135,9 @@ def _warn_of_textures(textures: Sequence[tuple[str, ...]], path: Path) -> None:
         return
     kinds = ", ".join(sorted({shortened(words[0], 40) for words in textures})[:10])
     # options come before the name, which may hold spaces
-    missing = [" ".join(words[1:]) for words in textures
-               if not any(is_there(path.parent / " ".join(words[k:])) for k in range(1, min(len(words), 20)))]
+    found = {words: any(is_there(path.parent / " ".join(words[k:])) for k in range(1, min(len(words), 20)))
+             for words in set(textures)}
+    missing = [" ".join(words[1:]) for words in textures if not found[words]]
     absent = f"; {len(missing):,} of them name no file: {first_faults([shortened(m, 80) for m in missing], ', ')}"
     text = f"{path}: {len(textures):,} texture(s) ({kinds}) passed over{absent if missing else ''}"
     warnings.warn(RefgiWarning(text), stacklevel=6)

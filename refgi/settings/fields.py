@@ -265,7 +265,11 @@ def names_of(owner: type[Settings], hint: Any) -> frozenset[str]:
 def _is_in_range(value: Any, kind: Any, about: Any) -> bool:
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral if kind is int else numbers.Real):
         return False
-    if not math.isfinite(value) and value != about.get("most"):
+    try:
+        finite = math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
+    if not finite and value != about.get("most"):
         return False
     low, high, above = about.get("least"), about.get("most"), about.get("above")
     return (low is None or value >= low) and (high is None or value <= high) and (above is None or value > above)

@@ -8,7 +8,6 @@ computation, so nothing of a file that is damaged, or another's, is ever read.
 import contextlib
 import hashlib
 import os
-import tempfile
 import time
 import warnings
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import InputError, RefgiWarning, expect
+from refgi.image import temporary_name
 from refgi.truth.result import Moments, no_passes
 
 Array = npt.NDArray[Any]
@@ -113,15 +113,15 @@ def _digest(computation: bytes, content: bytes) -> bytes:
 @contextlib.contextmanager
 def _temporary(path: Path, content: bytes) -> Iterator[Path]:
     """Write a file beside a path, on the disk itself, and remove it unless it is renamed inside the block."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    name = temporary_name(path)
     try:
-        with os.fdopen(handle, "wb") as file:
+        with name.open("xb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        yield Path(name)
+        yield name
     finally:
-        Path(name).unlink(missing_ok=True)
+        name.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager

@@ -2,46 +2,21 @@
 
 import json
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+from benchmarks.stability.mutations import ODD, places, spoiled, with_value
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import load_scene
 from tests.scene.samples import FACES, SCENE, glb_bytes, gltf_tree, ply_bytes, write_scene
 
-MUTATIONS = 400  # per format
+MUTATIONS = 800  # per format; few of a scene file are still sound
 OBJ = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nusemtl a\nf 1//1 2//1 3//1 4//1\nf -4 -3 -2\n"
 MTL = b"newmtl a\nKd 0.1 0.2 0.3\nKs 0.1 0.1 0.1\nNs 10\nKe 0 0 1\n"
 SEEDS = {"scene.json": json.dumps(SCENE).encode(), "square.glb": glb_bytes(), "square.ply": ply_bytes(),
          "text.ply": ply_bytes(text=True), "square.obj": OBJ, "m.mtl": MTL}
-TOKENS = [b"0", b"-1", b"1e999", b"NaN", b"4294967295", b"99999999999", b"null", b"[", b"}", b'"', b"\0", b"\xff", b""]
-
-ODD: list[Any] = [0, -1, 1, 1e300, -1e300, 1e-300, float("inf"), float("nan"), 2**31, 2**63, 10**30, True, None, "",
-                  "x", [], {}, [[]], [0, 0, 0], [1e308] * 3, [1e-320] * 3, [float("nan")] * 3, "../x", "\0", [1] * 16]
-
-
-def spoiled(content: bytes, random: np.random.Generator) -> bytes:
-    """Return the bytes with one to four flips, cuts, repeats or insertions."""
-    for _ in range(int(random.integers(1, 5))):
-        if not content:
-            break
-        place, length = int(random.integers(len(content))), int(random.integers(1, 24))
-        choice = int(random.integers(5))
-        if choice == 0:
-            content = content[:place] + bytes([content[place] ^ (1 << int(random.integers(8)))]) + content[place + 1 :]
-        elif choice == 1:
-            content = content[:place] + content[place + length :]
-        elif choice == 2:
-            content = content[: place + length] + content[place:]
-        elif choice == 3:
-            content = content[:place] + TOKENS[int(random.integers(len(TOKENS)))] + content[place + length % 4 :]
-        else:
-            content = content[:place] + random.bytes(min(length, 4)) + content[place + min(length, 4) :]
-    return content
 
 
 @pytest.mark.parametrize("name", SEEDS)
@@ -71,25 +46,6 @@ def test_spoiled_real_headers(data_dir: Path, tmp_path: Path) -> None:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RefgiWarning)
                 _outcome(tmp_path / name)
-
-
-def places(tree: Any, above: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
-    """Give the way to every value of a tree."""
-    yield above
-    for key, value in tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ():
-        yield from places(value, (*above, key))
-
-
-def with_value(tree: Any, place: tuple[str | int, ...], value: Any) -> Any:
-    """Return the tree with one value replaced."""
-    if not place:
-        return value
-    changed = json.loads(json.dumps(tree))
-    owner = changed
-    for key in place[:-1]:
-        owner = owner[key]
-    owner[place[-1]] = value
-    return changed
 
 
 @pytest.mark.parametrize("form", ["json", "glb"])

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from refgi.errors import InputError, expect
+from refgi.errors import InputError, expect, shortened
 from refgi.scene.files import read_bytes
 from refgi.scene.model import Array
 
@@ -135,7 +135,10 @@ class Document:
         named = Path(urllib.parse.unquote(uri))
         beside = not named.is_absolute() and ".." not in named.parts and "://" not in uri and "\0" not in str(named)
         expect(beside, f"{self.path}: {where}.uri", "a file beside the .gltf", uri[:80])
-        return read_bytes(self.path.parent / named)
+        try:
+            return read_bytes(self.path.parent / named)
+        except InputError as error:
+            raise InputError(f"{self.path}: {where}.uri: {shortened(str(error), 1000)}") from error
 
 
 def _chunks(content: bytes, path: Path) -> tuple[bytes, bytes | None]:

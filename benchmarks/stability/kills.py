@@ -1,0 +1,176 @@
+"""Kills: whenever a process is ended, its files are whole or absent, and what goes on ends as if nothing had been.
+
+kill -9 at random moments of render, compare, sequence --resume, a truth with checkpoint, and batch; SIGTERM and SIGINT,
+after which the exit code is 143 or 130, one line says so, and no unfinished file is left.
+`python -m benchmarks.stability.kills NAME TIMES SEED` does one of them again.
+"""
+
+import random
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from benchmarks.kill_batch import killed as killed_batch
+from benchmarks.stability.tasks import Task, Tell
+from benchmarks.stability.victim_host import Host
+from benchmarks.stability.victims import VICTIMS, Stand, allowed, undisturbed, with_old_files
+from refgi.stress.rows import Row
+
+SEED = 19
+TIMES = {"render": 50, "compare": 30, "sequence": 50, "checkpoint": 40}
+SHORT_TIMES = {"render": 6}
+BATCH_TIMES, BATCH_JOBS = 30, 120
+ASKED = {signal.SIGTERM: (143, "terminated"), signal.SIGINT: (130, "interrupted")}
+ASKED_TIMES = {True: 1, False: 12}  # each signal of each command
+
+
+class Found(NamedTuple):
+    """What some kills of a command did."""
+
+    kills: int
+    torn: int  # files that are not whole, or hold what no undisturbed run gives
+    lost: int  # files that were there and are not, or are others
+    other: int  # files of the run that was let end at last, that differ from those of an undisturbed one
+    left: int  # unfinished files after that
+    began: int  # unfinished files that kills left in all: how often one came while a file was written
+    text: str = ""
+
+
+def tasks(short: bool) -> list[Task]:
+    """Return a task a command that is killed, and one a signal that asks it to end."""
+    times = SHORT_TIMES if short else TIMES
+    asked = [Task(f"{name}-asked", partial(_asked_task, name, short)) for name in (("render",) if short else VICTIMS)]
+    batch = [] if short else [Task("batch", _batch_task)]
+    return [Task(name, partial(_killed_task, name, number)) for name, number in times.items()] + asked + batch
+
+
+def killed(name: str, times: int, seed: int, folder: Path, patch: str = "") -> Found:
+    """Kill a command some times at random moments, let it end, and count what is not as promised."""
+    victim = VICTIMS[name]
+    moments = random.Random(seed)
+    torn = lost = began = 0
+    texts: list[str] = []
+    with Host(f"{victim.patch}\n{patch}") as host:
+        stand, seconds, whole = _prepared(name, folder, host)
+        for number in range(times):
+            if not victim.resumes or number == 0 or stand.digests() == whole:
+                stand.renew()
+                with_old_files(name, stand, host)
+            before = stand.digests()
+            host.run(victim.arguments, stand.folder, end=signal.SIGKILL, after=moments.uniform(0, 1.1 * seconds))
+            now, broken = stand.digests() if not (found := stand.torn()) else {}, found
+            began += len(stand.parts())
+            torn += len(broken)
+            gone = [file for file in before if not broken and file not in now]
+            gone += [file for file in before if victim.resumes and file in now and file.endswith(".exr")
+                     and now[file] != before[file]]
+            lost += len(gone)
+            texts += [f"kill {number}: torn {broken}, lost {gone}"] if broken or gone else []
+        code, said = host.run(victim.arguments, stand.folder)
+        texts += [f"at last exit {code}: {said[-300:]}"] if code else []
+        end = stand.digests()
+        other = sum(end.get(file) != content for file, content in whole.items())
+        return Found(times, torn, lost, other + (code != 0), len(stand.parts()), began, "; ".join(texts)[:600])
+
+
+def _prepared(name: str, folder: Path, host: Host) -> tuple[Stand, float, dict[str, str]]:
+    """Return a stand that knows what files may hold, the seconds of an undisturbed run and what that gives."""
+    stand = Stand(folder, {})
+    seconds, whole = undisturbed(name, stand, host, clock=time.monotonic)
+    stand.renew()
+    with_old_files(name, stand, host)
+    return Stand(folder, allowed(whole, stand.digests())), seconds, whole
+
+
+def asked(name: str, number: signal.Signals, times: int, seed: int, folder: Path, patch: str = "") -> list[str]:
+    """Ask a command to end at random moments, and return what is not as promised."""
+    moments, faults = random.Random(seed + number), []
+    code_promised, word = ASKED[number]
+    victim = VICTIMS[name]
+    with Host(f"{victim.patch}\n{patch}") as host:
+        stand, seconds, whole = _prepared(name, folder, host)
+        for turn in range(times):
+            stand.renew()
+            with_old_files(name, stand, host)
+            moment = moments.uniform(0, seconds)
+            code, said = host.run(victim.arguments, stand.folder, end=number, after=moment)
+            torn = stand.torn()
+            is_done = not torn and stand.digests() == whole
+            heeded = code == code_promised and f"refgi: {word}" in said.splitlines() and "Traceback" not in said
+            if not (heeded or (is_done and code in (0, -number))):
+                faults.append(f"{turn}, after {moment:.3f} s: exit {code}: {said[-300:]}")
+            faults += [f"{turn}, after {moment:.3f} s: left {part}" for part in stand.parts()]
+            faults += [f"{turn}, after {moment:.3f} s: torn {file}" for file in torn]
+    return faults
+
+
+def _killed_task(name: str, times: int, tell: Tell) -> Iterable[Row]:
+    with tempfile.TemporaryDirectory() as folder:
+        found = killed(name, times, SEED, Path(folder) / "work")
+    tell(str(found))
+    yield from rows_of(name, found, f"python -m benchmarks.stability.kills {name} {times} {SEED}")
+
+
+def rows_of(name: str, found: Found, again: str) -> Iterator[Row]:
+    """Return the rows of some kills."""
+    domain = f"kill -9 at any moment; {found.began} of {found.kills} while a file was written"
+    for promise, figure, unit in (
+        ("killed: each file is whole, old or new", found.torn + found.lost, "files torn or lost"),
+        ("killed: the next run ends as if undisturbed", found.other, "files that differ"),
+        ("killed: the next run removes unfinished files", found.left, "files left"),
+    ):
+        yield _row(promise, name, domain, figure, unit, found.kills, again, found.text)
+
+
+def _asked_task(name: str, short: bool, tell: Tell) -> Iterable[Row]:
+    times = ASKED_TIMES[short]
+    for number, (code, _) in ASKED.items():
+        with tempfile.TemporaryDirectory() as folder:
+            faults = asked(name, number, times, SEED, Path(folder) / "work")
+        tell(f"{number.name}: {faults or 'as promised'}")
+        yield _row(f"{number.name}: exit {code}, one line, no unfinished file", name, "any moment of its work",
+                   len(faults), "breaches", times, f"python -m benchmarks.stability.kills {name} {times} {SEED}",
+                   "; ".join(faults)[:600])
+
+
+def _batch_task(tell: Tell) -> Iterable[Row]:
+    with tempfile.TemporaryDirectory() as folder:
+        tally = killed_batch(Path(folder), BATCH_TIMES, 2, 2.0, SEED, BATCH_JOBS)
+    tell(str(tally))
+    again = f"python -m benchmarks kill-batch --times {BATCH_TIMES} --seed {SEED} --longest 2"
+    domain = "kill -9 of the first process at any moment, 2 workers"
+    yield _row("killed: each file is whole, old or new", "batch", domain, tally.lost + tally.torn,
+               "files torn or lost", tally.kills, again, str(tally))
+    yield _row("killed: no worker outlives the batch", "batch", domain, tally.stray, "kills", tally.kills, again)
+    yield Row(part="kills", property="killed: jobs to be done again", subject="batch", domain=domain,
+              figure=tally.most_repeated, unit="jobs a kill", limit=2, kind="exact", source="one a worker",
+              cases=tally.kills, seed=SEED, reproduce=again)
+
+
+def _row(promise: str, name: str, domain: str, figure: int, unit: str, cases: int, again: str,
+         text: str = "") -> Row:
+    return Row(part="kills", property=promise, subject=name, domain=domain, figure=figure, unit=unit, limit=0,
+               kind="exact", source="written under another name, then renamed", cases=cases, seed=SEED,
+               reproduce=again, detail=text)
+
+
+def main(arguments: list[str]) -> int:
+    name, times, seed = arguments
+    with tempfile.TemporaryDirectory() as folder:
+        found: Any = killed(name, int(times), int(seed), Path(folder) / "work")
+    print(found)
+    faults: list[str] = []
+    for number in ASKED:
+        with tempfile.TemporaryDirectory() as folder:
+            faults += asked(name, number, int(times), int(seed), Path(folder) / "work")
+    print(*faults, sep="\n")
+    return int(bool(faults or found.torn or found.lost or found.other or found.left))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,45 @@
+"""A limit of address space (`ulimit -v`) too small for the libraries is refused before they are loaded.
+
+Without room OpenBLAS asks for memory without end, and LLVM and Embree end the process with no word of refgi's.
+"""
+
+import sys
+from pathlib import Path
+
+from refgi.errors import InputError
+
+COMPUTING = frozenset({"render", "sequence", "compare", "bench", "batch", "choose", "vectors", "explain", "warm"})
+LIBRARIES = 600 << 20  # bytes: with NumPy, SciPy, LLVM, Embree and a small picture 650 MiB in all, some of it loaded
+KERNELS = 64 << 20  # ... where the libraries are loaded; a small picture by sii takes 32 MiB
+
+
+def require_room(verb: str) -> None:
+    """Refuse a verb that computes where the address space left is too small for what it loads.
+
+    Parameters
+    ----------
+    verb : str
+        Of the command line.
+
+    Raises
+    ------
+    InputError
+        If there is a limit, and too little left below it.
+    """
+    left = _left()
+    needed = KERNELS if "scipy.spatial" in sys.modules else LIBRARIES
+    if verb in COMPUTING and left is not None and left < needed:
+        raise InputError(f"out of memory: the limit of address space (ulimit -v) leaves {max(0, left) >> 20} MiB, "
+                         f"{verb} needs {needed >> 20} or more")
+
+
+def _left() -> int | None:
+    """Return the bytes of address space below a limit; None where there is none or that cannot be told."""
+    try:
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+    except (ImportError, OSError, ValueError):
+        return None
+    return None if limit == resource.RLIM_INFINITY else limit - pages * resource.getpagesize()

@@ -6,10 +6,14 @@ Prints inputs, answer, reference and error; the lines of the table end in such a
 import importlib
 import sys
 
-USAGE = "usage: python -m benchmarks.stability.again kernels|rays NAME SEED CASE"
+from benchmarks.stability import again_files
+
+USAGE = "usage: python -m benchmarks.stability.again kernels|rays NAME SEED CASE, or files NAME CASE"
 
 
 def main(arguments: list[str]) -> int:
+    if arguments[:1] == ["files"]:
+        return again_files.main(arguments[1:])
     try:
         part, name, seed, case = arguments
         numbers = int(seed), int(case)

@@ -125,7 +125,7 @@ def penumbras(x: Array) -> Array:
     real, n = x.dtype.type, x.shape[1]
     constants, rows = np.zeros(CONSTANTS, real), np.zeros((SCRATCH_ROWS, n), real)
     rows[D] = x[0]
-    sizing = FilterSizing(False, False, False, False)
+    sizing = FilterSizing(False, False, False, False, False)
     find_penumbra(constants, sizing, DepthScale(False, 0.0, 1.0, 1.0), _series_weights(real),
                   np.ascontiguousarray(x[1:]), n, np.ones(n, bool), rows)
     return rows[DEPTH : DEPTH + 1].copy()

@@ -11,10 +11,10 @@ from typing import Annotated, Any, NamedTuple, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from refgi.batch.thresholds import Threshold, read_threshold
-from refgi.bench.grid import Grid, grid_of, read_tables, value_text
+from refgi.bench.grid import Grid, grid_of, value_text
 from refgi.errors import InputError, expect, first_faults, shortened
 from refgi.scene import builtin_scenes
-from refgi.scene.files import text_of
+from refgi.scene.files import read_toml, text_of
 from refgi.settings import from_text
 from refgi.sssil.settings import TemporalSettings
 from refgi.truth import TruthSettings
@@ -83,7 +83,7 @@ def read_plan(file: Path) -> Plan:
     InputError
         If the file cannot be read, or a table, a method, a key or a value is not usable.
     """
-    tables = read_tables(file)
+    tables = read_toml(file)
     expect(BATCH in tables, str(file), "a table [batch] with the key scenes", ", ".join(tables) or "no table")
     table, thresholds = tables.pop(BATCH), tables.pop(EXPECT, {})
     own = _validated(table, file)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from refgi.errors import InputError, expect, first_faults
 from refgi.methods import find_method
-from refgi.scene.files import read_bytes
+from refgi.scene.files import read_toml
 from refgi.settings import Settings, from_text
 
 FILES = Path(__file__).with_name("files")
@@ -74,34 +74,7 @@ def read_grid(file: Path) -> Grid:
     InputError
         If the file cannot be read, a method or key is unknown or a value not usable; names all of them.
     """
-    return grid_of(read_tables(file), file)
-
-
-def read_tables(file: Path) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Parameters
-    ----------
-    file : Path
-        TOML.
-
-    Returns
-    -------
-    dict
-        Its tables by name.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    """
-    try:
-        return tomllib.loads(read_bytes(file).decode())
-    except InputError as error:
-        error.file = str(file)
-        raise
-    except (ValueError, RecursionError) as error:  # a number of 5,000 digits is no TOMLDecodeError
-        raise InputError(f"{file}: no TOML: {error}", file=str(file)) from error
+    return grid_of(read_toml(file), file)
 
 
 def grid_of(tables: Mapping[str, Any], file: Path) -> Grid:

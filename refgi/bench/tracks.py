@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from refgi.bench.grid import FILES, Choice, flat, read_tables, value_text
+from refgi.bench.grid import FILES, Choice, flat, value_text
 from refgi.errors import InputError, expect
 from refgi.methods import find_method
+from refgi.scene.files import read_toml
 from refgi.settings import from_text
 
 STEP = math.sqrt(2.0)
@@ -73,7 +74,7 @@ def read_tracks(file: Path) -> tuple[Track, ...]:
         If the file cannot be read, a method or key is unknown or a value not usable.
     """
     found = []
-    for name, tables in read_tables(file).items():
+    for name, tables in read_toml(file).items():
         for table in tables if isinstance(tables, list) else [tables]:
             try:
                 found.append(_track(name, table))

@@ -2,15 +2,17 @@
 
 import difflib
 import itertools
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from refgi.errors import InputError
 from refgi.scene.mesh import physical_memory
 from refgi.scene.model import Camera, Light, Mesh
 from refgi.scene.source import record_file
 
+MOST_PARTS = 1000  # of a key in TOML
 LONGEST_WORD, MOST_CANDIDATES = 200, 1000  # comparing words takes the square of their length, for each candidate
 
 
@@ -44,6 +46,38 @@ def read_bytes(path: Path) -> bytes:
         raise InputError(f"{path}: the file is empty")
     record_file(path, content)
     return content
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict
+        Its tables by name.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is no TOML. A key of very many parts counts as damage: its parts take time that grows
+        with the square of their number.
+    """
+    try:
+        text = read_bytes(path).decode()
+        deepest = max((line.partition("=")[0].count(".") for line in text.splitlines()), default=0)
+        if deepest > MOST_PARTS:
+            raise ValueError(f"a key of {deepest + 1:,} parts")
+        return tomllib.loads(text)
+    except InputError as error:
+        error.file = str(path)
+        raise
+    except (ValueError, RecursionError) as error:  # a number of 5,000 digits is no TOMLDecodeError
+        raise InputError(f"{path}: no TOML: {error}", file=str(path)) from error
 
 
 def _content(path: Path) -> bytes:

@@ -20,7 +20,6 @@ no key of the camera or a light names stays as the scene has it. A file has ::
 """
 
 import json
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Self
@@ -29,7 +28,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from refgi.errors import InputError, expect, first_faults, shortened
-from refgi.scene.files import read_bytes
+from refgi.scene.files import read_toml
 from refgi.scene.light import DirectionalLight, PointLight, SpotLight
 from refgi.scene.model import Scene
 from refgi.scene.motion import faces_of
@@ -148,12 +147,7 @@ def read_path(file: str | FilePath, scene: Scene) -> tuple[Path, int | None]:
 
 
 def _validated(file: FilePath) -> PathFile:
-    try:
-        tree = tomllib.loads(read_bytes(file).decode())
-    except InputError:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{file}: damaged TOML: {error}") from error
+    tree = read_toml(file)
     try:
         return PathFile.model_validate_json(json.dumps(tree, default=str))  # as JSON, a list may be a tuple
     except ValidationError as error:

@@ -155,7 +155,7 @@ objects = [{material = "rde", keys = [{at = 0.0}]}, {faces = [3, 31], keys = [{a
 
 
 @pytest.mark.parametrize(("content", "words"), [
-    ("frames = ", "damaged TOML"), ("frames = 1\nframes = 2", "damaged TOML"), ("colour = 1", "colour: unknown key"),
+    ("frames = ", "no TOML"), ("frames = 1\nframes = 2", "no TOML"), ("colour = 1", "colour: unknown key"),
     ("camera = 3", "camera: "),
 ])
 def test_damaged_files_are_refused(room, written, content, words):
@@ -214,8 +214,8 @@ def test_many_faults_of_a_path_are_counted(room, written):
     with pytest.raises(InputError) as caught:
         read_path(written("\n".join(f"key{number} = 1" for number in range(500))), room)
     lines = str(caught.value).splitlines()
-    assert len(lines) == 21
-    assert lines[-1] == "... and 480 more"
+    assert 2 <= len(lines) <= 21  # as many as 2,000 bytes hold, which the length of the file's name decides
+    assert lines[-1] == f"... and {501 - len(lines)} more"
 
 
 def test_each_kind_of_light_has_its_own_keys(room, written):

@@ -105,8 +105,8 @@ def test_every_bit_of_seed_stream_and_index_turns_half_of_the_bits():
 
 
 def test_methods_draw_from_nothing_else():
-    """NumPy's generators are left to path tracing, scenes in the making, test vectors and the bootstrap."""
+    """NumPy's generators are left to path tracing, scenes in the making and changed, test vectors and the bootstrap."""
     package = Path(refgi.__file__).parent
     used = {path.relative_to(package).as_posix() for path in package.rglob("*.py")
             if re.search(r"np\.random|numpy\.random|import random", path.read_text(encoding="utf-8"))}
-    assert {name.split("/")[0] for name in used} <= {"truth", "scene", "vectors", "bench"}
+    assert {name.split("/")[0] for name in used} <= {"truth", "scene", "vectors", "bench", "stress"}

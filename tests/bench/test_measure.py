@@ -63,7 +63,7 @@ def test_errors_are_those_of_the_method_run_by_hand_with_each_seed(box, bench):
 
 def test_a_method_of_the_screen_is_judged_by_what_the_camera_sees_as_well(box):
     """Each reference is the truth with the method's own limits, traced by hand; with rays it knows what blocks."""
-    grid = Grid((choice("hssil", samples=8), choice("hssil", samples=8, visibility="rays")), ())
+    grid = Grid((choice("hssil", samples=64), choice("hssil", samples=64, visibility="rays")), ())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)
         found = bench_scene(box, grid, rounds=1, truth=TruthSettings(samples=96), **SIZE)

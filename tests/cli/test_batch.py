@@ -201,7 +201,7 @@ def test_wrong_use_is_one_clear_error_before_anything_runs(tmp_path, plan, did, 
 
 
 def test_a_plan_that_is_none(tmp_path):
-    assert "cannot be read" in run(tmp_path / "none.toml", "--out", tmp_path / "out").stderr
+    assert "no such file" in run(tmp_path / "none.toml", "--out", tmp_path / "out").stderr
     (tmp_path / "plan.toml").write_text(PLAN.replace("cornell_box", "cornel_box"))
     wrong = run(tmp_path / "plan.toml", "--out", tmp_path / "out")
     assert wrong.exit_code == 2

@@ -122,7 +122,7 @@ def test_pictures_of_others_are_spared(tmp_path, grid, monkeypatch):
 
 @pytest.mark.parametrize(("arguments", "said"), [
     (["--grid", "GRID", "--quick"], "not both"),
-    (["--grid", "none.toml"], "cannot be read"),
+    (["--grid", "none.toml"], "no such file"),
     (["--quick", "--methods", "siii"], "siii"),
     (["--quick", "--set", "samplse=3"], "samplse"),
     (["cornel_box", "--quick"], "cornel_box"),

@@ -18,7 +18,7 @@ from refgi.stress.promises import settings_of
 from refgi.stress.rows import Row
 from refgi.stress.run import PART, stress
 
-SIZE, SHORT_SIZE = 64, 24
+SIZE = 64
 SCENES = ("cornell_box", "stage", "ring:faces=3000", "glass_ball:faces=3000", "metaballs",
           "integrating_sphere:faces=1000")
 SHORT_METHODS = ("sii", "multires", "hssil", "gather")
@@ -26,7 +26,7 @@ SHORT_METHODS = ("sii", "multires", "hssil", "gather")
 FEW = {"sii": ("lights=64",), "multires": ("lights=64",), "val": ("lights=64", "clusters=4", "maps=16"),
        "vpl": ("lights=64",), "truth": ("samples=8",)}
 MAP = 32  # texels of a lamp's map
-HOSTILE, SHORT_HOSTILE = 700, 6
+HOSTILE, SHORT_HOSTILE = 150, 6
 SLOWEST = 10.0  # s of a processor, a picture
 DOMAIN = ("needles, soups, fans, lamps and cameras in walls, 1e-8 to 1e8 m, exponents to 1e20, 1 to 17 pixels "
           "along a side")
@@ -37,17 +37,16 @@ def tasks(short: bool) -> list[Task]:
     """Return the tasks: each scene's changes, and hostile scenes by method."""
     scenes = SCENES[:1] if short else SCENES
     methods = SHORT_METHODS if short else tuple(BUILT_IN)
-    size = SHORT_SIZE if short else SIZE
-    changed = [Task(f"changes-{name.partition(':')[0]}", lambda _, name=name: _changed(name, methods, size))
+    changed = [Task(f"changes-{name.partition(':')[0]}", lambda _, name=name: _changed(name, methods))
                for name in scenes]
     count = SHORT_HOSTILE if short else HOSTILE
     return [*changed, *(Task(f"hostile-{name}", lambda tell, name=name: [hostile_row(name, range(count), tell)])
                         for name in methods)]
 
 
-def _changed(name: str, methods: Sequence[str], size: int) -> list[Row]:
+def _changed(name: str, methods: Sequence[str]) -> list[Row]:
     scene = load_scene(name)
-    return [found.row for found in stress(scene, methods, width=size, height=size, source=name)]
+    return [found.row for found in stress(scene, methods, width=SIZE, height=SIZE, source=name)]
 
 
 def hostile_row(method: str, seeds: Sequence[int], tell: Tell) -> Row:

@@ -41,11 +41,11 @@ def test_a_finished_task_is_not_run_again(tmp_path, monkeypatch):
 def test_broken_promises_are_an_exit_code(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(pictures, "tasks", lambda _: [Task("one", lambda _: [row("a"), row("b", 2.0)])])
     page = tmp_path / "page.md"
-    page.write_text(f"head\n{runner.BEGIN}\nold\n{runner.END}\ntail\n")
+    page.write_text(f"head\n{runner.BEGIN}\nprevious\n{runner.END}\ntail\n")
     assert runner.main(["--part", "pictures", "--out", str(tmp_path / "out"), "--page", str(page)]) == 1
     assert "FAIL pictures: b, sii : 2  > 1" in capsys.readouterr().out
     assert page.read_text().startswith(f"head\n{runner.BEGIN}\n")
-    assert "old" not in page.read_text()
+    assert "previous" not in page.read_text()
     assert page.read_text().endswith(f"{runner.END}\ntail\n")
     with pytest.raises(ValueError, match="expected"):
         runner.with_table("no marks", "table")

@@ -129,13 +129,15 @@ def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:
     Returns
     -------
     float
-        1; infinity where the picture before is black and that after is not.
+        1; infinity where the picture before is black and that after is not, and where no pixel shows the same place.
     """
     first = before.light[:, *changed.part].astype(np.float64)
     apart = changed.back(after.light.astype(np.float64)) - first
     kept = same_surface(before, after, changed)
     mean = float(first.mean())
-    if not kept.any() or not apart[:, kept].any():
+    if not kept.any():
+        return math.inf
+    if not apart[:, kept].any():
         return 0.0
     return math.sqrt(float((apart[:, kept] ** 2).mean())) / mean if mean > 0 else math.inf
 
@@ -181,5 +183,5 @@ def estimates_apart(before: Seen, after: Seen, changed: Changed) -> tuple[float,
     apart = np.abs(first.picture_mean - second.picture_mean / changed.flux)
     variance = first.picture_variance + second.picture_variance / changed.flux**2
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.where(apart > 0, apart / np.sqrt(variance), 0.0)
+        t = np.where(apart == 0, 0.0, apart / np.sqrt(variance))  # NaN stays
     return float(t.max()), float(first.degrees_of_freedom + second.degrees_of_freedom)

@@ -51,6 +51,7 @@ class Silence(NamedTuple):
 def stress(
     scene: Scene, methods: Sequence[str], *, width: int, height: int, changes: Sequence[str] | None = None,
     source: str = "", tell: Tell = lambda *_: None, silent: Callable[[Silence], None] = lambda _: None,
+    unknown: bool = False,
 ) -> Iterator[Found]:
     """Attack a scene: render it by methods after changes of which the outcome is known.
 
@@ -70,6 +71,8 @@ def stress(
         Called with (what runs, share done).
     silent : callable
         Called with what a method is not asked.
+    unknown : bool
+        Yield rows whose limit is still to be observed as well.
 
     Yields
     ------
@@ -93,7 +96,7 @@ def stress(
         except NotPromisedError as why:
             silent(Silence("every method", change.name, str(why)))
     for number, method in enumerate(methods):
-        one = _Method(scene, method, size, source or scene.name, silent)
+        one = _Method(scene, method, size, source or scene.name, silent, unknown)
         done: list[Change] = [change for change in chosen if change.name in applied]
         for count, change in enumerate(done):
             tell(f"{method}: {change.name}", (number + count / len(done)) / len(methods))
@@ -106,8 +109,9 @@ class _Method:
     """One method on one scene; its pictures before are kept."""
 
     def __init__(self, scene: Scene, method: str, size: dict[str, int], source: str,
-                 silent: Callable[[Silence], None]) -> None:
+                 silent: Callable[[Silence], None], unknown: bool) -> None:
         self._scene, self._method, self._size, self._source, self._silent = scene, method, size, source, silent
+        self._unknown = unknown
         self._before: dict[Any, Seen] = {}
         self._pictures = self._unsound = 0
         self._warned: list[str] = []
@@ -117,6 +121,8 @@ class _Method:
         """Yield the row of one change, and that of the surfaces it shows with the first method."""
         try:
             how = asked(self._method, change, self._scene)
+            if math.isinf(how.limit) and not self._unknown:
+                raise NotPromisedError("no limit was observed yet")
         except NotPromisedError as why:
             self._silent(Silence(self._method, change.name, str(why)))
             return

@@ -173,3 +173,14 @@ def test_editing_materials_recompiles_nothing(tmp_path: Path):
         done = subprocess.run([sys.executable, "keys.py"], cwd=tmp_path, capture_output=True, text=True, check=True,
                               env=os.environ | {"PYTHONPATH": str(tmp_path)})
         assert json.loads(done.stdout) == kernels()
+
+
+@pytest.mark.parametrize("name", ["NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_LOOP_VECTORIZE", "NUMBA_OPT"])
+def test_what_numba_compiles_for_changes_the_key(monkeypatch, name):
+    """A kernel of another target would have other code under the same name."""
+    from refgi.jit.key import _platform
+
+    monkeypatch.delenv(name, raising=False)
+    plain = _platform.__wrapped__()
+    monkeypatch.setenv(name, "1")
+    assert _platform.__wrapped__() != plain

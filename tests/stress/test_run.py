@@ -1,6 +1,7 @@
 """Methods with faults put in: each must break the promise that is about it, and no other."""
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from refgi.jit import most_threads
 from refgi.scene import PointLight
 from refgi.stress import promises
 from refgi.stress.changes import CHANGES, Changed
-from refgi.stress.judge import Seen, bits_apart, means_apart, rmse_apart, same_surface, unsound
+from refgi.stress.judge import Seen, bits_apart, estimates_apart, means_apart, rmse_apart, same_surface, unsound
 from refgi.stress.run import Silence, stress
 
 SIZE = {"width": 16, "height": 12}
@@ -142,6 +143,29 @@ def test_every_limit_has_a_source(box):
 def seen(light, depth=1.0):
     light = np.broadcast_to(np.asarray(light, float), (3, 2, 2))
     return Seen(light, np.broadcast_to(np.asarray(depth, float), (2, 2)), np.full((3, 2, 2), 0.5), None, ())
+
+
+def test_what_cannot_be_compared_is_not_well():
+    """No pixel of the same place; an estimate that is no number."""
+    assert rmse_apart(seen(2.0), seen(2.0, 3.0), Changed(None)) == np.inf
+
+    def estimate(mean):
+        return SimpleNamespace(picture_mean=np.array([1.0, mean, 1.0]), picture_variance=np.full(3, 0.5),
+                               degrees_of_freedom=3)
+
+    one, two = (seen(1.0)._replace(estimate=estimate(mean)) for mean in (1.0, 4.0))
+    assert estimates_apart(one, one, Changed(None)) == (0.0, 6.0)
+    assert estimates_apart(one, two, Changed(None)) == (3.0, 6.0)
+    assert np.isnan(estimates_apart(one, one._replace(estimate=estimate(np.nan)), Changed(None))[0])
+
+
+def test_a_method_without_observed_limits_is_not_asked(box, monkeypatch):
+    monkeypatch.setattr(promises, "_file", lambda: {"worst": {}, "scenes": ""})
+    silent: list[Silence] = []
+    assert list(stress(box, ["hssil"], changes=["turned"], silent=silent.append, **SIZE)) == []
+    assert silent == [Silence("hssil", "turned", "no limit was observed yet")]
+    unknown = list(stress(box, ["hssil"], changes=["turned"], unknown=True, **SIZE))
+    assert [found.row.subject for found in unknown] == ["visible surfaces", "hssil"]
 
 
 def test_judges_in_closed_form():

@@ -28,26 +28,22 @@ DOMAIN = "r 1e-7 .. 1e9 m, areas 1e-6 .. 10 r^2, 1 .. 10 texels a sample"
 
 
 @kernel
+def _terms(x: Array, discs: Array, out: Array) -> None:
+    for i in range(x.shape[1]):
+        out[0, i] = term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i], x[9, i],
+                         x[10, i], x[11, i], x[12, i], discs[i])
+
+
 def _points(x: Array, out: Array) -> None:
-    zero = out.dtype.type(0.0)
-    for i in range(x.shape[1]):
-        out[0, i] = term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i], x[9, i],
-                         x[10, i], x[11, i], x[12, i], zero)
+    _terms(x, np.zeros_like(x[12]), out)
 
 
-@kernel
 def _texels(x: Array, out: Array) -> None:
-    one = out.dtype.type(1.0)
-    for i in range(x.shape[1]):
-        out[0, i] = term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i], x[9, i],
-                         x[10, i], x[11, i], x[12, i], one)
+    _terms(x, np.ones_like(x[12]), out)
 
 
-@kernel
 def _discs(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i], x[9, i],
-                         x[10, i], x[11, i], x[12, i], x[12, i])
+    _terms(x, x[12], out)
 
 
 @kernel

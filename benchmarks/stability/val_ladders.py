@@ -131,7 +131,8 @@ def penumbras(x: Array) -> Array:
     return rows[DEPTH : DEPTH + 1].copy()
 
 
-def penumbra(m: Any, x: Any) -> Any:
+def _blocked(m: Any, x: Any) -> tuple[Any, Any]:
+    """Return the share of blockers before a receiver, by the series, and the sum of their depths."""
     d, means = x[0], x[1:]
     shade, depth = 0, 0
     for k in range(TERMS):
@@ -140,24 +141,21 @@ def penumbra(m: Any, x: Any) -> Any:
         shade = shade + 2 / c * (cosine * means[k] - sine * means[TERMS + k])
         depth = depth + 2 / c * (cosine * means[2 * TERMS + k] - sine * means[3 * TERMS + k])
     half = 1 / (2 + 0 * d)
-    blocked = half - shade
+    return half - shade, half * means[4 * TERMS] - depth
+
+
+def penumbra(m: Any, x: Any) -> Any:
+    blocked, total = _blocked(m, x)
     found = blocked >= LEAST_BLOCKED
-    mean = (half * means[4 * TERMS] - depth) / np.where(found, blocked, 1)
-    return [np.where(found, np.minimum(np.maximum(mean, 0), d), d)]
+    mean = total / np.where(found, blocked, 1)
+    return [np.where(found, np.minimum(np.maximum(mean, 0), x[0]), x[0])]
 
 
 def penumbra_whole(m: Any, x: Any) -> Any:
     """Return the mean depth without limits, and what is divided by, whose own rounding decides whether it counts."""
-    d, means = x[0], x[1:]
-    shade, depth = 0, 0
-    for k in range(TERMS):
-        c = _frequency(m, k + 1)
-        sine, cosine = m.sin(c * d), m.cos(c * d)
-        shade = shade + 2 / c * (cosine * means[k] - sine * means[TERMS + k])
-        depth = depth + 2 / c * (cosine * means[2 * TERMS + k] - sine * means[3 * TERMS + k])
-    half = 1 / (2 + 0 * d)
-    mean = (half * means[4 * TERMS] - depth) / (half - shade)
-    return [np.where(abs(half - shade - LEAST_BLOCKED) < 1e-5, mean * 1e7 * d, mean)]
+    blocked, total = _blocked(m, x)
+    mean = total / blocked
+    return [np.where(abs(blocked - LEAST_BLOCKED) < 1e-5, mean * 1e7 * x[0], mean)]
 
 
 def draw_scales(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001

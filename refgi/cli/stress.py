@@ -1,6 +1,7 @@
 """`refgi stress`: what breaks on a scene, against what is promised."""
 
 import math
+import shlex
 from typing import Any
 
 import click
@@ -31,6 +32,7 @@ def _stress(session: Session, /, methods: str | None, changes: tuple[str, ...], 
     limit; the exit code is 1 where one is broken.
     """
     from refgi.cli.destination import Permission, folder
+    from refgi.cli.memory import require_memory
     from refgi.cli.view import View
     from refgi.cli.warm import warm_up
     from refgi.compare.provenance import environment
@@ -45,12 +47,15 @@ def _stress(session: Session, /, methods: str | None, changes: tuple[str, ...], 
     shrink = max(1.0, max(camera.width, camera.height) / (QUICK if quick else USUAL))
     width, height = (camera.width, camera.height) if options["size"] else (
         max(1, math.floor(n / shrink)) for n in (camera.width, camera.height))
+    largest = scene.with_camera(width=2 * width, height=2 * height)  # of "resolution x 2"
+    require_memory(largest, "float64", 512, traced=True,
+                   settings={name: find_method(name).settings() for name in names})
     path = folder(out, Permission(parents, force), FILES)
     found: list[Found] = []
     silent: list[Silence] = []
     with on_threads(threads), progress() as tell:
         warm_up(names, "float32", tell)
-        found += stress(scene, names, width=width, height=height, changes=changes or None, source=options["scene"],
+        found += stress(scene, names, width=width, height=height, changes=changes or None, source=_typed(options),
                         tell=tell, silent=silent.append)
     result = Stability(environment=environment(), rows=tuple(one.row for one in found))
     path.mkdir(parents=True, exist_ok=True)
@@ -65,3 +70,13 @@ def _stress(session: Session, /, methods: str | None, changes: tuple[str, ...], 
 
 
 command = _stress
+
+
+def _typed(options: dict[str, Any]) -> str:
+    """Return the scene and what is seen of it as one types it, without the size."""
+    words = [options["scene"]]
+    for key in ("eye", "target", "up", "vfov_deg"):
+        if (value := options[key]) is not None:
+            text = ",".join(f"{c:.17g}" for c in value) if isinstance(value, tuple) else f"{value:.17g}"
+            words.append(f"--{key.replace('_', '-')}={text}")
+    return shlex.join([*words, *(f"--light={light}" for light in options["lights"])])

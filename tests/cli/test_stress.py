@@ -1,6 +1,7 @@
 """`refgi stress`: files, what is said, exit codes."""
 
 import json
+import shlex
 
 import pytest
 from click.testing import CliRunner
@@ -59,4 +60,24 @@ def test_a_broken_promise_is_an_exit_code(tmp_path, monkeypatch):
 def test_wrong_options_write_nothing(tmp_path, wrong):
     done = run("cornell_box", *wrong, "--out", tmp_path / "out")
     assert done.exit_code == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_seen_is_part_of_the_line_that_does_it_again(tmp_path):
+    seen = ("--eye", "0.278,0.273,-0.7", "--vfov-deg", "45", "--light", "point:position=0.2,0.4,0.2:intensity=1")
+    done = run("cornell_box", *ONE, *seen, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    line = read_rows(tmp_path / "out" / "stability.json").rows[1].reproduce
+    words = shlex.split(line)
+    again = CliRunner().invoke(VerbGroup.refgi(), [*words[1:-1], str(tmp_path / "again")])
+    assert again.exit_code == 0, again.output
+    rows = [read_rows(tmp_path / name / "stability.json").rows[1] for name in ("out", "again")]
+    assert rows[0].model_copy(update={"seconds": 0}) == rows[1].model_copy(update={"seconds": 0})
+    assert "--light=point:position=0.2,0.4,0.2:intensity=1" in words
+
+
+def test_what_does_not_fit_is_refused_first(tmp_path):
+    done = run("cornell_box", "--size", "30000x30000", "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "memory" in done.stderr
     assert not (tmp_path / "out").exists()

@@ -9,13 +9,21 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from py_compile import PycInvalidationMode
+from typing import Protocol
 
-from benchmarks.mutate.faults import Fault
 from benchmarks.mutate.project import Project
 
 LEFT = (".*", "__pycache__", "out", "_build", "*.egg-info")
 KERNELS = "*.kernel"
 PREFIX = "copy-"
+
+
+class Edited(Protocol):
+    """What is changed in one file."""
+
+    @property
+    def file(self) -> str: ...
+    def put_into(self, text: str) -> str: ...
 
 
 class Scratch:
@@ -35,7 +43,7 @@ class Scratch:
         compileall.compile_dir(self.tree / project.package, quiet=2, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
 
     @contextlib.contextmanager
-    def with_fault(self, fault: Fault) -> Iterator[None]:
+    def with_fault(self, fault: Edited) -> Iterator[None]:
         """Put a fault into the copy while the block runs, with the kernels of sources without faults."""
         file = self.tree / fault.file
         whole = file.read_text()

@@ -8,7 +8,6 @@ import contextlib
 import os
 import subprocess
 import tempfile
-import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -113,7 +112,7 @@ def writers_faults(name: str, folder: Path, patch: str = "") -> list[str]:
     with contextlib.ExitStack() as stack:
         hosts = [stack.enter_context(Host(patch)) for _ in range(WRITERS)]
         stand = Stand(folder, {})
-        _, whole = undisturbed(name, stand, hosts[0], clock=time.monotonic)
+        whole = undisturbed(name, stand, hosts[0]).whole
         stand.renew()
         with ThreadPoolExecutor(WRITERS) as pool:
             ends = list(pool.map(lambda host: host.run(victim.arguments, stand.folder, said=f"said{id(host)}"), hosts))

@@ -1,7 +1,8 @@
 """Kills: whenever a process is ended, its files are whole or absent, and what goes on ends as if nothing had been.
 
-kill -9 at random moments of render, compare, sequence --resume, a truth with checkpoint, and batch; SIGTERM and SIGINT,
-after which the exit code is 143 or 130, one line says so, and no unfinished file is left.
+kill -9 of render, compare, sequence --resume, a truth with checkpoint, and batch, at random moments spread over their
+work and every other time while a file is written; SIGTERM and SIGINT, after which the exit code is 143 or 130, one line
+says so, and no unfinished file is left.
 `python -m benchmarks.stability.kills NAME TIMES SEED` does one of them again.
 """
 
@@ -9,7 +10,6 @@ import random
 import signal
 import sys
 import tempfile
-import time
 from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from benchmarks.kill_batch import killed as killed_batch
 from benchmarks.stability.tasks import Task, Tell
 from benchmarks.stability.victim_host import Host
-from benchmarks.stability.victims import VICTIMS, Stand, allowed, undisturbed, with_old_files
+from benchmarks.stability.victims import VICTIMS, Stand, Undisturbed, allowed, undisturbed, with_old_files
 from refgi.stress.rows import Row
 
 SEED = 19
@@ -56,13 +56,16 @@ def killed(name: str, times: int, seed: int, folder: Path, patch: str = "") -> F
     torn = lost = began = 0
     texts: list[str] = []
     with Host(f"{victim.patch}\n{patch}") as host:
-        stand, seconds, whole = _prepared(name, folder, host)
+        stand, (seconds, files, whole) = _prepared(name, folder, host)
         for number in range(times):
             if not victim.resumes or number == 0 or stand.digests() == whole:
                 stand.renew()
                 with_old_files(name, stand, host)
             before = stand.digests()
-            host.run(victim.arguments, stand.folder, end=signal.SIGKILL, after=moments.uniform(0, 1.1 * seconds))
+            # every other one and the last come while a file is written, where that can be seen
+            at_file = moments.randint(1, files) if files and (times - number) % 2 else 0
+            after = 1.1 * seconds * (number + moments.random()) / times
+            host.run(victim.arguments, stand.folder, end=signal.SIGKILL, after=after, at_file=at_file)
             now, broken = stand.digests() if not (found := stand.torn()) else {}, found
             began += len(stand.parts())
             torn += len(broken)
@@ -78,13 +81,13 @@ def killed(name: str, times: int, seed: int, folder: Path, patch: str = "") -> F
         return Found(times, torn, lost, other + (code != 0), len(stand.parts()), began, "; ".join(texts)[:600])
 
 
-def _prepared(name: str, folder: Path, host: Host) -> tuple[Stand, float, dict[str, str]]:
-    """Return a stand that knows what files may hold, the seconds of an undisturbed run and what that gives."""
+def _prepared(name: str, folder: Path, host: Host) -> tuple[Stand, Undisturbed]:
+    """Return a stand that knows what files may hold, and an undisturbed run."""
     stand = Stand(folder, {})
-    seconds, whole = undisturbed(name, stand, host, clock=time.monotonic)
+    run = undisturbed(name, stand, host)
     stand.renew()
     with_old_files(name, stand, host)
-    return Stand(folder, allowed(whole, stand.digests())), seconds, whole
+    return Stand(folder, allowed(run.whole, stand.digests())), run
 
 
 def asked(name: str, number: signal.Signals, times: int, seed: int, folder: Path, patch: str = "") -> list[str]:
@@ -93,11 +96,11 @@ def asked(name: str, number: signal.Signals, times: int, seed: int, folder: Path
     code_promised, word = ASKED[number]
     victim = VICTIMS[name]
     with Host(f"{victim.patch}\n{patch}") as host:
-        stand, seconds, whole = _prepared(name, folder, host)
+        stand, (seconds, _, whole) = _prepared(name, folder, host)
         for turn in range(times):
             stand.renew()
             with_old_files(name, stand, host)
-            moment = moments.uniform(0, seconds)
+            moment = seconds * (turn + moments.random()) / times
             code, said = host.run(victim.arguments, stand.folder, end=number, after=moment)
             torn = stand.torn()
             is_done = not torn and stand.digests() == whole

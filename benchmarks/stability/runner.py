@@ -11,7 +11,7 @@ import hashlib
 import importlib
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -28,12 +28,13 @@ BEGIN, END = "<!-- table -->", "<!-- end of table -->"
 def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks stability", description=__doc__)
     parser.add_argument("--part", action="append", choices=PARTS, help="repeatable; all where absent")
+    parser.add_argument("--task", action="append", help="of these parts the task of this name alone; repeatable")
     parser.add_argument("--short", action="store_true", help="fewer cases: under a minute in all")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--page", type=Path, help="page whose table is made anew")
     options = parser.parse_args(arguments)
     result = Stability(environment=environment(),
-                       rows=tuple(run_parts(options.part or PARTS, options.out, short=options.short)))
+                       rows=tuple(run_parts(options.part or PARTS, options.out, options.task, short=options.short)))
     write_rows(result, options.out / "stability.json")
     (options.out / "table.md").write_text(markdown(over_scenes(result.rows)))
     if options.page:
@@ -51,12 +52,15 @@ def tasks_of(part: str, *, short: bool) -> list[Task]:
     return tasks
 
 
-def run_parts(parts: Iterable[str], folder: Path, *, short: bool) -> Iterable[Row]:
-    """Yield the rows of some parts; those of finished tasks are read from `folder`."""
+def run_parts(parts: Iterable[str], folder: Path, names: Sequence[str] | None = None, *,
+              short: bool) -> Iterable[Row]:
+    """Yield the rows of some parts, or of the tasks of some names; those of finished ones are read from `folder`."""
     console = Console(stderr=True)
     digest = sources_digest()
     for part in parts:
-        tasks = tasks_of(part, short=short)
+        tasks = [task for task in tasks_of(part, short=short) if names is None or task.name in names]
+        if not tasks:
+            raise SystemExit(f"no task of part {part} is named {', '.join(names or ())}")
         for number, task in enumerate(tasks, 1):
             kept = folder / "tasks" / digest / ("short" if short else "full") / part / f"{task.name}.json"
             if not kept.exists():

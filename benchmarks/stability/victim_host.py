@@ -19,6 +19,7 @@ from typing import Any, Self
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120.0  # s
+POLL = 1e-4  # s; a file is written for a millisecond or longer, as it is flushed to the disk
 MODULES = ["refgi.cli.render", "refgi.cli.sequence", "refgi.cli.compare", "refgi.cli.job", "refgi.cli.memory",
            "refgi.cli.warm", "refgi.cli.frame_files", "refgi.compare", "refgi.methods", "refgi.truth.truth",
            "refgi.splat.sii", "refgi.rays", "refgi.scene.builtin", "refgi.provenance.frames", "pydantic", "OpenEXR",
@@ -49,8 +50,17 @@ class Host:
         self._process.stdout.close()
 
     def run(self, arguments: Sequence[str], folder: Path, *, end: signal.Signals | None = None, after: float = 0.0,
-            limits: Mapping[str, int] | None = None, said: str = "said") -> tuple[int, str]:
-        """Run a command, and send it a signal some seconds after it has begun to heed signals.
+            at_file: int = 0, limits: Mapping[str, int] | None = None, said: str = "said") -> tuple[int, str]:
+        """Run a command, and send it a signal some seconds after it has begun to heed signals, or while it writes.
+
+        Parameters
+        ----------
+        arguments, folder
+            Of the command, and where it works.
+        end, after, at_file
+            The signal, and its moment: seconds, or the how manieth unfinished file that is seen, from 1.
+        limits, said
+            Of resources, and the end of the name of the file for what it says.
 
         Returns
         -------
@@ -59,22 +69,41 @@ class Host:
         said : str
             On stdout and stderr.
         """
-        place = folder.with_name(f"{folder.name}.{said}")
-        asked = {"arguments": list(arguments), "folder": str(folder), "said": str(place), "limits": dict(limits or {})}
-        process = int(self._ask(json.dumps(asked)))
+        process, place = self._start(arguments, folder, limits or {}, said)
         if end is not None:
-            _wait_for_handler(process)
-            time.sleep(after)
+            if at_file:
+                written_files(process, folder, at_file)
+            else:
+                time.sleep(after)
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, end)
-        code = int(self._ask(""))
-        return code, place.read_text(errors="replace")
+        return self._ended(place)
+
+    def timed(self, arguments: Sequence[str], folder: Path) -> tuple[int, str, float, int]:
+        """Run a command to its end; also return its seconds since it heeded signals, and how many files were seen."""
+        process, place = self._start(arguments, folder, {}, "said")
+        begin = time.monotonic()
+        files = written_files(process, folder)
+        seconds = time.monotonic() - begin
+        return *self._ended(place), seconds, files
 
     def address_space(self) -> int:
         """Return the bytes that a fork has from its start."""
         self._ask("")
         pages = int(Path(f"/proc/{self._process.pid}/statm").read_text().split()[0])
         return pages * resource.getpagesize()
+
+    def _start(self, arguments: Sequence[str], folder: Path, limits: Mapping[str, int], said: str) -> tuple[int, Path]:
+        """Start a command; return its process once it heeds signals, and the file for what it says."""
+        place = folder.with_name(f"{folder.name}.{said}")
+        asked = {"arguments": list(arguments), "folder": str(folder), "said": str(place), "limits": dict(limits)}
+        process = int(self._ask(json.dumps(asked)))
+        _wait_for_handler(process)
+        return process, place
+
+    def _ended(self, place: Path) -> tuple[int, str]:
+        """Wait until the command has ended; return its exit code and what it said."""
+        return int(self._ask("")), place.read_text(errors="replace")
 
     def _ask(self, line: str) -> str:
         assert self._process.stdin is not None
@@ -96,6 +125,17 @@ def _wait_for_handler(process: int) -> None:
         if caught >> (signal.SIGTERM - 1) & 1 or any(line.startswith("State:\tZ") for line in lines):
             return
         time.sleep(0.001)
+
+
+def written_files(process: int, folder: Path, most: int = 1 << 30) -> int:
+    """Wait until so many unfinished files were seen in a folder, or a process has ended; return how many were."""
+    seen: set[str] = set()
+    state = Path(f"/proc/{process}/stat")
+    while len(seen) < most and state.read_text().rpartition(")")[2].split()[0] != "Z":
+        for place, _, files in os.walk(folder):
+            seen.update(f"{place}/{name}" for name in files if ".part" in name)
+        time.sleep(POLL)
+    return len(seen)
 
 
 def command(arguments: Sequence[str]) -> None:

@@ -2,7 +2,6 @@
 
 import hashlib
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -99,18 +98,23 @@ def digest(file: Path) -> str:
     return found.hexdigest()
 
 
-def undisturbed(name: str, stand: Stand, host: Host, *, clock: Callable[[], float]) -> tuple[float, dict[str, str]]:
-    """Run a victim to its end twice, the second time with a clock; return its seconds and what its files hold."""
-    victim = VICTIMS[name]
-    seconds = 0.0
+class Undisturbed(NamedTuple):
+    """A victim's run to its end."""
+
+    seconds: float  # since it heeded signals
+    files: int  # that were seen unfinished
+    whole: dict[str, str]  # what its files hold, by name
+
+
+def undisturbed(name: str, stand: Stand, host: Host) -> Undisturbed:
+    """Run a victim to its end twice; the first may compile."""
+    seconds, files = 0.0, 0
     for _ in range(2):
         stand.renew()
-        begin = clock()
-        code, said = host.run(victim.arguments, stand.folder)
-        seconds = clock() - begin
+        code, said, seconds, files = host.timed(VICTIMS[name].arguments, stand.folder)
         if code != 0:
             raise RuntimeError(f"{name} undisturbed: exit {code}: {said[-500:]}")
-    return seconds, stand.digests()
+    return Undisturbed(seconds, files, stand.digests())
 
 
 def with_old_files(name: str, stand: Stand, host: Host) -> None:

@@ -65,7 +65,8 @@ def write(path):
 OTHER = """
 def write(path):
     turn = pathlib.Path("turn")
-    turn.write_text(turn.read_text() + "x" if turn.exists() else "x")
+    with turn.open("a") as file:
+        file.write("x")
     if len(turn.read_text()) < 4:
         path.write_text(TEXT)
 """

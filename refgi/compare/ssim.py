@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import correlate1d
 
 Array = npt.NDArray[Any]
 
@@ -92,6 +91,8 @@ def _constants(reference: Array, covered: Array) -> tuple[float, float]:
 
 
 def _window_average(covered: Array) -> Callable[[Array], Array]:
+    from scipy.ndimage import correlate1d  # here, as a picture that is not compared needs none of it
+
     offsets = np.arange(-RADIUS, RADIUS + 1)
     weights = np.exp(-(offsets**2) / (2 * SIGMA**2))
 

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from refgi.cluster.settings import Csm
 
@@ -119,6 +118,8 @@ def first_lit(weight: Array) -> float:
         b*, about 0.305 / M; below 0.41. For a series that stays below 1: where it has come 95 % of the way to its top,
         the highest of 64 values for each term.
     """
+    from scipy.optimize import brentq  # here, as methods that cast no such shadows need none of it
+
     u = np.linspace(0.0, 0.5, SCAN * len(weight) + 1)
     values = above_half(u, weight)
     level = min(0.5, NEARLY_ALL * float(values.max()))

@@ -6,6 +6,7 @@ says so, and no unfinished file is left.
 `python -m benchmarks.stability.kills NAME TIMES SEED` does one of them again.
 """
 
+import contextlib
 import random
 import signal
 import sys
@@ -13,7 +14,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from benchmarks.kill_batch import killed as killed_batch
 from benchmarks.stability.tasks import Task, Tell
@@ -42,81 +43,95 @@ class Found(NamedTuple):
 
 
 def tasks(short: bool) -> list[Task]:
-    """Return a task a command that is killed, and one a signal that asks it to end."""
+    """Return a task a command that is killed and asked to end."""
     times = SHORT_TIMES if short else TIMES
-    asked = [Task(f"{name}-asked", partial(_asked_task, name, short)) for name in (("render",) if short else VICTIMS)]
     batch = [] if short else [Task("batch", _batch_task)]
-    return [Task(name, partial(_killed_task, name, number)) for name, number in times.items()] + asked + batch
+    return [Task(name, partial(_task, name, number, ASKED_TIMES[short])) for name, number in times.items()] + batch
 
 
-def killed(name: str, times: int, seed: int, folder: Path, patch: str = "") -> Found:
+class Prepared(NamedTuple):
+    """A command that can be started again and again."""
+
+    name: str
+    host: Host
+    stand: Stand  # knows what files may hold
+    run: Undisturbed
+
+
+@contextlib.contextmanager
+def prepared(name: str, patch: str = "") -> Iterator[Prepared]:
+    """Open a host that has run a command undisturbed, in a folder of its own."""
+    with tempfile.TemporaryDirectory() as folder, Host(f"{VICTIMS[name].patch}\n{patch}") as host:
+        stand = Stand(Path(folder) / "work", {})
+        run = undisturbed(name, stand, host)
+        stand.renew()
+        with_old_files(name, stand, host)
+        yield Prepared(name, host, stand._replace(known=allowed(run.whole, stand.digests())), run)
+
+
+def killed(prepared: Prepared, times: int, seed: int) -> Found:
     """Kill a command some times at random moments, let it end, and count what is not as promised."""
+    name, host, stand, (seconds, files, whole) = prepared
     victim = VICTIMS[name]
     moments = random.Random(seed)
     torn = lost = began = 0
     texts: list[str] = []
-    with Host(f"{victim.patch}\n{patch}") as host:
-        stand, (seconds, files, whole) = _prepared(name, folder, host)
-        for number in range(times):
-            if not victim.resumes or number == 0 or stand.digests() == whole:
-                stand.renew()
-                with_old_files(name, stand, host)
-            before = stand.digests()
-            # every other one and the last come while a file is written, where that can be seen
-            at_file = moments.randint(1, files) if files and (times - number) % 2 else 0
-            after = 1.1 * seconds * (number + moments.random()) / times
-            host.run(victim.arguments, stand.folder, end=signal.SIGKILL, after=after, at_file=at_file)
-            now, broken = stand.digests() if not (found := stand.torn()) else {}, found
-            began += len(stand.parts())
-            torn += len(broken)
-            gone = [file for file in before if not broken and file not in now]
-            gone += [file for file in before if victim.resumes and file in now and file.endswith(".exr")
-                     and now[file] != before[file]]
-            lost += len(gone)
-            texts += [f"kill {number}: torn {broken}, lost {gone}"] if broken or gone else []
-        code, said = host.run(victim.arguments, stand.folder)
-        texts += [f"at last exit {code}: {said[-300:]}"] if code else []
-        end = stand.digests()
-        other = sum(end.get(file) != content for file, content in whole.items())
-        return Found(times, torn, lost, other + (code != 0), len(stand.parts()), began, "; ".join(texts)[:600])
+    for number in range(times):
+        if not victim.resumes or number == 0 or stand.digests() == whole:
+            stand.renew()
+            with_old_files(name, stand, host)
+        before = stand.digests()
+        # every other one and the last come while a file is written, where that can be seen
+        at_file = moments.randint(1, files) if files and (times - number) % 2 else 0
+        after = 1.1 * seconds * (number + moments.random()) / times
+        host.run(victim.arguments, stand.folder, end=signal.SIGKILL, after=after, at_file=at_file)
+        now, broken = stand.digests() if not (found := stand.torn()) else {}, found
+        began += len(stand.parts())
+        torn += len(broken)
+        gone = [file for file in before if not broken and file not in now]
+        gone += [file for file in before if victim.resumes and file in now and file.endswith(".exr")
+                 and now[file] != before[file]]
+        lost += len(gone)
+        texts += [f"kill {number}: torn {broken}, lost {gone}"] if broken or gone else []
+    code, said = host.run(victim.arguments, stand.folder)
+    texts += [f"at last exit {code}: {said[-300:]}"] if code else []
+    end = stand.digests()
+    other = sum(end.get(file) != content for file, content in whole.items())
+    return Found(times, torn, lost, other + (code != 0), len(stand.parts()), began, "; ".join(texts)[:600])
 
 
-def _prepared(name: str, folder: Path, host: Host) -> tuple[Stand, Undisturbed]:
-    """Return a stand that knows what files may hold, and an undisturbed run."""
-    stand = Stand(folder, {})
-    run = undisturbed(name, stand, host)
-    stand.renew()
-    with_old_files(name, stand, host)
-    return Stand(folder, allowed(run.whole, stand.digests())), run
-
-
-def asked(name: str, number: signal.Signals, times: int, seed: int, folder: Path, patch: str = "") -> list[str]:
+def asked(prepared: Prepared, number: signal.Signals, times: int, seed: int) -> list[str]:
     """Ask a command to end at random moments, and return what is not as promised."""
+    name, host, stand, (seconds, _, whole) = prepared
     moments, faults = random.Random(seed + number), []
     code_promised, word = ASKED[number]
     victim = VICTIMS[name]
-    with Host(f"{victim.patch}\n{patch}") as host:
-        stand, (seconds, _, whole) = _prepared(name, folder, host)
-        for turn in range(times):
-            stand.renew()
-            with_old_files(name, stand, host)
-            moment = seconds * (turn + moments.random()) / times
-            code, said = host.run(victim.arguments, stand.folder, end=number, after=moment)
-            torn = stand.torn()
-            is_done = not torn and stand.digests() == whole
-            heeded = code == code_promised and f"refgi: {word}" in said.splitlines() and "Traceback" not in said
-            if not (heeded or (is_done and code in (0, -number))):
-                faults.append(f"{turn}, after {moment:.3f} s: exit {code}: {said[-300:]}")
-            faults += [f"{turn}, after {moment:.3f} s: left {part}" for part in stand.parts()]
-            faults += [f"{turn}, after {moment:.3f} s: torn {file}" for file in torn]
+    for turn in range(times):
+        stand.renew()
+        with_old_files(name, stand, host)
+        moment = seconds * (turn + moments.random()) / times
+        code, said = host.run(victim.arguments, stand.folder, end=number, after=moment)
+        torn = stand.torn()
+        is_done = not torn and stand.digests() == whole
+        heeded = code == code_promised and f"refgi: {word}" in said.splitlines() and "Traceback" not in said
+        if not (heeded or (is_done and code in (0, -number))):
+            faults.append(f"{turn}, after {moment:.3f} s: exit {code}: {said[-300:]}")
+        faults += [f"{turn}, after {moment:.3f} s: left {part}" for part in stand.parts()]
+        faults += [f"{turn}, after {moment:.3f} s: torn {file}" for file in torn]
     return faults
 
 
-def _killed_task(name: str, times: int, tell: Tell) -> Iterable[Row]:
-    with tempfile.TemporaryDirectory() as folder:
-        found = killed(name, times, SEED, Path(folder) / "work")
-    tell(str(found))
-    yield from rows_of(name, found, f"python -m benchmarks.stability.kills {name} {times} {SEED}")
+def _task(name: str, times: int, times_asked: int, tell: Tell) -> Iterable[Row]:
+    with prepared(name) as victim:
+        found = killed(victim, times, SEED)
+        tell(str(found))
+        yield from rows_of(name, found, f"python -m benchmarks.stability.kills {name} {times} {SEED}")
+        for number, (code, _) in ASKED.items():
+            faults = asked(victim, number, times_asked, SEED)
+            tell(f"{number.name}: {faults or 'as promised'}")
+            yield _row(f"{number.name}: exit {code}, one line, no unfinished file", name, "any moment of its work",
+                       len(faults), "breaches", times_asked,
+                       f"python -m benchmarks.stability.kills {name} {times_asked} {SEED}", "; ".join(faults)[:600])
 
 
 def rows_of(name: str, found: Found, again: str) -> Iterator[Row]:
@@ -128,17 +143,6 @@ def rows_of(name: str, found: Found, again: str) -> Iterator[Row]:
         ("killed: the next run removes unfinished files", found.left, "files left"),
     ):
         yield _row(promise, name, domain, figure, unit, found.kills, again, found.text)
-
-
-def _asked_task(name: str, short: bool, tell: Tell) -> Iterable[Row]:
-    times = ASKED_TIMES[short]
-    for number, (code, _) in ASKED.items():
-        with tempfile.TemporaryDirectory() as folder:
-            faults = asked(name, number, times, SEED, Path(folder) / "work")
-        tell(f"{number.name}: {faults or 'as promised'}")
-        yield _row(f"{number.name}: exit {code}, one line, no unfinished file", name, "any moment of its work",
-                   len(faults), "breaches", times, f"python -m benchmarks.stability.kills {name} {times} {SEED}",
-                   "; ".join(faults)[:600])
 
 
 def _batch_task(tell: Tell) -> Iterable[Row]:
@@ -164,13 +168,10 @@ def _row(promise: str, name: str, domain: str, figure: int, unit: str, cases: in
 
 def main(arguments: list[str]) -> int:
     name, times, seed = arguments
-    with tempfile.TemporaryDirectory() as folder:
-        found: Any = killed(name, int(times), int(seed), Path(folder) / "work")
-    print(found)
-    faults: list[str] = []
-    for number in ASKED:
-        with tempfile.TemporaryDirectory() as folder:
-            faults += asked(name, number, int(times), int(seed), Path(folder) / "work")
+    with prepared(name) as victim:
+        found = killed(victim, int(times), int(seed))
+        print(found)
+        faults = [fault for number in ASKED for fault in asked(victim, number, int(times), int(seed))]
     print(*faults, sep="\n")
     return int(bool(faults or found.torn or found.lost or found.other or found.left))
 

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from benchmarks.stability import kills
-from benchmarks.stability.kills import Found, asked, killed, rows_of
+from benchmarks.stability.kills import Found, asked, killed, prepared, rows_of
 from benchmarks.stability.victims import VICTIMS, Victim
 from refgi.image import write_text
 from refgi.image.whole import TEMPORARY, is_dead, remove_dead, temporary_name, whole_file
@@ -96,8 +96,9 @@ def _fake(monkeypatch):
 
 @pytest.mark.parametrize(("patch", "wrong"), [("", set()), (TORN, {"torn"}), (LOSES, {"lost"}), (LEAVES, {"left"}),
                                               (OTHER, {"other"})], ids=["sound", "torn", "loses", "leaves", "other"])
-def test_what_kills_do_is_counted(tmp_path, patch, wrong):
-    found = killed("fake", 5, 1, tmp_path / "work", patch)
+def test_what_kills_do_is_counted(patch, wrong):
+    with prepared("fake", patch) as victim:
+        found = killed(victim, 5, 1)
     assert {name for name in ("torn", "lost", "other", "left") if getattr(found, name)} - wrong <= {"other"} & wrong
     assert all(getattr(found, name) for name in wrong), found
     assert found.kills == 5
@@ -105,10 +106,13 @@ def test_what_kills_do_is_counted(tmp_path, patch, wrong):
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_command_that_heeds_a_signal_and_those_that_do_not(tmp_path, number):
-    assert asked("fake", number, 2, 1, tmp_path / "work") == []
-    assert asked("fake", number, 1, 1, tmp_path / "deaf", DEAF)
-    said = asked("fake", number, 1, 1, tmp_path / "speaks", SPEAKS)
+def test_a_command_that_heeds_a_signal_and_those_that_do_not(number):
+    with prepared("fake") as victim:
+        assert asked(victim, number, 2, 1) == []
+    with prepared("fake", DEAF) as victim:
+        assert asked(victim, number, 3, 1)  # one of them in the first third of its work
+    with prepared("fake", SPEAKS) as victim:
+        said = asked(victim, number, 3, 1)
     assert said
     assert "by the way" in said[0]
 
@@ -125,7 +129,8 @@ def test_rows_fail_where_files_are_torn_lost_other_or_left():
 def test_full_and_short_runs_have_their_kills():
     assert sum(kills.TIMES.values()) + kills.BATCH_TIMES == 200
     assert sum(kills.SHORT_TIMES.values()) == 6
-    assert {task.name for task in kills.tasks(False)} == {*kills.TIMES, *(f"{n}-asked" for n in VICTIMS), "batch"}
+    assert {task.name for task in kills.tasks(False)} == {*VICTIMS, "batch"} - {"fake"} == {*kills.TIMES, "batch"}
+    assert [task.name for task in kills.tasks(True)] == list(kills.SHORT_TIMES)
 
 
 def test_unfinished_files_of_dead_writers_are_removed_and_no_others(tmp_path):

@@ -2,7 +2,8 @@
 
 import dataclasses
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Any, TypeVar
 
 from refgi.errors import InputError, first_faults
@@ -135,7 +136,7 @@ def find_key(settings: Settings, key: str) -> Leaf:
         whole = "." + leaf.key.replace("_", ".")
         if whole.endswith(wanted):
             ranked[0 if whole == wanted else 1].setdefault(leaf.key, leaf)
-    for leaf in _principals(type(settings), ""):
+    for leaf in _principals(type(settings)):
         part = "." + leaf.key.rpartition(".")[0].replace("_", ".")
         if part.endswith(wanted):
             ranked[0 if part == wanted else 2].setdefault(leaf.key, leaf)
@@ -180,8 +181,15 @@ def meant(settings: Settings, leaf: Leaf, value: Any) -> Leaf:
     return next(one for one in leaves(type(settings)) if one.key == f"{leaf.key}.{kind.PRINCIPAL}")
 
 
-def _principals(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
+def _all_principals(kind: type[Settings]) -> tuple[Leaf, ...]:
     """Return, for every part that a bare value may stand for, the key of that value."""
+    return tuple(_principals_below(kind, ""))
+
+
+_principals: Any = cache(_all_principals)
+
+
+def _principals_below(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
     for field in dataclasses.fields(kind):
         hint = hints(kind)[field.name]
         for part in choices_of(hint).values():
@@ -189,10 +197,10 @@ def _principals(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
             if part.PRINCIPAL and not is_choice(hint):  # what a bare value of a choice means depends on what is chosen
                 principal = next(one for one in dataclasses.fields(part) if one.name == part.PRINCIPAL)
                 yield Leaf(inner + part.PRINCIPAL, principal, hints(part)[part.PRINCIPAL], part)
-            yield from _principals(part, inner)
+            yield from _principals_below(part, inner)
 
 
-def _hint(key: str, tree: list[Leaf]) -> str:
+def _hint(key: str, tree: Sequence[Leaf]) -> str:
     whole = {name: leaf.key for leaf in tree for name in (leaf.key.rpartition(".")[2], leaf.key)}
     whole |= {part: part for leaf in tree for part in leaf.key.split(".")[:-1]}
     near = difflib.get_close_matches(key, whole, n=1)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterator
+from functools import cache
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
 from refgi.settings.fields import Settings, choices_of, expected, hints, is_choice, may_be_none, members
@@ -32,7 +33,7 @@ class Leaf(NamedTuple):
         return expected(self.field, self.hint)
 
 
-def leaves(kind: type[Settings]) -> list[Leaf]:
+def leaves(kind: type[Settings]) -> tuple[Leaf, ...]:
     """Return every key of a settings class, those of all choices among them.
 
     Parameters
@@ -42,10 +43,18 @@ def leaves(kind: type[Settings]) -> list[Leaf]:
 
     Returns
     -------
-    list of Leaf
+    tuple of Leaf
         In the order of the fields; a choice before what it holds.
     """
-    return list(_leaves(kind, ""))
+    found: tuple[Leaf, ...] = _listed(kind)
+    return found
+
+
+def _all_leaves(kind: type[Settings]) -> tuple[Leaf, ...]:
+    return tuple(_leaves(kind, ""))
+
+
+_listed: Any = cache(_all_leaves)
 
 
 def _leaves(kind: type[Settings], prefix: str) -> Iterator[Leaf]:

@@ -1,10 +1,16 @@
-"""Pictures: what `refgi stress` promises, on built-in scenes, and scenes that nobody would build."""
+"""Pictures: what `refgi stress` promises, on built-in scenes, and scenes that nobody would build.
+
+`python -m benchmarks.stability.pictures METHOD SEED` shows one of these, `METHOD FIRST LAST` tries many.
+"""
 
 import sys
 import time
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -26,7 +32,8 @@ SHORT_METHODS = ("sii", "multires", "hssil", "gather")
 FEW = {"sii": ("lights=64",), "multires": ("lights=64",), "val": ("lights=64", "clusters=4", "maps=16"),
        "vpl": ("lights=64",), "truth": ("samples=8",)}
 MAP = 32  # texels of a lamp's map
-HOSTILE, SHORT_HOSTILE = 150, 6
+HOSTILE, SHORT_HOSTILE = 400, 6
+PROCESSES = 2  # of the full form
 SLOWEST = 10.0  # s of a processor, a picture
 DOMAIN = ("needles, soups, fans, lamps and cameras in walls, 1e-8 to 1e8 m, exponents to 1e20, 1 to 17 pixels "
           "along a side")
@@ -40,7 +47,9 @@ def tasks(short: bool) -> list[Task]:
     changed = [Task(f"changes-{name.partition(':')[0]}", lambda _, name=name: _changed(name, methods))
                for name in scenes]
     count = SHORT_HOSTILE if short else HOSTILE
-    return [*changed, *(Task(f"hostile-{name}", lambda tell, name=name: [hostile_row(name, range(count), tell)])
+    processes = 1 if short else PROCESSES
+    return [*changed, *(Task(f"hostile-{name}",
+                             lambda tell, name=name: [hostile_row(name, range(count), tell, processes)])
                         for name in methods)]
 
 
@@ -49,14 +58,16 @@ def _changed(name: str, methods: Sequence[str]) -> list[Row]:
     return [found.row for found in stress(scene, methods, width=SIZE, height=SIZE, source=name)]
 
 
-def hostile_row(method: str, seeds: Sequence[int], tell: Tell) -> Row:
-    """Return how many hostile scenes break a method."""
-    broken: list[tuple[int, str]] = []
-    for seed in seeds:
-        why = fault_of(hostile(seed), method)
-        if why:
-            broken.append((seed, why))
-            tell(f"{method}, seed {seed}: {why}")
+def hostile_row(method: str, seeds: Sequence[int], tell: Tell, processes: int = 1) -> Row:
+    """Return how many hostile scenes break a method; in this process, or in some others."""
+    if processes == 1:
+        broken = broken_by(method, seeds)
+    else:
+        with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+            shares = [seeds[k::processes] for k in range(processes)]
+            broken = sorted(one for share in pool.map(partial(broken_by, method), shares) for one in share)
+    for seed, why in broken:
+        tell(f"{method}, seed {seed}: {why}")
     worst = ""
     if broken:
         smallest = shrunk(hostile(broken[0][0]), lambda one: bool(fault_of(one, method)))
@@ -65,6 +76,12 @@ def hostile_row(method: str, seeds: Sequence[int], tell: Tell) -> Row:
     return Row(part=PART, property="hostile scenes", subject=method, domain=DOMAIN, figure=len(broken), unit="scenes",
                limit=0, kind="exact", source=SOUND, cases=len(seeds), seed=seed, detail=worst,
                reproduce=f"python -m benchmarks.stability.pictures {method} {seed or 0}")
+
+
+def broken_by(method: str, seeds: Iterable[int]) -> list[tuple[int, str]]:
+    """Return the hostile scenes that break a method, and how."""
+    found = ((seed, fault_of(hostile(seed), method)) for seed in seeds)
+    return [(seed, why) for seed, why in found if why]
 
 
 def fault_of(scene: Hostile, method: str) -> str:
@@ -87,7 +104,18 @@ def fault_of(scene: Hostile, method: str) -> str:
     return f"{spent:.0f} s" if spent > SLOWEST else ""
 
 
+def main(arguments: list[str]) -> int:
+    """Show one scene, or count those that break of as many as are wanted."""
+    method, first, *last = arguments
+    if last:
+        row = hostile_row(method, range(int(first), int(last[0])), print, PROCESSES)
+        print(f"{method}: {row.figure:g} of {row.cases} scenes break it\n{row.detail}".rstrip())
+        return int(not row.passed)
+    print(hostile(int(first)).written())
+    fault = fault_of(hostile(int(first)), method)
+    print(fault or "nothing breaks")
+    return int(bool(fault))
+
+
 if __name__ == "__main__":
-    asked_method, asked_seed = sys.argv[1], int(sys.argv[2])
-    print(hostile(asked_seed).written())
-    print(fault_of(hostile(asked_seed), asked_method) or "nothing breaks")
+    sys.exit(main(sys.argv[1:]))

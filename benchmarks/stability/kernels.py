@@ -8,13 +8,17 @@ import numpy as np
 from benchmarks.stability import (
     crown_ladders,
     elementary_range,
+    floor_promises,
     lamp_ladders,
     light_ladders,
     lobe_ladders,
+    lobe_promises,
     map_ladders,
+    map_promises,
     pair_ladders,
     promise,
     sum_promises,
+    unit_promises,
     val_ladders,
 )
 from benchmarks.stability.inputs import BLOCK
@@ -25,7 +29,7 @@ from refgi.stress.rows import Row
 
 MODULES = (pair_ladders, crown_ladders, lamp_ladders, val_ladders, map_ladders, elementary_range, lobe_ladders,
            light_ladders)
-PROMISED = (sum_promises,)  # promises of stages
+PROMISED = (sum_promises, lobe_promises, unit_promises, floor_promises, map_promises)  # of stages
 ALL = ".all"
 
 

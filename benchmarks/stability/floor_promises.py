@@ -33,8 +33,8 @@ class Seen:
         along, over, up = turn[0], turn[1], sign * turn[2]
         half = self.share * self.height
         corners = np.array([a * along * half + b * over * half for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
-        self.middle, shift = rng.uniform(-0.3, 0.3, 2), half
-        eye = self.height * up + (self.middle[0] * along + self.middle[1] * over) * shift
+        middle = half * rng.uniform(-0.3, 0.3, 2)
+        eye = self.height * up + middle[0] * along + middle[1] * over
         down = rng.uniform(0.2, 1.0) if rng.random() < 0.8 else 1.0
         way = np.sqrt(1 - down * down) * (along * np.cos(t := rng.uniform(0, 6.28)) + over * np.sin(t)) - down * up
         self.camera = Camera(tuple(eye), tuple(eye + way * max(1.0, self.height)),
@@ -42,7 +42,7 @@ class Seen:
         floor = Geometry(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.zeros(2, np.int64))
         self.scene = Scene("floor", floor, (Material("floor", (0.5, 0.5, 0.5)),), self.camera,
                            (PointLight(tuple(eye), (1.0, 1.0, 1.0)),))
-        self._ends, self._plane = (along, over, half), (up, axis)
+        self._ends, self._up = (along, over, half), up
 
     def exact(self) -> tuple[Array, Array, Array, Array]:
         """Return depth, distance and position (3) at each pixel, and the condition; NaN where nothing is asked."""
@@ -56,7 +56,7 @@ class Seen:
         place = ((np.arange(SIZE) + np.longdouble(0.5)) * 2 / SIZE - 1) * half
         u, v = np.meshgrid(place, place)
         ray = u * frame[0][:, None, None] + v * frame[1][:, None, None] + frame[2][:, None, None]
-        (along, over, end), (up, axis) = self._ends, self._plane
+        (along, over, end), up = self._ends, self._up
         falls = -np.einsum("c,chw->hw", up, ray)
         height = np.longdouble(np.dot(up, camera.eye))
         with np.errstate(all="ignore"):

@@ -105,7 +105,7 @@ def bright_lobes(rng: np.random.Generator) -> Case:
     to = _receivers(place, np.broadcast_to(-axis, place.shape), np.float32)
     got = irradiance(to, lights, PLAIN)
     bad = int(np.count_nonzero(~np.isfinite(got) | (got < 0)))
-    return Case(bad, f"{count} lobes, up to {strength.max():.3g} W and exponent {exponent.max():.3g}: {bad} of {got.size}")
+    return Case(bad, f"{count} lobes, up to {strength.max():.3g} W and P {exponent.max():.3g}: {bad} of {got.size}")
 
 
 PROMISES = (

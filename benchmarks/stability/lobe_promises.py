@@ -40,5 +40,5 @@ def bias(rng: np.random.Generator) -> Case:
 PROMISES = (
     Promise("lobe.norm_bias", "float64 norms, mean error", "lobe.norm", "P 100 .. 45,000, 1.7 to 1.9 widths of the "
             "lobe below the horizon", bias, "standard errors", SIGMAS, "statistics",
-            "6 standard errors of 100 values: a row of 1000 cases fails once in a thousand", 1000, 12),
+            "6 standard errors of 100 values: 200 such means pass it once in 100,000 runs", 200, 8),
 )

@@ -111,7 +111,7 @@ def bright_lobes(rng: np.random.Generator) -> Case:
 PROMISES = (
     Promise("sum.many", "float32 sum over m times the same lights", "pairs.sum",
             "64,000 to 1,000,000 pixel lights or lobes in one order", many_lights, "U of E", 4, "derived",
-            "the compensated total rounds by 2 U, once more where it ends, the reference once", 400, 4),
+            "the compensated total rounds by 2 U, once more where it ends, the reference once", 60, 4),
     *(Promise(f"sum.{name}", f"{name} sum against a literal one", "pairs.sum",
               "1 to 100 lights, 1e-9 of the scene's size off a receiver and more; 1e-6 .. 1e6 m, up to 16 sizes off "
               "the origin", partial(near_lights, real), "of the bound", 1.0, "derived",

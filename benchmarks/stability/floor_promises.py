@@ -103,7 +103,7 @@ PROMISES = (
     Promise("floor.holes", "pixels of a floor that see none", "G-buffer", DOMAIN, holes, "pixels", 0, "exact",
             "a triangle is seen from a share of 1e-9 of its size and more", 1500, 40, adds=True),
     Promise("floor.float32", "float32 depth, distance, position of a plane", "G-buffer", DOMAIN,
-            lambda rng: off_plane(np.float32, rng), "of the bound", 1.0, "derived", BOUND, 1500, 20),
+            lambda rng: off_plane(np.float32, rng), "of the bound", 1.0, "derived", BOUND, 700, 20),
     Promise("floor.float64", "float64 depth, distance, position of a plane", "G-buffer", DOMAIN,
-            lambda rng: off_plane(np.float64, rng), "of the bound", 1.0, "derived", BOUND, 1500, 20),
+            lambda rng: off_plane(np.float64, rng), "of the bound", 1.0, "derived", BOUND, 700, 20),
 )

@@ -129,15 +129,15 @@ def boxes(rng: np.random.Generator) -> Case:
 PROMISES = (
     Promise("map.borders", "points upon borders without a texel that sees them", "cube map",
             "edges and corners of cubes, 1 to 512 texels a side, whole coordinates", borders, "points", 0, "exact",
-            "a border belongs to the first map that sees it", 3000, 10, adds=True),
+            "a border belongs to the first map that sees it", 800, 10, adds=True),
     Promise("map.wide", "texels that differ from the test by planes", "paraboloid map",
             "triangles with an edge 1e-17 .. 1e-11 of its length off the map's axis, 96 x 96 texels",
             wide_triangles, "texels", 0, "exact", "spans are cut where nothing is inside; texels 1e-11 rad off an edge",
-            2000, 10, adds=True),
+            400, 10, adds=True),
     Promise("map.spot_power", "power of a spot's map against its closed form", "spot_power",
             "half-angles 2e-7 .. 1.26 rad, soft edges of 1e-6 of them and more", spots, "of the power", 3.6e-9,
             "observed x 2", "1.77e-9 of 1500: Gauss rules over an edge of 1e-6 of the cone", 2000, 30),
     Promise("map.directional", "margin around the box of a directional light's map", "directional_projection",
             "boxes of 1e-8 .. 1e8 m, flat ones and lines, up to 4 sizes off the origin", boxes, "of the limit", 1.0,
-            "derived", "1e-6 of the box's size on every side, within 1 % of that for what is rounded", 20_000, 300),
+            "derived", "1e-6 of the box's size on every side, within 1 % of that for what is rounded", 5000, 300),
 )

@@ -115,7 +115,7 @@ PROMISES = (
     *(Promise(f"sum.{name}", f"{name} sum against a literal one", "pairs.sum",
               "1 to 100 lights, 1e-9 of the scene's size off a receiver and more; 1e-6 .. 1e6 m, up to 16 sizes off "
               "the origin", partial(near_lights, real), "of the bound", 1.0, "derived",
-              "14 roundings of a term, 4 of each cosine, 67 of the sum", 20_000, 100)
+              "14 roundings of a term, 4 of each cosine, 67 of the sum", 6000, 100)
       for name, real in (("float32", np.float32), ("float64", np.float64))),
     Promise("sum.bright", "infinite or NaN", "pairs.sum", "1 to 64 lobes of up to 1e30 W and exponents to 1e20, from "
             "1e-3 m on", bright_lobes, "numbers", 0, "exact", "what no float32 holds is cut", 5000, 60, adds=True),

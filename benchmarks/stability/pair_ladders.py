@@ -13,13 +13,14 @@ from benchmarks.stability.inputs import BLOCK, around, directions, sizes, some
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.maths import dot
 from refgi.jit import kernel
-from refgi.lobes import LEAST_FRACTION, lobe_gap, lobe_norm, lobe_power
+from refgi.lobes import lobe_gap, lobe_norm, lobe_power
 from refgi.pairs.pair_sum import clamped_term, geometry_term
 from refgi.rays.offsets import far_offset, ray_offset
 
 Array = npt.NDArray[Any]
 NEAREST, FARTHEST = 1.01e-15, 1e9  # m
 ROUNDINGS = "14 roundings, each at most one ULP: 5 of r^2, each of which counts twice, 2 divisions, 2 products"
+LEAST = 1e-12  # of a lobe above the surface, below which it counts as dark: docs/radiometry.md
 PAIR = "r 1e-15 .. 1e9 m and 0; normals any way, 1 ULP off, grazing, opposite"
 
 
@@ -161,7 +162,7 @@ def norm(m: Any, x: Any) -> Any:
     """(P + 1) / (2 pi K), K = 1 - I / 2; I the regularised incomplete beta function of sin^2, (P + 1) / 2 and 1/2."""
     half = m.beta(np.maximum(1 - x[0] * x[0], 0), (x[1] + 1) / 2) / 2
     fraction = np.where(x[0] >= 0, 1 - half, half)
-    return [np.where(fraction > LEAST_FRACTION, (x[1] + 1) / (2 * m.pi * fraction), 0 * x[0])]
+    return [np.where(fraction > LEAST, (x[1] + 1) / (2 * m.pi * fraction), 0 * x[0])]
 
 
 def draw_offsets(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001

@@ -18,7 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.stability import promise
 from benchmarks.stability.meshes import MESHES, Mesh, Places, Rays, aimed_rays, leaving_rays, places_upon, random_rays
+from benchmarks.stability.promise import Promise, promise_tasks
 from benchmarks.stability.tasks import Task, Tell
 from refgi.rays import MISS, Tracer
 from refgi.stress.rows import Row
@@ -189,7 +191,7 @@ def rows(mesh: str, way: str, kind: str, total: int) -> Iterable[Row]:
 
 
 def tasks(short: bool) -> list[Task]:
-    """Return a task for each mesh, way to Embree and kind of rays."""
+    """Return a task for each mesh, way to Embree and kind of rays, and for each promise."""
     def run(mesh: str, way: str, kind: str, total: int, _: Tell) -> Iterable[Row]:
         return rows(mesh, way, kind, total)
 
@@ -198,14 +200,25 @@ def tasks(short: bool) -> list[Task]:
         return most // SLOWER[kind] if mesh == "needles" else most
 
     return [Task(f"{mesh}.{way}.{kind}", partial(run, mesh, way, kind, count(mesh, way, kind)))
-            for mesh in MESHES for way in DOORS for kind in KINDS if mesh != "star" or kind != "between"]
+            for mesh in MESHES for way in DOORS for kind in KINDS if mesh != "star" or kind != "between"] + (
+                promise_tasks(promises().values(), "rays", short))
+
+
+def promises() -> dict[str, Promise]:
+    """Return the promises of shadow rays and of reach by name."""
+    from benchmarks.stability import shadow_promises
+
+    return {one.name: one for one in shadow_promises.PROMISES}
 
 
 def again(name: str, seed: int, case: int) -> str:
     """Return one ray, both paths' answers and those of a brute force in float64."""
+    if name in promises():
+        return promise.again(promises()[name], seed, case)
     mesh, way, kind = (*name.split("."), "", "")[:3]
     if mesh not in MESHES or way not in DOORS or kind not in KINDS:
-        raise ValueError(f"expected MESH.DOOR.KIND of {', '.join(MESHES)}; {', '.join(DOORS)}; {', '.join(KINDS)}")
+        raise ValueError(f"expected MESH.DOOR.KIND of {', '.join(MESHES)}; {', '.join(DOORS)}; {', '.join(KINDS)}, or "
+                         f"{', '.join(promises())}")
     chunk, place = divmod(case, CHUNK)
     shape, tracer, found = chunk_of(mesh, way, kind, seed, chunk, place, place + 1)
     lines = [f"{name}, seed {seed}, case {case}: size {SIZES[chunk % len(SIZES)]:g} m"]

@@ -214,7 +214,8 @@ def texel_coordinates(projection: Projection, m: int, u: float, v: float) -> tup
     """
     column = (u / projection.half[0] + 1.0) * 0.5 * projection.width
     row = (v / projection.half[1] + 1.0) * 0.5 * projection.height
-    return column, min(row, projection.height * (1.0 - 1e-16)) + m * projection.height
+    # the bottom border is the map's own; of the sum, as adding rounds up to the next map's first row
+    return column, min(row + m * projection.height, (m + 1) * projection.height * (1.0 - 1e-16))
 
 
 @kernel

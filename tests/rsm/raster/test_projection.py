@@ -98,6 +98,20 @@ def test_a_cube_sees_every_direction_once():
     np.testing.assert_array_equal(face, 2 * axis + sign)
 
 
+@pytest.mark.parametrize("texels", [1, 7, 64, 100])
+def test_the_bottom_border_of_a_face_is_its_own(texels):
+    """Of the first face that sees it, though that is not the first of the stacked maps, nor the next one's top row."""
+    for point, face in (((0.5, 1, -1), 2), ((-1, -1, 0.5), 1), ((0.5, -1, -1), 3), ((1, -1, 0.5), 0)):
+        row, _, depth = (float(value[0]) for value in project(cube_projection((0, 0, 0), texels),
+                                                               np.array(point, float)[:, None]))
+        assert int(row // texels) == face
+        assert depth == 1
+    for face in range(6):  # just within the border
+        frame = cube_projection((0, 0, 0), texels).frame[face]
+        row, _, _ = project(cube_projection((0, 0, 0), texels), (frame[2] + (1 - 1e-15) * frame[1])[:, None])
+        assert row[0] < (face + 1) * texels
+
+
 def test_a_directional_map_encloses_the_box():
     rng = np.random.default_rng(6)
     bounds = np.array([-1.0, -2, -3]), np.array([2.0, 1, 4])

@@ -1,4 +1,4 @@
-"""Part `kernels`: each scalar kernel against its formula, and every float32 through the elementary functions."""
+"""Part `kernels`: kernels against their formulas, every float32 through elementary functions, promises of stages."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -6,11 +6,18 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability import (
+    area_promises,
     crown_ladders,
     elementary_range,
+    height_ladders,
     lamp_ladders,
+    level_promises,
     map_ladders,
     pair_ladders,
+    place_promises,
+    promise,
+    sampled_promises,
+    sent_promises,
     val_ladders,
 )
 from benchmarks.stability.inputs import BLOCK
@@ -19,7 +26,9 @@ from benchmarks.stability.maths import DIGITS, EXTENDED, trusted
 from benchmarks.stability.tasks import Task, Tell
 from refgi.stress.rows import Row
 
-MODULES = (pair_ladders, crown_ladders, lamp_ladders, val_ladders, map_ladders, elementary_range)
+MODULES = (pair_ladders, crown_ladders, lamp_ladders, val_ladders, map_ladders, elementary_range,
+           area_promises, height_ladders, level_promises, sent_promises)
+PROMISED = (area_promises, level_promises, place_promises, sampled_promises, sent_promises)  # promises of stages
 ALL = ".all"
 
 
@@ -29,8 +38,13 @@ def ladders() -> dict[str, Ladder]:
     return {one.name: one if trusted() else one._replace(extended=0) for one in found}
 
 
+def promises() -> dict[str, promise.Promise]:
+    """Return all promises of stages by name."""
+    return {one.name: one for module in PROMISED for one in module.PROMISES}
+
+
 def tasks(short: bool) -> list[Task]:
-    """Return a task for each kernel, and one for each elementary function over all float32 numbers."""
+    """Return a task for each kernel and promise, and for each elementary function over all float32 numbers."""
     def measured(ladder: Ladder) -> Callable[[Tell], Iterable[Row]]:
         return lambda _: rows(ladder, short)
 
@@ -39,16 +53,19 @@ def tasks(short: bool) -> list[Task]:
 
     return [*(Task(name, measured(ladder)) for name, ladder in ladders().items()),
             Task("crown.unit", lambda _: crown_ladders.unit_rows(short)),
-            *(Task(f"{name}{ALL}", whole(name)) for name in elementary_range.FILL)]
+            *(Task(f"{name}{ALL}", whole(name)) for name in elementary_range.FILL),
+            *promise.promise_tasks(promises().values(), "kernels", short)]
 
 
 def again(name: str, seed: int, case: int) -> str:
     """Return inputs, answer, reference and error of one case; of a whole range, `case` is the bit pattern."""
     if name.endswith(ALL):
         return _pattern(name.removesuffix(ALL), case)
+    if name in promises():
+        return promise.again(promises()[name], seed, case)
     known = ladders()
     if name not in known:
-        raise ValueError(f"expected a kernel of {', '.join(known)}, got {name}")
+        raise ValueError(f"expected a kernel of {', '.join(known | promises())}, got {name}")
     ladder, lines = known[name], []
     for real in ladder.reals:
         x = inputs_of(ladder, seed, case // BLOCK, real)[:, case % BLOCK : case % BLOCK + 1].copy()

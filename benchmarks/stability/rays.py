@@ -18,7 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.stability import ground_promises
 from benchmarks.stability.meshes import MESHES, Mesh, Places, Rays, aimed_rays, leaving_rays, places_upon, random_rays
+from benchmarks.stability.promise import again as case_again
+from benchmarks.stability.promise import promise_tasks
 from benchmarks.stability.tasks import Task, Tell
 from refgi.rays import MISS, Tracer
 from refgi.stress.rows import Row
@@ -189,7 +192,7 @@ def rows(mesh: str, way: str, kind: str, total: int) -> Iterable[Row]:
 
 
 def tasks(short: bool) -> list[Task]:
-    """Return a task for each mesh, way to Embree and kind of rays."""
+    """Return a task for each mesh, way to Embree and kind of rays, and for each promise."""
     def run(mesh: str, way: str, kind: str, total: int, _: Tell) -> Iterable[Row]:
         return rows(mesh, way, kind, total)
 
@@ -197,12 +200,16 @@ def tasks(short: bool) -> list[Task]:
         most = COUNTS[kind, way][short]
         return most // SLOWER[kind] if mesh == "needles" else most
 
-    return [Task(f"{mesh}.{way}.{kind}", partial(run, mesh, way, kind, count(mesh, way, kind)))
-            for mesh in MESHES for way in DOORS for kind in KINDS if mesh != "star" or kind != "between"]
+    return [*(Task(f"{mesh}.{way}.{kind}", partial(run, mesh, way, kind, count(mesh, way, kind)))
+              for mesh in MESHES for way in DOORS for kind in KINDS if mesh != "star" or kind != "between"),
+            *promise_tasks(ground_promises.PROMISES, "rays", short)]
 
 
 def again(name: str, seed: int, case: int) -> str:
     """Return one ray, both paths' answers and those of a brute force in float64."""
+    for promised in ground_promises.PROMISES:
+        if promised.name == name:
+            return case_again(promised, seed, case)
     mesh, way, kind = (*name.split("."), "", "")[:3]
     if mesh not in MESHES or way not in DOORS or kind not in KINDS:
         raise ValueError(f"expected MESH.DOOR.KIND of {', '.join(MESHES)}; {', '.join(DOORS)}; {', '.join(KINDS)}")

@@ -76,7 +76,8 @@ def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tup
     for k in np.unique(chosen):
         here = chosen == k
         on_map, its_weights = warp_samples(warped[here], pyramids[k], warp.levels, warp.method)
-        row = k * height + on_map[:, 1] * height
+        following = k * height + texel_of(on_map[:, 1], height) + 1.0  # row, or map, to which the sum may round up
+        row = np.minimum(k * height + on_map[:, 1] * height, np.nextafter(following, 0.0))
         warped[here] = np.stack([on_map[:, 0], _clamped_to_texel(row, maps * height)], axis=1)
         weights[here] *= its_weights
     return warped, weights

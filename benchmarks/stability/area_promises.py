@@ -23,6 +23,7 @@ from refgi.scene import Geometry
 
 Array = npt.NDArray[Any]
 LIGHTS, CLUSTERS = 60, 8
+NUMBERS = ("map_of", "center", "near", "far", "scene_far", "depth")  # of shadow maps
 
 
 @kernel
@@ -97,8 +98,8 @@ def unmoved(rng: np.random.Generator) -> Case:
         geometry, ends, areas = room(np.random.default_rng(seed), half)
         made.append(shadow_maps(geometry, areas, ShadowMapSettings(resolution=8), np.float32, ends=ends))
     one, other = made
-    differing = sum(int((getattr(one, name) != getattr(other, name)).sum())
-                    for name in ("center", "near", "far", "scene_far", "depth"))
+    differing = sum(0 if np.array_equal(a, b) else int((a != b).sum()) if a.shape == b.shape else max(a.size, b.size)
+                    for a, b in ((getattr(one, name), getattr(other, name)) for name in NUMBERS))
     return Case(differing, f"a plane of {ground:.3g} m under a room of 2 m: {differing} numbers differ")
 
 
@@ -108,9 +109,10 @@ LADDERS = (
            unit="one", conditioned=False, reals=("float64",)),
 )
 PROMISES = (
-    Promise("val.rectangles", "lengths x 2^k, to the bit", "area_lights", "k -60 .. 60; lights in rows and in one place",
-            rectangles, "lengths", 0.0, "exact", "a power of two rounds nothing", 5000, 60, adds=True),
+    Promise("val.rectangles", "lengths x 2^k, to the bit", "area_lights",
+            "k -60 .. 60; lights in rows and in one place", rectangles, "lengths", 0.0, "exact",
+            "a power of two rounds nothing", 2000, 60, adds=True),
     Promise("val.maps", "what no light meets moves no map", "shadow_maps",
             "a plane of 100 m to 1e8 m under a room of 2 m", unmoved, "numbers", 0.0, "exact",
-            "maps are made of what light meets", 500, 6, adds=True),
+            "maps are made of what light meets", 200, 6, adds=True),
 )

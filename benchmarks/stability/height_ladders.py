@@ -70,11 +70,12 @@ def height(m: Any, x: Any) -> Any:
 
 
 def rounding(m: Any, x: Any, real: Any) -> Any:
-    """Return the rounding of a height: of places, |p| + |s|, seen across the line of sight."""
+    """Return the rounding of a height: of places, |p| + |s|, seen across the line of sight; on that line it is any."""
     aside = cross(x[:3], x[6:9])
     across_it = m.sqrt(dot(aside, aside) / dot(x[:3], x[:3]))
     places = m.sqrt(dot(x[:3], x[:3])) + m.sqrt(dot(x[6:9], x[6:9]))
-    return m.number(np.float64(np.finfo(real).eps)) * places / np.where(across_it > 0, across_it, places)
+    lost = m.number(np.float64(np.finfo(real).eps)) * places
+    return np.where(across_it > 8 * lost, lost / np.where(across_it > 0, across_it, 1), 2)
 
 
 LADDERS = (

@@ -116,5 +116,5 @@ PROMISES = (
             "weights", 0.0, "exact", "a power of two rounds nothing", 3000, 20, adds=True),
     Promise("reproject.origin", "the same points by another origin, to the bit", "reproject",
             "origins up to 64 m apart, places on a grid of 2^-10 m", fetched, "values", 0.0, "exact",
-            "no place is rounded", 5000, 30, adds=True),
+            "no place is rounded", 2000, 30, adds=True),
 )

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.stability.promise import Case, Promise
+from refgi.errors import InputError
 from refgi.lights.importance import importance_pyramid
 from refgi.lights.warp import Warp, texel_of, warp_stacked
 from refgi.splat.gather.gather_sum import GatherMap, disc_pattern, gather_discs
@@ -72,9 +73,11 @@ def warped(rng: np.random.Generator) -> Case:
     points[maps : 2 * maps, 1] = np.nextafter(points[:maps, 1], 0)
     points[:20] = np.where(rng.random((20, 2)) < 0.3, 0.0, points[:20])
     depth = max(height, width).bit_length() + 1
-    with np.errstate(all="ignore"):  # a place that is no number counts as wrong
-        place, weight = warp_stacked(points, texels, maps, Warp("A", depth))
-    place = np.where(np.isfinite(place), place, 0.0)
+    try:
+        with np.errstate(all="ignore"):
+            place, weight = warp_stacked(points, texels, maps, Warp("A", depth))
+    except InputError as error:  # a place that is no number
+        return Case(math.inf, f"{maps} maps of {height} x {width} texels, {int(dark.sum())} of them dark: {error}")
     here = texels[texel_of(place[:, 1], maps * height), texel_of(place[:, 0], width)]
     with np.errstate(all="ignore"):
         share = of_map.sum() / of_map[texel_of(place[:, 1], maps * height) // height]

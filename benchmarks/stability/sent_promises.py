@@ -148,6 +148,6 @@ PROMISES = (
             "7e-7: distances of float32", 2000, 30),
     Promise("sent.lift", "rays start the offset above their face", "truth surfaces",
             f"faces of 1e-3 .. 1e3 m, {THINNEST:g} .. 1 as wide as long, found from up to 1e5 times that away", lifted,
-            "of the offset", 1e-5, "derived", "face normals of float64, 1e-12 off, over an offset of 2^-22", 20_000,
-            500),
+            "of the offset", 1e-5, "derived", "face normals of float64, 1e-12 off, over an offset of 2^-22", 6000,
+            200),
 )

@@ -246,7 +246,7 @@ def test_a_unit_that_is_no_power_of_two_shows(monkeypatch):
 
 def test_tasks_are_of_one_name_each_and_rows_tell_how_to_see_them():
     names = [task.name for task in tasks(short=True)]
-    assert len(set(names)) == len(names) == len(KNOWN) + 4
+    assert len(set(names)) == len(names) == len(KNOWN) + len(kernels.promises()) + 4
     assert {"eq2.term", "crown.disc", "val.z_avg", "spot.falloff", "exp2.all"} <= set(names)
     found = list(rows(KNOWN["eq2.term"]._replace(extended=CASES, exact=20), True))
     assert all(row.passed for row in found)

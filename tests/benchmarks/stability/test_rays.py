@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.stability import again, rays
+from benchmarks.stability import again, ground_promises, rays
 from benchmarks.stability.meshes import MESHES, WITHIN, aimed_rays, places_upon, random_rays
 from refgi.rays import watertight
 
@@ -131,6 +131,6 @@ def test_chunks_do_not_depend_on_how_many_are_asked():
 
 def test_each_mesh_and_door_has_its_tasks():
     names = [task.name for task in rays.tasks(short=False)]
-    assert len(names) == len(set(names)) == 22
+    assert len(names) == len(set(names)) == 22 + len(ground_promises.PROMISES)
     counted = rays.COUNTS["random", "address"][0]
     assert 2 * counted + counted // rays.SLOWER["random"] > 100_000_000

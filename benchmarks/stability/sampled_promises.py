@@ -1,7 +1,7 @@
 """Promises of sampled maps: sums of importance, points warped after it, discs of texels near a map's border.
 
 References are literal: sums in extended precision by the borders floor(i H / 2^l) of docs, the identity that weight
-times importance is the map's mean where points are warped down to texels, and a sum over texels found by floor.
+times the mean of a point's cell is the mean of all maps, and a sum over texels found by floor.
 """
 
 import math
@@ -34,6 +34,15 @@ def _cells(finest: Array, level: int) -> Array:
     return sums
 
 
+def _of_cells(finest: Array, level: int) -> Array:
+    """Return, for each texel, the mean of the cell of a level that holds it."""
+    count = _cells(np.ones_like(finest), level)
+    mean = np.divide(_cells(finest, level), count, out=np.zeros_like(count), where=count > 0).astype(np.float64)
+    for axis, size in enumerate(finest.shape):
+        mean = np.repeat(mean, np.diff((np.arange((1 << level) + 1) * size) >> level), axis=axis)
+    return mean
+
+
 def sums(rng: np.random.Generator) -> Case:
     """Return how far the sums of a map's cells are from their texels, over the roundings that they take."""
     height, width = (int(2 ** rng.uniform(0, math.log2(MOST_SIDE))) for _ in range(2))
@@ -54,7 +63,7 @@ def sums(rng: np.random.Generator) -> Case:
 
 
 def warped(rng: np.random.Generator) -> Case:
-    """Return how far weight times importance is from the mean, over its roundings; some maps and texels are dark.
+    """Return how far weight times a cell's mean is from the whole mean, over its roundings; some maps are dark.
 
     Some points lie upon borders between maps, texels or at 0.
     """
@@ -72,19 +81,20 @@ def warped(rng: np.random.Generator) -> Case:
     points[:maps, 1] = np.minimum(np.concatenate([[0.0], ends[:-1]]), 1 - U)
     points[maps : 2 * maps, 1] = np.nextafter(points[:maps, 1], 0)
     points[:20] = np.where(rng.random((20, 2)) < 0.3, 0.0, points[:20])
-    depth = max(height, width).bit_length() + 1
+    depth = int(rng.integers(0, max(height, width).bit_length() + 2))
+    mean = np.concatenate([_of_cells(one, min(depth, (max(height, width) - 1).bit_length())) for one in whole])
     try:
         with np.errstate(all="ignore"):
             place, weight = warp_stacked(points, texels, maps, Warp("A", depth))
     except InputError as error:  # a place that is no number
         return Case(math.inf, f"{maps} maps of {height} x {width} texels, {int(dark.sum())} of them dark: {error}")
-    here = texels[texel_of(place[:, 1], maps * height), texel_of(place[:, 0], width)]
+    here = mean[texel_of(place[:, 1], maps * height), texel_of(place[:, 0], width)]
     with np.errstate(all="ignore"):
         share = of_map.sum() / of_map[texel_of(place[:, 1], maps * height) // height]
         off = np.abs(weight * here / texels.mean() - 1) / (U * (ROUNDINGS * depth + 8 + 4 * share))
     worst = int(np.argmax(np.where(np.isnan(off), np.inf, off)))
-    return Case(float(off[worst]), f"{maps} maps of {height} x {width} texels, {int(dark.sum())} of them dark: point "
-                f"{points[worst].tolist()} of weight {weight[worst]:.6g} where importance is {here[worst]:g}, "
+    return Case(float(off[worst]), f"{maps} maps of {height} x {width} texels, {int(dark.sum())} of them dark, {depth} "
+                f"levels: point {points[worst].tolist()} of weight {weight[worst]:.6g} where importance is {here[worst]:g}, "
                 f"mean {texels.mean():g}")
 
 
@@ -127,9 +137,9 @@ PROMISES = (
     Promise("importance.sums", "sums of cells beside those of their texels", "importance_pyramid",
             f"maps of 1 .. {MOST_SIDE - 1} texels a side, a hundredth of them 1e12 times as bright", sums,
             "of the bound", 1.0, "derived", "a sum over n rows and columns rounds n times, in float64", 4000, 60),
-    Promise("importance.warp", "weight times importance is the mean", "warp_stacked",
+    Promise("importance.warp", "weight times a cell's mean is the whole mean", "warp_stacked",
             "1 .. 6 maps of 1 .. 39 texels a side, dark ones among them; points upon borders", warped, "of the bound",
-            1.0, "derived", "8 roundings a level, and 4 of the whole for a map's share of it", 10_000, 60),
+            1.0, "derived", "8 roundings a level, and 4 of the whole for a map's share of it", 5000, 60),
     Promise("gather.discs", "discs beside a map's border and a literal sum", "gather_discs",
             "1 .. 32 texels a side, centres within 1.5 texels of a border, radii 0.1 .. 4 texels", discs,
             "of the bound", 1.0, "derived", "22 roundings of a term of Eq. 2 and one for each sum", 500, 8),

@@ -82,5 +82,5 @@ LADDERS = (
     Ladder("hssil.height", "1e-3 .. 1e3 m from the eye, facing 1e-3 .. 1; samples 1e-3 .. 100 of that off, or "
            "1e-7 off the line of sight", draw, run, height, 24.0,
            source="24 roundings, each at most one ULP: b by 14, c and x by 5 of these each, a by 10",
-           scale=rounding, extended=400_000, exact=2000, brief=2 * BLOCK),
+           scale=rounding, extended=400_000, exact=2000, brief=BLOCK),
 )

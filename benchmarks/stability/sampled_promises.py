@@ -94,7 +94,8 @@ def warped(rng: np.random.Generator) -> Case:
         off = np.abs(weight * here / texels.mean() - 1) / (U * (ROUNDINGS * depth + 8 + 4 * share))
     worst = int(np.argmax(np.where(np.isnan(off), np.inf, off)))
     return Case(float(off[worst]), f"{maps} maps of {height} x {width} texels, {int(dark.sum())} of them dark, {depth} "
-                f"levels: point {points[worst].tolist()} of weight {weight[worst]:.6g} where importance is {here[worst]:g}, "
+                f"levels: point {points[worst].tolist()}"
+                f" of weight {weight[worst]:.6g} where importance is {here[worst]:g}, "
                 f"mean {texels.mean():g}")
 
 

@@ -8,11 +8,12 @@ import sys
 
 from benchmarks.stability import again_files
 
-USAGE = "usage: python -m benchmarks.stability.again kernels|rays NAME SEED CASE, or files NAME CASE"
+USAGE = ("usage: python -m benchmarks.stability.again kernels|rays|files NAME SEED CASE, "
+         "or files FORMAT CASE of a mutated file")
 
 
 def main(arguments: list[str]) -> int:
-    if arguments[:1] == ["files"]:
+    if arguments[:1] == ["files"] and not (len(arguments) == 4 and arguments[3].isdigit()):
         return again_files.main(arguments[1:])
     try:
         part, name, seed, case = arguments
@@ -20,7 +21,7 @@ def main(arguments: list[str]) -> int:
     except ValueError:
         print(USAGE, file=sys.stderr)
         return 2
-    if part not in ("kernels", "rays"):
+    if part not in ("kernels", "rays", "files"):
         print(USAGE, file=sys.stderr)
         return 2
     try:

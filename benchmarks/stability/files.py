@@ -7,6 +7,7 @@ A mutation is a sound file changed at random (`benchmarks.stability.mutations`);
 from collections.abc import Iterable, Sequence
 from functools import partial
 
+from benchmarks.stability import promise, written_promises
 from benchmarks.stability.bombs import BOMBS
 from benchmarks.stability.file_child import BOMB, MEMORY, SECONDS, Breach
 from benchmarks.stability.file_formats import FORMATS
@@ -24,8 +25,9 @@ LIMITS = f"{SECONDS} s of processor time and {MEMORY >> 20} MiB a file"
 
 
 def tasks(short: bool) -> list[Task]:
-    """Return a task a format, and in full one for its bombs."""
+    """Return a task a format and a promise of what is written, and in full one for the bombs of each format."""
     mutated = [Task(name, partial(_mutated, name, short)) for name in FORMATS]
+    mutated += promise.promise_tasks(written_promises.PROMISES, "files", short)
     return mutated if short else mutated + [Task(f"{name}-bombs", partial(_bombs, name)) for name in BOMBS]
 
 
@@ -50,3 +52,11 @@ def row(promise: str, name: str, found: Sequence[Breach], count: int, seed: int 
     again = f"python -m benchmarks.stability.again files {name}{'' if seed is not None else '-bombs'} {worst.number}"
     return Row(part="files", property=promise, subject=name, domain=LIMITS, figure=len(found), unit="breaches", limit=0,
                kind="exact", source=PROMISE, cases=count, seed=seed, reproduce=again, detail=detail)
+
+
+def again(name: str, seed: int, case: int) -> str:
+    """Return one case of a promise of what is written."""
+    known = {one.name: one for one in written_promises.PROMISES}
+    if name not in known:
+        raise ValueError(f"expected one of {', '.join(known)}, got {name}")
+    return promise.again(known[name], seed, case)

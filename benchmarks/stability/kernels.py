@@ -6,17 +6,23 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability import (
+    area_promises,
     crown_ladders,
     elementary_range,
     floor_promises,
+    height_ladders,
     lamp_ladders,
+    level_promises,
     light_ladders,
     lobe_ladders,
     lobe_promises,
     map_ladders,
     map_promises,
     pair_ladders,
+    place_promises,
     promise,
+    sampled_promises,
+    sent_promises,
     sum_promises,
     unit_promises,
     val_ladders,
@@ -28,8 +34,9 @@ from benchmarks.stability.tasks import Task, Tell
 from refgi.stress.rows import Row
 
 MODULES = (pair_ladders, crown_ladders, lamp_ladders, val_ladders, map_ladders, elementary_range, lobe_ladders,
-           light_ladders)
-PROMISED = (sum_promises, lobe_promises, unit_promises, floor_promises, map_promises)  # of stages
+           light_ladders, area_promises, height_ladders, level_promises, sent_promises)
+PROMISED = (sum_promises, lobe_promises, unit_promises, floor_promises, map_promises, area_promises, level_promises,
+            place_promises, sampled_promises, sent_promises)  # of stages
 ALL = ".all"
 
 

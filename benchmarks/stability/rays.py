@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.stability import promise
+from benchmarks.stability import ground_promises, promise
 from benchmarks.stability.meshes import MESHES, Mesh, Places, Rays, aimed_rays, leaving_rays, places_upon, random_rays
 from benchmarks.stability.promise import Promise, promise_tasks
 from benchmarks.stability.tasks import Task, Tell
@@ -199,16 +199,16 @@ def tasks(short: bool) -> list[Task]:
         most = COUNTS[kind, way][short]
         return most // SLOWER[kind] if mesh == "needles" else most
 
-    return [Task(f"{mesh}.{way}.{kind}", partial(run, mesh, way, kind, count(mesh, way, kind)))
-            for mesh in MESHES for way in DOORS for kind in KINDS if mesh != "star" or kind != "between"] + (
-                promise_tasks(promises().values(), "rays", short))
+    return [*(Task(f"{mesh}.{way}.{kind}", partial(run, mesh, way, kind, count(mesh, way, kind)))
+              for mesh in MESHES for way in DOORS for kind in KINDS if mesh != "star" or kind != "between"),
+            *promise_tasks(promises().values(), "rays", short)]
 
 
 def promises() -> dict[str, Promise]:
-    """Return the promises of shadow rays and of reach by name."""
+    """Return the promises of shadow rays, of reach and of what stands on a large floor, by name."""
     from benchmarks.stability import shadow_promises
 
-    return {one.name: one for one in shadow_promises.PROMISES}
+    return {one.name: one for one in (*shadow_promises.PROMISES, *ground_promises.PROMISES)}
 
 
 def again(name: str, seed: int, case: int) -> str:

@@ -76,7 +76,8 @@ def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tup
     for k in np.unique(chosen):
         here = chosen == k
         on_map, its_weights = warp_samples(warped[here], pyramids[k], warp.levels, warp.method)
-        row = k * height + on_map[:, 1] * height
+        end = k * height + _cell_end(texel_of(on_map[:, 1], height), min(warp.levels, len(pyramids[k]) - 1), height)
+        row = np.minimum(k * height + on_map[:, 1] * height, np.nextafter(end, 0.0))  # the sum may round up to it
         warped[here] = np.stack([on_map[:, 0], _clamped_to_texel(row, maps * height)], axis=1)
         weights[here] *= its_weights
     return warped, weights
@@ -142,6 +143,12 @@ def _choose_map(v: Array, sums: Array) -> tuple[Array, Array, Array]:
     starts = np.concatenate([[0.0], ends[:-1]])
     width = (ends - starts)[chosen]
     return chosen, np.clip((v - starts[chosen]) / width, 0, BELOW_1), 1 / (len(sums) * width)
+
+
+def _cell_end(row: Array, level: int, rows: int) -> Array:
+    """Return the first row after the cell of a level that holds each row."""
+    borders = (np.arange((1 << level) + 1) * rows) >> level
+    return np.asarray(borders[np.searchsorted(borders, row, side="right")], np.float64)
 
 
 def _clamped_to_texel(row: Array, rows: int) -> Array:

@@ -329,6 +329,18 @@ def test_a_sample_reads_four_sums_on_every_level(method, monkeypatch, evidence):
     evidence(f"method {method}: {', '.join(f'{count:g}' for count in counts)} reads a sample with 0 to 5 levels")
 
 
+@pytest.mark.parametrize("place", ["map", "row"])
+def test_a_point_just_above_a_border_stays_in_its_row_on_stacked_maps(place):
+    """Below the whole number that map and row on it begin at lie fewer numbers than on the map alone."""
+    height, width = 24, 3
+    importance = np.zeros((4 * height, width))
+    importance[[2 * height - 1 if place == "map" else height + 3, -1]] = 1.0  # a row of two maps each, equally bright
+    points = np.array([[0.5, np.nextafter(0.5, 0)], [0.5, 0.5]])
+    got, weights = warp_stacked(points, importance, 4, Warp("A", 20))
+    np.testing.assert_array_equal(values_at(got, importance), 1.0)
+    np.testing.assert_allclose(weights, importance.mean(), rtol=ROUNDING)
+
+
 def test_black_stacked_maps_leave_samples_as_they_are():
     got, weights = warp_stacked(halton(50), np.zeros((30, 5)), 6, Warp("A", 9))
     np.testing.assert_allclose(got, halton(50), atol=ROUNDING)

@@ -12,6 +12,9 @@ import importlib
 import sys
 import time
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 from rich.console import Console
@@ -30,11 +33,15 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--part", action="append", choices=PARTS, help="repeatable; all where absent")
     parser.add_argument("--task", action="append", help="of these parts the task of this name alone; repeatable")
     parser.add_argument("--short", action="store_true", help="fewer cases: under a minute in all")
+    parser.add_argument("--processes", type=int, help="parts at once; 2 in the short form, else 1")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--page", type=Path, help="page whose table is made anew")
     options = parser.parse_args(arguments)
+    parts, processes = options.part or PARTS, options.processes or (2 if options.short else 1)
+    if min(processes, len(parts)) > 1:
+        run_apart(parts, options.out, options.task, processes, short=options.short)
     result = Stability(environment=environment(),
-                       rows=tuple(run_parts(options.part or PARTS, options.out, options.task, short=options.short)))
+                       rows=tuple(run_parts(parts, options.out, options.task, short=options.short)))
     write_rows(result, options.out / "stability.json")
     (options.out / "table.md").write_text(markdown(over_scenes(result.rows)))
     if options.page:
@@ -72,6 +79,17 @@ def run_parts(parts: Iterable[str], folder: Path, names: Sequence[str] | None = 
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 write_rows(Stability(environment={}, rows=rows), kept)
             yield from read_rows(kept).rows
+
+
+def run_apart(parts: Iterable[str], folder: Path, names: Sequence[str] | None, processes: int, *, short: bool) -> None:
+    """Run parts in processes of their own, so that `run_parts` finds their tasks finished."""
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        list(pool.map(partial(_run_part, folder, names, short), parts))
+
+
+def _run_part(folder: Path, names: Sequence[str] | None, short: bool, part: str) -> None:
+    for _ in run_parts([part], folder, names, short=short):
+        pass
 
 
 def sources_digest() -> str:

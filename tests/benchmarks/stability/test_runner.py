@@ -38,6 +38,13 @@ def test_a_finished_task_is_not_run_again(tmp_path, monkeypatch):
     assert ran == ["one", "two"] * 2
 
 
+def test_parts_in_processes_of_their_own_leave_their_tasks(tmp_path, capfd):
+    runner.run_apart(["kernels"], tmp_path, ["ray.offset"], 2, short=True)
+    assert "ray.offset" in capfd.readouterr().err
+    assert len(list(runner.run_parts(["kernels"], tmp_path, ["ray.offset"], short=True))) == 3
+    assert "ray.offset" not in capfd.readouterr().err
+
+
 def test_broken_promises_are_an_exit_code(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(pictures, "tasks", lambda _: [Task("one", lambda _: [row("a"), row("b", 2.0)])])
     page = tmp_path / "page.md"

@@ -73,6 +73,7 @@ def write(path):
 DEAF = """
 import signal
 def write(path):
+    time.sleep(0.2)  # in which the host sees that it heeds signals
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, signal.SIG_DFL)
     time.sleep(0.5)
@@ -110,7 +111,7 @@ def test_a_command_that_heeds_a_signal_and_those_that_do_not(number):
     with prepared("fake") as victim:
         assert asked(victim, number, 2, 1) == []
     with prepared("fake", DEAF) as victim:
-        assert asked(victim, number, 3, 1)  # one of them in the first third of its work
+        assert asked(victim, number, 3, 1)  # one of them in the second third of its work
     with prepared("fake", SPEAKS) as victim:
         said = asked(victim, number, 3, 1)
     assert said

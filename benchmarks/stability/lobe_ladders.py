@@ -12,9 +12,9 @@ import numpy.typing as npt
 from benchmarks.stability.inputs import BLOCK, across, directions, sizes
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.maths import digits, dot
-from benchmarks.stability.pair_ladders import LEAST, filled, norm
+from benchmarks.stability.pair_ladders import LEAST, filled, norm, norms
 from refgi.jit import kernel
-from refgi.lobes import lobe_direction, lobe_norm
+from refgi.lobes import lobe_direction
 from refgi.pairs.lobe_culling import LIMIT, bound_lobes
 from refgi.pairs.lobe_sum import EXPONENT, RATIO, add_lobe
 from refgi.pairs.pair_sum import NX, SUM, Clamp, X
@@ -24,12 +24,6 @@ ROWS = max(EXPONENT, RATIO) + 1
 SHARP, SHARPEST = 1e6, 1e20
 SMALLEST, STEP = 2.0**-126, 2.0**-149  # a lobe below this share of its peak is 0; of subnormal float32 numbers
 EDGE = 8 * 2.0**-24  # of the light's plane, within which rounding may decide
-
-
-@kernel
-def _norms(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = lobe_norm(x[0, i], x[1, i])
 
 
 @kernel
@@ -149,9 +143,9 @@ def sample_unit(m: Any, x: Any, real: Any) -> Any:  # noqa: ARG001
 
 
 LADDERS = (
-    Ladder("lobe.norm_sharp", "P 1e6 .. 1e20, to 6.6 widths of the lobe off the horizon", draw_sharp, filled(_norms),
+    Ladder("lobe.norm_sharp", "P 1e6 .. 1e20, to 6.6 widths of the lobe off the horizon", draw_sharp, filled(norms),
            sharp_norm, 12.0, source="12 roundings of the exponent, erfc and the norm", extended=0, exact=4000),
-    Ladder("lobe.norm_middle", "P 1e3 .. 1e6, to 5 widths of the lobe off the horizon", draw_middle, filled(_norms),
+    Ladder("lobe.norm_middle", "P 1e3 .. 1e6, to 5 widths of the lobe off the horizon", draw_middle, filled(norms),
            norm, reals=("float32",), extended=0, exact=1000, brief_exact=40),
     Ladder("lobe.term", "P 1e-3 .. 1e8, r 1e-6 .. 1e6 m, mostly where the lobe is seen", draw_terms, terms, term, 1.0,
            source="the bound that add_lobes promises", conditioned=False, scale=term_bound, floor=undecided,

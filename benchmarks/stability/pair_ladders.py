@@ -50,7 +50,7 @@ def _powers(x: Array, out: Array) -> None:
 
 
 @kernel
-def _norms(x: Array, out: Array) -> None:
+def norms(x: Array, out: Array) -> None:
     for i in range(x.shape[1]):
         out[0, i] = lobe_norm(x[0, i], x[1, i])
 
@@ -187,9 +187,9 @@ LADDERS = (
            source="6.5 roundings of the unit vector and 5 of its square, each at most one ULP", extended=2_000_000),
     Ladder("lobe.power", "P 0 .. 1e8 (float64: 1e20), gap 0 .. 2", draw_powers, filled(_powers), power, floor=flushed,
            extended=4_000_000),
-    Ladder("lobe.norm", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(_norms), norm,
+    Ladder("lobe.norm", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(norms), norm,
            reals=("float32",), extended=0, exact=2000),
-    Ladder("lobe.norm64", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(_norms), norm, 5300.0,
+    Ladder("lobe.norm64", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(norms), norm, 5300.0,
            "observed x 2", "2615 ULP: a continued fraction of sqrt(P) steps", conditioned=False, reals=("float64",),
            extended=0, exact=2000),
     Ladder("ray.offset", "coordinates 0, 1e-30 .. 1e30 m", draw_offsets, filled(_offsets, 2), offset),

@@ -10,10 +10,11 @@ bias that it puts into the truth.
 """
 
 import os
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from functools import cache, partial
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 import numpy.typing as npt
@@ -54,17 +55,9 @@ class Found(NamedTuple):
     farthest: int = -1
 
 
-@contextmanager
-def door(name: str) -> Iterator[None]:
+def door(name: str) -> AbstractContextManager[Any]:
     """Open Embree one way or the other inside the block."""
-    before = os.environ.get("REFGI_EMBREE")
-    os.environ["REFGI_EMBREE"] = name
-    try:
-        yield
-    finally:
-        os.environ.pop("REFGI_EMBREE")
-        if before is not None:
-            os.environ["REFGI_EMBREE"] = before
+    return patch.dict(os.environ, REFGI_EMBREE=name)
 
 
 @cache

@@ -8,10 +8,10 @@ import os
 import tempfile
 import warnings
 from collections.abc import Callable
-from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import numpy.typing as npt
@@ -98,18 +98,6 @@ def magenta(rng: np.random.Generator) -> Case:
     return Case(counted, f"{counted} of {int(wrong.any(axis=-1).sum())} pixels without a number do not show")
 
 
-@contextmanager
-def _kernels_in(folder: Path) -> Any:
-    before = os.environ.get("REFGI_CACHE_DIR")
-    os.environ["REFGI_CACHE_DIR"] = str(folder)
-    try:
-        yield
-    finally:
-        os.environ.pop("REFGI_CACHE_DIR")
-        if before is not None:
-            os.environ["REFGI_CACHE_DIR"] = before
-
-
 def _plain(x: float) -> float:
     return 2 * x
 
@@ -117,7 +105,7 @@ def _plain(x: float) -> float:
 def _write_kernel(folder: Path, turn: int) -> Path:
     """Write a compiled kernel, as far as the cache knows."""
     made = SimpleNamespace(library=SimpleNamespace(has_dynamic_globals=False), _reduce=lambda: ("code", 1000 * [turn]))
-    with _kernels_in(folder):
+    with patch.dict(os.environ, REFGI_CACHE_DIR=str(folder)):
         cache, signature = KernelCache(_plain), types.float64(types.float64)
         cache.save_overload(signature, made)
         return cache.path(signature)

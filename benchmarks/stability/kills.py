@@ -24,7 +24,7 @@ from refgi.stress.rows import Row
 
 SEED = 19
 TIMES = {"render": 50, "compare": 30, "sequence": 50, "checkpoint": 40}
-SHORT_TIMES = {"render": 6}
+SHORT_TIMES = {"render": 4}
 BATCH_TIMES, BATCH_JOBS = 30, 120
 ASKED = {signal.SIGTERM: (143, "terminated"), signal.SIGINT: (130, "interrupted")}
 ASKED_TIMES = {True: 1, False: 12}  # each signal of each command

@@ -13,6 +13,7 @@ from functools import partial
 from multiprocessing import get_context
 from typing import Any
 
+import numba
 import numpy as np
 
 from benchmarks.stability.hostile import Hostile, hostile, shrunk
@@ -30,10 +31,10 @@ SCENES = ("cornell_box", "stage", "ring:faces=3000", "glass_ball:faces=3000", "m
 SHORT_METHODS = ("sii", "multires", "hssil", "gather")
 # a few lights each: what breaks on a strange scene breaks with few
 FEW = {"sii": ("lights=64",), "multires": ("lights=64",), "val": ("lights=64", "clusters=4", "maps=16"),
-       "vpl": ("lights=64",), "truth": ("samples=8",)}
+       "vpl": ("lights=64",), "truth": ("samples=8", "photons=4096")}
 MAP = 32  # texels of a lamp's map
-HOSTILE, SHORT_HOSTILE = 400, 6
-PROCESSES = 2  # of the full form
+HOSTILE, SHORT_HOSTILE = 3000, 6
+PROCESSES, SHARE = 2, 200  # of the full form; scenes that one of them tries at once
 SLOWEST = 10.0  # s of a processor, a picture
 DOMAIN = ("needles, soups, fans, lamps and cameras in walls, 1e-8 to 1e8 m, exponents to 1e20, 1 to 17 pixels "
           "along a side")
@@ -63,9 +64,9 @@ def hostile_row(method: str, seeds: Sequence[int], tell: Tell, processes: int = 
     if processes == 1:
         broken = broken_by(method, seeds)
     else:
-        with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-            shares = [seeds[k::processes] for k in range(processes)]
-            broken = sorted(one for share in pool.map(partial(broken_by, method), shares) for one in share)
+        shares = [seeds[first : first + SHARE] for first in range(0, len(seeds), SHARE)]
+        with ProcessPoolExecutor(processes, get_context("spawn"), numba.set_num_threads, (1,)) as pool:
+            broken = [one for share in pool.map(partial(broken_by, method), shares) for one in share]
     for seed, why in broken:
         tell(f"{method}, seed {seed}: {why}")
     worst = ""

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.radiometry import FOR_FLOAT32, SPOT, falloff_in_float64, incident_light
+from refgi.radiometry import FOR_FLOAT32, POINT, SPOT, falloff_in_float64, incident_light
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.pool import plane
@@ -131,15 +131,17 @@ def _shadow_lookup_rows(
 @kernel
 def _project_row(maps: Projection, position: Array, row: int, nearest_texel: Array, receiver_depth: Array) -> None:
     """Write the texel of the first map that sees each point, as `texel_of` does, or -1, and the point's depth."""
-    half, rows = maps.half, len(maps.origin) * maps.height
+    half, width = maps.half, np.int32(maps.width)
+    last_row = np.int32(len(maps.origin) * maps.height - 1)
     nearest_texel[:] = -1
     for m in range(len(maps.origin)):
         for x in range(len(nearest_texel)):
             u, v, depth = image_point(maps, m, position[0, row, x], position[1, row, x], position[2, row, x])
             inside = (nearest_texel[x] < 0) & (abs(u) <= half[0]) & (abs(v) <= half[1])
             column, line = texel_coordinates(maps, m, u if inside else 0.0, v if inside else 0.0)
-            texel = min(int(line), rows - 1) * maps.width + min(int(column), maps.width - 1)
-            nearest_texel[x] = texel if inside else nearest_texel[x]
+            # int32, as no SIMD lanes of AVX2 turn float64 into int64
+            texel = min(np.int32(line), last_row) * width + min(np.int32(column), width - np.int32(1))
+            nearest_texel[x] = np.int32(texel) if inside else nearest_texel[x]
             receiver_depth[x] = depth if inside else receiver_depth[x]
 
 
@@ -205,48 +207,83 @@ def direct_irradiance(buffer: GBuffer, light: Light, visible: Array | None = Non
 def _irradiance(
     lights: LightTable, position: Array, normal: Array, covered: Array, visible: Array, out: Array
 ) -> None:
-    for row in prange(covered.shape[0]):
-        if lights.kind[0] == SPOT:
-            _spot_row(lights, SurfacePoints(position, normal, covered), visible, row, out)
-        else:
-            for column in range(covered.shape[1]):
-                _irradiance_at(lights, SurfacePoints(position, normal, covered), visible, row, column, out)
-
-
-@kernel
-def _irradiance_at(
-    lights: LightTable, receivers: SurfacePoints, visible: Array, row: int, column: int, out: Array
-) -> None:
-    position, normal, covered = receivers
-    out[0, row, column], out[1, row, column], out[2, row, column] = 0.0, 0.0, 0.0
-    if covered[row, column] and (visible.size == 0 or visible[row, column]):
-        x, y, z = position[0, row, column], position[1, row, column], position[2, row, column]
-        wx, wy, wz, _, er, eg, eb = incident_light(lights, 0, x, y, z)
-        cosine = wx * normal[0, row, column] + wy * normal[1, row, column] + wz * normal[2, row, column]
-        cosine = max(cosine, 0.0)
-        # E = I(w) cos / d^2
-        out[0, row, column], out[1, row, column], out[2, row, column] = er * cosine, eg * cosine, eb * cosine
-
-
-@kernel
-def _spot_row(lights: LightTable, receivers: SurfacePoints, visible: Array, row: int, out: Array) -> None:
-    """Fill a row of a spot's irradiance in SIMD lanes; doubtful receivers at the edge of its cone are recomputed."""
-    position, normal, covered = receivers
-    width, plain = covered.shape[1], FOR_FLOAT32 if out.itemsize == 4 else np.inf
-    px, py, pz = lights.position[0, 0], lights.position[0, 1], lights.position[0, 2]
     red, green, blue = lights.intensity[0, 0], lights.intensity[0, 1], lights.intensity[0, 2]
+    width = covered.shape[1]
+    for row in prange(covered.shape[0]):
+        # a row of factors first: loops that write planes as well would be no SIMD lanes
+        reached, doubtful, factor = np.empty(width, np.bool_), np.empty(width, np.bool_), np.empty(width)
+        for x in range(width):
+            reached[x] = covered[row, x] if visible.size == 0 else covered[row, x] & visible[row, x]
+        receivers = SurfacePoints(position, normal, covered)
+        if lights.kind[0] == SPOT:
+            _spot_factors(lights, receivers, row, out.itemsize == 4, reached, factor, doubtful)
+        elif lights.kind[0] == POINT:
+            _point_factors(lights, receivers, row, reached, factor)
+        else:
+            _directional_factors(lights, receivers, row, reached, factor)
+        for x in range(width):
+            out[0, row, x], out[1, row, x], out[2, row, x] = red * factor[x], green * factor[x], blue * factor[x]
+        if lights.kind[0] == SPOT:
+            for x in range(width):
+                if doubtful[x]:
+                    _irradiance_at(lights, receivers, row, x, out)
+
+
+@kernel
+def _spot_factors(
+    lights: LightTable, receivers: SurfacePoints, row: int, in_float32: bool, reached: Array, factor: Array,
+    doubtful: Array,
+) -> None:
+    """Fill factors of a spot's on-axis intensity, 1/m^2; at the edge of its cone float64 alone may be too little."""
+    position, normal, _ = receivers
+    px, py, pz = lights.position[0, 0], lights.position[0, 1], lights.position[0, 2]
     axis = lights.direction[0, 0], lights.direction[0, 1], lights.direction[0, 2]
-    cone, doubtful = lights.cone[0], np.empty(width, np.bool_)
-    for x in range(width):
+    cone, plain = lights.cone[0], FOR_FLOAT32 if in_float32 else np.inf
+    for x in range(len(factor)):
         dx, dy, dz = position[0, row, x] - px, position[1, row, x] - py, position[2, row, x] - pz
         square = dx * dx + dy * dy + dz * dz
         cosine = -(dx * normal[0, row, x] + dy * normal[1, row, x] + dz * normal[2, row, x])
         share, certain = falloff_in_float64((dx, dy, dz), axis, cone, plain)
-        illuminated = (visible.size == 0 or visible[row, x]) & covered[row, x] & (cosine > 0.0) & (square > 0.0)
+        illuminated = reached[x] & (cosine > 0.0) & (square > 0.0)
         # E = I(w) cos / d^2, with a cosine times d
-        factor = share * cosine / (square * math.sqrt(square)) if illuminated else 0.0
-        out[0, row, x], out[1, row, x], out[2, row, x] = red * factor, green * factor, blue * factor
+        factor[x] = share * cosine / (square * math.sqrt(square)) if illuminated else 0.0
         doubtful[x] = illuminated & (not certain)
-    for x in range(width):
-        if doubtful[x]:
-            _irradiance_at(lights, receivers, visible, row, x, out)
+
+
+@kernel
+def _point_factors(
+    lights: LightTable, receivers: SurfacePoints, row: int, reached: Array, factor: Array
+) -> None:
+    """Fill factors of a point light's intensity, 1/m^2."""
+    position, normal, _ = receivers
+    px, py, pz = lights.position[0, 0], lights.position[0, 1], lights.position[0, 2]
+    for x in range(len(factor)):
+        dx, dy, dz = position[0, row, x] - px, position[1, row, x] - py, position[2, row, x] - pz
+        square = dx * dx + dy * dy + dz * dz
+        cosine = -(dx * normal[0, row, x] + dy * normal[1, row, x] + dz * normal[2, row, x])
+        illuminated = reached[x] & (cosine > 0.0) & (square > 0.0)
+        # E = I cos / d^2, with a cosine times d
+        factor[x] = cosine / (square * math.sqrt(square)) if illuminated else 0.0
+
+
+@kernel
+def _directional_factors(
+    lights: LightTable, receivers: SurfacePoints, row: int, reached: Array, factor: Array
+) -> None:
+    """Fill the cosines that light from one direction arrives at."""
+    normal = receivers.normal
+    wx, wy, wz = -lights.direction[0, 0], -lights.direction[0, 1], -lights.direction[0, 2]
+    for x in range(len(factor)):
+        cosine = wx * normal[0, row, x] + wy * normal[1, row, x] + wz * normal[2, row, x]
+        factor[x] = cosine if reached[x] & (cosine > 0.0) else 0.0
+
+
+@kernel
+def _irradiance_at(lights: LightTable, receivers: SurfacePoints, row: int, column: int, out: Array) -> None:
+    position, normal, _ = receivers
+    x, y, z = position[0, row, column], position[1, row, column], position[2, row, column]
+    wx, wy, wz, _, er, eg, eb = incident_light(lights, 0, x, y, z)
+    cosine = wx * normal[0, row, column] + wy * normal[1, row, column] + wz * normal[2, row, column]
+    cosine = max(cosine, 0.0)
+    # E = I(w) cos / d^2
+    out[0, row, column], out[1, row, column], out[2, row, column] = er * cosine, eg * cosine, eb * cosine

@@ -7,17 +7,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from refgi.animation import frames
     from refgi.compare import compare
     from refgi.frame import Frame
     from refgi.methods import render
     from refgi.scene import load_scene
 
-__all__ = ["Frame", "compare", "load_scene", "render"]
+__all__ = ["Frame", "compare", "frames", "load_scene", "render"]
 __version__ = "0.1.0"
 
 _HOME = {
     "Frame": "refgi.frame",
     "compare": "refgi.compare",
+    "frames": "refgi.animation",
     "load_scene": "refgi.scene",
     "render": "refgi.methods",
 }

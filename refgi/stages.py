@@ -63,24 +63,44 @@ class Log:
         return [run.status for run in self.runs if run.name == name]
 
 
+@dataclasses.dataclass
+class _Kept:
+    """A result, what it was made of, and whether it has been of use since the last frame began."""
+
+    inputs: tuple[Any, ...]
+    output: Any
+    used: bool = True
+
+
 class Memory:
     """Last results of every stage, given back while the inputs stay the same."""
 
+    MOST: int | None = KEPT_RESULTS  # of a stage; None: any number
+
     def __init__(self) -> None:
-        self._kept: dict[str, list[tuple[tuple[Any, ...], Any]]] = defaultdict(list)
+        self._kept: dict[str, list[_Kept]] = defaultdict(list)
 
     def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
         """Return whether a result for these inputs is kept, and the result."""
-        for known, output in self._kept[name]:
-            if len(known) == len(inputs) and all(map(_same, known, inputs)):
-                return True, output
+        for kept in self._kept[name]:
+            if len(kept.inputs) == len(inputs) and all(map(_same, kept.inputs, inputs)):
+                kept.used = True
+                return True, kept.output
         return False, None
 
     def keep(self, name: str, inputs: tuple[Any, ...], output: Any) -> None:
         """Keep a result, dropping the oldest of that stage."""
         kept = self._kept[name]
-        kept.append((inputs, output))
-        del kept[:-KEPT_RESULTS]
+        kept.append(_Kept(inputs, output))
+        if self.MOST is not None:
+            del kept[: -self.MOST]
+
+    def begin_frame(self) -> None:
+        """Drop what the frame before had no use for, so that memory is that of two frames and serves the next ones."""
+        for name, kept in self._kept.items():
+            self._kept[name] = [one for one in kept if one.used]
+            for one in self._kept[name]:
+                one.used = False
 
 
 _log: ContextVar[Log | None] = ContextVar("refgi_stage_log", default=None)
@@ -149,6 +169,36 @@ def observe(
         yield log
     finally:
         _log.reset(token)
+
+
+@contextmanager
+def reusing(memory: Memory | None) -> Iterator[list[Run]]:
+    """Let the stages inside the block, a frame, reuse what the frames before left; whoever observes goes on observing.
+
+    Parameters
+    ----------
+    memory : Memory or None
+        Of these frames; None: nothing is reused but what the observer's own memory holds.
+
+    Yields
+    ------
+    list of Run
+        Filled with the block's runs when it ends.
+    """
+    log, runs = _log.get(), list[Run]()
+    if log is None:
+        with observe(memory=memory) as log, reusing(memory) as runs:
+            yield runs
+        return
+    others, begun = log.memory, len(log.runs)
+    if memory is not None:
+        memory.begin_frame()
+        log.memory = memory
+    try:
+        yield runs
+    finally:
+        log.memory = others
+        runs += log.runs[begun:]
 
 
 def skip(name: str, reason: str) -> None:

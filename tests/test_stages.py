@@ -144,6 +144,36 @@ def test_memory_forgets_the_oldest():
     assert log.status("test.double")[-2:] == ["ran", "reused"]
 
 
+def test_a_new_frame_forgets_what_the_last_one_did_not_use():
+    memory = stages.Memory()
+    with stages.observe() as log:
+        for values in ((1, 2), (2, 3), (1, 2)):
+            with stages.reusing(memory):
+                for value in values:
+                    double(value)
+    assert log.status("test.double") == ["ran", "ran", "reused", "ran", "ran", "reused"]
+
+
+def test_reusing_leaves_the_log_as_it_was():
+    own, memory = stages.Memory(), stages.Memory()
+    with stages.observe(memory=own) as log:
+        double(5)
+        with stages.reusing(memory):
+            double(5)
+        with pytest.raises(ValueError, match="no"), stages.reusing(memory):
+            raise ValueError("no")
+        with stages.reusing(None):
+            double(5)
+        assert log.memory is own
+    with stages.reusing(memory):
+        double(6)
+        double(6)
+    with stages.observe() as after, stages.reusing(memory):
+        double(6)
+    assert log.status("test.double") == ["ran", "ran", "reused"]
+    assert after.status("test.double") == ["reused"]
+
+
 def test_a_stage_that_is_not_kept_runs_again():
     fresh = stages.stage("test.fresh", kept=False)(lambda value: value + 1)
     with stages.observe(memory=stages.Memory()) as log:

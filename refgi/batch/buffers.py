@@ -27,6 +27,8 @@ class Buffer(NamedTuple):
 class Buffers(stages.Memory):
     """Memory of a frame's buffers alone, which says what those that it gave back took and what they hold."""
 
+    MOST = None  # a scene may have many lights
+
     def __init__(self) -> None:
         super().__init__()
         self._begun: dict[str, float] = {}
@@ -52,7 +54,7 @@ class Buffers(stages.Memory):
             content = output.recorded() if hasattr(output, "recorded") else output
         seconds = time.perf_counter() - self._begun.pop(name)
         buffer = Buffer(name, seconds, digest_of(content))
-        self._kept[name].append((inputs, (output, buffer)))  # all: a scene may have many lights
+        super().keep(name, inputs, (output, buffer))
         self.used.append(buffer)
 
     def start_anew(self) -> None:

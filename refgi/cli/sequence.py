@@ -67,6 +67,7 @@ def _sequence(session: Session, /, **options: Any) -> int:
     from refgi.scene.files import text_of
     from refgi.scene.path import scenes_along
     from refgi.sssil.temporal import Sequence
+    from refgi.stages import Memory
 
     kind, resume, exposure, out, threads = _taken(options, "kind", "resume", "exposure", "out", "threads")
     permission = Permission(*_taken(options, "parents", "force"))
@@ -88,7 +89,9 @@ def _sequence(session: Session, /, **options: Any) -> int:
     files = FrameFiles(Path(out), text_of(Path(path).stem), KINDS[kind], record,
                        lambda number: frame_record(scene, way, number, frames))
     folder(out, permission, files.kept(frames, resume=resume))
-    sequence = Sequence(scenes_along(scene, way, frames), settings, temporal, method=light, **frame_options)
+    memory = Memory() if way.leaves_at_rest(len(scene.lights)) else None
+    sequence = Sequence(scenes_along(scene, way, frames), settings, temporal, method=light, memory=memory,
+                        **frame_options)
     with on_threads(threads), progress() as tell:
         warm_up([method], frame_options["dtype"], tell)
         done = files.done(frames) if resume else 0

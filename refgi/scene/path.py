@@ -48,6 +48,10 @@ class Path:
     objects: tuple[Motion, ...] = ()
     source: str = ""
 
+    def leaves_at_rest(self, lights: int) -> bool:
+        """Return whether the camera's view, or what one of a scene's `lights` sees, is the same in all frames."""
+        return not self.objects and (not self.camera or len(self.lights) < lights)
+
     def place(self, frame: int, frames: int) -> str:
         """Return file, frame and time, for the text of an error."""
         file = f"{self.source}: " if self.source else ""

@@ -11,6 +11,7 @@ from refgi.scene.model import Scene
 from refgi.settings import flat, replaced
 from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
 from refgi.sssil.temporal.filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
+from refgi.stages import Memory, reusing
 
 Array = npt.NDArray[Any]
 Method = Callable[[Frame, Any], Array]
@@ -41,6 +42,8 @@ class Sequence:
         The temporal filter; None renders each frame by itself.
     method : callable, optional
         Function of a frame and settings that gives its indirect irradiance; `hssil` where absent.
+    memory : stages.Memory, optional
+        Keeps what frames share, beside the buffers of two frames in place of one; nothing is kept where absent.
     **frame_options : object
         Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
 
@@ -51,13 +54,13 @@ class Sequence:
 
     Notes
     -----
-    Of earlier frames only the last one's `History` stays in memory. Under one `stages.Memory` frames share what is the
-    same object in both: the G-buffer while camera and geometry rest, an RSM while its light does.
+    Of earlier frames only the last one's `History` stays, but for what `memory` keeps: the G-buffer while camera and
+    geometry rest, an RSM while its light does, and what a method makes of them.
     """
 
     def __init__(
         self, scenes: Iterable[Scene], settings: Any = None, temporal: TemporalSettings | None = DEFAULT, *,
-        method: Method | None = None, **frame_options: Any,
+        method: Method | None = None, memory: Memory | None = None, **frame_options: Any,
     ) -> None:
         expect(temporal is None or isinstance(temporal, TemporalSettings), "temporal", "TemporalSettings or None",
                temporal)
@@ -65,6 +68,7 @@ class Sequence:
         self.settings = HssilSettings() if settings is None else settings
         self.temporal = temporal
         self.method = method or _hssil()
+        self.memory = memory
         self.frame_options = frame_options
 
     def __iter__(self) -> Iterator[SequenceFrame]:
@@ -89,7 +93,8 @@ class Sequence:
         """
         for number, scene in enumerate(scenes, first):
             expect(isinstance(scene, Scene), f"scene of frame {number}", "a Scene", type(scene).__name__)
-            step, history = self._step(scene, number, history)
+            with reusing(self.memory):
+                step, history = self._step(scene, number, history)
             yield step
             del step  # whoever took it may let go of it before the next is made
 

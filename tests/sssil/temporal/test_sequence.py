@@ -100,9 +100,11 @@ def test_a_list_of_scenes_can_be_rendered_twice(room):
     assert all(map(np.array_equal, first, second))
 
 
-def test_under_a_memory_resting_frames_share_their_buffers(room):
-    with stages.observe(memory=stages.Memory()) as log:
-        list(Sequence([room, room], method=white, **QUICK))
+@pytest.mark.parametrize("own", [False, True])
+def test_under_a_memory_resting_frames_share_their_buffers(room, own):
+    memory = stages.Memory()
+    with stages.observe(memory=None if own else memory) as log:
+        list(Sequence([room, room], method=white, memory=memory if own else None, **QUICK))
     for shared in ("rsm.gbuffer", "rsm.reflective_shadow_map"):
         assert log.status(shared) == ["ran", "reused"]
 

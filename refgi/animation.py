@@ -1,0 +1,113 @@
+"""Frames of a scene that changes: what rests since the frame before is not computed again.
+
+Each frame is the picture that `render` makes of its scene, to the bit. Buffers, pixel lights, clusters, maps and lists
+whose inputs rest are those of the frame before, and the memory of what has changed serves the next frame.
+"""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from refgi import stages
+from refgi.methods import Picture, render
+from refgi.scene import load_scene
+
+if TYPE_CHECKING:
+    from refgi.scene import Scene
+
+
+class Animation:
+    """Pictures of a scene that changes, by one method.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene as it is at first.
+    method : str
+        A name of `METHODS`.
+    settings : object, optional
+        The method's settings; its defaults where absent.
+    **frame_options : object
+        Passed to `Frame`.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene of the last frame, from which the next one follows: `with_camera`, `with_lights`.
+    runs : list of stages.Run
+        Stages of the last frame: which ran, and which were reused.
+    """
+
+    def __init__(self, scene: "Scene", method: str = "sii", settings: Any = None, **frame_options: Any) -> None:
+        self.scene = scene
+        self.runs: list[stages.Run] = []
+        self._options = (method, settings, frame_options)
+        self._memory = stages.Memory()
+
+    def render(self, scene: "Scene | None" = None) -> Picture:
+        """Render the next frame.
+
+        Parameters
+        ----------
+        scene : Scene, optional
+            What the frame shows; the scene as it was where absent.
+
+        Returns
+        -------
+        Picture
+            As that of `refgi.render`. Its arrays are shared with other frames: they are to be read, not written.
+
+        Raises
+        ------
+        InputError
+            If scene, method or settings are not usable; the next frame may be rendered all the same.
+        """
+        method, settings, frame_options = self._options
+        scene = self.scene if scene is None else scene
+        with stages.reusing(self._memory) as runs:
+            picture = render(scene, method, settings, **frame_options)
+        self.scene, self.runs = scene, runs
+        return picture
+
+    def along(self, scenes: Iterable["Scene"]) -> Iterator[Picture]:
+        """Render frames one after the other.
+
+        Parameters
+        ----------
+        scenes : iterable of Scene
+            What they show; taken one by one.
+
+        Yields
+        ------
+        Picture
+            Of each. Who lets go of it before the next one is made gives its memory to that.
+        """
+        for scene in scenes:
+            yield self.render(scene)
+
+
+def frames(scene: "Scene | str | Path", method: str = "sii", settings: Any = None, **frame_options: Any) -> Animation:
+    """Begin the frames of a scene that changes.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, or what `load_scene` takes.
+    method : str
+        A name of `METHODS`.
+    settings : object, optional
+        The method's settings; its defaults where absent.
+    **frame_options : object
+        Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
+
+    Returns
+    -------
+    Animation
+        Renders frame after frame.
+
+    Raises
+    ------
+    InputError
+        If the scene cannot be loaded.
+    """
+    return Animation(load_scene(scene) if isinstance(scene, str | Path) else scene, method, settings, **frame_options)

@@ -66,15 +66,34 @@ def _path() -> Array:
 @kernel
 def _fill(covered: Array, path: Array, places: Array) -> int:
     height, width = covered.shape
+    offset = path[0] * width + path[1]
     count = 0
     for top in range(0, height, BLOCK):
         for left in range(0, width, BLOCK):
+            first = top * width + left
+            if _is_full(covered, top, left):
+                for i in range(BLOCK * BLOCK):
+                    places[count + i] = first + offset[i]
+                count += BLOCK * BLOCK
+                continue
             for i in range(BLOCK * BLOCK):
                 row, column = top + path[0, i], left + path[1, i]
                 if row < height and column < width and covered[row, column]:
                     places[count] = row * width + column
                     count += 1
     return count
+
+
+@kernel
+def _is_full(covered: Array, top: int, left: int) -> bool:
+    """Return whether a whole block lies on the picture and shows surfaces alone."""
+    if top + BLOCK > covered.shape[0] or left + BLOCK > covered.shape[1]:
+        return False
+    full = True
+    for row in range(top, top + BLOCK):
+        for column in range(left, left + BLOCK):
+            full &= covered[row, column]
+    return full
 
 
 @kernel

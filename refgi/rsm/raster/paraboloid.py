@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel, prange
+from refgi.jit import has_wide_registers, kernel, prange
 from refgi.rsm.raster.paraboloid_batch import (
     ACROSS,
     BEHIND,
@@ -38,7 +38,8 @@ from refgi.rsm.raster.triangle import CHUNK, SPAN_CUT, Chunks, chunks
 
 Array = npt.NDArray[Any]
 
-BLOCK = 16  # texels tested at once; a map has at least as many columns in memory
+# texels tested at once; a map has at least as many columns in memory
+BLOCK = 16 if has_wide_registers() else 1
 
 
 class Ignored(NamedTuple):

@@ -1,0 +1,28 @@
+"""The width of registers that loops are shaped for."""
+
+import llvmlite.binding
+import pytest
+
+from refgi.jit import has_wide_registers
+
+
+@pytest.mark.parametrize(("name", "features", "wide"), [
+    (None, "+sse2,+avx512f", True), (None, "+avx2,-avx512f", False), ("skylake-avx512", None, False),
+    ("skylake-avx512", "+avx2,+avx512f", True), ("x86-64", None, False)])
+def test_the_target_that_is_named_counts(monkeypatch, name, features, wide):
+    for key, value in (("NUMBA_CPU_NAME", name), ("NUMBA_CPU_FEATURES", features)):
+        monkeypatch.delenv(key, raising=False)
+        if value is not None:
+            monkeypatch.setenv(key, value)
+    assert has_wide_registers() is wide
+
+
+@pytest.mark.parametrize("name", [None, "host"])
+def test_else_the_processor_does(monkeypatch, name):
+    monkeypatch.delenv("NUMBA_CPU_FEATURES", raising=False)
+    monkeypatch.delenv("NUMBA_CPU_NAME", raising=False)
+    if name:
+        monkeypatch.setenv("NUMBA_CPU_NAME", name)
+    for has in (True, False):
+        monkeypatch.setattr(llvmlite.binding, "get_host_cpu_features", lambda has=has: {"avx512f": has})
+        assert has_wide_registers() is has

@@ -39,7 +39,8 @@ def base_colour(document: Document, material: dict[str, Any], where: str) -> Loo
     change = document.member(document.member(info, "extensions", where), EXTENSION, f"{where}.extensions")
     number = document.integer(change, "texCoord", where, document.integer(info, "texCoord", where, 0))
     expect(number <= LARGEST_SET, f"{document.path}: {where}.texCoord", f"0 to {LARGEST_SET}", number)
-    return Look(_texture(document, info, where), number, _transform(document, change, f"{where}.extensions.{EXTENSION}"))
+    transform = _transform(document, change, f"{where}.extensions.{EXTENSION}")
+    return Look(_texture(document, info, where), number, transform)
 
 
 def transformed(uv: Array, transform: Array) -> Array:

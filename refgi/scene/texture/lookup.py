@@ -15,32 +15,33 @@ from refgi.scene.texture.table import FILTER, FIRST, MIRROR, NEAREST, REPEAT, WR
 Array = npt.NDArray[Any]
 Colour = tuple[float, float, float]
 
+FARTHEST = 1e15  # texels; whole numbers of float64 are then still apart
+
 
 @kernel
-def wrapped(u: float, wrap: int) -> float:
-    """Return the coordinate within the image, 0 to 1, that stands for u beyond its edges."""
+def inside(i: int, count: int, wrap: int) -> int:
+    """Return the texel of the image that stands for texel i beyond its edges."""
     if wrap == REPEAT:
-        return u - math.floor(u)
+        if count & (count - 1) == 0:
+            return i & (count - 1)
+        return i - count * int(math.floor(i / count))
     if wrap == MIRROR:
-        u = abs(u - 2.0 * math.floor(0.5 * u + 0.5))  # a triangle wave: 0 at even, 1 at odd numbers
-    return min(max(u, 0.0), 1.0)
+        i -= 2 * count * int(math.floor(i / (2 * count)))
+        return i if i < count else 2 * count - 1 - i
+    return min(max(i, 0), count - 1)
 
 
 @kernel
-def neighbours(x: float, count: int, wrap: int) -> tuple[int, int, float]:
+def neighbours_of(x: float, count: int, wrap: int) -> tuple[int, int, float]:
     """Return the texels on both sides of a place along an axis, and the share of the second.
 
-    `x`: 0 to `count`, texel i from i to i + 1.
+    `x`: u times `count`: texel i of the image lies from i to i + 1.
     """
     below = math.floor(x - 0.5)
-    share = x - 0.5 - below
-    first = int(below)
-    second = first + 1
-    if first < 0:  # beyond a mirrored edge lies the same texel
-        first = count - 1 if wrap == REPEAT else 0
-    if second >= count:
-        second = 0 if wrap == REPEAT else count - 1
-    return first, second, share
+    first = int(min(max(below, -FARTHEST), FARTHEST))
+    if 0 <= first < count - 1:
+        return first, first + 1, x - 0.5 - below
+    return inside(first, count, wrap), inside(first + 1, count, wrap), x - 0.5 - below
 
 
 @kernel
@@ -48,8 +49,9 @@ def nearest(table: TextureTable, texture: int, u: float, v: float) -> Colour:
     """Return the texel of the image that (u, v) lies in."""
     row = table.texture[texture, FIRST]
     start, width, height = table.level[row, 0], table.level[row, 1], table.level[row, 2]
-    i = min(int(wrapped(u, table.texture[texture, WRAP_U]) * width), width - 1)
-    j = min(int(wrapped(v, table.texture[texture, WRAP_V]) * height), height - 1)
+    x, y = min(max(u * width, -FARTHEST), FARTHEST), min(max(v * height, -FARTHEST), FARTHEST)
+    i = inside(int(math.floor(x)), width, table.texture[texture, WRAP_U])
+    j = inside(int(math.floor(y)), height, table.texture[texture, WRAP_V])
     at = start + j * width + i
     return np.float64(table.texels[at, 0]), np.float64(table.texels[at, 1]), np.float64(table.texels[at, 2])
 
@@ -60,15 +62,16 @@ def bilinear(table: TextureTable, texture: int, level: int, u: float, v: float) 
     row = table.texture[texture, FIRST] + level
     start, width, height = table.level[row, 0], table.level[row, 1], table.level[row, 2]
     wrap_u, wrap_v = table.texture[texture, WRAP_U], table.texture[texture, WRAP_V]
-    left, right, a = neighbours(wrapped(u, wrap_u) * width, width, wrap_u)
-    upper, lower, b = neighbours(wrapped(v, wrap_v) * height, height, wrap_v)
-    ul, ur = np.uint64(start + upper * width + left), np.uint64(start + upper * width + right)
-    ll, lr = np.uint64(start + lower * width + left), np.uint64(start + lower * width + right)
-    c, d = 1.0 - a, 1.0 - b
+    left, right, p = neighbours_of(u * width, width, wrap_u)
+    upper, lower, q = neighbours_of(v * height, height, wrap_v)
+    ul, ur = start + upper * width + left, start + upper * width + right
+    ll, lr = start + lower * width + left, start + lower * width + right
+    c, d = 1.0 - p, 1.0 - q
+    wul, wur, wll, wlr = c * d, p * d, c * q, p * q
     texels = table.texels
-    return (d * (c * texels[ul, 0] + a * texels[ur, 0]) + b * (c * texels[ll, 0] + a * texels[lr, 0]),
-            d * (c * texels[ul, 1] + a * texels[ur, 1]) + b * (c * texels[ll, 1] + a * texels[lr, 1]),
-            d * (c * texels[ul, 2] + a * texels[ur, 2]) + b * (c * texels[ll, 2] + a * texels[lr, 2]))
+    return (wul * texels[ul, 0] + wur * texels[ur, 0] + wll * texels[ll, 0] + wlr * texels[lr, 0],
+            wul * texels[ul, 1] + wur * texels[ur, 1] + wll * texels[ll, 1] + wlr * texels[lr, 1],
+            wul * texels[ul, 2] + wur * texels[ur, 2] + wll * texels[ll, 2] + wlr * texels[lr, 2])
 
 
 @kernel

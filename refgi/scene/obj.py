@@ -115,7 +115,8 @@ class _Reader:
             found = self.maps[name]
             painted = dataclasses.replace(material, texture=found.texture())
             # u' = s u + o as the file has them, v upwards
-            turned = coordinates * found.scale + (0, 1) - np.array((0, 1)) * found.scale + (1, -1) * found.offset
+            scale, offset, bottom = np.array(found.scale), np.array(found.offset), np.array((0.0, 1.0))
+            turned = (coordinates - bottom) * scale + bottom + offset * (1.0, -1.0)
             meshes.append(self._mesh(name, corners[placed], positions, normals, painted, turned))
         if not placed.all():
             meshes.append(self._mesh(name, corners[~placed], positions, normals, material, None))

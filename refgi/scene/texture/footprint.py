@@ -7,7 +7,6 @@ those more than `MOST` times as long as wide the parts are longer.
 """
 
 import math
-
 from typing import Any
 
 import numpy as np

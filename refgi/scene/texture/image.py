@@ -177,7 +177,6 @@ def _both_bytes(picture: Any, content: bytes, raw: str) -> Array:
 
     upper = np.asarray(picture)[..., :3].astype(np.uint16)
     with Pictures.open(io.BytesIO(content), formats=["PNG"]) as again:
-        kind, box, start, _ = again.tile[0]
-        again.tile = [(kind, box, start, raw.replace("16B", "16L"))]
+        again.tile = [again.tile[0]._replace(args=raw.replace("16B", "16L"))]
         lower = np.asarray(again)[..., :3].astype(np.uint16)
     return upper << 8 | lower

@@ -104,3 +104,21 @@ def coordinates_at(vertices: Array, faces: Array, uv: Array, triangle: int, x: f
     t = ((ay * qz - az * qy) * nx + (az * qx - ax * qz) * ny + (ax * qy - ay * qx) * nz) / square
     return (u + s * (uv[triangle, 1, 0] - u) + t * (uv[triangle, 2, 0] - u),
             v + s * (uv[triangle, 1, 1] - v) + t * (uv[triangle, 2, 1] - v))
+
+
+@kernel
+def multiply_at(table: TextureTable, vertices: Array, faces: Array, uv: Array, triangle: Array, material: Array,
+                position: Array, colour: Array) -> None:
+    """Multiply colours by the textures at points.
+
+    `triangle`, `material` (n,): of each point. `position` (n, 3): the points, m. `colour` (n, 3): changed where the
+    material has a texture.
+    """
+    for i in range(len(triangle)):
+        texture = table.of_material[material[i]]
+        if texture >= 0:
+            u, v = coordinates_at(vertices, faces, uv, triangle[i], position[i, 0], position[i, 1], position[i, 2])
+            r, g, b = point_sample(table, texture, u, v)
+            colour[i, 0] *= r
+            colour[i, 1] *= g
+            colour[i, 2] *= b

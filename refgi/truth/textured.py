@@ -22,11 +22,11 @@ def diffuse_at(textures: Any, surfaces: Any, triangle: int, y: tuple[float, floa
         textures, surfaces, triangle, y)
 
 
-def _plain(textures: Any, surfaces: Any, triangle: int, y: Any) -> Any:  # noqa: ARG001
+def _plain(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:  # noqa: ARG001
     return row(surfaces.diffuse, surfaces.material_of_face[triangle])
 
 
-def _painted(textures: Any, surfaces: Any, triangle: int, y: Any) -> Any:
+def _painted(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:
     material = surfaces.material_of_face[triangle]
     r, g, b = row(surfaces.diffuse, material)
     texture = textures.of_material[material]

@@ -1,9 +1,10 @@
 """Textures on a map: the albedo of the texels that show a textured material, after all other channels.
 
-A texel's ray o + t d meets the triangle's plane where t = N . (v_0 - o) / (N . d), N its normal; texture coordinates are
-affine there, u = u_o + t u_d, so they are right in perspective. They change from one texel to the next by ray
+A texel's ray o + t d meets the triangle's plane where t = N . (v_0 - o) / (N . d), N its normal; texture coordinates
+are affine there, u = u_o + t u_d, so they are right in perspective. They change from one texel to the next by ray
 differentials on that plane (Igehy 1999): u' = u_o' + t' u_d + t u_d', where a dash is the change over one texel of the
-map, exact but for the paraboloid's, which is a central difference. Neighbours on the map, and silhouettes, do not matter.
+map, exact but for the paraboloid's, which is a central difference. Neighbours on the map, and silhouettes, are not
+asked.
 """
 
 from typing import Any, NamedTuple
@@ -115,9 +116,9 @@ def _paint_texels(surface: Painted, projection: Projection, triangle_id: Array, 
     footprint_means(surface.table, scratch.texture, scratch.place, len(texel), scratch.colour)
     for k in range(len(texel)):
         if scratch.texture[k] >= 0:
-            face = triangle_id[texel[k] // width, texel[k] % width]
+            material = surface.material_of_face[triangle_id[texel[k] // width, texel[k] % width]]
             for channel in range(3):
-                albedo[channel, k] = surface.diffuse[surface.material_of_face[face], channel] * scratch.colour[channel, k]
+                albedo[channel, k] = surface.diffuse[material, channel] * scratch.colour[channel, k]
 
 
 @kernel
@@ -162,7 +163,7 @@ def _place(surface: Painted, projection: Projection, face: int, run: tuple[int, 
 @kernel
 def plane_of(px: float, py: float, pz: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float,
              u0: float, v0: float, u1: float, v1: float, u2: float, v2: float) -> Any:
-    """Return corner v_0, normal N, u and v at v_0, and their gradients on the plane of a triangle with edges a and b."""
+    """Return corner v_0, normal N, u and v at v_0, and their gradients on the plane, of a triangle with edges a, b."""
     nx, ny, nz = cross(ax, ay, az, bx, by, bz)
     scale = 1.0 / (nx * nx + ny * ny + nz * nz)
     # q . (e_2 x N) / N^2 and q . (N x e_1) / N^2 are the barycentric coordinates of v_1 and v_2 at v_0 + q

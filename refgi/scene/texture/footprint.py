@@ -1,9 +1,9 @@
 """The mean of a texture over what a pixel covers: probes on its footprint, each blended between two mip levels.
 
 The footprint of a pixel is the parallelogram that its sides a and b span on the image, in texels. It is divided into
-n_a x n_b equal parts no longer than its shorter side, and a probe in the middle of each is looked up where a texel is as
-long as the part. A longer footprint thus has more probes along it and is not blurred across (anisotropic filtering); of
-those more than `MOST` times as long as wide the parts are longer.
+n_a x n_b equal parts no longer than its shorter side, and a probe in the middle of each is looked up where a texel is
+as long as the part. A longer footprint thus has more probes along it and is not blurred across (anisotropic
+filtering); of those more than `MOST` times as long as wide the parts are longer.
 """
 
 import math
@@ -28,7 +28,7 @@ def probe_counts(a: float, b: float) -> tuple[int, int]:
     """Return how many probes lie along the sides of a footprint, lengths in texels."""
     part = max(min(a, b), max(a, b) / MOST, SHORTEST)
     # a side that rounding makes longer than the part has no second probe
-    return max(1, int(math.ceil(a / part - 1e-6))), max(1, int(math.ceil(b / part - 1e-6)))
+    return max(1, int(np.ceil(a / part - 1e-6))), max(1, int(np.ceil(b / part - 1e-6)))
 
 
 @kernel
@@ -57,20 +57,23 @@ def footprint_means(table: TextureTable, texture: Array, place: Array, count: in
             row = first + below + upwards
             start, width, height = sizes[row, 0], sizes[row, 1], sizes[row, 2]
             # the first probe, and the steps along both sides, in texels of the level
-            sx, sy = place[2, x] * width / across, place[3, x] * height / across
-            tx, ty = place[4, x] * width / down, place[5, x] * height / down
+            sx, sy, tx, ty = 0.0, 0.0, 0.0, 0.0
+            if across * down > 1:
+                sx, sy = place[2, x] * width / across, place[3, x] * height / across
+                tx, ty = place[4, x] * width / down, place[5, x] * height / down
             x0 = place[0, x] * width - 0.5 * ((across - 1) * sx + (down - 1) * tx)
             y0 = place[1, x] * height - 0.5 * ((across - 1) * sy + (down - 1) * ty)
             along = 0
             weight = (share if upwards else 1.0 - share) / (across * down)
-            for probe in range(across * down):
+            for _ in range(across * down):
                 left, right, p = neighbours_of(x0, width, wrap_u)
                 upper, lower, q = neighbours_of(y0, height, wrap_v)
                 if chosen == NEAREST:
                     p, q = nearer(p), nearer(q)
                 ul, ur = np.uint64(start + upper * width + left), np.uint64(start + upper * width + right)
                 ll, lr = np.uint64(start + lower * width + left), np.uint64(start + lower * width + right)
-                a, b, c, d = weight * (1.0 - p) * (1.0 - q), weight * p * (1.0 - q), weight * (1.0 - p) * q, weight * p * q
+                a, b = weight * (1.0 - p) * (1.0 - q), weight * p * (1.0 - q)
+                c, d = weight * (1.0 - p) * q, weight * p * q
                 red += a * texels[ul, 0] + b * texels[ur, 0] + c * texels[ll, 0] + d * texels[lr, 0]
                 green += a * texels[ul, 1] + b * texels[ur, 1] + c * texels[ll, 1] + d * texels[lr, 1]
                 blue += a * texels[ul, 2] + b * texels[ur, 2] + c * texels[ll, 2] + d * texels[lr, 2]
@@ -96,7 +99,7 @@ def plan(chosen: int, levels: int, ax: float, ay: float, bx: float, by: float) -
     if chosen != TRILINEAR or max(a, b) <= SHORTEST:
         return 1, 1, 0.0
     if not a + b < EDGE_ON:
-        return 1, 1, levels - 1.0
+        return 1, 1, levels - 1.0  # the mean of the image
     across, down = probe_counts(a, b)
     part = max(a / across, b / down)
     return across, down, min(math.log2(part), levels - 1.0) if part > 1.0 else 0.0

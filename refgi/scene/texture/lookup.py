@@ -3,7 +3,6 @@
 Symbols: u, v texture coordinates; n texels along an axis, the centre of texel i at (i + 1/2) / n.
 """
 
-import math
 from typing import Any
 
 import numpy as np
@@ -24,11 +23,17 @@ def inside(i: int, count: int, wrap: int) -> int:
     if wrap == REPEAT:
         if count & (count - 1) == 0:
             return i & (count - 1)
-        return i - count * int(math.floor(i / count))
+        return i - count * int(np.floor(i / count))
     if wrap == MIRROR:
-        i -= 2 * count * int(math.floor(i / (2 * count)))
+        i -= 2 * count * int(np.floor(i / (2 * count)))
         return i if i < count else 2 * count - 1 - i
     return min(max(i, 0), count - 1)
+
+
+@kernel
+def near(x: float) -> float:
+    """Return a place, in texels; 0 in place of one so far away, or so undefined, that no texel is the nearest."""
+    return x if abs(x) < FARTHEST else 0.0
 
 
 @kernel
@@ -37,8 +42,9 @@ def neighbours_of(x: float, count: int, wrap: int) -> tuple[int, int, float]:
 
     `x`: u times `count`: texel i of the image lies from i to i + 1.
     """
-    below = math.floor(x - 0.5)
-    first = int(min(max(below, -FARTHEST), FARTHEST))
+    x = near(x)
+    below = np.floor(x - 0.5)
+    first = int(below)
     if 0 <= first < count - 1:
         return first, first + 1, x - 0.5 - below
     return inside(first, count, wrap), inside(first + 1, count, wrap), x - 0.5 - below
@@ -49,9 +55,8 @@ def nearest(table: TextureTable, texture: int, u: float, v: float) -> Colour:
     """Return the texel of the image that (u, v) lies in."""
     row = table.texture[texture, FIRST]
     start, width, height = table.level[row, 0], table.level[row, 1], table.level[row, 2]
-    x, y = min(max(u * width, -FARTHEST), FARTHEST), min(max(v * height, -FARTHEST), FARTHEST)
-    i = inside(int(math.floor(x)), width, table.texture[texture, WRAP_U])
-    j = inside(int(math.floor(y)), height, table.texture[texture, WRAP_V])
+    i = inside(int(np.floor(near(u * width))), width, table.texture[texture, WRAP_U])
+    j = inside(int(np.floor(near(v * height))), height, table.texture[texture, WRAP_V])
     at = start + j * width + i
     return np.float64(table.texels[at, 0]), np.float64(table.texels[at, 1]), np.float64(table.texels[at, 2])
 

@@ -3,8 +3,7 @@
 Every texel of every projection has a ray: an origin o and a direction d, where d reaches depth 1 (planar maps) or has
 unit length (paraboloid). With v_i relative to o and N = (v1 - v0) x (v2 - v0) the hit is o + t d,
 t = v0 . N / (d . N), and t is the depth itself. Positions therefore lie on the ray and on the plane to float64
-rounding, before the cast to the buffer's type. Interpolated normals use barycentric coordinates
-b_i = d . (v_j x v_k) / (d . N).
+rounding, before the cast to the buffer's type. `surfaces` has how normals are interpolated.
 """
 
 import math
@@ -14,24 +13,32 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.buffers.runs import (
-    Rows,
-    Runs,
+from refgi.rsm.buffers.runs import TABLE, Runs, find_runs
+from refgi.rsm.buffers.surfaces import (
+    ALBEDO,
+    BATCH,
+    COLUMNS,
+    CONSTANT,
+    CORNER,
+    INPUTS,
+    MIXED,
+    NORMAL,
+    PLANE,
+    Records,
     Surface,
-    allocate_runs,
-    cross,
-    describe_runs,
-    find_runs,
-    image_ray,
-    row_view,
-    runs_at,
-    towards,
+    describe,
 )
-from refgi.rsm.raster.projection import Projection
+from refgi.rsm.buffers.texel_rays import image_ray, row_view, texel_ray
+from refgi.rsm.pool import plane
+from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection
 
 Array = npt.NDArray[Any]
 
-STRIP = 8  # rows resolved at once: their runs stay in cache
+ROWS, SIDE = 16, 256  # rows and columns of a tile: its records stay in cache, most of a triangle's runs lie in one
+LANES = 4  # texels computed at once: runs are short
+LINE = SIDE + LANES
+# where a line holds what varies along it, direction or origin of rays: x, then y, z; then t; then three numbers
+Y, Z, HIT, VALUE, LINES = np.uint64(LINE), np.uint64(2 * LINE), np.uint64(3 * LINE), np.uint64(4 * LINE), 7
 
 
 class ChannelMask(NamedTuple):
@@ -56,160 +63,267 @@ class Planes(NamedTuple):
     material_id: Array  # (H, W) int32
 
 
+class Tile(NamedTuple):
+    """Texels resolved at once: `rows` rows from `top` on, `columns` columns from `left` on, all of one map."""
+
+    top: int
+    left: int
+    rows: int
+    columns: int
+
+
+class Scratch(NamedTuple):
+    """Scratch arrays of each worker."""
+
+    runs: Runs
+    records: Records
+    line: Array  # (workers, LINES LINE) float64
+
+
+def allocate(workers: int, rows: int = ROWS) -> Scratch:
+    """Allocate scratch arrays for workers that resolve tiles of `rows` rows."""
+    most = rows * SIDE + 2
+    runs = Runs(np.empty((workers, rows, SIDE + 1), np.int32), np.empty((workers, rows, SIDE), np.int32),
+                np.empty((workers, rows), np.int32), np.zeros((workers, TABLE), np.int32))  # fmt: skip
+    records = Records(np.empty((workers, most), np.int32), np.empty((workers, most), np.int32),
+                      plane((workers, most, COLUMNS), np.float64), np.zeros((workers, (INPUTS + COLUMNS) * BATCH)))
+    records.fixed[:, 0] = 0.0  # of texels that see nothing
+    records.material[:, 0] = -1
+    return Scratch(runs, records, np.ones((workers, LINES * LINE)))
+
+
 @kernel(parallel=True)
 def resolve(
-    surface: Surface, projection: Projection, triangle_id: Array, channels: ChannelMask, planes: Planes, workers: int
+    surface: Surface, projection: Projection, triangle_id: Array, channels: ChannelMask, planes: Planes,
+    scratch: Scratch,
 ) -> None:
     """Fill the planes of the chosen channels.
 
     `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
-    `channels`: which planes to fill. `workers`: threads; strips of rows are assigned to them round-robin.
+    `channels`: which planes to fill. `scratch`: of each worker; strips of rows are assigned to them round-robin.
     """
+    workers, height, width = len(scratch.line), projection.height, projection.width
+    strips = (height + ROWS - 1) // ROWS  # of a map
     for worker in prange(workers):
-        _resolve_rows(surface, projection, triangle_id, channels, planes, worker, workers)
+        runs, records, line = _runs_of(scratch, worker), _records_of(scratch, worker), scratch.line[worker]
+        for strip in range(worker, strips * len(projection.origin), workers):
+            m = strip // strips
+            first = (strip - m * strips) * ROWS
+            for left in range(0, width, SIDE):
+                tile = Tile(m * height + first, left, min(ROWS, height - first), min(SIDE, width - left))
+                count = find_runs(triangle_id, tile.top, tile.top + tile.rows, left, left + tile.columns, runs, records)
+                describe(surface, projection, m, count, records)
+                _fill(projection, tile, False, len(surface.normals) > 0, runs, records, line, channels, planes)
 
 
 @kernel
-def _resolve_rows(
-    surface: Surface, projection: Projection, triangle_id: Array, channels: ChannelMask, planes: Planes, first: int,
-    step: int,
-) -> None:
-    """Fill every `step`-th strip of rows from strip `first` on.
+def _runs_of(scratch: Scratch, worker: int) -> Runs:
+    runs = scratch.runs
+    return Runs(runs.first[worker], runs.record[worker], runs.count[worker], runs.table[worker])
 
-    Triangles are looked up once a run of texels. The rest is the same arithmetic for all texels of a row, free of
-    branches, in SIMD lanes. Strips, because each call with arrays costs atomic reference counts, which threads share.
-    """
-    height, width = triangle_id.shape
-    runs = allocate_runs(STRIP, width)
-    for top in range(first * STRIP, height, step * STRIP):
-        rows = (top, min(top + STRIP, height))
-        _fill_rows(surface, projection, find_runs(triangle_id, rows, runs), runs, rows, channels, planes)
+
+@kernel
+def _records_of(scratch: Scratch, worker: int) -> Records:
+    records = scratch.records
+    return Records(records.face[worker], records.material[worker], records.fixed[worker], records.batch[worker])
 
 
 @kernel
 def resolve_at(
-    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, channels: ChannelMask, planes: Planes
+    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, channels: ChannelMask, planes: Planes,
+    scratch: Scratch,
 ) -> None:
     """Fill the planes of the chosen channels at some texels, with the bits that `resolve` gives there.
 
     `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
-    `texel` (n,): texels of the flattened maps. `channels`: which planes to fill. `planes`: the result, n rows of one
-    texel.
+    `texel` (n,): texels of the flattened maps. `channels`: which planes to fill. `planes`: the result, one row of n
+    texels. `scratch`: of one worker.
     """
-    runs = allocate_runs(len(texel), 1)
-    _fill_rows(surface, projection, runs_at(triangle_id, texel, runs), runs, (0, len(texel)), channels, planes)
+    runs, records, line = _runs_of(scratch, 0), _records_of(scratch, 0), scratch.line[0]
+    width, height, done = projection.width, projection.height, 0
+    while done < len(texel):  # as many as follow one another on the same map
+        m, count = texel[done] // width // height, 0
+        while count < BATCH and done + count < len(texel) and texel[done + count] // width // height == m:
+            row, column = texel[done + count] // width, texel[done + count] % width
+            face = triangle_id[row, column]
+            records.face[count + 1] = max(face, 0)
+            runs.first[0, count], runs.record[0, count] = count, count + 1 if face >= 0 else 0
+            _write_ray(projection, row, column, count, line)
+            count += 1
+        runs.first[0, count], runs.count[0] = count, count
+        describe(surface, projection, m, count + 1, records)
+        tile = Tile(m * height, done, 1, count)
+        _fill(projection, tile, True, len(surface.normals) > 0, runs, records, line, channels, planes)
+        done += count
 
 
 @kernel
-def _fill_rows(
-    surface: Surface, projection: Projection, count: int, runs: Runs, rows: Rows, channels: ChannelMask, planes: Planes
+def _fill(
+    projection: Projection, tile: Tile, listed: bool, smooth: bool, runs: Runs, records: Records, line: Array,
+    channels: ChannelMask, planes: Planes,
 ) -> None:
-    """Fill some rows of the planes; `count` is one past the last run."""
-    describe_runs(surface, projection, count, runs)
-    if channels.depth or channels.distance or channels.position:
-        _intersect(projection, rows, runs, channels, planes)
-    _write_constant(rows, runs, channels, planes)
-    if len(surface.normals) > 0 and channels.normal:
-        _interpolate(surface, projection, rows, runs, planes.normal)
+    """Fill a tile of the planes row by row: what depends on the triangle run by run, the rest along the whole row.
 
-
-@kernel
-def _intersect(projection: Projection, rows: Rows, runs: Runs, channels: ChannelMask, planes: Planes) -> None:
-    """Write t, the length of t d and the point o + t d of each texel: inf, inf and 0 without surface."""
-    across, half, kind = 2.0 / projection.width, projection.half[0], projection.kind
-    slot, fixed, width = runs.slot, runs.fixed, runs.slot.shape[1]
-    line, hit = np.empty((6, width)), np.empty((4, width))
-    for row in range(rows[0], rows[1]):
-        y = row - rows[0]
-        view, v = row_view(projection, runs.row[y])
-        middle = runs.column[y] + 0.5
-        for x in range(width):
-            run = np.uint64(slot[y, x])
-            line[0, x], line[1, x], line[2, x] = fixed[run, 0], fixed[run, 1], fixed[run, 2]
-            line[3, x], line[4, x], line[5, x] = fixed[run, 3], fixed[run, 4], fixed[run, 5]
-        for x in range(width):
-            ox, oy, oz, dx, dy, dz = image_ray(kind, view, ((x + middle) * across - 1.0) * half, v)
-            gx, gy, gz = line[3, x], line[4, x], line[5, x]
-            facing = dx * gx + dy * gy + dz * gz
-            t = ((line[0, x] - ox) * gx + (line[1, x] - oy) * gy + (line[2, x] - oz) * gz) / facing
-            covered = slot[y, x] > 0
-            hit[0, x] = t if covered else np.inf
-            hit[1, x] = ox + t * dx if covered else 0.0
-            hit[2, x] = oy + t * dy if covered else 0.0
-            hit[3, x] = oz + t * dz if covered else 0.0
-        if channels.distance:
-            for x in range(width):
-                _, _, _, dx, dy, dz = image_ray(kind, view, ((x + middle) * across - 1.0) * half, v)
-                planes.distance[row, x] = hit[0, x] * math.sqrt(dx * dx + dy * dy + dz * dz)
-        _store_hits(hit, row, channels, planes)
-
-
-@kernel
-def _store_hits(hit: Array, row: int, channels: ChannelMask, planes: Planes) -> None:
-    """Round depths and points of a row to the buffer's type."""
-    if channels.depth:
-        for x in range(hit.shape[1]):
-            planes.depth[row, x] = hit[0, x]
-    if channels.position:
-        for axis in range(3):
-            for x in range(hit.shape[1]):
-                planes.position[axis, row, x] = hit[1 + axis, x]
-
-
-@kernel
-def _write_constant(rows: Rows, runs: Runs, channels: ChannelMask, planes: Planes) -> None:
-    """Write along each run what is the same all along it."""
-    slot, fixed, corner = runs.slot, runs.fixed, runs.corner
-    normal, albedo = planes.normal, planes.albedo
-    for row in range(rows[0], rows[1]):
-        y = row - rows[0]
-        if channels.normal:
-            for x in range(slot.shape[1]):
-                run = np.uint64(slot[y, x])
-                normal[0, row, x], normal[1, row, x], normal[2, row, x] = fixed[run, 6], fixed[run, 7], fixed[run, 8]
+    `listed`: `line` holds rays of texels from anywhere on the tile's map, which belong in row 0 of the planes.
+    """
+    fixed, first, record, material = records.fixed, runs.first, runs.record, records.material
+    kind, left, columns = projection.kind, tile.left, tile.columns
+    for y in range(tile.rows):
+        row, count = 0 if listed else tile.top + y, runs.count[y]
+        view, v = row_view(projection, tile.top + y)
+        if not listed:
+            _write_rays(projection, view, v, left, columns, line)
+        if channels.depth or channels.distance or channels.position:
+            _write_hits(kind, view, y, count, first, record, fixed, line)
+            _store_hits(kind, view, row, left, columns, line, channels, planes)
+        if smooth and channels.normal:
+            _mix_normals(y, count, first, record, fixed, line)
+            _store_units(row, left, columns, line, planes.normal)
+        elif channels.normal:
+            _spread(NORMAL, y, count, first, record, fixed, line)
+            _store(row, left, columns, line, planes.normal)
         if channels.albedo:
-            for x in range(slot.shape[1]):
-                run = np.uint64(slot[y, x])
-                albedo[0, row, x], albedo[1, row, x], albedo[2, row, x] = fixed[run, 9], fixed[run, 10], fixed[run, 11]
+            _spread(ALBEDO, y, count, first, record, fixed, line)
+            _store(row, left, columns, line, planes.albedo)
         if channels.material_id:
-            for x in range(slot.shape[1]):
-                planes.material_id[row, x] = corner[np.uint64(slot[y, x]), 3]
+            _store_material(row, left, y, count, first, record, material, planes.material_id)
 
 
 @kernel
-def _barycentric(ray: Any, ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
-    """Return d . (a x b), relative to the ray's origin: a barycentric coordinate up to the common factor d . N."""
-    ox, oy, oz, dx, dy, dz = ray
-    cx, cy, cz = cross(ax - ox, ay - oy, az - oz, bx - ox, by - oy, bz - oz)
-    return dx * cx + dy * cy + dz * cz
+def _write_ray(projection: Projection, row: int, column: int, i: int, line: Array) -> None:
+    """Write at place `i` what varies over texels: the direction of a ray from one centre, the origin of a parallel one."""
+    ox, oy, oz, dx, dy, dz = texel_ray(projection, row, column)
+    parallel, at = projection.kind == ORTHOGRAPHIC, np.uint64(i)
+    line[at], line[at + Y], line[at + Z] = ox if parallel else dx, oy if parallel else dy, oz if parallel else dz
 
 
 @kernel
-def _interpolate(surface: Surface, projection: Projection, rows: Rows, runs: Runs, normal: Array) -> None:
-    """Replace face normals by interpolated ones, on the same side."""
-    vertices, faces, shading, fixed = surface.vertices, surface.faces, surface.normals, runs.fixed
-    for row in range(rows[0], rows[1]):
-        y = row - rows[0]
-        view, v = row_view(projection, runs.row[y])
-        middle = runs.column[y] + 0.5
-        for x in range(normal.shape[2]):
-            run = runs.slot[y, x]
-            if run == 0:
-                continue
-            face = runs.start[run, 0]
-            i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-            u = ((x + middle) * (2.0 / projection.width) - 1.0) * projection.half[0]
-            ray = image_ray(projection.kind, view, u, v)
-            gx, gy, gz = fixed[run, 3], fixed[run, 4], fixed[run, 5]
-            facing = ray[3] * gx + ray[4] * gy + ray[5] * gz
-            ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-            jx, jy, jz = vertices[j, 0], vertices[j, 1], vertices[j, 2]
-            kx, ky, kz = vertices[k, 0], vertices[k, 1], vertices[k, 2]
-            a = _barycentric(ray, jx, jy, jz, kx, ky, kz) / facing
-            b = _barycentric(ray, kx, ky, kz, ix, iy, iz) / facing
-            c = 1.0 - a - b
-            sx = a * shading[i, 0] + b * shading[j, 0] + c * shading[k, 0]
-            sy = a * shading[i, 1] + b * shading[j, 1] + c * shading[k, 1]
-            sz = a * shading[i, 2] + b * shading[j, 2] + c * shading[k, 2]
-            nx, ny, nz = towards(gx, gy, gz, -ray[3], -ray[4], -ray[5])
-            normal[0, row, x], normal[1, row, x], normal[2, row, x] = towards(sx, sy, sz, nx, ny, nz)
+def _write_rays(projection: Projection, view: Any, v: float, left: int, columns: int, line: Array) -> None:
+    """Write what varies along a row: directions of rays from one centre, origins of parallel ones."""
+    kind, across, half, middle = projection.kind, 2.0 / projection.width, projection.half[0], left + 0.5
+    for i in range(columns):
+        ox, oy, oz, dx, dy, dz = image_ray(kind, view, ((np.int32(i) + middle) * across - 1.0) * half, v)
+        parallel, at = kind == ORTHOGRAPHIC, np.uint64(i)
+        line[at] = ox if parallel else dx
+        line[at + Y] = oy if parallel else dy
+        line[at + Z] = oz if parallel else dz
+
+
+@kernel
+def _write_hits(
+    kind: int, view: Any, y: int, count: int, first: Array, record: Array, fixed: Array, line: Array
+) -> None:
+    """Write t of each texel of a row: inf without surface."""
+    ox, oy, oz, _, _, _, _, _, _, dx, dy, dz = view
+    for run in range(count):
+        start, stop, r = first[y, run], first[y, run + 1], record[y, run]
+        gx, gy, gz = fixed[r, PLANE], fixed[r, PLANE + 1], fixed[r, PLANE + 2]
+        vx, vy, vz = fixed[r, CORNER], fixed[r, CORNER + 1], fixed[r, CORNER + 2]
+        texels = (stop - start + LANES - 1) & -LANES
+        if r == 0:
+            for lane in range(texels):
+                line[np.uint64(start) + np.uint64(lane) + HIT] = np.inf
+        elif kind == ORTHOGRAPHIC:
+            facing = dx * gx + dy * gy + dz * gz
+            for lane in range(texels):
+                at = np.uint64(start) + np.uint64(lane)
+                above = (vx - line[at]) * gx + (vy - line[at + Y]) * gy + (vz - line[at + Z]) * gz
+                line[at + HIT] = above / facing
+        else:
+            above = (vx - ox) * gx + (vy - oy) * gy + (vz - oz) * gz
+            for lane in range(texels):
+                at = np.uint64(start) + np.uint64(lane)
+                line[at + HIT] = above / (line[at] * gx + line[at + Y] * gy + line[at + Z] * gz)
+
+
+@kernel
+def _store_hits(
+    kind: int, view: Any, row: int, left: int, columns: int, line: Array, channels: ChannelMask, planes: Planes
+) -> None:
+    """Round depths, distances and points of a row to the buffer's type."""
+    ox, oy, oz, _, _, _, _, _, _, dx, dy, dz = view
+    parallel, to = kind == ORTHOGRAPHIC, np.uint64(left)
+    if channels.depth:
+        for i in range(columns):
+            at = np.uint64(i)
+            planes.depth[row, to + at] = line[at + HIT]
+    if channels.distance:
+        for i in range(columns):
+            at = np.uint64(i)
+            x, y, z = dx if parallel else line[at], dy if parallel else line[at + Y], dz if parallel else line[at + Z]
+            planes.distance[row, to + at] = line[at + HIT] * math.sqrt(x * x + y * y + z * z)
+    if channels.position:
+        for i in range(columns):
+            at = np.uint64(i)
+            t, x, y, z = line[at + HIT], line[at], line[at + Y], line[at + Z]
+            px = x + t * dx if parallel else ox + t * x
+            py = y + t * dy if parallel else oy + t * y
+            pz = z + t * dz if parallel else oz + t * z
+            planes.position[0, row, to + at] = px if t != np.inf else 0.0
+            planes.position[1, row, to + at] = py if t != np.inf else 0.0
+            planes.position[2, row, to + at] = pz if t != np.inf else 0.0
+
+
+@kernel
+def _mix_normals(y: int, count: int, first: Array, record: Array, fixed: Array, line: Array) -> None:
+    """Write interpolated normals of a row, of any length, on the side of the face's: 0 without surface."""
+    for run in range(count):
+        start, stop, r = first[y, run], first[y, run + 1], record[y, run]
+        nx, ny, nz = fixed[r, NORMAL], fixed[r, NORMAL + 1], fixed[r, NORMAL + 2]
+        mxx, mxy, mxz, kx = fixed[r, MIXED], fixed[r, MIXED + 1], fixed[r, MIXED + 2], fixed[r, CONSTANT]
+        myx, myy, myz, ky = fixed[r, MIXED + 3], fixed[r, MIXED + 4], fixed[r, MIXED + 5], fixed[r, CONSTANT + 1]
+        mzx, mzy, mzz, kz = fixed[r, MIXED + 6], fixed[r, MIXED + 7], fixed[r, MIXED + 8], fixed[r, CONSTANT + 2]
+        for lane in range((stop - start + LANES - 1) & -LANES):
+            at = np.uint64(start) + np.uint64(lane)
+            x, y_, z = line[at], line[at + Y], line[at + Z]
+            sx = kx + (x * mxx + y_ * mxy + z * mxz)
+            sy = ky + (x * myx + y_ * myy + z * myz)
+            sz = kz + (x * mzx + y_ * mzy + z * mzz)
+            long = sx * sx + sy * sy + sz * sz > 0.0
+            side = math.copysign(1.0, sx * nx + sy * ny + sz * nz)
+            line[at + VALUE] = side * sx if long else nx
+            line[at + VALUE + Y] = side * sy if long else ny
+            line[at + VALUE + Z] = side * sz if long else nz
+
+
+@kernel
+def _store_units(row: int, left: int, columns: int, line: Array, normal: Array) -> None:
+    """Round normals of a row, brought to unit length, to the buffer's type."""
+    to = np.uint64(left)
+    for i in range(columns):
+        at = np.uint64(i)
+        x, y, z = line[at + VALUE], line[at + VALUE + Y], line[at + VALUE + Z]
+        square = x * x + y * y + z * z
+        scale = 1.0 / math.sqrt(square) if square > 0.0 else 0.0
+        normal[0, row, to + at], normal[1, row, to + at], normal[2, row, to + at] = x * scale, y * scale, z * scale
+
+
+@kernel
+def _spread(column: int, y: int, count: int, first: Array, record: Array, fixed: Array, line: Array) -> None:
+    """Write three numbers of a record, from `column` on, along each of its runs in a row."""
+    for run in range(count):
+        start, stop, r = first[y, run], first[y, run + 1], record[y, run]
+        a, b, c = fixed[r, column], fixed[r, column + 1], fixed[r, column + 2]
+        for lane in range((stop - start + LANES - 1) & -LANES):
+            at = np.uint64(start) + np.uint64(lane)
+            line[at + VALUE], line[at + VALUE + Y], line[at + VALUE + Z] = a, b, c
+
+
+@kernel
+def _store(row: int, left: int, columns: int, line: Array, channel: Array) -> None:
+    """Round three numbers of each texel of a row to the buffer's type."""
+    to = np.uint64(left)
+    for i in range(columns):
+        at = np.uint64(i)
+        channel[0, row, to + at], channel[1, row, to + at] = line[at + VALUE], line[at + VALUE + Y]
+        channel[2, row, to + at] = line[at + VALUE + Z]
+
+
+@kernel
+def _store_material(
+    row: int, left: int, y: int, count: int, first: Array, record: Array, material: Array, channel: Array
+) -> None:
+    for run in range(count):
+        value = material[record[y, run]]
+        for i in range(first[y, run], first[y, run + 1]):
+            channel[row, np.uint64(left) + np.uint64(i)] = value

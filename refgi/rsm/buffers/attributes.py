@@ -175,7 +175,12 @@ def _fill(
             _write_rays(projection, view, v, left, columns, line)
         if channels.depth or channels.distance or channels.position:
             _write_hits(kind, view, y, count, first, record, fixed, line)
-            _store_hits(kind, view, row, left, columns, line, channels, planes)
+        if channels.depth:
+            _store_depth(row, left, columns, line, planes.depth)
+        if channels.distance:
+            _store_distance(kind, view, row, left, columns, line, planes.distance)
+        if channels.position:
+            _store_points(kind, view, row, left, columns, line, planes.position)
         if smooth and channels.normal:
             _mix_normals(y, count, first, record, fixed, line)
             _store_units(row, left, columns, line, planes.normal)
@@ -237,31 +242,38 @@ def _write_hits(
 
 
 @kernel
-def _store_hits(
-    kind: int, view: Any, row: int, left: int, columns: int, line: Array, channels: ChannelMask, planes: Planes
-) -> None:
-    """Round depths, distances and points of a row to the buffer's type."""
+def _store_depth(row: int, left: int, columns: int, line: Array, depth: Array) -> None:
+    """Round depths of a row to the buffer's type."""
+    to = np.uint64(left)
+    for i in range(columns):
+        at = np.uint64(i)
+        depth[row, to + at] = line[at + HIT]
+
+
+@kernel
+def _store_distance(kind: int, view: Any, row: int, left: int, columns: int, line: Array, distance: Array) -> None:
+    """Round the lengths of t d of a row to the buffer's type."""
+    _, _, _, _, _, _, _, _, _, dx, dy, dz = view
+    parallel, to = kind == ORTHOGRAPHIC, np.uint64(left)
+    for i in range(columns):
+        at = np.uint64(i)
+        x, y, z = dx if parallel else line[at], dy if parallel else line[at + Y], dz if parallel else line[at + Z]
+        distance[row, to + at] = line[at + HIT] * math.sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def _store_points(kind: int, view: Any, row: int, left: int, columns: int, line: Array, position: Array) -> None:
+    """Round the points o + t d of a row to the buffer's type: 0 without surface."""
     ox, oy, oz, _, _, _, _, _, _, dx, dy, dz = view
     parallel, to = kind == ORTHOGRAPHIC, np.uint64(left)
-    if channels.depth:
-        for i in range(columns):
-            at = np.uint64(i)
-            planes.depth[row, to + at] = line[at + HIT]
-    if channels.distance:
-        for i in range(columns):
-            at = np.uint64(i)
-            x, y, z = dx if parallel else line[at], dy if parallel else line[at + Y], dz if parallel else line[at + Z]
-            planes.distance[row, to + at] = line[at + HIT] * math.sqrt(x * x + y * y + z * z)
-    if channels.position:
-        for i in range(columns):
-            at = np.uint64(i)
-            t, x, y, z = line[at + HIT], line[at], line[at + Y], line[at + Z]
-            px = x + t * dx if parallel else ox + t * x
-            py = y + t * dy if parallel else oy + t * y
-            pz = z + t * dz if parallel else oz + t * z
-            planes.position[0, row, to + at] = px if t != np.inf else 0.0
-            planes.position[1, row, to + at] = py if t != np.inf else 0.0
-            planes.position[2, row, to + at] = pz if t != np.inf else 0.0
+    for i in range(columns):
+        at = np.uint64(i)
+        t, x, y, z = line[at + HIT], line[at], line[at + Y], line[at + Z]
+        x, y, z = x + t * dx if parallel else ox + t * x, y + t * dy if parallel else oy + t * y, z + t * dz if parallel else oz + t * z
+        seen = t < np.inf
+        position[0, row, to + at] = x if seen else 0.0
+        position[1, row, to + at] = y if seen else 0.0
+        position[2, row, to + at] = z if seen else 0.0
 
 
 @kernel
@@ -281,9 +293,10 @@ def _mix_normals(y: int, count: int, first: Array, record: Array, fixed: Array, 
             sz = kz + (x * mzx + y_ * mzy + z * mzz)
             long = sx * sx + sy * sy + sz * sz > 0.0
             side = math.copysign(1.0, sx * nx + sy * ny + sz * nz)
-            line[at + VALUE] = side * sx if long else nx
-            line[at + VALUE + Y] = side * sy if long else ny
-            line[at + VALUE + Z] = side * sz if long else nz
+            sx, sy, sz = side * sx, side * sy, side * sz
+            line[at + VALUE] = sx if long else nx
+            line[at + VALUE + Y] = sy if long else ny
+            line[at + VALUE + Z] = sz if long else nz
 
 
 @kernel

@@ -30,22 +30,22 @@ def find_runs(triangle_id: Array, top: int, bottom: int, left: int, right: int, 
     receives where they lie. `records`: `face` receives each triangle, mostly once. Result: one past the last record.
     """
     first, record, table, face_of = runs.first, runs.record, runs.table, records.face
-    known, width = 1, right - left
+    known, width = 1, np.uint64(right - left)
     face_of[0] = -1
     for row in range(top, bottom):
-        y, count, before = row - top, 0, -2
+        y, line, count, before = np.uint64(row - top), np.uint64(row), np.uint64(0), np.int32(-2)
         for x in range(width):  # free of branches: what does not begin a run is overwritten
-            face = triangle_id[row, left + x]
+            face = triangle_id[line, np.uint64(left) + x]
             first[y, count] = x
-            count += face != before
+            count += np.uint64(face != before)
             before = face
         first[y, count] = width
         runs.count[y] = count
         for run in range(count):
-            face = triangle_id[row, left + first[y, run]]
+            face = triangle_id[line, np.uint64(left) + np.uint64(first[y, run])]
             place = np.uint64(face) & np.uint64(TABLE - 1)
             there = table[place]
-            new = (there >= known) | (face_of[there] != face)  # the table may still hold records of other strips
+            new = (there >= known) | (face_of[there] != face)  # the table may still hold records of other tiles
             slot = known if new else there
             face_of[known] = face
             known += new & (face >= 0)

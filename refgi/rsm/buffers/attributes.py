@@ -182,7 +182,7 @@ def _fill(
         if channels.position:
             _store_points(kind, view, row, left, columns, line, planes.position)
         if smooth and channels.normal:
-            _mix_normals(y, count, first, record, fixed, line)
+            _mix_normals(kind, y, count, first, record, fixed, line)
             _store_units(row, left, columns, line, planes.normal)
         elif channels.normal:
             _spread(NORMAL, y, count, first, record, fixed, line)
@@ -269,7 +269,9 @@ def _store_points(kind: int, view: Any, row: int, left: int, columns: int, line:
     for i in range(columns):
         at = np.uint64(i)
         t, x, y, z = line[at + HIT], line[at], line[at + Y], line[at + Z]
-        x, y, z = x + t * dx if parallel else ox + t * x, y + t * dy if parallel else oy + t * y, z + t * dz if parallel else oz + t * z
+        x = x + t * dx if parallel else ox + t * x
+        y = y + t * dy if parallel else oy + t * y
+        z = z + t * dz if parallel else oz + t * z
         seen = t < np.inf
         position[0, row, to + at] = x if seen else 0.0
         position[1, row, to + at] = y if seen else 0.0
@@ -277,20 +279,23 @@ def _store_points(kind: int, view: Any, row: int, left: int, columns: int, line:
 
 
 @kernel
-def _mix_normals(y: int, count: int, first: Array, record: Array, fixed: Array, line: Array) -> None:
+def _mix_normals(kind: int, y: int, count: int, first: Array, record: Array, fixed: Array, line: Array) -> None:
     """Write interpolated normals of a row, of any length, on the side of the face's: 0 without surface."""
+    parallel = kind == ORTHOGRAPHIC
     for run in range(count):
         start, stop, r = first[y, run], first[y, run + 1], record[y, run]
+        vx, vy, vz = fixed[r, CORNER], fixed[r, CORNER + 1], fixed[r, CORNER + 2]
+        vx, vy, vz = vx if parallel else 0.0, vy if parallel else 0.0, vz if parallel else 0.0
         nx, ny, nz = fixed[r, NORMAL], fixed[r, NORMAL + 1], fixed[r, NORMAL + 2]
         mxx, mxy, mxz, kx = fixed[r, MIXED], fixed[r, MIXED + 1], fixed[r, MIXED + 2], fixed[r, CONSTANT]
         myx, myy, myz, ky = fixed[r, MIXED + 3], fixed[r, MIXED + 4], fixed[r, MIXED + 5], fixed[r, CONSTANT + 1]
         mzx, mzy, mzz, kz = fixed[r, MIXED + 6], fixed[r, MIXED + 7], fixed[r, MIXED + 8], fixed[r, CONSTANT + 2]
         for lane in range((stop - start + LANES - 1) & -LANES):
             at = np.uint64(start) + np.uint64(lane)
-            x, y_, z = line[at], line[at + Y], line[at + Z]
-            sx = kx + (x * mxx + y_ * mxy + z * mxz)
-            sy = ky + (x * myx + y_ * myy + z * myz)
-            sz = kz + (x * mzx + y_ * mzy + z * mzz)
+            qx, qy, qz = line[at] - vx, line[at + Y] - vy, line[at + Z] - vz
+            sx = kx + (qx * mxx + qy * mxy + qz * mxz)
+            sy = ky + (qx * myx + qy * myy + qz * myz)
+            sz = kz + (qx * mzx + qy * mzy + qz * mzz)
             long = sx * sx + sy * sy + sz * sz > 0.0
             side = math.copysign(1.0, sx * nx + sy * ny + sz * nz)
             sx, sy, sz = side * sx, side * sy, side * sz

@@ -8,7 +8,7 @@ triangle's plane at t = q . N / (d . N). There the barycentric coordinates of v1
 so the interpolated normal of corner normals n0, n1, n2 is, times d . N, an affine function of what varies over texels:
 
 - rays from one centre:  d . M,           M = N n0 + (e2 x q) (n1 - n0) + (q x e1) (n2 - n0),
-- parallel rays:         K + (v0 - o) . M,   M = (d x e2) (n1 - n0) + (e1 x d) (n2 - n0),   K = (d . N) n0.
+- parallel rays:         K + (o - v0) . M,   M = (e2 x d) (n1 - n0) + (d x e1) (n2 - n0),   K = (d . N) n0.
 
 Corners enter by differences of 1, not of 2 factors of their distance, so small triangles far away keep their digits.
 """
@@ -53,6 +53,18 @@ class Records(NamedTuple):
 def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
     """Return a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@kernel
+def barycentric_axes(v0: Any, v1: Any, v2: Any, origin: Any) -> Any:
+    """Return e2 x q and q x e1: their products with a ray's direction are b1 and b2, times d . N.
+
+    `v0`, `v1`, `v2`: corners. `origin`: of the ray. All are tuples of 3 floats, world space, m.
+    """
+    (x, y, z), (ox, oy, oz) = v0, origin
+    qx, qy, qz = x - ox, y - oy, z - oz
+    first = cross(v2[0] - x, v2[1] - y, v2[2] - z, qx, qy, qz)
+    return first, cross(qx, qy, qz, v1[0] - x, v1[1] - y, v1[2] - z)
 
 
 @kernel
@@ -109,7 +121,7 @@ def _orient(projection: Projection, m: int, batch: Array) -> None:
     dx, dy, dz = projection.frame[m, 2, 0], projection.frame[m, 2, 1], projection.frame[m, 2, 2]
     central = projection.kind != ORTHOGRAPHIC
     for b in range(BATCH):
-        x, y, z = batch[b], batch[1 * BATCH + b], batch[2 * BATCH + b]
+        x, y, z = batch[b], batch[BATCH + b], batch[2 * BATCH + b]
         gx, gy, gz = cross(batch[3 * BATCH + b] - x, batch[4 * BATCH + b] - y, batch[5 * BATCH + b] - z,
                             batch[6 * BATCH + b] - x, batch[7 * BATCH + b] - y, batch[8 * BATCH + b] - z)  # fmt: skip
         # from the surface to the eye; all of the plane has the eye on the same side
@@ -120,8 +132,10 @@ def _orient(projection: Projection, m: int, batch: Array) -> None:
         scale = math.copysign(1.0 / math.sqrt(nx * nx + ny * ny + nz * nz), nx * tx + ny * ty + nz * tz)
         at = INPUTS + CORNER
         batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = x, y, z
-        batch[(at + PLANE) * BATCH + b], batch[(at + PLANE + 1) * BATCH + b], batch[(at + PLANE + 2) * BATCH + b] = gx, gy, gz
-        batch[(at + NORMAL) * BATCH + b], batch[(at + NORMAL + 1) * BATCH + b], batch[(at + NORMAL + 2) * BATCH + b] = nx * scale, ny * scale, nz * scale
+        at = INPUTS + PLANE
+        batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = gx, gy, gz
+        at, nx, ny, nz = INPUTS + NORMAL, nx * scale, ny * scale, nz * scale
+        batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = nx, ny, nz
 
 
 @kernel
@@ -129,13 +143,11 @@ def _mix_central(projection: Projection, m: int, batch: Array) -> None:
     """Write M of rays from one centre, in SIMD lanes."""
     ox, oy, oz = projection.origin[m, 0], projection.origin[m, 1], projection.origin[m, 2]
     for b in range(BATCH):
-        x, y, z = batch[b], batch[1 * BATCH + b], batch[2 * BATCH + b]
-        ax, ay, az = batch[3 * BATCH + b] - x, batch[4 * BATCH + b] - y, batch[5 * BATCH + b] - z
-        bx, by, bz = batch[6 * BATCH + b] - x, batch[7 * BATCH + b] - y, batch[8 * BATCH + b] - z
-        qx, qy, qz = x - ox, y - oy, z - oz
-        ux, uy, uz = cross(bx, by, bz, qx, qy, qz)
-        vx, vy, vz = cross(qx, qy, qz, ax, ay, az)
-        gx, gy, gz = cross(ax, ay, az, bx, by, bz)
+        x, y, z = batch[b], batch[BATCH + b], batch[2 * BATCH + b]
+        ax, ay, az = batch[3 * BATCH + b], batch[4 * BATCH + b], batch[5 * BATCH + b]
+        bx, by, bz = batch[6 * BATCH + b], batch[7 * BATCH + b], batch[8 * BATCH + b]
+        gx, gy, gz = cross(ax - x, ay - y, az - z, bx - x, by - y, bz - z)
+        (ux, uy, uz), (vx, vy, vz) = barycentric_axes((x, y, z), (ax, ay, az), (bx, by, bz), (ox, oy, oz))
         for axis in range(3):
             first = batch[(9 + axis) * BATCH + b]
             second, third = batch[(12 + axis) * BATCH + b] - first, batch[(15 + axis) * BATCH + b] - first
@@ -150,11 +162,11 @@ def _mix_parallel(projection: Projection, m: int, batch: Array) -> None:
     """Write M and K of parallel rays, in SIMD lanes."""
     dx, dy, dz = projection.frame[m, 2, 0], projection.frame[m, 2, 1], projection.frame[m, 2, 2]
     for b in range(BATCH):
-        x, y, z = batch[b], batch[1 * BATCH + b], batch[2 * BATCH + b]
+        x, y, z = batch[b], batch[BATCH + b], batch[2 * BATCH + b]
         ax, ay, az = batch[3 * BATCH + b] - x, batch[4 * BATCH + b] - y, batch[5 * BATCH + b] - z
         bx, by, bz = batch[6 * BATCH + b] - x, batch[7 * BATCH + b] - y, batch[8 * BATCH + b] - z
-        ux, uy, uz = cross(dx, dy, dz, bx, by, bz)
-        vx, vy, vz = cross(ax, ay, az, dx, dy, dz)
+        ux, uy, uz = cross(bx, by, bz, dx, dy, dz)
+        vx, vy, vz = cross(dx, dy, dz, ax, ay, az)
         gx, gy, gz = cross(ax, ay, az, bx, by, bz)
         facing = dx * gx + dy * gy + dz * gz
         for axis in range(3):

@@ -21,14 +21,14 @@ from refgi.scene import Geometry
 
 Array = npt.NDArray[Any]
 WIDE, HIGH, LANES = 4, 2, 8
-# rows of a packet: origin, tnear, direction, time, tfar, mask, id, flags; normal, u, v, triangle, geometry, two instances
+# rows of a packet: origin, tnear, direction, time, tfar, mask, id, flags; normal, u, v, triangle, geometry, 2 instances
 ROWS, DIRECTION, REACH, MASK, HIT, GEOMETRY = 21, 4, 8, 9, 17, 18
 ARGUMENTS = 64  # bytes: flags of RTCIntersectArguments, of which bit 16 says that rays are coherent
 COHERENT = 1 << 16
 SHARE = 64  # packets that one parallel iteration traces
 
 
-def _call_by_address(_: Any, function: Any, valid: Any, scene: Any, packet: Any, arguments: Any) -> Any:
+def _call_by_address(_: Any, function: Any, valid: Any, scene: Any, packet: Any, arguments: Any) -> Any:  # noqa: ARG001
     """Type and emit a call of `void function(valid, scene, packet, arguments)`."""
 
     def generate(context: Any, builder: Any, _: Any, values: Any) -> Any:

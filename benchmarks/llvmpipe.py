@@ -26,7 +26,9 @@ void main() { place = position; side = normal; colour = albedo; gl_Position = cl
 FRAGMENT = """
 #version 330
 in vec3 place; in vec3 side; flat in vec3 colour;
-layout(location = 0) out vec4 position_depth; layout(location = 1) out vec4 normal; layout(location = 2) out vec4 albedo;
+layout(location = 0) out vec4 position_depth;
+layout(location = 1) out vec4 normal;
+layout(location = 2) out vec4 albedo;
 void main() {
     position_depth = vec4(place, 1.0 / gl_FragCoord.w); normal = vec4(normalize(side), 0.0); albedo = vec4(colour, 0.0);
 }

@@ -258,7 +258,8 @@ def _resolve(
     """
     planes = _planes(names, triangle_id.shape, dtype)
     channels = ChannelMask(*(name in names for name in ChannelMask._fields))
-    resolve(_surface(geometry, materials, dtype), projection, triangle_id, channels, planes, allocate(numba.get_num_threads()))
+    scratch = allocate(numba.get_num_threads())
+    resolve(_surface(geometry, materials, dtype), projection, triangle_id, channels, planes, scratch)
     return {name: getattr(planes, name) for name in names}
 
 

@@ -18,7 +18,7 @@ class Runs(NamedTuple):
 
     first: Array  # (rows, texels + 1) int32: first texel of each run, then one past the last texel
     record: Array  # (rows, texels) int32: record of each run; 0: it sees nothing
-    count: Array  # (rows,) int32: how many runs a row has
+    number: Array  # (rows,) int32: how many runs a row has
     table: Array  # (TABLE,) int32: a record where one may be that of a triangle
 
 
@@ -40,7 +40,7 @@ def find_runs(triangle_id: Array, top: int, bottom: int, left: int, right: int, 
             count += np.uint64(face != before)
             before = face
         first[y, count] = width
-        runs.count[y] = count
+        runs.number[y] = count
         for run in range(count):
             face = triangle_id[line, np.uint64(left) + np.uint64(first[y, run])]
             place = np.uint64(face) & np.uint64(TABLE - 1)

@@ -16,7 +16,6 @@ Corners enter by differences of 1, not of 2 factors of their distance, so small 
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel

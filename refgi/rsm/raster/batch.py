@@ -23,7 +23,7 @@ Array = npt.NDArray[Any]
 
 NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the eye
 BATCH = 64  # triangles set up at once
-EMPTY = 0xFFFFFFFF  # key of a texel where nothing is: no nearness; above it nearness in the upper half, then ids, the first highest
+EMPTY = 0xFFFFFFFF  # key of a texel where nothing is; others have nearness in the upper half, EMPTY - id in the lower
 LIMIT, CORNERS, ROWS = 15 * BATCH, 16 * BATCH, 28  # where a batch's limits and corners start, and its rows in all
 
 
@@ -111,7 +111,7 @@ def unpack(keys: Array, width: int, top: int, bottom: int, nearness: Array, ids:
 
 
 @kernel
-def _key(near: float, earliness: int) -> Any:
+def _key(near: float, earliness: Any) -> Any:
     """Return a number that is greater for the nearer triangle, then for the earlier one; negative behind the eye.
 
     Nearness is rounded to float32, of which positive numbers have the order of their bits.

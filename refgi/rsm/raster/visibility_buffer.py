@@ -1,8 +1,9 @@
 """The visibility buffer: nearest triangle and its inverse depth at every texel.
 
 Work is split by rows. One map is cut into bands; each band keeps the list of triangles that reach it, in mesh order,
-and draws them alone into keys of its own, so that the result does not depend on the height of a band or the number of threads. Several
-maps are drawn one map per task without lists. Depth is kept as nearness in float32, ties go to the lowest id.
+and draws them alone, so that the result does not depend on the height of a band or the number of threads. Several maps
+are drawn one map per task without lists. Whoever draws has keys of nearness and id of its own and writes the planes at
+the end. Depth is kept as nearness in float32, ties go to the lowest id.
 """
 
 from typing import Any, NamedTuple
@@ -124,7 +125,7 @@ def bands(corners: Array, cells: Array, faces: Array, width: int, height: int, r
     _count(corners, cells, faces, (width, height), band_of, boxes, counts)
     ends = np.cumsum(counts.T).reshape(counts.T.shape)  # band by band, chunk by chunk
     length = int(ends[-1, -1]) + CHUNKS
-    step = 1 << max(length.bit_length() - 4, 0)  # whole steps, so that a moved camera finds the memory of the last frame
+    step = 1 << max(length.bit_length() - 4, 0)  # whole steps: a moved camera finds the memory of the last frame
     members = plane((-(-length // step) * step,), np.int32)[:length]
     _list(boxes, band_of, np.ascontiguousarray((ends - counts.T).T), members)
     return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)

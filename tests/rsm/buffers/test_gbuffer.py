@@ -9,8 +9,9 @@ import pytest
 from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.rsm import gbuffer
-from refgi.rsm.buffers.attributes import SIDE, ChannelMask
+from refgi.rsm.buffers.attributes import ChannelMask
 from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.buffers.lines import SIDE
 from refgi.rsm.raster.projection import (
     ORTHOGRAPHIC,
     PARABOLOID,
@@ -102,7 +103,8 @@ def test_channels_of_maps_equal_those_of_a_literal_twin(name, kind):
             hit = naive.nearest(*ray, shape.vertices, shape.faces)
             if hit[0] < 0 or hit[3] < DOUBT:
                 continue
-            position, normal, distance = naive.attributes(ray[1], hit, shape.vertices, shape.faces, shape.vertex_normals)
+            expected = naive.attributes(ray[1], hit, shape.vertices, shape.faces, shape.vertex_normals)
+            position, normal, distance = expected
             np.testing.assert_allclose(seen.position[:, row, column], position, atol=FLOAT64)
             np.testing.assert_allclose(seen.normal[:, row, column], normal, atol=1e3 * FLOAT64)
             np.testing.assert_allclose([seen.distance[row, column], seen.depth[row, column]], [distance, hit[1]],
